@@ -1,0 +1,116 @@
+"""The one place that knows that versions of dolfinx and gmsh differ (0.5.2 to 0.10; 4.8 to 4.13).
+
+Everything is decided by what a library offers, never by its version number.
+"""
+
+import inspect
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import basix
+import dolfinx
+import gmsh
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+_JIT = {
+    new if new in inspect.signature(fem.form).parameters else old: key
+    for key, new, old in (
+        ("jit", "jit_options", "jit_params"),
+        ("ffcx", "form_compiler_options", "form_compiler_params"),
+    )
+}
+_DIAGONAL = "diag" if "diag" in inspect.signature(fem.petsc.assemble_matrix).parameters else "diagonal"
+
+
+@contextmanager
+def gmsh_session() -> Iterator[None]:
+    """Start and end gmsh, leaving Python's handling of Ctrl-C as it was.
+
+    gmsh 4.8 changes it when imported and when finalized, later versions when initialized.
+    """
+    handler = signal.getsignal(signal.SIGINT)
+    gmsh.initialize([""], readConfigFiles=False)
+    signal.signal(signal.SIGINT, handler)
+    try:
+        yield
+    finally:
+        gmsh.finalize()
+        signal.signal(signal.SIGINT, handler)
+
+
+def _vector_element(cell: str, degree: int, dim: int) -> Any:
+    if hasattr(ufl, "VectorElement"):
+        return ufl.VectorElement("Lagrange", cell, degree, dim=dim)
+    return basix.ufl.element("Lagrange", cell, degree, shape=(dim,))
+
+
+def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray, order: int) -> Any:
+    """Create a distributed tetrahedral mesh of geometric ``order``; collective, arrays empty except on rank 0."""
+    domain = ufl.Mesh(_vector_element("tetrahedron", order, 3))
+    names = inspect.signature(dolfinx.mesh.create_mesh).parameters
+    keyword = "domain" if "domain" in names else "e"
+    return dolfinx.mesh.create_mesh(comm, cells=cells, x=points, **{keyword: domain})
+
+
+def geometry_dofs(mesh: Any) -> np.ndarray:
+    """Return the geometry nodes of each local cell (owned and ghosts), shape (cells, nodes per cell)."""
+    dofmap = mesh.geometry.dofmap if hasattr(mesh.geometry, "dofmap") else mesh.geometry.dofmaps[0]
+    array = dofmap.array if hasattr(dofmap, "array") else np.asarray(dofmap)
+    topology = mesh.topology.index_map(mesh.topology.dim)
+    return array.reshape(topology.size_local + topology.num_ghosts, -1)
+
+
+def vector_space(mesh: Any, degree: int) -> Any:
+    """Return the continuous vector Lagrange space of ``degree`` on ``mesh``."""
+    if hasattr(fem, "functionspace"):
+        return fem.functionspace(mesh, ("Lagrange", degree, (mesh.geometry.dim,)))
+    return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
+
+
+def cellwise_tensor_space(mesh: Any) -> Any:
+    """Return the space of 3 × 3 tensors constant on each cell."""
+    if hasattr(fem, "functionspace"):
+        return fem.functionspace(mesh, ("DG", 0, (3, 3)))
+    return fem.TensorFunctionSpace(mesh, ("DG", 0))
+
+
+def form(expression: Any, cache: str) -> Any:
+    """Compile ``expression``, with the generated code in the folder ``cache``; collective."""
+    jit = {"cache_dir": cache, "cffi_extra_compile_args": ["-O2", "-march=native"], "timeout": 120}
+    options = {"jit": jit, "ffcx": {}}
+    return fem.form(expression, **{name: options[key] for name, key in _JIT.items()})
+
+
+def assemble_matrix(form: Any, bcs: list[Any], diagonal: float, mat_type: str) -> PETSc.Mat:
+    """Assemble a matrix with the rows and columns of ``bcs`` replaced by ``diagonal``; collective."""
+    matrix = fem.petsc.create_matrix(form, mat_type)
+    try:
+        fem.petsc.assemble_matrix(matrix, form, bcs=bcs, **{_DIAGONAL: diagonal})
+        matrix.assemble()
+    except BaseException:
+        matrix.destroy()
+        raise
+    return matrix
+
+
+def interpolation_matrix(coarse: Any, fine: Any) -> PETSc.Mat:
+    """Return the matrix that carries functions of ``coarse`` to ``fine``; collective."""
+    if hasattr(fem.petsc, "interpolation_matrix"):
+        matrix = fem.petsc.interpolation_matrix(coarse, fine)
+    else:
+        spaces = (getattr(space, "_cpp_object", space) for space in (coarse, fine))
+        matrix = dolfinx.cpp.fem.petsc.interpolation_matrix(*spaces)
+    matrix.assemble()
+    return matrix
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of the libraries that a force depends on."""
+    petsc = ".".join(map(str, PETSc.Sys.getVersion()))
+    return {"dolfinx": str(dolfinx.__version__), "petsc": petsc, "gmsh": str(gmsh.__version__)}

@@ -1,0 +1,1 @@
+"""Size field, generation, curving and distribution of the mesh. Knows nothing of elasticity."""

@@ -1,0 +1,122 @@
+"""Order-2 geometry: curved rim and sides, and quarter-point elements at the probe's edge.
+
+The displacement behaves like r^½ at the edge of a probe. Where the mid node of an edge that ends on the rim sits
+at a quarter of its length, a quadratic element contains r^½ (R. S. Barsoum, Int. J. Numer. Methods Eng. 10, 1976).
+"""
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from pipeline.mesh.generate import FloatArray, IntArray, MeshArrays
+from pipeline.scene.model import Scene
+from pipeline.study.schema import Cylinder, Disc
+
+# Edges of the reference tetrahedron in the order of basix's quadratic nodes 4 to 9.
+_EDGES = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
+# A cell is straightened where its Jacobian falls below this share of the straight cell's.
+_LEAST_JACOBIAN = 1e-3
+
+
+def curve(mesh: MeshArrays, scene: Scene) -> MeshArrays:
+    """Return ``mesh`` with ten nodes a cell, on the true rim and sides, with quarter-point nodes at the rim."""
+    corners = mesh.cells
+    pairs = np.sort(corners[:, _EDGES].reshape(-1, 2), axis=1)
+    keys, first, inverse = np.unique(pairs[:, 0] * len(mesh.points) + pairs[:, 1], return_index=True, return_inverse=True)
+    edges = pairs[first]
+    straight = mesh.points[edges].mean(axis=1)
+    of_cell = inverse.reshape(-1, len(_EDGES))
+    middle = _on_rim(mesh, scene, edges, _on_sides(mesh, scene, edges, straight, keys))
+    middle = _quarter_points(mesh, edges, middle)
+    bad = _folded(mesh.points[corners], middle[of_cell])
+    while bad.any():
+        middle[of_cell[bad]] = straight[of_cell[bad]]
+        folded = _folded(mesh.points[corners], middle[of_cell])
+        if not (folded & ~bad).any():
+            break
+        bad |= folded
+    nodes = np.hstack([corners, len(mesh.points) + of_cell])
+    return replace(mesh, points=np.vstack([mesh.points, middle]), cells=nodes)
+
+
+def _on_rim(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray) -> FloatArray:
+    """Move the mid nodes of edges along a round rim onto the circle."""
+    if not isinstance(scene.probe, Disc):
+        return middle
+    both = np.isin(edges, mesh.rim).all(axis=1) & np.isin(_key(mesh, edges), _facet_edges(mesh, ["probe"]))
+    radius = min(scene.probe.radius, scene.column)
+    return _project(middle, both, scene.probe.at, radius)
+
+
+def _on_sides(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray, keys: IntArray) -> FloatArray:
+    """Move the mid nodes of edges in a round side of the body, or of the column, onto that side."""
+    cylinders = []
+    if isinstance(scene.body, Cylinder):
+        cylinders.append(((0.0, 0.0), scene.body.radius))
+    if scene.is_cut:
+        cylinders.append((scene.probe.at, scene.column))
+    outer = np.isin(keys, _facet_edges(mesh, mesh.facets))
+    for centre, radius in cylinders:
+        distance = np.hypot(*(mesh.points[:, :2] - centre).T)
+        on_side = np.abs(distance - radius) < 1e-6 * radius
+        middle = _project(middle, outer & on_side[edges].all(axis=1), centre, radius)
+    return middle
+
+
+def _key(mesh: MeshArrays, edges: IntArray) -> IntArray:
+    return edges[:, 0] * len(mesh.points) + edges[:, 1]
+
+
+def _facet_edges(mesh: MeshArrays, names: object) -> IntArray:
+    """Keys of the edges of the boundary triangles in the named groups."""
+    facets = np.concatenate([mesh.facets[name] for name in names])  # type: ignore[attr-defined]
+    pairs = np.concatenate([np.sort(facets[:, pair], axis=1) for pair in combinations(range(3), 2)])
+    return np.unique(_key(mesh, pairs))
+
+
+def _project(points: FloatArray, chosen: np.ndarray, centre: tuple[float, float], radius: float) -> FloatArray:
+    points = points.copy()
+    offset = points[chosen, :2] - centre
+    points[chosen, :2] = centre + radius * offset / np.linalg.norm(offset, axis=1, keepdims=True)
+    return points
+
+
+def _quarter_points(mesh: MeshArrays, edges: IntArray, middle: FloatArray) -> FloatArray:
+    """Move the mid node of every edge with exactly one end on the rim to a quarter of its length from there."""
+    ends = np.isin(edges, mesh.rim)
+    for here in (0, 1):
+        chosen = ends[:, here] & ~ends[:, 1 - here]
+        start, end = mesh.points[edges[chosen, here]], mesh.points[edges[chosen, 1 - here]]
+        # An edge in a round side bulges: keep the bulge, which a quarter of the way is 3/4 of that in the middle.
+        bulge = middle[chosen] - (start + end) / 2
+        middle[chosen] = start + (end - start) / 4 + 0.75 * bulge
+    return middle
+
+
+def _folded(corners: FloatArray, middle: FloatArray) -> np.ndarray:
+    """Tell, for each cell, whether its quadratic map folds at a point where the stiffness is integrated."""
+    curved = np.abs(middle - corners[:, _EDGES].mean(axis=2)).max(axis=(1, 2)) > 0
+    result = np.zeros(len(corners), dtype=bool)
+    if curved.any():
+        nodes = np.concatenate([corners[curved], middle[curved]], axis=1)
+        straight = np.linalg.det(corners[curved, 1:] - corners[curved, :1])
+        least = np.min([np.linalg.det(np.einsum("nk,cni->cki", g, nodes)) for g in _gradients()], axis=0)
+        result[curved] = least < _LEAST_JACOBIAN * straight
+    return result
+
+
+def _gradients() -> list[FloatArray]:
+    """Gradients (10, 3) of the quadratic shape functions at interior points near every corner, and between."""
+    weights = [np.full(4, 0.25)]
+    for corner in range(4):
+        weights += [np.where(np.arange(4) == corner, w, (1 - w) / 3) for w in (0.9, 0.7)]
+    for i, j in _EDGES:
+        weights.append(np.where(np.isin(np.arange(4), (i, j)), 0.45, 0.05))
+    slope = np.vstack([-np.ones(3), np.eye(3)])  # gradients of the barycentric coordinates
+    gradients = []
+    for w in weights:
+        corner_part = (4 * w - 1)[:, None] * slope
+        edge_part = np.array([4 * (w[i] * slope[j] + w[j] * slope[i]) for i, j in _EDGES])
+        gradients.append(np.vstack([corner_part, edge_part]))
+    return gradients

@@ -1,0 +1,73 @@
+"""From arrays on one process to a distributed dolfinx mesh with named boundary facets."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import dolfinx
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+from pipeline import compat
+from pipeline.mesh.generate import MeshArrays
+
+Int32Array = npt.NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class BodyMesh:
+    """A distributed mesh and the facets, local to this rank, of each boundary group."""
+
+    mesh: Any
+    facets: dict[str, Int32Array]
+    cells: int  # global
+
+    @property
+    def owned_cells(self) -> int:
+        """Number of cells that this rank owns."""
+        return int(self.mesh.topology.index_map(self.mesh.topology.dim).size_local)
+
+    @property
+    def comm(self) -> MPI.Comm:
+        """Communicator of the mesh."""
+        return self.mesh.comm
+
+
+def distribute(comm: MPI.Comm, arrays: MeshArrays | None) -> BodyMesh:
+    """Create the dolfinx mesh of ``arrays``, which only rank 0 holds; collective."""
+    if arrays is not None:
+        cells, points = arrays.cells, arrays.points
+        width, surface, count = cells.shape[1], arrays.facets, len(cells)
+    else:
+        cells, points, width, surface, count = np.empty((0, 0), np.int64), np.empty((0, 3)), 0, {}, 0
+    width, surface, count = comm.bcast((width, surface, count))
+    mesh = compat.create_mesh(comm, cells.reshape(-1, width), points, order=1 if width == 4 else 2)
+    return BodyMesh(mesh, _find_facets(mesh, surface), count)
+
+
+def _find_facets(mesh: Any, surface: dict[str, npt.NDArray[np.int64]]) -> dict[str, Int32Array]:
+    """Find the local facets of each group of triangles, given by the input numbers of their corners."""
+    topology = mesh.topology
+    tdim = topology.dim
+    topology.create_connectivity(tdim - 1, tdim)
+    topology.create_connectivity(tdim - 1, 0)
+    topology.create_connectivity(tdim, 0)
+    exterior = np.asarray(dolfinx.mesh.exterior_facet_indices(topology), dtype=np.int32)
+    corner_of_vertex = np.empty(topology.index_map(0).size_local + topology.index_map(0).num_ghosts, dtype=np.int64)
+    vertices = topology.connectivity(tdim, 0).array
+    corner_of_vertex[vertices] = compat.geometry_dofs(mesh)[:, : tdim + 1].reshape(-1)
+    input_number = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)[corner_of_vertex]
+    corners = topology.connectivity(tdim - 1, 0).array.reshape(-1, tdim)[exterior]
+    local = np.sort(input_number[corners], axis=1)
+    # Boundary points numbered among themselves: three of their numbers fit one integer.
+    boundary = np.unique(np.concatenate([triangles.reshape(-1) for triangles in surface.values()]))
+    base = len(boundary)
+    local_keys = _keys(np.searchsorted(boundary, local), base)
+    return {
+        name: exterior[np.isin(local_keys, _keys(np.searchsorted(boundary, np.sort(triangles, axis=1)), base))]
+        for name, triangles in surface.items()
+    }
+
+
+def _keys(triples: npt.NDArray[np.int64], base: int) -> npt.NDArray[np.int64]:
+    return (triples[:, 0] * base + triples[:, 1]) * base + triples[:, 2]

@@ -1,0 +1,64 @@
+"""The size field: fine within ε of the contact, growing to coarse, and refined to the probe's edge."""
+
+from dataclasses import dataclass
+from math import ceil, inf, pi
+
+import gmsh
+
+from pipeline.study.schema import AnyProbe, Blade, Disc
+
+# Fewer segments than this would not tell a disc from a box.
+_FEWEST_SEGMENTS = 8
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Element sizes (m): ``fine`` within ``epsilon`` of the contact, ``rim`` at the probe's edge, else ``coarse``.
+
+    ``growth`` is the increase of size per unit of distance, both from the rim and beyond ``epsilon``.
+    """
+
+    epsilon: float
+    fine: float
+    coarse: float
+    rim: float
+    growth: float
+
+    def rim_segments(self, probe: AnyProbe) -> int:
+        """Return the number of edges along the rim of a disc, 0 for other probes."""
+        return max(_FEWEST_SEGMENTS, ceil(2 * pi * probe.radius / self.rim)) if isinstance(probe, Disc) else 0
+
+
+def set_size_field(sizes: Sizes, probe: AnyProbe, scale: float) -> None:
+    """Make ``sizes`` the background field of gmsh's current model, whose unit is ``scale`` metres."""
+    unit = 1 / scale
+    terms = [f"{unit * sizes.rim:.15g}+{sizes.growth:.15g}*{_rim_distance(probe, unit)}"]
+    if sizes.epsilon == inf:
+        terms.append(f"{unit * sizes.fine:.15g}")
+    else:
+        x, y = (unit * c for c in probe.at)
+        outside = f"Max(Sqrt((x-({x:.15g}))^2+(y-({y:.15g}))^2+z^2)-{unit * sizes.epsilon:.15g},0)"
+        terms.append(f"{unit * sizes.fine:.15g}+{sizes.growth:.15g}*{outside}")
+        terms.append(f"{unit * sizes.coarse:.15g}")
+    field = gmsh.model.mesh.field
+    tags = []
+    for term in terms:
+        tags.append(field.add("MathEval"))
+        field.setString(tags[-1], "F", term)
+    smallest = field.add("Min")
+    field.setNumbers(smallest, "FieldsList", tags)
+    field.setAsBackgroundMesh(smallest)
+
+
+def _rim_distance(probe: AnyProbe, unit: float) -> str:
+    """Write the distance from (x, y, z) to the edge of the footprint as a gmsh expression."""
+    x, y = (f"({c}-({unit * a:.15g}))" for c, a in zip("xy", probe.at, strict=True))
+    if isinstance(probe, Disc):
+        return f"Sqrt((Sqrt({x}^2+{y}^2)-{unit * probe.radius:.15g})^2+z^2)"
+    assert isinstance(probe, Blade)
+    tx, ty = probe.along
+    p = f"(Fabs({x}*({tx:.15g})+{y}*({ty:.15g}))-{unit * probe.length / 2:.15g})"
+    q = f"(Fabs({y}*({tx:.15g})-{x}*({ty:.15g}))-{unit * probe.width / 2:.15g})"
+    # Signed distance to a rectangle in its plane; its magnitude is the distance to the edge line.
+    in_plane = f"(Sqrt(Max({p},0)^2+Max({q},0)^2)+Min(Max({p},{q}),0))"
+    return f"Sqrt({in_plane}^2+z^2)"

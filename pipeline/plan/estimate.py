@@ -1,0 +1,58 @@
+"""What a case will need, before it is begun: tetrahedra, and memory."""
+
+from math import inf, log, pi
+
+from pipeline.study.sweep import Case
+
+# Volume of gmsh's mean tetrahedron in units of the cube of the size asked for: measured, docs/performance.md.
+_TETRAHEDRON = 0.16
+# Bytes for each dof at the peak of a solve, matrices and factors or multigrid included: measured, docs/performance.md.
+_BYTES_PER_DOF = {"iterative": {1: 1500, 2: 3500, 3: 6000}, "direct": {1: 20_000, 2: 25_000, 3: 40_000}}
+_BASE = 200e6
+# Dofs for each tetrahedron on large meshes, three components.
+_DOFS_PER_CELL = {1: 0.55, 2: 4.2, 3: 14.0}
+# Bytes gmsh and the arrays take for each tetrahedron while meshing.
+_BYTES_PER_CELL = 1000
+
+
+def cells(case: Case) -> float:
+    """Estimate the tetrahedra of the case's mesh, within about a factor of two."""
+    mesh, probe, body = case.mesh, case.probe, case.body
+    rim, growth = mesh.rim_size(probe.half_width), mesh.growth
+    perimeter = 2 * pi * probe.half_width if probe.shape == "disc" else 4 * probe.circumradius
+    # Half discs round the rim: ∫ π s / (rim + growth s)³ ds up to the distance where the size is fine.
+    total = perimeter * pi * (1 / rim - 1 / mesh.fine) ** 2 * rim / (2 * growth**2) if rim < mesh.fine else 0.0
+    epsilon = min(mesh.epsilon, (3 * body.volume / (2 * pi)) ** (1 / 3))
+    if case.is_full or mesh.epsilon == inf:
+        return (total + body.volume / mesh.fine**3) / _TETRAHEDRON
+    inside = min(2 / 3 * pi * epsilon**3, body.volume)
+    if mesh.outside != "coarse":
+        inside = min(inside, pi * mesh.epsilon**2 * body.height)
+    total += inside / mesh.fine**3
+    # Shells of size fine + growth (r - ε) round the contact, then coarse.
+    total += 2 * pi * epsilon**2 / (2 * growth * mesh.fine**2) + 4 * pi * epsilon / (growth**2 * mesh.fine)
+    total += 2 * pi / growth**3 * log(max(mesh.coarse / mesh.fine, 1.0))
+    if mesh.outside == "coarse":
+        total += max(body.volume - inside, 0.0) / mesh.coarse**3
+    return total / _TETRAHEDRON
+
+
+def meshing_memory(case: Case) -> float:
+    """Estimate the bytes that generating the case's mesh takes."""
+    return _BASE + _BYTES_PER_CELL * cells(case)
+
+
+def solving_memory(dofs: float, degree: int, *, direct: bool) -> float:
+    """Estimate the bytes that a solve takes, all ranks together."""
+    per_dof = _BYTES_PER_DOF["direct" if direct else "iterative"][degree]
+    # Fill of a factorisation in 3D grows like dofs^(4/3); the figure above is for 50,000.
+    growth = (dofs / 50_000) ** (1 / 3) if direct else 1.0
+    return _BASE + per_dof * growth * dofs
+
+
+def expected_memory(case: Case) -> float:
+    """Estimate the bytes for meshing and solving a case that has no mesh yet."""
+    count = cells(case)
+    dofs = _DOFS_PER_CELL[case.mesh.degree] * count
+    solving = solving_memory(dofs, case.mesh.degree, direct=case.solve.method == "direct")
+    return max(meshing_memory(case), solving)

@@ -1,0 +1,1 @@
+"""Dataset and figures. Knows nothing of dolfinx."""

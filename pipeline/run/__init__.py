@@ -1,0 +1,1 @@
+"""Execution under MPI: case store, records, progress. Knows nothing of plots."""

@@ -1,0 +1,47 @@
+"""What is kept of a case: its force, its checks, what it cost, and where it was computed."""
+
+import json
+from dataclasses import asdict, dataclass, field
+from math import nan
+
+
+@dataclass(frozen=True)
+class Record:
+    """The result of one case; SI units, times in seconds, memory in bytes summed over ranks.
+
+    ``force_vector`` is the force of the tissue on the probe; ``force`` its part against the probe's advance.
+    """
+
+    key: str
+    status: str  # ok | failed
+    message: str = ""
+    force: float = nan
+    force_vector: tuple[float, float, float] = (nan, nan, nan)
+    energy: float = nan
+    max_strain: float = nan
+    balance: float = nan
+    dofs: int = 0
+    cells: int = 0
+    iterations: int = 0
+    memory: float = nan
+    time_mesh: float = nan
+    time_assemble: float = nan
+    time_setup: float = nan
+    time_solve: float = nan
+    provenance: dict[str, str | int] = field(default_factory=dict)
+
+    @property
+    def time_total(self) -> float:
+        """Seconds that this case costs alone."""
+        return self.time_mesh + self.time_assemble + self.time_setup + self.time_solve
+
+    def to_json(self) -> str:
+        """Write as JSON text."""
+        return json.dumps(asdict(self))
+
+    @staticmethod
+    def from_json(text: str) -> "Record":
+        """Read what :meth:`to_json` wrote."""
+        content = json.loads(text)
+        content["force_vector"] = tuple(content["force_vector"])
+        return Record(**content)

@@ -1,0 +1,1 @@
+"""Bodies, probes and cuts as a gmsh CAD model with named groups. Knows nothing of PETSc."""

@@ -1,0 +1,1 @@
+"""Linear elasticity: operators, solvers, reaction force, checks. Knows nothing of study files."""

@@ -1,0 +1,148 @@
+"""A body, a probe that displaces part of its surface, and the force that this takes.
+
+    find u with K u = 0 inside, u = travel on the probe's footprint (bonded) or its normal part only
+    (frictionless), u = 0 on the support; K = λ A_λ + μ A_μ.
+
+The force is the reaction: the residual K u of the *unmodified* operator, summed over the probe's dofs.
+Stress integrated under the probe is wrong by tens of per cent on the same solution.
+"""
+
+import time
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from pipeline.mesh.distribute import BodyMesh
+from pipeline.solve.forms import mean_strain_form
+from pipeline.solve.linear import Level, LinearSolver, SolveError, is_direct
+from pipeline.solve.space import ConstrainedSpace, Contact
+
+FloatArray = npt.NDArray[np.float64]
+
+# F·d = 2U and F_probe + F_support = 0 hold for the exact solution of the discrete system. Conjugate gradients
+# stopped at 1e-10 keep both to about 1e-9; what misses them by this much has not been solved.
+BALANCE_LIMIT = 1e-6
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What one solve gives; all values global and equal on every rank.
+
+    ``reaction`` (N, xyz) is the force of the tissue on the probe, ``energy`` (J) the strain energy,
+    ``balance`` the larger of the relative errors of F·d = 2U and of F_probe + F_support = 0.
+    """
+
+    reaction: tuple[float, float, float]
+    energy: float
+    max_strain: float
+    balance: float
+    dofs: int
+    iterations: int
+    time_assemble: float
+    time_setup: float
+    time_solve: float
+
+
+class ElasticBody:
+    """A mesh, a degree and a contact: solves for any λ and μ, sharing the assembly. A context manager."""
+
+    def __init__(self, body: BodyMesh, degree: int, contact: Contact, *, shared: bool = False):
+        """Prepare; ``shared`` assembles A_λ and A_μ apart, once, for many pairs of λ and μ. Collective.
+
+        Raises:
+            SolveError: if footprint and support share a point: no displacement satisfies both.
+        """
+        self._shared = shared
+        self._body = body
+        self._contact = contact
+        self._levels: list[ConstrainedSpace] = []
+        self._fine = ConstrainedSpace(body, degree, contact)
+        self._strain = mean_strain_form(self._fine.space, self._fine.forms.displacement)
+        self._start: FloatArray | None = None
+        self.dofs = self._fine.dofs
+
+    def __enter__(self) -> "ElasticBody":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for level in (*self._levels, self._fine):
+            level.close()
+
+    def solve(self, lame: tuple[float, float], *, method: str = "auto", tolerance: float = 1e-10) -> Solution:
+        """Solve for Lamé's λ and μ (Pa) and return force, energy and checks; collective.
+
+        Raises:
+            SolveError: if the solver did not converge, or the solution fails a check.
+        """
+        fine = self._fine
+        direct = is_direct(method, self.dofs, fine.degree)
+        if not direct and not self._levels:
+            self._levels = [ConstrainedSpace(self._body, d, self._contact) for d in range(1, fine.degree)]
+        spaces = [fine] if direct else [*self._levels, fine]
+        with ExitStack() as stack:
+            start = time.perf_counter()
+            rhs, unknown = (stack.enter_context(fine.vector()) for _ in range(2))
+            fine.lift(rhs, lame)
+            assemble = time.perf_counter() - start
+            levels = []
+            for space in spaces:
+                matrix, seconds = space.operator(lame, shared=self._shared, blocked=not direct and space is fine and fine.degree > 1)
+                stack.callback(matrix.destroy)
+                levels.append(Level(space.space, matrix, space.prescribed))
+                assemble += seconds
+            solver = LinearSolver(levels, direct=direct, tolerance=tolerance)
+            stack.callback(solver.close)
+            start = time.perf_counter()
+            unknown.array[:] = fine.held[: fine.owned] if self._start is None else self._start
+            unknown.array[fine.prescribed_owned] = fine.held[fine.prescribed_owned]
+            iterations = solver.solve(rhs, unknown)
+            if self._shared:
+                self._start = unknown.array.copy()
+            reaction, energy, balance = self._reaction(unknown, lame)
+            seconds = time.perf_counter() - start
+            setup = solver.setup_seconds
+        return Solution(
+            reaction, energy, self._max_strain(), balance, self.dofs, iterations, assemble, setup, seconds
+        )  # fmt: skip
+
+    def _reaction(self, unknown: PETSc.Vec, lame: tuple[float, float]) -> tuple[tuple[float, float, float], float, float]:
+        """Return the force on the probe, the strain energy, and how well they balance."""
+        fine = self._fine
+        fine.set_displacement(unknown)
+        with fine.vector() as residual:
+            fine.apply(residual, lame)
+            r, u = residual.array, unknown.array
+            on_probe = _sum(fine.comm, r.reshape(-1, 3)[fine.probe_owned].sum(axis=0))
+            on_support = _sum(fine.comm, r.reshape(-1, 3)[fine.fixed_owned].sum(axis=0))
+            twice_energy = float(_sum(fine.comm, np.array([r @ u]))[0])
+            held = fine.held[: fine.owned]
+            work = float(_sum(fine.comm, np.array([r[fine.prescribed_owned] @ held[fine.prescribed_owned]]))[0])
+        size = float(np.linalg.norm(on_probe))
+        if not (np.isfinite(twice_energy) and np.isfinite(size) and twice_energy > 0 and size > 0):
+            raise SolveError(f"the solution is not a number or has no energy (2U = {twice_energy:g} J)")
+        # A frictionless probe takes no force across its axis, a bonded one balances in every direction.
+        balance = max(abs(work - twice_energy) / twice_energy, float(np.linalg.norm(on_probe + on_support)) / size)
+        if balance > BALANCE_LIMIT:
+            raise SolveError(f"forces do not balance: relative error {balance:.1e}, allowed {BALANCE_LIMIT:.0e}")
+        x, y, z = (-float(component) for component in on_probe)
+        return (x, y, z), twice_energy / 2, balance
+
+    def _max_strain(self) -> float:
+        """Return the largest principal strain, by magnitude, of the strain averaged over each cell."""
+        integral, volume = (fem.assemble_vector(form) for form in self._strain)
+        owned = self._body.owned_cells
+        tensors = [np.asarray(v.array).reshape(-1, 3, 3)[:owned] for v in (integral, volume)]
+        principal = np.linalg.eigvalsh(tensors[0] / tensors[1])
+        local = float(np.abs(principal).max()) if owned else 0.0
+        return float(self._fine.comm.allreduce(local, op=MPI.MAX))
+
+
+def _sum(comm: MPI.Comm, values: FloatArray) -> FloatArray:
+    total = np.empty_like(values)
+    comm.Allreduce(np.ascontiguousarray(values), total)
+    return total

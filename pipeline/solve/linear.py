@@ -1,0 +1,177 @@
+"""Linear solvers for elasticity: Cholesky by MUMPS, and conjugate gradients with multigrid.
+
+Multigrid goes down in degree (p, p - 1, …, 1) with Chebyshev smoothing, and from degree 1 by smoothed
+aggregation (PETSc's GAMG), which is told the rigid-body modes. Every solver has its own options prefix.
+"""
+
+import itertools
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from pipeline import compat
+
+# Dofs up to which Cholesky is faster than conjugate gradients, measured: docs/performance.md.
+DIRECT_LIMIT = {1: 8_000, 2: 6_000, 3: 6_000}
+_MOST_ITERATIONS = 500
+
+_prefixes = itertools.count()
+
+
+class SolveError(Exception):
+    """A solve that did not give a solution to rely on."""
+
+
+@dataclass(frozen=True)
+class Level:
+    """One level of a hierarchy: its space, its operator and the local dofs (unrolled) that are prescribed."""
+
+    space: Any
+    matrix: PETSc.Mat
+    prescribed: np.ndarray
+
+
+def is_direct(method: str, dofs: int, degree: int) -> bool:
+    """Decide between Cholesky and conjugate gradients for a system of ``dofs`` unknowns."""
+    return method == "direct" or (method == "auto" and dofs <= DIRECT_LIMIT[degree])
+
+
+class LinearSolver:
+    """A KSP for one operator, with everything that it needs; ``close`` frees it."""
+
+    def __init__(self, levels: list[Level], *, direct: bool, tolerance: float):
+        self._levels = levels
+        self._owned: list[Any] = []
+        matrix = levels[-1].matrix
+        start = time.perf_counter()
+        self._prefix = f"epsmesh{next(_prefixes)}_"
+        self._options: set[str] = set()
+        self.ksp = self._own(PETSc.KSP().create(matrix.comm))
+        self.ksp.setOptionsPrefix(self._prefix)
+        self.ksp.setOperators(matrix)
+        if direct:
+            self.ksp.setType("preonly")
+            self.ksp.pc.setType("cholesky")
+            self.ksp.pc.setFactorSolverType("mumps")
+        else:
+            self.ksp.setType("cg")
+            self.ksp.setNormType(PETSc.KSP.NormType.NATURAL)
+            self.ksp.setTolerances(rtol=tolerance, atol=0.0, max_it=_MOST_ITERATIONS)
+            self.ksp.setInitialGuessNonzero(True)
+            self._multigrid(self.ksp.pc)
+        try:
+            self.ksp.setFromOptions()
+            self.ksp.setUp()
+        except PETSc.Error as error:
+            self.close()
+            raise SolveError(_explain(error)) from error
+        finally:
+            self._clear_options()
+        self.setup_seconds = time.perf_counter() - start
+
+    def solve(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> int:
+        """Solve into ``solution`` (also the start vector) and return the iterations; collective.
+
+        Raises:
+            SolveError: if PETSc reports anything but convergence.
+        """
+        try:
+            self.ksp.solve(rhs, solution)
+        except PETSc.Error as error:
+            raise SolveError(_explain(error)) from error
+        reason = self.ksp.getConvergedReason()
+        if reason <= 0:
+            raise SolveError(f"the linear solver did not converge: {_reason(reason)} after {self.ksp.its} iterations")
+        return self.ksp.its
+
+    def close(self) -> None:
+        """Free everything that was made."""
+        while self._owned:
+            self._owned.pop().destroy()
+
+    def _own(self, item: Any) -> Any:
+        self._owned.append(item)
+        return item
+
+    def _option(self, prefix: str, **values: Any) -> None:
+        options = PETSc.Options()
+        for name, value in values.items():
+            options[prefix + name] = value
+            self._options.add(prefix + name)
+
+    def _clear_options(self) -> None:
+        options = PETSc.Options()
+        for name in self._options:
+            options.delValue(name)
+        self._options.clear()
+
+    def _multigrid(self, pc: PETSc.PC) -> None:
+        levels = self._levels
+        if len(levels) == 1:
+            self._aggregation(pc, levels[0], self._prefix)
+            return
+        pc.setType("mg")
+        pc.setMGLevels(len(levels))
+        pc.setMGType(PETSc.PC.MGType.MULTIPLICATIVE)
+        for number, (coarse, fine) in enumerate(itertools.pairwise(levels), start=1):
+            pc.setMGInterpolation(number, self._own(_transfer(coarse, fine)))
+            smoother = pc.getMGSmoother(number)
+            smoother.setOperators(fine.matrix)
+            self._option(
+                f"{self._prefix}mg_levels_{number}_",
+                ksp_type="chebyshev", ksp_max_it=2, ksp_chebyshev_esteig="0,0.1,0,1.1",
+                ksp_chebyshev_esteig_steps=10, pc_type="pbjacobi",
+            )  # fmt: skip
+        bottom = pc.getMGCoarseSolve()
+        bottom.setOperators(levels[0].matrix)
+        bottom.setType("preonly")
+        bottom.setOptionsPrefix(self._prefix + "mg_coarse_")
+        self._aggregation(bottom.pc, levels[0], self._prefix + "mg_coarse_")
+
+    def _aggregation(self, pc: PETSc.PC, level: Level, prefix: str) -> None:
+        modes = self._own(rigid_body_modes(level.space))
+        level.matrix.setNearNullSpace(modes)
+        pc.setType("gamg")
+        self._option(
+            prefix, pc_gamg_threshold=0.01, mg_levels_ksp_type="chebyshev", mg_levels_ksp_max_it=2,
+            mg_levels_pc_type="jacobi",
+        )  # fmt: skip
+
+
+def rigid_body_modes(space: Any) -> PETSc.NullSpace:
+    """Return translations and rotations of ``space`` as a near-nullspace; the caller destroys it."""
+    index_map, bs = space.dofmap.index_map, space.dofmap.index_map_bs
+    coordinates = PETSc.Vec().createMPI((index_map.size_local * bs, None), bsize=bs, comm=space.mesh.comm)
+    coordinates.array[:] = space.tabulate_dof_coordinates()[: index_map.size_local].reshape(-1)
+    modes = PETSc.NullSpace().createRigidBody(coordinates)
+    coordinates.destroy()
+    return modes
+
+
+def _transfer(coarse: Level, fine: Level) -> PETSc.Mat:
+    """Interpolation between degrees that neither reads nor writes prescribed dofs."""
+    matrix = compat.interpolation_matrix(coarse.space, fine.space)
+    columns, rows = matrix.createVecs()
+    for vector, level in ((rows, fine), (columns, coarse)):
+        owned = vector.getLocalSize()
+        vector.set(1.0)
+        vector.array[level.prescribed[level.prescribed < owned]] = 0.0
+    matrix.diagonalScale(rows, columns)
+    rows.destroy()
+    columns.destroy()
+    return matrix
+
+
+def _reason(reason: int) -> str:
+    names = {v: k for k, v in vars(PETSc.KSP.ConvergedReason).items() if isinstance(v, int)}
+    return names.get(reason, str(reason)).lower()
+
+
+def _explain(error: PETSc.Error) -> str:
+    return {
+        55: "out of memory",
+        76: "the factorisation failed (out of memory, or the operator is singular)",
+    }.get(error.ierr, f"PETSc error {error.ierr}")

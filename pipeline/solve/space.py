@@ -1,0 +1,135 @@
+"""A displacement space with its conditions, and its operator with the prescribed dofs eliminated symmetrically."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+from petsc4py import PETSc
+
+from pipeline import compat
+from pipeline.mesh.distribute import BodyMesh
+from pipeline.scene.model import FIXED, PROBE
+from pipeline.solve.forms import elastic_forms
+from pipeline.solve.linear import SolveError
+
+
+@dataclass(frozen=True)
+class Contact:
+    """How the probe moves its footprint: ``travel`` (m), all of it if ``bonded``, else only the z part."""
+
+    travel: tuple[float, float, float]
+    bonded: bool
+
+
+class ConstrainedSpace:
+    """Displacements of one degree on a mesh, prescribed on the probe's footprint and on the support.
+
+    Arrays named ``…_owned`` index the dofs, or for ``probe_owned`` and ``fixed_owned`` the blocks of three dofs,
+    that this rank owns.
+    """
+
+    def __init__(self, body: BodyMesh, degree: int, contact: Contact):
+        """Collective.
+
+        Raises:
+            SolveError: if the footprint and the support share a point.
+        """
+        self.comm, self.degree = body.comm, degree
+        self.space = space = compat.vector_space(body.mesh, degree)
+        index_map = space.dofmap.index_map
+        self.owned, self.dofs = 3 * index_map.size_local, 3 * index_map.size_global
+        self._ghosts = np.asarray(index_map.ghosts, dtype=PETSc.IntType)
+        self.forms = elastic_forms(space)
+        self._parts: tuple[PETSc.Mat, PETSc.Mat] | None = None
+        self._part_seconds = 0.0
+        probe, fixed = (
+            np.asarray(fem.locate_dofs_topological(space, body.mesh.topology.dim - 1, body.facets[name]))
+            for name in (PROBE, FIXED)
+        )
+        if self.comm.allreduce(len(np.intersect1d(probe, fixed))):
+            raise SolveError("the probe's footprint touches the held face: no displacement satisfies both conditions")
+        travel = np.array(contact.travel, dtype=PETSc.ScalarType)
+        self._conditions = [fem.dirichletbc(np.zeros(3, dtype=PETSc.ScalarType), fixed, space)]
+        components = range(3) if contact.bonded else [2]
+        for c in components:
+            self._conditions.append(fem.dirichletbc(travel[c], 3 * probe + c, space.sub(c)))
+        self.held = np.zeros(3 * (index_map.size_local + index_map.num_ghosts))
+        unrolled = [3 * probe + c for c in components]
+        for c, dofs in zip(components, unrolled, strict=True):
+            self.held[dofs] = travel[c]
+        self.prescribed = np.unique(np.concatenate([*unrolled, *(3 * fixed + c for c in range(3))]))
+        self.prescribed_owned = self.prescribed[self.prescribed < self.owned]
+        self.probe_owned, self.fixed_owned = (dofs[dofs < index_map.size_local] for dofs in (probe, fixed))
+
+    def close(self) -> None:
+        """Free the parts of the operator."""
+        for part in self._parts or ():
+            part.destroy()
+        self._parts = None
+
+    @contextmanager
+    def vector(self) -> Iterator[PETSc.Vec]:
+        """Lend a ghosted vector of zeros on the dofs of the space."""
+        vector = PETSc.Vec().createGhost(self._ghosts, (self.owned, None), bsize=3, comm=self.comm)
+        vector.set(0.0)
+        try:
+            yield vector
+        finally:
+            vector.destroy()
+
+    def operator(self, lame: tuple[float, float], *, shared: bool, blocked: bool) -> tuple[PETSc.Mat, float]:
+        """Return K with μ on the diagonal of prescribed dofs, and the seconds that one assembly takes; collective.
+
+        ``shared`` keeps A_λ and A_μ for the next pair of λ and μ. The caller destroys the matrix.
+        """
+        mat_type = "baij" if blocked else "aij"
+        start = time.perf_counter()
+        if not shared:
+            matrix = self._assemble(lame, lame[1], mat_type)
+            return matrix, time.perf_counter() - start
+        if self._parts is not None and self._parts[0].getType().endswith("baij") != blocked:
+            self.close()
+        if self._parts is None:
+            self._parts = self._assemble((1.0, 0.0), 0.0, mat_type), self._assemble((0.0, 1.0), 1.0, mat_type)
+            self._part_seconds = (time.perf_counter() - start) / 2
+        matrix = self._parts[0].copy()
+        matrix.scale(lame[0])
+        matrix.axpy(lame[1], self._parts[1], structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        _mark(matrix)
+        return matrix, self._part_seconds
+
+    def lift(self, rhs: PETSc.Vec, lame: tuple[float, float]) -> None:
+        """Put the loads of the prescribed displacements into ``rhs``; collective."""
+        self.forms.displacement.x.array[:] = self.held
+        self.apply(rhs, lame)
+        rhs.scale(-1.0)
+        rhs.array[self.prescribed_owned] = lame[1] * self.held[self.prescribed_owned]
+
+    def set_displacement(self, values: PETSc.Vec) -> None:
+        """Make ``values`` the displacement that ``apply`` acts on; collective."""
+        values.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
+        with values.localForm() as local:
+            self.forms.displacement.x.array[:] = local.array
+
+    def apply(self, result: PETSc.Vec, lame: tuple[float, float]) -> None:
+        """Add K u, with the unmodified operator, to ``result``; collective."""
+        self.forms.set_lame(*lame)
+        fem.petsc.assemble_vector(result, self.forms.action)
+        result.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+
+    def _assemble(self, lame: tuple[float, float], diagonal: float, mat_type: str) -> PETSc.Mat:
+        self.forms.set_lame(*lame)
+        matrix = compat.assemble_matrix(self.forms.stiffness, self._conditions, diagonal, mat_type)
+        _mark(matrix)
+        return matrix
+
+
+def _mark(matrix: PETSc.Mat) -> None:
+    matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    if not matrix.getType().endswith("baij"):  # PETSc 3.18 does not take the second one for blocked matrices
+        matrix.setOption(PETSc.Mat.Option.SPD, True)

@@ -1,0 +1,1 @@
+"""Study files: schema, units, and sweeps into cases. Knows nothing of dolfinx, gmsh or MPI."""

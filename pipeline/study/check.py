@@ -1,0 +1,140 @@
+"""Physical sense of a study: what cannot work is an error, what is doubtful a warning."""
+
+import itertools
+from math import hypot, isfinite
+
+from pipeline.study.problems import Problems
+from pipeline.study.schema import AnyBody, AnyProbe, Below, Blade, Box, Material, Mesh, Section, Solve
+from pipeline.study.sweep import Axis
+
+# Linear elasticity: strain under the probe is of order depth / radius.
+_LINEAR = 0.10
+# Displacement elements of degree 1 lock visibly from here on, of degree 2 and 3 from there (docs/accuracy.md).
+_LOCKING = {1: 0.45, 2: 0.49, 3: 0.49}
+
+
+def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
+    """Check single sections, then pairs of sections that must fit each other."""
+    bodies, materials, probes, meshes = (sections[name] for name in ("body", "material", "probe", "mesh"))
+    for body in bodies:
+        _check_body(body, problems)  # type: ignore[arg-type]
+    for probe in probes:
+        _check_probe(probe, problems)  # type: ignore[arg-type]
+    for mesh in meshes:
+        _check_mesh(mesh, problems)  # type: ignore[arg-type]
+    for body, probe in itertools.product(bodies, probes):
+        _check_fit(body, probe, problems)  # type: ignore[arg-type]
+    for mesh, probe in itertools.product(meshes, probes):
+        _check_epsilon(mesh, probe, problems)  # type: ignore[arg-type]
+    for body, mesh in itertools.product(bodies, meshes):
+        _check_outside(body, mesh, problems)  # type: ignore[arg-type]
+    for material, mesh in itertools.product(materials, meshes):
+        _check_locking(material, mesh, problems)  # type: ignore[arg-type]
+    _check_reference(meshes, axes, problems)
+    (solve,) = sections["solve"]
+    assert isinstance(solve, Solve)
+    if "repeats" in solve.model_fields_set and not solve.timing:
+        problems.error("solve.repeats", solve.repeats, "only a timing study repeats its cases: add `timing = true`")
+
+
+def _mm(length: float) -> str:
+    return f"{length * 1e3:.4g} mm"
+
+
+def _check_body(body: AnyBody, problems: Problems) -> None:
+    if isinstance(body.fixed, Below) and not -body.height < body.fixed.below < 0:
+        problems.error(
+            "body.fixed", f"below {_mm(body.fixed.below)}",
+            f"must lie inside the body: between -{_mm(body.height)} and 0 mm",
+        )
+
+
+def _check_probe(probe: AnyProbe, problems: Problems) -> None:
+    if probe.depth > _LINEAR * probe.half_width:
+        problems.warn(
+            "probe.depth", _mm(probe.depth),
+            f"is more than {_LINEAR:.0%} of the probe's half width {_mm(probe.half_width)}: linear elasticity is "
+            "then an extrapolation (F stays proportional to depth)",
+        )
+    if not isinstance(probe, Blade):
+        return
+    if probe.direction[2] != 0 or hypot(*probe.direction) == 0 or not all(map(isfinite, probe.direction)):
+        problems.error("probe.direction", list(probe.direction), "must be a horizontal vector: [x, y, 0], not all zero")
+    if probe.slice > 0 and probe.action != "cut":
+        problems.error("probe.slice", _mm(probe.slice), 'only a cut slices: set action = "cut"')
+    if probe.slice > 0 and probe.contact == "frictionless":
+        problems.error(
+            "probe.slice", _mm(probe.slice), "a frictionless blade slides along without force: use contact = 'bonded'"
+        )
+
+
+def _check_mesh(mesh: Mesh, problems: Problems) -> None:
+    if mesh.fine > mesh.coarse:
+        problems.error("mesh.fine", _mm(mesh.fine), f"must be at most coarse = {_mm(mesh.coarse)}")
+    if mesh.rim is not None and mesh.rim > mesh.fine:
+        problems.error("mesh.rim", _mm(mesh.rim), f"must be at most fine = {_mm(mesh.fine)}")
+
+
+def _check_fit(body: AnyBody, probe: AnyProbe, problems: Problems) -> None:
+    points = [probe.at]
+    reach = probe.half_width
+    if isinstance(probe, Blade):
+        if hypot(probe.direction[0], probe.direction[1]) == 0:
+            return
+        (tx, ty), half_l, half_w = probe.along, probe.length / 2, probe.width / 2
+        points = [
+            (probe.at[0] + i * half_l * tx - j * half_w * ty, probe.at[1] + i * half_l * ty + j * half_w * tx)
+            for i in (-1, 1) for j in (-1, 1)
+        ]
+        reach = 0.0
+    if min(body.gap(point) for point in points) - reach <= 0:
+        top = f"{_mm(body.size[0])} × {_mm(body.size[1])}" if isinstance(body, Box) else f"radius {_mm(body.radius)}"
+        problems.error(
+            "probe.at", [_mm(x) for x in probe.at],
+            f"the footprint of the {probe.shape} must lie inside the body's top ({top}), not on or over its edge",
+        )
+
+
+def _check_epsilon(mesh: Mesh, probe: AnyProbe, problems: Problems) -> None:
+    if mesh.epsilon < probe.circumradius:
+        problems.warn(
+            "mesh.epsilon", _mm(mesh.epsilon),
+            f"is less than the probe's radius {_mm(probe.circumradius)}: part of the contact lies outside the fine mesh"
+            + ("" if mesh.outside == "coarse" else ", and the column cuts the footprint off"),
+        )
+    if mesh.rim_size(probe.half_width) > probe.half_width:
+        problems.error(
+            "mesh.rim", _mm(mesh.rim_size(probe.half_width)),
+            f"must resolve the probe: at most its half width, {_mm(probe.half_width)}",
+        )
+
+
+def _check_outside(body: AnyBody, mesh: Mesh, problems: Problems) -> None:
+    if mesh.outside == "free" and body.fixed == "sides" and isfinite(mesh.epsilon):
+        problems.error(
+            "mesh.outside", mesh.outside,
+            "the column round the probe does not touch the fixed sides and would float: "
+            "use `outside = \"coarse\"` or \"fixed\", or fix the bottom",
+        )
+
+
+def _check_locking(material: Material, mesh: Mesh, problems: Problems) -> None:
+    if material.poisson >= 0.5:
+        problems.error(
+            "material.poisson", material.poisson,
+            "an incompressible material needs mixed elements, which are not supported; must be less than 0.5",
+        )
+    elif material.poisson > _LOCKING[mesh.degree] or (mesh.degree == 1 and material.poisson >= _LOCKING[1]):
+        problems.warn(
+            "material.poisson", material.poisson,
+            f"displacement elements of degree {mesh.degree} lock at this value: F comes out too high",
+        )
+
+
+def _check_reference(meshes: tuple[Section, ...], axes: tuple[Axis, ...], problems: Problems) -> None:
+    if all(isfinite(mesh.epsilon) for mesh in meshes if isinstance(mesh, Mesh)):
+        swept = any(axis.name == "epsilon" for axis in axes)
+        problems.warn(
+            "mesh.epsilon", None,
+            f"{'the list has' if swept else 'there is'} no \"full\" case: F_max, F/F_max and speed-up stay empty",
+        )

@@ -1,0 +1,206 @@
+"""Read a study file: TOML to checked sections and axes, or every problem at once."""
+
+import itertools
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from pipeline.study.check import check_sense
+from pipeline.study.problems import Problem, Problems, StudyError, nearest
+from pipeline.study.schema import LATER, LATER_KEYS, LATER_SECTIONS, SECTIONS, Below, Section
+from pipeline.study.sweep import Axis, Study
+
+# A label needs its section's axes only; more combinations than this in one section is a slip of the pen.
+_MOST_VARIANTS = 1_000_000
+
+
+def load(path: str | Path) -> Study:
+    """Read the study file at ``path``.
+
+    Raises:
+        StudyError: with every problem of the file: key, value found, what is allowed.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+        raw = tomllib.loads(text)
+    except OSError as error:
+        raise StudyError(str(path), [Problem("file", None, error.strerror or str(error))]) from None
+    except UnicodeDecodeError as error:
+        raise StudyError(str(path), [Problem("file", None, f"is not UTF-8 text: {error}")]) from None
+    except tomllib.TOMLDecodeError as error:
+        raise StudyError(str(path), [Problem("TOML syntax", None, str(error))]) from None
+    return parse(raw, file=str(path), text=text)
+
+
+def parse(raw: dict[str, Any], *, file: str = "study", text: str = "") -> Study:
+    """Turn a study, read from TOML into ``raw``, into a :class:`Study`; ``file`` is for messages."""
+    problems = Problems()
+    _check_top(raw, problems)
+    axes: list[Axis] = []
+    sections: dict[str, tuple[Section, ...]] = {}
+    for name in [*(n for n in raw if n in SECTIONS), *(n for n in SECTIONS if n not in raw)]:
+        own_axes, variants = _read_section(name, raw.get(name, {}), problems)
+        axes += own_axes
+        sections[name] = variants
+    if not problems.errors:
+        check_sense(sections, tuple(axes), problems)
+    if problems.errors:
+        raise StudyError(file, problems.errors)
+    warnings = tuple(f"{file}: {warning}" for warning in problems.warnings)
+    title = str(raw.get("title", Path(file).stem))
+    return Study(file, Path(file).stem, title, text, tuple(axes), sections, warnings)
+
+
+def _check_top(raw: dict[str, Any], problems: Problems) -> None:
+    for key, value in raw.items():
+        if key in LATER_SECTIONS:
+            problems.error(key, None, f"this section is not supported; supported are {', '.join(SECTIONS)}")
+        elif key not in (*SECTIONS, "title"):
+            problems.error(key, None, f"unknown section; {nearest(key, [*SECTIONS, 'title'])}")
+        elif key == "title" and not isinstance(value, str):
+            problems.error(key, value, "must be text")
+    for name in ("body", "material", "probe", "mesh"):
+        if name not in raw:
+            problems.error(f"[{name}]", None, "this section is required")
+
+
+def _read_section(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], tuple[Section, ...]]:
+    """Return the axes of a section and every combination of their values."""
+    if isinstance(raw, list) and name != "solve":
+        return _read_array(name, raw, problems)
+    if not isinstance(raw, dict):
+        problems.error(name, raw, f"must be a table: write [{name}]")
+        return [], ()
+    model = _model(name, raw, problems)
+    if model is None or (not raw and name != "solve"):
+        return [], ()
+    swept = {key: value for key, value in raw.items() if name != "solve" and _is_sweep(model, key, value)}
+    for key, values in swept.items():
+        if not values:
+            problems.error(f"{name}.{key}", values, "an empty list sweeps nothing; give at least one value")
+    if not all(swept.values()):
+        return [], ()
+    singles = _validate_each(name, model, raw, swept, problems)
+    if singles is None:
+        return [], ()
+    axes = [_axis(name, key, model, values, [s[i] for i in range(len(values))], problems) for (key, values), s in zip(
+        swept.items(), singles, strict=True)]
+    combinations = list(itertools.islice(itertools.product(*swept.values()), _MOST_VARIANTS + 1))
+    if len(combinations) > _MOST_VARIANTS:
+        problems.error(name, None, f"sweeps more than {_MOST_VARIANTS} combinations")
+        return [], ()
+    variants = [_validate(model, raw | dict(zip(swept, values, strict=True))) for values in combinations]
+    return axes, tuple(variants)
+
+
+def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[Axis], tuple[Section, ...]]:
+    """Read ``[[name]]`` tables: a sweep over the section as a whole, labelled by the tables' names."""
+    variants: list[Section] = []
+    for position, table in enumerate(tables, start=1):
+        where = f"{name}[{position}]"
+        if not isinstance(table, dict):
+            problems.error(where, table, f"must be a table: write [[{name}]]")
+            continue
+        if not isinstance(table.get("name"), str) or not table["name"]:
+            problems.error(f"{where}.name", table.get("name"), "is required in an array of tables: it labels the sweep")
+        model = _model(name, table, problems, where)
+        if model is None:
+            continue
+        for key, value in table.items():
+            if _is_sweep(model, key, value):
+                problems.error(f"{where}.{key}", value, "a list inside an array of tables: write one table for each value")
+        try:
+            variants.append(_validate(model, table))
+        except ValidationError as error:
+            problems.from_pydantic(where, error, model, table)
+    names = [variant.name for variant in variants]
+    for label in sorted({n for n in names if names.count(n) > 1 and n}):
+        problems.error(f"{name}.name", label, "is the name of more than one table; names label the sweep and must differ")
+    return [Axis(name, "", tuple(names), "")], tuple(variants)
+
+
+def _model(name: str, raw: dict[str, Any], problems: Problems, where: str = "") -> type[Section] | None:
+    """Return the model of a section, chosen by its shape where it has one."""
+    where = where or name
+    for key in LATER_KEYS.get(name, ()):
+        if key in raw:
+            problems.error(f"{where}.{key}", raw[key], "this key is not supported by this version")
+    model = SECTIONS[name]
+    if not isinstance(model, dict):
+        return model
+    shape = raw.get("shape")
+    if isinstance(shape, str) and shape in model:
+        return model[shape]
+    supported = ", ".join(model)
+    if shape is None:
+        if raw:
+            problems.error(f"{where}.shape", None, f"is required; supported are {supported}")
+    elif isinstance(shape, list):
+        problems.error(f"{where}.shape", shape, f"shapes are swept with an array of tables: write [[{name}]] for each")
+    elif shape in LATER[name]:
+        problems.error(f"{where}.shape", shape, f"not supported; supported are {supported}")
+    else:
+        problems.error(f"{where}.shape", shape, f"unknown shape; {nearest(str(shape), model)}")
+    return None
+
+
+def _is_sweep(model: type[BaseModel], key: str, value: Any) -> bool:
+    """Tell a list of values from a list that is one value (a point, a size)."""
+    if not isinstance(value, list):
+        return False
+    info = model.model_fields.get(key)
+    if info is not None and getattr(info.annotation, "__origin__", None) is tuple:
+        return bool(value) and isinstance(value[0], list)
+    return info is not None and key not in ("name", "shape")
+
+
+def _validate_each(
+    name: str, model: type[Section], raw: dict[str, Any], swept: dict[str, list[Any]], problems: Problems
+) -> list[list[Section]] | None:
+    """Validate each value of each sweep once, so that an error is reported once however many cases it meets."""
+    before = len(problems.errors)
+    first = {key: values[0] for key, values in swept.items()}
+    singles: list[list[Section]] = []
+    for key, values in swept.items() or {"": [None]}.items():
+        singles.append([])
+        for value in values:
+            candidate = raw | first | ({key: value} if key else {})
+            try:
+                singles[-1].append(_validate(model, candidate))
+            except ValidationError as error:
+                problems.from_pydantic(name, error, model, candidate)
+    if len(problems.errors) > before:
+        return None
+    return singles if swept else []
+
+
+def _validate(model: type[Section], raw: dict[str, Any]) -> Section:
+    return model.model_validate({key: _tuples(value) for key, value in raw.items()})
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
+
+
+def _axis(
+    section: str, key: str, model: type[Section], raw: list[Any], parsed: list[Section], problems: Problems
+) -> Axis:
+    values = [getattr(item, key) for item in parsed]
+    info = model.model_fields[key]
+    extra: Any = info.json_schema_extra or {}
+    unit = extra.get("unit", "")
+    if isinstance(values[0], tuple):
+        labels = [" ".join(str(part) for part in value) for value in raw]
+    elif any(isinstance(value, Below) for value in values):
+        labels = [f"below {value['below']}" if isinstance(value, dict) else value for value in raw]
+    else:
+        labels = values
+    for label in dict.fromkeys(labels):
+        if labels.count(label) > 1:
+            problems.error(f"{section}.{key}", raw[labels.index(label)], "stands more than once in the list")
+    if unit == "" and all(isinstance(label, float | int) for label in labels):
+        unit = "1"
+    return Axis(section, key, tuple(labels), unit)

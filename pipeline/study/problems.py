@@ -1,0 +1,105 @@
+"""Problems of a study file: collected all at once, each with file, key, what was found and what is allowed."""
+
+import difflib
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing wrong (or, as a warning, doubtful) in a study file."""
+
+    key: str
+    found: Any
+    allowed: str
+
+    def __str__(self) -> str:
+        found = "" if self.found is None else f" = {_toml(self.found)}"
+        return f"{self.key}{found}: {self.allowed}"
+
+
+class StudyError(Exception):
+    """A study file that cannot be run, with every problem found in it."""
+
+    def __init__(self, file: str, problems: Iterable[Problem]):
+        self.file = file
+        self.problems = tuple(dict.fromkeys(problems))
+        super().__init__("\n".join(f"{file}: {problem}" for problem in self.problems))
+
+
+@dataclass
+class Problems:
+    """A growing list of errors and warnings; the same one twice counts once."""
+
+    errors: list[Problem] = field(default_factory=list)
+    warnings: list[Problem] = field(default_factory=list)
+
+    def error(self, key: str, found: Any, allowed: str) -> None:
+        """Add an error."""
+        self._add(self.errors, Problem(key, _hashable(found), allowed))
+
+    def warn(self, key: str, found: Any, allowed: str) -> None:
+        """Add a warning."""
+        self._add(self.warnings, Problem(key, _hashable(found), allowed))
+
+    def from_pydantic(self, prefix: str, error: ValidationError, model: type[BaseModel], raw: dict[str, Any]) -> None:
+        """Translate pydantic's errors of the section ``prefix``, read from ``raw``, for the study's author."""
+        for item in error.errors():
+            key = item["loc"][0] if item["loc"] else ""
+            self.error(f"{prefix}.{key}".rstrip("."), raw.get(str(key)), _allowed(item, model))
+
+    @staticmethod
+    def _add(problems: list[Problem], problem: Problem) -> None:
+        if problem not in problems:
+            problems.append(problem)
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return ``did you mean …`` with the nearest known name, or the list of all of them."""
+    known = list(known)
+    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    return f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(known)}"
+
+
+def _allowed(item: Any, model: type[BaseModel]) -> str:
+    context = item.get("ctx", {})
+    match item["type"]:
+        case "missing":
+            return "is required"
+        case "extra_forbidden":
+            return f"unknown key; {nearest(str(item['loc'][-1]), model.model_fields)}"
+        case "literal_error":
+            return f"must be {context['expected']}"
+        case "greater_than" | "greater_than_equal" | "less_than" | "less_than_equal":
+            bounds = {"gt": "greater than", "ge": "at least", "lt": "less than", "le": "at most"}
+            return "must be " + " and ".join(f"{bounds[k]} {v:g}" for k, v in context.items() if k in bounds)
+        case "quantity":
+            return f"must be {context['allowed']}"
+        case "too_short" | "too_long" | "tuple_type":
+            return f"must be a list of {_tuple_length(item, model)} values"
+        case "not_supported":
+            return item["msg"]
+        case _:
+            return item["msg"].replace("Input should be", "must be").replace("Value error, ", "")
+
+
+def _tuple_length(item: Any, model: type[BaseModel]) -> str:
+    names = [part for part in item["loc"] if isinstance(part, str)]
+    annotation = model.model_fields[names[0]].annotation if names else None
+    return str(len(getattr(annotation, "__args__", ()))) or "several"
+
+
+class _Raw(str):
+    """A value already written as it stands in the file."""
+
+
+def _hashable(value: Any) -> Any:
+    return value if value is None or isinstance(value, str | int | float | bool) else _Raw(_toml(value))
+
+
+def _toml(value: Any) -> str:
+    return value if isinstance(value, _Raw) else json.dumps(value, default=str, ensure_ascii=False)

@@ -1,0 +1,113 @@
+"""Sweeps: lists and arrays of tables in a study file become axes, and axes become cases."""
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf
+from typing import Any
+
+from pipeline.study.schema import AnyBody, AnyProbe, Material, Mesh, Section, Solve
+
+# Keys that both body and probe have: their dimension says whose it is.
+_AMBIGUOUS = ("radius", "shape")
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One swept input: a dimension of the dataset."""
+
+    section: str
+    key: str  # "" for an array of tables, which sweeps the section as a whole
+    labels: tuple[float | int | str, ...]
+    unit: str
+
+    @property
+    def name(self) -> str:
+        """Name of the dimension in the dataset."""
+        if not self.key:
+            return self.section
+        return f"{self.section}_{self.key}" if self.key in _AMBIGUOUS else self.key
+
+    @property
+    def path(self) -> str:
+        """Where it stands in the study file."""
+        return f"{self.section}.{self.key}" if self.key else self.section
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One scene with one mesh setting: yields one force."""
+
+    index: tuple[int, ...]
+    labels: tuple[tuple[str, float | int | str], ...]
+    body: AnyBody
+    material: Material
+    probe: AnyProbe
+    mesh: Mesh
+    solve: Solve
+
+    @property
+    def is_full(self) -> bool:
+        """Whether the mesh is fine everywhere: asked for as such, or with an ε past the whole body."""
+        reach = self.body.reach(self.probe.at)
+        return self.mesh.epsilon >= (reach**2 + self.body.height**2) ** 0.5
+
+    def __str__(self) -> str:
+        return ", ".join(f"{name} = {format_label(name, value)}" for name, value in self.labels) or "the one case"
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study file, read and found to make sense."""
+
+    file: str
+    name: str
+    title: str
+    text: str
+    axes: tuple[Axis, ...]
+    sections: dict[str, tuple[Section, ...]]  # every combination of a section's own axes, last axis fastest
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Lengths of the axes."""
+        return tuple(len(axis) for axis in self.axes)
+
+    @cached_property
+    def solve(self) -> Solve:
+        """The solver section, which is not swept."""
+        (solve,) = self.sections["solve"]
+        assert isinstance(solve, Solve)
+        return solve
+
+    def cases(self) -> Iterator[Case]:
+        """Yield every case, the last axis fastest."""
+        for index in itertools.product(*(range(n) for n in self.shape)):
+            yield self.case(index)
+
+    def case(self, index: tuple[int, ...]) -> Case:
+        """Return the case at ``index``, one number for each axis."""
+        chosen: dict[str, Any] = {}
+        for name, variants in self.sections.items():
+            flat = 0
+            for axis, i in zip(self.axes, index, strict=True):
+                if axis.section == name:
+                    flat = flat * len(axis) + i
+            chosen[name] = variants[flat]
+        labels = tuple((axis.name, axis.labels[i]) for axis, i in zip(self.axes, index, strict=True))
+        return Case(index=index, labels=labels, **chosen)
+
+
+def format_label(name: str, value: float | int | str) -> str:
+    """Write an axis label as people read it: lengths in mm, pressures in kPa."""
+    if isinstance(value, str):
+        return value
+    if value == inf:
+        return "full"
+    if name == "young":
+        return f"{value / 1e3:g} kPa"
+    return f"{value:g}" if name in ("poisson", "growth", "degree") else f"{value * 1e3:g} mm"

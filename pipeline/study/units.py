@@ -1,0 +1,75 @@
+"""Quantities written with their unit, as text, and read into SI numbers."""
+
+from functools import cache
+from typing import Annotated, Any
+
+import pint
+from pydantic import BeforeValidator, Field
+from pydantic_core import PydanticCustomError
+
+# The units a study file may use. A small registry loads in a millisecond, and a unit that makes no
+# sense here (light years, barn) is refused rather than converted.
+_DEFINITIONS = """
+nano- = 1e-9 = n-
+micro- = 1e-6 = µ- = u-
+milli- = 1e-3 = m-
+centi- = 1e-2 = c-
+kilo- = 1e3 = k-
+mega- = 1e6 = M-
+giga- = 1e9 = G-
+meter = [length] = m = metre
+second = [time] = s
+gram = [mass] = g
+newton = kilogram * meter / second ** 2 = N
+pascal = newton / meter ** 2 = Pa
+bar = 1e5 * pascal
+""".strip().splitlines()
+
+# Twelve digits: "3 mm" and "0.3 cm" must be one number wherever two cases are compared.
+_DIGITS = 12
+
+
+@cache
+def _registry() -> pint.UnitRegistry:
+    registry = pint.UnitRegistry(None)
+    for line in _DEFINITIONS:
+        registry.define(line)
+    return registry
+
+
+def canonical(value: float) -> float:
+    """Return ``value`` rounded to the digits in which two inputs count as equal."""
+    return float(f"{value:.{_DIGITS}g}")
+
+
+def parse_quantity(text: Any, unit: str) -> float:
+    """Read ``"10 mm"`` into a number in the SI ``unit``; a bare number is refused, never guessed."""
+    example = {"m": "10 mm", "Pa": "10 kPa"}[unit]
+    allowed = f'a number with a unit as text, such as "{example}"'
+    if not isinstance(text, str):
+        raise PydanticCustomError("quantity", "{allowed}", {"allowed": allowed})
+    try:
+        quantity = _registry().Quantity(text)
+        magnitude = float(quantity.to(unit).magnitude)
+    except pint.DimensionalityError:
+        kind = {"m": "a length", "Pa": "a pressure"}[unit]
+        raise PydanticCustomError("quantity", "{allowed}", {"allowed": f'{kind}, such as "{example}"'}) from None
+    except Exception:  # pint raises many kinds, down to tokenizer errors, on text that is no quantity
+        raise PydanticCustomError("quantity", "{allowed}", {"allowed": allowed}) from None
+    if not abs(magnitude) < float("inf"):
+        raise PydanticCustomError("quantity", "{allowed}", {"allowed": "a finite number with a unit"})
+    return canonical(magnitude)
+
+
+def _length(text: Any) -> float:
+    return parse_quantity(text, "m")
+
+
+def _pressure(text: Any) -> float:
+    return parse_quantity(text, "Pa")
+
+
+Coordinate = Annotated[float, BeforeValidator(_length), Field(json_schema_extra={"unit": "m"})]
+Length = Annotated[Coordinate, Field(gt=0)]
+Travel = Annotated[Coordinate, Field(ge=0)]
+Pressure = Annotated[float, BeforeValidator(_pressure), Field(gt=0, json_schema_extra={"unit": "Pa"})]
