@@ -9,13 +9,16 @@ from pipeline.study.schema import AnyProbe, Blade, Disc
 
 # Fewer segments than this would not tell a disc from a box.
 _FEWEST_SEGMENTS = 8
+# A column is a dozen edges round at least.
+_EDGES_PER_RADIUS = 2
 
 
 @dataclass(frozen=True)
 class Sizes:
     """Element sizes (m): ``fine`` within ``epsilon`` of the contact, ``rim`` at the probe's edge, else ``coarse``.
 
-    ``growth`` is the increase of size per unit of distance, both from the rim and beyond ``epsilon``.
+    ``growth`` is the increase of size per unit of distance, both from the rim and beyond ``epsilon``;
+    a ``column`` cut out of the body is resolved all along, however far it reaches beyond ``epsilon``.
     """
 
     epsilon: float
@@ -23,6 +26,7 @@ class Sizes:
     coarse: float
     rim: float
     growth: float
+    column: float = inf
 
     def rim_segments(self, probe: AnyProbe) -> int:
         """Return the number of edges along the rim of a disc, 0 for other probes."""
@@ -40,6 +44,8 @@ def set_size_field(sizes: Sizes, probe: AnyProbe, scale: float) -> None:
         outside = f"Max(Sqrt((x-({x:.15g}))^2+(y-({y:.15g}))^2+z^2)-{unit * sizes.epsilon:.15g},0)"
         terms.append(f"{unit * sizes.fine:.15g}+{sizes.growth:.15g}*{outside}")
         terms.append(f"{unit * sizes.coarse:.15g}")
+    if sizes.column < inf:
+        terms.append(f"{unit * sizes.column / _EDGES_PER_RADIUS:.15g}")
     field = gmsh.model.mesh.field
     tags = []
     for term in terms:

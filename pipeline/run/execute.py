@@ -186,8 +186,8 @@ def _elastic_body(mesh: BodyMesh, case: Case, *, shared: bool) -> ElasticBody:
 def _mesh_arrays(case: Case) -> MeshArrays:
     mesh, probe = case.mesh, case.probe
     epsilon = inf if case.is_full else mesh.epsilon
-    sizes = Sizes(epsilon, mesh.fine, mesh.coarse, mesh.rim_size(probe.half_width), mesh.growth)
     column = inf if mesh.outside == "coarse" else epsilon
+    sizes = Sizes(epsilon, mesh.fine, mesh.coarse, mesh.rim_size(probe.half_width), mesh.growth, column)
     straight = mesh.degree == 1
     scene = Scene(case.body, probe, column, mesh.outside == "fixed", sizes.rim_segments(probe), straight)
     arrays = generate(scene, sizes)

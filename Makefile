@@ -1,0 +1,52 @@
+# `make` lists the targets. Each does all the set-up that it needs.
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+
+STUDY ?= studies/figure3.toml
+NP ?= 1
+PYTEST_ARGS ?=
+
+PYTHON := .venv/bin/python
+EPSMESH := .venv/bin/epsmesh
+# One thread a rank; Open MPI asks before it runs as root, or on more ranks than there are cores.
+MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+MPIRUN = $(MPI_ENV) mpirun --oversubscribe -n
+
+.PHONY: help setup study studies test test-debian13 lint format clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: ## install what is missing (root or sudo for Debian's packages)
+	@scripts/setup.sh
+
+study: setup ## run one study: make study STUDY=studies/quick.toml NP=2
+ifeq ($(NP),1)
+	$(EPSMESH) run $(STUDY)
+else
+	$(MPIRUN) $(NP) $(EPSMESH) run $(STUDY)
+endif
+
+studies: setup ## run every study in studies/
+	$(EPSMESH) run studies/*.toml
+
+test: setup ## run the tests, serial and on 2 ranks
+	$(PYTHON) -m pytest $(PYTEST_ARGS)
+	$(MPIRUN) 2 scripts/one-voice.sh $(PYTHON) -m mpi4py -m pytest -m mpi -p no:cacheprovider $(PYTEST_ARGS)
+
+test-debian13: ## run the tests on Debian 13, in a root of its own (needs root)
+	@scripts/test-debian13.sh
+
+lint: setup ## ruff, mypy and the layers of the imports
+	.venv/bin/ruff check
+	.venv/bin/ruff format --check
+	.venv/bin/mypy
+	.venv/bin/lint-imports
+
+format: setup ## let ruff mend and format
+	.venv/bin/ruff check --fix
+	.venv/bin/ruff format
+
+clean: ## remove caches and the venv; results stay
+	rm -rf .venv .pytest_cache .mypy_cache .ruff_cache .import_linter_cache *.egg-info
+	find . -name __pycache__ -type d -not -path './.cache/*' -prune -exec rm -rf {} +

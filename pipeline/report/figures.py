@@ -1,0 +1,2 @@
+from pathlib import Path
+def draw(dataset, stem, formats=("png","svg")): return []

@@ -1,0 +1,84 @@
+#!/bin/bash
+# Install what is missing: Debian packages, then a venv that sees them, then this project in it.
+# Idempotent, and done in a fraction of a second when nothing is missing.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+# What binds to MPI's or numpy's ABI comes from Debian; only pure Python comes from PyPI.
+packages=(
+    python3-dolfinx python3-gmsh python3-mpi4py python3-petsc4py python3-numpy python3-scipy
+    python3-xarray python3-netcdf4 python3-matplotlib python3-venv python3-dev
+    libopenblas0-pthread openmpi-bin gcc g++ make git ca-certificates
+)
+python=/usr/bin/python3
+venv=.venv
+stamp=$venv/.epsmesh-setup
+
+fail() { echo "setup: $*" >&2; exit 1; }
+
+# ---- Debian packages ----------------------------------------------------------------------------------
+missing() {
+    local installed
+    installed=$(dpkg-query -W -f '${db:Status-Abbrev}${Package}\n' "${packages[@]}" 2>/dev/null | sed -n 's/^ii *//p')
+    for package in "${packages[@]}"; do
+        grep -qx -- "$package" <<<"$installed" || echo "$package"
+    done
+}
+
+command -v dpkg-query >/dev/null || fail "this needs Debian 12 or 13: its packages hold dolfinx, PETSc and gmsh"
+mapfile -t wanted < <(missing)
+if ((${#wanted[@]})); then
+    install="apt-get install -y --no-install-recommends ${wanted[*]}"
+    if ((EUID == 0)); then
+        as_root=(env)
+    elif command -v sudo >/dev/null && { sudo -n true 2>/dev/null || [[ -t 0 ]]; }; then
+        as_root=(sudo)
+    else
+        fail "Debian packages are missing and this is neither root nor sudo. Ask an administrator to run:
+    apt-get update && $install"
+    fi
+    echo "setup: installing ${#wanted[@]} Debian packages: ${wanted[*]}"
+    log=$(mktemp)
+    export DEBIAN_FRONTEND=noninteractive
+    "${as_root[@]}" apt-get update >"$log" 2>&1 &&
+        "${as_root[@]}" DEBIAN_FRONTEND=noninteractive $install >>"$log" 2>&1 </dev/null ||
+        { tail -n 20 "$log" >&2; fail "apt-get failed; the whole log is in $log"; }
+    rm -f "$log"
+fi
+
+# ---- venv ---------------------------------------------------------------------------------------------
+# The stamp says for which project file, interpreter and folder the venv was last made complete.
+state=$({ cat pyproject.toml scripts/setup.sh; readlink -f "$python"; pwd; } | sha256sum)
+[[ -f $stamp && $(<"$stamp") == "$state" && -x $venv/bin/epsmesh ]] && exit 0
+
+if [[ $(readlink -f "$venv/bin/python" 2>/dev/null) != $(readlink -f "$python") ]]; then
+    echo "setup: making $venv"
+    "$python" -m venv --clear --system-site-packages "$venv"
+fi
+echo "setup: installing the project and its Python packages into $venv"
+# pip must never replace what comes from Debian: pin it to what is there.
+constraints=$venv/constraints.txt
+"$python" - >"$constraints" <<'PYTHON'
+from importlib.metadata import PackageNotFoundError, version
+
+for name in ("numpy", "scipy", "matplotlib", "netCDF4", "mpi4py", "petsc4py", "pandas"):
+    try:
+        print(f"{name}=={version(name)}")
+    except PackageNotFoundError:
+        pass
+PYTHON
+"$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input -c "$constraints" -e '.[dev]' ||
+    fail "pip could not install the project"
+
+# ---- check --------------------------------------------------------------------------------------------
+"$venv/bin/python" - <<'PYTHON' || fail "the installed libraries do not work together"
+import dolfinx, gmsh, matplotlib, mpi4py, netCDF4, numpy, petsc4py, scipy, xarray  # noqa: E401, F401
+
+for module in (numpy, mpi4py, petsc4py):
+    assert module.__file__.startswith("/usr/"), f"{module.__name__} does not come from Debian: {module.__file__}"
+PYTHON
+blas=$(readlink -f "/usr/lib/$("$python" -c 'import sysconfig; print(sysconfig.get_config_var("MULTIARCH"))')/libblas.so.3")
+[[ $blas == *openblas* ]] ||
+    echo "setup: warning: BLAS is $blas, not OpenBLAS: factorisations take 8 times longer (update-alternatives)" >&2
+echo "$state" >"$stamp"
+echo "setup: done; the command is $venv/bin/epsmesh"

@@ -1,0 +1,54 @@
+"""Small studies for the tests, solved by the program's own run."""
+
+import copy
+from typing import Any
+
+from mpi4py import MPI
+
+from pipeline.plan.plan import make_plan
+from pipeline.run.execute import execute
+from pipeline.run.progress import Silent
+from pipeline.run.record import Record
+from pipeline.study.load import parse
+from pipeline.study.sweep import Study
+
+BASE: dict[str, Any] = {
+    "body": {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "bottom"},
+    "material": {"young": "10 kPa", "poisson": 0.3},
+    "probe": {"action": "pierce", "shape": "disc", "radius": "3 mm", "depth": "0.2 mm"},
+    "mesh": {"epsilon": "full", "fine": "5 mm", "coarse": "8 mm", "rim": "1 mm", "growth": 0.8, "degree": 2},
+}
+
+BLADE: dict[str, Any] = {"action": "cut", "shape": "blade", "length": "10 mm", "width": "3 mm", "depth": "0.1 mm"}
+
+
+def raw(**changes: Any) -> dict[str, Any]:
+    """Return the base study with sections updated, or replaced where ``shape`` changes; None removes a key."""
+    study = copy.deepcopy(BASE)
+    for section, values in changes.items():
+        replaced = not isinstance(values, dict) or "shape" in values or section not in study
+        study[section] = values if replaced else {**study[section], **values}
+        if isinstance(study[section], dict):
+            study[section] = {key: value for key, value in study[section].items() if value is not None}
+    return study
+
+
+def study(**changes: Any) -> Study:
+    """Return the base study with changes, parsed."""
+    return parse(raw(**changes))
+
+
+def solve(comm: MPI.Comm = MPI.COMM_SELF, **changes: Any) -> dict[tuple[int, ...], Record]:
+    """Run the base study with changes and return the record of every case, by index."""
+    plan = make_plan(study(**changes))
+    records: dict[str, Record] = {}
+    execute(plan, comm, lambda record: records.__setitem__(record.key, record), Silent())
+    records = comm.bcast(records)
+    return {case.index: records[key] for case, key in zip(plan.study.cases(), plan.keys, strict=True)}
+
+
+def force(comm: MPI.Comm = MPI.COMM_SELF, **changes: Any) -> float:
+    """Run a study of one case and return its force (N)."""
+    (record,) = solve(comm, **changes).values()
+    assert record.status == "ok", record.message
+    return record.force

@@ -1,0 +1,127 @@
+"""Meshes: repeatable to the last node, true to the geometry, sized as asked."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from math import inf, pi
+
+import numpy as np
+import pytest
+
+from pipeline.mesh.curve import curve
+from pipeline.mesh.generate import MeshArrays, MeshError, generate
+from pipeline.mesh.size import Sizes
+from pipeline.scene.model import Scene
+from tests.cases import BLADE, study
+
+SIZES = Sizes(epsilon=8e-3, fine=2e-3, coarse=8e-3, rim=0.4e-3, growth=0.5)
+
+
+def scene(column: float = inf, held: bool = False, straight: bool = False, **changes) -> Scene:
+    case = study(**changes).case(())
+    return Scene(case.body, case.probe, column, held, SIZES.rim_segments(case.probe), straight)
+
+
+def volume(mesh: MeshArrays) -> float:
+    corners = mesh.points[mesh.cells[:, :4]]
+    return float(np.linalg.det(corners[:, 1:] - corners[:, :1]).sum() / 6)
+
+
+def area(mesh: MeshArrays, group: str) -> float:
+    corners = mesh.points[mesh.facets[group]]
+    return float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2)
+
+
+def test_same_input_same_mesh_in_this_process_and_in_another():
+    code = (
+        "from tests.mesh.test_mesh import *; import hashlib; m = curve(generate(scene(), SIZES), scene());"
+        "print(hashlib.sha256(m.points.tobytes() + m.cells.tobytes()).hexdigest())"
+    )
+    outputs = {subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout for _ in "ab"}
+    here = [curve(generate(scene(), SIZES), scene()) for _ in "ab"]
+    assert len(outputs) == 1
+    assert np.array_equal(here[0].points, here[1].points)
+    assert np.array_equal(here[0].cells, here[1].cells)
+
+
+@pytest.mark.parametrize("probe", [None, BLADE | {"direction": [1.0, 2.0, 0.0], "at": ["3 mm", "-2 mm"]}])
+@pytest.mark.parametrize("body", ["box", "cylinder"])
+def test_groups_cover_the_surface(body, probe):
+    shapes = {
+        "box": {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "bottom+sides"},
+        "cylinder": {"shape": "cylinder", "radius": "25 mm", "height": "20 mm", "fixed": {"below": "-12 mm"}},
+    }
+    changes = {"body": shapes[body]} | ({"probe": probe} if probe else {})
+    mesh = generate(scene(straight=True, **changes), SIZES)
+    footprint = 30e-6 if probe else pi * 9e-6
+    held = {"box": 40e-3**2 + 4 * 40e-3 * 20e-3, "cylinder": pi * 25e-3**2 + 2 * pi * 25e-3 * 8e-3}[body]
+    top = 40e-3**2 if body == "box" else pi * 25e-3**2
+    rest = top - footprint + (0 if body == "box" else 2 * pi * 25e-3 * 12e-3)
+    assert area(mesh, "probe") == pytest.approx(footprint, rel=1e-9)
+    assert area(mesh, "fixed") == pytest.approx(held, rel=1e-9 if body == "box" else 0.02)
+    assert area(mesh, "free") == pytest.approx(rest, rel=1e-9 if body == "box" else 0.02)
+    assert volume(mesh) == pytest.approx(top * 20e-3, rel=1e-9 if body == "box" else 0.02)
+
+
+@pytest.mark.parametrize("held", [False, True])
+@pytest.mark.parametrize("column", [3e-3, 6e-3, 25e-3])
+def test_column(column, held):
+    """A column of 25 mm sticks out of the sides of the box, whose corners it cuts off; 3 mm is the disc's radius."""
+    mesh = generate(scene(column, held), replace(SIZES, column=column))
+    assert ("cut" in mesh.facets) is not held
+    assert volume(mesh) == pytest.approx({25e-3: 31.14e-6}.get(column, pi * column**2 * 20e-3), rel=0.06)
+
+
+def test_curved_rim_and_sides_are_round():
+    mesh = scene(column=10e-3)
+    curved = curve(generate(mesh, SIZES), mesh)
+    assert curved.cells.shape[1] == 10
+    radius = np.hypot(curved.points[:, 0], curved.points[:, 1])
+    corners = np.unique(curved.cells[:, :4])
+    on_side = np.abs(radius - 10e-3) < 1e-9
+    assert np.setdiff1d(np.flatnonzero(on_side), corners).size > 50
+    assert np.setdiff1d(np.flatnonzero(np.abs(radius - 3e-3) < 1e-9), corners).size >= SIZES.rim_segments(mesh.probe)
+
+
+def test_quarter_points_lie_on_edges_that_end_on_the_rim():
+    mesh = scene()
+    plain = generate(mesh, SIZES)
+    curved = curve(plain, mesh)
+    edges = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
+    ends = curved.cells[:, :4][:, edges].reshape(-1, 2)
+    middle = curved.cells[:, 4:].reshape(-1)
+    one = np.isin(ends, plain.rim).sum(axis=1) == 1
+    at_rim = np.where(np.isin(ends[:, 0], plain.rim), ends[:, 0], ends[:, 1])
+    lengths = np.linalg.norm(curved.points[ends[:, 0]] - curved.points[ends[:, 1]], axis=1)
+    share = np.linalg.norm(curved.points[middle] - curved.points[at_rim], axis=1) / lengths
+    assert np.median(share[one]) == pytest.approx(0.25, abs=1e-3)
+    assert np.median(share[~one]) >= 0.4
+
+
+def test_polygon_of_a_straight_rim_has_the_area_of_the_disc():
+    assert area(generate(scene(straight=True), SIZES), "probe") == pytest.approx(pi * 9e-6, rel=1e-9)
+
+
+def test_sizes_are_as_asked():
+    mesh = generate(scene(straight=True), SIZES)
+    edges = mesh.points[mesh.cells][:, [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]]
+    length = np.linalg.norm(edges[:, :, 0] - edges[:, :, 1], axis=2).mean(axis=1)
+    centre = mesh.points[mesh.cells].mean(axis=1)
+    far = np.linalg.norm(centre, axis=1)
+    rim = np.hypot(np.hypot(centre[:, 0], centre[:, 1]) - 3e-3, centre[:, 2])
+    assert np.median(length[rim < 0.4e-3]) == pytest.approx(0.6e-3, rel=0.3)
+    assert np.median(length[(far < 8e-3) & (rim > 4e-3)]) == pytest.approx(2e-3, rel=0.4)
+    assert np.median(length[far > 18e-3]) > 4e-3
+
+
+def test_blade_corners_are_refined():
+    mesh = generate(scene(probe=BLADE), SIZES)
+    corners = np.array([[x, y, 0] for x in (-5e-3, 5e-3) for y in (-1.5e-3, 1.5e-3)])
+    for corner in corners:
+        distance = np.linalg.norm(mesh.points - corner, axis=1)
+        assert np.sort(distance)[1] < 0.6e-3
+
+
+def test_nothing_held_is_refused():
+    with pytest.raises(MeshError, match="float"):
+        generate(scene(column=6e-3, body={"fixed": "sides"}), SIZES)
