@@ -50,7 +50,8 @@ def validate(files: Files, as_json: Json = False) -> None:
 
     Example: epsmesh validate studies/*.toml
     """
-    failed, report = False, []
+    failed = False
+    report: list[dict[str, Any]] = []
     for file in files:
         try:
             study = load(file)
@@ -125,8 +126,10 @@ def status(file: File, output: Output = DEFAULT_OUTPUT, store: StoreFile = None,
 
 
 @app.command()
-def plot(file: Annotated[Path, typer.Argument(help="A dataset (.nc), or a study file whose dataset exists.")],
-         output: Output = DEFAULT_OUTPUT) -> None:
+def plot(
+    file: Annotated[Path, typer.Argument(help="A dataset (.nc), or a study file whose dataset exists.")],
+    output: Output = DEFAULT_OUTPUT,
+) -> None:
     """Draw the figure of a dataset again, as PNG and SVG.
 
     Example: epsmesh plot results/figure3.nc
@@ -242,7 +245,8 @@ def _write(plan: Plan, records: dict[str, "Record"], attributes: dict[str, str],
 def _stop(study: Study, plan: Plan, records: dict[str, "Record"], comm: Any) -> NoReturn:
     if comm.rank == 0:
         done = sum(key in records for key in plan.keys)
-        _error(f"interrupted: {done} of {len(plan.keys)} cases are on record; `epsmesh run {study.file}` goes on from there")
+        again = f"`epsmesh run {study.file}` goes on from there"
+        _error(f"interrupted: {done} of {len(plan.keys)} cases are on record; {again}")
     if comm.size > 1:
         comm.Abort(INTERRUPTED)
     raise typer.Exit(INTERRUPTED)

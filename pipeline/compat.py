@@ -15,6 +15,7 @@ import gmsh
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -25,7 +26,7 @@ _JIT = {
         ("ffcx", "form_compiler_options", "form_compiler_params"),
     )
 }
-_DIAGONAL = "diag" if "diag" in inspect.signature(fem.petsc.assemble_matrix).parameters else "diagonal"
+_DIAGONAL = "diag" if "diag" in inspect.signature(fem_petsc.assemble_matrix).parameters else "diagonal"
 
 
 @contextmanager
@@ -89,9 +90,9 @@ def form(expression: Any, cache: str) -> Any:
 
 def assemble_matrix(form: Any, bcs: list[Any], diagonal: float, mat_type: str) -> PETSc.Mat:
     """Assemble a matrix with the rows and columns of ``bcs`` replaced by ``diagonal``; collective."""
-    matrix = fem.petsc.create_matrix(form, mat_type)
+    matrix = fem_petsc.create_matrix(form, mat_type)
     try:
-        fem.petsc.assemble_matrix(matrix, form, bcs=bcs, **{_DIAGONAL: diagonal})
+        fem_petsc.assemble_matrix(matrix, form, bcs=bcs, **{_DIAGONAL: diagonal})
         matrix.assemble()
     except BaseException:
         matrix.destroy()
@@ -101,8 +102,8 @@ def assemble_matrix(form: Any, bcs: list[Any], diagonal: float, mat_type: str) -
 
 def interpolation_matrix(coarse: Any, fine: Any) -> PETSc.Mat:
     """Return the matrix that carries functions of ``coarse`` to ``fine``; collective."""
-    if hasattr(fem.petsc, "interpolation_matrix"):
-        matrix = fem.petsc.interpolation_matrix(coarse, fine)
+    if hasattr(fem_petsc, "interpolation_matrix"):
+        matrix = fem_petsc.interpolation_matrix(coarse, fine)
     else:
         spaces = (getattr(space, "_cpp_object", space) for space in (coarse, fine))
         matrix = dolfinx.cpp.fem.petsc.interpolation_matrix(*spaces)

@@ -19,7 +19,8 @@ fail() { echo "setup: $*" >&2; exit 1; }
 # ---- Debian packages ----------------------------------------------------------------------------------
 missing() {
     local installed
-    installed=$(dpkg-query -W -f '${db:Status-Abbrev}${Package}\n' "${packages[@]}" 2>/dev/null | sed -n 's/^ii *//p')
+    # dpkg-query fails when any of them is unknown; what it prints of the others still counts.
+    installed=$(dpkg-query -W -f '${db:Status-Abbrev}${Package}\n' "${packages[@]}" 2>/dev/null | sed -n 's/^ii *//p') || true
     for package in "${packages[@]}"; do
         grep -qx -- "$package" <<<"$installed" || echo "$package"
     done

@@ -23,7 +23,9 @@ def curve(mesh: MeshArrays, scene: Scene) -> MeshArrays:
     """Return ``mesh`` with ten nodes a cell, on the true rim and sides, with quarter-point nodes at the rim."""
     corners = mesh.cells
     pairs = np.sort(corners[:, _EDGES].reshape(-1, 2), axis=1)
-    keys, first, inverse = np.unique(pairs[:, 0] * len(mesh.points) + pairs[:, 1], return_index=True, return_inverse=True)
+    keys, first, inverse = np.unique(
+        pairs[:, 0] * len(mesh.points) + pairs[:, 1], return_index=True, return_inverse=True
+    )
     edges = pairs[first]
     straight = mesh.points[edges].mean(axis=1)
     of_cell = inverse.reshape(-1, len(_EDGES))

@@ -69,4 +69,6 @@ def _plain(value: Any) -> Any:
     if isinstance(value, tuple):
         return [_plain(v) for v in value]
     # Whole numbers and their floats are one value; there is no negative zero.
-    return float(value) + 0.0 if isinstance(value, int | float) and not isinstance(value, bool) and value != inf else value
+    return (
+        float(value) + 0.0 if isinstance(value, int | float) and not isinstance(value, bool) and value != inf else value
+    )

@@ -108,8 +108,10 @@ def _add_ratios(dataset: xr.Dataset) -> xr.Dataset:
         units="N", long_name="force of the full-order mesh of the same study (F_max)"
     )
     dataset["force_ratio"] = (force / full_force).transpose(*order).assign_attrs(units="1", long_name="F / F_max")
-    dataset["speedup"] = (full_seconds / seconds).transpose(*order).assign_attrs(
-        units="1", long_name="time of the full-order case over time of this case"
+    dataset["speedup"] = (
+        (full_seconds / seconds)
+        .transpose(*order)
+        .assign_attrs(units="1", long_name="time of the full-order case over time of this case")
     )
     return dataset
 

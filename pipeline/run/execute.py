@@ -2,10 +2,12 @@
 
 import gc
 import statistics
+import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -67,7 +69,7 @@ class _Runner:
         memory = PeakMemory(self.comm)
         if repeats > 1:
             (solve,) = step.solves
-            self._record_all([solve], lambda: self._repeat(step, repeats, memory))
+            self._record_one(solve, lambda: self._repeat(step, repeats, memory))
             return
         meshed: list[tuple[BodyMesh, float]] = []
         if not self._guard(step.solves, lambda: meshed.append(self._mesh(step.case))):
@@ -84,7 +86,8 @@ class _Runner:
         with bodies[0] as body:
             for solve in step.solves:
                 self._progress.note(str(solve.case))
-                self._record_all([solve], lambda solve=solve: self._solve(solve, body, mesh, mesh_seconds, memory))
+                compute = partial(self._solve, solve, body, mesh, mesh_seconds, memory)
+                self._record_one(solve, compute)
 
     def _solve(self, solve: Solve, body: ElasticBody, mesh: BodyMesh, seconds: float, memory: PeakMemory) -> Record:
         case = solve.case
@@ -144,11 +147,11 @@ class _Runner:
                 "use larger elements, or a smaller epsilon"
             )
 
-    def _record_all(self, solves: list[Solve], compute: Callable[[], Record]) -> None:
-        """Compute and keep a record; if that fails, keep records of the failure."""
+    def _record_one(self, solve: Solve, compute: Callable[[], Record]) -> None:
+        """Compute and keep a record; if that fails, keep a record of the failure."""
         done: list[Record] = []
-        if self._guard(tuple(solves), lambda: done.append(compute())):
-            self._finish(solves[0], done[0])
+        if self._guard((solve,), lambda: done.append(compute())):
+            self._finish(solve, done[0])
 
     def _guard(self, solves: tuple[Solve, ...], compute: Callable[[], None]) -> bool:
         """Run ``compute``; if it fails, record the failure of ``solves``. Return whether it went well; collective.
@@ -218,7 +221,5 @@ def abort_on_exception(comm: MPI.Comm) -> Iterator[None]:
     except Exception:
         if comm.size == 1:
             raise
-        import traceback
-
         traceback.print_exc()
         comm.Abort(1)

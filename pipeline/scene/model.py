@@ -79,7 +79,9 @@ def build(scene: Scene) -> list[int]:
     _, children = occ.fragment(volumes, tools)
     occ.synchronize()
     # Pieces of a tool that stick out of the body bound no volume: drop them.
-    inside = {tag for volume in gmsh.model.getEntities(3) for _, tag in gmsh.model.getBoundary([volume], oriented=False)}
+    inside = {
+        tag for volume in gmsh.model.getEntities(3) for _, tag in gmsh.model.getBoundary([volume], oriented=False)
+    }
     stray = [face for face in gmsh.model.getEntities(2) if face[1] not in inside]
     if stray:
         occ.remove(stray, recursive=True)

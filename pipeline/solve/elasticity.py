@@ -91,7 +91,9 @@ class ElasticBody:
             assemble = time.perf_counter() - start
             levels = []
             for space in spaces:
-                matrix, seconds = space.operator(lame, shared=self._shared, blocked=not direct and space is fine and fine.degree > 1)
+                matrix, seconds = space.operator(
+                    lame, shared=self._shared, blocked=not direct and space is fine and fine.degree > 1
+                )
                 stack.callback(matrix.destroy)
                 levels.append(Level(space.space, matrix, space.prescribed))
                 assemble += seconds
@@ -110,7 +112,9 @@ class ElasticBody:
             reaction, energy, self._max_strain(), balance, self.dofs, iterations, assemble, setup, seconds
         )  # fmt: skip
 
-    def _reaction(self, unknown: PETSc.Vec, lame: tuple[float, float]) -> tuple[tuple[float, float, float], float, float]:
+    def _reaction(
+        self, unknown: PETSc.Vec, lame: tuple[float, float]
+    ) -> tuple[tuple[float, float, float], float, float]:
         """Return the force on the probe, the strain energy, and how well they balance."""
         fine = self._fine
         fine.set_displacement(unknown)

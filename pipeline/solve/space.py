@@ -4,11 +4,10 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem
+from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 
 from pipeline import compat
@@ -119,7 +118,7 @@ class ConstrainedSpace:
     def apply(self, result: PETSc.Vec, lame: tuple[float, float]) -> None:
         """Add K u, with the unmodified operator, to ``result``; collective."""
         self.forms.set_lame(*lame)
-        fem.petsc.assemble_vector(result, self.forms.action)
+        fem_petsc.assemble_vector(result, self.forms.action)
         result.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
 
     def _assemble(self, lame: tuple[float, float], diagonal: float, mat_type: str) -> PETSc.Mat:

@@ -44,7 +44,8 @@ def _mm(length: float) -> str:
 def _check_body(body: AnyBody, problems: Problems) -> None:
     if isinstance(body.fixed, Below) and not -body.height < body.fixed.below < 0:
         problems.error(
-            "body.fixed", f"below {_mm(body.fixed.below)}",
+            "body.fixed",
+            f"below {_mm(body.fixed.below)}",
             f"must lie inside the body: between -{_mm(body.height)} and 0 mm",
         )
 
@@ -52,7 +53,8 @@ def _check_body(body: AnyBody, problems: Problems) -> None:
 def _check_probe(probe: AnyProbe, problems: Problems) -> None:
     if probe.depth > _LINEAR * probe.half_width:
         problems.warn(
-            "probe.depth", _mm(probe.depth),
+            "probe.depth",
+            _mm(probe.depth),
             f"is more than {_LINEAR:.0%} of the probe's half width {_mm(probe.half_width)}: linear elasticity is "
             "then an extrapolation (F stays proportional to depth)",
         )
@@ -84,13 +86,15 @@ def _check_fit(body: AnyBody, probe: AnyProbe, problems: Problems) -> None:
         (tx, ty), half_l, half_w = probe.along, probe.length / 2, probe.width / 2
         points = [
             (probe.at[0] + i * half_l * tx - j * half_w * ty, probe.at[1] + i * half_l * ty + j * half_w * tx)
-            for i in (-1, 1) for j in (-1, 1)
+            for i in (-1, 1)
+            for j in (-1, 1)
         ]
         reach = 0.0
     if min(body.gap(point) for point in points) - reach <= 0:
         top = f"{_mm(body.size[0])} × {_mm(body.size[1])}" if isinstance(body, Box) else f"radius {_mm(body.radius)}"
         problems.error(
-            "probe.at", [_mm(x) for x in probe.at],
+            "probe.at",
+            [_mm(x) for x in probe.at],
             f"the footprint of the {probe.shape} must lie inside the body's top ({top}), not on or over its edge",
         )
 
@@ -98,13 +102,15 @@ def _check_fit(body: AnyBody, probe: AnyProbe, problems: Problems) -> None:
 def _check_epsilon(mesh: Mesh, probe: AnyProbe, problems: Problems) -> None:
     if mesh.epsilon < probe.circumradius:
         problems.warn(
-            "mesh.epsilon", _mm(mesh.epsilon),
+            "mesh.epsilon",
+            _mm(mesh.epsilon),
             f"is less than the probe's radius {_mm(probe.circumradius)}: part of the contact lies outside the fine mesh"
             + ("" if mesh.outside == "coarse" else ", and the column cuts the footprint off"),
         )
     if mesh.rim_size(probe.half_width) > probe.half_width:
         problems.warn(
-            "mesh.rim", _mm(mesh.rim_size(probe.half_width)),
+            "mesh.rim",
+            _mm(mesh.rim_size(probe.half_width)),
             f"does not resolve the probe, whose half width is {_mm(probe.half_width)}: F may be far off",
         )
 
@@ -112,21 +118,24 @@ def _check_epsilon(mesh: Mesh, probe: AnyProbe, problems: Problems) -> None:
 def _check_outside(body: AnyBody, mesh: Mesh, problems: Problems) -> None:
     if mesh.outside == "free" and body.fixed == "sides" and isfinite(mesh.epsilon):
         problems.error(
-            "mesh.outside", mesh.outside,
+            "mesh.outside",
+            mesh.outside,
             "the column round the probe does not touch the fixed sides and would float: "
-            "use `outside = \"coarse\"` or \"fixed\", or fix the bottom",
+            'use `outside = "coarse"` or "fixed", or fix the bottom',
         )
 
 
 def _check_locking(material: Material, mesh: Mesh, problems: Problems) -> None:
     if material.poisson >= 0.5:
         problems.error(
-            "material.poisson", material.poisson,
+            "material.poisson",
+            material.poisson,
             "an incompressible material needs mixed elements, which are not supported; must be less than 0.5",
         )
     elif material.poisson > _LOCKING[mesh.degree] or (mesh.degree == 1 and material.poisson >= _LOCKING[1]):
         problems.warn(
-            "material.poisson", material.poisson,
+            "material.poisson",
+            material.poisson,
             f"displacement elements of degree {mesh.degree} lock at this value: F comes out too high",
         )
 
@@ -135,6 +144,7 @@ def _check_reference(meshes: tuple[Section, ...], axes: tuple[Axis, ...], proble
     if all(isfinite(mesh.epsilon) for mesh in meshes if isinstance(mesh, Mesh)):
         swept = any(axis.name == "epsilon" for axis in axes)
         problems.warn(
-            "mesh.epsilon", None,
-            f"{'the list has' if swept else 'there is'} no \"full\" case: F_max, F/F_max and speed-up stay empty",
+            "mesh.epsilon",
+            None,
+            f'{"the list has" if swept else "there is"} no "full" case: F_max, F/F_max and speed-up stay empty',
         )

@@ -86,8 +86,10 @@ def _read_section(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], 
     singles = _validate_each(name, model, raw, swept, problems)
     if singles is None:
         return [], ()
-    axes = [_axis(name, key, model, values, [s[i] for i in range(len(values))], problems) for (key, values), s in zip(
-        swept.items(), singles, strict=True)]
+    axes = [
+        _axis(name, key, model, values, [s[i] for i in range(len(values))], problems)
+        for (key, values), s in zip(swept.items(), singles, strict=True)
+    ]
     combinations = list(itertools.islice(itertools.product(*swept.values()), _MOST_VARIANTS + 1))
     if len(combinations) > _MOST_VARIANTS:
         problems.error(name, None, f"sweeps more than {_MOST_VARIANTS} combinations")
@@ -111,14 +113,18 @@ def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[
             continue
         for key, value in table.items():
             if _is_sweep(model, key, value):
-                problems.error(f"{where}.{key}", value, "a list inside an array of tables: write one table for each value")
+                problems.error(
+                    f"{where}.{key}", value, "a list inside an array of tables: write one table for each value"
+                )
         try:
             variants.append(_validate(model, table))
         except ValidationError as error:
             problems.from_pydantic(where, error, model, table)
     names = [variant.name for variant in variants]
     for label in sorted({n for n in names if names.count(n) > 1 and n}):
-        problems.error(f"{name}.name", label, "is the name of more than one table; names label the sweep and must differ")
+        problems.error(
+            f"{name}.name", label, "is the name of more than one table; names label the sweep and must differ"
+        )
     return [Axis(name, "", tuple(names), "")], tuple(variants)
 
 

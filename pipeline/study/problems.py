@@ -49,8 +49,8 @@ class Problems:
     def from_pydantic(self, prefix: str, error: ValidationError, model: type[BaseModel], raw: dict[str, Any]) -> None:
         """Translate pydantic's errors of the section ``prefix``, read from ``raw``, for the study's author."""
         for item in error.errors():
-            key = item["loc"][0] if item["loc"] else ""
-            self.error(f"{prefix}.{key}".rstrip("."), raw.get(str(key)), _allowed(item, model))
+            key = str(item["loc"][0]) if item["loc"] else ""
+            self.error(f"{prefix}.{key}".rstrip("."), raw.get(key), _allowed(item, model))
 
     @staticmethod
     def _add(problems: list[Problem], problem: Problem) -> None:
@@ -68,7 +68,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
 def _allowed(item: Any, model: type[BaseModel]) -> str:
     context = item.get("ctx", {})
     match item["type"]:
-        case "missing":
+        case "missing" if len(item["loc"]) == 1:
             return "is required"
         case "extra_forbidden":
             return f"unknown key; {nearest(str(item['loc'][-1]), model.model_fields)}"
@@ -79,18 +79,13 @@ def _allowed(item: Any, model: type[BaseModel]) -> str:
             return "must be " + " and ".join(f"{bounds[k]} {v:g}" for k, v in context.items() if k in bounds)
         case "quantity":
             return f"must be {context['allowed']}"
-        case "too_short" | "too_long" | "tuple_type":
-            return f"must be a list of {_tuple_length(item, model)} values"
+        case "missing" | "too_short" | "too_long" | "tuple_type":
+            values = getattr(model.model_fields[str(item["loc"][0])].annotation, "__args__", ())
+            return f"must be a list of {len(values)} values"
         case "not_supported":
             return item["msg"]
         case _:
             return item["msg"].replace("Input should be", "must be").replace("Value error, ", "")
-
-
-def _tuple_length(item: Any, model: type[BaseModel]) -> str:
-    names = [part for part in item["loc"] if isinstance(part, str)]
-    annotation = model.model_fields[names[0]].annotation if names else None
-    return str(len(getattr(annotation, "__args__", ()))) or "several"
 
 
 class _Raw(str):

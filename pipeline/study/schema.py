@@ -26,7 +26,7 @@ def _refuse(kind: str, later: tuple[str, ...], supported: tuple[str, ...]) -> Be
     def check(value: Any) -> Any:
         if value in later:
             message = f'{kind} "{value}" is not supported; supported: {", ".join(supported)}'
-            raise PydanticCustomError("not_supported", message)  # type: ignore[arg-type]
+            raise PydanticCustomError("not_supported", message)
         return value
 
     return BeforeValidator(check)
@@ -121,9 +121,7 @@ class Material(Section):
 
 # ---- probes -----------------------------------------------------------------------------------------
 
-Contact = Annotated[
-    Literal["bonded", "frictionless"], _refuse("contact", ("unilateral",), ("bonded", "frictionless"))
-]
+Contact = Annotated[Literal["bonded", "frictionless"], _refuse("contact", ("unilateral",), ("bonded", "frictionless"))]
 
 
 class Probe(Section):

@@ -29,7 +29,9 @@ def volume(mesh: MeshArrays) -> float:
 
 def area(mesh: MeshArrays, group: str) -> float:
     corners = mesh.points[mesh.facets[group]]
-    return float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2)
+    return float(
+        np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+    )
 
 
 def test_same_input_same_mesh_in_this_process_and_in_another():
@@ -37,7 +39,9 @@ def test_same_input_same_mesh_in_this_process_and_in_another():
         "from tests.mesh.test_mesh import *; import hashlib; m = curve(generate(scene(), SIZES), scene());"
         "print(hashlib.sha256(m.points.tobytes() + m.cells.tobytes()).hexdigest())"
     )
-    outputs = {subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout for _ in "ab"}
+    outputs = {
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout for _ in "ab"
+    }
     here = [curve(generate(scene(), SIZES), scene()) for _ in "ab"]
     assert len(outputs) == 1
     assert np.array_equal(here[0].points, here[1].points)

@@ -1,0 +1,146 @@
+"""A study file: every kind of mistake gets its message, and all of them at once."""
+
+from pathlib import Path
+
+import pytest
+
+from pipeline.plan.key import case_key
+from pipeline.study.load import load, parse
+from pipeline.study.problems import StudyError
+from tests.cases import BLADE, raw, study
+
+STUDIES = sorted(Path("studies").glob("*.toml"))
+
+# section changes -> what the message must hold: the key, what was found, what is allowed
+MISTAKES = {
+    "bare number": ({"probe": {"radius": 2}}, ["probe.radius = 2", 'such as "10 mm"']),
+    "wrong unit": ({"probe": {"radius": "2 kPa"}}, ['probe.radius = "2 kPa"', "a length"]),
+    "no quantity": ({"material": {"young": "soft"}}, ['material.young = "soft"', "10 kPa"]),
+    "unknown unit": ({"probe": {"depth": "1 parsec"}}, ['probe.depth = "1 parsec"', "unit"]),
+    "negative length": ({"probe": {"radius": "-2 mm"}}, ['probe.radius = "-2 mm"', "greater than 0"]),
+    "poisson above": ({"material": {"poisson": 0.7}}, ["material.poisson = 0.7", "at most 0.5"]),
+    "poisson below": ({"material": {"poisson": -0.1}}, ["material.poisson = -0.1", "at least 0"]),
+    "incompressible": ({"material": {"poisson": 0.5}}, ["material.poisson = 0.5", "mixed"]),
+    "not a number": ({"material": {"poisson": float("nan")}}, ["material.poisson"]),
+    "text for a number": ({"material": {"poisson": "0.3"}}, ['material.poisson = "0.3"', "number"]),
+    "unknown key": ({"material": {"poison": 0.3}}, ["material.poison = 0.3", "did you mean `poisson`?"]),
+    "unknown section": ({"materials": {}}, ["materials", "did you mean `material`?"]),
+    "missing key": ({"material": {"young": None}}, ["material.young", "required"]),
+    "unknown shape": ({"probe": {"shape": "disk"}}, ['probe.shape = "disk"', "did you mean `disc`?"]),
+    "later probe": ({"probe": {"shape": "sphere"}}, ['probe.shape = "sphere"', "not supported", "disc, blade"]),
+    "later body": ({"body": {"shape": "ellipsoid"}}, ["not supported", "box, cylinder"]),
+    "later contact": ({"probe": {"contact": "unilateral"}}, ["not supported", "bonded, frictionless"]),
+    "later element": ({"mesh": {"element": "mixed"}}, ["not supported", "displacement"]),
+    "later key": ({"mesh": {"accuracy": "1 %"}}, ["mesh.accuracy", "not supported"]),
+    "later section": ({"load": {"gravity": 1}}, ["load", "not supported"]),
+    "wrong word": ({"mesh": {"outside": "void"}}, ['mesh.outside = "void"', "'coarse', 'free' or 'fixed'"]),
+    "degree": ({"mesh": {"degree": 4}}, ["mesh.degree = 4", "1, 2 or 3"]),
+    "vector length": ({"body": {"size": ["1 mm", "2 mm"]}}, ["body.size", "3 values"]),
+    "support": ({"body": {"fixed": "top"}}, ['body.fixed = "top"', "'bottom'"]),
+    "support height": ({"body": {"fixed": {"below": "-30 mm"}}}, ["body.fixed", "inside the body"]),
+    "support table": ({"body": {"fixed": {"above": "-3 mm"}}}, ["body.fixed", "below"]),
+    "footprint outside": ({"probe": {"at": ["19 mm", "0 mm"]}}, ["probe.at", "inside the body's top"]),
+    "blade outside": ({"probe": BLADE | {"length": "41 mm"}}, ["probe.at", "blade"]),
+    "fine above coarse": ({"mesh": {"fine": "9 mm"}}, ['mesh.fine = "9 mm"', "at most coarse = 8 mm"]),
+    "rim above fine": ({"mesh": {"rim": "6 mm"}}, ['mesh.rim = "6 mm"', "at most fine"]),
+    "direction": ({"probe": BLADE | {"direction": [0.0, 0.0, 1.0]}}, ["probe.direction", "horizontal"]),
+    "slice without cut": (
+        {"probe": BLADE | {"action": "pierce", "slice": "1 mm"}}, ["probe.slice", 'action = "cut"'],
+    ),
+    "slice without friction": (
+        {"probe": BLADE | {"contact": "frictionless", "slice": "1 mm"}}, ["probe.slice", "frictionless"],
+    ),
+    "disc that cuts": ({"probe": {"action": "cut"}}, ['probe.action = "cut"', "'pierce'"]),
+    "floating column": (
+        {"body": {"fixed": "sides"}, "mesh": {"outside": "free", "epsilon": "8 mm"}}, ["mesh.outside", "float"],
+    ),
+    "repeats": ({"solve": {"repeats": 3}}, ["solve.repeats", "timing"]),
+    "empty sweep": ({"material": {"poisson": []}}, ["material.poisson", "empty"]),
+    "value twice": ({"mesh": {"epsilon": ["1 cm", "10 mm"]}}, ["mesh.epsilon", "more than once"]),
+    "one bad in a sweep": ({"material": {"poisson": [0.3, 0.8]}}, ["material.poisson = 0.8"]),
+    "table without name": ({"probe": [raw()["probe"]]}, ["probe[1].name", "labels the sweep"]),
+    "section is no table": ({"probe": 3}, ["probe = 3", "[probe]"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_each_mistake_gets_its_message(name):
+    changes, words = MISTAKES[name]
+    content = raw(**{k: v for k, v in changes.items() if isinstance(v, dict)})
+    content |= {k: v for k, v in changes.items() if not isinstance(v, dict)}
+    with pytest.raises(StudyError) as caught:
+        parse(content, file="my.toml")
+    message = str(caught.value)
+    assert all(line.startswith("my.toml: ") for line in message.splitlines())
+    for word in words:
+        assert word in message
+
+
+def test_all_mistakes_at_once():
+    with pytest.raises(StudyError) as caught:
+        study(material={"young": 3, "poisson": 0.9}, probe={"radius": "x"}, mesh={"fien": "1 mm", "fine": None})
+    keys = {problem.key for problem in caught.value.problems}
+    assert keys == {"material.young", "material.poisson", "probe.radius", "mesh.fien", "mesh.fine"}
+
+
+def test_syntax_error_has_line_and_column(tmp_path):
+    file = tmp_path / "bad.toml"
+    file.write_text("[body]\nshape = box\n")
+    with pytest.raises(StudyError, match=r"bad.toml: TOML syntax: .*line 2, column 9"):
+        load(file)
+
+
+def test_missing_file():
+    with pytest.raises(StudyError, match=r"nowhere\.toml: file: No such file"):
+        load("nowhere.toml")
+
+
+@pytest.mark.parametrize("file", STUDIES, ids=lambda path: path.name)
+def test_every_study_validates(file):
+    assert len(load(file).shape) > 0
+
+
+def test_doubtful_input_is_a_warning():
+    words = " ".join(study(probe={"depth": "1 mm"}, mesh={"epsilon": "2 mm"}).warnings)
+    assert "linear elasticity" in words
+    assert "less than the probe's radius" in words
+    assert "F_max" in words
+    assert "lock" in " ".join(study(material={"poisson": 0.495}).warnings)
+    assert not study().warnings
+
+
+def test_sweeps_become_dimensions_in_the_file_s_order():
+    result = study(
+        material={"poisson": [0.3, 0.4]},
+        mesh={"epsilon": ["5 mm", "full"], "outside": ["coarse", "free"]},
+    )
+    assert [axis.name for axis in result.axes] == ["poisson", "epsilon", "outside"]
+    cases = list(result.cases())
+    assert len(cases) == 8
+    assert dict(cases[-1].labels) == {"poisson": 0.4, "epsilon": float("inf"), "outside": "free"}
+    assert cases[-1].material.poisson == 0.4
+
+
+def test_array_of_tables_is_a_sweep_by_name():
+    content = raw()
+    content["probe"] = [{"name": "needle", **raw()["probe"]}, {"name": "knife", **BLADE}]
+    result = parse(content)
+    assert result.axes[0].labels == ("needle", "knife")
+    assert [case.probe.shape for case in result.cases()] == ["disc", "blade"]
+
+
+def test_points_and_sizes_sweep_as_lists_of_lists():
+    result = study(probe={"at": [["0 mm", "0 mm"], ["5 mm", "0 mm"]]})
+    assert [case.probe.at for case in result.cases()] == [(0.0, 0.0), (0.005, 0.0)]
+
+
+def test_equal_cases_have_equal_keys():
+    def key(**changes):
+        return case_key(study(**changes).case(()))
+
+    assert key(probe={"radius": "3 mm"}) == key(probe={"radius": "0.3 cm"})
+    assert key(material={"poisson": 0.1}) == key(material={"poisson": 1e-1})
+    assert key(mesh={"epsilon": "1 m"}) == key(mesh={"epsilon": "full"})
+    assert key(material={"poisson": 0}) == key(material={"poisson": 0.0})
+    assert key(probe={"radius": "3 mm"}) != key(probe={"radius": "3.001 mm"})
+    assert key(mesh={"degree": 3}) != key()
