@@ -74,6 +74,12 @@ def vector_space(mesh: Any, degree: int) -> Any:
     return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
 
 
+def degree(space: Any) -> int:
+    """Return the polynomial degree of a Lagrange space."""
+    value = space.ufl_element().degree
+    return int(value() if callable(value) else value)
+
+
 def cellwise_tensor_space(mesh: Any) -> Any:
     """Return the space of 3 × 3 tensors constant on each cell."""
     if hasattr(fem, "functionspace"):

@@ -13,6 +13,7 @@ from typing import Any
 
 import psutil
 from mpi4py import MPI
+from threadpoolctl import threadpool_limits
 
 from pipeline.mesh.curve import curve
 from pipeline.mesh.distribute import BodyMesh, distribute
@@ -49,10 +50,12 @@ def execute(plan: Plan, comm: MPI.Comm, keep: Keep, progress: Progress) -> int:
     runner = _Runner(comm, keep, progress, timed=plan.study.solve.timing)
     if plan.solves:
         prepare(comm, {solve.case.mesh.degree for solve in plan.solves})
-    for step in plan.meshes:
-        repeats = step.case.solve.repeats if runner.timed else 1
-        runner.run(step, repeats)
-        gc.collect()  # dolfinx's meshes hold communicators, and Python's cycles hold the meshes
+    # A rank is one thread: OpenBLAS's own would wait for work by spinning, and take the other ranks' cores.
+    with threadpool_limits(limits=1, user_api="blas"):
+        for step in plan.meshes:
+            repeats = step.case.solve.repeats if runner.timed else 1
+            runner.run(step, repeats)
+            gc.collect()  # dolfinx's meshes hold communicators, and Python's cycles hold the meshes
     return runner.failed
 
 

@@ -41,14 +41,9 @@ class ElasticForms:
 def _quadrature_degree(space: Any) -> int:
     # On straight cells 2p - 2 is exact. The map of a quarter-point element varies within the cell, and 2p reads
     # F up to 0.07 % low there; at p = 2, degree 4 has points at which the map is singular.
-    degree, order = _degrees(space)
-    return 2 * degree - 2 if order == 1 else max(6, 2 * degree)
-
-
-def _degrees(space: Any) -> tuple[int, int]:
-    """Return degree of the space and order of the geometry."""
-    nodes_per_cell = compat.geometry_dofs(space.mesh).shape[1]
-    return space.ufl_element().degree(), 1 if nodes_per_cell == 4 else 2
+    degree = compat.degree(space)
+    is_straight = compat.geometry_dofs(space.mesh).shape[1] == 4
+    return 2 * degree - 2 if is_straight else max(6, 2 * degree)
 
 
 def strain(u: Any) -> Any:

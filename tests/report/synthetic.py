@@ -1,0 +1,42 @@
+"""A dataset such as a study yields, made without solving anything."""
+
+import itertools
+
+import numpy as np
+
+from pipeline.plan.plan import make_plan
+from pipeline.report.dataset import build
+from pipeline.run.record import Record
+from pipeline.study.load import parse
+from tests.cases import BLADE, raw
+
+
+def dataset(failed: int = 0, pending: int = 0, **changes):
+    """Return the dataset of a study with forces that follow the curves that real ones have."""
+    content = raw(**changes)
+    plan = make_plan(parse(content))
+    records = {}
+    for number, solve in enumerate(plan.solves):
+        case = solve.case
+        epsilon = 40e-3 if case.is_full else case.mesh.epsilon
+        ratio = {"coarse": 1 + 0.3 * np.exp(-epsilon / 4e-3), "free": 1 - np.exp(-epsilon / 5e-3),
+                 "fixed": 1 + 9 * np.exp(-epsilon / 4e-3)}["coarse" if case.is_full else case.mesh.outside]  # fmt: skip
+        force = 0.02 * ratio * (1 + case.material.poisson)
+        seconds = 4 * (epsilon / 40e-3) ** 1.5
+        records[solve.key] = Record(
+            solve.key, "ok", "", force, (0.0, 0.0, force), force * 1e-4, 0.1, 1e-12, 1000, 300, 9, 1e8,
+            seconds, seconds, seconds, seconds, {"host": "here", "ranks": 1},
+        )  # fmt: skip
+        if number < failed:
+            records[solve.key] = Record(solve.key, "failed", "it went wrong")
+    for key in itertools.islice(reversed(plan.keys), pending):
+        records.pop(key, None)
+    return build(plan, records, {"start": "2026-01-01"})
+
+
+EPSILONS = ["3 mm", "5 mm", "7 mm", "10 mm", "15 mm", "20 mm", "full"]
+FIGURE = {
+    "probe": [{"name": "disc, pierce", **raw()["probe"]}, {"name": "blade, cut", **BLADE}],
+    "material": {"poisson": [0.30, 0.40, 0.45, 0.49]},
+    "mesh": {"epsilon": EPSILONS, "outside": ["coarse", "free", "fixed"]},
+}

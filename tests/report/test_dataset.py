@@ -1,0 +1,60 @@
+"""The dataset: dimensions of the study, SI units, ratios to the full order of the same scene."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline.report.dataset import write
+from tests.report.synthetic import FIGURE, dataset
+
+
+def test_dimensions_are_what_the_study_sweeps():
+    data = dataset(**FIGURE)
+    assert dict(data["force"].sizes) == {"probe": 2, "poisson": 4, "epsilon": 7, "outside": 3} or (
+        set(data["force"].dims) == {"probe", "poisson", "epsilon", "outside"}
+    )
+    assert data["epsilon"].attrs["units"] == "m"
+    assert np.isinf(data["epsilon"].values[-1])
+    assert all("long_name" in variable.attrs for variable in data.data_vars.values())
+    assert dataset()["force"].dims == ()
+
+
+def test_ratios_are_to_the_full_order_of_the_same_scene():
+    data = dataset(**FIGURE)
+    full = data.sel(epsilon=np.inf)
+    xr.testing.assert_allclose(data["force_ratio"], data["force"] / full["force"].drop_vars("epsilon"))
+    assert (data["force_ratio"].sel(epsilon=np.inf) == 1).all()
+    assert (data["speedup"].sel(epsilon=10e-3) > 1).all()
+    assert dataset()["force_ratio"] == 1.0
+
+
+def test_without_full_order_there_is_no_ratio():
+    data = dataset(mesh={"epsilon": ["4 mm", "8 mm"]})
+    assert np.isnan(data["force_ratio"]).all()
+    assert np.isfinite(data["force"]).all()
+
+
+def test_failed_and_pending_cases_have_no_force():
+    data = dataset(failed=2, pending=3, **FIGURE)
+    assert (np.isnan(data["force"]) == (data["status"] != "ok")).all()
+    assert set(np.unique(data["status"])) == {"ok", "failed", "pending"}
+    assert (data["message"].where(data["status"] == "failed", "it went wrong") == "it went wrong").all()
+
+
+def test_written_file_opens_with_xarray_alone(tmp_path):
+    data = dataset(failed=1, **FIGURE)
+    write(data, tmp_path / "deep" / "a.nc")
+    with xr.open_dataset(tmp_path / "deep" / "a.nc") as again:
+        xr.testing.assert_identical(again["force_ratio"].load(), data["force_ratio"])
+        assert again.attrs["host"] == "here"
+        assert float(again["force"].sel(epsilon=10e-3, poisson=0.3, probe="disc, pierce", outside="free")) > 0
+
+
+def test_earlier_result_survives_a_failed_write(tmp_path):
+    path = tmp_path / "a.nc"
+    write(dataset(), path)
+    before = path.read_bytes()
+    with pytest.raises(TypeError):
+        write(dataset().assign_attrs(bad={"not": "allowed"}), path)
+    assert path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["a.nc"]

@@ -1,0 +1,163 @@
+"""The command line as a person uses it: end to end, in a process of its own."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from mpi4py import MPI
+
+pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts processes itself")
+
+SMALL = """
+title = "small"
+[body]
+shape = "box"
+size = ["20 mm", "20 mm", "10 mm"]
+[material]
+young = "10 kPa"
+poisson = [0.3, 0.4]
+[probe]
+shape = "disc"
+radius = "2 mm"
+depth = "0.1 mm"
+[mesh]
+epsilon = ["4 mm", "6 mm", "full"]
+fine = "2 mm"
+coarse = "4 mm"
+rim = "0.5 mm"
+outside = ["coarse", "free"]
+"""
+ROOT = Path(__file__).parents[1]
+# Under pytest, mpi4py may have marked this process's environment as a running MPI job.
+ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_"))} | {
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+}
+
+
+def epsmesh(*arguments: object, ranks: int = 1) -> subprocess.CompletedProcess[str]:
+    launcher = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
+    command = [*launcher, sys.executable, "-m", "pipeline", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, check=False, timeout=300, cwd=ROOT)
+
+
+@pytest.fixture
+def small(tmp_path):
+    file = tmp_path / "small.toml"
+    file.write_text(SMALL)
+    return file
+
+
+def test_quick_study_end_to_end(tmp_path):
+    done = epsmesh("run", "studies/quick.toml", "--output", tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert {"quick.nc", "quick.png", "quick.svg", "cases.sqlite"} <= {path.name for path in tmp_path.iterdir()}
+    with xr.open_dataset(tmp_path / "quick.nc") as data:
+        assert data["force"].dims == ("poisson", "epsilon", "outside")
+        assert (data["status"] == "ok").all()
+        assert (data["force"] > 0).all()
+        assert data["force"].attrs["units"] == "N"
+        free = data["force_ratio"].sel(outside="free")
+        assert (free.diff("epsilon") > 0).all()
+        assert (data["force_ratio"].sel(outside="coarse") >= 0.995).all()
+        np.testing.assert_allclose(data["force_ratio"].sel(epsilon=np.inf), 1.0)
+        np.testing.assert_allclose(data["speedup"].sel(epsilon=np.inf), 1.0)
+        assert {
+            "study",
+            "study_hash",
+            "version_dolfinx",
+            "version_petsc",
+            "version_gmsh",
+            "host",
+            "ranks",
+            "start",
+        } <= set(data.attrs)
+
+
+def test_second_run_reads_back_and_two_ranks_agree(small, tmp_path):
+    first, again = (epsmesh("run", small, "--output", tmp_path / "a") for _ in "ab")
+    parallel = epsmesh("run", small, "--output", tmp_path / "b", ranks=2)
+    assert first.returncode == again.returncode == parallel.returncode == 0, parallel.stderr
+    assert "10 struck out: A case whose record is stored is read back." in again.stdout
+    one, two = (xr.load_dataset(tmp_path / folder / "small.nc") for folder in "ab")
+    assert set(np.unique(one["origin"])) == {"stored"}
+    np.testing.assert_allclose(one["force"], two["force"], rtol=1e-8)
+    assert parallel.stdout.count("wrote") == 1
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_bad_study_ends_with_2_and_writes_nothing(small, tmp_path, ranks):
+    small.write_text(SMALL.replace('"2 mm"', "2").replace("0.4", "0.9"))
+    done = epsmesh("run", small, "--output", tmp_path / "out", ranks=ranks)
+    assert done.returncode == 2
+    assert "probe.radius = 2" in done.stderr
+    assert "material.poisson = 0.9" in done.stderr
+    assert done.stderr.count("probe.radius") == 1
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_failed_case_ends_with_1_and_is_told(small, tmp_path):
+    small.write_text(SMALL.replace('["coarse", "free"]', '"fixed"').replace('"4 mm", "6 mm"', '"2 mm", "6 mm"'))
+    done = epsmesh("run", small, "--output", tmp_path)
+    assert done.returncode == 1
+    assert "touches the held face" in done.stderr
+    data = xr.load_dataset(tmp_path / "small.nc")
+    assert (data["status"].sel(epsilon=2e-3) == "failed").all()
+    assert (data["status"].sel(epsilon=6e-3) == "ok").all()
+    status = json.loads(epsmesh("status", small, "--output", tmp_path, "--json").stdout)
+    assert (status["ok"], status["failed"], status["pending"]) == (4, 2, 0)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_run_leaves_what_is_done_and_goes_on(small, tmp_path, number):
+    command = [sys.executable, "-m", "pipeline", "run", str(small), "--output", str(tmp_path / "a")]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT)
+    assert process.stderr is not None
+    while "[2/" not in process.stderr.readline():
+        assert process.poll() is None
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "goes on from there" in errors
+    partial = xr.load_dataset(tmp_path / "a" / "small.nc")
+    assert 0 < int((partial["status"] == "ok").sum()) < partial["status"].size
+    assert epsmesh("run", small, "--output", tmp_path / "a").returncode == 0
+    assert epsmesh("run", small, "--output", tmp_path / "b").returncode == 0
+    resumed, whole = (xr.load_dataset(tmp_path / folder / "small.nc") for folder in "ab")
+    for name in ("force", "force_vector", "energy", "dofs", "cells", "force_ratio", "status"):
+        xr.testing.assert_allclose(resumed[name], whole[name], rtol=1e-9)
+
+
+def test_killed_run_loses_no_finished_case(small, tmp_path):
+    command = [sys.executable, "-m", "pipeline", "run", str(small), "--output", str(tmp_path)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT)
+    assert process.stderr is not None
+    while "[3/" not in process.stderr.readline():
+        assert process.poll() is None
+    time.sleep(0.05)
+    process.kill()
+    process.communicate()
+    status = json.loads(epsmesh("status", small, "--output", tmp_path, "--json").stdout)
+    assert status["ok"] >= 3
+    assert epsmesh("run", small, "--output", tmp_path).returncode == 0
+
+
+def test_validate_status_and_plot(small, tmp_path):
+    assert "small.toml: fine; 12 cases (2 poisson × 3 epsilon × 2 outside)" in epsmesh("validate", small).stdout
+    assert "12 pending" in epsmesh("status", small, "--output", tmp_path).stdout
+    assert epsmesh("plot", small, "--output", tmp_path).returncode == 2
+    report = json.loads(epsmesh("validate", small, "--json").stdout)
+    assert report == [{"file": str(small), "errors": [], "warnings": [], "cases": 12}]
+
+
+def test_every_command_has_help_with_an_example():
+    for command in ("validate", "run", "status", "plot"):
+        assert "Example: epsmesh " + command in epsmesh(command, "--help").stdout
