@@ -42,9 +42,8 @@ def main() -> None:
         degree, size, method = arguments.one
         measure(int(degree), float(size), method, arguments.repeats)
         return
-    print(
-        "| degree | dofs | cells/dof | method | set-up + solve (s) | iterations | bytes/dof |\n|---|---|---|---|---|---|---|"
-    )
+    names = ("degree", "dofs", "cells/dof", "method", "set-up + solve (s)", "iterations", "bytes/dof")
+    print(f"| {' | '.join(names)} |", "|---" * len(names) + "|", sep="\n", flush=True)
     for degree, sizes in SIZES.items():
         for size in sizes:
             for method in ("direct", "iterative"):

@@ -3,6 +3,7 @@
 import json
 import signal
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from pipeline.run.store import Store
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+# Seconds that the first rank has, when a parallel run is interrupted, to write what is finished.
+_GRACE = 30
 
 app = typer.Typer(
     help="How fine must a mesh be, and where, for the reaction force of a surgical tool?",
@@ -176,7 +179,7 @@ def _run_study(study: Study, comm: Any, output: Path, store_path: Path, fresh: b
     interrupted = False
     try:
         with _interruptible():
-            failed = _execute(plan, comm, keep, quiet=quiet or not first)
+            _execute(plan, comm, keep, quiet=quiet or not first)
     except KeyboardInterrupt:
         interrupted = True
     if first:
@@ -212,16 +215,17 @@ def _open(study: Study, comm: Any, path: Path, fresh: bool) -> tuple[Plan, dict[
     return make_plan(study, stored), records, store
 
 
-def _execute(plan: Plan, comm: Any, keep: Any, *, quiet: bool) -> int:
+def _execute(plan: Plan, comm: Any, keep: Any, *, quiet: bool) -> None:
     if not plan.solves:
-        return 0
+        return
     from pipeline.run.execute import execute
     from pipeline.run.progress import Silent, Terminal
 
     if quiet:
-        return execute(plan, comm, keep, Silent())
+        execute(plan, comm, keep, Silent())
+        return
     with Terminal(len(plan.solves)) as progress:
-        return execute(plan, comm, keep, progress)
+        execute(plan, comm, keep, progress)
 
 
 def _write(plan: Plan, records: dict[str, "Record"], attributes: dict[str, str], output: Path, quiet: bool) -> None:
@@ -248,6 +252,9 @@ def _stop(study: Study, plan: Plan, records: dict[str, "Record"], comm: Any) -> 
         again = f"`epsmesh run {study.file}` goes on from there"
         _error(f"interrupted: {done} of {len(plan.keys)} cases are on record; {again}")
     if comm.size > 1:
+        # The other ranks may wait in a call that will never be answered; the first one writes before it ends them.
+        if comm.rank != 0:
+            time.sleep(_GRACE)
         comm.Abort(INTERRUPTED)
     raise typer.Exit(INTERRUPTED)
 
@@ -278,6 +285,12 @@ def _load_all(files: list[Path]) -> list[Study]:
             studies.append(load(file))
         except StudyError as error:
             messages.append(str(error))
+    names = [study.name for study in studies]
+    messages += [
+        f"{s.file}: another study given is called {s.name}, too: both would write {s.name}.nc"
+        for s in studies
+        if names.count(s.name) > 1
+    ]
     if messages:
         _fail("\n".join(messages))
     return studies

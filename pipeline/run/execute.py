@@ -45,7 +45,8 @@ class CaseFailure(Exception):
 def execute(plan: Plan, comm: MPI.Comm, keep: Keep, progress: Progress) -> int:
     """Carry out ``plan``; collective. ``keep`` is called on rank 0 with each record, as soon as it exists.
 
-    Returns the number of cases that failed: each has a record with its message, and the rest went on.
+    Returns the number of cases that failed, the same on every rank: each has a record with its message, and the
+    rest went on.
     """
     runner = _Runner(comm, keep, progress, timed=plan.study.solve.timing)
     if plan.solves:

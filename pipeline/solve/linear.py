@@ -60,9 +60,9 @@ class LinearSolver:
             self.ksp.setType("cg")
             self.ksp.setNormType(PETSc.KSP.NormType.NATURAL)
             self.ksp.setTolerances(rtol=tolerance, atol=0.0, max_it=_MOST_ITERATIONS)
-            self.ksp.setInitialGuessNonzero(True)
-            self._multigrid(self.ksp.pc)
         try:
+            if not direct:
+                self._multigrid(self.ksp.pc)
             self.ksp.setFromOptions()
             self.ksp.setUp()
         except PETSc.Error as error:
@@ -73,7 +73,7 @@ class LinearSolver:
         self.setup_seconds = time.perf_counter() - start
 
     def solve(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> int:
-        """Solve into ``solution`` (also the start vector) and return the iterations; collective.
+        """Solve from zero into ``solution`` and return the iterations; collective.
 
         Raises:
             SolveError: if PETSc reports anything but convergence.

@@ -103,11 +103,15 @@ class ConstrainedSpace:
         return matrix, self._part_seconds
 
     def lift(self, rhs: PETSc.Vec, lame: tuple[float, float]) -> None:
-        """Put the loads of the prescribed displacements into ``rhs``; collective."""
+        """Put the loads of the prescribed displacements into ``rhs``; collective.
+
+        What is left to find is zero on the prescribed dofs, and so is its load: the solver's norms then measure the
+        energy of the error and nothing else, in any unit of length.
+        """
         self.forms.displacement.x.array[:] = self.held
         self.apply(rhs, lame)
         rhs.scale(-1.0)
-        rhs.array[self.prescribed_owned] = lame[1] * self.held[self.prescribed_owned]
+        rhs.array[self.prescribed_owned] = 0.0
 
     def set_displacement(self, values: PETSc.Vec) -> None:
         """Make ``values`` the displacement that ``apply`` acts on; collective."""

@@ -230,7 +230,7 @@ class Solve(Section):
     """How cases are solved and timed."""
 
     method: Literal["auto", "direct", "iterative"] = "auto"
-    tolerance: Annotated[float, Field(ge=1e-14, le=1e-3)] = 1e-10
+    tolerance: Annotated[float, Field(ge=1e-14, le=1e-3)] = 1e-8
     timing: bool = False
     repeats: Annotated[int, Field(ge=1, le=1000)] = 3
 

@@ -61,7 +61,7 @@ def test_world_agrees_with_each_rank_alone():
 def test_forces_balance(degree):
     (record,) = solve(WORLD, probe=BLADE | {"slice": "0.1 mm"}, mesh={"degree": degree}).values()
     assert record.status == "ok"
-    assert record.balance < 1e-8
+    assert record.balance < 2e-7
     assert record.force > 0
     work = record.force * 0.1e-3 - record.force_vector[0] * 0.1e-3
     assert work == pytest.approx(2 * record.energy, rel=1e-7)
