@@ -5,12 +5,13 @@ from math import inf, log, pi
 from pipeline.study.sweep import Case
 
 # Volume of gmsh's mean tetrahedron in units of the cube of the size asked for: measured, docs/performance.md.
-_TETRAHEDRON = 0.16
-# Bytes for each dof at the peak of a solve, matrices and factors or multigrid included: measured, docs/performance.md.
-_BYTES_PER_DOF = {"iterative": {1: 1500, 2: 3500, 3: 6000}, "direct": {1: 20_000, 2: 25_000, 3: 40_000}}
+_TETRAHEDRON = 0.21
+# Bytes for each dof at the peak of a solve: the two parts of the operator, their sum, multigrid; or the factor of a
+# system of 50,000 dofs. Measured: docs/performance.md.
+_BYTES_PER_DOF = {"iterative": {1: 3000, 2: 3500, 3: 6000}, "direct": {1: 9000, 2: 9000, 3: 10_000}}
 _BASE = 200e6
 # Dofs for each tetrahedron on large meshes, three components.
-_DOFS_PER_CELL = {1: 0.55, 2: 4.2, 3: 14.0}
+_DOFS_PER_CELL = {1: 0.55, 2: 4.4, 3: 15.0}
 # Bytes gmsh and the arrays take for each tetrahedron while meshing.
 _BYTES_PER_CELL = 1000
 
@@ -37,11 +38,6 @@ def cells(case: Case) -> float:
     return total / _TETRAHEDRON
 
 
-def meshing_memory(case: Case) -> float:
-    """Estimate the bytes that generating the case's mesh takes."""
-    return _BASE + _BYTES_PER_CELL * cells(case)
-
-
 def solving_memory(dofs: float, degree: int, *, direct: bool) -> float:
     """Estimate the bytes that a solve takes, all ranks together."""
     per_dof = _BYTES_PER_DOF["direct" if direct else "iterative"][degree]
@@ -50,9 +46,9 @@ def solving_memory(dofs: float, degree: int, *, direct: bool) -> float:
     return _BASE + per_dof * growth * dofs
 
 
-def expected_memory(case: Case) -> float:
-    """Estimate the bytes for meshing and solving a case that has no mesh yet."""
+def case_memory(case: Case) -> float:
+    """Estimate the bytes for meshing and solving a case that has no mesh yet, within about a factor of two."""
     count = cells(case)
     dofs = _DOFS_PER_CELL[case.mesh.degree] * count
     solving = solving_memory(dofs, case.mesh.degree, direct=case.solve.method == "direct")
-    return max(meshing_memory(case), solving)
+    return max(_BASE + _BYTES_PER_CELL * count, solving)

@@ -137,7 +137,7 @@ class _Runner:
     def _mesh(self, case: Case) -> tuple[BodyMesh, float]:
         """Return the distributed mesh of a case and the seconds that it took; collective."""
         self._progress.note(f"meshing: {case}")
-        self._check_memory(estimate.meshing_memory(case), "meshing")
+        self._check_memory(estimate.case_memory(case), "this case")
         start = MPI.Wtime()
         arrays = _on_first_rank(self.comm, lambda: _mesh_arrays(case))
         mesh = distribute(self.comm, arrays)

@@ -15,7 +15,7 @@ from petsc4py import PETSc
 from pipeline import compat
 
 # Dofs up to which Cholesky is faster than conjugate gradients, measured: docs/performance.md.
-DIRECT_LIMIT = {1: 8_000, 2: 6_000, 3: 6_000}
+DIRECT_LIMIT = {1: 12_000, 2: 4_000, 3: 4_000}
 _MOST_ITERATIONS = 500
 
 _prefixes = itertools.count()
