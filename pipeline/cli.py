@@ -1,12 +1,8 @@
 """The command line: parse, call, print. Everything below it raises; only this file prints and exits."""
 
 import json
-import signal
+import os
 import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -19,12 +15,11 @@ from pipeline.study.problems import StudyError
 from pipeline.study.sweep import Study
 
 if TYPE_CHECKING:
+    from pipeline.run.progress import Terminal
     from pipeline.run.record import Record
-    from pipeline.run.store import Store
+    from pipeline.workflow import Opened, Outcome
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-# Seconds that the first rank has, when a parallel run is interrupted, to write what is finished.
-_GRACE = 30
 
 app = typer.Typer(
     help="How fine must a mesh be, and where, for the reaction force of a surgical tool?",
@@ -93,14 +88,27 @@ def run(
     studies = _load_all(files)
     from mpi4py import MPI
 
-    from pipeline.run.execute import abort_on_exception
+    from pipeline import workflow
+    from pipeline.run.store import StoreError
 
-    comm = MPI.COMM_WORLD
-    status = DONE
-    with abort_on_exception(comm):
-        for study in studies:
-            status = max(status, _run_study(study, comm, output, store or output / "cases.sqlite", fresh, quiet))
-    raise typer.Exit(status)
+    comm, failed = MPI.COMM_WORLD, False
+    speaks = comm.rank == 0
+    for study in studies:
+        try:
+            plan, opened = workflow.prepare(study, comm, store or output / "cases.sqlite", fresh=fresh)
+            if speaks:
+                _announce(plan, opened, quiet)
+            with workflow.abort_on_exception(comm):
+                outcome = workflow.run(plan, opened, comm, output, _progress(plan) if speaks and not quiet else None)
+        except StoreError as error:
+            _fail(str(error))
+        if speaks:
+            _conclude(plan, outcome, quiet)
+        if outcome.interrupted:
+            workflow.end_ranks(comm, INTERRUPTED)
+            raise typer.Exit(INTERRUPTED)
+        failed = failed or outcome.counts["failed"] > 0
+    raise typer.Exit(SOME_FAILED if failed else DONE)
 
 
 @app.command()
@@ -159,121 +167,6 @@ def version() -> None:
             print(f"{name.removeprefix('version_'):10} {value}")
 
 
-# ---- running ----------------------------------------------------------------------------------------
-
-
-def _run_study(study: Study, comm: Any, output: Path, store_path: Path, fresh: bool, quiet: bool) -> int:
-    """Run one study and write what came of it; collective. Return the exit status, the same on every rank."""
-    first = comm.rank == 0
-    plan, records, store = _open(study, comm, store_path, fresh)
-    if first and not quiet:
-        _warn(study)
-        _describe(plan)
-    attributes = {"start": _now()}
-
-    def keep(record: "Record") -> None:
-        assert store is not None
-        store.put(record)
-        records[record.key] = record
-
-    interrupted = False
-    try:
-        with _interruptible():
-            _execute(plan, comm, keep, quiet=quiet or not first)
-    except KeyboardInterrupt:
-        interrupted = True
-    if first:
-        attributes["end"] = _now()
-        _write(plan, records, attributes, output, quiet)
-    if store is not None:
-        store.close()
-    if interrupted:
-        _stop(study, plan, records, comm)
-    failed = comm.bcast(sum(records[key].status == "failed" for key in plan.keys) if first else None)
-    return SOME_FAILED if failed else DONE
-
-
-def _open(study: Study, comm: Any, path: Path, fresh: bool) -> tuple[Plan, dict[str, "Record"], "Store | None"]:
-    """Open the store on rank 0 and plan, on every rank alike, what is not on record; collective."""
-    from pipeline.run.store import Store, StoreError
-
-    store, records, message = None, {}, ""
-    if comm.rank == 0:
-        try:
-            store = Store(path)
-            if store.notice:
-                _error(store.notice)
-            if not (fresh or study.solve.timing):
-                records = {k: r for k, r in store.get(set(make_plan(study).keys)).items() if r.status == "ok"}
-        except StoreError as error:
-            message = str(error)
-    message, stored = comm.bcast((message, sorted(records)))
-    if message:
-        if comm.rank == 0:
-            _error(message)
-        raise typer.Exit(BAD_INPUT)
-    return make_plan(study, stored), records, store
-
-
-def _execute(plan: Plan, comm: Any, keep: Any, *, quiet: bool) -> None:
-    if not plan.solves:
-        return
-    from pipeline.run.execute import execute
-    from pipeline.run.progress import Silent, Terminal
-
-    if quiet:
-        execute(plan, comm, keep, Silent())
-        return
-    with Terminal(len(plan.solves)) as progress:
-        execute(plan, comm, keep, progress)
-
-
-def _write(plan: Plan, records: dict[str, "Record"], attributes: dict[str, str], output: Path, quiet: bool) -> None:
-    from pipeline.report.dataset import build, write
-    from pipeline.report.figures import draw
-
-    path = output / f"{plan.study.name}.nc"
-    dataset = build(plan, records, attributes)
-    write(dataset, path)
-    pictures = draw(dataset, path.with_suffix(""))
-    for key, case in zip(plan.keys, plan.study.cases(), strict=True):
-        record = records.get(key)
-        if record and record.status == "failed":
-            _error(f"failed: {case}: {record.message}")
-    if not quiet:
-        states = [records[key].status if key in records else "pending" for key in plan.keys]
-        counts = ", ".join(f"{states.count(s)} {s}" for s in ("ok", "failed", "pending") if s in states)
-        print(f"{plan.study.file}: {counts}; wrote {', '.join(str(p) for p in [path, *pictures])}", flush=True)
-
-
-def _stop(study: Study, plan: Plan, records: dict[str, "Record"], comm: Any) -> NoReturn:
-    if comm.rank == 0:
-        done = sum(key in records for key in plan.keys)
-        again = f"`epsmesh run {study.file}` goes on from there"
-        _error(f"interrupted: {done} of {len(plan.keys)} cases are on record; {again}")
-    if comm.size > 1:
-        # The other ranks may wait in a call that will never be answered; the first one writes before it ends them.
-        if comm.rank != 0:
-            time.sleep(_GRACE)
-        comm.Abort(INTERRUPTED)
-    raise typer.Exit(INTERRUPTED)
-
-
-@contextmanager
-def _interruptible() -> Iterator[None]:
-    """Turn Ctrl-C, and the request to end that mpirun or a batch system sends, into KeyboardInterrupt."""
-
-    def interrupt(*_: Any) -> NoReturn:
-        raise KeyboardInterrupt
-
-    before = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
 # ---- words ------------------------------------------------------------------------------------------
 
 
@@ -308,8 +201,20 @@ def _stored(path: Path, plan: Plan) -> dict[str, "Record"]:
     return records
 
 
-def _describe(plan: Plan) -> None:
+def _progress(plan: Plan) -> "Terminal":
+    from pipeline.run.progress import Terminal
+
+    return Terminal(len(plan.solves))
+
+
+def _announce(plan: Plan, opened: "Opened", quiet: bool) -> None:
+    """Say, before the run, what is to be done and what is not, and why."""
+    if opened.notice:
+        _error(opened.notice)
+    if quiet:
+        return
     study = plan.study
+    _warn(study)
     print(f"{study.title}: {len(plan.keys)} cases{_axes(study)}")
     for struck in plan.struck:
         print(f"  {struck.count} struck out: {struck.reason}")
@@ -317,6 +222,20 @@ def _describe(plan: Plan) -> None:
         print(f"  timing: every case afresh and alone, median of {study.solve.repeats}; nothing is struck out")
     if plan.solves:
         print(f"  to do: {len(plan.meshes)} meshes, {len(plan.solves)} solves", flush=True)
+
+
+def _conclude(plan: Plan, outcome: "Outcome", quiet: bool) -> None:
+    """Say, after the run, what came of it and where it is."""
+    study = plan.study
+    for case, message in outcome.failures:
+        _error(f"failed: {case}: {message}")
+    if not quiet:
+        counts = ", ".join(f"{count} {state}" for state, count in outcome.counts.items() if count)
+        print(f"{study.file}: {counts}; wrote {', '.join(map(str, outcome.files))}", flush=True)
+    if outcome.interrupted:
+        done = len(plan.keys) - outcome.counts["pending"]
+        again = f"`epsmesh run {study.file}` goes on from there"
+        _error(f"interrupted: {done} of {len(plan.keys)} cases are on record; {again}")
 
 
 def _axes(study: Study) -> str:
@@ -341,11 +260,5 @@ def _fail(text: str) -> NoReturn:
 
 def _is_first_rank() -> bool:
     """Tell, before MPI is started, whether this is the rank that speaks."""
-    import os
-
     ranks = (os.environ.get(name) for name in ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"))
     return next((rank for rank in ranks if rank is not None), "0") == "0"
-
-
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="seconds")

@@ -136,6 +136,25 @@ def test_interrupted_run_leaves_what_is_done_and_goes_on(small, tmp_path, number
         xr.testing.assert_allclose(resumed[name], whole[name], rtol=1e-9)
 
 
+def test_interrupted_parallel_run_writes_what_is_done(small, tmp_path):
+    command = ["mpirun", "--oversubscribe", "-n", "2", sys.executable, "-m", "pipeline", "run", str(small)]
+    process = subprocess.Popen(
+        [*command, "--output", str(tmp_path)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True, cwd=ROOT, env=ENVIRONMENT,
+    )  # fmt: skip
+    assert process.stderr is not None
+    while "[2/" not in process.stderr.readline():
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+    assert process.returncode != 0
+    status = json.loads(epsmesh("status", small, "--output", tmp_path, "--json").stdout)
+    assert status["ok"] >= 2
+    again = epsmesh("run", small, "--output", tmp_path, ranks=2)
+    assert again.returncode == 0, again.stderr
+    assert (xr.load_dataset(tmp_path / "small.nc")["status"] == "ok").all()
+
+
 def test_killed_run_loses_no_finished_case(small, tmp_path):
     command = [sys.executable, "-m", "pipeline", "run", str(small), "--output", str(tmp_path)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT)

@@ -2,9 +2,7 @@
 
 import gc
 import statistics
-import traceback
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
@@ -215,15 +213,3 @@ def _on_first_rank(comm: MPI.Comm, compute: Callable[[], Any]) -> Any:
     if message is not None:
         raise MeshError(message)
     return result
-
-
-@contextmanager
-def abort_on_exception(comm: MPI.Comm) -> Iterator[None]:
-    """End all ranks when one of them meets an error that nobody handles: the others would wait for ever."""
-    try:
-        yield
-    except Exception:
-        if comm.size == 1:
-            raise
-        traceback.print_exc()
-        comm.Abort(1)

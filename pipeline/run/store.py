@@ -52,18 +52,31 @@ class Store:
         return database
 
     def put(self, record: Record) -> None:
-        """Write one record, atomically, in place of an earlier one of the same key."""
-        self._database.execute(
-            "INSERT OR REPLACE INTO records VALUES (?, ?, ?)", (record.key, record.to_json(), time.time())
-        )
+        """Write one record, atomically, in place of an earlier one of the same key.
+
+        Raises:
+            StoreError: if it cannot be written: the disk is full, or another run holds the file.
+        """
+        row = (record.key, record.to_json(), time.time())
+        try:
+            self._database.execute("INSERT OR REPLACE INTO records VALUES (?, ?, ?)", row)
+        except sqlite3.Error as error:
+            raise StoreError(f"the case store {self.path} cannot be written: {error}") from error
 
     def get(self, keys: Iterable[str]) -> dict[str, Record]:
-        """Return the records on disk among ``keys``."""
+        """Return the records on disk among ``keys``.
+
+        Raises:
+            StoreError: if a record cannot be read.
+        """
         found = {}
-        for key in keys:
-            row = self._database.execute("SELECT record FROM records WHERE key = ?", (key,)).fetchone()
-            if row:
-                found[key] = Record.from_json(row[0])
+        try:
+            for key in keys:
+                row = self._database.execute("SELECT record FROM records WHERE key = ?", (key,)).fetchone()
+                if row:
+                    found[key] = Record.from_json(row[0])
+        except (sqlite3.Error, ValueError, TypeError, KeyError) as error:
+            raise StoreError(f"the case store {self.path} cannot be read: {error}") from error
         return found
 
     def close(self) -> None:

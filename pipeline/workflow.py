@@ -1,0 +1,162 @@
+"""A study from plan to dataset, on a communicator: store, execution, interruption, results."""
+
+import signal
+import time
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, NoReturn
+
+from mpi4py import MPI
+
+from pipeline.plan.plan import Plan, make_plan
+from pipeline.report.dataset import build, write
+from pipeline.run.progress import Silent, Terminal
+from pipeline.run.record import Record
+from pipeline.run.store import Store, StoreError
+from pipeline.study.sweep import Study
+
+# Seconds that the first rank has, when a parallel run is interrupted, to write what is finished.
+_GRACE = 30
+
+
+@dataclass
+class Opened:
+    """The case store of a run, on rank 0 (None elsewhere), and the records read from it."""
+
+    store: Store | None = None
+    records: dict[str, Record] = field(default_factory=dict)
+
+    @property
+    def notice(self) -> str:
+        """What the user should know of the store."""
+        return self.store.notice if self.store else ""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a run. ``failures`` (case, message) and ``files`` are rank 0's, the rest is every rank's."""
+
+    counts: dict[str, int]
+    failures: tuple[tuple[str, str], ...]
+    files: tuple[Path, ...]
+    interrupted: bool
+
+
+def prepare(study: Study, comm: MPI.Comm, store_path: Path, *, fresh: bool = False) -> tuple[Plan, Opened]:
+    """Open the case store and plan, on every rank alike, what is not on record; collective.
+
+    ``fresh`` computes again what is stored; a timing study always does.
+
+    Raises:
+        StoreError: on every rank, if the store cannot be used.
+    """
+    opened, message = Opened(), ""
+    if comm.rank == 0:
+        try:
+            opened.store = Store(store_path)
+            if not (fresh or study.solve.timing):
+                found = opened.store.get(set(make_plan(study).keys))
+                opened.records = {key: record for key, record in found.items() if record.status == "ok"}
+        except StoreError as error:
+            message = str(error)
+    message, stored = comm.bcast((message, sorted(opened.records)))
+    if message:
+        raise StoreError(message)
+    return make_plan(study, stored), opened
+
+
+def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Terminal | None = None) -> Outcome:
+    """Carry out ``plan`` and write ``<study>.nc`` and its figure into ``output``; collective.
+
+    Ctrl-C, and the request to end that mpirun or a batch system sends, end it with what is finished written.
+    """
+    start, interrupted = _now(), False
+    # dolfinx loads only when something is solved, and before signals are handled: gmsh resets Ctrl-C as it loads.
+    if plan.solves:
+        import pipeline.run.execute  # noqa: F401, PLC0415
+    try:
+        with _interruptible():
+            _execute(plan, opened, comm, progress)
+    except KeyboardInterrupt:
+        interrupted = True
+    files: tuple[Path, ...] = ()
+    if opened.store is not None:
+        opened.store.close()
+        files = _write(plan, opened.records, {"start": start, "end": _now()}, output)
+    states = [opened.records[key].status if key in opened.records else "pending" for key in plan.keys]
+    counts = {state: states.count(state) for state in ("ok", "failed", "pending")}
+    if not interrupted:
+        counts = comm.bcast(counts)
+    cases = zip(plan.keys, plan.study.cases(), strict=True)
+    failures = tuple(
+        (str(case), opened.records[key].message)
+        for key, case in cases
+        if key in opened.records and opened.records[key].status == "failed"
+    )
+    return Outcome(counts, failures, files, interrupted)
+
+
+def end_ranks(comm: MPI.Comm, status: int) -> None:
+    """End every rank of an interrupted run: some may wait in a call that will never be answered."""
+    if comm.size > 1:
+        if comm.rank != 0:
+            time.sleep(_GRACE)
+        comm.Abort(status)
+
+
+@contextmanager
+def abort_on_exception(comm: MPI.Comm) -> Iterator[None]:
+    """End all ranks when one of them meets an error that nobody handles: the others would wait for ever."""
+    try:
+        yield
+    except Exception:
+        if comm.size == 1:
+            raise
+        traceback.print_exc()
+        comm.Abort(1)
+
+
+def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | None) -> None:
+    if not plan.solves:
+        return
+    from pipeline.run.execute import execute  # noqa: PLC0415
+
+    def keep(record: Record) -> None:
+        assert opened.store is not None
+        opened.store.put(record)
+        opened.records[record.key] = record
+
+    with progress or nullcontext():
+        execute(plan, comm, keep, progress or Silent())
+
+
+def _write(plan: Plan, records: dict[str, Record], attributes: dict[str, str], output: Path) -> tuple[Path, ...]:
+    from pipeline.report.figures import draw  # noqa: PLC0415 (matplotlib is slow to load, and wanted last)
+
+    path = output / f"{plan.study.name}.nc"
+    dataset = build(plan, records, attributes)
+    write(dataset, path)
+    return (path, *draw(dataset, path.with_suffix("")))
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Turn the signals that ask the program to end into KeyboardInterrupt."""
+
+    def interrupt(*_: Any) -> NoReturn:
+        raise KeyboardInterrupt
+
+    before = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
