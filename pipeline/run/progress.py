@@ -39,15 +39,13 @@ class Terminal:
             from rich.console import Console
             from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
             from rich.progress import Progress as Bar
+            from rich.table import Column
 
-            columns = (
-                BarColumn(),
-                MofNCompleteColumn(),
-                TimeElapsedColumn(),
-                TextColumn("left"),
-                TimeRemainingColumn(),
-            )
-            self._bar = Bar(*columns, TextColumn("{task.description}"), console=Console(stderr=True), transient=True)
+            numbers = (MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
+            # What is being worked on gives way to the numbers where the terminal is narrow.
+            words = TextColumn("{task.description}", table_column=Column(ratio=1, no_wrap=True, overflow="ellipsis"))
+            console = Console(stderr=True)
+            self._bar = Bar(BarColumn(bar_width=20), *numbers, words, console=console, transient=True, expand=True)
             self._bar.start()
             self._task = self._bar.add_task("", total=self._total)
         return self
