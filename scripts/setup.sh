@@ -54,7 +54,7 @@ state=$({ cat pyproject.toml scripts/setup.sh; readlink -f "$python"; pwd; } | s
 
 if [[ $(readlink -f "$venv/bin/python" 2>/dev/null) != $(readlink -f "$python") ]]; then
     echo "setup: making $venv"
-    "$python" -m venv --clear --system-site-packages "$venv"
+    "$python" -m venv --clear --system-site-packages "$venv" || fail "could not make $venv"
 fi
 echo "setup: installing the project and its Python packages into $venv"
 # pip must never replace what comes from Debian: pin it to what is there.
@@ -68,18 +68,22 @@ for name in ("numpy", "scipy", "matplotlib", "netCDF4", "mpi4py", "petsc4py", "p
     except PackageNotFoundError:
         pass
 PYTHON
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input -c "$constraints" -e '.[dev]' ||
+# A pip configured for --user would install beside the venv.
+PIP_USER=0 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input -c "$constraints" -e '.[dev]' ||
     fail "pip could not install the project"
 
 # ---- check --------------------------------------------------------------------------------------------
 "$venv/bin/python" - <<'PYTHON' || fail "the installed libraries do not work together"
 import dolfinx, gmsh, matplotlib, mpi4py, netCDF4, numpy, petsc4py, scipy, xarray  # noqa: E401, F401
 
-for module in (numpy, mpi4py, petsc4py):
-    assert module.__file__.startswith("/usr/"), f"{module.__name__} does not come from Debian: {module.__file__}"
+for module in (numpy, scipy, xarray, netCDF4, matplotlib, mpi4py, petsc4py, dolfinx, gmsh):
+    assert module.__file__.startswith("/usr/lib/"), f"{module.__name__} does not come from Debian: {module.__file__}"
 PYTHON
-blas=$(readlink -f "/usr/lib/$("$python" -c 'import sysconfig; print(sysconfig.get_config_var("MULTIARCH"))')/libblas.so.3")
-[[ $blas == *openblas* ]] ||
-    echo "setup: warning: BLAS is $blas, not OpenBLAS: factorisations take 8 times longer (update-alternatives)" >&2
+multiarch=$("$python" -c 'import sysconfig; print(sysconfig.get_config_var("MULTIARCH"))')
+for library in libblas.so.3 liblapack.so.3; do
+    [[ $(readlink -f "/usr/lib/$multiarch/$library") == *openblas* ]] ||
+        echo "setup: warning: $library is not OpenBLAS's, factorisations may take 8 times longer. To change it, as root:
+    update-alternatives --auto $library-$multiarch" >&2
+done
 echo "$state" >"$stamp"
 echo "setup: done; the command is $venv/bin/epsmesh"

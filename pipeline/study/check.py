@@ -9,8 +9,9 @@ from pipeline.study.sweep import Axis
 
 # Linear elasticity: strain under the probe is of order depth / radius.
 _LINEAR = 0.10
-# Displacement elements of degree 1 lock visibly from here on, of degree 2 and 3 from there (docs/accuracy.md).
-_LOCKING = {1: 0.45, 2: 0.49, 3: 0.49}
+# Displacement elements lock as ν nears ½: from the first value on visibly, from the second on F is worth nothing
+# (docs/accuracy.md), and a number that looks like any other would be returned for it.
+_LOCKING = {1: (0.45, 0.45), 2: (0.49, 0.495), 3: (0.49, 0.495)}
 
 
 def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
@@ -126,13 +127,16 @@ def _check_outside(body: AnyBody, mesh: Mesh, problems: Problems) -> None:
 
 
 def _check_locking(material: Material, mesh: Mesh, problems: Problems) -> None:
-    if material.poisson >= 0.5:
+    visible, most = _LOCKING[mesh.degree]
+    if material.poisson > most:
+        hint = "; degree 2 goes further" if mesh.degree == 1 else ""
         problems.error(
             "material.poisson",
             material.poisson,
-            "an incompressible material needs mixed elements, which are not supported; must be less than 0.5",
+            f"displacement elements of degree {mesh.degree} lock: must be at most {most}{hint}; "
+            "values up to 0.5 need mixed elements, which are not supported",
         )
-    elif material.poisson > _LOCKING[mesh.degree] or (mesh.degree == 1 and material.poisson >= _LOCKING[1]):
+    elif material.poisson > visible or material.poisson == most:
         problems.warn(
             "material.poisson",
             material.poisson,

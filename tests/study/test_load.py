@@ -21,6 +21,8 @@ MISTAKES = {
     "poisson above": ({"material": {"poisson": 0.7}}, ["material.poisson = 0.7", "at most 0.5"]),
     "poisson below": ({"material": {"poisson": -0.1}}, ["material.poisson = -0.1", "at least 0"]),
     "incompressible": ({"material": {"poisson": 0.5}}, ["material.poisson = 0.5", "mixed"]),
+    "locking": ({"material": {"poisson": 0.499}}, ["material.poisson = 0.499", "lock", "at most 0.495"]),
+    "locking of degree 1": ({"material": {"poisson": 0.46}, "mesh": {"degree": 1}}, ["at most 0.45", "degree 2"]),
     "not a number": ({"material": {"poisson": float("nan")}}, ["material.poisson"]),
     "text for a number": ({"material": {"poisson": "0.3"}}, ['material.poisson = "0.3"', "number"]),
     "unknown key": ({"material": {"poison": 0.3}}, ["material.poison = 0.3", "did you mean `poisson`?"]),
