@@ -79,8 +79,8 @@ def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Term
     if plan.solves:
         import pipeline.run.execute  # noqa: F401, PLC0415
     try:
-        with _interruptible():
-            _execute(plan, opened, comm, progress)
+        with _interruptible() as signals:
+            _execute(plan, opened, comm, progress, signals)
     except KeyboardInterrupt:
         interrupted = True
     files: tuple[Path, ...] = ()
@@ -120,7 +120,7 @@ def abort_on_exception(comm: MPI.Comm) -> Iterator[None]:
         comm.Abort(1)
 
 
-def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | None) -> None:
+def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | None, signals: list[int]) -> None:
     if not plan.solves:
         return
     from pipeline.run.execute import execute  # noqa: PLC0415
@@ -129,6 +129,8 @@ def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | No
         assert opened.store is not None
         opened.store.put(record)
         opened.records[record.key] = record
+        if signals:
+            raise KeyboardInterrupt
 
     with progress or nullcontext():
         execute(plan, comm, keep, progress or Silent())
@@ -144,15 +146,20 @@ def _write(plan: Plan, records: dict[str, Record], attributes: dict[str, str], o
 
 
 @contextmanager
-def _interruptible() -> Iterator[None]:
-    """Turn the signals that ask the program to end into KeyboardInterrupt."""
+def _interruptible() -> Iterator[list[int]]:
+    """Turn the signals that ask the program to end into KeyboardInterrupt; yield the list of those received.
 
-    def interrupt(*_: Any) -> NoReturn:
+    An exception raised while Python frees an object is lost: whoever has time looks at the list.
+    """
+    received: list[int] = []
+
+    def interrupt(number: int, _: Any) -> NoReturn:
+        received.append(number)
         raise KeyboardInterrupt
 
     before = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield
+        yield received
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
