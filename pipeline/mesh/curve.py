@@ -14,7 +14,7 @@ from pipeline.scene.model import Scene
 from pipeline.study.schema import Cylinder, Disc
 
 # Edges of the reference tetrahedron in the order of basix's quadratic nodes 4 to 9.
-_EDGES = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
+EDGES = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
 # A cell is straightened where its Jacobian falls below this share of the straight cell's.
 _LEAST_JACOBIAN = 1e-3
 
@@ -22,13 +22,13 @@ _LEAST_JACOBIAN = 1e-3
 def curve(mesh: MeshArrays, scene: Scene) -> MeshArrays:
     """Return ``mesh`` with ten nodes a cell, on the true rim and sides, with quarter-point nodes at the rim."""
     corners = mesh.cells
-    pairs = np.sort(corners[:, _EDGES].reshape(-1, 2), axis=1)
+    pairs = np.sort(corners[:, EDGES].reshape(-1, 2), axis=1)
     keys, first, inverse = np.unique(
         pairs[:, 0] * len(mesh.points) + pairs[:, 1], return_index=True, return_inverse=True
     )
     edges = pairs[first]
     straight = mesh.points[edges].mean(axis=1)
-    of_cell = inverse.reshape(-1, len(_EDGES))
+    of_cell = inverse.reshape(-1, len(EDGES))
     middle = _on_rim(mesh, scene, edges, _on_sides(mesh, scene, edges, straight, keys))
     middle = _quarter_points(mesh, edges, middle)
     bad = _folded(mesh.points[corners], middle[of_cell])
@@ -98,7 +98,7 @@ def _quarter_points(mesh: MeshArrays, edges: IntArray, middle: FloatArray) -> Fl
 
 def _folded(corners: FloatArray, middle: FloatArray) -> np.ndarray:
     """Tell, for each cell, whether its quadratic map folds at a point where the stiffness is integrated."""
-    curved = np.abs(middle - corners[:, _EDGES].mean(axis=2)).max(axis=(1, 2)) > 0
+    curved = np.abs(middle - corners[:, EDGES].mean(axis=2)).max(axis=(1, 2)) > 0
     result = np.zeros(len(corners), dtype=bool)
     if curved.any():
         nodes = np.concatenate([corners[curved], middle[curved]], axis=1)
@@ -113,12 +113,12 @@ def _gradients() -> list[FloatArray]:
     weights = [np.full(4, 0.25)]
     for corner in range(4):
         weights += [np.where(np.arange(4) == corner, w, (1 - w) / 3) for w in (0.9, 0.7)]
-    for i, j in _EDGES:
+    for i, j in EDGES:
         weights.append(np.where(np.isin(np.arange(4), (i, j)), 0.45, 0.05))
     slope = np.vstack([-np.ones(3), np.eye(3)])  # gradients of the barycentric coordinates
     gradients = []
     for w in weights:
         corner_part = (4 * w - 1)[:, None] * slope
-        edge_part = np.array([4 * (w[i] * slope[j] + w[j] * slope[i]) for i, j in _EDGES])
+        edge_part = np.array([4 * (w[i] * slope[j] + w[j] * slope[i]) for i, j in EDGES])
         gradients.append(np.vstack([corner_part, edge_part]))
     return gradients

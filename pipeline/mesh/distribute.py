@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from pipeline import compat
 from pipeline.mesh.generate import MeshArrays
+from pipeline.scene.model import MIRROR
 
 Int32Array = npt.NDArray[np.int32]
 
@@ -26,6 +27,11 @@ class BodyMesh:
     def owned_cells(self) -> int:
         """Number of cells that this rank owns."""
         return int(self.mesh.topology.index_map(self.mesh.topology.dim).size_local)
+
+    @property
+    def mirrored(self) -> tuple[int, ...]:
+        """Axes normal to the planes of symmetry that bound the mesh: 0 for x = 0, 1 for y = 0."""
+        return tuple("xy".index(plane) for plane, name in MIRROR.items() if name in self.facets)
 
     @property
     def comm(self) -> MPI.Comm:

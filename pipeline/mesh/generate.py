@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from pipeline.compat import gmsh_session
 from pipeline.mesh.size import Sizes, set_size_field
-from pipeline.scene.model import CUT, FIXED, FREE, PROBE, Scene, SceneError, build
+from pipeline.scene.model import CUT, FIXED, FREE, MIRROR, PROBE, Scene, SceneError, build
 
 IntArray = npt.NDArray[np.int64]
 FloatArray = npt.NDArray[np.float64]
@@ -51,7 +51,8 @@ def generate(scene: Scene, sizes: Sizes) -> MeshArrays:
         try:
             rim_curves = build(scene)
             if scene.rim_segments and len(rim_curves) == 1:
-                gmsh.model.mesh.setTransfiniteCurve(rim_curves[0], scene.rim_segments + 1)
+                edges = scene.rim_segments // 2 ** len(scene.mirrors)
+                gmsh.model.mesh.setTransfiniteCurve(rim_curves[0], edges + 1)
             set_size_field(sizes, scene.probe, scene.scale)
             gmsh.model.mesh.generate(3)
         except SceneError as error:
@@ -90,7 +91,7 @@ def _collect(scale: float, rim_curves: list[int], start: float) -> MeshArrays:
     for dim, group in gmsh.model.getPhysicalGroups(2):
         name = gmsh.model.getPhysicalName(dim, group)
         facets[name] = _elements(2, gmsh.model.getEntitiesForPhysicalGroup(dim, group), 3, position)
-    assert set(facets) <= {PROBE, FIXED, FREE, CUT}
+    assert set(facets) <= {PROBE, FIXED, FREE, CUT, *MIRROR.values()}
     rim = [position[mesh.getNodes(1, curve, includeBoundary=True)[0]] for curve in rim_curves]
     points, cells, facets, rim_points = _drop_unused(points, cells, facets, np.unique(np.concatenate(rim)))
     return MeshArrays(points, _orient(points, cells), facets, rim_points, time.perf_counter() - start)

@@ -9,6 +9,8 @@ from pipeline.study.schema import AnyProbe, Blade, Disc
 
 # Fewer segments than this would not tell a disc from a box.
 _FEWEST_SEGMENTS = 8
+# A quarter of a disc has a whole number of edges.
+_SEGMENT_MULTIPLE = 4
 # A column is a dozen edges round at least.
 _EDGES_PER_RADIUS = 2
 
@@ -30,7 +32,10 @@ class Sizes:
 
     def rim_segments(self, probe: AnyProbe) -> int:
         """Return the number of edges along the rim of a disc, 0 for other probes."""
-        return max(_FEWEST_SEGMENTS, ceil(2 * pi * probe.radius / self.rim)) if isinstance(probe, Disc) else 0
+        if not isinstance(probe, Disc):
+            return 0
+        quarters = ceil(2 * pi * probe.radius / self.rim / _SEGMENT_MULTIPLE)
+        return max(_FEWEST_SEGMENTS, _SEGMENT_MULTIPLE * quarters)
 
 
 def set_size_field(sizes: Sizes, probe: AnyProbe, scale: float) -> None:

@@ -8,10 +8,10 @@ from pipeline.study.sweep import Case
 _TETRAHEDRON = 0.21
 # Bytes for each dof at the peak of a solve: the two parts of the operator, their sum, multigrid; or the factor of a
 # system of 50,000 dofs. Measured: docs/performance.md.
-_BYTES_PER_DOF = {"iterative": {1: 3000, 2: 3500, 3: 6000}, "direct": {1: 9000, 2: 9000, 3: 10_000}}
+_BYTES_PER_DOF = {"iterative": {1: 3000, 2: 3500, 3: 6000, 4: 9000}, "direct": {1: 9000, 2: 9000, 3: 10_000}}
 _BASE = 200e6
 # Dofs for each tetrahedron on large meshes, three components.
-_DOFS_PER_CELL = {1: 0.55, 2: 4.4, 3: 15.0}
+_DOFS_PER_CELL = {1: 0.55, 2: 4.4, 3: 15.0, 4: 35.0}
 # Bytes gmsh and the arrays take for each tetrahedron while meshing.
 _BYTES_PER_CELL = 1000
 
@@ -46,9 +46,18 @@ def solving_memory(dofs: float, degree: int, *, direct: bool) -> float:
     return _BASE + per_dof * growth * dofs
 
 
-def case_memory(case: Case) -> float:
-    """Estimate the bytes for meshing and solving a case that has no mesh yet, within about a factor of two."""
-    count = cells(case)
+def enriched_memory(dofs: float, degree: int) -> float:
+    """Estimate the bytes that an error bar takes: a solve of one degree more than that of ``dofs`` unknowns."""
+    growth = _DOFS_PER_CELL[degree + 1] / _DOFS_PER_CELL[degree]
+    return solving_memory(growth * dofs, degree + 1, direct=False)
+
+
+def case_memory(case: Case, share: float = 1.0) -> float:
+    """Estimate the bytes for meshing and solving a case that has no mesh yet, within about a factor of two.
+
+    ``share`` is the part of the body that is modelled.
+    """
+    count = share * cells(case)
     dofs = _DOFS_PER_CELL[case.mesh.degree] * count
     solving = solving_memory(dofs, case.mesh.degree, direct=case.solve.method == "direct")
     return max(_BASE + _BYTES_PER_CELL * count, solving)

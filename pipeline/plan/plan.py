@@ -1,20 +1,24 @@
 """The plan of a study: which meshes, operators and solves yield its cases, and what was struck out."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Hashable
 from dataclasses import dataclass, replace
-from itertools import groupby
 
 from pipeline.plan.key import case_key, mesh_key, operator_key
+from pipeline.plan.symmetry import model_planes
 from pipeline.study.sweep import Case, Study
 
 
 @dataclass(frozen=True)
 class Solve:
-    """One case to be solved, and the indices of the cases of the study that its record serves."""
+    """One case to be solved, and the indices of the cases of the study that its record serves.
+
+    ``mirrors`` are the planes of symmetry ("x": x = 0) that leave half or a quarter of the body to be solved.
+    """
 
     key: str
     case: Case
     serves: tuple[tuple[int, ...], ...]
+    mirrors: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,11 @@ class MeshStep:
     def case(self) -> Case:
         """A case that stands for all of them."""
         return self.operators[0].case
+
+    @property
+    def mirrors(self) -> tuple[str, ...]:
+        """The planes of symmetry that leave the part of the body to be meshed."""
+        return self.solves[0].mirrors
 
     @property
     def solves(self) -> tuple[Solve, ...]:
@@ -71,8 +80,9 @@ class Plan:
         if self.study.solve.timing:
             return tuple(MeshStep((OperatorStep((solve,)),)) for solve in self.solves)
         steps = []
-        for group in _grouped(self.solves, mesh_key):
-            steps.append(MeshStep(tuple(OperatorStep(solves) for solves in _grouped(group, operator_key))))
+        for group in _grouped(self.solves, lambda solve: (mesh_key(solve.case), solve.mirrors)):
+            operators = _grouped(group, lambda solve: operator_key(solve.case))
+            steps.append(MeshStep(tuple(OperatorStep(solves) for solves in operators)))
         return tuple(steps)
 
 
@@ -93,7 +103,7 @@ def make_plan(study: Study, stored: Collection[str] = ()) -> Plan:
     plan = declare(study)
     if study.solve.timing:
         return plan
-    return strike_stored(strike_duplicates(plan), frozenset(stored))
+    return use_symmetry(strike_stored(strike_duplicates(plan), frozenset(stored)))
 
 
 def strike_duplicates(plan: Plan) -> Plan:
@@ -112,6 +122,16 @@ def strike_stored(plan: Plan, stored: frozenset[str]) -> Plan:
     return replace(_strike(plan, kept, "stored", strike_stored), stored=found)
 
 
+def use_symmetry(plan: Plan) -> Plan:
+    """Body, support and probe are their own mirror image: half or a quarter of the body is solved."""
+
+    def reduced(solve: Solve) -> Solve:
+        planes = model_planes(solve.case.probe) if solve.case.mesh.model == "auto" else ()
+        return replace(solve, mirrors=planes)
+
+    return replace(plan, solves=tuple(reduced(solve) for solve in plan.solves))
+
+
 def _strike(plan: Plan, kept: tuple[Solve, ...], name: str, reduction: Callable[..., Plan]) -> Plan:
     count = len(plan.solves) - len(kept)
     reason = (reduction.__doc__ or "").strip()
@@ -119,9 +139,9 @@ def _strike(plan: Plan, kept: tuple[Solve, ...], name: str, reduction: Callable[
     return replace(plan, solves=kept, struck=struck)
 
 
-def _grouped(solves: tuple[Solve, ...], key: Callable[[Case], str]) -> list[tuple[Solve, ...]]:
+def _grouped(solves: tuple[Solve, ...], key: Callable[[Solve], Hashable]) -> list[tuple[Solve, ...]]:
     """Group by key, groups in order of first appearance."""
-    keyed = [(key(solve.case), solve) for solve in solves]
-    rank = {name: position for position, name in reversed(list(enumerate(name for name, _ in keyed)))}
-    keyed.sort(key=lambda pair: rank[pair[0]])
-    return [tuple(solve for _, solve in group) for _, group in groupby(keyed, key=lambda pair: pair[0])]
+    groups: dict[Hashable, list[Solve]] = {}
+    for solve in solves:
+        groups.setdefault(key(solve), []).append(solve)
+    return [tuple(group) for group in groups.values()]

@@ -18,6 +18,7 @@ from pipeline.study.sweep import Axis, Study
 # name: (units, long_name) of the variables taken as they are from the records
 _FLOATS = {
     "force": ("N", "reaction force along the probe's axis, positive against its advance"),
+    "force_error": ("1", "relative error bar (95 %) on force, against the exact solution of the case's scene"),
     "energy": ("J", "strain energy"),
     "max_strain": ("1", "largest principal strain of a cell's mean strain; grows as the rim is refined"),
     "balance": ("1", "relative error of F d = 2 U and of the balance of forces"),
@@ -25,12 +26,13 @@ _FLOATS = {
     "time_assemble": ("s", "time to assemble operator and load"),
     "time_setup": ("s", "time to factorise, or to set up the preconditioner"),
     "time_solve": ("s", "time to solve and to evaluate the force"),
+    "time_error": ("s", "time spent on the error bar, not in time_total"),
     "time_total": ("s", "time that this case costs alone"),
     "memory": ("bytes", "peak memory of all ranks"),
 }
 _COUNTS = {
-    "dofs": ("1", "displacement unknowns"),
-    "cells": ("1", "tetrahedra"),
+    "dofs": ("1", "unknowns of the whole body"),
+    "cells": ("1", "elements of the whole body"),
     "iterations": ("1", "iterations of the linear solver"),
 }
 _TEXTS = {"status": "ok, failed, or pending where not yet run", "message": "why a case failed"}
@@ -119,7 +121,7 @@ def _add_ratios(dataset: xr.Dataset) -> xr.Dataset:
 def _origin(plan: Plan, key: str, record: Record | None) -> str:
     if record is None or record.status != "ok":
         return ""
-    return "stored" if key in plan.stored else "solved"
+    return "stored" if key in plan.stored else record.origin
 
 
 def _coordinate(axis: Axis) -> Any:

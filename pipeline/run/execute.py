@@ -6,25 +6,24 @@ from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
-from math import inf
-from typing import Any
+from math import nan
 
 import psutil
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
-from pipeline.mesh.curve import curve
-from pipeline.mesh.distribute import BodyMesh, distribute
-from pipeline.mesh.generate import MeshArrays, MeshError, generate
-from pipeline.mesh.size import Sizes
+from pipeline.mesh.distribute import BodyMesh
+from pipeline.mesh.generate import MeshError
 from pipeline.plan import estimate
 from pipeline.plan.plan import MeshStep, OperatorStep, Plan, Solve
+from pipeline.plan.symmetry import model_planes
 from pipeline.run.memory import PeakMemory
+from pipeline.run.meshing import mesh_case
 from pipeline.run.progress import Progress
 from pipeline.run.provenance import provenance
 from pipeline.run.record import Record
-from pipeline.scene.model import Scene
 from pipeline.solve.elasticity import ElasticBody, Solution
+from pipeline.solve.enrich import error_bar
 from pipeline.solve.forms import prepare
 from pipeline.solve.linear import SolveError, is_direct
 from pipeline.solve.space import Contact
@@ -48,7 +47,7 @@ def execute(plan: Plan, comm: MPI.Comm, keep: Keep, progress: Progress) -> int:
     """
     runner = _Runner(comm, keep, progress, timed=plan.study.solve.timing)
     if plan.solves:
-        prepare(comm, {solve.case.mesh.degree for solve in plan.solves})
+        prepare(comm, {solve.case.mesh.degree + more for solve in plan.solves for more in (0, 1)})
     # A rank is one thread: OpenBLAS's own would wait for work by spinning, and take the other ranks' cores.
     with threadpool_limits(limits=1, user_api="blas"):
         for step in plan.meshes:
@@ -74,7 +73,7 @@ class _Runner:
             self._record_one(solve, lambda: self._repeat(step, repeats, memory))
             return
         meshed: list[tuple[BodyMesh, float]] = []
-        if not self._guard(step.solves, lambda: meshed.append(self._mesh(step.case))):
+        if not self._guard(step.solves, lambda: meshed.append(self._mesh(step.case, step.mirrors))):
             return
         ((mesh, seconds),) = meshed
         for operator in step.operators:
@@ -92,62 +91,84 @@ class _Runner:
                 self._record_one(solve, compute)
 
     def _solve(self, solve: Solve, body: ElasticBody, mesh: BodyMesh, seconds: float, memory: PeakMemory) -> Record:
-        case = solve.case
-        direct = is_direct(case.solve.method, body.dofs, case.mesh.degree)
-        self._check_memory(estimate.solving_memory(body.dofs, case.mesh.degree, direct=direct), "solving")
-        solution = body.solve(case.material.lame, method=case.solve.method, tolerance=case.solve.tolerance)
-        return self._record(solve, solution, mesh.cells, seconds, memory)
+        case, degree = solve.case, solve.case.mesh.degree
+        direct = is_direct(case.solve.method, body.dofs, degree)
+        self._check_memory(estimate.solving_memory(body.dofs, degree, direct=direct), "solving")
+        missing = ""
+        if not self.timed:
+            missing = self._lacks_memory(estimate.enriched_memory(body.dofs, degree), "the error bar")
+        wanted = not (self.timed or missing)
+        solution = body.solve(
+            case.material.lame, method=case.solve.method, tolerance=case.solve.tolerance, estimate=wanted
+        )
+        return replace(self._record(solve, solution, mesh.cells, seconds, memory), message=missing)
 
     def _record(self, solve: Solve, solution: Solution, cells: int, seconds: float, memory: PeakMemory) -> Record:
         axis = solve.case.probe.axis
+        force = -sum(f * a for f, a in zip(solution.reaction, axis, strict=True))
         return Record(
             key=solve.key,
             status="ok",
-            force=-sum(f * a for f, a in zip(solution.reaction, axis, strict=True)),
+            origin="symmetric" if solve.mirrors else "solved",
+            force=force,
+            force_error=_relative_error(solve.case, solution, force),
             force_vector=solution.reaction,
             energy=solution.energy,
             max_strain=solution.max_strain,
             balance=solution.balance,
             dofs=solution.dofs,
-            cells=cells,
+            cells=cells * 2 ** len(solve.mirrors),
             iterations=solution.iterations,
             memory=memory.peak(),
             time_mesh=seconds,
             time_assemble=solution.time_assemble,
             time_setup=solution.time_setup,
             time_solve=solution.time_solve,
+            time_error=solution.time_estimate,
             provenance=self._provenance | {"date": datetime.now(UTC).isoformat(timespec="seconds")},
         )
 
     def _repeat(self, step: MeshStep, repeats: int, memory: PeakMemory) -> Record:
-        """Compute a case afresh several times; its times are the medians."""
+        """Compute a case afresh several times; its times are the medians. The error bar comes after them."""
         (solve,) = step.solves
-        records = []
-        for _ in range(repeats):
-            mesh, seconds = self._mesh(solve.case)
-            with _elastic_body(mesh, solve.case, shared=False) as body:
-                records.append(self._solve(solve, body, mesh, seconds, memory))
-            del mesh, body
-            gc.collect()
+        records = [self._compute(solve, memory) for _ in range(repeats)]
         names = ("time_mesh", "time_assemble", "time_setup", "time_solve")
-        return replace(records[-1], **{n: statistics.median(getattr(r, n) for r in records) for n in names})
+        medians = {n: statistics.median(getattr(r, n) for r in records) for n in names}
+        self.timed = False
+        try:
+            bar = self._compute(replace(solve, mirrors=model_planes(solve.case.probe)), memory)
+        finally:
+            self.timed = True
+        return replace(
+            records[-1], **medians, force_error=bar.force_error, time_error=bar.time_total + bar.time_error,
+            message=bar.message,
+        )  # fmt: skip
 
-    def _mesh(self, case: Case) -> tuple[BodyMesh, float]:
+    def _compute(self, solve: Solve, memory: PeakMemory) -> Record:
+        """Compute one case afresh, mesh and all; collective."""
+        mesh, seconds = self._mesh(solve.case, solve.mirrors)
+        with _elastic_body(mesh, solve.case, shared=False) as body:
+            record = self._solve(solve, body, mesh, seconds, memory)
+        del mesh, body
+        gc.collect()
+        return record
+
+    def _mesh(self, case: Case, mirrors: tuple[str, ...]) -> tuple[BodyMesh, float]:
         """Return the distributed mesh of a case and the seconds that it took; collective."""
         self._progress.note(f"meshing: {case}")
-        self._check_memory(estimate.case_memory(case), "this case")
-        start = MPI.Wtime()
-        arrays = _on_first_rank(self.comm, lambda: _mesh_arrays(case))
-        mesh = distribute(self.comm, arrays)
-        return mesh, self.comm.allreduce(MPI.Wtime() - start, op=MPI.MAX)
+        self._check_memory(estimate.case_memory(case, share=0.5 ** len(mirrors)), "this case")
+        return mesh_case(case, mirrors, self.comm)
 
     def _check_memory(self, needed: float, what: str) -> None:
+        if message := self._lacks_memory(needed, what):
+            raise CaseFailure(f"{message}: use larger elements, or a smaller epsilon")
+
+    def _lacks_memory(self, needed: float, what: str) -> str:
+        """Return what to say if ``needed`` bytes are too much, the same on every rank; collective."""
         available = self.comm.bcast(psutil.virtual_memory().available if self.comm.rank == 0 else None)
-        if needed > _MEMORY_SHARE * available:
-            raise CaseFailure(
-                f"{what} needs about {needed / 1e9:.1f} GB of memory, {available / 1e9:.1f} GB are available: "
-                "use larger elements, or a smaller epsilon"
-            )
+        if needed <= _MEMORY_SHARE * available:
+            return ""
+        return f"{what} needs about {needed / 1e9:.1f} GB of memory, {available / 1e9:.1f} GB are available"
 
     def _record_one(self, solve: Solve, compute: Callable[[], Record]) -> None:
         """Compute and keep a record; if that fails, keep a record of the failure."""
@@ -188,28 +209,13 @@ def _elastic_body(mesh: BodyMesh, case: Case, *, shared: bool) -> ElasticBody:
     return ElasticBody(mesh, case.mesh.degree, contact, shared=shared)
 
 
-def _mesh_arrays(case: Case) -> MeshArrays:
-    mesh, probe = case.mesh, case.probe
-    epsilon = inf if case.is_full else mesh.epsilon
-    column = inf if mesh.outside == "coarse" else epsilon
-    sizes = Sizes(epsilon, mesh.fine, mesh.coarse, mesh.rim_size(probe.half_width), mesh.growth, column)
-    straight = mesh.degree == 1
-    scene = Scene(case.body, probe, column, mesh.outside == "fixed", sizes.rim_segments(probe), straight)
-    arrays = generate(scene, sizes)
-    return arrays if straight else curve(arrays, scene)
+def _relative_error(case: Case, solution: Solution, force: float) -> float:
+    """Return the relative error bar on the force along the probe's axis.
 
-
-def _on_first_rank(comm: MPI.Comm, compute: Callable[[], Any]) -> Any:
-    """Return what ``compute`` gives on rank 0, None elsewhere; its failure is raised on every rank."""
-    result, message = None, None
-    if comm.rank == 0:
-        try:
-            result = compute()
-        except MeshError as error:
-            message = str(error)
-        except (MemoryError, RuntimeError) as error:
-            message = f"{type(error).__name__}: {error}"
-    message = comm.bcast(message)
-    if message is not None:
-        raise MeshError(message)
-    return result
+    The decrement is one of work. A probe that slices works along the blade, too: all of what is lost may then belong
+    to the force along the axis, which is less of the work.
+    """
+    if solution.decrement != solution.decrement:
+        return nan
+    share = 2 * solution.energy / (force * case.probe.depth)
+    return error_bar(solution.decrement, case.mesh.degree) * share

@@ -9,13 +9,16 @@ from math import nan
 class Record:
     """The result of one case; SI units, times in seconds, memory in bytes summed over ranks.
 
-    ``force_vector`` is the force of the tissue on the probe; ``force`` its part against the probe's advance.
+    ``force_vector`` is the force of the tissue on the probe; ``force`` its part against the probe's advance, and
+    ``force_error`` the relative 95 % error bar on that, which ``time_error`` seconds were spent on.
     """
 
     key: str
     status: str  # ok | failed
     message: str = ""
+    origin: str = "solved"  # solved | symmetric
     force: float = nan
+    force_error: float = nan
     force_vector: tuple[float, float, float] = (nan, nan, nan)
     energy: float = nan
     max_strain: float = nan
@@ -28,6 +31,7 @@ class Record:
     time_assemble: float = nan
     time_setup: float = nan
     time_solve: float = nan
+    time_error: float = nan
     provenance: dict[str, str | int] = field(default_factory=dict)
 
     @property

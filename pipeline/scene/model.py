@@ -6,6 +6,7 @@ millimetre and one of ten metres give OpenCASCADE the same numbers, and the same
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from math import inf, pi, sin, sqrt
 from typing import Any
 
@@ -16,8 +17,10 @@ from pipeline.study.schema import AnyBody, AnyProbe, Below, Blade, Box, Disc
 
 # Names of the physical groups. Every boundary face is in exactly one of them.
 TISSUE, PROBE, FIXED, FREE, CUT = "tissue", "probe", "fixed", "free", "cut"
+MIRROR = {"x": "mirror_x", "y": "mirror_y"}
 
 _BODY_SIZE = 100.0  # extent of the body in the model: OpenCASCADE's tolerance of 1e-7 is then 1e-9 of it
+_CLOSE = 1e-6 * _BODY_SIZE  # in the model's unit
 
 
 @dataclass(frozen=True)
@@ -25,7 +28,8 @@ class Scene:
     """Geometry of one scene: what is kept of the body, where the probe touches it, what is held.
 
     ``column`` is the radius (m) of the piece that is kept round the probe's axis, or infinite;
-    ``rim_segments`` is the number of edges along a round rim, which ``straight`` elements cannot bend.
+    ``rim_segments`` is the number of edges along a round rim, which ``straight`` elements cannot bend;
+    ``mirrors`` are the planes of symmetry, of which only the positive side is modelled.
     """
 
     body: AnyBody
@@ -34,6 +38,7 @@ class Scene:
     column_fixed: bool = False
     rim_segments: int = 0
     straight: bool = False
+    mirrors: tuple[str, ...] = ()
 
     @property
     def scale(self) -> float:
@@ -73,6 +78,8 @@ def build(scene: Scene) -> list[int]:
     if scene.is_cut:
         column = (3, occ.addCylinder(x, y, -height, 0, 0, height, unit * scene.column))
         volumes, _ = occ.intersect(volumes, [column])
+    if scene.mirrors:
+        volumes, _ = occ.intersect(volumes, [(3, _add_positive_side(scene))])
     tools = [(2, _add_footprint(scene, unit))]
     if isinstance(scene.body.fixed, Below):
         tools.append((2, _add_level(scene, unit)))
@@ -90,7 +97,21 @@ def build(scene: Scene) -> list[int]:
     if not footprint:
         raise SceneError("no part of the probe's footprint lies on the body")
     _name_groups(scene, footprint)
-    return [abs(tag) for _, tag in gmsh.model.getBoundary([(2, tag) for tag in footprint], oriented=False)]
+    edge = gmsh.model.getBoundary([(2, tag) for tag in footprint], oriented=False)
+    return [abs(tag) for _, tag in edge if not _is_on_mirror(scene, abs(tag))]
+
+
+def _is_on_mirror(scene: Scene, curve: int) -> bool:
+    (start,), (end,) = gmsh.model.getParametrizationBounds(1, curve)
+    points = np.array(gmsh.model.getValue(1, curve, [start, (start + end) / 2, end])).reshape(-1, 3)
+    return any(bool(np.all(np.abs(points[:, "xy".index(plane)]) < _CLOSE)) for plane in scene.mirrors)
+
+
+def _add_positive_side(scene: Scene) -> int:
+    """Add a box that holds what lies on the positive side of every mirror plane."""
+    size = 3 * _BODY_SIZE
+    low = [0.0 if plane in scene.mirrors else -size for plane in "xy"]
+    return gmsh.model.occ.addBox(*low, -size, size - low[0], size - low[1], 2 * size)
 
 
 def _add_body(body: AnyBody, unit: float) -> int:
@@ -126,6 +147,7 @@ def _name_groups(scene: Scene, footprint: list[int]) -> None:
     model, unit = gmsh.model, 1 / scene.scale
     volumes = model.getEntities(3)
     groups: dict[str, list[int]] = {PROBE: list(footprint), FIXED: [], FREE: [], CUT: []}
+    groups |= {MIRROR[plane]: [] for plane in scene.mirrors}
     tests = _face_tests(scene)
     for _, tag in model.getBoundary(volumes, combined=True, oriented=False):
         if tag in footprint:
@@ -152,7 +174,7 @@ def _sample(face: int) -> Any:
 def _face_tests(scene: Scene) -> list[tuple[str, Callable[[Any], bool]]]:
     """Tests, in order, that tell which group a face belongs to from points (m) of its surface."""
     body, (x, y) = scene.body, scene.probe.at
-    close = 1e-6 * scene.scale * _BODY_SIZE
+    close = scene.scale * _CLOSE
 
     def near(values: Any, target: float) -> bool:
         return bool(np.all(np.abs(values - target) < close))
@@ -176,4 +198,9 @@ def _face_tests(scene: Scene) -> list[tuple[str, Callable[[Any], bool]]]:
         held = [lambda p: not on_cut(p) and bool(np.all(p[:, 2] < below + close))]
     else:
         held = [{"bottom": on_bottom, "sides": on_side}[part] for part in body.fixed.split("+")]
-    return [(FREE, on_top), *((FIXED, test) for test in held), (CUT, on_cut)]
+
+    def on_mirror(p: Any, axis: int) -> bool:
+        return near(p[:, axis], 0.0)
+
+    mirrors = [(MIRROR[plane], partial(on_mirror, axis="xy".index(plane))) for plane in scene.mirrors]
+    return [*mirrors, (FREE, on_top), *((FIXED, test) for test in held), (CUT, on_cut)]

@@ -9,7 +9,8 @@ Stress integrated under the probe is wrong by tens of per cent on the same solut
 
 import time
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import nan
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline.mesh.distribute import BodyMesh
+from pipeline.solve.enrich import energy_decrement
 from pipeline.solve.forms import mean_strain_form
 from pipeline.solve.linear import Level, LinearSolver, SolveError, is_direct
 from pipeline.solve.space import ConstrainedSpace, Contact
@@ -34,7 +36,8 @@ class Solution:
     """What one solve gives; all values global and equal on every rank.
 
     ``reaction`` (N, xyz) is the force of the tissue on the probe, ``energy`` (J) the strain energy,
-    ``balance`` the larger of the relative errors of F·d = 2U and of F_probe + F_support = 0.
+    ``balance`` the larger of the relative errors of F·d = 2U and of F_probe + F_support = 0. ``decrement`` is the
+    share of the energy that one degree more takes away: s / F_p (see :mod:`pipeline.solve.enrich`).
     """
 
     reaction: tuple[float, float, float]
@@ -46,6 +49,9 @@ class Solution:
     time_assemble: float
     time_setup: float
     time_solve: float
+    decrement: float = nan
+    estimate_iterations: int = 0
+    time_estimate: float = 0.0
 
 
 class ElasticBody:
@@ -61,6 +67,7 @@ class ElasticBody:
         self._body = body
         self._contact = contact
         self._levels: list[ConstrainedSpace] = []
+        self._finer: ConstrainedSpace | None = None
         self._fine = ConstrainedSpace(body, degree, contact)
         self._strain = mean_strain_form(self._fine.space, self._fine.forms.displacement)
         self.dofs = self._fine.dofs
@@ -69,32 +76,31 @@ class ElasticBody:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for level in (*self._levels, self._fine):
-            level.close()
+        for space in (*self._levels, self._fine, self._finer):
+            if space is not None:
+                space.close()
 
-    def solve(self, lame: tuple[float, float], *, method: str = "auto", tolerance: float = 1e-8) -> Solution:
+    def solve(
+        self, lame: tuple[float, float], *, method: str = "auto", tolerance: float = 1e-8, estimate: bool = False
+    ) -> Solution:
         """Solve for Lamé's λ and μ (Pa) and return force, energy and checks; collective.
+
+        ``estimate`` goes on in the space of one degree more, for :attr:`Solution.decrement`.
 
         Raises:
             SolveError: if the solver did not converge, or the solution fails a check.
         """
         fine = self._fine
         direct = is_direct(method, self.dofs, fine.degree)
-        if not direct and not self._levels:
-            self._levels = [ConstrainedSpace(self._body, d, self._contact) for d in range(1, fine.degree)]
-        spaces = [fine] if direct else [*self._levels, fine]
         with ExitStack() as stack:
             start = time.perf_counter()
             rhs, unknown = (stack.enter_context(fine.vector()) for _ in range(2))
             fine.lift(rhs, lame)
             assemble = time.perf_counter() - start
-            levels = []
-            for space in spaces:
-                matrix, seconds = space.operator(
-                    lame, shared=self._shared, blocked=not direct and space is fine and fine.degree > 1
-                )
-                stack.callback(matrix.destroy)
-                levels.append(Level(space.space, matrix, space.prescribed))
+            levels: list[Level] = []
+            for space in [fine] if direct else [*self._coarser(), fine]:
+                level, seconds = self._level(space, lame, stack, blocked=not direct)
+                levels.append(level)
                 assemble += seconds
             solver = LinearSolver(levels, direct=direct, tolerance=tolerance)
             stack.callback(solver.close)
@@ -103,10 +109,56 @@ class ElasticBody:
             unknown.array[:] += fine.held[: fine.owned]
             reaction, energy, balance = self._reaction(unknown, lame)
             seconds = time.perf_counter() - start
-            setup = solver.setup_seconds
-        return Solution(
-            reaction, energy, self._max_strain(), balance, self.dofs, iterations, assemble, setup, seconds
+            solution = Solution(
+                reaction, energy, self._max_strain(), balance, fine.whole_dofs, iterations,
+                assemble, solver.setup_seconds, seconds,
+            )  # fmt: skip
+            if not estimate:
+                return solution
+            start = time.perf_counter()
+            found, more = self._decrement(lame, levels, stack)
+        return replace(
+            solution, decrement=found / (2 * energy), estimate_iterations=more,
+            time_estimate=time.perf_counter() - start,
         )  # fmt: skip
+
+    def _coarser(self) -> list[ConstrainedSpace]:
+        """Return the spaces of lower degree, made when first asked for; collective."""
+        if not self._levels:
+            self._levels = [ConstrainedSpace(self._body, d, self._contact) for d in range(1, self._fine.degree)]
+        return self._levels
+
+    def _level(
+        self, space: ConstrainedSpace, lame: tuple[float, float], stack: ExitStack, *, blocked: bool
+    ) -> tuple[Level, float]:
+        blocked = blocked and space.degree > 1 and space.degree >= self._fine.degree
+        matrix, seconds = space.operator(lame, shared=self._shared, blocked=blocked)
+        stack.callback(matrix.destroy)
+        return Level(space.space, matrix, space.prescribed), seconds
+
+    def _decrement(self, lame: tuple[float, float], levels: list[Level], stack: ExitStack) -> tuple[float, int]:
+        """Return the energy, of the whole body, that one degree more takes away from the last solution."""
+        fine = self._fine
+        if self._finer is None:
+            self._finer = ConstrainedSpace(self._body, fine.degree + 1, self._contact)
+        finer = self._finer
+        if len(levels) == 1:
+            levels = [*(self._level(space, lame, stack, blocked=True)[0] for space in self._coarser()), *levels]
+        level, _ = self._level(finer, lame, stack, blocked=True)
+        solver = LinearSolver([*levels, level], direct=False, tolerance=0.5)
+        stack.callback(solver.close)
+        finer.forms.displacement.interpolate(fine.forms.displacement)
+        with finer.vector() as residual:
+            finer.apply(residual, lame)
+            residual.scale(-1.0)
+            residual.array[finer.prescribed_owned] = 0.0
+            energy, iterations = energy_decrement(solver, residual)
+        return self._multiplicity * energy, iterations
+
+    @property
+    def _multiplicity(self) -> float:
+        """How many times the modelled part makes up the whole body."""
+        return 2.0 ** len(self._body.mirrored)
 
     def _reaction(
         self, unknown: PETSc.Vec, lame: tuple[float, float]
@@ -122,6 +174,11 @@ class ElasticBody:
             twice_energy = float(_sum(fine.comm, np.array([r @ u]))[0])
             held = fine.held[: fine.owned]
             work = float(_sum(fine.comm, np.array([r[fine.prescribed_owned] @ held[fine.prescribed_owned]]))[0])
+        # Of a half or quarter model: its images double what lies in the plane and cancel what is across it.
+        whole = np.full(3, self._multiplicity)
+        whole[list(self._body.mirrored)] = 0.0
+        on_probe, on_support = whole * on_probe, whole * on_support
+        work, twice_energy = self._multiplicity * work, self._multiplicity * twice_energy
         size = float(np.linalg.norm(on_probe))
         if not (np.isfinite(twice_energy) and np.isfinite(size) and twice_energy > 0 and size > 0):
             raise SolveError(f"the solution is not a number or has no energy (2U = {twice_energy:g} J)")

@@ -87,6 +87,22 @@ class LinearSolver:
             raise SolveError(f"the linear solver did not converge: {_reason(reason)} after {self.ksp.its} iterations")
         return self.ksp.its
 
+    @property
+    def matrix(self) -> PETSc.Mat:
+        """The operator."""
+        return self._levels[-1].matrix
+
+    def precondition(self, residual: PETSc.Vec, result: PETSc.Vec) -> None:
+        """Apply the preconditioner alone; collective.
+
+        Raises:
+            SolveError: if PETSc fails.
+        """
+        try:
+            self.ksp.pc.apply(residual, result)
+        except PETSc.Error as error:
+            raise SolveError(_explain(error)) from error
+
     def close(self) -> None:
         """Free everything that was made."""
         while self._owned:

@@ -12,7 +12,7 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.mesh.distribute import BodyMesh
-from pipeline.scene.model import FIXED, PROBE
+from pipeline.scene.model import FIXED, MIRROR, PROBE
 from pipeline.solve.forms import elastic_forms
 from pipeline.solve.linear import SolveError
 
@@ -27,6 +27,8 @@ class Contact:
 
 class ConstrainedSpace:
     """Displacements of one degree on a mesh, prescribed on the probe's footprint and on the support.
+
+    On planes of symmetry that bound the mesh the displacement across them is zero.
 
     Arrays named ``…_owned`` index the dofs, or for ``probe_owned`` and ``fixed_owned`` the blocks of three dofs,
     that this rank owns.
@@ -46,9 +48,9 @@ class ConstrainedSpace:
         self.forms = elastic_forms(space)
         self._parts: tuple[PETSc.Mat, PETSc.Mat] | None = None
         self._part_seconds = 0.0
-        probe, fixed = (
+        probe, fixed, *planes = (
             np.asarray(fem.locate_dofs_topological(space, body.mesh.topology.dim - 1, body.facets[name]))
-            for name in (PROBE, FIXED)
+            for name in (PROBE, FIXED, *(MIRROR["xy"[axis]] for axis in body.mirrored))
         )
         if self.comm.allreduce(len(np.intersect1d(probe, fixed))):
             raise SolveError("the probe's footprint touches the held face: no displacement satisfies both conditions")
@@ -57,13 +59,25 @@ class ConstrainedSpace:
         components = range(3) if contact.bonded else [2]
         for c in components:
             self._conditions.append(fem.dirichletbc(travel[c], 3 * probe + c, space.sub(c)))
+        mirrored = [3 * plane + axis for axis, plane in zip(body.mirrored, planes, strict=True)]
+        for axis, dofs in zip(body.mirrored, mirrored, strict=True):
+            self._conditions.append(fem.dirichletbc(PETSc.ScalarType(0), dofs, space.sub(axis)))
         self.held = np.zeros(3 * (index_map.size_local + index_map.num_ghosts))
         unrolled = [3 * probe + c for c in components]
         for c, dofs in zip(components, unrolled, strict=True):
             self.held[dofs] = travel[c]
-        self.prescribed = np.unique(np.concatenate([*unrolled, *(3 * fixed + c for c in range(3))]))
+        self.prescribed = np.unique(np.concatenate([*unrolled, *(3 * fixed + c for c in range(3)), *mirrored]))
         self.prescribed_owned = self.prescribed[self.prescribed < self.owned]
+        self._planes = planes
         self.probe_owned, self.fixed_owned = (dofs[dofs < index_map.size_local] for dofs in (probe, fixed))
+
+    @property
+    def whole_dofs(self) -> int:
+        """Unknowns of the whole body: points in a plane of symmetry count once, their images with the others."""
+        images = np.full(self.owned // 3, 2.0 ** len(self._planes))
+        for plane in self._planes:
+            images[plane[plane < len(images)]] /= 2
+        return round(3 * self.comm.allreduce(float(images.sum())))
 
     def close(self) -> None:
         """Free the parts of the operator."""

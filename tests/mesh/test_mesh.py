@@ -10,6 +10,7 @@ import pytest
 
 from pipeline.mesh.curve import curve
 from pipeline.mesh.generate import MeshArrays, MeshError, generate
+from pipeline.mesh.reflect import reflect
 from pipeline.mesh.size import Sizes
 from pipeline.scene.model import Scene
 from tests.cases import BLADE, study
@@ -129,3 +130,20 @@ def test_blade_corners_are_refined():
 def test_nothing_held_is_refused():
     with pytest.raises(MeshError, match="float"):
         generate(scene(column=6e-3, body={"fixed": "sides"}), SIZES)
+
+
+@pytest.mark.parametrize("straight", [True, False])
+def test_reflection_joins_without_a_seam(straight):
+    """The whole has twice the volume, its surface is closed, and what was a plane of symmetry is inside."""
+    half = replace(scene(straight=straight), mirrors=("x", "y"))
+    part = generate(half, SIZES) if straight else curve(generate(half, SIZES), half)
+    whole = reflect(part, ("x", "y"))
+    assert volume(whole) == pytest.approx(4 * volume(part), rel=1e-12)
+    assert area(whole, "probe") == pytest.approx(4 * area(part, "probe"), rel=1e-12)
+    assert set(whole.facets) == {"probe", "fixed", "free"}
+    assert len(np.unique(np.round(whole.points, 12), axis=0)) == len(whole.points)
+    corners = whole.cells[:, :4]
+    faces = np.sort(np.concatenate([np.delete(corners, i, axis=1) for i in range(4)]), axis=1)
+    _, counts = np.unique(faces, axis=0, return_counts=True)
+    assert counts.max() == 2
+    assert (counts == 1).sum() == sum(map(len, whole.facets.values()))

@@ -1,0 +1,53 @@
+"""Whole meshes from parts: reflect a mesh in the planes of symmetry that bound it.
+
+A mirror-symmetric scene is always meshed by reflection, so that its discrete solution is symmetric, too, and the
+half or quarter model gives the same force to rounding.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.mesh.curve import EDGES
+from pipeline.mesh.generate import IntArray, MeshArrays
+from pipeline.scene.model import MIRROR
+
+# Reflection turns tetrahedra inside out: corners 2 and 3 change places, and with them their edges' mid nodes.
+_TURNED = {4: [0, 1, 3, 2], 10: [0, 1, 3, 2, 4, 6, 5, 8, 7, 9]}
+
+
+def reflect(mesh: MeshArrays, planes: tuple[str, ...]) -> MeshArrays:
+    """Return ``mesh`` joined with its images in ``planes`` ("x": x = 0, "y": y = 0), which bound it."""
+    for plane in planes:
+        mesh = _reflect_once(mesh, plane)
+    return mesh
+
+
+def _reflect_once(mesh: MeshArrays, plane: str) -> MeshArrays:
+    axis, name = "xy".index(plane), MIRROR[plane]
+    points = mesh.points.copy()
+    # Facets hold corners only: mid nodes in the plane are those between two corners in it.
+    on_plane = np.zeros(len(points), dtype=bool)
+    on_plane[mesh.facets[name]] = True
+    on_plane |= _mid_nodes_within(mesh.cells, on_plane)
+    points[on_plane, axis] = 0.0
+    image = np.where(on_plane, np.arange(len(points)), len(points) + np.cumsum(~on_plane) - 1)
+    mirrored = points[~on_plane]
+    mirrored[:, axis] *= -1
+    facets = {key: np.vstack([f, image[f]]) for key, f in mesh.facets.items() if key != name}
+    return replace(
+        mesh,
+        points=np.vstack([points, mirrored]),
+        cells=np.vstack([mesh.cells, image[mesh.cells][:, _TURNED[mesh.cells.shape[1]]]]),
+        facets=facets,
+        rim=np.union1d(mesh.rim, image[mesh.rim]),
+    )
+
+
+def _mid_nodes_within(cells: IntArray, corner: np.ndarray) -> np.ndarray:
+    """Mark the mid nodes of edges with both ends in the plane: they lie in it, too."""
+    marked = np.zeros_like(corner)
+    if cells.shape[1] == 10:
+        for number, (i, j) in enumerate(EDGES, start=4):
+            marked[cells[:, number]] |= corner[cells[:, i]] & corner[cells[:, j]]
+    return marked

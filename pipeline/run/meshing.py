@@ -1,0 +1,60 @@
+"""From a case to its distributed mesh: a symmetric part is meshed, and reflected where the whole is wanted."""
+
+from collections.abc import Callable
+from math import inf
+from typing import TypeVar
+
+from mpi4py import MPI
+
+from pipeline.mesh.curve import curve
+from pipeline.mesh.distribute import BodyMesh, distribute
+from pipeline.mesh.generate import MeshArrays, MeshError, generate
+from pipeline.mesh.reflect import reflect
+from pipeline.mesh.size import Sizes
+from pipeline.plan.symmetry import mirror_planes
+from pipeline.scene.model import Scene
+from pipeline.study.sweep import Case
+
+T = TypeVar("T")
+
+
+def mesh_case(case: Case, mirrors: tuple[str, ...], comm: MPI.Comm) -> tuple[BodyMesh, float]:
+    """Return the mesh of a case, of the part that ``mirrors`` leave of it, and the seconds it took; collective.
+
+    Raises:
+        MeshError: on every rank.
+    """
+    start = MPI.Wtime()
+    arrays = on_first_rank(comm, lambda: mesh_arrays(case, mirrors))
+    mesh = distribute(comm, arrays)
+    return mesh, comm.allreduce(MPI.Wtime() - start, op=MPI.MAX)
+
+
+def mesh_arrays(case: Case, mirrors: tuple[str, ...]) -> MeshArrays:
+    """Return the mesh of a case as arrays, of the part that ``mirrors`` leave of it."""
+    mesh, probe = case.mesh, case.probe
+    epsilon = inf if case.is_full else mesh.epsilon
+    column = inf if mesh.outside == "coarse" else epsilon
+    sizes = Sizes(epsilon, mesh.fine, mesh.coarse, mesh.rim_size(probe.half_width), mesh.growth, column)
+    straight = mesh.degree == 1
+    planes = mirror_planes(probe)
+    scene = Scene(case.body, probe, column, mesh.outside == "fixed", sizes.rim_segments(probe), straight, planes)
+    arrays = generate(scene, sizes)
+    arrays = arrays if straight else curve(arrays, scene)
+    return reflect(arrays, tuple(plane for plane in planes if plane not in mirrors))
+
+
+def on_first_rank(comm: MPI.Comm, compute: Callable[[], T]) -> T | None:
+    """Return what ``compute`` gives on rank 0, None elsewhere; its failure is raised on every rank."""
+    result, message = None, None
+    if comm.rank == 0:
+        try:
+            result = compute()
+        except MeshError as error:
+            message = str(error)
+        except (MemoryError, RuntimeError) as error:
+            message = f"{type(error).__name__}: {error}"
+    message = comm.bcast(message)
+    if message is not None:
+        raise MeshError(message)
+    return result
