@@ -59,6 +59,19 @@ def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray, order: in
     return dolfinx.mesh.create_mesh(comm, cells=cells, x=points, **{keyword: domain})
 
 
+def create_plane_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray) -> Any:
+    """Create a distributed mesh of straight triangles in the plane; collective, arrays empty except on rank 0."""
+    element = _vector_element("triangle", 1, 2)
+    if hasattr(ufl, "VectorElement"):
+        # ffcx 0.5 writes this variant into the element when it first compiles a form on the mesh, which changes the
+        # name under which every later form on it is looked up in the cache.
+        element = ufl.VectorElement("Lagrange", "triangle", 1, dim=2, variant="equispaced")
+    domain = ufl.Mesh(element)
+    names = inspect.signature(dolfinx.mesh.create_mesh).parameters
+    keyword = "domain" if "domain" in names else "e"
+    return dolfinx.mesh.create_mesh(comm, cells=cells, x=points, **{keyword: domain})
+
+
 def geometry_dofs(mesh: Any) -> np.ndarray:
     """Return the geometry nodes of each local cell (owned and ghosts), shape (cells, nodes per cell)."""
     dofmap = mesh.geometry.dofmap if hasattr(mesh.geometry, "dofmap") else mesh.geometry.dofmaps[0]
@@ -72,6 +85,31 @@ def vector_space(mesh: Any, degree: int) -> Any:
     if hasattr(fem, "functionspace"):
         return fem.functionspace(mesh, ("Lagrange", degree, (mesh.geometry.dim,)))
     return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
+
+
+def scalar_space(mesh: Any, degree: int) -> Any:
+    """Return the continuous scalar Lagrange space of ``degree`` on ``mesh``."""
+    if hasattr(fem, "functionspace"):
+        return fem.functionspace(mesh, ("Lagrange", degree))
+    return fem.FunctionSpace(mesh, ("Lagrange", degree))
+
+
+def taylor_hood_space(mesh: Any, degree: int) -> Any:
+    """Return the mixed space of vectors of ``degree`` and of scalars one degree lower, both continuous."""
+    cell = mesh.ufl_cell().cellname() if callable(mesh.ufl_cell().cellname) else mesh.ufl_cell().cellname
+    vector = _vector_element(cell, degree, mesh.geometry.dim)
+    if hasattr(ufl, "MixedElement"):
+        scalar = ufl.FiniteElement("Lagrange", cell, degree - 1)
+        return fem.FunctionSpace(mesh, ufl.MixedElement([vector, scalar]))
+    scalar = basix.ufl.element("Lagrange", cell, degree - 1)
+    return fem.functionspace(mesh, basix.ufl.mixed_element([vector, scalar]))
+
+
+def cellwise_vector_space(mesh: Any, size: int) -> Any:
+    """Return the space of vectors of ``size`` components constant on each cell."""
+    if hasattr(fem, "functionspace"):
+        return fem.functionspace(mesh, ("DG", 0, (size,)))
+    return fem.VectorFunctionSpace(mesh, ("DG", 0), dim=size)
 
 
 def degree(space: Any) -> int:

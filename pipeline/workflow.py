@@ -49,7 +49,7 @@ class Outcome:
 def prepare(study: Study, comm: MPI.Comm, store_path: Path, *, fresh: bool = False) -> tuple[Plan, Opened]:
     """Open the case store and plan, on every rank alike, what is not on record; collective.
 
-    ``fresh`` computes again what is stored; a timing study always does.
+    ``fresh`` computes again what is stored; a timing study always does, but for F_exact.
 
     Raises:
         StoreError: on every rank, if the store cannot be used.
@@ -58,8 +58,10 @@ def prepare(study: Study, comm: MPI.Comm, store_path: Path, *, fresh: bool = Fal
     if comm.rank == 0:
         try:
             opened.store = Store(store_path)
-            if not (fresh or study.solve.timing):
-                found = opened.store.get(set(make_plan(study).keys))
+            if not fresh:
+                declared = make_plan(study)
+                keys = () if study.solve.timing else declared.keys
+                found = opened.store.get({*keys, *declared.reference_keys})
                 opened.records = {key: record for key, record in found.items() if record.status == "ok"}
         except StoreError as error:
             message = str(error)

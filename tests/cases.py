@@ -6,8 +6,7 @@ from typing import Any
 from mpi4py import MPI
 
 from pipeline.plan.plan import make_plan
-from pipeline.run.execute import execute
-from pipeline.run.progress import Silent
+from pipeline.run.execute import compute
 from pipeline.run.record import Record
 from pipeline.study.load import parse
 from pipeline.study.sweep import Study
@@ -17,6 +16,7 @@ BASE: dict[str, Any] = {
     "material": {"young": "10 kPa", "poisson": 0.3},
     "probe": {"action": "pierce", "shape": "disc", "radius": "3 mm", "depth": "0.2 mm"},
     "mesh": {"epsilon": "full", "fine": "5 mm", "coarse": "8 mm", "rim": "1 mm", "growth": 0.8, "degree": 2},
+    "solve": {"exact": False},
 }
 
 BLADE: dict[str, Any] = {"action": "cut", "shape": "blade", "length": "10 mm", "width": "3 mm", "depth": "0.1 mm"}
@@ -41,9 +41,7 @@ def study(**changes: Any) -> Study:
 def solve(comm: MPI.Comm = MPI.COMM_SELF, **changes: Any) -> dict[tuple[int, ...], Record]:
     """Run the base study with changes and return the record of every case, by index."""
     plan = make_plan(study(**changes))
-    records: dict[str, Record] = {}
-    execute(plan, comm, lambda record: records.__setitem__(record.key, record), Silent())
-    records = comm.bcast(records)
+    records = compute(plan, comm)
     return {case.index: records[key] for case, key in zip(plan.study.cases(), plan.keys, strict=True)}
 
 

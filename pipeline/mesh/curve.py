@@ -29,15 +29,11 @@ def curve(mesh: MeshArrays, scene: Scene) -> MeshArrays:
     edges = pairs[first]
     straight = mesh.points[edges].mean(axis=1)
     of_cell = inverse.reshape(-1, len(EDGES))
-    middle = _on_rim(mesh, scene, edges, _on_sides(mesh, scene, edges, straight, keys))
-    middle = _quarter_points(mesh, edges, middle)
-    bad = _folded(mesh.points[corners], middle[of_cell])
-    while bad.any():
-        middle[of_cell[bad]] = straight[of_cell[bad]]
-        folded = _folded(mesh.points[corners], middle[of_cell])
-        if not (folded & ~bad).any():
-            break
-        bad |= folded
+    curved = _on_rim(mesh, scene, edges, _on_sides(mesh, scene, edges, straight, keys))
+    middle = _quarter_points(mesh, edges, curved.copy())
+    # A folded cell gives up its quarter points first: without its arcs the footprint would be a smaller one.
+    for milder in (curved, straight):
+        _unfold(mesh.points[corners], middle, of_cell, milder)
     nodes = np.hstack([corners, len(mesh.points) + of_cell])
     return replace(mesh, points=np.vstack([mesh.points, middle]), cells=nodes)
 
@@ -94,6 +90,14 @@ def _quarter_points(mesh: MeshArrays, edges: IntArray, middle: FloatArray) -> Fl
         bulge = middle[chosen] - (start + end) / 2
         middle[chosen] = start + (end - start) / 4 + 0.75 * bulge
     return middle
+
+
+def _unfold(corners: FloatArray, middle: FloatArray, of_cell: IntArray, milder: FloatArray) -> None:
+    """Replace the mid nodes of folded cells by those of ``milder``, and so on with the neighbours that this folds."""
+    bad = np.zeros(len(corners), dtype=bool)
+    while (folded := _folded(corners, middle[of_cell]) & ~bad).any():
+        bad |= folded
+        middle[of_cell[folded]] = milder[of_cell[folded]]
 
 
 def _folded(corners: FloatArray, middle: FloatArray) -> np.ndarray:

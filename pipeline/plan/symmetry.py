@@ -4,7 +4,8 @@ The vertical planes x = 0 and y = 0 are the candidates: the bodies are centred o
 symmetric, so that it is the probe that decides.
 """
 
-from pipeline.study.schema import AnyProbe, Blade
+from pipeline.study.schema import AnyProbe, Blade, Cylinder, Disc
+from pipeline.study.sweep import Case
 
 PLANES = ("x", "y")  # the coordinate that is zero on the plane
 _ALIGNED = 1e-12
@@ -20,3 +21,8 @@ def model_planes(probe: AnyProbe) -> tuple[str, ...]:
     """Return the mirror planes that the probe's movement respects, too: half or quarter of the body tells all."""
     planes = mirror_planes(probe)
     return tuple(plane for plane, travel in zip(PLANES, probe.travel, strict=False) if plane in planes and travel == 0)
+
+
+def is_round(case: Case) -> bool:
+    """Tell whether body, support and probe are the same all round one axis, and the movement along it."""
+    return isinstance(case.body, Cylinder) and isinstance(case.probe, Disc) and case.probe.at == (0.0, 0.0)

@@ -30,6 +30,11 @@ _FLOATS = {
     "time_total": ("s", "time that this case costs alone"),
     "memory": ("bytes", "peak memory of all ranks"),
 }
+# Of the records of F_exact, which are for a Young's modulus of 1 Pa and a depth of 1 m.
+_EXACT = {
+    "force_exact": ("N", "force converged well below every error in the study, whole body (F_exact)"),
+    "force_exact_error": ("1", "relative error bar (95 %) on force_exact"),
+}
 _COUNTS = {
     "dofs": ("1", "unknowns of the whole body"),
     "cells": ("1", "elements of the whole body"),
@@ -60,9 +65,11 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     dims = tuple(axis.name for axis in study.axes)
     flat = [records.get(key) for key in plan.keys]
 
-    def array(values: list[Any], dtype: Any) -> np.ndarray:
+    def array(values: Any, dtype: Any) -> np.ndarray:
         return np.array(values, dtype=dtype).reshape(study.shape)
 
+    exact = [records.get(key) for key in plan.reference_keys] or [None] * len(flat)
+    scales = [case.material.young * case.probe.depth for case in study.cases()]
     variables: dict[str, Any] = {}
     for name, (units, text) in _FLOATS.items():
         values = [getattr(r, name) if r else nan for r in flat]
@@ -71,6 +78,10 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
         values = [getattr(r, name) if r and r.status == "ok" else _MISSING for r in flat]
         attributes = {"units": units, "long_name": text, "missing_value": _MISSING}
         variables[name] = (dims, array(values, np.int64), attributes)
+    for name, (units, text) in _EXACT.items():
+        values = [getattr(r, name.replace("_exact", "")) if r else nan for r in exact]
+        scale = np.array(scales) if name == "force_exact" else 1.0
+        variables[name] = (dims, array(np.array(values) * scale, float), {"units": units, "long_name": text})
     vectors = np.array([r.force_vector if r else (nan,) * 3 for r in flat]).reshape(*study.shape, 3)
     variables["force_vector"] = (
         (*dims, "component"), vectors, {"units": "N", "long_name": "force of the tissue on the probe"},
@@ -106,6 +117,7 @@ def _add_ratios(dataset: xr.Dataset) -> xr.Dataset:
     elif "epsilon" not in dataset.dims and dataset.attrs["epsilon_is_full"]:
         full_force, full_seconds = force, seconds
     order = force.dims
+    dataset["accuracy"] = (force / dataset["force_exact"]).assign_attrs(units="1", long_name="F / F_exact")
     dataset["force_max"] = full_force.transpose(*order).assign_attrs(
         units="N", long_name="force of the full-order mesh of the same study (F_max)"
     )

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
-from math import nan
 
 import psutil
 from mpi4py import MPI
@@ -15,17 +14,19 @@ from threadpoolctl import threadpool_limits
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.mesh.generate import MeshError
 from pipeline.plan import estimate
-from pipeline.plan.plan import MeshStep, OperatorStep, Plan, Solve
+from pipeline.plan.plan import MeshStep, OperatorStep, Plan, Solve, mesh_steps
 from pipeline.plan.symmetry import model_planes
+from pipeline.run.compile import prepare
+from pipeline.run.measure import TIMES, add_times, record_of, record_of_meridian
 from pipeline.run.memory import PeakMemory
-from pipeline.run.meshing import mesh_case
-from pipeline.run.progress import Progress
+from pipeline.run.meshing import meridian_of, mesh_case, on_first_rank
+from pipeline.run.progress import Progress, Silent
 from pipeline.run.provenance import provenance
 from pipeline.run.record import Record
-from pipeline.solve.elasticity import ElasticBody, Solution
-from pipeline.solve.enrich import error_bar
-from pipeline.solve.forms import prepare
+from pipeline.solve.axisymmetric import solve_axisymmetric
+from pipeline.solve.elasticity import ElasticBody
 from pipeline.solve.linear import SolveError, is_direct
+from pipeline.solve.mixed import MixedBody
 from pipeline.solve.space import Contact
 from pipeline.study.sweep import Case
 
@@ -33,6 +34,7 @@ from pipeline.study.sweep import Case
 _MEMORY_SHARE = 0.9
 
 Keep = Callable[[Record], None]
+Body = ElasticBody | MixedBody
 
 
 class CaseFailure(Exception):
@@ -46,15 +48,23 @@ def execute(plan: Plan, comm: MPI.Comm, keep: Keep, progress: Progress) -> int:
     rest went on.
     """
     runner = _Runner(comm, keep, progress, timed=plan.study.solve.timing)
-    if plan.solves:
-        prepare(comm, {solve.case.mesh.degree + more for solve in plan.solves for more in (0, 1)})
+    todo = plan.solves
     # A rank is one thread: OpenBLAS's own would wait for work by spinning, and take the other ranks' cores.
     with threadpool_limits(limits=1, user_api="blas"):
-        for step in plan.meshes:
-            repeats = step.case.solve.repeats if runner.timed else 1
-            runner.run(step, repeats)
-            gc.collect()  # dolfinx's meshes hold communicators, and Python's cycles hold the meshes
+        while todo:
+            prepare(comm, todo)
+            for step in mesh_steps(todo, shared=not runner.timed):
+                runner.run(step)
+                gc.collect()  # dolfinx's meshes hold communicators, and Python's cycles hold the meshes
+            todo = runner.take_retries()
     return runner.failed
+
+
+def compute(plan: Plan, comm: MPI.Comm) -> dict[str, Record]:
+    """Carry out ``plan`` without a store and return its records by key, on every rank; collective."""
+    records: dict[str, Record] = {}
+    execute(plan, comm, lambda record: records.__setitem__(record.key, record), Silent())
+    return comm.bcast(records)
 
 
 class _Runner:
@@ -64,13 +74,25 @@ class _Runner:
         self.comm, self.timed, self.failed = comm, timed, 0
         self._keep, self._progress = keep, progress
         self._provenance = provenance(comm.size)
+        self._retries: list[Solve] = []
+        self._attempts: dict[str, list[Record]] = {}
 
-    def run(self, step: MeshStep, repeats: int) -> None:
+    def take_retries(self) -> tuple[Solve, ...]:
+        """Return the solves that missed their goal and have a better mesh to go on with."""
+        retries, self._retries = tuple(self._retries), []
+        return retries
+
+    def run(self, step: MeshStep) -> None:
         """Compute every case of a mesh step, and record each; collective."""
         memory = PeakMemory(self.comm)
-        if repeats > 1:
-            (solve,) = step.solves
-            self._record_one(solve, lambda: self._repeat(step, repeats, memory))
+        first = step.solves[0]
+        if first.axisymmetric:
+            for solve in step.solves:
+                self._progress.note(str(solve.case))
+                self._record_one(solve, partial(self._solve_meridian, solve, memory))
+            return
+        if self.timed and not first.is_reference:
+            self._record_one(first, lambda: self._repeat(first, memory))
             return
         meshed: list[tuple[BodyMesh, float]] = []
         if not self._guard(step.solves, lambda: meshed.append(self._mesh(step.case, step.mirrors))):
@@ -80,9 +102,9 @@ class _Runner:
             self._run_operator(operator, mesh, seconds, memory)
 
     def _run_operator(self, step: OperatorStep, mesh: BodyMesh, mesh_seconds: float, memory: PeakMemory) -> None:
-        bodies: list[ElasticBody] = []
+        bodies: list[Body] = []
         shared = len(step.solves) > 1
-        if not self._guard(step.solves, lambda: bodies.append(_elastic_body(mesh, step.case, shared=shared))):
+        if not self._guard(step.solves, lambda: bodies.append(_body(mesh, step.case, shared=shared))):
             return
         with bodies[0] as body:
             for solve in step.solves:
@@ -90,50 +112,38 @@ class _Runner:
                 compute = partial(self._solve, solve, body, mesh, mesh_seconds, memory)
                 self._record_one(solve, compute)
 
-    def _solve(self, solve: Solve, body: ElasticBody, mesh: BodyMesh, seconds: float, memory: PeakMemory) -> Record:
+    def _solve(self, solve: Solve, body: Body, mesh: BodyMesh, seconds: float, memory: PeakMemory) -> Record:
         case, degree = solve.case, solve.case.mesh.degree
         direct = is_direct(case.solve.method, body.dofs, degree)
         self._check_memory(estimate.solving_memory(body.dofs, degree, direct=direct), "solving")
         missing = ""
-        if not self.timed:
+        untimed = solve.is_reference or not self.timed
+        if untimed:
             missing = self._lacks_memory(estimate.enriched_memory(body.dofs, degree), "the error bar")
-        wanted = not (self.timed or missing)
+        wanted = untimed and not missing
         solution = body.solve(
             case.material.lame, method=case.solve.method, tolerance=case.solve.tolerance, estimate=wanted
         )
-        return replace(self._record(solve, solution, mesh.cells, seconds, memory), message=missing)
+        return replace(self._stamp(record_of(solve, solution, mesh.cells, seconds), memory), message=missing)
 
-    def _record(self, solve: Solve, solution: Solution, cells: int, seconds: float, memory: PeakMemory) -> Record:
-        axis = solve.case.probe.axis
-        force = -sum(f * a for f, a in zip(solution.reaction, axis, strict=True))
-        return Record(
-            key=solve.key,
-            status="ok",
-            origin="symmetric" if solve.mirrors else "solved",
-            force=force,
-            force_error=_relative_error(solve.case, solution, force),
-            force_vector=solution.reaction,
-            energy=solution.energy,
-            max_strain=solution.max_strain,
-            balance=solution.balance,
-            dofs=solution.dofs,
-            cells=cells * 2 ** len(solve.mirrors),
-            iterations=solution.iterations,
-            memory=memory.peak(),
-            time_mesh=seconds,
-            time_assemble=solution.time_assemble,
-            time_setup=solution.time_setup,
-            time_solve=solution.time_solve,
-            time_error=solution.time_estimate,
-            provenance=self._provenance | {"date": datetime.now(UTC).isoformat(timespec="seconds")},
-        )
+    def _solve_meridian(self, solve: Solve, memory: PeakMemory) -> Record:
+        """Solve a round scene in two dimensions, on the first rank; collective."""
+        case = solve.case
+        compute = partial(
+            solve_axisymmetric, meridian_of(case), case.material.poisson, case.probe.contact == "bonded",
+            young=case.material.young, depth=case.probe.depth,
+        )  # fmt: skip
+        record = on_first_rank(self.comm, lambda: record_of_meridian(solve, compute()))
+        return self._stamp(self.comm.bcast(record), memory)
 
-    def _repeat(self, step: MeshStep, repeats: int, memory: PeakMemory) -> Record:
+    def _stamp(self, record: Record, memory: PeakMemory) -> Record:
+        date = datetime.now(UTC).isoformat(timespec="seconds")
+        return replace(record, memory=memory.peak(), provenance=self._provenance | {"date": date})
+
+    def _repeat(self, solve: Solve, memory: PeakMemory) -> Record:
         """Compute a case afresh several times; its times are the medians. The error bar comes after them."""
-        (solve,) = step.solves
-        records = [self._compute(solve, memory) for _ in range(repeats)]
-        names = ("time_mesh", "time_assemble", "time_setup", "time_solve")
-        medians = {n: statistics.median(getattr(r, n) for r in records) for n in names}
+        records = [self._compute(solve, memory) for _ in range(solve.case.solve.repeats)]
+        medians = {n: statistics.median(getattr(r, n) for r in records) for n in TIMES}
         self.timed = False
         try:
             bar = self._compute(replace(solve, mirrors=model_planes(solve.case.probe)), memory)
@@ -147,7 +157,7 @@ class _Runner:
     def _compute(self, solve: Solve, memory: PeakMemory) -> Record:
         """Compute one case afresh, mesh and all; collective."""
         mesh, seconds = self._mesh(solve.case, solve.mirrors)
-        with _elastic_body(mesh, solve.case, shared=False) as body:
+        with _body(mesh, solve.case, shared=False) as body:
             record = self._solve(solve, body, mesh, seconds, memory)
         del mesh, body
         gc.collect()
@@ -197,6 +207,16 @@ class _Runner:
         return False
 
     def _finish(self, solve: Solve, record: Record) -> None:
+        if solve.goal is not None and record.status == "ok":
+            missed = not record.force_error <= solve.goal
+            if missed and solve.later:
+                self._attempts.setdefault(solve.key, []).append(record)
+                self._retries.append(solve.again())
+                return
+            record = add_times(record, self._attempts.pop(solve.key, []))
+            if missed and not solve.is_reference:
+                message = f"error bar {record.force_error:.2g} on the finest mesh tried: accuracy {solve.goal:g} missed"
+                record = replace(record, status="failed", message=message)
         if record.status == "failed":
             self.failed += len(solve.serves)
         if self.comm.rank == 0:
@@ -204,18 +224,8 @@ class _Runner:
         self._progress.done(str(solve.case), record.message)
 
 
-def _elastic_body(mesh: BodyMesh, case: Case, *, shared: bool) -> ElasticBody:
+def _body(mesh: BodyMesh, case: Case, *, shared: bool) -> Body:
     contact = Contact(case.probe.travel, case.probe.contact == "bonded")
+    if case.element == "mixed":
+        return MixedBody(mesh, case.mesh.degree, contact)
     return ElasticBody(mesh, case.mesh.degree, contact, shared=shared)
-
-
-def _relative_error(case: Case, solution: Solution, force: float) -> float:
-    """Return the relative error bar on the force along the probe's axis.
-
-    The decrement is one of work. A probe that slices works along the blade, too: all of what is lost may then belong
-    to the force along the axis, which is less of the work.
-    """
-    if solution.decrement != solution.decrement:
-        return nan
-    share = 2 * solution.energy / (force * case.probe.depth)
-    return error_bar(solution.decrement, case.mesh.degree) * share

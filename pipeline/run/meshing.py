@@ -9,10 +9,13 @@ from mpi4py import MPI
 from pipeline.mesh.curve import curve
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.mesh.generate import MeshArrays, MeshError, generate
+from pipeline.mesh.meridian import Meridian
 from pipeline.mesh.reflect import reflect
 from pipeline.mesh.size import Sizes
 from pipeline.plan.symmetry import mirror_planes
 from pipeline.scene.model import Scene
+from pipeline.solve.linear import SolveError
+from pipeline.study.schema import Below, Cylinder, Disc
 from pipeline.study.sweep import Case
 
 T = TypeVar("T")
@@ -44,13 +47,23 @@ def mesh_arrays(case: Case, mirrors: tuple[str, ...]) -> MeshArrays:
     return reflect(arrays, tuple(plane for plane in planes if plane not in mirrors))
 
 
+def meridian_of(case: Case) -> Meridian:
+    """Return the half plane of a round case."""
+    body, probe, mesh = case.body, case.probe, case.mesh
+    assert isinstance(body, Cylinder)
+    assert isinstance(probe, Disc)
+    fixed = body.fixed.below if isinstance(body.fixed, Below) else body.fixed
+    column, held = (mesh.epsilon, mesh.outside == "fixed") if case.is_truncated else (inf, False)
+    return Meridian(body.radius, body.height, probe.radius, fixed, column, held)
+
+
 def on_first_rank(comm: MPI.Comm, compute: Callable[[], T]) -> T | None:
     """Return what ``compute`` gives on rank 0, None elsewhere; its failure is raised on every rank."""
     result, message = None, None
     if comm.rank == 0:
         try:
             result = compute()
-        except MeshError as error:
+        except (MeshError, SolveError) as error:
             message = str(error)
         except (MemoryError, RuntimeError) as error:
             message = f"{type(error).__name__}: {error}"

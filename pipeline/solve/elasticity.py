@@ -9,49 +9,18 @@ Stress integrated under the probe is wrong by tens of per cent on the same solut
 
 import time
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
-from math import nan
+from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
-from dolfinx import fem
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.enrich import energy_decrement
+from pipeline.solve.error import error_bar
 from pipeline.solve.forms import mean_strain_form
 from pipeline.solve.linear import Level, LinearSolver, SolveError, is_direct
+from pipeline.solve.solution import BALANCE_LIMIT, Solution, global_sum, largest_strain
 from pipeline.solve.space import ConstrainedSpace, Contact
-
-FloatArray = npt.NDArray[np.float64]
-
-# F·d = 2U and F_probe + F_support = 0 hold for the exact solution of the discrete system. Conjugate gradients
-# stopped at 1e-8 keep both to about 1e-8; what misses them by this much has not been solved.
-BALANCE_LIMIT = 1e-6
-
-
-@dataclass(frozen=True)
-class Solution:
-    """What one solve gives; all values global and equal on every rank.
-
-    ``reaction`` (N, xyz) is the force of the tissue on the probe, ``energy`` (J) the strain energy,
-    ``balance`` the larger of the relative errors of F·d = 2U and of F_probe + F_support = 0. ``decrement`` is the
-    share of the energy that one degree more takes away: s / F_p (see :mod:`pipeline.solve.enrich`).
-    """
-
-    reaction: tuple[float, float, float]
-    energy: float
-    max_strain: float
-    balance: float
-    dofs: int
-    iterations: int
-    time_assemble: float
-    time_setup: float
-    time_solve: float
-    decrement: float = nan
-    estimate_iterations: int = 0
-    time_estimate: float = 0.0
 
 
 class ElasticBody:
@@ -110,15 +79,16 @@ class ElasticBody:
             reaction, energy, balance = self._reaction(unknown, lame)
             seconds = time.perf_counter() - start
             solution = Solution(
-                reaction, energy, self._max_strain(), balance, fine.whole_dofs, iterations,
+                reaction, energy, largest_strain(self._strain, self._body), balance, fine.whole_dofs, iterations,
                 assemble, solver.setup_seconds, seconds,
             )  # fmt: skip
             if not estimate:
                 return solution
             start = time.perf_counter()
             found, more = self._decrement(lame, levels, stack)
+        decrement = found / (2 * energy)
         return replace(
-            solution, decrement=found / (2 * energy), estimate_iterations=more,
+            solution, decrement=decrement, bar=error_bar(decrement, fine.degree), estimate_iterations=more,
             time_estimate=time.perf_counter() - start,
         )  # fmt: skip
 
@@ -169,11 +139,11 @@ class ElasticBody:
         with fine.vector() as residual:
             fine.apply(residual, lame)
             r, u = residual.array, unknown.array
-            on_probe = _sum(fine.comm, r.reshape(-1, 3)[fine.probe_owned].sum(axis=0))
-            on_support = _sum(fine.comm, r.reshape(-1, 3)[fine.fixed_owned].sum(axis=0))
-            twice_energy = float(_sum(fine.comm, np.array([r @ u]))[0])
+            on_probe = global_sum(fine.comm, r.reshape(-1, 3)[fine.probe_owned].sum(axis=0))
+            on_support = global_sum(fine.comm, r.reshape(-1, 3)[fine.fixed_owned].sum(axis=0))
+            twice_energy = float(global_sum(fine.comm, np.array([r @ u]))[0])
             held = fine.held[: fine.owned]
-            work = float(_sum(fine.comm, np.array([r[fine.prescribed_owned] @ held[fine.prescribed_owned]]))[0])
+            work = float(global_sum(fine.comm, np.array([r[fine.prescribed_owned] @ held[fine.prescribed_owned]]))[0])
         # Of a half or quarter model: its images double what lies in the plane and cancel what is across it.
         whole = np.full(3, self._multiplicity)
         whole[list(self._body.mirrored)] = 0.0
@@ -188,18 +158,3 @@ class ElasticBody:
             raise SolveError(f"forces do not balance: relative error {balance:.1e}, allowed {BALANCE_LIMIT:.0e}")
         x, y, z = (-float(component) for component in on_probe)
         return (x, y, z), twice_energy / 2, balance
-
-    def _max_strain(self) -> float:
-        """Return the largest principal strain, by magnitude, of the strain averaged over each cell."""
-        integral, volume = (fem.assemble_vector(form) for form in self._strain)
-        owned = self._body.owned_cells
-        tensors = [np.asarray(v.array).reshape(-1, 3, 3)[:owned] for v in (integral, volume)]
-        principal = np.linalg.eigvalsh(tensors[0] / tensors[1])
-        local = float(np.abs(principal).max()) if owned else 0.0
-        return float(self._fine.comm.allreduce(local, op=MPI.MAX))
-
-
-def _sum(comm: MPI.Comm, values: FloatArray) -> FloatArray:
-    total = np.empty_like(values)
-    comm.Allreduce(np.ascontiguousarray(values), total)
-    return total

@@ -6,9 +6,7 @@ it that degree p + 1 can see,
     s = F_p - F_{p+1},    s·d = a(u_p - u_{p+1}, u_p - u_{p+1}),
 
 is summed by conjugate gradients that start from u_p: each iteration adds α (r, z) to the energy found, so that a few
-of them give s to a few per cent, always from below. What degree p + 1 cannot see either is taken to be a multiple of
-θ s with θ = p² / (2 p + 1), which is exact for an error that falls like p⁻², as it does at an edge where u ~ r^½
-(I. Babuška and M. Suri, SIAM J. Numer. Anal. 24, 750, 1987); the multiples are measured (docs/accuracy.md).
+of them give s to a few per cent, always from below.
 """
 
 from collections.abc import Iterator
@@ -21,13 +19,6 @@ from pipeline.solve.linear import LinearSolver, SolveError
 # Iterations end when one adds less than this share of the sum; the first few may be short by chance.
 _SMALL = 0.02
 _FEWEST, _MOST = 3, 60
-# The error of F_p is between s and s (1 + _BAR θ) in 95 % of all cases.
-_BAR = 1.25
-
-
-def error_bar(decrement: float, degree: int) -> float:
-    """Return the relative 95 % bar on F_p, given s / F_p."""
-    return decrement * (1 + _BAR * degree**2 / (2 * degree + 1))
 
 
 def energy_decrement(solver: LinearSolver, residual: PETSc.Vec) -> tuple[float, int]:

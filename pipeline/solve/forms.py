@@ -38,7 +38,8 @@ class ElasticForms:
             constant.value = value
 
 
-def _quadrature_degree(space: Any) -> int:
+def quadrature_degree(space: Any) -> int:
+    """Return the degree of quadrature for the forms of elasticity on ``space``."""
     # On straight cells 2p - 2 is exact. The map of a quarter-point element varies within the cell, and 2p reads
     # F up to 0.07 % low there; at p = 2, degree 4 has points at which the map is singular.
     degree = compat.degree(space)
@@ -56,7 +57,7 @@ def elastic_forms(space: Any) -> ElasticForms:
     mesh = space.mesh
     u, v, w = ufl.TrialFunction(space), ufl.TestFunction(space), fem.Function(space)
     lame = fem.Constant(mesh, 1.0), fem.Constant(mesh, 1.0)
-    dx = ufl.dx(metadata={"quadrature_degree": _quadrature_degree(space)})
+    dx = ufl.dx(metadata={"quadrature_degree": quadrature_degree(space)})
 
     def energy(a: Any, b: Any) -> Any:
         return (lame[0] * ufl.div(a) * ufl.div(b) + 2 * lame[1] * ufl.inner(strain(a), strain(b))) * dx
@@ -69,7 +70,7 @@ def mean_strain_form(space: Any, displacement: Any) -> tuple[Any, Any]:
     """Return forms of the integral of the strain, and of the volume, of each cell; collective."""
     tensors = compat.cellwise_tensor_space(space.mesh)
     test = ufl.TestFunction(tensors)
-    dx = ufl.dx(metadata={"quadrature_degree": _quadrature_degree(space)})
+    dx = ufl.dx(metadata={"quadrature_degree": quadrature_degree(space)})
     cache = str(form_cache())
     one = ufl.as_tensor(np.ones((3, 3)).tolist())
     return compat.form(ufl.inner(strain(displacement), test) * dx, cache), compat.form(ufl.inner(one, test) * dx, cache)
@@ -87,40 +88,40 @@ def form_cache() -> Path:
 
 
 @contextmanager
-def _exclusive(folder: Path) -> Iterator[None]:
-    """Hold the folder's lock, which the system releases when its holder dies, however it dies."""
+def compiling() -> Iterator[None]:
+    """Hold the cache's lock, which the system releases when its holder dies, however it dies.
+
+    A process killed while compiling leaves a source file without its mark of completion, for which every later run
+    would wait in vain; a mark without its source fails every later run. Whoever holds the lock may remove such orphans.
+    """
+    folder = form_cache()
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
+        for source in folder.glob("*.c"):
+            if not source.with_suffix(".c.cached").exists():
+                source.unlink()
+        for mark in folder.glob("*.c.cached"):
+            if not mark.with_suffix("").exists():
+                mark.unlink()
         yield
 
 
-def prepare(comm: MPI.Comm, degrees: set[int]) -> None:
-    """Compile every form that solves of these ``degrees`` need, before any rank waits for one; collective.
-
-    A process killed while compiling leaves a source file without its mark of completion, for which every later
-    run would wait in vain: whoever holds the lock may remove such orphans.
-    """
-    if comm.rank == 0:
-        folder = form_cache()
-        with _exclusive(folder):
-            for source in folder.glob("*.c"):
-                if not source.with_suffix(".c.cached").exists():
-                    source.unlink()
-            for degree in sorted(degrees):
-                mesh = distribute(MPI.COMM_SELF, _one_cell(degree)).mesh
-                for level in range(1, degree + 1):
-                    space = compat.vector_space(mesh, level)
-                    forms = elastic_forms(space)
-                    if level == degree:
-                        mean_strain_form(space, forms.displacement)
-    comm.barrier()
+def compile_elastic(degree: int, *, straight: bool) -> None:
+    """Compile the forms of displacements of ``degree`` and of those below, and of one degree more for the error bar."""
+    mesh = distribute(MPI.COMM_SELF, one_cell(straight=straight)).mesh
+    for level in range(1, degree + 2):
+        space = compat.vector_space(mesh, level)
+        forms = elastic_forms(space)
+        if level == degree:
+            mean_strain_form(space, forms.displacement)
 
 
-def _one_cell(degree: int) -> MeshArrays:
+def one_cell(*, straight: bool) -> MeshArrays:
+    """Return a mesh of one tetrahedron, to compile forms on."""
     corners = np.vstack([np.zeros(3), np.eye(3)])
     edges = [(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)]
     middle = np.array([(corners[i] + corners[j]) / 2 for i, j in edges])
-    points = corners if degree == 1 else np.vstack([corners, middle])
+    points = corners if straight else np.vstack([corners, middle])
     cells = np.arange(len(points), dtype=np.int64)[None, :]
     return MeshArrays(points, cells, {"fixed": np.array([[0, 1, 2]])}, np.array([0]), 0.0)

@@ -67,7 +67,7 @@ class LinearSolver:
             self.ksp.setUp()
         except PETSc.Error as error:
             self.close()
-            raise SolveError(_explain(error)) from error
+            raise SolveError(explain(error)) from error
         finally:
             self._clear_options()
         self.setup_seconds = time.perf_counter() - start
@@ -81,10 +81,12 @@ class LinearSolver:
         try:
             self.ksp.solve(rhs, solution)
         except PETSc.Error as error:
-            raise SolveError(_explain(error)) from error
+            raise SolveError(explain(error)) from error
         reason = self.ksp.getConvergedReason()
         if reason <= 0:
-            raise SolveError(f"the linear solver did not converge: {_reason(reason)} after {self.ksp.its} iterations")
+            raise SolveError(
+                f"the linear solver did not converge: {reason_name(reason)} after {self.ksp.its} iterations"
+            )
         return self.ksp.its
 
     @property
@@ -101,7 +103,7 @@ class LinearSolver:
         try:
             self.ksp.pc.apply(residual, result)
         except PETSc.Error as error:
-            raise SolveError(_explain(error)) from error
+            raise SolveError(explain(error)) from error
 
     def close(self) -> None:
         """Free everything that was made."""
@@ -181,12 +183,14 @@ def _transfer(coarse: Level, fine: Level) -> PETSc.Mat:
     return matrix
 
 
-def _reason(reason: int) -> str:
+def reason_name(reason: int) -> str:
+    """Return PETSc's name for a reason of convergence or divergence."""
     names = {v: k for k, v in vars(PETSc.KSP.ConvergedReason).items() if isinstance(v, int)}
     return names.get(reason, str(reason)).lower()
 
 
-def _explain(error: PETSc.Error) -> str:
+def explain(error: PETSc.Error) -> str:
+    """Return what an error of PETSc means, for the reader of a record."""
     return {
         55: "out of memory",
         76: "the factorisation failed (out of memory, or the operator is singular)",

@@ -4,6 +4,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from dolfinx import fem
@@ -40,7 +41,7 @@ class ConstrainedSpace:
         Raises:
             SolveError: if the footprint and the support share a point.
         """
-        self.comm, self.degree = body.comm, degree
+        self._body, self.comm, self.degree = body, body.comm, degree
         self.space = space = compat.vector_space(body.mesh, degree)
         index_map = space.dofmap.index_map
         self.owned, self.dofs = 3 * index_map.size_local, 3 * index_map.size_global
@@ -48,10 +49,8 @@ class ConstrainedSpace:
         self.forms = elastic_forms(space)
         self._parts: tuple[PETSc.Mat, PETSc.Mat] | None = None
         self._part_seconds = 0.0
-        probe, fixed, *planes = (
-            np.asarray(fem.locate_dofs_topological(space, body.mesh.topology.dim - 1, body.facets[name]))
-            for name in (PROBE, FIXED, *(MIRROR["xy"[axis]] for axis in body.mirrored))
-        )
+        probe, fixed = (_points(space, body, name) for name in (PROBE, FIXED))
+        planes = _planes(space, body)
         if self.comm.allreduce(len(np.intersect1d(probe, fixed))):
             raise SolveError("the probe's footprint touches the held face: no displacement satisfies both conditions")
         travel = np.array(contact.travel, dtype=PETSc.ScalarType)
@@ -68,16 +67,12 @@ class ConstrainedSpace:
             self.held[dofs] = travel[c]
         self.prescribed = np.unique(np.concatenate([*unrolled, *(3 * fixed + c for c in range(3)), *mirrored]))
         self.prescribed_owned = self.prescribed[self.prescribed < self.owned]
-        self._planes = planes
         self.probe_owned, self.fixed_owned = (dofs[dofs < index_map.size_local] for dofs in (probe, fixed))
 
     @property
     def whole_dofs(self) -> int:
-        """Unknowns of the whole body: points in a plane of symmetry count once, their images with the others."""
-        images = np.full(self.owned // 3, 2.0 ** len(self._planes))
-        for plane in self._planes:
-            images[plane[plane < len(images)]] /= 2
-        return round(3 * self.comm.allreduce(float(images.sum())))
+        """Unknowns of the whole body, of which a half or a quarter may be modelled."""
+        return 3 * whole_points(self.space, self._body)
 
     def close(self) -> None:
         """Free the parts of the operator."""
@@ -150,3 +145,21 @@ def _mark(matrix: PETSc.Mat) -> None:
     matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     if not matrix.getType().endswith("baij"):  # PETSc 3.18 does not take the second one for blocked matrices
         matrix.setOption(PETSc.Mat.Option.SPD, True)
+
+
+def whole_points(space: Any, body: BodyMesh) -> int:
+    """Return the points of ``space`` on the whole body, of which those in a plane have one image; collective."""
+    images = np.full(space.dofmap.index_map.size_local, 2.0 ** len(body.mirrored))
+    for plane in _planes(space, body):
+        images[plane[plane < len(images)]] /= 2
+    return round(body.comm.allreduce(float(images.sum())))
+
+
+def _planes(space: Any, body: BodyMesh) -> list[Any]:
+    """Local points of ``space`` in each of the planes of symmetry that bound the mesh."""
+    names = [MIRROR["xy"[axis]] for axis in body.mirrored]
+    return [_points(space, body, name) for name in names]
+
+
+def _points(space: Any, body: BodyMesh, group: str) -> Any:
+    return np.asarray(fem.locate_dofs_topological(space, body.mesh.topology.dim - 1, body.facets[group]))

@@ -13,6 +13,9 @@ _LINEAR = 0.10
 # (docs/accuracy.md), and a number that looks like any other would be returned for it.
 _LOCKING = {1: (0.45, 0.45), 2: (0.49, 0.495), 3: (0.49, 0.495)}
 
+# Mixed elements keep λ = μ, which is ν = 0.25, with the displacement and give the rest to the pressure.
+_LEAST_MIXED = 0.25
+
 
 def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
     """Check single sections, then pairs of sections that must fit each other."""
@@ -127,14 +130,16 @@ def _check_outside(body: AnyBody, mesh: Mesh, problems: Problems) -> None:
 
 
 def _check_locking(material: Material, mesh: Mesh, problems: Problems) -> None:
+    if mesh.element_for(material.poisson) == "mixed":
+        _check_mixed(material, mesh, problems)
+        return
     visible, most = _LOCKING[mesh.degree]
     if material.poisson > most:
-        hint = "; degree 2 goes further" if mesh.degree == 1 else ""
         problems.error(
             "material.poisson",
             material.poisson,
-            f"displacement elements of degree {mesh.degree} lock: must be at most {most}{hint}; "
-            "values up to 0.5 need mixed elements, which are not supported",
+            f"displacement elements of degree {mesh.degree} lock: must be at most {most}; "
+            'with degree 2 or 3 and element = "auto", mixed elements take values up to 0.5',
         )
     elif material.poisson > visible or material.poisson == most:
         problems.warn(
@@ -144,8 +149,20 @@ def _check_locking(material: Material, mesh: Mesh, problems: Problems) -> None:
         )
 
 
+def _check_mixed(material: Material, mesh: Mesh, problems: Problems) -> None:
+    if mesh.degree == 1:
+        problems.error("mesh.element", mesh.element, "there is no stable mixed element of degree 1: use 2 or 3")
+    if material.poisson <= _LEAST_MIXED:
+        problems.error(
+            "mesh.element", mesh.element, f"mixed elements are for Poisson's ratios above {_LEAST_MIXED}; "
+            'use "auto" or "displacement"',
+        )  # fmt: skip
+
+
 def _check_reference(meshes: tuple[Section, ...], axes: tuple[Axis, ...], problems: Problems) -> None:
-    if all(isfinite(mesh.epsilon) for mesh in meshes if isinstance(mesh, Mesh)):
+    if all(isfinite(mesh.epsilon) for mesh in meshes if isinstance(mesh, Mesh) and mesh.accuracy is None):
+        if any(isinstance(mesh, Mesh) and mesh.accuracy is not None for mesh in meshes):
+            return
         swept = any(axis.name == "epsilon" for axis in axes)
         problems.warn(
             "mesh.epsilon",

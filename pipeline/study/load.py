@@ -9,7 +9,7 @@ from pydantic import BaseModel, ValidationError
 
 from pipeline.study.check import check_sense
 from pipeline.study.problems import Problem, Problems, StudyError, nearest
-from pipeline.study.schema import LATER, LATER_KEYS, LATER_SECTIONS, SECTIONS, Below, Section
+from pipeline.study.schema import LATER, LATER_KEYS, LATER_SECTIONS, SECTIONS, Below, Mesh, Section
 from pipeline.study.sweep import Axis, Study
 
 # A label needs its section's axes only; more combinations than this in one section is a slip of the pen.
@@ -65,6 +65,12 @@ def _check_top(raw: dict[str, Any], problems: Problems) -> None:
     for name in ("body", "material", "probe", "mesh"):
         if name not in raw:
             problems.error(f"[{name}]", None, "this section is required")
+    meshes = raw.get("mesh")
+    for table in meshes if isinstance(meshes, list) else [meshes]:
+        if isinstance(table, dict) and table and "accuracy" not in table:
+            for key in Mesh.SIZES:
+                if key not in table:
+                    problems.error(f"mesh.{key}", None, "is required, unless an accuracy is asked for")
 
 
 def _read_section(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], tuple[Section, ...]]:

@@ -3,13 +3,13 @@
 All models are strict and frozen; lengths are in metres, pressures in pascal.
 """
 
-from math import hypot
+from math import hypot, inf
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
-from pipeline.study.units import Coordinate, Length, Pressure, Travel, parse_quantity
+from pipeline.study.units import Coordinate, Length, Pressure, Share, Travel, parse_quantity
 
 
 class Section(BaseModel):
@@ -116,7 +116,7 @@ class Material(Section):
     def lame(self) -> tuple[float, float]:
         """Lamé's λ and μ (Pa); λ is infinite for an incompressible material."""
         mu = self.young / (2 * (1 + self.poisson))
-        return (2 * mu * self.poisson / (1 - 2 * self.poisson) if self.poisson < 0.5 else float("inf")), mu
+        return (2 * mu * self.poisson / (1 - 2 * self.poisson) if self.poisson < 0.5 else inf), mu
 
 
 # ---- probes -----------------------------------------------------------------------------------------
@@ -197,40 +197,53 @@ class Blade(Probe):
 
 
 def _epsilon(value: Any) -> float:
-    return float("inf") if value == "full" else parse_quantity(value, "m")
+    return inf if value == "full" else parse_quantity(value, "m")
 
 
 Epsilon = Annotated[float, BeforeValidator(_epsilon), Field(gt=0, json_schema_extra={"unit": "m"})]
 
 
 class Mesh(Section):
-    """Element sizes and elements; ``epsilon`` is infinite for the full-order mesh."""
+    """Element sizes and elements; ``epsilon`` is infinite for the full-order mesh.
 
-    epsilon: Epsilon
-    fine: Length
-    coarse: Length
+    With an ``accuracy``, the largest relative error that F may have, what is not given is chosen.
+    """
+
+    accuracy: Annotated[Share | None, Field(ge=1e-4, le=0.2)] = None
+    epsilon: Epsilon = inf
+    fine: Length = inf
+    coarse: Length = inf
     rim: Length | None = None
     growth: Annotated[float, Field(gt=0, le=2)] = 0.5
     outside: Literal["coarse", "free", "fixed"] = "coarse"
     degree: Literal[1, 2, 3] = 2
-    element: Annotated[Literal["auto", "displacement"], _refuse("element", ("mixed",), ("auto", "displacement"))] = (
-        "auto"
-    )
+    element: Literal["auto", "displacement", "mixed"] = "auto"
     model: Literal["auto", "3d"] = "auto"
 
     # A tenth of the probe's half width puts F within about 1 % on the default elements (docs/accuracy.md).
     RIM_SHARE: ClassVar[float] = 0.1
+    # From this Poisson's ratio on, mixed elements give a smaller error for the same time (docs/accuracy.md).
+    MIXED_FROM: ClassVar[float] = 0.45
+    # What must be given where no accuracy is.
+    SIZES: ClassVar[tuple[str, ...]] = ("epsilon", "fine", "coarse")
 
     def rim_size(self, half_width: float) -> float:
         """Element size at the edge of a probe of that half width (m)."""
         return self.rim if self.rim is not None else min(self.fine, self.RIM_SHARE * half_width)
 
+    def element_for(self, poisson: float) -> Literal["displacement", "mixed"]:
+        """Return the element for a Poisson's ratio; of degree 1 there is no stable mixed one."""
+        if self.element != "auto":
+            return self.element
+        return "mixed" if self.degree > 1 and poisson >= self.MIXED_FROM else "displacement"
+
 
 class Solve(Section):
-    """How cases are solved and timed."""
+    """How cases are solved and timed; ``exact`` asks for F_exact of every scene."""
 
     method: Literal["auto", "direct", "iterative"] = "auto"
     tolerance: Annotated[float, Field(ge=1e-14, le=1e-3)] = 1e-8
+    exact: bool = True
     timing: bool = False
     repeats: Annotated[int, Field(ge=1, le=1000)] = 3
 
@@ -249,7 +262,6 @@ SECTIONS: dict[str, type[Section] | dict[str, type[Section]]] = {
 LATER_KEYS = {
     "body": ("layers", "inclusion"),
     "probe": ("incision", "angle"),
-    "mesh": ("accuracy",),
 }
 LATER_SECTIONS = ("load", "plan")
 

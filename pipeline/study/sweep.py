@@ -56,6 +56,16 @@ class Case:
         reach = self.body.reach(self.probe.at)
         return self.mesh.epsilon >= (reach**2 + self.body.height**2) ** 0.5
 
+    @property
+    def is_truncated(self) -> bool:
+        """Whether only a column of the body is kept."""
+        return self.mesh.outside != "coarse" and self.mesh.epsilon < self.body.reach(self.probe.at)
+
+    @property
+    def element(self) -> str:
+        """The element that solves it: displacement or mixed."""
+        return self.mesh.element_for(self.material.poisson)
+
     def __str__(self) -> str:
         return ", ".join(f"{name} = {format_label(name, value)}" for name, value in self.labels) or "the one case"
 
@@ -108,6 +118,8 @@ def format_label(name: str, value: float | int | str) -> str:
         return value
     if value == inf:
         return "full"
+    if name == "accuracy":
+        return f"{100 * value:.3g} %"
     if name == "young":
         return f"{value / 1e3:g} kPa"
     return f"{value:g}" if name in ("poisson", "growth", "degree") else f"{value * 1e3:g} mm"

@@ -23,6 +23,7 @@ gram = [mass] = g
 newton = kilogram * meter / second ** 2 = N
 pascal = newton / meter ** 2 = Pa
 bar = 1e5 * pascal
+percent = 0.01 = %
 """.strip().splitlines()
 
 # Twelve digits: "3 mm" and "0.3 cm" must be one number wherever two cases are compared.
@@ -44,7 +45,7 @@ def canonical(value: float) -> float:
 
 def parse_quantity(text: Any, unit: str) -> float:
     """Read ``"10 mm"`` into a number in the SI ``unit``; a bare number is refused, never guessed."""
-    example = {"m": "10 mm", "Pa": "10 kPa"}[unit]
+    example = {"m": "10 mm", "Pa": "10 kPa", "": "1 %"}[unit]
     allowed = f'a number with a unit as text, such as "{example}"'
     if not isinstance(text, str):
         raise PydanticCustomError("quantity", "{allowed}", {"allowed": allowed})
@@ -52,7 +53,7 @@ def parse_quantity(text: Any, unit: str) -> float:
         quantity = _registry().Quantity(text)
         magnitude = float(quantity.to(unit).magnitude)
     except pint.DimensionalityError:
-        kind = {"m": "a length", "Pa": "a pressure"}[unit]
+        kind = {"m": "a length", "Pa": "a pressure", "": "a share"}[unit]
         raise PydanticCustomError("quantity", "{allowed}", {"allowed": f'{kind}, such as "{example}"'}) from None
     except Exception:  # pint raises many kinds, down to tokenizer errors, on text that is no quantity
         raise PydanticCustomError("quantity", "{allowed}", {"allowed": allowed}) from None
@@ -69,7 +70,12 @@ def _pressure(text: Any) -> float:
     return parse_quantity(text, "Pa")
 
 
+def _share(text: Any) -> float:
+    return parse_quantity(text, "")
+
+
 Coordinate = Annotated[float, BeforeValidator(_length), Field(json_schema_extra={"unit": "m"})]
 Length = Annotated[Coordinate, Field(gt=0)]
 Travel = Annotated[Coordinate, Field(ge=0)]
+Share = Annotated[float, BeforeValidator(_share), Field(json_schema_extra={"unit": "1"})]
 Pressure = Annotated[float, BeforeValidator(_pressure), Field(gt=0, json_schema_extra={"unit": "Pa"})]

@@ -20,9 +20,23 @@ MISTAKES = {
     "negative length": ({"probe": {"radius": "-2 mm"}}, ['probe.radius = "-2 mm"', "greater than 0"]),
     "poisson above": ({"material": {"poisson": 0.7}}, ["material.poisson = 0.7", "at most 0.5"]),
     "poisson below": ({"material": {"poisson": -0.1}}, ["material.poisson = -0.1", "at least 0"]),
-    "incompressible": ({"material": {"poisson": 0.5}}, ["material.poisson = 0.5", "mixed"]),
-    "locking": ({"material": {"poisson": 0.499}}, ["material.poisson = 0.499", "lock", "at most 0.495"]),
+    "incompressible": (
+        {"material": {"poisson": 0.5}, "mesh": {"element": "displacement"}}, ["material.poisson = 0.5", "mixed"],
+    ),
+    "locking": (
+        {"material": {"poisson": 0.499}, "mesh": {"element": "displacement"}},
+        ["material.poisson = 0.499", "lock", "at most 0.495"],
+    ),
     "locking of degree 1": ({"material": {"poisson": 0.46}, "mesh": {"degree": 1}}, ["at most 0.45", "degree 2"]),
+    "mixed of degree 1": ({"mesh": {"element": "mixed", "degree": 1}}, ["mesh.element", "no stable mixed element"]),
+    "mixed for low ratios": (
+        {"mesh": {"element": "mixed"}, "material": {"poisson": 0.2}}, ["mesh.element", "above 0.25"],
+    ),
+    "accuracy without unit": ({"mesh": {"accuracy": 0.01}}, ["mesh.accuracy = 0.01", "1 %"]),
+    "accuracy out of reach": ({"mesh": {"accuracy": "0.001 %"}}, ["mesh.accuracy", "at least 0.0001"]),
+    "sizes missing": (
+        {"mesh": {"fine": None, "epsilon": None}}, ["mesh.fine", "mesh.epsilon", "unless an accuracy is asked for"],
+    ),
     "not a number": ({"material": {"poisson": float("nan")}}, ["material.poisson"]),
     "text for a number": ({"material": {"poisson": "0.3"}}, ['material.poisson = "0.3"', "number"]),
     "unknown key": ({"material": {"poison": 0.3}}, ["material.poison = 0.3", "did you mean `poisson`?"]),
@@ -32,8 +46,7 @@ MISTAKES = {
     "later probe": ({"probe": {"shape": "sphere"}}, ['probe.shape = "sphere"', "not supported", "disc, blade"]),
     "later body": ({"body": {"shape": "ellipsoid"}}, ["not supported", "box, cylinder"]),
     "later contact": ({"probe": {"contact": "unilateral"}}, ["not supported", "bonded, frictionless"]),
-    "later element": ({"mesh": {"element": "mixed"}}, ["not supported", "displacement"]),
-    "later key": ({"mesh": {"accuracy": "1 %"}}, ["mesh.accuracy", "not supported"]),
+    "unknown element": ({"mesh": {"element": "hybrid"}}, ["mesh.element", "'mixed'"]),
     "later section": ({"load": {"gravity": 1}}, ["load", "not supported"]),
     "wrong word": ({"mesh": {"outside": "void"}}, ['mesh.outside = "void"', "'coarse', 'free' or 'fixed'"]),
     "degree": ({"mesh": {"degree": 4}}, ["mesh.degree = 4", "1, 2 or 3"]),
@@ -107,7 +120,7 @@ def test_doubtful_input_is_a_warning():
     assert "linear elasticity" in words
     assert "less than the probe's radius" in words
     assert "F_max" in words
-    assert "lock" in " ".join(study(material={"poisson": 0.495}).warnings)
+    assert "lock" in " ".join(study(material={"poisson": 0.495}, mesh={"element": "displacement"}).warnings)
     assert not study().warnings
 
 

@@ -1,0 +1,251 @@
+"""The half plane (r, z) of a round scene, meshed by triangles that shrink towards every singular point.
+
+The half plane is a rectangle: it is halved into boxes until each is small enough for where it lies, and the boxes
+are cut into triangles. This takes milliseconds, gives the same mesh with every version of every library, and goes
+down to elements that are 1e-9 of the body without harm; gmsh 4.8 aborts the process at 1e-7.
+
+Lengths of the mesh are in units of the footprint's radius a, rounded to 12 digits: a body of a millimetre and one
+of ten metres give the same mesh.
+"""
+
+import time
+from dataclasses import dataclass
+from math import hypot, inf
+from typing import Any, Literal
+
+import dolfinx
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+from pipeline import compat
+from pipeline.mesh.generate import FloatArray, IntArray
+from pipeline.scene.model import CUT, FIXED, FREE, PROBE
+
+AXIS = "axis"
+
+# A body more slender than this is meshed by stretched boxes: nothing varies over a thickness far from the contact.
+_MOST_SLENDER = 1000
+# Where two held faces meet the displacement goes like r to a power between 1 (ν = 0.5) and 1.7, and not 1/2.
+_MILD = 1e3
+
+
+@dataclass(frozen=True)
+class Meridian:
+    """A cylinder about the z axis, top at z = 0, under a disc on its axis; lengths in metres.
+
+    ``fixed`` says what is held: the bottom, the side, both, or all of the boundary below the level z = ``fixed`` < 0.
+    Of the body, only r < ``column`` is kept; the face of that cut is free, or held if ``column_fixed``.
+    """
+
+    radius: float
+    height: float
+    probe_radius: float
+    fixed: Literal["bottom", "sides", "bottom+sides"] | float = "bottom"
+    column: float = inf
+    column_fixed: bool = False
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether a column is cut out of the body."""
+        return self.column < self.radius
+
+    @property
+    def kept_radius(self) -> float:
+        """Radius (m) of what is kept of the body."""
+        return min(self.column, self.radius)
+
+    @property
+    def unit(self) -> float:
+        """Radius a (m) of the part of the footprint that lies on what is kept: the unit of length of the mesh."""
+        return min(self.probe_radius, self.kept_radius)
+
+    @property
+    def held_below(self) -> float:
+        """Height (m) below which the outer face is held: 0 if all of it is, -height if none is."""
+        if self.is_cut:
+            return 0.0 if self.column_fixed else -self.height
+        if isinstance(self.fixed, str):
+            return 0.0 if "sides" in self.fixed else -self.height
+        return min(max(self.fixed, -self.height), 0.0)
+
+    @property
+    def bottom_held(self) -> bool:
+        """Whether the bottom face is held."""
+        return "bottom" in self.fixed if isinstance(self.fixed, str) else self.fixed >= -self.height
+
+
+@dataclass(frozen=True)
+class Grading:
+    """Element size: ``floor`` at the probe's edge, growing by ``growth`` per unit of distance, at most ``cap``.
+
+    ``floor`` is in units of a, ``cap`` in units of the smaller of the body's height and radius, or of a thousandth
+    of the larger. At an edge of the support at distance D the floor is larger by (D/a)², as the square of the strain
+    there is smaller.
+    """
+
+    floor: float = 1e-6
+    growth: float = 1.0
+    cap: float = 4.0
+
+
+@dataclass(frozen=True)
+class MeridianArrays:
+    """A mesh of the meridian, in units of ``unit`` metres.
+
+    ``points`` (n, 2) holds (r, z), ``cells`` (m, 3) the triangles; ``facets`` maps the name of a group of the
+    boundary to its edges (k, 2); ``singular`` (s, 2) are the points to which the mesh is graded.
+    """
+
+    points: FloatArray
+    cells: IntArray
+    facets: dict[str, IntArray]
+    singular: FloatArray
+    unit: float
+    seconds: float
+
+
+def generate_meridian(meridian: Meridian, grading: Grading) -> MeridianArrays:
+    """Mesh the meridian: the same input gives the same arrays, bit for bit."""
+    start = time.perf_counter()
+    singular = _singular_points(meridian)
+    points, cells = _triangulate(_boxes(meridian, singular, grading))
+    facets = _name_edges(meridian, points)
+    places = np.array([(r, z) for r, z, _ in singular]).reshape(-1, 2)
+    return MeridianArrays(points, cells, facets, places, meridian.unit, time.perf_counter() - start)
+
+
+def meridian_mesh(arrays: MeridianArrays) -> tuple[Any, dict[str, npt.NDArray[np.int32]]]:
+    """Return the dolfinx mesh of ``arrays`` on this process alone, and the facets of each group."""
+    mesh = compat.create_plane_mesh(MPI.COMM_SELF, arrays.cells, arrays.points)
+    topology = mesh.topology
+    for dims in ((1, 2), (1, 0), (2, 0)):
+        topology.create_connectivity(*dims)
+    exterior = np.asarray(dolfinx.mesh.exterior_facet_indices(topology), dtype=np.int32)
+    node_of_vertex = np.empty(topology.index_map(0).size_local, dtype=np.int64)
+    node_of_vertex[topology.connectivity(2, 0).array] = compat.geometry_dofs(mesh).reshape(-1)
+    number = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)[node_of_vertex]
+    ends = number[topology.connectivity(1, 0).array.reshape(-1, 2)[exterior]]
+
+    def keys(edges: IntArray) -> IntArray:
+        return edges.min(axis=1) * len(arrays.points) + edges.max(axis=1)
+
+    return mesh, {name: exterior[np.isin(keys(ends), keys(edges))] for name, edges in arrays.facets.items()}
+
+
+def _ratio(length: float, unit: float) -> float:
+    return float(f"{length / unit:.12g}")
+
+
+def _outline(meridian: Meridian) -> tuple[list[tuple[float, float]], list[str]]:
+    """Corners of the meridian in units of a, counter-clockwise, and the group of the edge that starts at each."""
+    a = meridian.unit
+    radius, height = _ratio(meridian.kept_radius, a), _ratio(meridian.height, a)
+    level = _ratio(meridian.held_below, a)
+    corners, groups = [(0.0, -height)], [FIXED if meridian.bottom_held else FREE]
+    outer = CUT if meridian.is_cut else FREE
+    if level > -height:
+        corners.append((radius, -height))
+        groups.append(FIXED)
+    if level < 0:
+        corners.append((radius, level))
+        groups.append(outer)
+    corners.append((radius, 0.0))
+    groups.append(FREE)
+    if radius > 1:
+        corners.append((1.0, 0.0))
+        groups.append(PROBE)
+    else:
+        groups[-1] = PROBE
+    corners.append((0.0, 0.0))
+    groups.append(AXIS)
+    return corners, groups
+
+
+def _singular_points(meridian: Meridian) -> list[tuple[float, float, float]]:
+    """Points (r, z) at which the displacement is singular, and how much larger than at the rim an element may be."""
+    corners, groups = _outline(meridian)
+    radius = max(r for r, _ in corners)
+    smallest = min(radius, -min(z for _, z in corners))
+    points = []
+    for (r, z), before, after in zip(corners, [groups[-1], *groups[:-1]], groups, strict=True):
+        held = {PROBE: 2, FIXED: 1}  # the rest is free
+        if AXIS in (before, after) or not {before, after} & set(held):
+            continue
+        distance = hypot(r - 1, z)
+        factor = min(max(1.0, min(distance, radius) ** 2), max(1.0, 100 * smallest))
+        points.append((r, z, factor if held.get(before) != held.get(after) else _MILD * factor))
+    return points
+
+
+def _boxes(meridian: Meridian, singular: list[tuple[float, float, float]], grading: Grading) -> FloatArray:
+    """Halve the meridian along the longer side of each box until all are small enough: (n, 4) of r0, r1, z0, z1.
+
+    Where a side is cut depends on that side alone. Corners of neighbours then either agree to the last bit or are a
+    good part of a side apart.
+    """
+    corners = np.array(_outline(meridian)[0])
+    (r_end, _), (_, z_end) = corners.max(axis=0), corners.min(axis=0)
+    most = grading.cap * max(min(r_end, -z_end), max(r_end, -z_end) / _MOST_SLENDER)
+    marks = [np.unique(corners[:, axis]) for axis in (0, 1)]
+    # Boxes smaller than any distance between marks have all of them among their corners.
+    least = min(np.diff(m).min() for m in marks) / 4
+    todo, done = np.array([[0.0, r_end, z_end, 0.0]]), []
+    while len(todo):
+        r0, r1, z0, z1 = todo.T
+        size = np.full(len(todo), most)
+        for r, z, factor in singular:
+            distance = np.hypot(np.maximum(np.maximum(r0 - r, r - r1), 0), np.maximum(np.maximum(z0 - z, z - z1), 0))
+            size = np.minimum(size, min(grading.floor * factor, least) + grading.growth * distance)
+        tall = z1 - z0 > r1 - r0
+        large = np.maximum(r1 - r0, z1 - z0) > size
+        done.append(todo[~large])
+        todo = np.vstack([_halve(todo[large & (tall == bool(axis))], axis, marks[axis]) for axis in (0, 1)])
+    return np.vstack(done)
+
+
+def _halve(boxes: FloatArray, axis: int, marks: FloatArray) -> FloatArray:
+    """Cut boxes across ``axis`` at the mark in the middle half of their side, if there is one, else in the middle."""
+    low, high = boxes[:, 2 * axis], boxes[:, 2 * axis + 1]
+    middle = cut = (low + high) / 2
+    for mark in marks:
+        cut = np.where(np.abs(mark - middle) <= (high - low) / 4, mark, cut)
+    first, second = boxes.copy(), boxes.copy()
+    first[:, 2 * axis + 1] = second[:, 2 * axis] = cut
+    return np.vstack([first, second])
+
+
+def _triangulate(boxes: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Join the centre of each box to all the corners, its own and its neighbours', on its boundary."""
+    r0, r1, z0, z1 = boxes.T
+    corners = np.array([(r0, z0), (r1, z0), (r1, z1), (r0, z1)])  # (4, 2, n), counter-clockwise
+    points, number = np.unique(corners.transpose(0, 2, 1).reshape(-1, 2), axis=0, return_inverse=True)
+    number = number.reshape(4, -1)
+    centre = len(points) + np.arange(len(boxes))
+    cells = []
+    for side, fixed in enumerate((1, 0, 1, 0)):
+        # In this order, the points between the two ends of a side are those that lie on it.
+        order = np.lexsort((points[:, 1 - fixed], points[:, fixed]))
+        place = np.argsort(order)
+        start, end = place[number[side]], place[number[(side + 1) % 4]]
+        count, step = np.abs(end - start), np.sign(end - start)
+        box = np.repeat(np.arange(len(boxes)), count)
+        along = np.arange(len(box)) - np.repeat(np.cumsum(count) - count, count)
+        first = start[box] + step[box] * along
+        cells.append(np.column_stack([centre[box], order[first], order[first + step[box]]]))
+    middles = np.column_stack([(r0 + r1) / 2, (z0 + z1) / 2])
+    return np.vstack([points, middles]), np.vstack(cells)
+
+
+def _name_edges(meridian: Meridian, points: FloatArray) -> dict[str, IntArray]:
+    """Return the edges along the outline, by group."""
+    corners, groups = _outline(meridian)
+    facets: dict[str, list[IntArray]] = {}
+    for start, end, name in zip(corners, [*corners[1:], corners[0]], groups, strict=True):
+        fixed = 0 if start[0] == end[0] else 1
+        low, high = sorted((start[1 - fixed], end[1 - fixed]))
+        along = points[:, 1 - fixed]
+        (chosen,) = np.nonzero((points[:, fixed] == start[fixed]) & (along >= low) & (along <= high))
+        chosen = chosen[np.argsort(along[chosen])]
+        facets.setdefault(name, []).append(np.column_stack([chosen[:-1], chosen[1:]]))
+    return {name: np.vstack(edges) for name, edges in facets.items()}

@@ -1,0 +1,94 @@
+"""From solutions to records: the force along the probe's axis, its error bar, and what it cost."""
+
+from dataclasses import replace
+
+from pipeline.plan.plan import Solve
+from pipeline.run.record import Record
+from pipeline.solve.axisymmetric import AxisymmetricSolution
+from pipeline.solve.elasticity import Solution
+from pipeline.solve.error import extrapolate
+from pipeline.study.sweep import Case
+
+TIMES = ("time_mesh", "time_assemble", "time_setup", "time_solve")
+
+
+def record_of(solve: Solve, solution: Solution, cells: int, mesh_seconds: float) -> Record:
+    """Return the record of a solution on a mesh of ``cells`` elements, of the part of the body that was modelled.
+
+    Where an accuracy is asked for, F is what the elements of one degree more, and the rest of the sequence, make of
+    it; otherwise it is that of the elements that the study declares.
+    """
+    case = solve.case
+    force = -sum(f * a for f, a in zip(solution.reaction, case.probe.axis, strict=True))
+    record = Record(
+        key=solve.key,
+        status="ok",
+        origin="symmetric" if solve.mirrors else "solved",
+        force=force,
+        force_error=_relative_bar(case, solution, force),
+        force_vector=solution.reaction,
+        energy=solution.energy,
+        max_strain=solution.max_strain,
+        balance=solution.balance,
+        dofs=solution.dofs,
+        cells=cells * 2 ** len(solve.mirrors),
+        iterations=solution.iterations,
+        time_mesh=mesh_seconds,
+        time_assemble=solution.time_assemble,
+        time_setup=solution.time_setup,
+        time_solve=solution.time_solve,
+        time_error=solution.time_estimate,
+    )
+    return _extrapolated(record, case, solution) if solve.goal is not None else record
+
+
+def record_of_meridian(solve: Solve, solution: AxisymmetricSolution) -> Record:
+    """Return the record of an axisymmetric solution."""
+    return Record(
+        key=solve.key,
+        status="ok",
+        origin="axisymmetric",
+        force=solution.force,
+        force_error=solution.force_error,
+        force_vector=(0.0, 0.0, solution.force),
+        energy=solution.energy,
+        max_strain=solution.max_strain,
+        balance=solution.balance,
+        dofs=solution.dofs,
+        cells=solution.cells,
+        iterations=solution.iterations,
+        time_mesh=solution.time_mesh,
+        time_assemble=solution.time_assemble,
+        time_setup=solution.time_setup,
+        time_solve=solution.time_solve,
+        time_error=0.0,
+    )
+
+
+def add_times(record: Record, earlier: list[Record]) -> Record:
+    """Return ``record`` with all the time that its goal took: error bars are part of the work, and earlier tries."""
+    sums = {name: sum(getattr(r, name) for r in [*earlier, record]) for name in TIMES}
+    sums["time_solve"] += sum(r.time_error for r in [*earlier, record])
+    return replace(record, **sums, time_error=0.0)
+
+
+def _relative_bar(case: Case, solution: Solution, force: float) -> float:
+    """Return the relative error bar on the force along the probe's axis.
+
+    The decrement is one of work. A probe that slices works along the blade, too: all of what is lost may then belong
+    to the force along the axis, which is less of the work.
+    """
+    share = 2 * solution.energy / (force * case.probe.depth)
+    return share * solution.bar
+
+
+def _extrapolated(record: Record, case: Case, solution: Solution) -> Record:
+    """Return ``record`` with the force that the sequence of degrees tends to, and the smaller bar of that."""
+    if getattr(case.probe, "slice", 0.0):  # the work of a slice does not tell which of the forces to correct
+        return record
+    factor, bar = extrapolate(solution.decrement, solution.bar, case.mesh.degree, case.element)
+    x, y, z = record.force_vector
+    return replace(
+        record, force=factor * record.force, force_error=bar, force_vector=(x, y, factor * z),
+        energy=factor * record.energy,
+    )  # fmt: skip

@@ -1,0 +1,258 @@
+"""Round scenes in the half plane (r, z): the same elasticity, two dimensions, and F to about 1e-7.
+
+Lengths are in units of the footprint's radius a, stresses in units of μ and displacements in units of the depth d:
+nothing depends on the unit of anything. The force is the reaction: the residual of the unmodified operator on the
+probe's dofs, times 2π.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from math import inf, pi
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from pipeline.mesh.generate import FloatArray
+from pipeline.mesh.meridian import AXIS, Grading, Meridian, MeridianArrays, generate_meridian, meridian_mesh
+from pipeline.scene.model import FIXED, PROBE
+from pipeline.solve.elasticity import BALANCE_LIMIT
+from pipeline.solve.linear import SolveError
+from pipeline.solve.meridian_forms import MeridianForms
+
+DEGREE = 5
+# Below this ν, displacement elements of degree 5 are as accurate as mixed ones at half the cost.
+MIXED_FROM = 0.49
+# Meshes in the order in which they are tried, until the error bar is below the accuracy asked for.
+_GRADINGS = (Grading(1e-6, 1.0, 4.0), Grading(1e-7, 0.7, 2.0), Grading(1e-8, 0.5, 1.0))
+# An error bar above this is no answer.
+_WORST_ERROR = 1e-3
+# Per cent of memory beyond MUMPS's estimate, which pivoting exceeds.
+_SPARE_MEMORY = 100
+# Each refinement gains the digits that the factors hold; a balance below the second number has nothing to gain.
+_MOST_REFINEMENTS, _BALANCED = 20, 1e-9
+# Strain is not read nearer to a singular point than this (in units of a).
+_STRAIN_DISTANCE = 0.1
+
+
+@dataclass(frozen=True)
+class AxisymmetricSolution:
+    """What one round scene gives.
+
+    ``force`` (N) is positive against the probe's advance; ``force_error`` its relative error bar (95 %); ``energy``
+    (J) the strain energy; ``balance`` the larger of the relative errors of F·d = 2U and of F_probe + F_support = 0;
+    ``max_strain`` the largest principal strain, by magnitude, of the mean strains of cells at least a/10 away from
+    every singular point. ``dofs``, ``cells`` and ``iterations`` belong to the solve that gave F, the seconds are of
+    all; an iteration beyond the first refines what a slender body loses to round-off.
+    """
+
+    force: float
+    force_error: float
+    energy: float
+    balance: float
+    max_strain: float
+    dofs: int
+    cells: int
+    iterations: int
+    time_mesh: float
+    time_assemble: float
+    time_setup: float
+    time_solve: float
+
+
+def solve_axisymmetric(
+    meridian: Meridian,
+    poisson: float,
+    bonded: bool,
+    *,
+    young: float = 1.0,
+    depth: float = 1.0,
+    accuracy: float = 1e-5,
+    degree: int = DEGREE,
+) -> AxisymmetricSolution:
+    """Solve a round scene for 0 <= ν <= 0.5 on this process alone; ``young`` in Pa, ``depth`` in m.
+
+    Refines until the error bar is at most ``accuracy``, or there is no finer mesh; then takes the best. ``degree``
+    is 3 at least.
+
+    Raises:
+        SolveError: if the conditions contradict each other or nothing is held, if a solve fails a check, or if the
+            error bar stays above 1e-3.
+    """
+    if not 0 <= poisson <= 0.5:
+        raise SolveError(f"Poisson's ratio is {poisson:g}, must be between 0 and 0.5")
+    clock, best, failure = _Clock(), None, SolveError("no mesh was tried")
+    for grading in _GRADINGS:
+        try:
+            arrays = generate_meridian(meridian, grading)
+            solution = _solve_on(arrays, poisson, bonded, degree, clock)
+        except _Unbalanced as error:
+            # Round-off grows with refinement: a finer mesh would do no better.
+            failure = error
+            break
+        if best is None or solution.error < best.error:
+            best, cells = solution, len(arrays.cells)
+        if best.error <= accuracy:
+            break
+    if best is None:
+        raise failure
+    if best.error > _WORST_ERROR:
+        raise SolveError(f"the force is known to {best.error:.0e} only, allowed {_WORST_ERROR:.0e}")
+    a, mu = meridian.unit, young / (2 * (1 + poisson))
+    return AxisymmetricSolution(
+        force=mu * a * depth * best.force,
+        force_error=best.error,
+        energy=mu * a * depth**2 * best.energy,
+        balance=best.balance,
+        max_strain=depth / a * best.max_strain,
+        dofs=best.forms.dofs,
+        cells=cells,
+        iterations=best.iterations,
+        **{f"time_{name}": seconds for name, seconds in clock.seconds.items()},
+    )
+
+
+def compile_axisymmetric(degree: int = DEGREE) -> None:
+    """Compile every form that ``solve_axisymmetric`` needs, on this process alone; call it within ``compiling()``."""
+    mesh, _ = meridian_mesh(generate_meridian(Meridian(2.0, 1.0, 1.0), Grading(1.0)))
+    for mixed in (False, True):
+        for p in (degree - 1, degree):
+            MeridianForms(mesh, p, mixed)
+
+
+class _Unbalanced(SolveError):
+    """Round-off has spoilt the solution."""
+
+
+class _Clock:
+    """Seconds spent, by kind of work."""
+
+    def __init__(self) -> None:
+        self.seconds = dict.fromkeys(("mesh", "assemble", "setup", "solve"), 0.0)
+
+    @contextmanager
+    def __call__(self, kind: str) -> Iterator[None]:
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[kind] += time.perf_counter() - start
+
+
+@dataclass(frozen=True)
+class _Scaled:
+    """A solution for a = μ = d = 1; ``error`` is relative."""
+
+    force: float
+    energy: float
+    balance: float
+    forms: MeridianForms
+    iterations: int
+    error: float = inf
+    max_strain: float = 0.0
+
+
+def _solve_on(arrays: MeridianArrays, poisson: float, bonded: bool, degree: int, clock: _Clock) -> _Scaled:
+    """Solve with degrees p - 1 and p on one mesh: the answer is that of p, its error bar comes from the difference.
+
+    At an edge where the displacement goes like r^½, the error falls like p⁻² if nothing else is left (the mesh's
+    smallest cell), faster elsewhere: what is left is at most θ = p²/(2p + 1) times the last step, p counted before
+    it. The safety of 1.25 on it is measured, and so is that round-off errs by less than 3 times the balance.
+    """
+    clock.seconds["mesh"] += arrays.seconds
+    if FIXED not in arrays.facets:
+        raise SolveError("nothing that is kept of the body is held: the tissue would float")
+    if len(np.intersect1d(arrays.facets[PROBE], arrays.facets[FIXED])):
+        raise SolveError("the probe covers the top right to the held side: no displacement satisfies both conditions")
+    with clock("mesh"):
+        mesh, facets = meridian_mesh(arrays)
+    mixed = poisson >= MIXED_FROM
+    coarse = _solve_degree(mesh, facets, degree - 1, mixed, poisson, bonded, clock)
+    fine = _solve_degree(mesh, facets, degree, mixed, poisson, bonded, clock)
+    theta = (degree - 1) ** 2 / (2 * degree - 1)
+    step = abs(coarse.force / fine.force - 1)
+    error = 1.25 * theta * step + 3 * max(coarse.balance, fine.balance)
+    with clock("solve"):
+        strain, corners = fine.forms.mean_strains()
+        distance = np.linalg.norm(corners[:, :, None] - arrays.singular, axis=-1).min(axis=(1, 2))
+        max_strain = float(strain[distance >= _STRAIN_DISTANCE].max(initial=0.0))
+    return replace(fine, error=error, max_strain=max_strain)
+
+
+def _solve_degree(
+    mesh: Any, facets: dict[str, Any], degree: int, mixed: bool, poisson: float, bonded: bool, clock: _Clock
+) -> _Scaled:
+    """Solve with one degree; refine the solution until round-off stops it."""
+    with clock("assemble"):
+        forms = MeridianForms(mesh, degree, mixed)
+        forms.set_poisson(poisson)
+        stiffness = forms.stiffness()
+        probe, support = forms.locate(facets, PROBE, 1), forms.locate(facets, FIXED, 1)
+        zero = [support, forms.locate(facets, FIXED, 0), forms.locate(facets, AXIS, 0)]
+        if bonded:
+            zero.append(forms.locate(facets, PROBE, 0))
+        free = np.setdiff1d(np.arange(forms.dofs), np.concatenate([probe, *zero]))
+        solution = np.zeros(forms.dofs)
+        solution[probe] = -1.0
+        unknown = stiffness[free][:, free]
+    with _factorised(unknown, definite=not mixed, clock=clock) as solve, clock("solve"):
+        residual, balance = forms.residual(solution), np.inf
+        for iteration in range(1, _MOST_REFINEMENTS + 1):  # noqa: B007
+            solution[free] -= solve(residual[free])
+            residual, before = forms.residual(solution), balance
+            on_probe, on_support = (2 * pi * float(residual[dofs].sum()) for dofs in (probe, support))
+            # This is 2U for the mixed form too, once its second row, p = λ div u, holds.
+            twice_energy = 2 * pi * float(solution @ residual)
+            if not -np.inf < on_probe < 0 < twice_energy < np.inf:
+                raise SolveError(f"the solution is not a number or has no energy (2U = {twice_energy:g})")
+            balance = max(abs(on_probe + on_support), abs(on_probe + twice_energy)) / -on_probe
+            if balance < _BALANCED or balance > before / 2:
+                break
+    if balance > BALANCE_LIMIT:
+        raise _Unbalanced(
+            f"forces do not balance: relative error {balance:.1e}, allowed {BALANCE_LIMIT:.0e}; "
+            "the body is so slender that its stiffness drowns in round-off"
+        )
+    return _Scaled(-on_probe, twice_energy / 2, balance, forms, iteration)
+
+
+@contextmanager
+def _factorised(
+    matrix: sp.csr_matrix, *, definite: bool, clock: _Clock
+) -> Iterator[Callable[[FloatArray], FloatArray]]:
+    """Factorise by MUMPS, Cholesky if ``definite``, else LDLᵀ with pivoting; lend the function that solves."""
+    matrix.sort_indices()
+    csr = matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), matrix.data
+    operator = PETSc.Mat().createAIJ(matrix.shape, csr=csr, comm=MPI.COMM_SELF)
+    ksp = PETSc.KSP().create(MPI.COMM_SELF)
+    right, left = operator.createVecs()
+
+    def solve(load: FloatArray) -> FloatArray:
+        left.array[:] = load
+        ksp.solve(left, right)
+        if ksp.getConvergedReason() <= 0:
+            raise SolveError("the factorisation failed (out of memory, or the operator is singular)")
+        return np.array(right.array)
+
+    try:
+        with clock("setup"):
+            operator.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+            if definite:
+                operator.setOption(PETSc.Mat.Option.SPD, True)
+            ksp.setOperators(operator)
+            ksp.setType("preonly")
+            ksp.pc.setType("cholesky")
+            ksp.pc.setFactorSolverType("mumps")
+            ksp.pc.setFactorSetUpSolverType()
+            ksp.pc.getFactorMatrix().setMumpsIcntl(14, _SPARE_MEMORY)
+            ksp.setUp()
+        yield solve
+    except PETSc.Error as error:
+        raise SolveError(f"the factorisation failed (PETSc error {error.ierr})") from error
+    finally:
+        for item in (left, right, ksp, operator):
+            item.destroy()

@@ -1,0 +1,119 @@
+"""Taylor–Hood spaces: displacements of degree k with their conditions, continuous pressures of degree k − 1."""
+
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+
+import numpy as np
+from dolfinx.fem import petsc as fem_petsc
+from petsc4py import PETSc
+
+from pipeline import compat
+from pipeline.mesh.distribute import BodyMesh
+from pipeline.solve.mixed_forms import mixed_forms
+from pipeline.solve.saddle import Pair
+from pipeline.solve.space import ConstrainedSpace, Contact, whole_points
+
+
+class MixedSpace:
+    """Displacements and pressures on a mesh, and what couples them.
+
+    Pressures are counted in units of ``unit`` × μ, ``unit`` (1/m) being about one over the element size: the blocks
+    of the saddle point are then of like magnitude in any unit of length.
+    """
+
+    def __init__(self, body: BodyMesh, degree: int, contact: Contact):
+        """Collective.
+
+        Raises:
+            SolveError: if the footprint and the support share a point.
+        """
+        self.comm, self.degree = body.comm, degree
+        self.displacements = ConstrainedSpace(body, degree, contact)
+        self.pressures = compat.scalar_space(body.mesh, degree - 1)
+        self.forms = mixed_forms(self.displacements.forms.displacement, self.pressures)
+        index_map = self.pressures.dofmap.index_map
+        self._owned, self._size = index_map.size_local, index_map.size_global
+        self._ghosts = np.asarray(index_map.ghosts, dtype=PETSc.IntType)
+        self.dofs = self.displacements.dofs + index_map.size_global
+        self.whole_dofs = self.displacements.whole_dofs + whole_points(self.pressures, body)
+        with ExitStack() as stack:
+            start = time.perf_counter()
+            self.mass, self.coupling = (_assemble(form, stack) for form in (self.forms.mass, self.forms.coupling))
+            self._mask_coupling()
+            diagonal = self.mass.getDiagonal()
+            self.unit = (diagonal.sum() / self._size) ** (-1 / 3)
+            diagonal.destroy()
+            self.mass.scale(self.unit**2)
+            self.coupling.scale(self.unit)
+            self.assembly_seconds = time.perf_counter() - start
+            self._stack = stack.pop_all()
+
+    def close(self) -> None:
+        """Free the matrices."""
+        self._stack.close()
+        self.displacements.close()
+
+    @contextmanager
+    def pair(self) -> Iterator[Pair]:
+        """Lend ghosted vectors of zeros for displacement and pressure."""
+        with self.displacements.vector() as u:
+            p = PETSc.Vec().createGhost(self._ghosts, (self._owned, None), comm=self.comm)
+            p.set(0.0)
+            try:
+                yield u, p
+            finally:
+                p.destroy()
+
+    def lift(self, rhs: Pair, lame: tuple[float, float]) -> None:
+        """Put the loads of the prescribed displacements into ``rhs``, λ and μ being those of K₀; collective."""
+        self.displacements.lift(rhs[0], lame)
+        self._dilate(rhs[1])
+        rhs[1].scale(-1.0)
+
+    def set_fields(self, unknown: Pair) -> None:
+        """Make ``unknown`` the displacement and the pressure that ``apply`` acts on; collective."""
+        self.displacements.set_displacement(unknown[0])
+        pressure = unknown[1]
+        pressure.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
+        with pressure.localForm() as local:
+            self.forms.pressure.x.array[:] = self.unit * local.array
+
+    def apply(self, elastic: PETSc.Vec, pull: PETSc.Vec, dilation: PETSc.Vec, lame: tuple[float, float]) -> None:
+        """Add K₀ u, Bᵀ p and B u, all with the unmodified operator, to the three vectors; collective."""
+        self.displacements.apply(elastic, lame)
+        fem_petsc.assemble_vector(pull, self.forms.pull)
+        pull.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        self._dilate(dilation)
+
+    def start_from(self, coarse: "MixedSpace", unknown: Pair) -> None:
+        """Put the fields of ``coarse``, less the prescribed displacements, into ``unknown``; collective."""
+        displacement, pressure = self.displacements.forms.displacement, self.forms.pressure
+        displacement.interpolate(coarse.displacements.forms.displacement)
+        pressure.interpolate(coarse.forms.pressure)
+        owned = self.displacements.owned
+        unknown[0].array[:] = displacement.x.array[:owned] - self.displacements.held[:owned]
+        unknown[0].array[self.displacements.prescribed_owned] = 0.0
+        unknown[1].array[:] = pressure.x.array[: self._owned] / self.unit
+
+    def release(self, unknown: Pair) -> None:
+        """Take the prescribed displacements out of ``unknown`` again."""
+        unknown[0].array[:] -= self.displacements.held[: self.displacements.owned]
+
+    def _dilate(self, result: PETSc.Vec) -> None:
+        fem_petsc.assemble_vector(result, self.forms.dilation)
+        result.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        result.scale(self.unit)
+
+    def _mask_coupling(self) -> None:
+        free = self.coupling.createVecRight()
+        free.set(1.0)
+        free.array[self.displacements.prescribed_owned] = 0.0
+        self.coupling.diagonalScale(None, free)
+        free.destroy()
+
+
+def _assemble(form: object, stack: ExitStack) -> PETSc.Mat:
+    matrix = compat.assemble_matrix(form, [], 1.0, "aij")
+    stack.callback(matrix.destroy)
+    return matrix

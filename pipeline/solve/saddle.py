@@ -1,0 +1,246 @@
+"""Linear solvers for the saddle point of the mixed element,
+
+    [ K₀   Bᵀ ] [u]   [f]
+    [ B  −c M ] [p] = [g],
+
+by LDLᵀ (MUMPS), or by generalised conjugate residuals (GCR) with a block-triangular preconditioner: multigrid for K₀
+and a multiple of the pressure's mass M for the Schur complement (D. Silvester and A. Wathen, SIAM J. Numer. Anal. 31,
+1352, 1994). K₀ is far from incompressible, so that neither c, 0 for an incompressible material, nor the size of the
+mesh changes the iterations much.
+"""
+
+import itertools
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from petsc4py import PETSc
+
+from pipeline.solve.linear import Level, LinearSolver, SolveError, explain, reason_name
+
+Pair = tuple[PETSc.Vec, PETSc.Vec]
+
+_MOST_ITERATIONS = 300
+# More directions than a solve takes, as a rule.
+_RESTART = 60
+# B K₀⁻¹ Bᵀ is M / (λ₀ + 2μ) inside the body and less where the displacement is held; measured, flat from 0.8 to 1.6.
+_SCHUR = 1.2
+# Chebyshev steps for M preconditioned by its diagonal, and smallest over largest eigenvalue, by the degree of the
+# pressure. Degree 1: 1/5 (A. Wathen, IMA J. Numer. Anal. 7, 449, 1987); the rest measured by the iterations.
+_MASS = {1: (3, 0.2), 2: (5, 0.1), 3: (10, 0.04), 4: (14, 0.02)}
+# Percentage by which MUMPS enlarges its work space: an indefinite matrix fills in more than the analysis foresees.
+_PIVOTING = 100
+
+_prefixes = itertools.count()
+
+
+@dataclass(frozen=True)
+class Saddle:
+    """The blocks: ``levels`` end with K₀, ``coupling`` is B, with columns of zeros for prescribed displacements.
+
+    ``stiffness`` is λ₀ + 2μ in units of the pressure, and ``degree`` that of the pressure.
+    """
+
+    levels: list[Level]
+    coupling: PETSc.Mat
+    mass: PETSc.Mat
+    stiffness: float
+    degree: int
+
+
+class SaddleSolver:
+    """Solves a saddle point for any c; a context manager, which frees what it made.
+
+    What does not depend on c is set up once. ``setup_seconds`` is the time of all set-up that the last solve relied
+    on, whether it was done for it or before; ``first_energy`` is the energy norm, squared, of the error that an
+    iterative solve began with, as its preconditioner sees it.
+    """
+
+    def __init__(self, saddle: Saddle, *, direct: bool):
+        self._saddle, self._direct = saddle, direct
+        self.setup_seconds, self.first_energy = 0.0, 0.0
+        start = time.perf_counter()
+        with ExitStack() as stack:
+            if not direct:
+                self._multigrid = LinearSolver(saddle.levels, direct=False, tolerance=1e-8)
+                stack.callback(self._multigrid.close)
+                self._mass = self._mass_solver(stack)
+            self._stack = stack.pop_all()
+        self._shared_seconds = time.perf_counter() - start
+
+    def __enter__(self) -> "SaddleSolver":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def solve(self, c: float, rhs: Pair, unknown: Pair, tolerance: float) -> int:
+        """Improve ``unknown``, (u, p), until the energy norm of its error has fallen by ``tolerance``; collective.
+
+        Returns the iterations. A direct solve is exact and does not look at what ``unknown`` holds.
+
+        Raises:
+            SolveError: if PETSc reports anything but convergence.
+        """
+        with ExitStack() as stack:
+            try:
+                matrix = self._matrix(c, stack)
+                b, x = (_keep(stack, vector) for vector in matrix.createVecs())
+                split = unknown[0].getLocalSize()
+                for whole, (first, second) in ((b, rhs), (x, unknown)):
+                    whole.array[:split], whole.array[split:] = first.array, second.array
+                block = None if self._direct else self._preconditioner(c, stack)
+                solver = self._factors(matrix, stack) if block is None else _iteration(matrix, block, tolerance, stack)
+                solver.solve(b, x)
+            except PETSc.Error as error:
+                raise SolveError(explain(error)) from error
+            reason, iterations = solver.getConvergedReason(), int(solver.its)
+            if reason <= 0:
+                raise SolveError(
+                    f"the linear solver did not converge: {reason_name(reason)} after {iterations} iterations"
+                )
+            unknown[0].array[:], unknown[1].array[:] = x.array[:split], x.array[split:]
+            self.first_energy = 0.0 if block is None else block.first_energy
+        return iterations
+
+    def _matrix(self, c: float, stack: ExitStack) -> PETSc.Mat:
+        saddle = self._saddle
+        mass = _keep(stack, saddle.mass.copy())
+        mass.scale(-c)
+        transpose = PETSc.Mat()
+        if self._direct:
+            saddle.coupling.transpose(transpose)
+        else:
+            transpose.createTranspose(saddle.coupling)
+        blocks = [[saddle.levels[-1].matrix, _keep(stack, transpose)], [saddle.coupling, mass]]
+        return _keep(stack, PETSc.Mat().createNest(blocks, comm=saddle.mass.comm))
+
+    def _factors(self, nest: PETSc.Mat, stack: ExitStack) -> PETSc.KSP:
+        start = time.perf_counter()
+        matrix = _keep(stack, nest.convert("aij", PETSc.Mat()))
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        ksp = _krylov(matrix, stack)
+        ksp.setType("preonly")
+        ksp.pc.setType("cholesky")
+        ksp.pc.setFactorSolverType("mumps")
+        with _options(ksp, {"mat_mumps_icntl_14": _PIVOTING}):
+            ksp.setFromOptions()
+            ksp.setUp()
+        self.setup_seconds = time.perf_counter() - start
+        return ksp
+
+    def _preconditioner(self, c: float, stack: ExitStack) -> "_BlockTriangular":
+        saddle = self._saddle
+        block = _BlockTriangular(self._multigrid, saddle.coupling, self._mass, c + _SCHUR / saddle.stiffness)
+        stack.callback(block.close)
+        self.setup_seconds = self._shared_seconds
+        return block
+
+    def _mass_solver(self, stack: ExitStack) -> PETSc.KSP:
+        ksp = _krylov(self._saddle.mass, stack)
+        steps, ratio = _MASS[self._saddle.degree]
+        values = {
+            "ksp_type": "chebyshev", "ksp_max_it": steps, "ksp_norm_type": "none", "pc_type": "jacobi",
+            "ksp_chebyshev_esteig": f"0,{ratio},0,1.1", "ksp_chebyshev_esteig_steps": 10,
+        }  # fmt: skip
+        with _options(ksp, values):
+            ksp.setFromOptions()
+            ksp.setUp()
+        return ksp
+
+
+class _BlockTriangular:
+    """The preconditioner z_u = K₀⁻¹ r_u, z_p = −S⁻¹ t with t = r_p − B z_u, both inverses approximate.
+
+    ``energy`` is |r_u·z_u| + |t·z_p| of what it was last applied to: with exact inverses r_u·K₀⁻¹r_u − t·S⁻¹t is the
+    error of the energy, and the sum a norm of the error that does not depend on units.
+    """
+
+    def __init__(self, multigrid: LinearSolver, coupling: PETSc.Mat, mass: PETSc.KSP, schur: float):
+        self._multigrid, self._coupling, self._mass, self._schur = multigrid, coupling, mass, schur
+        right, left = (coupling.createVecRight, coupling.createVecLeft)
+        self._vectors = [right(), right(), left(), left()]
+        self.energy = self.first_energy = 0.0
+
+    def apply(self, _: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
+        """Apply it; PETSc calls this."""
+        r_u, z_u, rest, z_p = self._vectors
+        split = r_u.getLocalSize()
+        r_u.array[:] = residual.getArray(readonly=True)[:split]
+        self._multigrid.precondition(r_u, z_u)
+        self._coupling.mult(z_u, rest)
+        rest.array[:] = residual.getArray(readonly=True)[split:] - rest.array
+        self._mass.solve(rest, z_p)
+        z_p.scale(-1 / self._schur)
+        self.energy = abs(r_u.dot(z_u)) + abs(rest.dot(z_p))
+        result.array[:split], result.array[split:] = z_u.array, z_p.array
+
+    def close(self) -> None:
+        """Free the work vectors."""
+        while self._vectors:
+            self._vectors.pop().destroy()
+
+
+class _EnergyTest:
+    """Stops GCR when the energy of the error has fallen to the square of the tolerance."""
+
+    def __init__(self, block: _BlockTriangular, tolerance: float):
+        self._block, self._share = block, tolerance**2
+        self._previous = 0.0
+
+    def __call__(self, ksp: PETSc.KSP, iteration: int, norm: float) -> int:
+        reasons = PETSc.KSP.ConvergedReason
+        previous, self._previous = self._previous, norm
+        if norm == 0.0:
+            return int(reasons.CONVERGED_ATOL)
+        if not norm < float("inf"):
+            return int(reasons.DIVERGED_NANORINF)
+        if iteration == 0:
+            return 0
+        if iteration == 1:
+            self._block.first_energy = self._block.energy
+        # The preconditioner has seen the residual of one iteration ago; what was gained since, the plain norm tells.
+        if self._block.energy * (norm / previous) ** 2 <= self._share * self._block.first_energy:
+            return int(reasons.CONVERGED_RTOL)
+        return int(reasons.DIVERGED_MAX_IT) if iteration >= _MOST_ITERATIONS else 0
+
+
+def _iteration(matrix: PETSc.Mat, block: _BlockTriangular, tolerance: float, stack: ExitStack) -> PETSc.KSP:
+    ksp = _krylov(matrix, stack)
+    ksp.setType("gcr")
+    with _options(ksp, {"ksp_gcr_restart": _RESTART}):
+        ksp.setFromOptions()
+    ksp.setInitialGuessNonzero(True)
+    ksp.pc.setType("python")
+    ksp.pc.setPythonContext(block)
+    ksp.setTolerances(max_it=_MOST_ITERATIONS)
+    ksp.setConvergenceTest(_EnergyTest(block, tolerance))
+    ksp.setUp()
+    return ksp
+
+
+def _krylov(matrix: PETSc.Mat, stack: ExitStack) -> PETSc.KSP:
+    ksp = _keep(stack, PETSc.KSP().create(matrix.comm))
+    ksp.setOptionsPrefix(f"epsmesh_mixed{next(_prefixes)}_")
+    ksp.setOperators(matrix)
+    return ksp
+
+
+@contextmanager
+def _options(ksp: PETSc.KSP, values: dict[str, Any]) -> Iterator[None]:
+    """Hold ``values`` among PETSc's options, under the solver's own prefix."""
+    options, prefix = PETSc.Options(), ksp.getOptionsPrefix()
+    for name, value in values.items():
+        options[prefix + name] = value
+    try:
+        yield
+    finally:
+        for name in values:
+            options.delValue(prefix + name)
+
+
+def _keep(stack: ExitStack, item: Any) -> Any:
+    stack.callback(item.destroy)
+    return item

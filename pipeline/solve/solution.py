@@ -1,0 +1,63 @@
+"""What one solve gives, and what every kind of element needs to say it."""
+
+from dataclasses import dataclass
+from math import nan
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+from mpi4py import MPI
+
+from pipeline.mesh.distribute import BodyMesh
+
+FloatArray = npt.NDArray[np.float64]
+
+# F·d = 2U and F_probe + F_support = 0 hold for the exact solution of the discrete system. Conjugate gradients
+# stopped at 1e-8 keep both to about 1e-8; what misses them by this much has not been solved.
+BALANCE_LIMIT = 1e-6
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What one solve gives; all values global and equal on every rank.
+
+    ``reaction`` (N, xyz) is the force of the tissue on the probe, ``energy`` (J) the strain energy,
+    ``balance`` the larger of the relative errors of F·d = 2U and of F_probe + F_support = 0. ``decrement`` is the
+    share of the energy that one degree more takes away, s / F_p, and ``bar`` the relative 95 % error bar on F·d that
+    comes of it (see :mod:`pipeline.solve.error`).
+    """
+
+    reaction: tuple[float, float, float]
+    energy: float
+    max_strain: float
+    balance: float
+    dofs: int
+    iterations: int
+    time_assemble: float
+    time_setup: float
+    time_solve: float
+    decrement: float = nan
+    bar: float = nan
+    estimate_iterations: int = 0
+    time_estimate: float = 0.0
+
+
+def global_sum(comm: MPI.Comm, values: FloatArray) -> FloatArray:
+    """Return the sum of ``values`` over all ranks, entry by entry; collective."""
+    total = np.empty_like(values)
+    comm.Allreduce(np.ascontiguousarray(values), total)
+    return total
+
+
+def largest_strain(mean_strain: tuple[Any, Any], body: BodyMesh) -> float:
+    """Return the largest principal strain, by magnitude, of the strain averaged over each cell; collective.
+
+    ``mean_strain`` are the forms of :func:`pipeline.solve.forms.mean_strain_form`.
+    """
+    integral, volume = (fem.assemble_vector(form) for form in mean_strain)
+    owned = body.owned_cells
+    tensors = [np.asarray(v.array).reshape(-1, 3, 3)[:owned] for v in (integral, volume)]
+    principal = np.linalg.eigvalsh(tensors[0] / tensors[1])
+    local = float(np.abs(principal).max()) if owned else 0.0
+    return float(body.comm.allreduce(local, op=MPI.MAX))

@@ -1,0 +1,156 @@
+"""The elements by themselves: patch test, and convergence to a manufactured solution at the rates of theory."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import log2
+from typing import Any
+
+import dolfinx
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+import ufl
+from dolfinx import fem
+from dolfinx.fem import petsc as fem_petsc
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from pipeline import compat
+from pipeline.mesh.distribute import distribute
+from pipeline.plan.plan import make_plan
+from pipeline.run.meshing import mesh_arrays
+from pipeline.solve.forms import elastic_forms, form_cache
+from pipeline.solve.mixed_forms import mixed_forms
+from pipeline.study.load import parse
+from pipeline.verify.row import Row
+
+_ROUND_OFF = 1e-10
+# Meshes of 2 and 4 cubes a side are coarse for a rate: it is to lie within 15 % of the theory's.
+_RATE_ERROR = 0.15
+_CUBES = {1: (8, 16), 2: (4, 8), 3: (2, 4)}
+_MIXED_CUBES = {2: (4, 8), 3: (2, 4)}
+
+_STRAIN = "uniform strain is in every space"
+_THEORY = "energy norm falls like h^p"
+
+
+def element_rows(*, quick: bool = False) -> Iterator[Row]:
+    """Yield the rows of the patch test and of the manufactured solutions; ``quick`` leaves out the largest."""
+    for degree in (1, 2, 3):
+        yield Row("patch test", f"degree {degree}", 0.0, _STRAIN, _patch(degree, mixed=False), _ROUND_OFF)
+    for degree in (2, 3):
+        yield Row("patch test", f"mixed {degree}", 0.0, _STRAIN, _patch(degree, mixed=True), _ROUND_OFF)
+    for degree, cubes in _CUBES.items():
+        if not (quick and degree != 2):
+            errors = [_manufactured(degree, n, poisson=0.3, mixed=False) for n in cubes]
+            yield _rate(f"degree {degree}, ν = 0.3", degree, errors)
+    for degree, cubes in _MIXED_CUBES.items():
+        if not (quick and degree != 2):
+            errors = [_manufactured(degree, n, poisson=0.5, mixed=True) for n in cubes]
+            yield _rate(f"mixed {degree}, ν = 0.5", degree, errors)
+
+
+def _rate(path: str, degree: int, errors: list[float]) -> Row:
+    return Row("manufactured solution", path, degree, _THEORY, log2(errors[0] / errors[1]), _RATE_ERROR)
+
+
+def _patch(degree: int, *, mixed: bool) -> float:
+    """Largest nodal force inside a body in uniform strain, over the largest on its surface: a mesh with curved,
+    quarter-point elements at the probe's edge.
+    """
+    study = parse({
+        "body": {"shape": "cylinder", "radius": "20 mm", "height": "10 mm"},
+        "material": {"young": "1 kPa", "poisson": 0.4},
+        "probe": {"shape": "disc", "radius": "3 mm", "depth": "0.1 mm"},
+        "mesh": {"epsilon": "full", "fine": "8 mm", "coarse": "8 mm", "rim": "1 mm", "degree": degree},
+    })  # fmt: skip
+    (solve,) = [s for s in make_plan(study).solves if not s.is_reference]
+    body = distribute(MPI.COMM_SELF, mesh_arrays(solve.case, ("x", "y")))
+    space = compat.vector_space(body.mesh, degree)
+    forms = elastic_forms(space)
+    forms.set_lame(1.0, 1.0)
+    gradient = np.array([[0.2, 0.5, -0.3], [0.1, -0.4, 0.7], [0.6, 0.3, 0.9]])
+    forms.displacement.interpolate(lambda x: gradient @ x)
+    parts = [forms.action]
+    if mixed:
+        coupled = mixed_forms(forms.displacement, compat.scalar_space(body.mesh, degree - 1))
+        coupled.pressure.x.array[:] = np.trace(gradient)
+        parts.append(coupled.pull)
+    vectors = [fem.assemble_vector(part) for part in parts]
+    force = np.linalg.norm(np.sum([v.array for v in vectors], axis=0).reshape(-1, 3), axis=1)
+    surface = dolfinx.mesh.exterior_facet_indices(body.mesh.topology)
+    on_surface = fem.locate_dofs_topological(space, 2, surface)
+    inside = np.setdiff1d(np.arange(len(force)), on_surface)
+    return float(force[inside].max(initial=0.0) / force.max())
+
+
+@dataclass(frozen=True)
+class _Exact:
+    """A smooth displacement, divergence-free so that it serves for ν = ½, and the load that it takes for μ = 1."""
+
+    displacement: Any
+    load: Any
+
+
+def _exact(mesh: Any, lame_lambda: float) -> _Exact:
+    x = ufl.SpatialCoordinate(mesh)
+    u = ufl.as_vector([ufl.sin(2 * x[1]) * ufl.cos(x[2]), ufl.sin(2 * x[2]) * ufl.cos(x[0]), ufl.sin(2 * x[0])])
+    if lame_lambda:
+        u = u + ufl.as_vector([ufl.sin(x[0]), x[1] ** 3, ufl.exp(x[2])]) / 3
+    stress = lame_lambda * ufl.div(u) * ufl.Identity(3) + 2 * ufl.sym(ufl.grad(u))
+    return _Exact(u, -ufl.div(stress))
+
+
+def _manufactured(degree: int, cubes: int, *, poisson: float, mixed: bool) -> float:
+    """Energy-norm error on a cube of ``cubes``³ × 6 tetrahedra, all of its surface being prescribed, μ = 1.
+
+    The mixed element solves for ν = ½, where K₀ has λ₀ = 1 and the solution no dilation.
+    """
+    mesh = dolfinx.mesh.create_unit_cube(MPI.COMM_SELF, cubes, cubes, cubes)
+    lame_lambda = 1.0 if mixed else 2 * poisson / (1 - 2 * poisson)
+    space = compat.vector_space(mesh, degree)
+    forms = elastic_forms(space)
+    forms.set_lame(lame_lambda, 1.0)
+    exact = _exact(mesh, 0.0 if mixed else lame_lambda)
+    cache = str(form_cache())
+    dx = ufl.dx(metadata={"quadrature_degree": 2 * degree + 2})
+    load = compat.form(ufl.inner(exact.load, ufl.TestFunction(space)) * dx, cache)
+    blocks = [[_sparse(forms.stiffness)]]
+    rhs = np.array(fem.assemble_vector(load).array)
+    if mixed:
+        coupling = _sparse(mixed_forms(forms.displacement, compat.scalar_space(mesh, degree - 1)).coupling)
+        blocks = [[blocks[0][0], coupling.T], [coupling, None]]
+        rhs = np.concatenate([rhs, np.zeros(coupling.shape[0])])
+    matrix = sp.bmat(blocks, format="csc")
+    mesh.topology.create_connectivity(2, 3)
+    edge = fem.locate_dofs_topological(space, 2, dolfinx.mesh.exterior_facet_indices(mesh.topology))
+    held = (3 * np.asarray(edge)[:, None] + np.arange(3)).reshape(-1)
+    if mixed:
+        held = np.append(held, len(rhs) - 1)  # pressure is known up to a constant
+    forms.displacement.interpolate(_evaluate(mixed))
+    values = np.zeros(len(rhs))
+    values[held[held < 3 * space.dofmap.index_map.size_local]] = forms.displacement.x.array[
+        held[held < 3 * space.dofmap.index_map.size_local]
+    ]
+    free = np.setdiff1d(np.arange(len(rhs)), held)
+    values[free] = spl.spsolve(matrix[free][:, free], (rhs - matrix @ values)[free])
+    forms.displacement.x.array[:] = values[: len(forms.displacement.x.array)]
+    error = ufl.sym(ufl.grad(forms.displacement - exact.displacement))
+    return float(fem.assemble_scalar(compat.form(ufl.inner(error, error) * dx, cache)) ** 0.5)
+
+
+def _evaluate(mixed: bool) -> Any:
+    def displacement(x: np.ndarray) -> np.ndarray:
+        u = np.array([np.sin(2 * x[1]) * np.cos(x[2]), np.sin(2 * x[2]) * np.cos(x[0]), np.sin(2 * x[0])])
+        return u if mixed else u + np.array([np.sin(x[0]), x[1] ** 3, np.exp(x[2])]) / 3
+
+    return displacement
+
+
+def _sparse(form: Any) -> sp.csr_matrix:
+    matrix: PETSc.Mat = fem_petsc.assemble_matrix(form)
+    matrix.assemble()
+    pointers, columns, values = matrix.getValuesCSR()
+    result = sp.csr_matrix((values, columns, pointers), shape=matrix.getSize())
+    matrix.destroy()
+    return result

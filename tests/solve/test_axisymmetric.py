@@ -1,0 +1,173 @@
+"""The solver for round scenes obeys mechanics: closed forms, published tables, limits, invariances, its error bar."""
+
+from math import inf, log, pi
+
+import numpy as np
+import pytest
+
+from pipeline.mesh.meridian import Grading, Meridian, generate_meridian
+from pipeline.solve.axisymmetric import compile_axisymmetric, solve_axisymmetric
+from pipeline.solve.forms import compiling
+from pipeline.solve.linear import SolveError
+
+# F / (E d · 1 mm) of the cylinder R = H = 50 mm under a disc of 3 mm, by another program, converged to 1e-7.
+REFERENCE = {
+    (True, 0.3): 7.126315, (True, 0.45): 7.943726, (True, 0.49): 8.325817,
+    (False, 0.3): 6.921313, (False, 0.45): 7.922109, (False, 0.49): 8.325029,
+}  # fmt: skip
+# Hayes et al., J. Biomech. 5, 1972, ν = 0.3: a layer of thickness h bonded to a rigid base, F = κ·2E a d/(1-ν²).
+HAYES = {0.2: 1.207, 0.4: 1.472, 0.6: 1.784, 0.8: 2.124, 1.0: 2.480}
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _forms():
+    with compiling():
+        for degree in (4, 5):
+            compile_axisymmetric(degree)
+
+
+@pytest.mark.parametrize(("bonded", "poisson"), REFERENCE)
+def test_reference_cylinder(bonded, poisson):
+    solution = solve_axisymmetric(Meridian(50e-3, 50e-3, 3e-3), poisson, bonded)
+    error = solution.force / 1e-3 / REFERENCE[bonded, poisson] - 1
+    assert abs(error) < 2e-7
+    assert solution.force_error < 1e-5
+    assert solution.balance < 1e-9
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.45, 0.49, 0.4999, 0.5])
+@pytest.mark.parametrize("bonded", [True, False])
+def test_half_space(bonded, poisson):
+    """In a body a million times as wide as the disc F is that of a half-space (closed forms), to 1e-6."""
+    if not bonded:
+        exact = 2 / (1 - poisson**2)
+    else:
+        x = 1 - 2 * poisson  # ln(3 - 4ν)/(1 - 2ν) = ln(1 + 2x)/x, which is 2 for ν = 1/2
+        exact = 4 / (2 * (1 + poisson)) * (log(1 + 2 * x) / x if x else 2)
+    assert solve_axisymmetric(Meridian(1e6, 1e6, 1), poisson, bonded).force == pytest.approx(exact, rel=3e-6)
+
+
+@pytest.mark.parametrize("ratio", HAYES)
+def test_layer_on_rigid_base(ratio):
+    force = solve_axisymmetric(Meridian(100, 1 / ratio, 1), 0.3, False).force
+    assert force / (2 / (1 - 0.3**2)) == pytest.approx(HAYES[ratio], rel=3e-3)
+
+
+@pytest.mark.parametrize("column", [inf, 1.0])
+@pytest.mark.parametrize("bonded", [True, False])
+def test_uniaxial_compression(bonded, column):
+    """Without lateral contraction, what a probe covers entirely is in uniform strain: F = E A d/H."""
+    meridian = Meridian(1 if column == inf else 9, 2, 3, column=column)
+    solution = solve_axisymmetric(meridian, 0.0, bonded)
+    assert solution.force == pytest.approx(pi / 2, rel=1e-10)
+    assert solution.energy == pytest.approx(pi / 4, rel=1e-10)
+    assert solution.max_strain == pytest.approx(0.5, rel=1e-8)
+
+
+@pytest.mark.parametrize(("bonded", "factor"), [(True, 1.0), (False, 0.25)])
+def test_incompressible_thin_layer(bonded, factor):
+    """An incompressible layer is squeezed out: F = 3π μ a⁴ d/(2 h³) between rough faces, a quarter with one smooth."""
+    h, mu = 1e-3, 1 / 3
+    force = solve_axisymmetric(Meridian(300, h, 1), 0.5, bonded).force
+    assert force == pytest.approx(factor * 1.5 * pi * mu / h**3, rel=8 * h)
+
+
+def test_clamped_thin_plate():
+    """A sheet held at its side bends: F = 16π D d/R², D = E h³/(12(1 - ν²)), up to the shear under a small disc."""
+    h, radius, nu = 1.0, 300.0, 0.3
+    force = solve_axisymmetric(Meridian(radius, h, 1, "sides"), nu, True).force
+    assert force == pytest.approx(16 * pi * h**3 / (12 * (1 - nu**2)) / radius**2, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("meridian", "bonded"),
+    [
+        (Meridian(5, 3, 1), False),
+        (Meridian(2, 3, 1, "sides"), True),
+        (Meridian(1.3, 2, 1, -0.5), False),
+        (Meridian(9, 2, 1, column=2), True),
+    ],
+)
+def test_incompressible_is_the_limit(meridian, bonded):
+    limit = solve_axisymmetric(meridian, 0.5, bonded).force
+    gaps = [solve_axisymmetric(meridian, 0.5 - x, bonded).force / limit - 1 for x in (1e-4, 1e-5)]
+    assert gaps[0] < 0
+    assert gaps[1] == pytest.approx(gaps[0] / 10, rel=0.05)
+
+
+def test_displacement_and_mixed_elements_agree(monkeypatch):
+    meridian = Meridian(4, 3, 1, -1.0)
+    forces = []
+    for threshold in (0.3, 0.5):
+        monkeypatch.setattr("pipeline.solve.axisymmetric.MIXED_FROM", threshold)
+        forces.append(solve_axisymmetric(meridian, 0.4, True).force)
+    assert forces[0] == pytest.approx(forces[1], rel=1e-7)
+
+
+@pytest.mark.parametrize(("unit", "young"), [(1e-3, 1e12), (1 / 3, 1e-3), (10.0, 1e4)])
+def test_units_do_not_matter(unit, young):
+    here, there = (
+        solve_axisymmetric(Meridian(5 * u, 3 * u, 0.7 * u, -1.1 * u), 0.45, True, young=e, depth=0.1 * u)
+        for u, e in ((1.0, 1.0), (unit, young))
+    )
+    assert there.force == pytest.approx(young * unit**2 * here.force, rel=1e-12)
+    assert there.energy == pytest.approx(young * unit**3 * here.energy, rel=1e-12)
+    assert there.max_strain == pytest.approx(here.max_strain, rel=1e-9)
+    assert there.dofs == here.dofs
+
+
+def test_more_support_is_stiffer():
+    """Holding more of the boundary can only raise F; so does keeping more of the body."""
+
+    def force(**change):
+        return solve_axisymmetric(Meridian(3, 2, 1, **change), 0.45, False).force
+
+    held = [force(fixed=f) for f in (-2.0, -1.0, -0.1, 0.0)]
+    assert held == sorted(held)
+    assert held[0] == pytest.approx(force(), rel=1e-12)
+    assert held[-1] == pytest.approx(force(fixed="bottom+sides"), rel=1e-12)
+    kept = [force(column=c) for c in (1.1, 2.0, 3.0)]
+    assert kept == sorted(kept)
+    assert force(column=2.0, column_fixed=True) > kept[-1] > force(fixed="sides")
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_error_bar_holds_the_truth(seed, monkeypatch):
+    """The bar of a rough mesh holds the answer of a fine one of higher degree."""
+    random = np.random.default_rng(seed)
+    radius, height = (float(np.exp(random.uniform(*np.log(ends)))) for ends in ((1.05, 300), (0.1, 100)))
+    support = [-height * random.uniform(0.05, 1), "bottom", "sides", "bottom+sides"][seed % 4]
+    meridian, poisson = Meridian(radius, height, 1, support), [0.0, 0.3, 0.45, 0.49, 0.4999, 0.5][seed]
+    exact = solve_axisymmetric(meridian, poisson, seed % 2 == 0)
+    monkeypatch.setattr("pipeline.solve.axisymmetric._GRADINGS", (Grading(1e-4, 1.4, 4.0),))
+    rough = solve_axisymmetric(meridian, poisson, seed % 2 == 0, degree=4)
+    assert exact.force_error < rough.force_error
+    assert rough.force == pytest.approx(exact.force, rel=rough.force_error + exact.force_error)
+
+
+def test_mesh_is_repeatable_and_exact():
+    meridian = Meridian(7.3, 2.1, 0.9, -1.3)
+    first, second = (generate_meridian(meridian, Grading()) for _ in range(2))
+    assert np.array_equal(first.points, second.points)
+    assert np.array_equal(first.cells, second.cells)
+    corners = first.points[first.cells]
+    area = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 2
+    assert area.min() > 0
+    assert area.sum() == pytest.approx(7.3 * 2.1 / 0.9**2, rel=1e-10)  # lengths have 12 digits
+    probe = first.points[first.facets["probe"]]
+    assert np.all(probe[..., 1] == 0)
+    assert probe[..., 0].max() == 1
+
+
+@pytest.mark.parametrize(
+    ("meridian", "message"),
+    [
+        (Meridian(1, 2, 1, "sides"), "covers the top"),
+        (Meridian(5, 2, 1, column=0.8, column_fixed=True), "covers the top"),
+        (Meridian(5, 2, 1, "sides", column=2.0), "float"),
+        (Meridian(5, 2, 1, -2.5), "float"),
+    ],
+)
+def test_impossible_scenes_are_refused(meridian, message):
+    with pytest.raises(SolveError, match=message):
+        solve_axisymmetric(meridian, 0.5, True)

@@ -1,0 +1,196 @@
+"""Mixed elements obey mechanics up to and including ν = ½, and their bars hold."""
+
+from dataclasses import replace
+from math import inf
+from typing import Any
+
+import numpy as np
+import pytest
+from dolfinx import fem, mesh
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from pipeline.mesh.distribute import BodyMesh, distribute
+from pipeline.run.meshing import mesh_arrays, mesh_case
+from pipeline.solve.elasticity import ElasticBody
+from pipeline.solve.error import error_bar
+from pipeline.solve.linear import SolveError
+from pipeline.solve.mixed import MixedBody, Solution
+from pipeline.solve.mixed_space import MixedSpace
+from pipeline.solve.space import Contact
+from tests.cases import study
+
+DEPTH = 0.2e-3
+YOUNG = 10e3
+QUARTER = ("x", "y")
+# F / (E d · 1 mm) of the cylinder R = H = 50 mm under a disc of 3 mm: axisymmetric, Taylor–Hood of degree 4, graded to
+# 1e-5 of the radius at the rim.
+CYLINDER = {"shape": "cylinder", "radius": "50 mm", "height": "50 mm"}
+EXACT = {
+    ("bonded", 0.45): 7.943726, ("bonded", 0.49): 8.325817, ("bonded", 0.4999): 8.437103, ("bonded", 0.5): 8.438265,
+    ("frictionless", 0.45): 7.922109, ("frictionless", 0.49): 8.325029, ("frictionless", 0.4999): 8.437071,
+    ("frictionless", 0.5): 8.438229,
+}  # fmt: skip
+
+
+def lame(poisson: float, young: float = YOUNG) -> tuple[float, float]:
+    mu = young / (2 * (1 + poisson))
+    return (2 * mu * poisson / (1 - 2 * poisson) if poisson < 0.5 else inf), mu
+
+
+def make_mesh(comm: MPI.Comm = MPI.COMM_SELF, mirrors: tuple[str, ...] = QUARTER, **changes: Any) -> BodyMesh:
+    body, _ = mesh_case(study(**changes).case(()), mirrors, comm)
+    return body
+
+
+def contact(bonded: bool = True, depth: float = DEPTH) -> Contact:
+    return Contact((0.0, 0.0, -depth), bonded)
+
+
+def solve(body: BodyMesh, poisson: float, degree: int = 2, *, bonded: bool = True, **options: Any) -> Solution:
+    with MixedBody(body, degree, contact(bonded)) as mixed:
+        return mixed.solve(lame(poisson), **options)
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+def test_patch(degree):
+    """A linear displacement with its constant pressure is in equilibrium, on curved, quarter-point elements."""
+    body = make_mesh()
+    space = MixedSpace(body, degree, contact())
+    gradient = np.array([[0.3, -0.2, 0.1], [0.4, 0.1, -0.5], [0.2, 0.6, -0.1]])
+    u = space.displacements.forms.displacement
+    u.interpolate(lambda x: gradient @ x)
+    c = 0.01
+    with space.pair() as (force, dilation), space.pair() as (pull, compression), space.pair() as unknown:
+        unknown[0].array[:] = u.x.array
+        unknown[1].set(np.trace(gradient) / c / space.unit)
+        space.set_fields(unknown)
+        space.apply(force, pull, dilation, (1.0, 1.0))
+        space.mass.mult(unknown[1], compression)
+        assert np.abs(dilation.array - c * compression.array).max() < 1e-12 * np.abs(dilation.array).max()
+        surface = mesh.exterior_facet_indices(body.mesh.topology)
+        outer = fem.locate_dofs_topological(space.displacements.space, 2, surface)
+        forces = (force.array + pull.array).reshape(-1, 3)
+        inner = np.setdiff1d(np.arange(len(forces)), outer)
+        assert len(inner)
+        assert np.abs(forces[inner]).max() < 1e-10 * np.abs(forces).max()
+    space.close()
+
+
+@pytest.mark.parametrize(("name", "poisson"), EXACT)
+def test_cylinder_is_within_the_bar(name, poisson):
+    """The truth is within the bar, and the bar is of use."""
+    body = make_mesh(body=CYLINDER, mesh={"fine": "15 mm", "coarse": "15 mm", "rim": "0.5 mm", "growth": 0.5})
+    solution = solve(body, poisson, bonded=name == "bonded", estimate=True)
+    error = solution.reaction[2] / (YOUNG * DEPTH * 1e-3) / EXACT[name, poisson] - 1
+    assert abs(error) <= solution.bar <= 0.04
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+def test_agrees_with_displacement_elements(degree):
+    body = make_mesh(mesh={"rim": "0.5 mm"})
+    mixed = solve(body, 0.4, degree, estimate=True)
+    with ElasticBody(body, degree, contact()) as elastic:
+        other = elastic.solve(lame(0.4), estimate=True)
+    bars = mixed.bar * mixed.reaction[2] + error_bar(other.decrement, degree) * other.reaction[2]
+    assert mixed.reaction[2] == pytest.approx(other.reaction[2], abs=bars)
+    assert mixed.reaction[2] != pytest.approx(other.reaction[2], rel=1e-6)
+    assert mixed.max_strain == pytest.approx(other.max_strain, rel=0.1)
+
+
+@pytest.mark.parametrize("bonded", [True, False])
+@pytest.mark.parametrize(("degree", "poisson"), [(2, 0.4), (2, 0.5), (3, 0.4999), (3, 0.5)])
+def test_direct_and_iterative_agree(degree, poisson, bonded):
+    body = make_mesh()
+    direct, iterative = (
+        solve(body, poisson, degree, bonded=bonded, method=method) for method in ("direct", "iterative")
+    )
+    assert iterative.reaction == pytest.approx(direct.reaction, rel=1e-9, abs=1e-9 * direct.reaction[2])
+    assert iterative.energy == pytest.approx(direct.energy, rel=1e-9)
+    assert direct.energy == pytest.approx(direct.reaction[2] * DEPTH / 2, rel=1e-9)
+    assert direct.iterations == 1 < iterative.iterations
+
+
+def test_degree_four():
+    """On a mesh of its own size: the next degree is within the bar of the last."""
+    body = make_mesh(mesh={"rim": "2 mm", "fine": "8 mm"})
+    cubic = solve(body, 0.5, 3, estimate=True)
+    direct, iterative = (solve(body, 0.5, 4, method=method).reaction[2] for method in ("direct", "iterative"))
+    assert iterative == pytest.approx(direct, rel=1e-9)
+    assert direct == pytest.approx(cubic.reaction[2], rel=cubic.bar)
+
+
+def test_force_is_quadratic_in_the_tolerance():
+    body = make_mesh()
+    exact, loose = (solve(body, 0.499, method="iterative", tolerance=t) for t in (1e-10, 1e-7))
+    assert loose.iterations < exact.iterations
+    assert loose.reaction[2] == pytest.approx(exact.reaction[2], rel=1e-11)
+
+
+def test_incompressible_is_the_limit():
+    """F is linear in 1 - 2ν towards ½, on one mesh and with one assembly."""
+    with MixedBody(make_mesh(), 2, contact()) as body:
+        near, nearer, limit = (body.solve(lame(0.5 - x)).reaction[2] for x in (2e-5, 1e-5, 0.0))
+    assert limit == pytest.approx(2 * nearer - near, rel=1e-8)
+    assert limit == pytest.approx(near, rel=1e-4)
+
+
+@pytest.mark.parametrize("bonded", [True, False])
+def test_iterations_are_bounded(bonded):
+    """In ν, and when the mesh is refined."""
+    counts, dofs = [], []
+    for rim, fine in (("1 mm", "5 mm"), ("0.25 mm", "3 mm")):
+        body = make_mesh(mesh={"rim": rim, "fine": fine, "growth": 0.5})
+        with MixedBody(body, 2, contact(bonded)) as mixed:
+            counts.append([mixed.solve(lame(nu), method="iterative").iterations for nu in (0.4, 0.45, 0.4999, 0.5)])
+            dofs.append(mixed.dofs)
+    assert dofs[1] > 3 * dofs[0]
+    assert max(map(max, counts)) <= 30
+    assert max(counts[1]) <= 1.3 * max(counts[0])
+
+
+@pytest.mark.parametrize("method", ["direct", "iterative"])
+def test_units_do_not_matter(method):
+    """Neither those of E nor those of length: every relative number stays."""
+    arrays = mesh_arrays(study().case(()), QUARTER)
+    numbers = []
+    for young, size in ((1e-3, 1.0), (YOUNG, 1.0), (1e12, 1.0), (YOUNG, 0.025), (YOUNG, 250.0)):
+        body = distribute(MPI.COMM_SELF, replace(arrays, points=size * arrays.points))
+        with MixedBody(body, 2, contact(depth=DEPTH * size)) as mixed:
+            s = mixed.solve(lame(0.4999, young), method=method, estimate=True)
+        unit = young * (DEPTH * size) * size
+        numbers.append((s.reaction[2] / unit, s.energy / unit / (DEPTH * size), s.max_strain, s.decrement, s.bar))
+    for other in numbers[1:]:
+        assert other[:3] == pytest.approx(numbers[0][:3], rel=1e-8)
+        assert other[3:] == pytest.approx(numbers[0][3:], rel=1e-3)
+
+
+def test_quarter_is_the_whole():
+    quarter, whole = (solve(make_mesh(mirrors=mirrors), 0.5, method="direct") for mirrors in (QUARTER, ()))
+    assert quarter.reaction[2] == pytest.approx(whole.reaction[2], rel=1e-9)
+    assert quarter.energy == pytest.approx(whole.energy, rel=1e-9)
+    assert np.hypot(*whole.reaction[:2]) < 1e-6 * whole.reaction[2]
+
+
+def test_small_ratios_are_refused():
+    with pytest.raises(SolveError, match=r"above 0\.25"):
+        solve(make_mesh(), 0.25)
+
+
+def test_no_options_are_left_behind():
+    before = PETSc.Options().getAll()
+    solve(make_mesh(), 0.5, method="iterative", estimate=True)
+    assert PETSc.Options().getAll() == before
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("method", ["direct", "iterative"])
+def test_ranks_agree(method):
+    alone, together = (
+        solve(make_mesh(comm), 0.5, bonded=False, method=method, estimate=True)
+        for comm in (MPI.COMM_SELF, MPI.COMM_WORLD)
+    )
+    assert together.reaction[2] == pytest.approx(alone.reaction[2], rel=1e-8)
+    assert together.energy == pytest.approx(alone.energy, rel=1e-8)
+    assert together.max_strain == pytest.approx(alone.max_strain, rel=1e-6)
+    assert together.bar == pytest.approx(alone.bar, rel=0.05)
