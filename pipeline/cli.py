@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from pipeline import __version__
+from pipeline import __version__, checks
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.study.load import load
 from pipeline.study.problems import StudyError
@@ -165,6 +165,10 @@ def version() -> None:
     for name, value in {"version_epsmesh": __version__, **provenance(ranks=1)}.items():
         if name.startswith("version_"):
             print(f"{name.removeprefix('version_'):10} {value}")
+
+
+app.command()(checks.verify)
+app.command()(checks.benchmark)
 
 
 # ---- words ------------------------------------------------------------------------------------------

@@ -4,6 +4,7 @@ Everything is decided by what a library offers, never by its version number.
 """
 
 import inspect
+import logging
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -51,22 +52,18 @@ def _vector_element(cell: str, degree: int, dim: int) -> Any:
     return basix.ufl.element("Lagrange", cell, degree, shape=(dim,))
 
 
-def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray, order: int) -> Any:
-    """Create a distributed tetrahedral mesh of geometric ``order``; collective, arrays empty except on rank 0."""
-    domain = ufl.Mesh(_vector_element("tetrahedron", order, 3))
-    names = inspect.signature(dolfinx.mesh.create_mesh).parameters
-    keyword = "domain" if "domain" in names else "e"
-    return dolfinx.mesh.create_mesh(comm, cells=cells, x=points, **{keyword: domain})
-
-
-def create_plane_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray) -> Any:
-    """Create a distributed mesh of straight triangles in the plane; collective, arrays empty except on rank 0."""
-    element = _vector_element("triangle", 1, 2)
+def _coordinate_element(cell: str, order: int, dim: int) -> Any:
     if hasattr(ufl, "VectorElement"):
         # ffcx 0.5 writes this variant into the element when it first compiles a form on the mesh, which changes the
         # name under which every later form on it is looked up in the cache.
-        element = ufl.VectorElement("Lagrange", "triangle", 1, dim=2, variant="equispaced")
-    domain = ufl.Mesh(element)
+        return ufl.VectorElement("Lagrange", cell, order, dim=dim, variant="equispaced")
+    return _vector_element(cell, order, dim)
+
+
+def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray, order: int) -> Any:
+    """Create a distributed mesh of tetrahedra, or in the plane of triangles; collective, arrays only on rank 0."""
+    dim = comm.bcast(points.shape[1] if comm.rank == 0 else 0)
+    domain = ufl.Mesh(_coordinate_element("tetrahedron" if dim == 3 else "triangle", order, dim))
     names = inspect.signature(dolfinx.mesh.create_mesh).parameters
     keyword = "domain" if "domain" in names else "e"
     return dolfinx.mesh.create_mesh(comm, cells=cells, x=points, **{keyword: domain})
@@ -129,7 +126,13 @@ def form(expression: Any, cache: str) -> Any:
     """Compile ``expression``, with the generated code in the folder ``cache``; collective."""
     jit = {"cache_dir": cache, "cffi_extra_compile_args": ["-O2", "-march=native"], "timeout": 120}
     options = {"jit": jit, "ffcx": {}}
-    return fem.form(expression, **{name: options[key] for name, key in _JIT.items()})
+    # The compiler's own words go to the root logger: not for those who wait for a force.
+    before = logging.root.manager.disable
+    logging.disable(logging.INFO)
+    try:
+        return fem.form(expression, **{name: options[key] for name, key in _JIT.items()})
+    finally:
+        logging.disable(before)
 
 
 def assemble_matrix(form: Any, bcs: list[Any], diagonal: float, mat_type: str) -> PETSc.Mat:

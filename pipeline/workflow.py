@@ -99,7 +99,13 @@ def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Term
         for key, case in cases
         if key in opened.records and opened.records[key].status == "failed"
     )
-    return Outcome(counts, failures, files, interrupted)
+    return Outcome(counts, failures + _without_exact(plan, opened.records), files, interrupted)
+
+
+def _without_exact(plan: Plan, records: dict[str, Record]) -> tuple[tuple[str, str], ...]:
+    """Return the scenes whose F_exact could not be found, and why: their cases are none the worse for it."""
+    failed = {key: records[key].message for key in plan.reference_keys if key in records and not records[key].is_ok}
+    return tuple((f"F_exact ({key[:6]})", message) for key, message in failed.items())
 
 
 def end_ranks(comm: MPI.Comm, status: int) -> None:

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import gmsh
 import numpy as np
@@ -19,6 +19,10 @@ FloatArray = npt.NDArray[np.float64]
 # gmsh's HXT is 3 to 6 times faster, but numbers its points by memory address: no two runs give the same mesh,
 # on one thread either (gmsh 4.8.4). The sequential Delaunay algorithm repeats to the last bit.
 _DELAUNAY = 1
+
+
+# Where gmsh fails, a round side gets the resolution of one with the body's extent divided by this.
+_RETRIES = (4, 8)
 
 
 class MeshError(Exception):
@@ -43,10 +47,21 @@ class MeshArrays:
 def generate(scene: Scene, sizes: Sizes) -> MeshArrays:
     """Mesh ``scene``: the same input gives the same arrays, bit for bit, on the same version of gmsh.
 
+    gmsh now and then fails on elements that are large for the body; it is then asked for smaller ones, far away.
+
     Raises:
         MeshError: with gmsh's own words, if the geometry or the mesh fails.
     """
     start = time.perf_counter()
+    for divisor in _RETRIES:
+        try:
+            return _generate(scene, sizes, start)
+        except MeshError:
+            sizes = replace(sizes, column=min(sizes.column, scene.extent / divisor))
+    return _generate(scene, sizes, start)
+
+
+def _generate(scene: Scene, sizes: Sizes, start: float) -> MeshArrays:
     with _model():
         try:
             rim_curves = build(scene)

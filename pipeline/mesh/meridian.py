@@ -117,7 +117,7 @@ def generate_meridian(meridian: Meridian, grading: Grading) -> MeridianArrays:
 
 def meridian_mesh(arrays: MeridianArrays) -> tuple[Any, dict[str, npt.NDArray[np.int32]]]:
     """Return the dolfinx mesh of ``arrays`` on this process alone, and the facets of each group."""
-    mesh = compat.create_plane_mesh(MPI.COMM_SELF, arrays.cells, arrays.points)
+    mesh = compat.create_mesh(MPI.COMM_SELF, arrays.cells, arrays.points, order=1)
     topology = mesh.topology
     for dims in ((1, 2), (1, 0), (2, 0)):
         topology.create_connectivity(*dims)

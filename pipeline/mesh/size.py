@@ -20,7 +20,7 @@ class Sizes:
     """Element sizes (m): ``fine`` within ``epsilon`` of the contact, ``rim`` at the probe's edge, else ``coarse``.
 
     ``growth`` is the increase of size per unit of distance, both from the rim and beyond ``epsilon``;
-    a ``column`` cut out of the body is resolved all along, however far it reaches beyond ``epsilon``.
+    a round side, with ``column`` its radius, is resolved all along, however far it reaches beyond ``epsilon``.
     """
 
     epsilon: float

@@ -6,6 +6,7 @@ from dataclasses import replace
 from math import inf
 from typing import Any
 
+from pipeline.plan.symmetry import mirror_planes, model_planes
 from pipeline.study.sweep import Case
 from pipeline.study.units import canonical
 
@@ -55,7 +56,11 @@ def normalised(case: Case) -> Case:
     material = case.material.model_copy(update={"young": 1.0})
     travel: dict[str, float] = {"depth": 1.0}
     if getattr(case.probe, "slice", 0.0):
-        travel["slice"] = canonical(case.probe.slice / case.probe.depth)  # type: ignore[union-attr]
+        # Where the blade moves across a plane of symmetry, that part of the movement takes no force along the axis.
+        if mirror_planes(case.probe) != model_planes(case.probe):
+            travel["slice"] = 0.0
+        else:
+            travel["slice"] = canonical(case.probe.slice / case.probe.depth)  # type: ignore[union-attr]
     return replace(case, material=material, probe=case.probe.model_copy(update=travel))
 
 

@@ -29,6 +29,11 @@ class Solve:
     later: tuple[Mesh, ...] = ()
     is_reference: bool = False
 
+    @property
+    def label(self) -> str:
+        """What people call it."""
+        return f"F_exact of {self.case}" if self.is_reference else str(self.case)
+
     def again(self) -> "Solve":
         """Return the next attempt at the goal."""
         return replace(self, case=replace(self.case, mesh=self.later[0]), later=self.later[1:])

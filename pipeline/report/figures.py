@@ -18,10 +18,10 @@ CLAIM_EPSILON, CLAIM_RATIO, CLAIM_SPEEDUP = 10e-3, 0.8, 50.0
 
 _WIDTH, _PANEL_HEIGHT = 7.1, 1.75  # inches: the width of a page's text
 # From dark to light, told apart by the colour-blind and in grey; markers tell them apart as well.
-_COLOURS = ("#00204d", "#1f5fa8", "#2a9d8f", "#c98a00", "#b0413e", "#7b5ea7", "#777777")
-_MARKERS = "osD^vPX"
+COLOURS = ("#00204d", "#1f5fa8", "#2a9d8f", "#c98a00", "#b0413e", "#7b5ea7", "#777777")
+MARKERS = "osD^vPX"
 _CLAIM = "#d81b60"
-_STYLE = {"font.size": 8, "axes.titlesize": 8, "legend.fontsize": 7.5, "svg.fonttype": "none", "axes.grid": True,
+STYLE = {"font.size": 8, "axes.titlesize": 8, "legend.fontsize": 7.5, "svg.fonttype": "none", "axes.grid": True,
           "grid.linewidth": 0.4, "grid.color": "#dddddd", "lines.linewidth": 1.2, "lines.markersize": 3.5}  # fmt: skip
 # Display units: factor and unit of coordinates that people do not read in SI.
 _DISPLAY = {"m": (1e3, "mm"), "Pa": (1e-3, "kPa")}
@@ -32,12 +32,13 @@ def draw(dataset: xr.Dataset, stem: Path, formats: Sequence[str] = ("png", "svg"
     """Draw the figure of ``dataset`` into ``<stem>.png`` and ``<stem>.svg``; return the files written."""
     import matplotlib as mpl  # noqa: PLC0415
 
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = _figure(dataset)
-        return [_save(figure, stem.with_name(f"{stem.name}.{kind}")) for kind in formats]
+        return [save(figure, stem.with_name(f"{stem.name}.{kind}")) for kind in formats]
 
 
-def _save(figure: Figure, path: Path) -> Path:
+def save(figure: Figure, path: Path) -> Path:
+    """Write ``figure`` to ``path``, in place of an earlier one only once it is whole."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
@@ -94,7 +95,7 @@ def _draw_panel(ax: Axes, panel: xr.Dataset, variable: str, curves: str | None) 
     x = _positions(panel["epsilon"].values)
     for number, (choice, label) in enumerate(_panels(panel, [curves] if curves else [])):
         y = panel[variable].sel(choice).values
-        style = {"color": _COLOURS[number % len(_COLOURS)], "marker": _MARKERS[number % len(_MARKERS)]}
+        style = {"color": COLOURS[number % len(COLOURS)], "marker": MARKERS[number % len(MARKERS)]}
         ax.plot(x, y, label=label, **style)
 
 
@@ -188,7 +189,7 @@ def _forces(dataset: xr.Dataset) -> Figure:
     others = [d for d in force.dims if d != numeric]
     for number, (choice, label) in enumerate(_panels(dataset, others)):
         line = force.sel(choice)
-        style = {"color": _COLOURS[number % len(_COLOURS)], "marker": _MARKERS[number % len(_MARKERS)]}
+        style = {"color": COLOURS[number % len(COLOURS)], "marker": MARKERS[number % len(MARKERS)]}
         if numeric:
             finite = np.where(np.isfinite(line[numeric]), line[numeric], np.nan)
             ax.plot(finite * _scale(dataset[numeric])[0], line.values, label=label, **style)

@@ -88,7 +88,7 @@ class _Runner:
         first = step.solves[0]
         if first.axisymmetric:
             for solve in step.solves:
-                self._progress.note(str(solve.case))
+                self._progress.note(solve.label)
                 self._record_one(solve, partial(self._solve_meridian, solve, memory))
             return
         if self.timed and not first.is_reference:
@@ -108,7 +108,7 @@ class _Runner:
             return
         with bodies[0] as body:
             for solve in step.solves:
-                self._progress.note(str(solve.case))
+                self._progress.note(solve.label)
                 compute = partial(self._solve, solve, body, mesh, mesh_seconds, memory)
                 self._record_one(solve, compute)
 
@@ -221,7 +221,7 @@ class _Runner:
             self.failed += len(solve.serves)
         if self.comm.rank == 0:
             self._keep(record)
-        self._progress.done(str(solve.case), record.message)
+        self._progress.done(solve.label, record.message)
 
 
 def _body(mesh: BodyMesh, case: Case, *, shared: bool) -> Body:

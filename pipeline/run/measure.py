@@ -83,10 +83,14 @@ def _relative_bar(case: Case, solution: Solution, force: float) -> float:
 
 
 def _extrapolated(record: Record, case: Case, solution: Solution) -> Record:
-    """Return ``record`` with the force that the sequence of degrees tends to, and the smaller bar of that."""
-    if getattr(case.probe, "slice", 0.0):  # the work of a slice does not tell which of the forces to correct
-        return record
+    """Return ``record`` with the force that the sequence of degrees tends to, and the smaller bar of that.
+
+    It is work that is extrapolated. Of a probe that slices, too, half of the correction is doubtful: the forces need
+    not share it evenly.
+    """
     factor, bar = extrapolate(solution.decrement, solution.bar, case.mesh.degree, case.element)
+    if getattr(case.probe, "slice", 0.0):
+        bar = (bar + abs(1 - factor) / 2) * 2 * solution.energy / (record.force * case.probe.depth)
     x, y, z = record.force_vector
     return replace(
         record, force=factor * record.force, force_error=bar, force_vector=(x, y, factor * z),

@@ -38,7 +38,9 @@ def mesh_arrays(case: Case, mirrors: tuple[str, ...]) -> MeshArrays:
     mesh, probe = case.mesh, case.probe
     epsilon = inf if case.is_full else mesh.epsilon
     column = inf if mesh.outside == "coarse" else epsilon
-    sizes = Sizes(epsilon, mesh.fine, mesh.coarse, mesh.rim_size(probe.half_width), mesh.growth, column)
+    # A round side is resolved all along, the body's as well as the column's.
+    side = min(column, case.body.radius) if isinstance(case.body, Cylinder) else column
+    sizes = Sizes(epsilon, mesh.fine, mesh.coarse, mesh.rim_size(probe.half_width), mesh.growth, side)
     straight = mesh.degree == 1
     planes = mirror_planes(probe)
     scene = Scene(case.body, probe, column, mesh.outside == "fixed", sizes.rim_segments(probe), straight, planes)

@@ -35,6 +35,11 @@ class Record:
     provenance: dict[str, str | int] = field(default_factory=dict)
 
     @property
+    def is_ok(self) -> bool:
+        """Whether there is a force to rely on."""
+        return self.status == "ok"
+
+    @property
     def time_total(self) -> float:
         """Seconds that this case costs alone."""
         return self.time_mesh + self.time_assemble + self.time_setup + self.time_solve

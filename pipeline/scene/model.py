@@ -41,10 +41,16 @@ class Scene:
     mirrors: tuple[str, ...] = ()
 
     @property
+    def extent(self) -> float:
+        """Largest extent (m) of the body."""
+        if isinstance(self.body, Box):
+            return max(self.body.size)
+        return 2 * max(self.body.radius, self.body.height)
+
+    @property
     def scale(self) -> float:
         """Metres in one unit of the model."""
-        extent = max(self.body.size) if isinstance(self.body, Box) else 2 * max(self.body.radius, self.body.height)
-        return extent / _BODY_SIZE
+        return self.extent / _BODY_SIZE
 
     @property
     def is_cut(self) -> bool:

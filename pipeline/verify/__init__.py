@@ -1,1 +1,23 @@
 """Is F right: against closed forms, published tables, manufactured solutions, and the program's other paths."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from pipeline.verify.row import Row
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+
+def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
+    """Yield every comparison as it is made, the same on every rank; ``quick`` leaves a few of each kind; collective."""
+    from pipeline.solve.forms import compiling  # noqa: PLC0415 (the folder's face loads no solver)
+    from pipeline.verify.elements import element_rows  # noqa: PLC0415
+    from pipeline.verify.scenes import scene_rows  # noqa: PLC0415
+
+    found: list[Row] = []
+    if comm.rank == 0:
+        with compiling():
+            found = list(element_rows(quick=quick))
+    yield from comm.bcast(found)
+    yield from scene_rows(comm, quick=quick)

@@ -1,0 +1,203 @@
+"""Work against precision: the error of F over run time and unknowns, for every kind of element and mesh.
+
+The scene is one of which F is known to 1e-7, a disc of 3 mm on a cylinder of R = H = 50 mm, bonded. Runs are warm
+(forms compiled, libraries loaded), alone, on one core; times are medians. ``epsmesh benchmark`` runs it.
+"""
+
+import itertools
+import platform
+import statistics
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+import xarray as xr
+from mpi4py import MPI
+from threadpoolctl import threadpool_limits
+
+from benchmarks.work_precision_figure import draw
+from pipeline import compat
+from pipeline.mesh.meridian import Meridian
+from pipeline.plan.plan import make_plan
+from pipeline.report.dataset import write
+from pipeline.run.execute import compute
+from pipeline.run.record import Record
+from pipeline.solve.axisymmetric import solve_axisymmetric
+from pipeline.study.load import parse
+
+NAME = "work_precision"
+POISSON = (0.3, 0.49)
+YOUNG, DEPTH = 10e3, 1e-4
+# F / (E d) in m, converged to 1e-7 (docs/accuracy.md).
+EXACT = {0.3: 7.126315e-3, 0.49: 8.325817e-3}
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way to a force, and the sequence of meshes on which it is tried, coarse to fine."""
+
+    name: str
+    degree: int
+    element: str
+    meshes: tuple[dict[str, Any], ...]
+    without: tuple[str, ...] = ()
+
+
+def _uniform(*sizes: float) -> tuple[dict[str, Any], ...]:
+    return tuple(
+        {"epsilon": "full", "fine": f"{h} mm", "coarse": f"{h} mm", "rim": f"{h} mm", "growth": 1.0} for h in sizes
+    )
+
+
+def _graded(*rims: float) -> tuple[dict[str, Any], ...]:
+    """Meshes that grow by 0.4 from ``rims``, in units of the probe's radius."""
+    return tuple(
+        {"epsilon": "full", "fine": "25 mm", "coarse": "25 mm", "rim": f"{3 * rim:g} mm", "growth": 0.4} for rim in rims
+    )
+
+
+METHODS = (
+    Method("P1 uniform", 1, "displacement", _uniform(8, 5, 3, 2)),
+    Method("P2 uniform", 2, "displacement", _uniform(12, 8, 5, 3.5)),
+    Method("P3 uniform", 3, "displacement", _uniform(16, 12, 8, 5)),
+    Method("P1 graded", 1, "displacement", _graded(0.4, 0.2, 0.1, 0.05)),
+    Method("P2 graded", 2, "displacement", _graded(0.4, 0.2, 0.1, 0.05)),
+    Method("P2 graded, no symmetry", 2, "displacement", _graded(0.4, 0.2, 0.1, 0.05), ("symmetry",)),
+    Method("P3 graded", 3, "displacement", _graded(0.4, 0.2, 0.1, 0.05)),
+    Method("P2/P1 mixed graded", 2, "mixed", _graded(0.4, 0.2, 0.1, 0.05)),
+    Method("P3/P2 mixed graded", 3, "mixed", _graded(0.4, 0.2, 0.1, 0.05)),
+)
+# The driver of accuracies, in three dimensions, and what it is asked for.
+ASKED = ("2 %", "1 %", "0.3 %", "0.1 %")
+AXISYMMETRIC = (2, 3, 4, 5)  # degrees
+
+
+@dataclass(frozen=True)
+class Point:
+    """One run of one method: what it cost, and how far F is from the truth."""
+
+    method: str
+    poisson: float
+    level: int
+    error: float
+    bar: float
+    seconds: float
+    estimate_seconds: float
+    dofs: int
+    iterations: int
+
+
+def measure(repeats: int, *, quick: bool = False) -> Iterator[Point]:
+    """Yield every point, coarse to fine; ``quick`` takes the two coarsest meshes of each method."""
+    most = 2 if quick else None
+    with threadpool_limits(limits=1, user_api="blas"):
+        for nu, method in itertools.product(POISSON, METHODS):
+            if method.degree == 1 and nu > 0.45:  # locks: the program refuses it
+                continue
+            for level, mesh in enumerate(method.meshes[:most]):
+                settings = {**mesh, "degree": method.degree, "element": method.element}
+                yield _point(method.name, nu, level, settings, method.without, repeats)
+        for nu in POISSON:
+            for level, accuracy in enumerate(ASKED[:most]):
+                yield _point("accuracy asked for, 3D", nu, level, {"accuracy": accuracy}, ("axisymmetric",), repeats)
+            yield from _meridians(nu, repeats)
+
+
+def _point(
+    name: str, nu: float, level: int, mesh: dict[str, Any], without: tuple[str, ...], repeats: int
+) -> Point:  # fmt: skip
+    study = parse({
+        "body": {"shape": "cylinder", "radius": "50 mm", "height": "50 mm"},
+        "material": {"young": "10 kPa", "poisson": nu},
+        "probe": {"shape": "disc", "radius": "3 mm", "depth": "0.1 mm"},
+        "mesh": mesh,
+        "solve": {"exact": False},
+    })  # fmt: skip
+    plan = make_plan(study, without=without)
+    runs: list[Record] = []
+    for _ in range(repeats + 1):  # the first one warms up
+        (record,) = compute(plan, MPI.COMM_SELF).values()
+        if record.status != "ok":
+            raise RuntimeError(f"{name}, ν = {nu:g}: {record.message}")
+        runs.append(record)
+    median = {n: statistics.median(getattr(r, n) for r in runs[1:]) for n in ("time_total", "time_error")}
+    error = record.force / (EXACT[nu] * YOUNG * DEPTH) - 1
+    return Point(
+        name, nu, level, error, record.force_error, median["time_total"], median["time_error"], record.dofs,
+        record.iterations,
+    )  # fmt: skip
+
+
+def _meridians(nu: float, repeats: int) -> Iterator[Point]:
+    """The axisymmetric solver by degree, on the first of its meshes."""
+    for level, degree in enumerate(AXISYMMETRIC):
+        runs = [
+            solve_axisymmetric(
+                Meridian(50e-3, 50e-3, 3e-3), nu, True, young=YOUNG, depth=DEPTH, degree=degree, accuracy=1.0
+            )
+            for _ in range(repeats + 1)
+        ]
+        seconds = statistics.median(r.time_mesh + r.time_assemble + r.time_setup + r.time_solve for r in runs[1:])
+        last = runs[-1]
+        error = last.force / (EXACT[nu] * YOUNG * DEPTH) - 1
+        yield Point("axisymmetric, by degree", nu, level, error, last.force_error, seconds, 0.0, last.dofs, 1)
+
+
+def dataset(points: list[Point], repeats: int) -> xr.Dataset:
+    """Arrange points by method, Poisson's ratio and level."""
+    methods = list(dict.fromkeys(p.method for p in points))
+    levels = range(max(p.level for p in points) + 1)
+    shape = (len(methods), len(POISSON), len(levels))
+    units = {"error": "1", "bar": "1", "seconds": "s", "estimate_seconds": "s", "dofs": "1", "iterations": "1"}
+    names = {
+        "error": "relative error of F", "bar": "relative error bar on F", "seconds": "run time, median, warm",
+        "estimate_seconds": "run time of the error bar, not in seconds", "dofs": "unknowns of the whole body",
+        "iterations": "iterations of the linear solver",
+    }  # fmt: skip
+    variables = {}
+    for name, unit in units.items():
+        values = np.full(shape, np.nan)
+        for p in points:
+            values[methods.index(p.method), POISSON.index(p.poisson), p.level] = getattr(p, name)
+        attributes = {"units": unit, "long_name": names[name]}
+        variables[name] = (("method", "poisson", "level"), values, attributes)
+    coordinates = {"method": methods, "poisson": list(POISSON), "level": list(levels)}
+    return xr.Dataset(variables, coordinates, _machine() | {"repeats": repeats})
+
+
+def _machine() -> dict[str, Any]:
+    """What the times belong to."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        processor = next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        processor = platform.processor()
+    return {
+        "title": "Work against precision",
+        "processor": processor,
+        "cores": psutil.cpu_count() or 0,
+        "memory_bytes": psutil.virtual_memory().total,
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        **{f"version_{name}": text for name, text in compat.versions().items()},
+    }
+
+
+def main(output: Path, repeats: int, *, quick: bool = False) -> list[Path]:
+    """Measure, print a table, and write dataset and figure into ``output``; return the files."""
+    print(f"{'method':26} {'ν':>5} {'dofs':>8} {'seconds':>8} {'bar':>6} {'error':>10} {'bar':>9} {'its':>4}")
+    points = []
+    for p in measure(repeats, quick=quick):
+        points.append(p)
+        print(
+            f"{p.method:26} {p.poisson:5g} {p.dofs:8d} {p.seconds:8.3f} {p.estimate_seconds:6.2f} "
+            f"{100 * p.error:9.4f}% {100 * p.bar:8.4f}% {p.iterations:4d}",
+            flush=True,
+        )
+    found = dataset(points, repeats)
+    path = output / f"{NAME}.nc"
+    write(found, path)
+    return [path, *draw(found, path.with_suffix(""))]

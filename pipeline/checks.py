@@ -1,0 +1,108 @@
+"""The commands that put the program itself to the test: verify, stress and benchmark."""
+
+import json
+from collections.abc import Iterable
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from pipeline.verify.coverage import Trial
+    from pipeline.verify.row import Row
+
+Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
+Quick = Annotated[bool, typer.Option("--quick", help="A few rows of each kind.")]
+
+
+def verify(
+    coverage: Annotated[bool, typer.Option("--coverage", help="Random scenes: do the error bars hold?")] = False,
+    count: Annotated[int, typer.Option(help="Number of random scenes.", min=1)] = 160,
+    seed: Annotated[int, typer.Option(help="Seed of the random scenes.")] = 2026,
+    quick: Quick = False,
+    as_json: Json = False,
+) -> None:
+    """Compare forces with closed forms, published tables and manufactured solutions.
+
+    Exit status 1 if any row is out.
+
+    Example: epsmesh verify
+
+    Example: epsmesh verify --coverage
+    """
+    from mpi4py import MPI
+
+    comm = MPI.COMM_WORLD
+    speaks = comm.rank == 0
+    if coverage:
+        from pipeline.verify.coverage import Coverage, trials
+
+        found = Coverage(tuple(_told(trials(comm, count, seed), _trial, speaks and not as_json)))
+        right = found.is_met
+        summary = {
+            "cases": len(found.trials), "held": found.held, "median_bar_over_error": found.ratio, "met": right,
+        }  # fmt: skip
+        if speaks and as_json:
+            print(json.dumps({**summary, "trials": [asdict(trial) for trial in found.trials]}, indent=2))
+        elif speaks:
+            print(
+                f"{found.held:.1%} of {len(found.trials)} error bars hold the truth (95 % asked for); median of "
+                f"bar / |error| {found.ratio:.2f} (at most 3 asked for): {'met' if right else 'NOT MET'}"
+            )
+    else:
+        from pipeline.verify import rows
+
+        if speaks and not as_json:
+            print(_ROW.format("", "scene", "path", "reference", "value", "error", "bar", "source"))
+        table = list(_told(rows(comm, quick=quick), _row, speaks and not as_json))
+        right = all(row.is_right for row in table)
+        if speaks and as_json:
+            print(json.dumps([{**asdict(r), "error": r.error, "right": r.is_right} for r in table], indent=2))
+        elif speaks:
+            out = sum(not row.is_right for row in table)
+            print(f"{len(table)} rows, {out} out" if out else f"{len(table)} rows, all right")
+    raise typer.Exit(0 if right else 1)
+
+
+def benchmark(
+    output: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("results"),
+    repeats: Annotated[int, typer.Option(help="Runs of each point; the median counts.", min=1)] = 3,
+    quick: Quick = False,
+) -> None:
+    """Measure the error of F against run time and unknowns, for every kind of element and mesh.
+
+    Writes work_precision.nc and its figure. Wants an idle machine, and takes ten minutes.
+
+    Example: epsmesh benchmark
+    """
+    from benchmarks.work_precision import main
+
+    for path in main(output, repeats, quick=quick):
+        print(path)
+
+
+_ROW = "{:4} {:58} {:24} {:>12} {:>12} {:>9} {:>9}  {}"
+
+
+def _row(row: "Row") -> str:
+    bar = row.bar + row.reference_bar
+    error, bar_text = (f"{100 * row.error:+.4f} %", f"{100 * bar:.4f} %") if row.reference else (f"{row.error:.0e}", "")
+    verdict = "ok" if row.is_right else "OUT"
+    source = f"{row.source}; {row.message}" if row.message else row.source
+    return _ROW.format(
+        verdict, row.scene, row.path, f"{row.reference:.6g}", f"{row.value:.6g}", error, bar_text, source
+    )  # fmt: skip
+
+
+def _trial(trial: "Trial") -> str:
+    verdict = "ok" if trial.is_held else "OUT"
+    return f"{verdict:4} error {100 * trial.error:8.4f} %  bar {100 * trial.bar:8.4f} %  {trial.name} {trial.message}"
+
+
+def _told(items: Iterable[Any], words: Any, speaks: bool) -> Iterable[Any]:
+    """Yield ``items``, each with its line printed as soon as it exists."""
+    for item in items:
+        if speaks:
+            print(words(item), flush=True)
+        yield item

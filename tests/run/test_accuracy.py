@@ -1,0 +1,117 @@
+"""Accuracy asked for, and F_exact: reached, proved by the truth, and shared wherever F is proportional."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from pipeline.plan.plan import make_plan
+from pipeline.report.dataset import build
+from pipeline.run.execute import compute
+from pipeline.study.load import parse
+from tests.cases import BLADE, raw
+
+CYLINDER = {"shape": "cylinder", "radius": "50 mm", "height": "50 mm"}
+# F / (E d) in mm, converged to 1e-7.
+EXACT = {
+    ("bonded", 0.3): 7.126315, ("bonded", 0.45): 7.943726, ("bonded", 0.49): 8.325817,
+    ("frictionless", 0.3): 6.921313, ("frictionless", 0.49): 8.325029,
+}  # fmt: skip
+
+
+def run(without=(), exact=False, **changes):
+    """Run a study whose mesh section is replaced; return plan and records."""
+    mesh = changes.pop("mesh")
+    study = parse({**raw(**changes), "mesh": mesh, "solve": {"exact": exact}})
+    plan = make_plan(study, without=without)
+    return plan, compute(plan, MPI.COMM_SELF)
+
+
+@pytest.mark.parametrize("accuracy", [0.01, 0.003, 0.001])
+@pytest.mark.parametrize(("contact", "poisson"), EXACT)
+def test_true_error_is_below_the_accuracy_asked_for(contact, poisson, accuracy):
+    _, records = run(
+        without=("axisymmetric",), body=CYLINDER, material={"poisson": poisson}, probe={"contact": contact},
+        mesh={"accuracy": f"{100 * accuracy} %"},
+    )  # fmt: skip
+    (record,) = records.values()
+    assert record.status == "ok"
+    assert record.origin == "symmetric"
+    error = abs(record.force / (EXACT[contact, poisson] * 10e3 * 0.2e-3 * 1e-3) - 1)
+    assert error <= accuracy
+    assert error <= 1.1 * record.force_error <= accuracy * 1.1
+
+
+def test_round_scenes_are_solved_in_two_dimensions():
+    """Two dimensions and three agree within their error bars, on whole and truncated bodies."""
+    mesh = {"accuracy": "0.3 %"}
+    for extra in ({}, {"epsilon": "10 mm", "outside": "free"}, {"epsilon": "10 mm", "outside": "fixed"}):
+        flat, solid = (
+            next(iter(run(without, body=CYLINDER, mesh=mesh | extra)[1].values()))
+            for without in ((), ("axisymmetric",))
+        )
+        assert (flat.origin, solid.origin) == ("axisymmetric", "symmetric")
+        assert flat.force == pytest.approx(solid.force, rel=flat.force_error + solid.force_error)
+        assert flat.force_error < 1e-5
+
+
+def test_accuracy_that_is_missed_is_a_failed_case():
+    """What the study file gives is kept: on one coarse mesh there is nothing to try but that."""
+    _, records = run(
+        mesh={"accuracy": "0.1 %", "rim": "1.5 mm", "growth": 1.0, "degree": 2, "fine": "5 mm", "coarse": "10 mm"}
+    )
+    (record,) = records.values()
+    assert record.status == "failed"
+    assert "accuracy 0.001 missed" in record.message
+    assert record.force_error > 0.001
+
+
+def test_a_mesh_that_misses_is_followed_by_a_better_one(monkeypatch):
+    """Recipes that promise too much are found out by the error bar, and the next one is tried."""
+    monkeypatch.setattr("pipeline.plan.recipe._MARGIN", 1e3)
+    _, records = run(mesh={"accuracy": "0.1 %"})
+    (record,) = records.values()
+    assert record.status == "ok"
+    assert record.force_error <= 1e-3
+    assert record.time_error == 0.0
+
+
+def test_exact_force_is_solved_once_for_all_moduli_depths_and_meshes():
+    sweep = {"epsilon": ["6 mm", "full"], "fine": "5 mm", "coarse": "8 mm", "rim": "1 mm"}
+    plan, records = run(
+        exact=True, material={"young": ["1 kPa", "10 kPa"]}, probe={"depth": ["0.1 mm", "0.2 mm"]}, mesh=sweep
+    )
+    assert sum(solve.is_reference for solve in plan.solves) == 1
+    dataset = build(plan, records)
+    exact = dataset["force_exact"]
+    assert exact.dims == ("young", "depth", "epsilon")
+    assert np.allclose(exact / (exact["young"] * exact["depth"]), exact.values[0, 0, 0] / (1e3 * 1e-4), rtol=1e-12)
+    assert float(dataset["force_exact_error"].max()) < 1e-3
+    # Every case's bar holds F_exact, and F is from above.
+    error = 1 - exact / dataset["force"]
+    assert bool(((error > 0) & (error < dataset["force_error"])).all())
+    assert np.allclose(dataset["accuracy"], dataset["force"] / exact)
+
+
+def test_exact_force_is_that_of_the_whole_body():
+    mesh = {"epsilon": "6 mm", "outside": ["coarse", "free"], "fine": "5 mm", "coarse": "8 mm", "rim": "1 mm"}
+    plan, records = run(exact=True, mesh=mesh)
+    dataset = build(plan, records)
+    assert len(np.unique(dataset["force_exact"])) == 1
+    assert float(dataset["accuracy"].sel(outside="free")) < 0.9
+
+
+def test_bars_of_a_slicing_blade_hold_its_exact_force():
+    mesh = {"epsilon": "full", "fine": "5 mm", "coarse": "8 mm", "rim": "0.8 mm"}
+    plan, records = run(exact=True, probe=BLADE | {"slice": ["0 mm", "0.1 mm"]}, mesh=mesh)
+    dataset = build(plan, records)
+    error = np.abs(1 - dataset["force_exact"] / dataset["force"])
+    assert bool((error < dataset["force_error"]).all())
+
+
+def test_slice_across_a_plane_of_symmetry_takes_no_force_along_the_axis():
+    def references(**blade):
+        study = parse(raw(probe=BLADE | {"slice": ["0 mm", "0.1 mm"]} | blade, solve={"exact": True}))
+        return len(set(make_plan(study).reference_keys))
+
+    assert references() == 1
+    assert references(at=["2 mm", "3 mm"]) == 2

@@ -1,0 +1,67 @@
+"""Verification itself: the quick rows are right, and a wrong number is called out."""
+
+from dataclasses import replace
+
+import pytest
+from mpi4py import MPI
+from typer.testing import CliRunner
+
+from pipeline import cli, verify
+from pipeline.verify.boundary import rectangle_stiffness
+from pipeline.verify.coverage import Coverage, Trial, trials
+from pipeline.verify.row import Row
+
+
+@pytest.fixture(scope="module")
+def rows():
+    return list(verify.rows(MPI.COMM_SELF, quick=True))
+
+
+def test_quick_rows_are_right(rows):
+    assert not [row for row in rows if not row.is_right]
+    assert {"2D", "3D"} <= {row.path for row in rows}
+    assert len({row.scene for row in rows}) >= 10
+
+
+def test_a_force_two_bars_off_is_out(rows):
+    for row in rows:
+        if row.reference:
+            wrong = row.reference * (1 + 2 * (row.bar + row.reference_bar))
+            assert not replace(row, value=wrong).is_right
+            assert not replace(row, value=float("nan")).is_right
+
+
+@pytest.mark.parametrize(("ratio", "published"), [(1, 1.1523), (2, 1.671), (4, 2.543), (8, 4.036)])
+def test_boundary_elements_agree_with_published_rectangles(ratio, published):
+    value, error = rectangle_stiffness(ratio)
+    assert value == pytest.approx(published, rel=error + 5e-4)
+
+
+def test_error_bars_of_random_scenes_hold():
+    found = Coverage(tuple(trials(MPI.COMM_SELF, count=4, seed=3)))
+    assert len(found.trials) == 6
+    assert all(trial.truth_bar < 0.3 * trial.bar for trial in found.trials)
+    assert found.is_met
+
+
+def test_same_seed_same_scenes():
+    first, again, other = (next(trials(MPI.COMM_SELF, 1, seed)).name for seed in (7, 7, 8))
+    assert first == again != other
+
+
+def test_coverage_asks_for_bars_that_hold_and_are_not_idle():
+    def coverage(bar):
+        return Coverage(tuple(Trial("", 1.0, bar, 0.99, 0.0) for _ in range(20)))
+
+    assert coverage(0.02).is_met
+    assert not coverage(0.005).is_met
+    assert not coverage(0.2).is_met
+
+
+def test_command_fails_if_a_row_is_out(monkeypatch):
+    right = Row("scene", "3D", 1.0, "source", 1.001, 0.01)
+    for table, status in (([right], 0), ([right, replace(right, value=1.1)], 1)):
+        monkeypatch.setattr(verify, "rows", lambda *_, table=table, **__: iter(table))
+        result = CliRunner().invoke(cli.app, ["verify"])
+        assert result.exit_code == status
+        assert ("1 out" in result.output) == bool(status)
