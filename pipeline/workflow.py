@@ -3,7 +3,7 @@
 import signal
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -46,10 +46,13 @@ class Outcome:
     interrupted: bool
 
 
-def prepare(study: Study, comm: MPI.Comm, store_path: Path, *, fresh: bool = False) -> tuple[Plan, Opened]:
+def prepare(
+    study: Study, comm: MPI.Comm, store_path: Path, *, fresh: bool = False, without: Collection[str] = ()
+) -> tuple[Plan, Opened]:
     """Open the case store and plan, on every rank alike, what is not on record; collective.
 
-    ``fresh`` computes again what is stored; a timing study always does, but for F_exact.
+    ``fresh`` computes again what is stored; a timing study always does, but for F_exact. ``without`` names reductions
+    that are not to be used.
 
     Raises:
         StoreError: on every rank, if the store cannot be used.
@@ -59,7 +62,7 @@ def prepare(study: Study, comm: MPI.Comm, store_path: Path, *, fresh: bool = Fal
         try:
             opened.store = Store(store_path)
             if not fresh:
-                declared = make_plan(study)
+                declared = make_plan(study, without=without)
                 keys = () if study.solve.timing else declared.keys
                 found = opened.store.get({*keys, *declared.reference_keys})
                 opened.records = {key: record for key, record in found.items() if record.status == "ok"}
@@ -68,7 +71,7 @@ def prepare(study: Study, comm: MPI.Comm, store_path: Path, *, fresh: bool = Fal
     message, stored = comm.bcast((message, sorted(opened.records)))
     if message:
         raise StoreError(message)
-    return make_plan(study, stored), opened
+    return make_plan(study, stored, without), opened
 
 
 def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Terminal | None = None) -> Outcome:

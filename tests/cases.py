@@ -17,6 +17,7 @@ BASE: dict[str, Any] = {
     "probe": {"action": "pierce", "shape": "disc", "radius": "3 mm", "depth": "0.2 mm"},
     "mesh": {"epsilon": "full", "fine": "5 mm", "coarse": "8 mm", "rim": "1 mm", "growth": 0.8, "degree": 2},
     "solve": {"exact": False},
+    "plan": {"without": ["axisymmetric"]},
 }
 
 BLADE: dict[str, Any] = {"action": "cut", "shape": "blade", "length": "10 mm", "width": "3 mm", "depth": "0.1 mm"}

@@ -3,104 +3,120 @@
 import hashlib
 import json
 from dataclasses import replace
+from functools import lru_cache
 from math import inf
 from typing import Any
 
 from pipeline.plan.symmetry import mirror_planes, model_planes
+from pipeline.study.schema import AnyProbe, Mesh, Section
 from pipeline.study.sweep import Case
 from pipeline.study.units import canonical
 
 # Raise by hand when the same input gives another force: records made before are then not used any more.
-PHYSICS_VERSION = 2
+PHYSICS_VERSION = 3
+
+_MANY = 200_000  # sections of a large study
 
 
-def physics(case: Case) -> dict[str, Any]:
-    """Return everything that a case's force depends on, defaults resolved, in SI units."""
-    return {
-        "version": PHYSICS_VERSION,
-        "body": _dump(case.body),
-        "material": _dump(case.material),
-        "probe": _dump(case.probe),
-        "mesh": _mesh(case),
-        "solve": {"method": case.solve.method, "tolerance": case.solve.tolerance},
-    }
+def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
+    """Key of the case's record: all that its force depends on, defaults resolved, in SI units.
 
-
-def _mesh(case: Case) -> dict[str, Any]:
-    mesh = case.mesh
-    if mesh.accuracy is not None:
-        given = {key: getattr(mesh, key) for key in mesh.model_fields_set if key != "name"}
-        return {**given, "accuracy": mesh.accuracy, "model": mesh.model}
-    epsilon: dict[str, Any] = {"epsilon": "full"}
-    if not case.is_full:
-        epsilon = {"epsilon": mesh.epsilon, "coarse": mesh.coarse, "outside": mesh.outside}
-    return {
-        **epsilon,
-        "fine": mesh.fine,
-        "rim": mesh.rim_size(case.probe.half_width),
-        "growth": mesh.growth,
-        "degree": mesh.degree,
-        "element": case.element,
-    }
+    ``folded`` takes every ε past the body for the full order; ``scaled`` leaves out Young's modulus and depth, to which
+    the force is proportional. Timed cases are records of their own, each: they are never shared.
+    """
+    parts = [
+        str(PHYSICS_VERSION),
+        text_of(case.body),
+        text_of(case.material, ("young",) if scaled else ()),
+        text_of(case.probe, ("depth", "slice") if scaled else ()),
+        str(slice_ratio(case.probe)) if scaled else "",
+        _mesh_text(case.mesh, folded and case.is_full, case.probe.half_width, case.element),
+        text_of(case.solve, ("timing", "repeats", "exact")),
+    ]
+    if case.solve.timing:
+        parts += [str(case.labels), str(case.solve.repeats)]
+    return digest("\n".join(parts))
 
 
 def reference_key(case: Case, accuracy: float) -> str:
     """Key of F_exact of the case's scene, for E = 1 and depth = 1: of what F / (E d) depends on, no mesh."""
-    unit = normalised(case)
-    scene = {"body": _dump(unit.body), "material": _dump(unit.material), "probe": _dump(unit.probe)}
-    return digest({"version": PHYSICS_VERSION, "exact": accuracy, **scene})
-
-
-def normalised(case: Case) -> Case:
-    """Return the case with a Young's modulus of 1 Pa and a depth of 1 m: its force is F / (E d)."""
-    material = case.material.model_copy(update={"young": 1.0})
-    travel: dict[str, float] = {"depth": 1.0}
-    if getattr(case.probe, "slice", 0.0):
-        # Where the blade moves across a plane of symmetry, that part of the movement takes no force along the axis.
-        if mirror_planes(case.probe) != model_planes(case.probe):
-            travel["slice"] = 0.0
-        else:
-            travel["slice"] = canonical(case.probe.slice / case.probe.depth)  # type: ignore[union-attr]
-    return replace(case, material=material, probe=case.probe.model_copy(update=travel))
-
-
-def case_key(case: Case) -> str:
-    """Key of the case's record. Timed cases are records of their own, each: they are never shared."""
-    content = physics(case)
-    if case.solve.timing:
-        content["timed"] = [list(pair) for pair in case.labels]
-        content["repeats"] = case.solve.repeats
-    return digest(content)
+    probe = case.probe
+    ratio = 0.0 if _slides_along_a_mirror(probe) else slice_ratio(probe)
+    parts = [
+        f"{PHYSICS_VERSION} exact {accuracy!r}", text_of(case.body), text_of(case.material, ("young",)),
+        text_of(probe, ("depth", "slice")), str(ratio),
+    ]  # fmt: skip
+    return digest("\n".join(parts))
 
 
 def mesh_key(case: Case) -> str:
     """Key of the case's mesh: body, footprint, sizes, and whether elements are straight or curved."""
-    content = physics(case)
-    shape = {k: v for k, v in content["probe"].items() if k not in ("action", "depth", "contact", "slice")}
-    sizes = {k: v for k, v in content["mesh"].items() if k not in ("degree", "element")}
-    return digest({"body": content["body"], "probe": shape, "mesh": sizes, "curved": case.mesh.degree > 1})
+    sizes = _mesh_text(case.mesh, case.is_full, case.probe.half_width, "")
+    footprint = text_of(case.probe, ("action", "depth", "contact", "slice"))
+    return digest("\n".join([text_of(case.body), footprint, sizes, str(case.mesh.degree > 1)]))
 
 
 def operator_key(case: Case) -> str:
     """Key of the case's spaces and conditions on its mesh: all but the material."""
-    content = physics(case)
-    element = {"degree": case.mesh.degree, "element": case.element}
-    return digest({"mesh": mesh_key(case), "probe": content["probe"], **element})
+    return digest("\n".join([mesh_key(case), text_of(case.probe), str(case.mesh.degree), case.element]))
 
 
-def digest(content: Any) -> str:
-    """Return a short hash of JSON-like ``content``."""
-    return hashlib.sha256(json.dumps(content, sort_keys=True, default=_plain).encode()).hexdigest()[:24]
+def normalised(case: Case) -> Case:
+    """Return the case with a Young's modulus of 1 Pa and a depth of 1 m: its force is F / (E d)."""
+    travel = {"depth": 1.0}
+    if getattr(case.probe, "slice", 0.0):
+        travel["slice"] = 0.0 if _slides_along_a_mirror(case.probe) else slice_ratio(case.probe)
+    material = case.material.model_copy(update={"young": 1.0})
+    return replace(case, material=material, probe=case.probe.model_copy(update=travel))
 
 
-def _dump(section: Any) -> dict[str, Any]:
-    return {key: _plain(value) for key, value in section.model_dump().items()}
+def slice_ratio(probe: AnyProbe) -> float:
+    """Return how far the probe slices for each unit of depth."""
+    return canonical(getattr(probe, "slice", 0.0) / probe.depth)
+
+
+def digest(text: str) -> str:
+    """Return a short hash of ``text``."""
+    return hashlib.sha256(text.encode()).hexdigest()[:24]
+
+
+@lru_cache(_MANY)
+def text_of(section: Section, without: tuple[str, ...] = ()) -> str:
+    """Write a section in canonical form, ``without`` some of its keys."""
+    return _text({key: value for key, value in section.model_dump().items() if key not in without})
+
+
+@lru_cache(_MANY)
+def _mesh_text(mesh: Mesh, is_full: bool, half_width: float, element: str) -> str:
+    """Write a mesh section in canonical form; without an ``element``, what the mesh itself depends on."""
+    content: dict[str, Any]
+    if mesh.accuracy is not None:
+        given = {key: getattr(mesh, key) for key in mesh.model_fields_set if key != "name"}
+        content = {**given, "accuracy": mesh.accuracy, "model": mesh.model}
+    else:
+        content = {"epsilon": "full"}
+        if not is_full:
+            content = {"epsilon": mesh.epsilon, "coarse": mesh.coarse, "outside": mesh.outside}
+        content |= {"fine": mesh.fine, "rim": mesh.rim_size(half_width), "growth": mesh.growth}
+        if element:
+            content |= {"degree": mesh.degree, "element": element}
+    return _text(content)
+
+
+def _slides_along_a_mirror(probe: AnyProbe) -> bool:
+    """Where a blade moves across a plane of symmetry, that movement takes no force along the axis."""
+    return mirror_planes(probe) != model_planes(probe)
+
+
+def _text(content: dict[str, Any]) -> str:
+    return json.dumps({key: _plain(value) for key, value in content.items()}, sort_keys=True)
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, tuple):
+    if isinstance(value, tuple | list):
         return [_plain(v) for v in value]
+    if isinstance(value, dict):
+        return {key: _plain(v) for key, v in value.items()}
     # Whole numbers and their floats are one value; there is no negative zero.
-    return (
-        float(value) + 0.0 if isinstance(value, int | float) and not isinstance(value, bool) and value != inf else value
-    )
+    is_number = isinstance(value, int | float) and not isinstance(value, bool) and value != inf
+    return float(value) + 0.0 if is_number else value

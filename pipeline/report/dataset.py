@@ -13,7 +13,7 @@ from pipeline import __version__
 from pipeline.plan.key import digest
 from pipeline.plan.plan import Plan
 from pipeline.run.record import Record
-from pipeline.study.sweep import Axis, Study
+from pipeline.study.sweep import Axis, Case, Study
 
 # name: (units, long_name) of the variables taken as they are from the records
 _FLOATS = {
@@ -30,7 +30,7 @@ _FLOATS = {
     "time_total": ("s", "time that this case costs alone"),
     "memory": ("bytes", "peak memory of all ranks"),
 }
-# Of the records of F_exact, which are for a Young's modulus of 1 Pa and a depth of 1 m.
+# Taken from the records of F_exact.
 _EXACT = {
     "force_exact": ("N", "force converged well below every error in the study, whole body (F_exact)"),
     "force_exact_error": ("1", "relative error bar (95 %) on force_exact"),
@@ -63,13 +63,13 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     """Arrange ``records`` (by key) as the dataset of the plan's study; ``run`` adds attributes of the run."""
     study = plan.study
     dims = tuple(axis.name for axis in study.axes)
-    flat = [records.get(key) for key in plan.keys]
+    flat = [_scaled(records.get(key), case) for key, case in zip(plan.keys, study.cases(), strict=True)]
 
     def array(values: Any, dtype: Any) -> np.ndarray:
         return np.array(values, dtype=dtype).reshape(study.shape)
 
-    exact = [records.get(key) for key in plan.reference_keys] or [None] * len(flat)
-    scales = [case.material.young * case.probe.depth for case in study.cases()]
+    keys = plan.reference_keys or [""] * len(flat)
+    exact = [_scaled(records.get(key), case) for key, case in zip(keys, study.cases(), strict=True)]
     variables: dict[str, Any] = {}
     for name, (units, text) in _FLOATS.items():
         values = [getattr(r, name) if r else nan for r in flat]
@@ -80,8 +80,7 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
         variables[name] = (dims, array(values, np.int64), attributes)
     for name, (units, text) in _EXACT.items():
         values = [getattr(r, name.replace("_exact", "")) if r else nan for r in exact]
-        scale = np.array(scales) if name == "force_exact" else 1.0
-        variables[name] = (dims, array(np.array(values) * scale, float), {"units": units, "long_name": text})
+        variables[name] = (dims, array(values, float), {"units": units, "long_name": text})
     vectors = np.array([r.force_vector if r else (nan,) * 3 for r in flat]).reshape(*study.shape, 3)
     variables["force_vector"] = (
         (*dims, "component"), vectors, {"units": "N", "long_name": "force of the tissue on the probe"},
@@ -128,6 +127,11 @@ def _add_ratios(dataset: xr.Dataset) -> xr.Dataset:
         .assign_attrs(units="1", long_name="time of the full-order case over time of this case")
     )
     return dataset
+
+
+def _scaled(record: Record | None, case: Case) -> Record | None:
+    """Return the record for the Young's modulus and the depth of ``case``."""
+    return record.scaled(case.material.young, case.probe.depth) if record else None
 
 
 def _origin(plan: Plan, key: str, record: Record | None) -> str:

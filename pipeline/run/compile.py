@@ -7,7 +7,7 @@ from mpi4py import MPI
 
 from pipeline import compat
 from pipeline.mesh.distribute import distribute
-from pipeline.plan.plan import Solve
+from pipeline.plan.steps import Solve
 from pipeline.solve.axisymmetric import compile_axisymmetric
 from pipeline.solve.forms import compile_elastic, compiling, one_cell
 from pipeline.solve.mixed_forms import mixed_forms

@@ -14,7 +14,8 @@ from threadpoolctl import threadpool_limits
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.mesh.generate import MeshError
 from pipeline.plan import estimate
-from pipeline.plan.plan import MeshStep, OperatorStep, Plan, Solve, mesh_steps
+from pipeline.plan.plan import Plan
+from pipeline.plan.steps import MeshStep, OperatorStep, Solve, mesh_steps
 from pipeline.plan.symmetry import model_planes
 from pipeline.run.compile import prepare
 from pipeline.run.measure import TIMES, add_times, record_of, record_of_meridian
@@ -47,13 +48,13 @@ def execute(plan: Plan, comm: MPI.Comm, keep: Keep, progress: Progress) -> int:
     Returns the number of cases that failed, the same on every rank: each has a record with its message, and the
     rest went on.
     """
-    runner = _Runner(comm, keep, progress, timed=plan.study.solve.timing)
+    runner = _Runner(comm, keep, progress, timed=plan.study.solve.timing, reuse=plan.reuse)
     todo = plan.solves
     # A rank is one thread: OpenBLAS's own would wait for work by spinning, and take the other ranks' cores.
     with threadpool_limits(limits=1, user_api="blas"):
         while todo:
             prepare(comm, todo)
-            for step in mesh_steps(todo, shared=not runner.timed):
+            for step in mesh_steps(todo, shared=plan.shared):
                 runner.run(step)
                 gc.collect()  # dolfinx's meshes hold communicators, and Python's cycles hold the meshes
             todo = runner.take_retries()
@@ -70,8 +71,8 @@ def compute(plan: Plan, comm: MPI.Comm) -> dict[str, Record]:
 class _Runner:
     """Carries out mesh steps, one after the other, on all ranks."""
 
-    def __init__(self, comm: MPI.Comm, keep: Keep, progress: Progress, *, timed: bool):
-        self.comm, self.timed, self.failed = comm, timed, 0
+    def __init__(self, comm: MPI.Comm, keep: Keep, progress: Progress, *, timed: bool, reuse: bool):
+        self.comm, self.timed, self.failed, self._reuse = comm, timed, 0, reuse
         self._keep, self._progress = keep, progress
         self._provenance = provenance(comm.size)
         self._retries: list[Solve] = []
@@ -104,7 +105,9 @@ class _Runner:
     def _run_operator(self, step: OperatorStep, mesh: BodyMesh, mesh_seconds: float, memory: PeakMemory) -> None:
         bodies: list[Body] = []
         shared = len(step.solves) > 1
-        if not self._guard(step.solves, lambda: bodies.append(_body(mesh, step.case, shared=shared))):
+        if not self._guard(
+            step.solves, lambda: bodies.append(_body(mesh, step.case, shared=shared, reuse=self._reuse))
+        ):
             return
         with bodies[0] as body:
             for solve in step.solves:
@@ -224,8 +227,8 @@ class _Runner:
         self._progress.done(solve.label, record.message)
 
 
-def _body(mesh: BodyMesh, case: Case, *, shared: bool) -> Body:
+def _body(mesh: BodyMesh, case: Case, *, shared: bool, reuse: bool = False) -> Body:
     contact = Contact(case.probe.travel, case.probe.contact == "bonded")
     if case.element == "mixed":
         return MixedBody(mesh, case.mesh.degree, contact)
-    return ElasticBody(mesh, case.mesh.degree, contact, shared=shared)
+    return ElasticBody(mesh, case.mesh.degree, contact, shared=shared, reuse=reuse)

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from pipeline.plan.plan import Solve
+from pipeline.plan.steps import Solve
 from pipeline.run.record import Record
 from pipeline.solve.axisymmetric import AxisymmetricSolution
 from pipeline.solve.elasticity import Solution
@@ -24,6 +24,8 @@ def record_of(solve: Solve, solution: Solution, cells: int, mesh_seconds: float)
         key=solve.key,
         status="ok",
         origin="symmetric" if solve.mirrors else "solved",
+        young=case.material.young,
+        depth=case.probe.depth,
         force=force,
         force_error=_relative_bar(case, solution, force),
         force_vector=solution.reaction,
@@ -48,6 +50,8 @@ def record_of_meridian(solve: Solve, solution: AxisymmetricSolution) -> Record:
         key=solve.key,
         status="ok",
         origin="axisymmetric",
+        young=solve.case.material.young,
+        depth=solve.case.probe.depth,
         force=solution.force,
         force_error=solution.force_error,
         force_vector=(0.0, 0.0, solution.force),

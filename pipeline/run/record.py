@@ -1,7 +1,7 @@
 """What is kept of a case: its force, its checks, what it cost, and where it was computed."""
 
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from math import nan
 
 
@@ -9,14 +9,17 @@ from math import nan
 class Record:
     """The result of one case; SI units, times in seconds, memory in bytes summed over ranks.
 
-    ``force_vector`` is the force of the tissue on the probe; ``force`` its part against the probe's advance, and
-    ``force_error`` the relative 95 % error bar on that, which ``time_error`` seconds were spent on.
+    ``young`` (Pa) and ``depth`` (m) are those it was computed for. ``force_vector`` is the force of the tissue on the
+    probe; ``force`` its part against the probe's advance, and ``force_error`` the relative 95 % error bar on that, on
+    which ``time_error`` seconds were spent.
     """
 
     key: str
     status: str  # ok | failed
     message: str = ""
     origin: str = "solved"  # solved | symmetric
+    young: float = nan
+    depth: float = nan
     force: float = nan
     force_error: float = nan
     force_vector: tuple[float, float, float] = (nan, nan, nan)
@@ -43,6 +46,17 @@ class Record:
     def time_total(self) -> float:
         """Seconds that this case costs alone."""
         return self.time_mesh + self.time_assemble + self.time_setup + self.time_solve
+
+    def scaled(self, young: float, depth: float) -> "Record":
+        """Return the record for another Young's modulus and depth, to which force and stress are proportional."""
+        if (young, depth) == (self.young, self.depth) or not self.is_ok:
+            return self
+        stiffer, deeper = young / self.young, depth / self.depth
+        x, y, z = (stiffer * deeper * component for component in self.force_vector)
+        return replace(
+            self, origin="scaled", young=young, depth=depth, force=stiffer * deeper * self.force,
+            force_vector=(x, y, z), energy=stiffer * deeper**2 * self.energy, max_strain=deeper * self.max_strain,
+        )  # fmt: skip
 
     def to_json(self) -> str:
         """Write as JSON text."""

@@ -2,7 +2,9 @@
 
 import sqlite3
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from math import isfinite
 from pathlib import Path
 
 from pipeline.run.record import Record
@@ -78,6 +80,49 @@ class Store:
         except (sqlite3.Error, ValueError, TypeError, KeyError) as error:
             raise StoreError(f"the case store {self.path} cannot be read: {error}") from error
         return found
+
+    def records(self) -> Iterator[Record]:
+        """Yield every record that can be read."""
+        for _, text in self._rows():
+            with suppress(ValueError, TypeError, KeyError):
+                yield Record.from_json(text)
+
+    def problems(self) -> Iterator[str]:
+        """Yield what is wrong with the file or with its records."""
+        (state,) = self._database.execute("PRAGMA integrity_check").fetchone()
+        if state != "ok":
+            yield f"the file: {state}"
+        for key, text in self._rows():
+            try:
+                record = Record.from_json(text)
+            except (ValueError, TypeError, KeyError) as error:
+                yield f"record {key}: cannot be read: {error}"
+                continue
+            if record.key != key:
+                yield f"record {key}: is that of {record.key}"
+            elif record.is_ok and not (isfinite(record.force) and record.force > 0):
+                yield f"record {key}: is ok, and its force {record.force}"
+
+    def prune(self, *, older_than: float | None = None, failed: bool = False) -> int:
+        """Remove records stored more than ``older_than`` seconds ago, failed ones, and those that cannot be read.
+
+        Returns their number.
+        """
+        gone = []
+        for key, text, stored in self._database.execute("SELECT key, record, stored FROM records").fetchall():
+            try:
+                is_ok = Record.from_json(text).is_ok
+            except (ValueError, TypeError, KeyError):
+                gone.append(key)
+                continue
+            if (failed and not is_ok) or (older_than is not None and time.time() - stored > older_than):
+                gone.append(key)
+        self._database.executemany("DELETE FROM records WHERE key = ?", [(key,) for key in gone])
+        self._database.execute("VACUUM")
+        return len(gone)
+
+    def _rows(self) -> list[tuple[str, str]]:
+        return self._database.execute("SELECT key, record FROM records ORDER BY key").fetchall()
 
     def close(self) -> None:
         """Close the file."""

@@ -19,20 +19,23 @@ from pipeline.solve.enrich import energy_decrement
 from pipeline.solve.error import error_bar
 from pipeline.solve.forms import mean_strain_form
 from pipeline.solve.linear import Level, LinearSolver, SolveError, is_direct
-from pipeline.solve.solution import BALANCE_LIMIT, Solution, global_sum, largest_strain
+from pipeline.solve.solution import BALANCE_LIMIT, FloatArray, Solution, global_sum, largest_strain
 from pipeline.solve.space import ConstrainedSpace, Contact
 
 
 class ElasticBody:
     """A mesh, a degree and a contact: solves for any λ and μ, sharing the assembly. A context manager."""
 
-    def __init__(self, body: BodyMesh, degree: int, contact: Contact, *, shared: bool = False):
+    def __init__(self, body: BodyMesh, degree: int, contact: Contact, *, shared: bool = False, reuse: bool = False):
         """Prepare; ``shared`` assembles A_λ and A_μ apart, once, for many pairs of λ and μ. Collective.
+
+        ``reuse`` begins each solve from the solution of the one before.
 
         Raises:
             SolveError: if footprint and support share a point: no displacement satisfies both.
         """
-        self._shared = shared
+        self._shared, self._reuse = shared, reuse
+        self._last: FloatArray | None = None
         self._body = body
         self._contact = contact
         self._levels: list[ConstrainedSpace] = []
@@ -65,6 +68,8 @@ class ElasticBody:
             start = time.perf_counter()
             rhs, unknown = (stack.enter_context(fine.vector()) for _ in range(2))
             fine.lift(rhs, lame)
+            if self._last is not None:
+                unknown.array[:] = self._last
             assemble = time.perf_counter() - start
             levels: list[Level] = []
             for space in [fine] if direct else [*self._coarser(), fine]:
@@ -75,6 +80,8 @@ class ElasticBody:
             stack.callback(solver.close)
             start = time.perf_counter()
             iterations = solver.solve(rhs, unknown)
+            if self._reuse:
+                self._last = unknown.array.copy()
             unknown.array[:] += fine.held[: fine.owned]
             reaction, energy, balance = self._reaction(unknown, lame)
             seconds = time.perf_counter() - start

@@ -73,12 +73,13 @@ class LinearSolver:
         self.setup_seconds = time.perf_counter() - start
 
     def solve(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> int:
-        """Solve from zero into ``solution`` and return the iterations; collective.
+        """Improve ``solution`` and return the iterations; collective. A direct solve does not look at what it holds.
 
         Raises:
             SolveError: if PETSc reports anything but convergence.
         """
         try:
+            self.ksp.setInitialGuessNonzero(self.ksp.getType() != "preonly")
             self.ksp.solve(rhs, solution)
         except PETSc.Error as error:
             raise SolveError(explain(error)) from error

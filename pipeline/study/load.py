@@ -9,7 +9,7 @@ from pydantic import BaseModel, ValidationError
 
 from pipeline.study.check import check_sense
 from pipeline.study.problems import Problem, Problems, StudyError, nearest
-from pipeline.study.schema import LATER, LATER_KEYS, LATER_SECTIONS, SECTIONS, Below, Mesh, Section
+from pipeline.study.schema import LATER, LATER_KEYS, LATER_SECTIONS, SECTIONS, SINGLE, Below, Mesh, Section
 from pipeline.study.sweep import Axis, Study
 
 # A label needs its section's axes only; more combinations than this in one section is a slip of the pen.
@@ -75,15 +75,15 @@ def _check_top(raw: dict[str, Any], problems: Problems) -> None:
 
 def _read_section(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], tuple[Section, ...]]:
     """Return the axes of a section and every combination of their values."""
-    if isinstance(raw, list) and name != "solve":
+    if isinstance(raw, list) and name not in SINGLE:
         return _read_array(name, raw, problems)
     if not isinstance(raw, dict):
         problems.error(name, raw, f"must be a table: write [{name}]")
         return [], ()
     model = _model(name, raw, problems)
-    if model is None or (not raw and name != "solve"):
+    if model is None or (not raw and name not in SINGLE):
         return [], ()
-    swept = {key: value for key, value in raw.items() if name != "solve" and _is_sweep(model, key, value)}
+    swept = {key: value for key, value in raw.items() if name not in SINGLE and _is_sweep(model, key, value)}
     for key, values in swept.items():
         if not values:
             problems.error(f"{name}.{key}", values, "an empty list sweeps nothing; give at least one value")

@@ -248,6 +248,19 @@ class Solve(Section):
     repeats: Annotated[int, Field(ge=1, le=1000)] = 3
 
 
+REDUCTIONS = ("full", "duplicates", "scaling", "axisymmetric", "symmetry", "sharing", "reuse", "stored", "all")
+
+
+class Planning(Section):
+    """What the planner may leave out: reductions not to be used, and where a sweep over ε may end.
+
+    ``stop_when`` is how near to F_exact F must be, at two values of ε in a row, for larger ones not to be run.
+    """
+
+    without: tuple[Literal[REDUCTIONS], ...] = ()  # type: ignore[valid-type]
+    stop_when: Annotated[Share | None, Field(gt=0, le=0.5)] = None
+
+
 BODIES: dict[str, type[Section]] = {"box": Box, "cylinder": Cylinder}
 PROBES: dict[str, type[Section]] = {"disc": Disc, "blade": Blade}
 LATER = {"body": ("ellipsoid", "cad", "surface"), "probe": ("sphere", "cone", "wedge")}
@@ -257,13 +270,16 @@ SECTIONS: dict[str, type[Section] | dict[str, type[Section]]] = {
     "probe": PROBES,
     "mesh": Mesh,
     "solve": Solve,
+    "plan": Planning,
 }
+# Sections that say how, not what: their lists are no sweeps.
+SINGLE = ("solve", "plan")
 # Keys of the format that this version does not compute: named as such, not as typing errors.
 LATER_KEYS = {
     "body": ("layers", "inclusion"),
     "probe": ("incision", "angle"),
 }
-LATER_SECTIONS = ("load", "plan")
+LATER_SECTIONS = ("load",)
 
 AnyBody = Box | Cylinder
 AnyProbe = Disc | Blade

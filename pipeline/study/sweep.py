@@ -7,10 +7,12 @@ from functools import cached_property
 from math import inf
 from typing import Any
 
-from pipeline.study.schema import AnyBody, AnyProbe, Material, Mesh, Section, Solve
+from pipeline.study.schema import AnyBody, AnyProbe, Material, Mesh, Planning, Section, Solve
 
 # Keys that both body and probe have: their dimension says whose it is.
 _AMBIGUOUS = ("radius", "shape")
+
+_PARTS = ("body", "material", "probe", "mesh", "solve")
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,13 @@ class Study:
         assert isinstance(solve, Solve)
         return solve
 
+    @cached_property
+    def planning(self) -> Planning:
+        """The planning section, which is not swept."""
+        (planning,) = self.sections["plan"]
+        assert isinstance(planning, Planning)
+        return planning
+
     def cases(self) -> Iterator[Case]:
         """Yield every case, the last axis fastest."""
         for index in itertools.product(*(range(n) for n in self.shape)):
@@ -107,7 +116,8 @@ class Study:
             for axis, i in zip(self.axes, index, strict=True):
                 if axis.section == name:
                     flat = flat * len(axis) + i
-            chosen[name] = variants[flat]
+            if name in _PARTS:
+                chosen[name] = variants[flat]
         labels = tuple((axis.name, axis.labels[i]) for axis, i in zip(self.axes, index, strict=True))
         return Case(index=index, labels=labels, **chosen)
 

@@ -3,16 +3,16 @@
 import json
 from collections.abc import Iterable
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output
 
 if TYPE_CHECKING:
     from pipeline.verify.coverage import Trial
     from pipeline.verify.row import Row
 
-Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
 Quick = Annotated[bool, typer.Option("--quick", help="A few rows of each kind.")]
 
 
@@ -66,7 +66,7 @@ def verify(
 
 
 def benchmark(
-    output: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("results"),
+    output: Output = DEFAULT_OUTPUT,
     repeats: Annotated[int, typer.Option(help="Runs of each point; the median counts.", min=1)] = 3,
     quick: Quick = False,
 ) -> None:
@@ -80,6 +80,22 @@ def benchmark(
 
     for path in main(output, repeats, quick=quick):
         print(path)
+
+
+def stress(
+    names: Annotated[list[str] | None, typer.Argument(help="Rows to run [default: all].", show_default=False)] = None,
+    quick: Quick = False,
+    as_json: Json = False,
+) -> None:
+    """Put extremes of every input to the program, against references and invariances.
+
+    Exit status 1 if any cell fails: that is, returns a wrong number with a good status.
+
+    Example: epsmesh stress
+
+    Example: epsmesh stress poisson layer
+    """
+    raise NotImplementedError
 
 
 _ROW = "{:4} {:58} {:24} {:>12} {:>12} {:>9} {:>9}  {}"

@@ -1,0 +1,155 @@
+"""The rows of the matrix: each takes one input to its extremes."""
+
+from collections.abc import Iterator
+from math import inf
+
+from benchmarks.stress.cell import Against, Cell, Expect
+from benchmarks.stress.corners import corners
+from benchmarks.stress.scenes import blade, box, cylinder, disc, mesh, mm, study
+
+_A, _R = 2.0, 20.0  # the probe's and the body's radius
+_NU = (0, 0.2, 0.3, 0.4, 0.44, 0.45, 0.49, 0.495, 0.499, 0.4999, 0.49999, 0.5)
+
+
+def cells() -> tuple[Cell, ...]:
+    """Return all cells, row by row; those of an invariance follow the one that they are compared with."""
+    rows = (_poisson, _young, _size, _depth, _probe, _layer, _jump, _growth, _edge, _epsilon, _blade, _degree, _locking)
+    return tuple(cell for row in (*rows, _support, _method, _ranks, corners) for cell in row())
+
+
+def _poisson() -> Iterator[Cell]:
+    for nu in _NU:
+        yield Cell("Poisson's ratio", f"{nu:g}", study(nu), quick=nu in (0, 0.44, 0.5))
+    for nu in (0, 0.44, 0.4999, 0.5):
+        yield Cell("Poisson's ratio, frictionless", f"{nu:g}", study(nu, probe=disc(contact="frictionless")))
+
+
+def _young() -> Iterator[Cell]:
+    for nu, moduli in ((0.3, (1e4, 1e-3, 1.0, 1e8, 1e12)), (0.4999, (1e4, 1e-3, 1e12))):
+        for young in moduli:
+            group = f"nu {nu:g}"
+            yield _same("Young's modulus (Pa)", f"{young:g}, {group}", study(nu, young=young), young / 1e4, group)
+
+
+def _size() -> Iterator[Cell]:
+    for nu, sizes in ((0.3, (20, 1, 7.3, 300, 1e4)), (0.4999, (20, 1, 1e4))):
+        for size in sizes:
+            s, group = size / 20, f"nu {nu:g}"
+            scene = study(nu, cylinder(size, size), disc(_A * s, 0.01 * s), mesh(0.4 * s, fine=8 * s, coarse=8 * s))
+            yield _same("body's radius (mm)", f"{size:g}, {group}", scene, s * s, group)
+
+
+def _depth() -> Iterator[Cell]:
+    for depth in (0.01, 1e-9, 1e-4, 1.0, 1e3):
+        yield _same("depth (mm)", f"{depth:g}", study(probe=disc(depth=depth)), depth / 0.01)
+
+
+def _same(row: str, value: str, scene: dict[str, object], scale: float, group: str = "") -> Cell:
+    """Return a cell of an invariance; the one of scale 1 is compared with the truth."""
+    first = scale == 1.0
+    return Cell(row, value, scene, "truth" if first else "base", scale=scale, group=group, quick=group != "nu 0.4999")
+
+
+def _probe() -> Iterator[Cell]:
+    for share in (0.001, 0.003, 0.01, 0.03, 0.1, 0.2, 0.4):
+        a = share * _R
+        yield Cell("probe / body radius", f"{share:g}", study(probe=disc(a), sizes=mesh(0.2 * a)), quick=share == 0.001)
+
+
+def _layer() -> Iterator[Cell]:
+    for ratio in (0.1, 0.2, 0.5, 1, 2, 5, 20, 50):
+        h = ratio * _A
+        body = cylinder(_A + 8 * h if ratio < 5 else 60, h)
+        sizes = mesh(min(0.4, 0.2 * h), fine=min(8, h))
+        for nu in (0.3, 0.4999):
+            yield Cell("layer thickness / a", f"{ratio:g}, nu {nu:g}", study(nu, body, sizes=sizes), quick=ratio == 0.5)
+
+
+def _jump() -> Iterator[Cell]:
+    for jump, a in ((10, 20), (100, 10), (1000, 1), (1e4, 0.1)):
+        for nu in (0.3, 0.49):
+            scene = study(nu, cylinder(200, 200), disc(a), mesh(100 / jump, fine=100, coarse=100))
+            yield Cell("coarse / rim", f"{jump:g}, nu {nu:g}", scene, quick=jump == 1e4 and nu == 0.3)
+
+
+def _growth() -> Iterator[Cell]:
+    for nu in (0.3, 0.4999):
+        for growth in (0.2, 0.5, 1.0, 1.5):
+            yield Cell("growth", f"{growth:g}, nu {nu:g}", study(nu, sizes=mesh(growth=growth)), quick=growth == 1.5)
+
+
+def _edge() -> Iterator[Cell]:
+    row = "gap to the body's edge / a"
+    for gap in (-0.01, 0.0, 0.001, 0.01):
+        a = _R / (1 + gap)
+        wanted: Expect = "refused" if gap <= 0 else "right"
+        yield Cell(row, f"{gap:g}, centred", study(probe=disc(a)), expect=wanted, quick=gap <= 0)
+        scene = study(probe=disc(at=_R - _A * (1 + gap)), sizes=mesh(0.3))
+        yield Cell(row, f"{gap:g}, off centre", scene, expect=wanted)
+        scene = study(0.45, box(20, 20, 20), blade(20 / (1 + gap)), mesh(0.3))
+        yield Cell(row, f"{gap:g}, blade across", scene, expect=wanted, accuracy="0.3 %")
+
+
+def _epsilon() -> Iterator[Cell]:
+    near = {"a/2": _A / 2, "a": _A, "a + 1e-6": _A + 2e-6, "a + 0.1 %": 1.001 * _A, "a + 1 %": 1.01 * _A, "2 a": 2 * _A}
+    far = {"R - 1 %": 0.99 * _R, "R - 1e-7": _R * (1 - 1e-7), "R": _R, "R + 1e-7": _R * (1 + 1e-7), "full": inf}
+    for outside in ("coarse", "free", "fixed"):
+        for label, epsilon in (near | far).items():
+            clash = outside == "fixed" and epsilon <= _A
+            barely = outside == "fixed" and epsilon < 1.005 * _A
+            expect: Expect = "refused" if clash else "either" if barely else "right"
+            scene = study(sizes=mesh(fine=4, epsilon=epsilon, outside=outside))
+            quick = label in ("a", "R - 1e-7")
+            yield Cell("epsilon", f"{label}, {outside}", scene, expect=expect, quick=quick)
+
+
+def _blade() -> Iterator[Cell]:
+    for ratio in (1, 2, 5, 10, 25, 50, 100):
+        w = 2.0 if ratio <= 25 else 0.5
+        scene = study(0.3, box(), blade(ratio * w, w), mesh(0.1 * w))
+        yield Cell("blade length / width", f"{ratio:g}", scene, accuracy="0.3 %", quick=ratio == 5)
+
+
+def _degree() -> Iterator[Cell]:
+    row = "element"
+    for degree in (1, 2, 3):
+        for nu in (0.0, 0.3, 0.44):
+            sizes = mesh(degree=degree)
+            yield Cell(row, f"displacement {degree}, nu {nu:g}", study(nu, sizes=sizes), quick=degree == 3 and nu == 0)
+    for degree in (2, 3):
+        for nu in (0.26, 0.4, 0.5):
+            sizes = mesh(degree=degree, element="mixed")
+            yield Cell(row, f"mixed {degree}, nu {nu:g}", study(nu, sizes=sizes), quick=degree == 3 and nu == 0.5)
+
+
+def _locking() -> Iterator[Cell]:
+    most = {1: 0.45, 2: 0.495, 3: 0.495}
+    for degree, limit in most.items():
+        for nu in (0.45, 0.495, 0.4951, 0.5):
+            expect: Expect = "right" if nu <= limit else "refused"
+            scene = study(nu, sizes=mesh(degree=degree, element="displacement"))
+            yield Cell("locking", f"displacement {degree}, nu {nu:g}", scene, expect=expect, quick=nu > limit)
+
+
+def _support() -> Iterator[Cell]:
+    for nu in (0.3, 0.5):
+        for fixed in ("sides", "bottom+sides", -19.99, -10.0, -1.0, -0.1):
+            name = fixed if isinstance(fixed, str) else f"below {mm(fixed)}"
+            yield Cell("support", f"{name}, nu {nu:g}", study(nu, cylinder(fixed=fixed)))
+
+
+def _method() -> Iterator[Cell]:
+    for nu in (0.0, 0.3, 0.44, 0.45, 0.4999, 0.5):
+        for method in ("direct", "iterative"):
+            against: Against = "truth" if method == "direct" else "base"
+            group = f"nu {nu:g}"
+            scene = study(nu, method=method)
+            yield Cell("method", f"{method}, {group}", scene, against, group=group, quick=nu in (0.3, 0.5))
+
+
+def _ranks() -> Iterator[Cell]:
+    for nu in (0.3, 0.4999):
+        for ranks in (1, 2, 3):
+            against: Against = "truth" if ranks == 1 else "base"
+            group = f"nu {nu:g}"
+            yield Cell("ranks", f"{ranks}, {group}", study(nu), against, group=group, ranks=ranks)

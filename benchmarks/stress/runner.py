@@ -1,0 +1,95 @@
+"""Compute the cells, each truth once, and judge them."""
+
+import json
+import time
+from collections.abc import Collection, Iterator
+from dataclasses import replace
+from typing import Any
+
+from mpi4py import MPI
+
+from benchmarks.stress.cell import Cell, Result, judge, refused
+from benchmarks.stress.ranks import PATH, compute_on, why_not
+from benchmarks.stress.rows import cells
+from pipeline.plan.plan import make_plan
+from pipeline.run.execute import compute
+from pipeline.run.record import Record
+from pipeline.study.load import parse
+from pipeline.study.problems import StudyError
+
+
+def run(comm: MPI.Comm, names: Collection[str] | None = None, *, quick: bool = False) -> Iterator[Result]:
+    """Yield the results of the rows in ``names``, of all by default, as they are computed; collective.
+
+    ``quick`` leaves one or a few cells of most rows.
+
+    Raises:
+        ValueError: if a row of that name does not exist.
+    """
+    chosen = cells()
+    known = tuple(dict.fromkeys(cell.row for cell in chosen))
+    if unknown := set(names or ()) - set(known):
+        raise ValueError(f"no row {', '.join(sorted(unknown))}; there are: {'; '.join(known)}")
+    matrix = _Matrix(comm)
+    for cell in chosen:
+        if (names is None or cell.row in names) and (cell.quick or not quick):
+            yield matrix.result(cell)
+
+
+class _Matrix:
+    """Keeps what cells are compared with."""
+
+    def __init__(self, comm: MPI.Comm):
+        self._comm = comm
+        self._truths: dict[str, Record] = {}
+        self._bases: dict[tuple[str, str], Record] = {}
+
+    def result(self, cell: Cell) -> Result:
+        """Compute a cell and its reference, and judge it; collective."""
+        if cell.ranks and (reason := why_not(self._comm)):
+            return Result(cell.row, cell.value, "skipped", message=reason)
+        start = time.perf_counter()
+        try:
+            record = self._record(cell)
+        except StudyError as error:
+            return refused(cell, "; ".join(str(problem) for problem in error.problems))
+        seconds = time.perf_counter() - start
+        if cell.against == "truth":
+            self._bases.setdefault((cell.row, cell.group), record)
+        reference = None
+        if record.status == "ok" and cell.expect != "refused":
+            reference = self._truth(cell) if cell.against == "truth" else self._bases.get((cell.row, cell.group))
+        return judge(cell, record, reference, seconds)
+
+    def _record(self, cell: Cell) -> Record:
+        if cell.ranks:
+            return compute_on(cell.ranks, cell.study)
+        return _compute(self._comm, cell.study, without=PATH)
+
+    def _truth(self, cell: Cell) -> Record:
+        """Return the force of the cell's scene with an accuracy asked for; a miss leaves a wider bar."""
+        sizes = cell.study["mesh"]
+        kept = ("epsilon", "outside") if sizes.get("outside", "coarse") != "coarse" else ()
+        if sizes["epsilon"] == "full":
+            kept = ()
+        scene = cell.study | {"mesh": {"accuracy": cell.accuracy, **{key: sizes[key] for key in kept}}}
+        scene["solve"] = {"exact": False}
+        key = json.dumps(scene, sort_keys=True)
+        if key not in self._truths:
+            try:
+                self._truths[key] = _compute(self._comm, scene)
+            except StudyError as error:
+                self._truths[key] = Record("", "failed", str(error))
+        return self._truths[key]
+
+
+def _compute(comm: MPI.Comm, scene: dict[str, Any], without: tuple[str, ...] = ()) -> Record:
+    """Return the record of a study of one case; what is raised alone on one rank is a failure too."""
+    plan = make_plan(parse(scene), without=without)
+    try:
+        (record,) = compute(plan, comm).values()
+    except Exception as error:
+        if comm.size > 1:
+            raise
+        return Record("", "failed", f"raised {type(error).__name__}: {error}")
+    return replace(record, message=" ".join(record.message.split()))

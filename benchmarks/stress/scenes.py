@@ -1,0 +1,58 @@
+"""Sections of a study, as a study file would hold them; lengths in millimetres."""
+
+from math import inf
+from typing import Any
+
+Section = dict[str, Any]
+
+
+def mm(length: float) -> str:
+    """Write a length."""
+    return f"{length:.12g} mm"
+
+
+def cylinder(radius: float = 20, height: float = 20, fixed: str | float = "bottom") -> Section:
+    """Return a cylinder; a number for ``fixed`` is the level below which it is held."""
+    held = fixed if isinstance(fixed, str) else {"below": mm(fixed)}
+    return {"shape": "cylinder", "radius": mm(radius), "height": mm(height), "fixed": held}
+
+
+def box(x: float = 60, y: float = 60, z: float = 20, fixed: str = "bottom") -> Section:
+    """Return a box."""
+    return {"shape": "box", "size": [mm(x), mm(y), mm(z)], "fixed": fixed}
+
+
+def disc(radius: float = 2, depth: float = 0.01, contact: str = "bonded", at: float = 0.0) -> Section:
+    """Return a disc, ``at`` off the axis."""
+    probe = {"shape": "disc", "radius": mm(radius), "depth": mm(depth), "contact": contact}
+    return probe | ({"at": [mm(at), "0 mm"]} if at else {})
+
+
+def blade(length: float, width: float = 2, **more: Any) -> Section:
+    """Return a blade."""
+    return {"shape": "blade", "length": mm(length), "width": mm(width), "depth": "0.01 mm", **more}
+
+
+def mesh(
+    rim: float = 0.4, growth: float = 0.5, fine: float = 8, coarse: float = 0.0, epsilon: float = inf, degree: int = 2,
+    **more: Any,
+) -> Section:  # fmt: skip
+    """Return sizes; by default a mesh of 10,000 dofs for the default body and disc."""
+    return {
+        "epsilon": "full" if epsilon == inf else mm(epsilon), "fine": mm(fine), "coarse": mm(coarse or max(fine, 8)),
+        "rim": mm(rim), "growth": growth, "degree": degree, **more,
+    }  # fmt: skip
+
+
+def study(
+    nu: float = 0.3, body: Section | None = None, probe: Section | None = None, sizes: Section | None = None,
+    young: float = 1e4, **solve: Any,
+) -> Section:  # fmt: skip
+    """Return a study of one case."""
+    return {
+        "body": body or cylinder(),
+        "material": {"young": f"{young:.12g} Pa", "poisson": nu},
+        "probe": probe or disc(),
+        "mesh": sizes or mesh(),
+        "solve": {"exact": False, **solve},
+    }

@@ -1,0 +1,93 @@
+"""The commands that look after the case store and the mesh cache."""
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pipeline.cli.words import DEFAULT_OUTPUT, SOME_FAILED, Json, fail
+
+if TYPE_CHECKING:
+    from pipeline.run.store import Store
+
+app = typer.Typer(no_args_is_help=True, help="Look after the case store: list, prune, verify.")
+
+StoreFile = Annotated[Path, typer.Option("--store", help="The case store.")]
+DEFAULT_STORE = DEFAULT_OUTPUT / "cases.sqlite"
+
+
+@app.command("list")
+def list_records(store: StoreFile = DEFAULT_STORE, as_json: Json = False) -> None:
+    """Count the records, by status and by what computed them.
+
+    Example: epsmesh store list
+    """
+    opened = _open(store)
+    rows = list(opened.records())
+    opened.close()
+    content: dict[str, Any] = {
+        "file": str(store), "records": len(rows), "bytes": store.stat().st_size,
+        "status": dict(Counter(r.status for r in rows)), "origin": dict(Counter(r.origin for r in rows)),
+        "versions": dict(Counter(_versions(r.provenance) for r in rows)),
+        "seconds": sum(r.time_total for r in rows if r.is_ok),
+    }  # fmt: skip
+    if as_json:
+        print(json.dumps(content, indent=2))
+        return
+    print(f"{store}: {len(rows)} records, {content['bytes'] / 1e6:.1f} MB, {content['seconds']:.0f} s of work")
+    for name in ("status", "origin", "versions"):
+        for value, count in content[name].items():
+            print(f"  {count:6} {value}")
+
+
+@app.command()
+def prune(
+    store: StoreFile = DEFAULT_STORE,
+    days: Annotated[float | None, typer.Option(help="Remove what was stored longer ago.", min=0)] = None,
+    failed: Annotated[bool, typer.Option("--failed", help="Remove failed cases.")] = False,
+) -> None:
+    """Remove records that are old or failed, and those that cannot be read.
+
+    Example: epsmesh store prune --days 90 --failed
+    """
+    opened = _open(store)
+    count = opened.prune(older_than=None if days is None else 86400 * days, failed=failed)
+    opened.close()
+    print(f"{store}: {count} records removed")
+
+
+@app.command()
+def verify(store: StoreFile = DEFAULT_STORE) -> None:
+    """Check that every record can be read and makes sense.
+
+    Exit status 1 if one does not.
+
+    Example: epsmesh store verify
+    """
+    opened = _open(store)
+    problems = list(opened.problems())
+    opened.close()
+    for problem in problems:
+        print(problem)
+    print(f"{store}: {f'{len(problems)} problems' if problems else 'sound'}")
+    raise typer.Exit(SOME_FAILED if problems else 0)
+
+
+def _open(path: Path) -> "Store":
+    from pipeline.run.store import Store, StoreError
+
+    if not path.exists():
+        fail(f"{path}: there is no such store")
+    try:
+        opened = Store(path)
+    except StoreError as wrong:
+        fail(str(wrong))
+    if opened.notice:
+        fail(opened.notice)
+    return opened
+
+
+def _versions(provenance: dict[str, str | int]) -> str:
+    return ", ".join(f"{k.removeprefix('version_')} {v}" for k, v in provenance.items() if k.startswith("version_"))

@@ -1,0 +1,113 @@
+"""What is not done: each reduction is a function from plan to plan whose docstring is the reason that users read."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+
+from pipeline.plan.key import case_key, digest
+from pipeline.plan.plan import Plan
+from pipeline.plan.steps import Solve, mesh_steps
+from pipeline.plan.symmetry import is_round, model_planes
+
+
+def strike_past_body(plan: Plan) -> Plan:
+    """An ε that reaches past the body is the full order, whatever becomes of the outside."""
+    return _rekeyed(plan, "full", strike_past_body, lambda case: case_key(case, folded=True))
+
+
+def strike_duplicates(plan: Plan) -> Plan:
+    """The same case twice is solved once."""
+    return _merged(plan, "duplicates", strike_duplicates)
+
+
+def strike_scaled(plan: Plan) -> Plan:
+    """F is proportional to Young's modulus and to the depth: cases that differ in them only are solved once."""
+    return _rekeyed(plan, "scaling", strike_scaled, lambda case: case_key(case, folded=True, scaled=True))
+
+
+def use_axisymmetry(plan: Plan) -> Plan:
+    """A round scene of which the mesh is not the question is solved on its meridian, in two dimensions."""
+    if not _asks_for_accuracy_or_truncation(plan):
+        return plan
+    solves = {solve.key: solve for solve in plan.solves if is_round(solve.case) and solve.case.mesh.model == "auto"}
+    key = {old: digest(f"{old} axisymmetric") if not solve.goal else old for old, solve in solves.items()}
+    changed = tuple(replace(s, axisymmetric=True, key=key[s.key]) if s.key in key else s for s in plan.solves)
+    plan = replace(plan, solves=changed, keys=tuple(key.get(k, k) for k in plan.keys))
+    return plan.struck_by("axisymmetric", len(key), _reason(use_axisymmetry))
+
+
+def use_symmetry(plan: Plan) -> Plan:
+    """Body, support and probe are their own mirror image: half or a quarter of the body is solved."""
+    solves = tuple(_mirrored(solve) for solve in plan.solves)
+    count = sum(bool(solve.mirrors) for solve in solves)
+    return replace(plan, solves=solves).struck_by("symmetry", count, _reason(use_symmetry))
+
+
+def share_meshes(plan: Plan) -> Plan:
+    """Cases on the same geometry and sizes share one mesh, and one assembly if they differ in the material only."""
+    plan = replace(plan, shared=True)
+    return plan.struck_by("sharing", len(plan.solves) - len(mesh_steps(plan.solves)), _reason(share_meshes))
+
+
+def reuse_solutions(plan: Plan) -> Plan:
+    """A solve begins from the solutions for the neighbouring Poisson's ratios."""
+    plan = replace(plan, reuse=True)
+    count = sum(len(operator.solves) - 1 for step in plan.meshes for operator in step.operators)
+    return plan.struck_by("reuse", count, _reason(reuse_solutions))
+
+
+def strike_stored(plan: Plan, stored: frozenset[str]) -> Plan:
+    """A case whose record is stored is read back."""
+    if plan.study.solve.timing:
+        stored &= frozenset(plan.reference_keys)
+    kept = tuple(solve for solve in plan.solves if solve.key not in stored)
+    found = frozenset(solve.key for solve in plan.solves) & stored
+    plan = replace(plan, solves=kept, stored=found)
+    return plan.struck_by("stored", len(found), _reason(strike_stored))
+
+
+# In the order in which they are applied.
+REDUCTIONS: dict[str, Callable[[Plan], Plan]] = {
+    "full": strike_past_body,
+    "duplicates": strike_duplicates,
+    "scaling": strike_scaled,
+    "axisymmetric": use_axisymmetry,
+    "symmetry": use_symmetry,
+    "sharing": share_meshes,
+    "reuse": reuse_solutions,
+}
+
+
+def _reason(reduction: Callable[..., Plan]) -> str:
+    return (reduction.__doc__ or "").strip()
+
+
+def _rekeyed(plan: Plan, name: str, reduction: Callable[[Plan], Plan], key: Callable[..., str]) -> Plan:
+    """Give every solve the key that ``key`` makes of its case, and merge those that then agree."""
+    solves = tuple(replace(solve, key=key(solve.case)) for solve in plan.solves)
+    new = dict(zip((solve.key for solve in plan.solves), (solve.key for solve in solves), strict=True))
+    return _merged(replace(plan, solves=solves, keys=tuple(new[k] for k in plan.keys)), name, reduction)
+
+
+def _merged(plan: Plan, name: str, reduction: Callable[[Plan], Plan]) -> Plan:
+    unique: dict[str, list[Solve]] = {}
+    for solve in plan.solves:
+        unique.setdefault(solve.key, []).append(solve)
+    merged = tuple(replace(same[0], serves=_joined(same)) if len(same) > 1 else same[0] for same in unique.values())
+    return replace(plan, solves=merged).struck_by(name, len(plan.solves) - len(merged), _reason(reduction))
+
+
+def _joined(solves: Iterable[Solve]) -> tuple[tuple[int, ...], ...]:
+    return tuple(index for solve in solves for index in solve.serves)
+
+
+def _mirrored(solve: Solve) -> Solve:
+    use = solve.case.mesh.model == "auto" and not solve.axisymmetric
+    return replace(solve, mirrors=model_planes(solve.case.probe)) if use else solve
+
+
+def _asks_for_accuracy_or_truncation(plan: Plan) -> bool:
+    """Tell whether a study varies scenes and truncation, but not the mesh: sizes, elements, or ε with all outside."""
+    swept = {axis.key for axis in plan.study.axes if axis.section == "mesh"}
+    if swept - {"epsilon", "outside", "accuracy"}:
+        return False
+    return all(solve.goal or solve.case.is_full or solve.case.is_truncated for solve in plan.solves)

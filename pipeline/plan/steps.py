@@ -1,0 +1,94 @@
+"""The steps that a study needs: solves, grouped by operator and by mesh."""
+
+from collections.abc import Callable, Collection, Hashable
+from dataclasses import dataclass, replace
+
+from pipeline.plan.key import mesh_key, operator_key
+from pipeline.study.schema import Mesh
+from pipeline.study.sweep import Case
+
+
+@dataclass(frozen=True)
+class Solve:
+    """One case to be solved, and the indices of the cases of the study that its record serves.
+
+    ``mirrors`` are the planes of symmetry ("x": x = 0) that leave half or a quarter of the body to be solved;
+    ``axisymmetric`` leaves the meridian. A case with a ``goal``, the relative error asked for, is tried again with the
+    meshes of ``later`` until its error bar is below it.
+    """
+
+    key: str
+    case: Case
+    serves: tuple[tuple[int, ...], ...] = ()
+    mirrors: tuple[str, ...] = ()
+    axisymmetric: bool = False
+    goal: float | None = None
+    later: tuple[Mesh, ...] = ()
+    is_reference: bool = False
+
+    @property
+    def label(self) -> str:
+        """What people call it."""
+        return f"F_exact of {self.case}" if self.is_reference else str(self.case)
+
+    def again(self) -> "Solve":
+        """Return the next attempt at the goal."""
+        return replace(self, case=replace(self.case, mesh=self.later[0]), later=self.later[1:])
+
+
+@dataclass(frozen=True)
+class OperatorStep:
+    """Solves that share spaces, conditions and the assembly: they differ in material only."""
+
+    solves: tuple[Solve, ...]
+
+    @property
+    def case(self) -> Case:
+        """A case that stands for all of them."""
+        return self.solves[0].case
+
+
+@dataclass(frozen=True)
+class MeshStep:
+    """Operators that share one mesh."""
+
+    operators: tuple[OperatorStep, ...]
+
+    @property
+    def case(self) -> Case:
+        """A case that stands for all of them."""
+        return self.operators[0].case
+
+    @property
+    def mirrors(self) -> tuple[str, ...]:
+        """The planes of symmetry that leave the part of the body to be meshed."""
+        return self.solves[0].mirrors
+
+    @property
+    def axisymmetric(self) -> bool:
+        """Whether the solves are on meridians, each with its own mesh."""
+        return self.solves[0].axisymmetric
+
+    @property
+    def solves(self) -> tuple[Solve, ...]:
+        """All solves on this mesh."""
+        return tuple(solve for operator in self.operators for solve in operator.solves)
+
+
+def mesh_steps(solves: Collection[Solve], *, shared: bool = True) -> tuple[MeshStep, ...]:
+    """Group solves by mesh and operator, in order of first appearance, or leave each by itself."""
+    if not shared:
+        return tuple(MeshStep((OperatorStep((solve,)),)) for solve in solves)
+    steps = []
+    for group in _grouped(solves, lambda solve: (solve.axisymmetric or mesh_key(solve.case), solve.mirrors)):
+        operators = _grouped(group, lambda solve: operator_key(solve.case))
+        steps.append(MeshStep(tuple(OperatorStep(found) for found in operators)))
+    return tuple(steps)
+
+
+def _grouped(solves: Collection[Solve], key: Callable[[Solve], Hashable]) -> list[tuple[Solve, ...]]:
+    """Group by key, groups in order of first appearance."""
+    groups: dict[Hashable, list[Solve]] = {}
+    for solve in solves:
+        groups.setdefault(key(solve), []).append(solve)
+    return [tuple(group) for group in groups.values()]
