@@ -25,9 +25,10 @@ _GRACE = 30
 
 @dataclass
 class Opened:
-    """The case store of a run, on rank 0 (None elsewhere), and the records read from it."""
+    """The case store of a run, on rank 0 (None elsewhere), the records read from it, and the folder of its meshes."""
 
     store: Store | None = None
+    meshes: Path | None = None
     records: dict[str, Record] = field(default_factory=dict)
 
     @property
@@ -47,7 +48,13 @@ class Outcome:
 
 
 def prepare(
-    study: Study, comm: MPI.Comm, store_path: Path, *, fresh: bool = False, without: Collection[str] = ()
+    study: Study,
+    comm: MPI.Comm,
+    store_path: Path,
+    *,
+    fresh: bool = False,
+    without: Collection[str] = (),
+    meshes: Path | None = None,
 ) -> tuple[Plan, Opened]:
     """Open the case store and plan, on every rank alike, what is not on record; collective.
 
@@ -57,7 +64,7 @@ def prepare(
     Raises:
         StoreError: on every rank, if the store cannot be used.
     """
-    opened, message = Opened(), ""
+    opened, message = Opened(meshes=meshes), ""
     if comm.rank == 0:
         try:
             opened.store = Store(store_path)
@@ -93,7 +100,7 @@ def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Term
         opened.store.close()
         files = _write(plan, opened.records, {"start": start, "end": _now()}, output)
     states = [opened.records[key].status if key in opened.records else "pending" for key in plan.keys]
-    counts = {state: states.count(state) for state in ("ok", "failed", "pending")}
+    counts = {state: states.count(state) for state in ("ok", "skipped", "failed", "pending")}
     if not interrupted:
         counts = comm.bcast(counts)
     cases = zip(plan.keys, plan.study.cases(), strict=True)
@@ -135,16 +142,21 @@ def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | No
     if not plan.solves:
         return
     from pipeline.run.execute import execute  # noqa: PLC0415
+    from pipeline.run.mesh_cache import MeshCache  # noqa: PLC0415
+    from pipeline.run.stop import SKIPPED  # noqa: PLC0415
+
+    cache = MeshCache(opened.meshes) if opened.meshes else None
 
     def keep(record: Record) -> None:
         assert opened.store is not None
-        opened.store.put(record)
+        if record.status != SKIPPED:  # why it was depends on this study
+            opened.store.put(record)
         opened.records[record.key] = record
         if signals:
             raise KeyboardInterrupt
 
     with progress or nullcontext():
-        execute(plan, comm, keep, progress or Silent())
+        execute(plan, comm, keep, progress or Silent(), opened.records, cache)
 
 
 def _write(plan: Plan, records: dict[str, Record], attributes: dict[str, str], output: Path) -> tuple[Path, ...]:

@@ -66,6 +66,7 @@ def run(
     files: Files,
     output: Annotated[Path, typer.Option(help="Folder for <study>.nc and the figure.")] = DEFAULT_OUTPUT,
     store: StoreFile = None,
+    meshes: Annotated[Path, typer.Option(help="Folder of the meshes that are kept.")] = Path("meshes/cache"),
     fresh: Annotated[bool, typer.Option("--fresh", help="Compute again what is stored.")] = False,
     without: Without = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
@@ -89,7 +90,7 @@ def run(
     for study in studies:
         try:
             plan, opened = workflow.prepare(
-                study, comm, store or output / "cases.sqlite", fresh=fresh, without=left_out
+                study, comm, store or output / "cases.sqlite", fresh=fresh, without=left_out, meshes=meshes
             )
             if speaks:
                 _announce(plan, opened, quiet)
@@ -175,7 +176,7 @@ def _announce(plan: Plan, opened: "Opened", quiet: bool) -> None:
     warn(study)
     print(f"{study.title}: {len(plan.keys)} cases{axes_of(study)}")
     for struck in plan.struck:
-        print(f"  {struck.count} struck out: {struck.reason}")
+        print(f"  {struck.name:13} {struck.count:6}  {struck.reason}")
     if study.solve.timing:
         print(f"  timing: every case afresh and alone, median of {study.solve.repeats}; nothing is struck out")
     if plan.solves:

@@ -70,6 +70,7 @@ def normalised(case: Case) -> Case:
     return replace(case, material=material, probe=case.probe.model_copy(update=travel))
 
 
+@lru_cache(_MANY)
 def slice_ratio(probe: AnyProbe) -> float:
     """Return how far the probe slices for each unit of depth."""
     return canonical(getattr(probe, "slice", 0.0) / probe.depth)
@@ -103,6 +104,7 @@ def _mesh_text(mesh: Mesh, is_full: bool, half_width: float, element: str) -> st
     return _text(content)
 
 
+@lru_cache(_MANY)
 def _slides_along_a_mirror(probe: AnyProbe) -> bool:
     """Where a blade moves across a plane of symmetry, that movement takes no force along the axis."""
     return mirror_planes(probe) != model_planes(probe)

@@ -40,7 +40,7 @@ _COUNTS = {
     "cells": ("1", "elements of the whole body"),
     "iterations": ("1", "iterations of the linear solver"),
 }
-_TEXTS = {"status": "ok, failed, or pending where not yet run", "message": "why a case failed"}
+_TEXTS = {"status": "ok, failed, skipped, or pending where not yet run", "message": "why a case failed or was skipped"}
 _AXES = {
     "epsilon": "radius of the fine mesh round the contact (infinite: full order)",
     "fine": "element size within epsilon of the contact",

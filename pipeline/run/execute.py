@@ -2,7 +2,7 @@
 
 import gc
 import statistics
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
@@ -20,10 +20,12 @@ from pipeline.plan.symmetry import model_planes
 from pipeline.run.compile import prepare
 from pipeline.run.measure import TIMES, add_times, record_of, record_of_meridian
 from pipeline.run.memory import PeakMemory
+from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import meridian_of, mesh_case, on_first_rank
 from pipeline.run.progress import Progress, Silent
 from pipeline.run.provenance import provenance
 from pipeline.run.record import Record
+from pipeline.run.stop import SKIPPED, reason_to_skip, waves
 from pipeline.solve.axisymmetric import solve_axisymmetric
 from pipeline.solve.elasticity import ElasticBody
 from pipeline.solve.linear import SolveError, is_direct
@@ -42,22 +44,27 @@ class CaseFailure(Exception):
     """A case cannot be computed, for a reason that all ranks have agreed on."""
 
 
-def execute(plan: Plan, comm: MPI.Comm, keep: Keep, progress: Progress) -> int:
+def execute(
+    plan: Plan, comm: MPI.Comm, keep: Keep, progress: Progress,
+    known: Mapping[str, Record] | None = None, cache: MeshCache | None = None,
+) -> int:  # fmt: skip
     """Carry out ``plan``; collective. ``keep`` is called on rank 0 with each record, as soon as it exists.
 
-    Returns the number of cases that failed, the same on every rank: each has a record with its message, and the
-    rest went on.
+    ``known`` are rank 0's records of what the plan takes from the store; meshes are kept in ``cache``. Returns the
+    number of cases that failed, the same on every rank: each has a record with its message, and the rest went on.
     """
-    runner = _Runner(comm, keep, progress, timed=plan.study.solve.timing, reuse=plan.reuse)
-    todo = plan.solves
+    runner = _Runner(plan, comm, keep, progress, cache)
+    runner.records |= comm.bcast(dict(known or {}))
     # A rank is one thread: OpenBLAS's own would wait for work by spinning, and take the other ranks' cores.
     with threadpool_limits(limits=1, user_api="blas"):
-        while todo:
-            prepare(comm, todo)
-            for step in mesh_steps(todo, shared=plan.shared):
-                runner.run(step)
-                gc.collect()  # dolfinx's meshes hold communicators, and Python's cycles hold the meshes
-            todo = runner.take_retries()
+        for wave in waves(plan, plan.solves):
+            todo = tuple(solve for solve in wave if not runner.skip(solve))
+            while todo:
+                prepare(comm, todo)
+                for step in mesh_steps(todo, shared=plan.shared):
+                    runner.run(step)
+                    gc.collect()  # dolfinx's meshes hold communicators, and Python's cycles hold the meshes
+                todo = runner.take_retries()
     return runner.failed
 
 
@@ -71,12 +78,20 @@ def compute(plan: Plan, comm: MPI.Comm) -> dict[str, Record]:
 class _Runner:
     """Carries out mesh steps, one after the other, on all ranks."""
 
-    def __init__(self, comm: MPI.Comm, keep: Keep, progress: Progress, *, timed: bool, reuse: bool):
-        self.comm, self.timed, self.failed, self._reuse = comm, timed, 0, reuse
-        self._keep, self._progress = keep, progress
+    def __init__(self, plan: Plan, comm: MPI.Comm, keep: Keep, progress: Progress, cache: MeshCache | None):
+        self.comm, self.timed, self.failed, self.records = comm, plan.study.solve.timing, 0, dict[str, Record]()
+        self._plan, self._keep, self._progress = plan, keep, progress
+        self._cache = None if self.timed else cache
         self._provenance = provenance(comm.size)
         self._retries: list[Solve] = []
         self._attempts: dict[str, list[Record]] = {}
+
+    def skip(self, solve: Solve) -> bool:
+        """Tell whether a solve need not be run, and record why not."""
+        reason = reason_to_skip(self._plan, solve, self.records.get)
+        if reason:
+            self._finish(solve, Record(solve.key, SKIPPED, reason, provenance=self._provenance))
+        return bool(reason)
 
     def take_retries(self) -> tuple[Solve, ...]:
         """Return the solves that missed their goal and have a better mesh to go on with."""
@@ -106,7 +121,7 @@ class _Runner:
         bodies: list[Body] = []
         shared = len(step.solves) > 1
         if not self._guard(
-            step.solves, lambda: bodies.append(_body(mesh, step.case, shared=shared, reuse=self._reuse))
+            step.solves, lambda: bodies.append(_body(mesh, step.case, shared=shared, reuse=self._plan.reuse))
         ):
             return
         with bodies[0] as body:
@@ -170,7 +185,7 @@ class _Runner:
         """Return the distributed mesh of a case and the seconds that it took; collective."""
         self._progress.note(f"meshing: {case}")
         self._check_memory(estimate.case_memory(case, share=0.5 ** len(mirrors)), "this case")
-        return mesh_case(case, mirrors, self.comm)
+        return mesh_case(case, mirrors, self.comm, self._cache)
 
     def _check_memory(self, needed: float, what: str) -> None:
         if message := self._lacks_memory(needed, what):
@@ -220,11 +235,12 @@ class _Runner:
             if missed and not solve.is_reference:
                 message = f"error bar {record.force_error:.2g} on the finest mesh tried: accuracy {solve.goal:g} missed"
                 record = replace(record, status="failed", message=message)
+        self.records[record.key] = record
         if record.status == "failed":
             self.failed += len(solve.serves)
         if self.comm.rank == 0:
             self._keep(record)
-        self._progress.done(solve.label, record.message)
+        self._progress.done(solve.label, record.message if record.status == "failed" else "")
 
 
 def _body(mesh: BodyMesh, case: Case, *, shared: bool, reuse: bool = False) -> Body:

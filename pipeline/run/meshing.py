@@ -1,7 +1,9 @@
 """From a case to its distributed mesh: a symmetric part is meshed, and reflected where the whole is wanted."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import inf
+from time import perf_counter
 from typing import TypeVar
 
 from mpi4py import MPI
@@ -13,6 +15,7 @@ from pipeline.mesh.meridian import Meridian
 from pipeline.mesh.reflect import reflect
 from pipeline.mesh.size import Sizes
 from pipeline.plan.symmetry import mirror_planes
+from pipeline.run.mesh_cache import MeshCache
 from pipeline.scene.model import Scene
 from pipeline.solve.linear import SolveError
 from pipeline.study.schema import Below, Cylinder, Disc
@@ -21,20 +24,38 @@ from pipeline.study.sweep import Case
 T = TypeVar("T")
 
 
-def mesh_case(case: Case, mirrors: tuple[str, ...], comm: MPI.Comm) -> tuple[BodyMesh, float]:
-    """Return the mesh of a case, of the part that ``mirrors`` leave of it, and the seconds it took; collective.
+def mesh_case(
+    case: Case, mirrors: tuple[str, ...], comm: MPI.Comm, cache: MeshCache | None = None
+) -> tuple[BodyMesh, float]:
+    """Return the mesh of a case, of the part that ``mirrors`` leave of it, and the seconds it takes; collective.
+
+    A mesh from the ``cache`` counts with the seconds that it took to make.
 
     Raises:
         MeshError: on every rank.
     """
+    arrays = on_first_rank(comm, lambda: _cached_arrays(case, mirrors, cache))
     start = MPI.Wtime()
-    arrays = on_first_rank(comm, lambda: mesh_arrays(case, mirrors))
     mesh = distribute(comm, arrays)
-    return mesh, comm.allreduce(MPI.Wtime() - start, op=MPI.MAX)
+    making = comm.bcast(arrays.seconds if arrays is not None else 0.0)
+    return mesh, making + comm.allreduce(MPI.Wtime() - start, op=MPI.MAX)
+
+
+def _cached_arrays(case: Case, mirrors: tuple[str, ...], cache: MeshCache | None) -> MeshArrays:
+    """Return the mesh from the cache, or made and put there."""
+    if cache is None:
+        return mesh_arrays(case, mirrors)
+    path = cache.path(case, mirrors)
+    found = cache.get(path)
+    if found is None:
+        found = mesh_arrays(case, mirrors)
+        cache.put(path, found)
+    return found
 
 
 def mesh_arrays(case: Case, mirrors: tuple[str, ...]) -> MeshArrays:
     """Return the mesh of a case as arrays, of the part that ``mirrors`` leave of it."""
+    start = perf_counter()
     mesh, probe = case.mesh, case.probe
     epsilon = inf if case.is_full else mesh.epsilon
     column = inf if mesh.outside == "coarse" else epsilon
@@ -46,7 +67,8 @@ def mesh_arrays(case: Case, mirrors: tuple[str, ...]) -> MeshArrays:
     scene = Scene(case.body, probe, column, mesh.outside == "fixed", sizes.rim_segments(probe), straight, planes)
     arrays = generate(scene, sizes)
     arrays = arrays if straight else curve(arrays, scene)
-    return reflect(arrays, tuple(plane for plane in planes if plane not in mirrors))
+    whole = reflect(arrays, tuple(plane for plane in planes if plane not in mirrors))
+    return replace(whole, seconds=perf_counter() - start)
 
 
 def meridian_of(case: Case) -> Meridian:

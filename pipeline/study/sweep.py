@@ -45,12 +45,17 @@ class Case:
     """One scene with one mesh setting: yields one force."""
 
     index: tuple[int, ...]
-    labels: tuple[tuple[str, float | int | str], ...]
+    axes: tuple[Axis, ...]
     body: AnyBody
     material: Material
     probe: AnyProbe
     mesh: Mesh
     solve: Solve
+
+    @property
+    def labels(self) -> tuple[tuple[str, float | int | str], ...]:
+        """Names and values of what is swept."""
+        return tuple((axis.name, axis.labels[i]) for axis, i in zip(self.axes, self.index, strict=True))
 
     @property
     def is_full(self) -> bool:
@@ -110,16 +115,21 @@ class Study:
 
     def case(self, index: tuple[int, ...]) -> Case:
         """Return the case at ``index``, one number for each axis."""
-        chosen: dict[str, Any] = {}
-        for name, variants in self.sections.items():
+        chosen: list[Any] = []
+        for variants, own in self._layout:
             flat = 0
-            for axis, i in zip(self.axes, index, strict=True):
-                if axis.section == name:
-                    flat = flat * len(axis) + i
-            if name in _PARTS:
-                chosen[name] = variants[flat]
-        labels = tuple((axis.name, axis.labels[i]) for axis, i in zip(self.axes, index, strict=True))
-        return Case(index=index, labels=labels, **chosen)
+            for position, length in own:
+                flat = flat * length + index[position]
+            chosen.append(variants[flat])
+        return Case(index, self.axes, *chosen)
+
+    @cached_property
+    def _layout(self) -> tuple[tuple[tuple[Section, ...], tuple[tuple[int, int], ...]], ...]:
+        """For each part of a case, its variants, and position and length of the axes that choose among them."""
+        return tuple(
+            (self.sections[name], tuple((i, len(axis)) for i, axis in enumerate(self.axes) if axis.section == name))
+            for name in _PARTS
+        )
 
 
 def format_label(name: str, value: float | int | str) -> str:

@@ -1,0 +1,79 @@
+"""Meshes kept on disk, by what they depend on: a bounded folder, the least recently used go first."""
+
+import os
+import time
+import zipfile
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.compat import versions
+from pipeline.mesh.generate import MeshArrays
+from pipeline.plan.key import digest, mesh_key
+from pipeline.study.sweep import Case
+
+# Raise by hand when the same case gives another mesh.
+MESH_VERSION = 1
+LIMIT = 2_000_000_000  # bytes
+
+
+class MeshCache:
+    """Meshes in a folder; one process of a run uses it. Two runs may share a folder: files appear whole."""
+
+    def __init__(self, folder: Path, limit: float = LIMIT):
+        self._folder, self._limit = folder, limit
+
+    def path(self, case: Case, mirrors: tuple[str, ...]) -> Path:
+        """Return the file of a case's mesh, of the part that ``mirrors`` leave."""
+        key = digest(f"{MESH_VERSION} {versions()['gmsh']} {mesh_key(case)} {mirrors}")
+        return self._folder / f"{key}.npz"
+
+    def get(self, path: Path) -> MeshArrays | None:
+        """Return the mesh in ``path``; a file that cannot be read is removed."""
+        try:
+            with np.load(path, allow_pickle=False) as content:
+                facets = {name.removeprefix("facets_"): content[name] for name in content if name.startswith("facets_")}
+                mesh = MeshArrays(
+                    content["points"], content["cells"], facets, content["rim"], float(content["seconds"])
+                )  # fmt: skip
+            _touch(path)
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError, KeyError, zipfile.BadZipFile):
+            with suppress(OSError):
+                path.unlink()
+            return None
+        return mesh
+
+    def put(self, path: Path, mesh: MeshArrays) -> None:
+        """Keep a mesh. A full disk is no reason to end a run: it is then not kept."""
+        temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp")
+        facets = {f"facets_{name}": value for name, value in mesh.facets.items()}
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with temporary.open("wb") as file:
+                np.savez(
+                    file, points=mesh.points, cells=mesh.cells, rim=mesh.rim, seconds=np.float64(mesh.seconds), **facets
+                )
+            _touch(temporary)
+            os.replace(temporary, path)
+            self._shrink()
+        except OSError:
+            with suppress(OSError):
+                temporary.unlink()
+
+    def _shrink(self) -> None:
+        """Remove the least recently used files until the rest is within the limit."""
+        files = sorted(((f.stat().st_mtime, f.stat().st_size, f) for f in self._folder.glob("*.npz")), reverse=True)
+        total = 0
+        for _, size, file in files:
+            total += size
+            if total > self._limit:
+                file.unlink(missing_ok=True)
+
+
+def _touch(path: Path) -> None:
+    """Mark a file as used now: by the fine clock, since the file system's own may tick every few milliseconds."""
+    now = time.time_ns()
+    os.utime(path, ns=(now, now))

@@ -1,0 +1,128 @@
+"""Reductions: none changes F, each can be left out, and each says what it did."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from pipeline.plan.describe import story, summary
+from pipeline.plan.plan import declare, make_plan
+from pipeline.plan.reduce import REDUCTIONS
+from pipeline.report.dataset import build
+from pipeline.run.execute import compute
+from pipeline.study.load import parse
+from tests.cases import BLADE, raw, study
+
+ROUND = {"shape": "cylinder", "radius": "20 mm", "height": "15 mm"}
+# reduction -> a study on which it does something
+STUDIES = {
+    "full": {"mesh": {"epsilon": ["8 mm", "50 mm", "full"], "outside": ["coarse", "free"]}},
+    "duplicates": {"probe": [{"name": name, **raw()["probe"]} for name in ("here", "there")]},
+    "scaling": {"material": {"young": ["1 kPa", "30 MPa"]}, "probe": BLADE | {"depth": ["0.1 mm", "0.2 mm"]}},
+    "symmetry": {"probe": {"at": [["0 mm", "0 mm"], ["4 mm", "0 mm"]]}},
+    "sharing": {"material": {"poisson": [0.2, 0.4, 0.47]}, "probe": {"contact": ["bonded", "frictionless"]}},
+    "reuse": {"material": {"poisson": [0.2, 0.25, 0.3, 0.4]}, "solve": {"method": "iterative", "exact": False}},
+}
+
+
+def run(without=(), **changes):
+    content = raw(**changes)
+    content["plan"] = {}
+    plan = make_plan(parse(content), without=without)
+    return plan, build(plan, compute(plan, MPI.COMM_SELF))
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_force_with_and_without(name):
+    more = ("axisymmetric",) if name != "axisymmetric" else ()
+    reduced, whole = run(more, **STUDIES[name]), run((*more, name), **STUDIES[name])
+    struck = {s.name: s for s in reduced[0].struck}
+    assert struck[name].count > 0
+    assert struck[name].reason.endswith(".")
+    assert name not in {s.name for s in whole[0].struck}
+    for variable in ("force", "energy", "force_error"):
+        tolerance = {"force": 1e-8, "energy": 1e-8, "force_error": 0.05}[variable]
+        np.testing.assert_allclose(reduced[1][variable], whole[1][variable], rtol=tolerance)
+
+
+def test_all_at_once():
+    changes = STUDIES["full"] | {"material": {"young": ["1 kPa", "5 kPa"], "poisson": [0.3, 0.4]}}
+    reduced, whole = run(("axisymmetric",), **changes), run(("all",), **changes)
+    assert len(whole[0].solves) == len(whole[0].meshes) == whole[1]["force"].size
+    assert not whole[0].struck
+    assert len(reduced[0].solves) * 3 < len(whole[0].solves)
+    np.testing.assert_allclose(reduced[1]["force"], whole[1]["force"], rtol=1e-8)
+
+
+def test_axisymmetric_agrees_to_the_error_bars():
+    changes = {
+        "body": ROUND, "material": {"poisson": [0.3, 0.45]},
+        "mesh": {"epsilon": ["6 mm", "full"], "outside": ["free", "fixed"]},
+    }  # fmt: skip
+    flat, solid = run(**changes), run(("axisymmetric",), **changes)
+    assert set(np.unique(flat[1]["origin"])) == {"axisymmetric"}
+    assert set(np.unique(solid[1]["origin"])) == {"symmetric"}
+    error = np.abs(flat[1]["force"] / solid[1]["force"] - 1)
+    assert bool((error <= solid[1]["force_error"] + flat[1]["force_error"]).all())
+    assert len(make_plan(parse(raw(**changes, plan={}))).solves) == len(flat[0].solves)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"mesh": {"epsilon": ["6 mm", "full"]}},  # how coarse the outside may be is the question
+        {"mesh": {"epsilon": "full", "rim": ["1 mm", "2 mm"]}},
+        {"mesh": {"epsilon": "full", "degree": [1, 2]}},
+        {"mesh": {"epsilon": "full", "model": "3d"}},
+        {"mesh": {"epsilon": "full"}, "probe": {"at": ["1 mm", "0 mm"]}},
+        {"mesh": {"epsilon": "full"}, "probe": BLADE},
+    ],
+)
+def test_studies_of_the_mesh_and_scenes_that_are_not_round_stay_in_three_dimensions(changes):
+    plan = make_plan(parse(raw(body=ROUND, plan={}, **changes)))
+    assert not any(solve.axisymmetric for solve in plan.solves)
+
+
+def test_names_are_checked():
+    with pytest.raises(ValueError, match="no reduction is called symetry"):
+        make_plan(study(), without=("symetry",))
+    assert {"full", "scaling", "axisymmetric", "symmetry", "sharing"} <= set(REDUCTIONS)
+
+
+def test_study_file_leaves_reductions_out():
+    plan = make_plan(parse(raw(plan={"without": ["symmetry", "axisymmetric"]})))
+    assert not any(solve.mirrors for solve in plan.solves)
+
+
+def test_scaled_cases_carry_the_cost_of_their_source():
+    plan, dataset = run(("axisymmetric",), **STUDIES["scaling"])
+    assert len(plan.solves) == 1
+    assert sorted(np.unique(dataset["origin"], return_counts=True)[1]) == [1, 3]
+    assert len(np.unique(dataset["time_total"])) == 1
+
+
+def test_summary_and_story():
+    content = raw(material={"poisson": [0.3, 0.4]}, mesh={"epsilon": ["8 mm", "full"], "outside": ["coarse", "free"]})
+    made, plain = (make_plan(parse(content), without=w) for w in ((), ("all",)))
+    few, many = summary(made), summary(plain)
+    assert (few["cases"], few["meshes"], few["solves"]) == (8, 3, 6)
+    assert (many["meshes"], many["solves"]) == (8, 8)
+    assert 0 < few["seconds"] < many["seconds"]
+    assert few["memory"] <= many["memory"]
+    told = story(made, declare(made.study), (0, 1, 0))
+    assert told["record_shared_with"] == ["poisson = 0.3, epsilon = full, outside = free"]
+    assert any("poisson = 0.4" in label for label in told["mesh_shared_with"])
+    assert "proportional" in told["changes"]["young, depth"]
+
+
+def test_plan_of_a_hundred_thousand_cases_is_made_of_few_steps():
+    ratios = [0.2 + 0.002 * i for i in range(100)]
+    radii = [f"{1 + 0.1 * i:.1f} mm" for i in range(20)]
+    young = [f"{1 + i} kPa" for i in range(10)]
+    content = raw(
+        material={"young": young, "poisson": ratios}, probe={"radius": radii, "depth": "0.02 mm"},
+        mesh={"epsilon": ["5 mm", "6 mm", "7 mm", "8 mm", "full"]},
+    )  # fmt: skip
+    plan = make_plan(parse(content))
+    assert len(plan.keys) == 100_000
+    assert len(plan.solves) == 10_000
+    assert len(plan.meshes) == 100

@@ -1,0 +1,57 @@
+"""The mesh cache: the same mesh back, damage undone, a bounded folder."""
+
+import numpy as np
+from mpi4py import MPI
+
+from pipeline.run.mesh_cache import MeshCache
+from pipeline.run.meshing import mesh_arrays, mesh_case
+from tests.cases import study
+
+CASE = study().case(())
+PLANES = ("x", "y")
+
+
+def test_same_mesh_comes_back(tmp_path):
+    cache = MeshCache(tmp_path / "meshes")
+    path = cache.path(CASE, PLANES)
+    assert cache.get(path) is None
+    made = mesh_arrays(CASE, PLANES)
+    cache.put(path, made)
+    found = cache.get(path)
+    assert np.array_equal(found.points, made.points)
+    assert np.array_equal(found.cells, made.cells)
+    assert found.facets.keys() == made.facets.keys()
+    assert found.seconds == made.seconds
+    assert path != cache.path(CASE, ("x",))
+    assert path != cache.path(study(mesh={"rim": "0.9 mm"}).case(()), PLANES)
+    assert path == cache.path(study(material={"poisson": 0.4}, probe={"depth": "0.1 mm"}).case(()), PLANES)
+
+
+def test_damaged_file_is_made_again(tmp_path):
+    cache = MeshCache(tmp_path)
+    path = cache.path(CASE, PLANES)
+    for damage in (b"no mesh", b""):
+        path.write_bytes(damage)
+        mesh, seconds = mesh_case(CASE, PLANES, MPI.COMM_SELF, cache)
+        assert mesh.cells > 0
+        assert seconds > 0
+        assert cache.get(path) is not None
+
+
+def test_least_recently_used_go_first(tmp_path):
+    made = mesh_arrays(CASE, PLANES)
+    cache = MeshCache(tmp_path)
+    cache.put(tmp_path / "first.npz", made)
+    size = (tmp_path / "first.npz").stat().st_size
+    small = MeshCache(tmp_path, limit=2.5 * size)
+    small.put(tmp_path / "second.npz", made)
+    assert small.get(tmp_path / "first.npz") is not None
+    small.put(tmp_path / "third.npz", made)
+    assert {file.stem for file in tmp_path.glob("*.npz")} == {"first", "third"}
+
+
+def test_a_folder_that_cannot_be_written_is_no_reason_to_end(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    cache = MeshCache(tmp_path / "file" / "meshes")
+    mesh, _ = mesh_case(CASE, PLANES, MPI.COMM_SELF, cache)
+    assert mesh.cells > 0

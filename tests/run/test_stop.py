@@ -1,0 +1,48 @@
+"""An early stop along ε: what is run is what an unstopped study gives, what is not says why."""
+
+import numpy as np
+from mpi4py import MPI
+
+from pipeline.plan.plan import make_plan
+from pipeline.report.dataset import build
+from pipeline.run.execute import compute, execute
+from pipeline.run.progress import Silent
+from tests.cases import study
+
+SWEEP = {
+    "material": {"young": ["5 kPa", "10 kPa"]},
+    "mesh": {"epsilon": ["10 mm", "5 mm", "15 mm", "full", "7 mm"], "outside": ["coarse", "free"], "rim": "0.5 mm"},
+    "solve": {"exact": True},
+}
+STOPPED = SWEEP | {"plan": {"without": ["axisymmetric"], "stop_when": "5 %"}}
+
+
+def test_larger_epsilons_are_not_run_and_say_so():
+    plan = make_plan(study(**STOPPED))
+    records = compute(plan, MPI.COMM_SELF)
+    dataset, whole = (
+        build(plan, records),
+        build(make_plan(study(**SWEEP)), compute(make_plan(study(**SWEEP)), MPI.COMM_SELF)),
+    )
+    run = dataset["status"] == "ok"
+    np.testing.assert_allclose(dataset["force"].values[run], whole["force"].values[run], rtol=1e-8)
+    near = np.abs(whole["accuracy"] - 1) <= 0.05
+    coarse = dataset["status"].sel(outside="coarse", young=5e3).sortby("epsilon")
+    assert list(coarse.values[:3]) == ["ok", "ok", "skipped"]
+    assert bool(near.sel(outside="coarse", young=5e3).sortby("epsilon")[:2].all())
+    assert list(coarse.values[2:]) == ["skipped"] * 3
+    free = dataset["status"].sel(outside="free", young=5e3).sortby("epsilon")
+    assert list(free.values).index("skipped") > 2 if "skipped" in free.values else True
+    skipped = dataset["message"].values[dataset["status"].values == "skipped"]
+    assert all("within 5 % of F_exact" in message for message in skipped)
+
+
+def test_stop_is_decided_alike_from_stored_records():
+    plan = make_plan(study(**STOPPED))
+    records = compute(plan, MPI.COMM_SELF)
+    stored = {key: record for key, record in records.items() if record.is_ok}
+    again = make_plan(study(**STOPPED), stored)
+    found = {}
+    execute(again, MPI.COMM_SELF, lambda record: found.__setitem__(record.key, record), Silent(), known=stored)
+    assert {record.status for record in found.values()} == {"skipped"}
+    assert set(found) == set(records) - set(stored)
