@@ -70,19 +70,24 @@ def judge(cell: Cell, record: Record, reference: Record | None, seconds: float =
         return _changed(found, status="refused" if cell.expect != "right" and record.message else "FAIL")
     if cell.expect == "refused":
         return _changed(found, wrong=True, message="computed, though it should be refused")
+    if not isfinite(record.force):
+        return _changed(found, wrong=True, message=f"a force of {record.force} N")
+    if not (isfinite(record.force_error) and record.force_error >= 0):
+        words = f"error bar of {record.force_error:.3g} {record.message}".strip()
+        return _changed(found, wrong=record.force_error < 0, message=words)
+    idle = f"idle error bar of {record.force_error:.0%}" if record.force_error > IDLE else ""
     if reference is None or not (isfinite(reference.force) and reference.force):
-        return _changed(found, message=f"no reference: {reference.message if reference else 'not computed'}")
+        words = f"no reference: {reference.message if reference else 'not computed'}"
+        return _changed(found, message=f"{idle} {words}".strip())
     if cell.against == "truth" and record.origin == reference.origin == "axisymmetric":
         return _changed(found, message="case and reference were computed in the same way: nothing is compared")
     ratio = record.force / cell.scale / reference.force
     bar = INVARIANT if cell.against == "base" else abs(ratio) * record.force_error + reference.force_error
     found = _changed(found, error=ratio - 1, bar=bar)
-    if not isfinite(record.force_error):
-        return _changed(found, message=f"no error bar {record.message}".strip())
     if not abs(ratio - 1) <= bar:
         return _changed(found, wrong=True, message=f"WRONG by {abs(ratio - 1) / bar:.3g} bars {record.message}".strip())
-    if record.force_error > IDLE:
-        return _changed(found, wrong=abs(ratio - 1) > 1, message=f"idle error bar of {record.force_error:.0%}")
+    if idle:
+        return _changed(found, wrong=abs(ratio - 1) > 1, message=idle)
     return _changed(found, status="pass")
 
 

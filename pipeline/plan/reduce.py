@@ -67,8 +67,8 @@ def strike_stored(plan: Plan, stored: frozenset[str]) -> Plan:
 
 # In the order in which they are applied.
 REDUCTIONS: dict[str, Callable[[Plan], Plan]] = {
-    "full": strike_past_body,
     "duplicates": strike_duplicates,
+    "full": strike_past_body,
     "scaling": strike_scaled,
     "axisymmetric": use_axisymmetry,
     "symmetry": use_symmetry,

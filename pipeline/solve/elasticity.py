@@ -163,5 +163,8 @@ class ElasticBody:
         balance = max(abs(work - twice_energy) / twice_energy, float(np.linalg.norm(on_probe + on_support)) / size)
         if balance > BALANCE_LIMIT:
             raise SolveError(f"forces do not balance: relative error {balance:.1e}, allowed {BALANCE_LIMIT:.0e}")
+        # Along the travel, force is what makes the work 2U: an energy is stationary, its error the solver's squared.
+        travel = np.array(self._contact.travel) if self._contact.bonded else self._contact.travel[2] * np.eye(3)[2]
+        on_probe += (twice_energy - work) * travel / (travel @ travel)
         x, y, z = (-float(component) for component in on_probe)
         return (x, y, z), twice_energy / 2, balance

@@ -53,6 +53,7 @@ def test_a_wrong_force_with_a_good_status_fails(monkeypatch):
         (replace(GOOD, force=nan), "FAIL", True),
         (replace(GOOD, force=inf), "FAIL", True),
         (replace(GOOD, force_error=nan), "FAIL", False),
+        (replace(GOOD, force_error=-0.02), "FAIL", True),
         (replace(GOOD, force=5.0, force_error=0.9), "FAIL", True),
         (replace(GOOD, origin="axisymmetric"), "FAIL", False),
         (Record("", "failed", "did not converge"), "FAIL", False),

@@ -40,3 +40,19 @@ def test_locked_store_is_not_taken_for_damaged(tmp_path, monkeypatch):
         Store(path)
     other.close()
     assert not list(tmp_path.glob("*damaged*"))
+
+
+def test_prune_and_problems(tmp_path):
+    store = Store(tmp_path / "cases.sqlite")
+    store.put(Record("good", "ok", force=1.0))
+    store.put(Record("bad", "failed", "no"))
+    store.put(Record("nonsense", "ok", force=-1.0))
+    store._database.execute("INSERT INTO records VALUES ('torn', '{', 0)")
+    store._database.execute("INSERT INTO records SELECT 'moved', record, stored FROM records WHERE key = 'good'")
+    problems = "\n".join(store.problems())
+    assert len(problems.splitlines()) == 3
+    assert all(word in problems for word in ("nonsense", "torn", "moved"))
+    assert {record.key for record in store.records()} == {"good", "bad", "nonsense"}
+    assert store.prune(failed=True) == 2
+    assert {record.key for record in store.records()} == {"good", "nonsense"}
+    assert store.prune(older_than=0.0) == 3
