@@ -5,8 +5,11 @@ from dataclasses import replace
 
 from pipeline.plan.key import case_key, digest
 from pipeline.plan.plan import Plan
-from pipeline.plan.steps import Solve, mesh_steps
+from pipeline.plan.steps import OperatorStep, Solve, mesh_steps
 from pipeline.plan.symmetry import is_round, model_planes
+
+# Fewer Poisson's ratios than this are solved one by one: a basis needs about five solutions itself.
+_FEWEST_RATIOS = 8
 
 
 def strike_past_body(plan: Plan) -> Plan:
@@ -55,6 +58,21 @@ def reuse_solutions(plan: Plan) -> Plan:
     return plan.struck_by("reuse", count, _reason(reuse_solutions))
 
 
+def use_reduced_basis(plan: Plan) -> Plan:
+    """Many Poisson's ratios on one operator: a few are solved, and the rest follow with a bound on the error of F."""
+    if not plan.shared:
+        return plan
+    tolerance = plan.study.planning.tolerance
+    many = {
+        solve.key: digest(f"{solve.key} reduced {tolerance!r}")
+        for step in plan.meshes for operator in step.operators if _suits_a_basis(operator)
+        for solve in operator.solves
+    }  # fmt: skip
+    solves = tuple(replace(s, key=many[s.key], reduced=True) if s.key in many else s for s in plan.solves)
+    plan = replace(plan, solves=solves, keys=tuple(many.get(key, key) for key in plan.keys))
+    return plan.struck_by("reduced", len(many), _reason(use_reduced_basis))
+
+
 def strike_stored(plan: Plan, stored: frozenset[str]) -> Plan:
     """A case whose record is stored is read back."""
     if plan.study.solve.timing:
@@ -74,6 +92,7 @@ REDUCTIONS: dict[str, Callable[[Plan], Plan]] = {
     "symmetry": use_symmetry,
     "sharing": share_meshes,
     "reuse": reuse_solutions,
+    "reduced": use_reduced_basis,
 }
 
 
@@ -103,6 +122,14 @@ def _joined(solves: Iterable[Solve]) -> tuple[tuple[int, ...], ...]:
 def _mirrored(solve: Solve) -> Solve:
     use = solve.case.mesh.model == "auto" and not solve.axisymmetric
     return replace(solve, mirrors=model_planes(solve.case.probe)) if use else solve
+
+
+def _suits_a_basis(operator: OperatorStep) -> bool:
+    """Displacement elements depend on one parameter; of a probe that slices, energy tells the work, not the forces."""
+    first = operator.solves[0]
+    ratios = {solve.case.material.poisson for solve in operator.solves}
+    plain = first.goal is None and not first.axisymmetric and first.case.element == "displacement"
+    return plain and len(ratios) >= _FEWEST_RATIOS and not getattr(first.case.probe, "slice", 0.0)
 
 
 def _asks_for_accuracy_or_truncation(plan: Plan) -> bool:

@@ -13,8 +13,8 @@ class Solve:
     """One case to be solved, and the indices of the cases of the study that its record serves.
 
     ``mirrors`` are the planes of symmetry ("x": x = 0) that leave half or a quarter of the body to be solved;
-    ``axisymmetric`` leaves the meridian. A case with a ``goal``, the relative error asked for, is tried again with the
-    meshes of ``later`` until its error bar is below it.
+    ``axisymmetric`` leaves the meridian; ``reduced`` may be answered from a reduced basis. A case with a ``goal``, the
+    relative error asked for, is tried again with the meshes of ``later`` until its error bar is below it.
     """
 
     key: str
@@ -25,6 +25,7 @@ class Solve:
     goal: float | None = None
     later: tuple[Mesh, ...] = ()
     is_reference: bool = False
+    reduced: bool = False
 
     @property
     def label(self) -> str:

@@ -25,6 +25,7 @@ from pipeline.run.meshing import meridian_of, mesh_case, on_first_rank
 from pipeline.run.progress import Progress, Silent
 from pipeline.run.provenance import provenance
 from pipeline.run.record import Record
+from pipeline.run.reduce import reduced_records
 from pipeline.run.stop import SKIPPED, reason_to_skip, waves
 from pipeline.solve.axisymmetric import solve_axisymmetric
 from pipeline.solve.elasticity import ElasticBody
@@ -125,10 +126,24 @@ class _Runner:
         ):
             return
         with bodies[0] as body:
+            if step.solves[0].reduced and isinstance(body, ElasticBody):
+                self._run_reduced(step, body, mesh, mesh_seconds, memory)
+                return
             for solve in step.solves:
                 self._progress.note(solve.label)
-                compute = partial(self._solve, solve, body, mesh, mesh_seconds, memory)
-                self._record_one(solve, compute)
+                self._record_one(solve, partial(self._solve, solve, body, mesh, mesh_seconds, memory))
+
+    def _run_reduced(
+        self, step: OperatorStep, body: ElasticBody, mesh: BodyMesh, mesh_seconds: float, memory: PeakMemory
+    ) -> None:
+        def compute(solve: Solve) -> Record | None:
+            self._progress.note(solve.label)
+            self._record_one(solve, partial(self._solve, solve, body, mesh, mesh_seconds, memory))
+            record = self.records[solve.key]
+            return record if record.is_ok else None
+
+        tolerance = self._plan.study.planning.tolerance
+        self._guard((), lambda: reduced_records(step.solves, body, tolerance, compute, self._finish))
 
     def _solve(self, solve: Solve, body: Body, mesh: BodyMesh, seconds: float, memory: PeakMemory) -> Record:
         case, degree = solve.case, solve.case.mesh.degree

@@ -8,7 +8,8 @@ Stress integrated under the probe is wrong by tens of per cent on the same solut
 """
 
 import time
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -35,7 +36,7 @@ class ElasticBody:
             SolveError: if footprint and support share a point: no displacement satisfies both.
         """
         self._shared, self._reuse = shared, reuse
-        self._last: FloatArray | None = None
+        self.correction: FloatArray | None = None  # the last solution less the prescribed displacements, owned dofs
         self._body = body
         self._contact = contact
         self._levels: list[ConstrainedSpace] = []
@@ -68,20 +69,16 @@ class ElasticBody:
             start = time.perf_counter()
             rhs, unknown = (stack.enter_context(fine.vector()) for _ in range(2))
             fine.lift(rhs, lame)
-            if self._last is not None:
-                unknown.array[:] = self._last
+            if self._reuse and self.correction is not None:
+                unknown.array[:] = self.correction
             assemble = time.perf_counter() - start
-            levels: list[Level] = []
-            for space in [fine] if direct else [*self._coarser(), fine]:
-                level, seconds = self._level(space, lame, stack, blocked=not direct)
-                levels.append(level)
-                assemble += seconds
+            levels, seconds = self._hierarchy(lame, stack, direct=direct)
+            assemble += seconds
             solver = LinearSolver(levels, direct=direct, tolerance=tolerance)
             stack.callback(solver.close)
             start = time.perf_counter()
             iterations = solver.solve(rhs, unknown)
-            if self._reuse:
-                self._last = unknown.array.copy()
+            self.correction = unknown.array.copy()
             unknown.array[:] += fine.held[: fine.owned]
             reaction, energy, balance = self._reaction(unknown, lame)
             seconds = time.perf_counter() - start
@@ -98,6 +95,40 @@ class ElasticBody:
             solution, decrement=decrement, bar=error_bar(decrement, fine.degree), estimate_iterations=more,
             time_estimate=time.perf_counter() - start,
         )  # fmt: skip
+
+    @contextmanager
+    def solver(self, lame: tuple[float, float], method: str = "auto") -> Iterator[LinearSolver]:
+        """Lend the solver for Lamé's λ and μ (Pa); collective.
+
+        Raises:
+            SolveError: if it cannot be set up.
+        """
+        direct = is_direct(method, self.dofs, self.space.degree)
+        with ExitStack() as stack:
+            solver = LinearSolver(self._hierarchy(lame, stack, direct=direct)[0], direct=direct, tolerance=0.5)
+            stack.callback(solver.close)
+            yield solver
+
+    @property
+    def space(self) -> ConstrainedSpace:
+        """The space of displacements."""
+        return self._fine
+
+    @property
+    def multiplicity(self) -> float:
+        """How many times the modelled part makes up the whole body."""
+        return 2.0 ** len(self._body.mirrored)
+
+    def largest_strain(self, displacement: PETSc.Vec) -> float:
+        """Return the largest principal strain of ``displacement``; collective."""
+        self._fine.set_displacement(displacement)
+        return largest_strain(self._strain, self._body)
+
+    def _hierarchy(self, lame: tuple[float, float], stack: ExitStack, *, direct: bool) -> tuple[list[Level], float]:
+        """Return the levels of multigrid, or the one of a direct solve, and the seconds that one assembly takes."""
+        spaces = [self._fine] if direct else [*self._coarser(), self._fine]
+        found = [self._level(space, lame, stack, blocked=not direct) for space in spaces]
+        return [level for level, _ in found], sum(seconds for _, seconds in found)
 
     def _coarser(self) -> list[ConstrainedSpace]:
         """Return the spaces of lower degree, made when first asked for; collective."""
@@ -130,12 +161,7 @@ class ElasticBody:
             residual.scale(-1.0)
             residual.array[finer.prescribed_owned] = 0.0
             energy, iterations = energy_decrement(solver, residual)
-        return self._multiplicity * energy, iterations
-
-    @property
-    def _multiplicity(self) -> float:
-        """How many times the modelled part makes up the whole body."""
-        return 2.0 ** len(self._body.mirrored)
+        return self.multiplicity * energy, iterations
 
     def _reaction(
         self, unknown: PETSc.Vec, lame: tuple[float, float]
@@ -152,10 +178,10 @@ class ElasticBody:
             held = fine.held[: fine.owned]
             work = float(global_sum(fine.comm, np.array([r[fine.prescribed_owned] @ held[fine.prescribed_owned]]))[0])
         # Of a half or quarter model: its images double what lies in the plane and cancel what is across it.
-        whole = np.full(3, self._multiplicity)
+        whole = np.full(3, self.multiplicity)
         whole[list(self._body.mirrored)] = 0.0
         on_probe, on_support = whole * on_probe, whole * on_support
-        work, twice_energy = self._multiplicity * work, self._multiplicity * twice_energy
+        work, twice_energy = self.multiplicity * work, self.multiplicity * twice_energy
         size = float(np.linalg.norm(on_probe))
         if not (np.isfinite(twice_energy) and np.isfinite(size) and twice_energy > 0 and size > 0):
             raise SolveError(f"the solution is not a number or has no energy (2U = {twice_energy:g} J)")

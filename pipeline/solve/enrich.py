@@ -12,6 +12,7 @@ of them give s to a few per cent, always from below.
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
+import numpy as np
 from petsc4py import PETSc
 
 from pipeline.solve.linear import LinearSolver, SolveError
@@ -45,6 +46,33 @@ def energy_decrement(solver: LinearSolver, residual: PETSc.Vec) -> tuple[float, 
             if iteration >= _FEWEST and step * rz <= _SMALL * total:
                 return total, iteration
     raise SolveError(f"the error estimate did not settle in {_MOST} iterations")
+
+
+def smallest_eigenvalue(solver: LinearSolver, start: PETSc.Vec, steps: int = 30) -> float:
+    """Return the smallest eigenvalue of preconditioner times operator, from above, by Lanczos' method; collective.
+
+    The coefficients are those of conjugate gradients for the right-hand side ``start``, which is overwritten.
+    """
+    diagonal, beside = [], []
+    with ExitStack() as stack:
+        direction, preconditioned, product = (stack.enter_context(_like(start)) for _ in range(3))
+        previous = step = first = 0.0
+        for _ in range(steps):
+            solver.precondition(start, preconditioned)
+            rz = start.dot(preconditioned)
+            first = first or rz
+            if rz <= 1e-24 * first:
+                break
+            ratio = rz / previous if previous else 0.0
+            direction.aypx(ratio, preconditioned)
+            solver.matrix.mult(direction, product)
+            before, step = step, rz / direction.dot(product)
+            diagonal.append(1 / step + (ratio / before if before else 0.0))
+            beside.append(ratio**0.5 / before if before else 0.0)
+            start.axpy(-step, product)
+            previous = rz
+    lanczos = np.diag(diagonal) + np.diag(beside[1:], 1) + np.diag(beside[1:], -1)
+    return float(np.linalg.eigvalsh(lanczos)[0])
 
 
 @contextmanager

@@ -70,6 +70,11 @@ class ConstrainedSpace:
         self.probe_owned, self.fixed_owned = (dofs[dofs < index_map.size_local] for dofs in (probe, fixed))
 
     @property
+    def mirrored(self) -> tuple[int, ...]:
+        """Axes normal to the planes of symmetry that bound the mesh."""
+        return self._body.mirrored
+
+    @property
     def whole_dofs(self) -> int:
         """Unknowns of the whole body, of which a half or a quarter may be modelled."""
         return 3 * whole_points(self.space, self._body)

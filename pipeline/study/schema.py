@@ -248,16 +248,21 @@ class Solve(Section):
     repeats: Annotated[int, Field(ge=1, le=1000)] = 3
 
 
-REDUCTIONS = ("full", "duplicates", "scaling", "axisymmetric", "symmetry", "sharing", "reuse", "stored", "all")
+REDUCTIONS = (
+    "duplicates", "full", "scaling", "axisymmetric", "symmetry", "sharing", "reuse", "reduced", "stored", "all",
+)  # fmt: skip
 
 
 class Planning(Section):
     """What the planner may leave out: reductions not to be used, and where a sweep over ε may end.
 
+    ``tolerance`` is the relative error of F that a reduced basis may cost.
+
     ``stop_when`` is how near to F_exact F must be, at two values of ε in a row, for larger ones not to be run.
     """
 
     without: tuple[Literal[REDUCTIONS], ...] = ()  # type: ignore[valid-type]
+    tolerance: Annotated[float, Field(ge=1e-10, le=1e-2)] = 1e-6
     stop_when: Annotated[Share | None, Field(gt=0, le=0.5)] = None
 
 

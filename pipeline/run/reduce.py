@@ -1,0 +1,67 @@
+"""Carry out an operator step by a reduced basis: solve where the bound is worst, until it is small everywhere."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from pipeline.plan.steps import Solve
+from pipeline.run.record import Record
+from pipeline.solve.elasticity import ElasticBody
+from pipeline.solve.reduced import Reduced, ReducedBasis
+
+Compute = Callable[[Solve], Record | None]
+Finish = Callable[[Solve, Record], None]
+
+
+def reduced_records(
+    solves: tuple[Solve, ...], body: ElasticBody, tolerance: float, compute: Compute, finish: Finish
+) -> None:
+    """Solve a few of ``solves`` by ``compute``, which returns None where it fails, and ``finish`` the rest; collective.
+
+    What is not solved gets the cost of the solved case next above in ν, and the larger of its two neighbours' bars.
+    """
+    todo = sorted(solves, key=_ratio)
+    solved: dict[float, Record] = {}
+    found: dict[str, Reduced] = {}
+    case = todo[0].case
+    with ReducedBasis(body, case.probe.travel, _ratio(todo[0]), case.solve.method) as basis:
+        ends = [todo[0], todo[-1]]
+        while todo:
+            following = ends.pop() if ends else max(todo, key=lambda solve: found[solve.key].bound)
+            todo.remove(following)
+            record = compute(following)
+            if record is not None and body.correction is not None:
+                basis.add(body.correction)
+                solved[_ratio(following)] = record
+            if ends or not solved:
+                continue
+            found = {solve.key: basis.evaluate(_ratio(solve)) for solve in todo}
+            if all(reduced.bound <= tolerance for reduced in found.values()):
+                break
+        for solve in todo:
+            finish(solve, _record(solve, found[solve.key], _source(solve, solved), body, basis))
+
+
+def _source(solve: Solve, solved: dict[float, Record]) -> Record:
+    """Return the solved record next above in ν, or below, with the larger error bar of both."""
+    t = _ratio(solve)
+    above = [solved[min(other for other in solved if other >= t)]] if max(solved) >= t else []
+    below = [solved[max(other for other in solved if other <= t)]] if min(solved) <= t else []
+    neighbours = above + below
+    return replace(neighbours[0], force_error=max(record.force_error for record in neighbours))
+
+
+def _ratio(solve: Solve) -> float:
+    lame_lambda, mu = solve.case.material.lame
+    return lame_lambda / mu
+
+
+def _record(solve: Solve, reduced: Reduced, source: Record, body: ElasticBody, basis: ReducedBasis) -> Record:
+    """Return the record of an evaluation, which is for μ = 1."""
+    material, probe = solve.case.material, solve.case.probe
+    mu = material.lame[1]
+    x, y, z = (mu * float(component) for component in reduced.reaction)
+    return replace(
+        source, key=solve.key, origin="reduced", young=material.young, depth=probe.depth, force=z,
+        force_vector=(x, y, z), force_error=source.force_error + reduced.bound, energy=mu * reduced.twice_energy / 2,
+        max_strain=body.largest_strain(basis.displacement(reduced)), balance=reduced.bound, iterations=0,
+    )  # fmt: skip
