@@ -33,7 +33,7 @@ def _slender() -> Iterator[_Corner]:
     for nu in (0.3, 0.5):
         for height in (1000, 5000):
             sizes = mesh(fine=20, coarse=20)
-            yield f"needle {height // 20} R high, nu {nu:g}", study(nu, cylinder(20, height), sizes=sizes), "right"
+            yield f"needle {height // 20} R high, nu {nu:g}", study(nu, cylinder(20, height), sizes=sizes), "either"
 
 
 def _held() -> Iterator[_Corner]:
@@ -68,14 +68,15 @@ def _blades() -> Iterator[_Corner]:
         probe = blade(10, 2, action="cut", slice=f"{slice_} mm")
         yield f"blade slices {100 * slice_:g} times its depth", study(0.3, box(), probe, mesh(0.2)), "right"
     off = blade(10, 2, action="cut", slice="1 mm", at=["20 mm", "25 mm"])
-    yield "slices in a corner, nu 0.5", study(0.5, box(), off, mesh(0.2)), "right"
+    # The work of the slice hides what the depth takes: the bar may say that F is not known.
+    yield "slices in a corner, nu 0.5", study(0.5, box(), off, mesh(0.2)), "either"
 
 
 def _naive() -> Iterator[_Corner]:
     for degree in (1, 2, 3):
         for nu in (0.0, 0.44):
             sizes = mesh(2, 1.5, degree=degree)
-            yield f"rim = a, growth 1.5, degree {degree}, nu {nu:g}", study(nu, sizes=sizes), "right"
+            yield f"rim = a, growth 1.5, degree {degree}, nu {nu:g}", study(nu, sizes=sizes), "either"
     for nu in (0.45, 0.5):
         yield f"rim = a, growth 1.5, mixed, nu {nu:g}", study(nu, sizes=mesh(2, 1.5)), "right"
         yield f"rim = 4 a, mixed, nu {nu:g}", study(nu, sizes=mesh(8, 1.5)), "right"

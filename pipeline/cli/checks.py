@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output
+from pipeline.cli.words import DEFAULT_OUTPUT, DONE, SOME_FAILED, Json, Output, fail
 
 if TYPE_CHECKING:
     from pipeline.verify.coverage import Trial
@@ -95,7 +95,21 @@ def stress(
 
     Example: epsmesh stress poisson layer
     """
-    raise NotImplementedError
+    from mpi4py import MPI
+
+    from benchmarks.stress import line, run, summary, to_json
+    from benchmarks.stress.report import heading
+
+    speaks = MPI.COMM_WORLD.rank == 0
+    if speaks and not as_json:
+        print(heading())
+    try:
+        results = list(_told(run(MPI.COMM_WORLD, names, quick=quick), line, speaks and not as_json))
+    except ValueError as wrong:
+        fail(str(wrong))
+    if speaks:
+        print(to_json(results) if as_json else summary(results))
+    raise typer.Exit(DONE if all(result.is_good for result in results) else SOME_FAILED)
 
 
 _ROW = "{:4} {:58} {:24} {:>12} {:>12} {:>9} {:>9}  {}"

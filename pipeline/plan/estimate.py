@@ -29,6 +29,8 @@ def cells(case: Case) -> float:
     inside = min(2 / 3 * pi * epsilon**3, body.volume)
     if mesh.outside != "coarse":
         inside = min(inside, pi * mesh.epsilon**2 * body.height)
+        # A column is resolved to half its radius all along.
+        total += min(pi * mesh.epsilon**2 * body.height, body.volume) / (mesh.epsilon / 2) ** 3
     total += inside / mesh.fine**3
     # Shells of size fine + growth (r - ε) round the contact, then coarse.
     total += 2 * pi * epsilon**2 / (2 * growth * mesh.fine**2) + 4 * pi * epsilon / (growth**2 * mesh.fine)

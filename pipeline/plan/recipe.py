@@ -8,6 +8,7 @@ scale with the probe, hardly with the body. What an error bar costs and leaves w
 from dataclasses import dataclass
 from typing import Any
 
+from pipeline.study.check import held_gaps
 from pipeline.study.schema import Mesh
 from pipeline.study.sweep import Case
 
@@ -34,6 +35,8 @@ LADDER = (
 _LOCKING = 0.35
 # A bar is expected to be met if the mesh should give this share of it.
 _MARGIN = 0.75
+# Elements between the probe's edge and a held face beside it.
+_ACROSS_GAP = 3
 # Elements through the thickness of a layer, near the probe.
 _THROUGH = 2
 
@@ -59,10 +62,11 @@ def _mesh(case: Case, recipe: Recipe) -> Mesh:
     """Return the mesh section of a recipe for the body and probe of ``case``."""
     given, probe, thickness = case.mesh, case.probe, case.body.height
     reach = case.body.reach(probe.at) + thickness
+    gaps = held_gaps(case.body, probe, given).values()
     sizes = {
         "fine": min(thickness / _THROUGH, reach),
         "coarse": reach,
-        "rim": recipe.rim * probe.half_width,
+        "rim": min([recipe.rim * probe.half_width, *(gap / _ACROSS_GAP for gap in gaps)]),
         "growth": recipe.growth,
         "degree": recipe.degree,
     }

@@ -28,7 +28,7 @@ def strike_scaled(plan: Plan) -> Plan:
 
 
 def use_axisymmetry(plan: Plan) -> Plan:
-    """A round scene of which the mesh is not the question is solved on its meridian, in two dimensions."""
+    """A round scene of which the mesh is not the question is solved on its meridian, on a mesh of its own."""
     if not _asks_for_accuracy_or_truncation(plan):
         return plan
     solves = {solve.key: solve for solve in plan.solves if is_round(solve.case) and solve.case.mesh.model == "auto"}

@@ -31,9 +31,14 @@ from pipeline.solve.axisymmetric import solve_axisymmetric
 from pipeline.solve.elasticity import ElasticBody
 from pipeline.solve.linear import SolveError, is_direct
 from pipeline.solve.mixed import MixedBody
+from pipeline.solve.solution import Solution
 from pipeline.solve.space import Contact
 from pipeline.study.sweep import Case
 
+# An error bar above this says that the force is not known.
+_WORST_BAR = 0.5
+# Unknowns up to which a direct solve is a way out where iterations do not converge.
+_MOST_DIRECT = 60_000
 # A case may take this share of the memory that is free when it begins.
 _MEMORY_SHARE = 0.9
 
@@ -154,10 +159,18 @@ class _Runner:
         if untimed:
             missing = self._lacks_memory(estimate.enriched_memory(body.dofs, degree), "the error bar")
         wanted = untimed and not missing
-        solution = body.solve(
-            case.material.lame, method=case.solve.method, tolerance=case.solve.tolerance, estimate=wanted
-        )
+        solution = self._solution(case, body, wanted)
         return replace(self._stamp(record_of(solve, solution, mesh.cells, seconds), memory), message=missing)
+
+    def _solution(self, case: Case, body: Body, estimate: bool) -> Solution:
+        """Solve; where iterations do not converge and the system is small, directly."""
+        lame, method, tolerance = case.material.lame, case.solve.method, case.solve.tolerance
+        try:
+            return body.solve(lame, method=method, tolerance=tolerance, estimate=estimate)
+        except SolveError:
+            if method != "auto" or body.dofs > _MOST_DIRECT:
+                raise
+            return body.solve(lame, method="direct", tolerance=tolerance, estimate=estimate)
 
     def _solve_meridian(self, solve: Solve, memory: PeakMemory) -> Record:
         """Solve a round scene in two dimensions, on the first rank; collective."""
@@ -241,7 +254,7 @@ class _Runner:
 
     def _finish(self, solve: Solve, record: Record) -> None:
         if solve.goal is not None and record.status == "ok":
-            missed = not record.force_error <= solve.goal
+            missed = not 0 <= record.force_error <= solve.goal
             if missed and solve.later:
                 self._attempts.setdefault(solve.key, []).append(record)
                 self._retries.append(solve.again())
@@ -249,7 +262,12 @@ class _Runner:
             record = add_times(record, self._attempts.pop(solve.key, []))
             if missed and not solve.is_reference:
                 message = f"error bar {record.force_error:.2g} on the finest mesh tried: accuracy {solve.goal:g} missed"
-                record = replace(record, status="failed", message=message)
+                record = replace(record, status="failed", message=record.message or message)
+        if record.is_ok and record.force_error > _WORST_BAR and not solve.is_reference:
+            message = (
+                f"error bar {100 * record.force_error:.0f} %: the mesh is too coarse for this scene; use a smaller rim"
+            )
+            record = replace(record, status="failed", message=message)
         self.records[record.key] = record
         if record.status == "failed":
             self.failed += len(solve.serves)

@@ -3,12 +3,15 @@
 from dataclasses import replace
 
 from pipeline.plan.steps import Solve
+from pipeline.plan.symmetry import mirror_planes, model_planes
 from pipeline.run.record import Record
 from pipeline.solve.axisymmetric import AxisymmetricSolution
 from pipeline.solve.elasticity import Solution
 from pipeline.solve.error import extrapolate
 from pipeline.study.sweep import Case
 
+# The relative errors of two movements on one mesh differ by less than this factor.
+_OTHER_MOVEMENT = 2.0
 TIMES = ("time_mesh", "time_assemble", "time_setup", "time_solve")
 
 
@@ -77,13 +80,21 @@ def add_times(record: Record, earlier: list[Record]) -> Record:
 
 
 def _relative_bar(case: Case, solution: Solution, force: float) -> float:
-    """Return the relative error bar on the force along the probe's axis.
+    """Return the relative error bar on the force along the probe's axis."""
+    return solution.bar * _share_of_work(case, solution, force)
 
-    The decrement is one of work. A probe that slices works along the blade, too: all of what is lost may then belong
-    to the force along the axis, which is less of the work.
+
+def _share_of_work(case: Case, solution: Solution, force: float) -> float:
+    """Return by how much a relative error of the work may be larger as one of the force along the axis.
+
+    A probe that slices works along the blade, too: all of what is lost may then belong to the force along the axis,
+    which is less of the work. Across a plane of symmetry the two movements do not mix: each has its own error.
     """
-    share = 2 * solution.energy / (force * case.probe.depth)
-    return share * solution.bar
+    if not getattr(case.probe, "slice", 0.0):
+        return 1.0
+    if mirror_planes(case.probe) != model_planes(case.probe):
+        return _OTHER_MOVEMENT
+    return 2 * solution.energy / abs(force * case.probe.depth)
 
 
 def _extrapolated(record: Record, case: Case, solution: Solution) -> Record:
@@ -94,7 +105,7 @@ def _extrapolated(record: Record, case: Case, solution: Solution) -> Record:
     """
     factor, bar = extrapolate(solution.decrement, solution.bar, case.mesh.degree, case.element)
     if getattr(case.probe, "slice", 0.0):
-        bar = (bar + abs(1 - factor) / 2) * 2 * solution.energy / (record.force * case.probe.depth)
+        bar = (bar + abs(1 - factor) / 2) * _share_of_work(case, solution, record.force)
     x, y, z = record.force_vector
     return replace(
         record, force=factor * record.force, force_error=bar, force_vector=(x, y, factor * z),

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import inf
 
 from pipeline.plan.steps import Solve
 from pipeline.run.record import Record
@@ -26,7 +27,7 @@ def reduced_records(
     with ReducedBasis(body, case.probe.travel, _ratio(todo[0]), case.solve.method) as basis:
         ends = [todo[0], todo[-1]]
         while todo:
-            following = ends.pop() if ends else max(todo, key=lambda solve: found[solve.key].bound)
+            following = ends.pop() if ends else max(todo, key=lambda s: found[s.key].bound if s.key in found else inf)
             todo.remove(following)
             record = compute(following)
             if record is not None and body.correction is not None:

@@ -15,6 +15,10 @@ _LOCKING = {1: (0.45, 0.45), 2: (0.49, 0.495), 3: (0.49, 0.495)}
 
 # Mixed elements keep λ = μ, which is ν = 0.25, with the displacement and give the rest to the pressure.
 _LEAST_MIXED = 0.25
+# A footprint this near the edge, in units of the body, touches it: the rest is rounding.
+_TOUCHING = 1e-9
+# Elements may be this much longer than a strip is wide.
+_LONGEST_NEEDLE = 200
 
 
 def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
@@ -32,6 +36,9 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         _check_epsilon(mesh, probe, problems)  # type: ignore[arg-type]
     for body, mesh in itertools.product(bodies, meshes):
         _check_outside(body, mesh, problems)  # type: ignore[arg-type]
+        _check_strip(body, mesh, problems)  # type: ignore[arg-type]
+    for body, probe, mesh in itertools.product(bodies, probes, meshes):
+        _check_gap(body, probe, mesh, problems)  # type: ignore[arg-type]
     for material, mesh in itertools.product(materials, meshes):
         _check_locking(material, mesh, problems)  # type: ignore[arg-type]
     _check_reference(meshes, axes, problems)
@@ -82,24 +89,65 @@ def _check_mesh(mesh: Mesh, problems: Problems) -> None:
 
 
 def _check_fit(body: AnyBody, probe: AnyProbe, problems: Problems) -> None:
-    points = [probe.at]
-    reach = probe.half_width
-    if isinstance(probe, Blade):
-        if hypot(probe.direction[0], probe.direction[1]) == 0:
-            return
-        (tx, ty), half_l, half_w = probe.along, probe.length / 2, probe.width / 2
-        points = [
-            (probe.at[0] + i * half_l * tx - j * half_w * ty, probe.at[1] + i * half_l * ty + j * half_w * tx)
-            for i in (-1, 1)
-            for j in (-1, 1)
-        ]
-        reach = 0.0
-    if min(body.gap(point) for point in points) - reach <= 0:
+    if isinstance(probe, Blade) and hypot(probe.direction[0], probe.direction[1]) == 0:
+        return
+    if _gap_to_side(body, probe) <= _TOUCHING * body.reach((0.0, 0.0)):
         top = f"{_mm(body.size[0])} × {_mm(body.size[1])}" if isinstance(body, Box) else f"radius {_mm(body.radius)}"
         problems.error(
             "probe.at",
             [_mm(x) for x in probe.at],
             f"the footprint of the {probe.shape} must lie inside the body's top ({top}), not on or over its edge",
+        )
+
+
+def _gap_to_side(body: AnyBody, probe: AnyProbe) -> float:
+    """Distance (m) between the footprint and the edge of the body's top, negative outside."""
+    if not isinstance(probe, Blade):
+        return body.gap(probe.at) - probe.half_width
+    (tx, ty), half_l, half_w = probe.along, probe.length / 2, probe.width / 2
+    corners = [
+        (probe.at[0] + i * half_l * tx - j * half_w * ty, probe.at[1] + i * half_l * ty + j * half_w * tx)
+        for i in (-1, 1)
+        for j in (-1, 1)
+    ]
+    return min(body.gap(corner) for corner in corners)
+
+
+def held_gaps(body: AnyBody, probe: AnyProbe, mesh: Mesh) -> dict[str, float]:
+    """Return the distances (m) between the probe's edge and the faces held beside it, by the key that sets them."""
+    gaps = {}
+    if isinstance(body.fixed, Below):
+        gaps["body.fixed"] = hypot(_gap_to_side(body, probe), body.fixed.below)
+    elif "sides" in body.fixed:
+        gaps["body.fixed"] = _gap_to_side(body, probe)
+    if mesh.outside == "fixed" and mesh.epsilon < body.reach(probe.at):
+        gaps["mesh.epsilon"] = mesh.epsilon - probe.circumradius
+    return {key: gap for key, gap in gaps.items() if gap > 0}
+
+
+def _check_gap(body: AnyBody, probe: AnyProbe, mesh: Mesh, problems: Problems) -> None:
+    """Between the probe and a held face there must be room for an element, or F is that of the element."""
+    if mesh.accuracy is not None and "rim" not in mesh.model_fields_set:
+        return
+    for key, gap in held_gaps(body, probe, mesh).items():
+        if gap < mesh.rim_size(probe.half_width):
+            problems.error(
+                key, None, f"leaves {_mm(gap)} between the probe's edge and a held face, less than an element there: "
+                f"use a rim below {_mm(gap)}",
+            )  # fmt: skip
+
+
+def _check_strip(body: AnyBody, mesh: Mesh, problems: Problems) -> None:
+    """A level that leaves a strip far thinner than the elements beside it makes needles of them."""
+    if not isinstance(body.fixed, Below) or not isfinite(mesh.fine):
+        return
+    strip = min(-body.fixed.below, body.height + body.fixed.below)
+    if 0 < strip < mesh.fine / _LONGEST_NEEDLE:
+        problems.error(
+            "body.fixed",
+            f"below {_mm(body.fixed.below)}",
+            f"leaves a strip of {_mm(strip)} at the side, too thin for elements of {_mm(mesh.fine)}: "
+            f"use fine = {_mm(_LONGEST_NEEDLE * strip)} at most, or another level",
         )
 
 

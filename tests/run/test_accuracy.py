@@ -21,7 +21,7 @@ EXACT = {
 def run(without=(), exact=False, **changes):
     """Run a study whose mesh section is replaced; return plan and records."""
     mesh = changes.pop("mesh")
-    study = parse({**raw(**changes), "mesh": mesh, "solve": {"exact": exact}})
+    study = parse({**raw(**changes), "mesh": mesh, "solve": {"exact": exact}, "plan": {}})
     plan = make_plan(study, without=without)
     return plan, compute(plan, MPI.COMM_SELF)
 

@@ -69,6 +69,16 @@ MISTAKES = {
     "floating column": (
         {"body": {"fixed": "sides"}, "mesh": {"outside": "free", "epsilon": "8 mm"}}, ["mesh.outside", "float"],
     ),
+    "footprint touching": ({"probe": {"at": ["17 mm", "0 mm"]}}, ["probe.at", "inside the body's top"]),
+    "no room beside the probe": (
+        {"body": {"shape": "cylinder", "radius": "3.5 mm", "height": "9 mm", "fixed": "sides"}},
+        ["body.fixed", "leaves 0.5 mm", "rim below 0.5 mm"],
+    ),
+    "no room in the column": (
+        {"mesh": {"outside": "fixed", "epsilon": "3.2 mm"}}, ["mesh.epsilon", "leaves 0.2 mm"],
+    ),
+    "thin strip": ({"body": {"fixed": {"below": "-0.01 mm"}}}, ["body.fixed", "strip of 0.01 mm", "fine = 2 mm"]),
+    "unknown reduction": ({"plan": {"without": ["magic"]}}, ["plan.without", "'duplicates'"]),
     "repeats": ({"solve": {"repeats": 3}}, ["solve.repeats", "timing"]),
     "empty sweep": ({"material": {"poisson": []}}, ["material.poisson", "empty"]),
     "value twice": ({"mesh": {"epsilon": ["1 cm", "10 mm"]}}, ["mesh.epsilon", "more than once"]),
