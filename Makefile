@@ -16,7 +16,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's own mpirun: another one on PATH would not fit Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies test test-debian13 lint format clean
+.PHONY: help setup study studies test test-debian13 verify benchmark stress lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -40,6 +40,15 @@ test: setup ## run the tests, serial and on 2 ranks
 
 test-debian13: ## run the tests on Debian 13, in a root of its own (needs root)
 	@scripts/test-debian13.sh
+
+verify: setup ## forces against closed forms, tables and the program's other paths
+	$(EPSMESH) verify
+
+benchmark: setup ## work against precision: results/work_precision.nc and its figure (an idle machine, 10 minutes)
+	$(EPSMESH) benchmark
+
+stress: setup ## numerical stability: a matrix of extremes (10 minutes)
+	$(EPSMESH) stress
 
 lint: setup ## ruff, mypy and the layers of the imports
 	.venv/bin/ruff check

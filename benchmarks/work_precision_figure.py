@@ -19,7 +19,7 @@ _OTHERS = {"axisymmetric, by degree": ("#2a9d8f", "-", "D"), "accuracy asked for
 def draw(dataset: xr.Dataset, stem: Path) -> list[Path]:
     """Draw the error of F over run time and over unknowns into ``<stem>.png`` and ``<stem>.svg``."""
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.1, 6.4), constrained_layout=True)
+        figure = Figure(figsize=(7.1, 6.6))
         FigureCanvasAgg(figure)
         panels = figure.subplots(len(dataset["poisson"]), 2, sharey=True, sharex="col", squeeze=False)
         for row, nu in zip(panels, dataset["poisson"].values, strict=True):
@@ -31,14 +31,15 @@ def draw(dataset: xr.Dataset, stem: Path) -> list[Path]:
         handles, labels = panels[0, 0].get_legend_handles_labels()
         more = panels[-1, 0].get_legend_handles_labels()
         known = dict(zip([*labels, *more[1]], [*handles, *more[0]], strict=True))
-        figure.legend(known.values(), known.keys(), loc="outside lower center", ncols=3)
+        figure.legend(known.values(), known.keys(), loc="lower center", ncol=3)
+        figure.subplots_adjust(left=0.11, right=0.98, top=0.94, bottom=0.2, wspace=0.06, hspace=0.08)
         figure.suptitle(dataset.attrs["title"], fontsize=9.5, fontweight="bold")
         return [save(figure, stem.with_name(f"{stem.name}.{kind}")) for kind in ("png", "svg")]
 
 
 def _panel(axes: Axes, dataset: xr.Dataset, quantity: str) -> None:
-    for method in dataset["method"].values:
-        curve = dataset.sel(method=method)
+    for method in dataset["elements"].values:
+        curve = dataset.sel(elements=method)
         x, y = curve[quantity].values, 100 * np.abs(curve["error"].values)
         known = np.isfinite(x) & np.isfinite(y)
         if known.any():

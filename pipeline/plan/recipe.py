@@ -34,7 +34,7 @@ LADDER = (
 # Bars of displacement elements grow like (1 - 2 ν)^-0.35 on the way to locking; measured from ν = 0.3 to 0.49.
 _LOCKING = 0.35
 # A bar is expected to be met if the mesh should give this share of it.
-_MARGIN = 0.75
+_MARGIN = 0.8
 # Elements between the probe's edge and a held face beside it.
 _ACROSS_GAP = 3
 # Elements through the thickness of a layer, near the probe.
