@@ -43,7 +43,10 @@ def solve(comm: MPI.Comm = MPI.COMM_SELF, **changes: Any) -> dict[tuple[int, ...
     """Run the base study with changes and return the record of every case, by index."""
     plan = make_plan(study(**changes))
     records = compute(plan, comm)
-    return {case.index: records[key] for case, key in zip(plan.study.cases(), plan.keys, strict=True)}
+    return {
+        case.index: records[key].scaled(case.material.young, case.probe.depth)
+        for case, key in zip(plan.study.cases(), plan.keys, strict=True)
+    }
 
 
 def force(comm: MPI.Comm = MPI.COMM_SELF, **changes: Any) -> float:
