@@ -161,7 +161,8 @@ def test_units_do_not_matter(method):
         unit = young * (DEPTH * size) * size
         numbers.append((s.reaction[2] / unit, s.energy / unit / (DEPTH * size), s.max_strain, s.decrement, s.bar))
     for other in numbers[1:]:
-        assert other[:3] == pytest.approx(numbers[0][:3], rel=1e-8)
+        assert other[:2] == pytest.approx(numbers[0][:2], rel=1e-8)
+        assert other[2] == pytest.approx(numbers[0][2], rel=1e-6)  # linear in the solver's error
         assert other[3:] == pytest.approx(numbers[0][3:], rel=1e-3)
 
 
