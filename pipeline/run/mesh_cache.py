@@ -40,7 +40,7 @@ class MeshCache:
             _touch(path)
         except FileNotFoundError:
             return None
-        except (OSError, ValueError, KeyError, zipfile.BadZipFile):
+        except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile):
             with suppress(OSError):
                 path.unlink()
             return None
