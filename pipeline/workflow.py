@@ -5,18 +5,20 @@ import time
 import traceback
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NoReturn
 
 from mpi4py import MPI
 
+from pipeline.plan.cost import CostModel
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.report.dataset import build, write
 from pipeline.run.progress import Silent, Terminal
 from pipeline.run.record import Record
 from pipeline.run.store import Store, StoreError
+from pipeline.stages import stage
 from pipeline.study.sweep import Study
 
 # Seconds that the first rank has, when a parallel run is interrupted, to write what is finished.
@@ -64,10 +66,11 @@ def prepare(
     Raises:
         StoreError: on every rank, if the store cannot be used.
     """
-    opened, message = Opened(meshes=meshes), ""
+    opened, message, cost = Opened(meshes=meshes), "", CostModel()
     if comm.rank == 0:
         try:
             opened.store = Store(store_path)
+            cost = opened.store.cost_model()
             if not fresh:
                 declared = make_plan(study, without=without)
                 keys = () if study.solve.timing else declared.keys
@@ -75,10 +78,10 @@ def prepare(
                 opened.records = {key: record for key, record in found.items() if record.status == "ok"}
         except StoreError as error:
             message = str(error)
-    message, stored = comm.bcast((message, sorted(opened.records)))
+    message, stored, cost = comm.bcast((message, sorted(opened.records), cost))
     if message:
         raise StoreError(message)
-    return make_plan(study, stored, without), opened
+    return replace(make_plan(study, stored, without), cost=cost), opened
 
 
 def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Terminal | None = None) -> Outcome:
@@ -159,6 +162,7 @@ def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | No
         execute(plan, comm, keep, progress or Silent(), opened.records, cache)
 
 
+@stage("dataset, figure")
 def _write(plan: Plan, records: dict[str, Record], attributes: dict[str, str], output: Path) -> tuple[Path, ...]:
     from pipeline.report.figures import draw  # noqa: PLC0415 (matplotlib is slow to load, and wanted last)
 

@@ -1,6 +1,7 @@
 """The commands that tell what a run would do, before it is begun."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -58,13 +59,15 @@ def plan(
     exact = f" ({found['exact']} of them for F_exact)" if found["exact"] else ""
     print(f"  to do: {found['meshes']} meshes, {found['operators']} operators, {found['solves']} solves{exact}")
     if found["steps"]:
-        print(f"  estimate: {_seconds(found['seconds'])} on {ranks} ranks, {found['memory'] / 1e9:.1f} GB at the peak")
+        ground = f"fitted to {found['fitted_to']} cases on record" if found["fitted_to"] else "nothing on record yet"
+        on = "1 rank" if ranks == 1 else f"{ranks} ranks"
+        print(
+            f"  estimate: {_seconds(found['seconds'])} on {on}, {found['memory'] / 1e9:.1f} GB for the largest step"
+            f" ({ground}; a step's time is typically right within a factor of {found['factor']:.1f})"
+        )
         steps = sorted(found["steps"], key=lambda step: -step["seconds"])
         for step in steps[:_MOST_STEPS]:
-            print(
-                f"    {step['kind']:8} {step['cells']:9.0f} cells {step['solves']:4} solves"
-                f" {_seconds(step['seconds']):>8} {step['memory'] / 1e9:5.1f} GB  {step['case']}"
-            )
+            print(_line(step))
         if len(steps) > _MOST_STEPS:
             print(f"    … and {len(steps) - _MOST_STEPS} smaller steps")
 
@@ -110,11 +113,10 @@ def _planned(
     study: Study, output: Path, store: Path | None, without: tuple[str, ...]
 ) -> tuple[Plan, dict[str, "Record"]]:
     """Return the plan of what is not on record, and the records that are."""
-    path = store or output / "cases.sqlite"
     bare = make_plan(study, without=without)
-    records = stored_records(path, bare) if path.exists() else {}
+    records, cost = stored_records(store or output / "cases.sqlite", bare)
     done = [key for key, record in records.items() if record.is_ok]
-    return make_plan(study, done, without) if done else bare, records
+    return replace(make_plan(study, done, without) if done else bare, cost=cost), records
 
 
 def _find(study: Study, text: str) -> Case:
@@ -155,3 +157,12 @@ def _squeezed(text: Any) -> str:
 
 def _seconds(value: float) -> str:
     return f"{value:.1f} s" if value < 100 else f"{value / 60:.0f} min"
+
+
+def _line(step: dict[str, Any]) -> str:
+    size, gigabytes, ranks = f"{step['cells']:9.0f} cells", step["memory"] / 1e9, step["ranks"]
+    on = f"on {ranks} rank" + "s" * (ranks > 1)
+    return (
+        f"    {step['kind']:8} {size} {step['solves']:4} solves {_seconds(step['seconds']):>8} {on}"
+        f" {gigabytes:5.1f} GB  {step['case']}"
+    )

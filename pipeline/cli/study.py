@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipeline import __version__
+from pipeline import __version__, stages
 from pipeline.cli.words import (
     BAD_INPUT,
     DEFAULT_OUTPUT,
@@ -70,6 +70,7 @@ def run(
     fresh: Annotated[bool, typer.Option("--fresh", help="Compute again what is stored.")] = False,
     without: Without = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+    profile: Annotated[bool, typer.Option("--profile", help="Print where the time went (on the first rank).")] = False,
 ) -> None:
     """Run studies: forces, timings, dataset and figure. Under mpirun, on all ranks.
 
@@ -104,6 +105,8 @@ def run(
             workflow.end_ranks(comm, INTERRUPTED)
             raise typer.Exit(INTERRUPTED)
         failed = failed or outcome.counts["failed"] > 0
+    if profile and speaks:
+        _print_stages()
     raise typer.Exit(SOME_FAILED if failed else DONE)
 
 
@@ -115,7 +118,7 @@ def status(file: File, output: Output = DEFAULT_OUTPUT, store: StoreFile = None,
     (study,) = load_all([file])
     plan = make_plan(study)
     path = store or output / "cases.sqlite"
-    records = stored_records(path, plan) if path.exists() else {}
+    records, _ = stored_records(path, plan)
     counts = dict.fromkeys(("ok", "failed", "pending"), 0)
     failed = []
     for key, case in zip(plan.keys, study.cases(), strict=True):
@@ -164,6 +167,11 @@ def _progress(plan: Plan) -> "Terminal":
     from pipeline.run.progress import Terminal
 
     return Terminal(len(plan.solves))
+
+
+def _print_stages() -> None:
+    for name, seconds, share in stages.table():
+        print(f"{seconds:10.2f} s  {100 * share:5.1f} %  {name}")
 
 
 def _announce(plan: Plan, opened: "Opened", quiet: bool) -> None:

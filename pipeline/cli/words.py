@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
+from pipeline.plan.cost import CostModel
 from pipeline.plan.plan import Plan
 from pipeline.study.load import load
 from pipeline.study.problems import StudyError
@@ -49,17 +50,19 @@ def load_all(files: list[Path]) -> list[Study]:
     return studies
 
 
-def stored_records(path: Path, plan: Plan) -> dict[str, "Record"]:
-    """Return the records of a plan's cases and of their F_exact that are in the store at ``path``."""
+def stored_records(path: Path, plan: Plan) -> tuple[dict[str, "Record"], CostModel]:
+    """Return what the store at ``path`` has of a plan's cases and of their F_exact, and what cases cost."""
+    if not path.exists():
+        return {}, CostModel()
     from pipeline.run.store import Store, StoreError
 
     try:
         store = Store(path)
     except StoreError as problem:
         fail(str(problem))
-    records = store.get({*plan.keys, *plan.reference_keys})
+    records, cost = store.get({*plan.keys, *plan.reference_keys}), store.cost_model()
     store.close()
-    return records
+    return records, cost
 
 
 def axes_of(study: Study) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 
 from pipeline.mesh.generate import FloatArray, IntArray, MeshArrays
 from pipeline.scene.model import Scene
+from pipeline.stages import stage
 from pipeline.study.schema import Cylinder, Disc
 
 # Edges of the reference tetrahedron in the order of basix's quadratic nodes 4 to 9.
@@ -19,6 +20,7 @@ EDGES = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
 _LEAST_JACOBIAN = 1e-3
 
 
+@stage("curved rim and sides")
 def curve(mesh: MeshArrays, scene: Scene) -> MeshArrays:
     """Return ``mesh`` with ten nodes a cell, on the true rim and sides, with quarter-point nodes at the rim."""
     corners = mesh.cells

@@ -11,6 +11,7 @@ from mpi4py import MPI
 from pipeline import compat
 from pipeline.mesh.generate import MeshArrays
 from pipeline.scene.model import MIRROR
+from pipeline.stages import stage
 
 Int32Array = npt.NDArray[np.int32]
 
@@ -39,6 +40,7 @@ class BodyMesh:
         return self.mesh.comm
 
 
+@stage("dolfinx mesh")
 def distribute(comm: MPI.Comm, arrays: MeshArrays | None) -> BodyMesh:
     """Create the dolfinx mesh of ``arrays``, which only rank 0 holds; collective."""
     if arrays is not None:

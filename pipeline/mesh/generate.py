@@ -12,6 +12,7 @@ import numpy.typing as npt
 from pipeline.compat import gmsh_session
 from pipeline.mesh.size import Sizes, set_size_field
 from pipeline.scene.model import CUT, FIXED, FREE, MIRROR, PROBE, Scene, SceneError, build
+from pipeline.stages import stage
 
 IntArray = npt.NDArray[np.int64]
 FloatArray = npt.NDArray[np.float64]
@@ -44,6 +45,7 @@ class MeshArrays:
     seconds: float
 
 
+@stage("gmsh")
 def generate(scene: Scene, sizes: Sizes) -> MeshArrays:
     """Mesh ``scene``: the same input gives the same arrays, bit for bit, on the same version of gmsh.
 

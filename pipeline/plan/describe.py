@@ -1,61 +1,47 @@
 """A plan in words and numbers: what is to be done, what is not and why, and what it will take."""
 
-from dataclasses import dataclass
+import heapq
+from collections.abc import Iterable
 from typing import Any
 
-from pipeline.plan import estimate
+from pipeline.plan.cost import speed_up
 from pipeline.plan.plan import Plan
+from pipeline.plan.schedule import schedule
 from pipeline.plan.steps import MeshStep, Solve
 
 
-@dataclass(frozen=True)
-class StepEstimate:
-    """What a mesh step will take: seconds, bytes, elements; rough, see :mod:`pipeline.plan.estimate`."""
-
-    kind: str  # mesh | meridian
-    solves: int
-    operators: int
-    cells: float
-    seconds: float
-    memory: float
-    case: str
-
-
 def summary(plan: Plan, ranks: int = 1) -> dict[str, Any]:
-    """Return the plan as plain data."""
-    steps = [estimate_step(step) for step in plan.meshes]
+    """Return the plan as plain data: ``steps`` in the order in which they begin, with the ranks that each gets."""
+    phases = schedule(plan.meshes, ranks, plan.cost, apart=plan.study.solve.timing)
+    steps, seconds = [], 0.0
+    for phase in phases:
+        found = [plan.cost.step(step) for step in phase.steps]
+        costs = [step.seconds / speed_up(phase.size) for step in found]
+        seconds += _makespan(costs, ranks // phase.size)
+        steps += [vars(s) | {"seconds": cost, "ranks": phase.size} for s, cost in zip(found, costs, strict=True)]
     return {
         "study": plan.study.file,
         "cases": len(plan.keys),
-        "meshes": sum(1 if step.kind == "mesh" else step.solves for step in steps),
-        "operators": sum(step.operators for step in steps),
+        "meshes": len(steps),
+        "operators": sum(step["operators"] for step in steps),
         "solves": len(plan.solves),
         "exact": sum(solve.is_reference for solve in plan.solves),
         "struck": [{"name": s.name, "count": s.count, "reason": s.reason} for s in plan.struck],
-        "seconds": sum(step.seconds for step in steps) / ranks**0.8,
-        "memory": max((step.memory for step in steps), default=0.0),
+        "seconds": seconds,
+        "memory": max((step["memory"] for step in steps), default=0.0),
         "ranks": ranks,
-        "steps": [vars(step) for step in steps],
+        "fitted_to": plan.cost.count,
+        "factor": plan.cost.error,
+        "steps": steps,
     }
 
 
-def estimate_step(step: MeshStep) -> StepEstimate:
-    """Estimate one mesh step: its mesh, its assemblies, its solves with their error bars."""
-    if step.axisymmetric:
-        count = len(step.solves)
-        return StepEstimate("meridian", count, count, 1e3, count * estimate.MERIDIAN_SECONDS, 3e8, _title(step))
-    share = 0.5 ** len(step.mirrors)
-    cells = share * estimate.cells(step.case)
-    seconds = estimate.meshing_seconds(cells)
-    for operator in step.operators:
-        seconds += sum(estimate.solving_seconds(solve.case, cells) for solve in operator.solves)
-    memory = estimate.case_memory(step.case, share)
-    return StepEstimate("mesh", len(step.solves), len(step.operators), cells, seconds, memory, _title(step))
-
-
-def _title(step: MeshStep) -> str:
-    first = step.solves[0].label
-    return first if len(step.solves) == 1 else f"{first} and {len(step.solves) - 1} more"
+def _makespan(costs: Iterable[float], groups: int) -> float:
+    """Return when the last of ``groups`` is done, if each takes the next step when it is free."""
+    busy = [0.0] * groups
+    for seconds in costs:
+        heapq.heappush(busy, heapq.heappop(busy) + seconds)
+    return max(busy)
 
 
 def story(plan: Plan, declared: Plan, index: tuple[int, ...]) -> dict[str, Any]:

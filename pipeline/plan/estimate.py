@@ -63,24 +63,3 @@ def case_memory(case: Case, share: float = 1.0) -> float:
     dofs = _DOFS_PER_CELL[case.mesh.degree] * count
     solving = solving_memory(dofs, case.mesh.degree, direct=case.solve.method == "direct")
     return max(_BASE + _BYTES_PER_CELL * count, solving)
-
-
-# Seconds on one core of 2020s hardware; a fit to the timings that the store keeps is better, once there are some.
-MERIDIAN_SECONDS = 0.5
-_CELLS_PER_SECOND = 50_000
-_SECONDS_PER_DOF = {1: 1.2e-5, 2: 1.4e-5, 3: 2.2e-5, 4: 4.0e-5}
-_MIXED_FACTOR = 1.3
-
-
-def meshing_seconds(count: float) -> float:
-    """Estimate the seconds that a mesh of ``count`` tetrahedra takes, within about a factor of two."""
-    return 0.05 + count / _CELLS_PER_SECOND
-
-
-def solving_seconds(case: Case, count: float) -> float:
-    """Estimate the seconds for assembly, solve and error bar on ``count`` tetrahedra, to about a factor of three."""
-    degree = case.mesh.degree
-    seconds = sum(_SECONDS_PER_DOF[d] * _DOFS_PER_CELL[d] * count for d in (degree, degree + 1))
-    # Iterations grow on the way to incompressible.
-    growth = _MIXED_FACTOR if case.element == "mixed" else ((1 - 2 * case.material.poisson) / 0.4) ** -0.35
-    return 0.05 + growth * seconds

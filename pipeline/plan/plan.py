@@ -1,8 +1,9 @@
 """The plan of a study: which steps yield its cases, and what was struck out, by which reduction, and why."""
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
+from pipeline.plan.cost import CostModel
 from pipeline.plan.key import case_key, normalised, reference_key
 from pipeline.plan.recipe import meshes_for
 from pipeline.plan.steps import MeshStep, Solve, mesh_steps
@@ -30,7 +31,7 @@ class Plan:
 
     ``keys`` holds, for each case in order, the key of its record, ``reference_keys`` that of its scene's F_exact.
     ``stored`` are the keys that were on record; ``shared`` says that solves share meshes and assembly, ``reuse`` that
-    they begin from their neighbours' solutions.
+    they begin from their neighbours' solutions; ``cost`` estimates what steps take.
     """
 
     study: Study
@@ -41,6 +42,7 @@ class Plan:
     stored: frozenset[str] = frozenset()
     shared: bool = False
     reuse: bool = False
+    cost: CostModel = field(default_factory=CostModel)
 
     @property
     def meshes(self) -> tuple[MeshStep, ...]:

@@ -81,10 +81,17 @@ def mesh_steps(solves: Collection[Solve], *, shared: bool = True) -> tuple[MeshS
     if not shared:
         return tuple(MeshStep((OperatorStep((solve,)),)) for solve in solves)
     steps = []
-    for group in _grouped(solves, lambda solve: (solve.axisymmetric or mesh_key(solve.case), solve.mirrors)):
+    for group in _grouped(
+        solves, lambda solve: ((solve.axisymmetric and solve.key) or mesh_key(solve.case), solve.mirrors)
+    ):
         operators = _grouped(group, lambda solve: operator_key(solve.case))
         steps.append(MeshStep(tuple(OperatorStep(found) for found in operators)))
     return tuple(steps)
+
+
+def _mesh_of(solve: Solve) -> Hashable:
+    """Tell apart the meshes of solves: each meridian is one of its own."""
+    return (solve.key if solve.axisymmetric else mesh_key(solve.case), solve.mirrors)
 
 
 def _grouped(solves: Collection[Solve], key: Callable[[Solve], Hashable]) -> list[tuple[Solve, ...]]:

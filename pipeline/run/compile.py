@@ -11,8 +11,10 @@ from pipeline.plan.steps import Solve
 from pipeline.solve.axisymmetric import compile_axisymmetric
 from pipeline.solve.forms import compile_elastic, compiling, one_cell
 from pipeline.solve.mixed_forms import mixed_forms
+from pipeline.stages import stage
 
 
+@stage("compiler")
 def prepare(comm: MPI.Comm, solves: Collection[Solve]) -> None:
     """Compile what ``solves`` need and the cache does not have; collective."""
     if comm.rank == 0:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from pipeline.plan.cost import features
 from pipeline.plan.steps import Solve
 from pipeline.plan.symmetry import mirror_planes, model_planes
 from pipeline.run.record import Record
@@ -22,6 +23,7 @@ def record_of(solve: Solve, solution: Solution, cells: int, mesh_seconds: float)
     it; otherwise it is that of the elements that the study declares.
     """
     case = solve.case
+    kind, planned_cells, poisson = features(solve)
     force = -sum(f * a for f, a in zip(solution.reaction, case.probe.axis, strict=True))
     record = Record(
         key=solve.key,
@@ -43,6 +45,9 @@ def record_of(solve: Solve, solution: Solution, cells: int, mesh_seconds: float)
         time_setup=solution.time_setup,
         time_solve=solution.time_solve,
         time_error=solution.time_estimate,
+        kind=kind,
+        planned_cells=planned_cells,
+        poisson=poisson,
     )
     return _extrapolated(record, case, solution) if solve.goal is not None else record
 
@@ -69,6 +74,9 @@ def record_of_meridian(solve: Solve, solution: AxisymmetricSolution) -> Record:
         time_setup=solution.time_setup,
         time_solve=solution.time_solve,
         time_error=0.0,
+        kind="meridian",
+        planned_cells=1.0,
+        poisson=0.0,
     )
 
 

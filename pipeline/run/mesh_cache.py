@@ -11,6 +11,7 @@ import numpy as np
 from pipeline.compat import versions
 from pipeline.mesh.generate import MeshArrays
 from pipeline.plan.key import digest, mesh_key
+from pipeline.stages import stage
 from pipeline.study.sweep import Case
 
 # Raise by hand when the same case gives another mesh.
@@ -29,6 +30,7 @@ class MeshCache:
         key = digest(f"{MESH_VERSION} {versions()['gmsh']} {mesh_key(case)} {mirrors}")
         return self._folder / f"{key}.npz"
 
+    @stage("mesh cache")
     def get(self, path: Path) -> MeshArrays | None:
         """Return the mesh in ``path``; a file that cannot be read is removed."""
         try:
@@ -46,6 +48,7 @@ class MeshCache:
             return None
         return mesh
 
+    @stage("mesh cache")
     def put(self, path: Path, mesh: MeshArrays) -> None:
         """Keep a mesh. A full disk is no reason to end a run: it is then not kept."""
         temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp")

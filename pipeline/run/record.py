@@ -4,6 +4,8 @@ import json
 from dataclasses import asdict, dataclass, field, replace
 from math import nan
 
+from pipeline.plan.cost import Observation, speed_up
+
 
 @dataclass(frozen=True)
 class Record:
@@ -11,7 +13,8 @@ class Record:
 
     ``young`` (Pa) and ``depth`` (m) are those it was computed for. ``force_vector`` is the force of the tissue on the
     probe; ``force`` its part against the probe's advance, and ``force_error`` the relative 95 % error bar on that, on
-    which ``time_error`` seconds were spent.
+    which ``time_error`` seconds were spent. ``kind``, ``planned_cells`` and ``poisson`` are what its cost was estimated
+    from (:mod:`pipeline.plan.cost`).
     """
 
     key: str
@@ -35,6 +38,9 @@ class Record:
     time_setup: float = nan
     time_solve: float = nan
     time_error: float = nan
+    kind: str = ""
+    planned_cells: float = nan
+    poisson: float = nan
     provenance: dict[str, str | int] = field(default_factory=dict)
 
     @property
@@ -46,6 +52,20 @@ class Record:
     def time_total(self) -> float:
         """Seconds that this case costs alone."""
         return self.time_mesh + self.time_assemble + self.time_setup + self.time_solve
+
+    def observation(self) -> Observation | None:
+        """Return what the case took, on one rank, or None if that is not known."""
+        if not self.is_ok or not self.kind or self.origin not in ("solved", "symmetric", "axisymmetric"):
+            return None
+        faster = speed_up(int(self.provenance.get("ranks", 1)))
+        solve = self.time_assemble + self.time_setup + self.time_solve
+        if self.kind == "meridian":
+            seconds = {"solve": self.time_mesh + solve}
+        else:
+            seconds = {"mesh": self.time_mesh, "solve": solve, "bar": self.time_error}
+        return Observation(
+            self.kind, self.planned_cells, self.poisson, {stage: faster * spent for stage, spent in seconds.items()}
+        )
 
     def scaled(self, young: float, depth: float) -> "Record":
         """Return the record for another Young's modulus and depth, to which force and stress are proportional."""

@@ -7,11 +7,15 @@ from contextlib import suppress
 from math import isfinite
 from pathlib import Path
 
+from pipeline.plan.cost import CostModel, fit
 from pipeline.run.record import Record
+from pipeline.stages import stage
 
 _SCHEMA = "CREATE TABLE IF NOT EXISTS records (key TEXT PRIMARY KEY, record TEXT NOT NULL, stored REAL NOT NULL)"
 # Two runs may share a store: each write takes milliseconds, so half a minute means that something hangs.
 _PATIENCE = 30.0
+# Records that the cost model is fitted to: the newest.
+_RECENT = 500
 
 
 class StoreError(Exception):
@@ -53,6 +57,7 @@ class Store:
             raise
         return database
 
+    @stage("store")
     def put(self, record: Record) -> None:
         """Write one record, atomically, in place of an earlier one of the same key.
 
@@ -86,6 +91,15 @@ class Store:
         for _, text in self._rows():
             with suppress(ValueError, TypeError, KeyError):
                 yield Record.from_json(text)
+
+    def cost_model(self) -> CostModel:
+        """Return the cost model that fits the latest records: those that can be read."""
+        latest, seen = "SELECT record FROM records ORDER BY stored DESC LIMIT ?", []
+        with suppress(sqlite3.Error):
+            for (text,) in self._database.execute(latest, (_RECENT,)):
+                with suppress(ValueError, TypeError, KeyError):
+                    seen.append(Record.from_json(text).observation())
+        return fit(observation for observation in seen if observation is not None)
 
     def problems(self) -> Iterator[str]:
         """Yield what is wrong with the file or with its records."""

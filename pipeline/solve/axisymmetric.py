@@ -23,6 +23,7 @@ from pipeline.scene.model import FIXED, PROBE
 from pipeline.solve.elasticity import BALANCE_LIMIT
 from pipeline.solve.linear import SolveError
 from pipeline.solve.meridian_forms import MeridianForms
+from pipeline.stages import stage
 
 DEGREE = 5
 # Below this ν, displacement elements of degree 5 are as accurate as mixed ones at half the cost.
@@ -64,6 +65,7 @@ class AxisymmetricSolution:
     time_solve: float
 
 
+@stage("axisymmetric")
 def solve_axisymmetric(
     meridian: Meridian,
     poisson: float,

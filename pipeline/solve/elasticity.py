@@ -22,6 +22,7 @@ from pipeline.solve.forms import mean_strain_form
 from pipeline.solve.linear import Level, LinearSolver, SolveError, is_direct
 from pipeline.solve.solution import BALANCE_LIMIT, FloatArray, Solution, global_sum, largest_strain
 from pipeline.solve.space import ConstrainedSpace, Contact
+from pipeline.stages import stage
 
 
 class ElasticBody:
@@ -144,6 +145,7 @@ class ElasticBody:
         stack.callback(matrix.destroy)
         return Level(space.space, matrix, space.prescribed), seconds
 
+    @stage("error bar")
     def _decrement(self, lame: tuple[float, float], levels: list[Level], stack: ExitStack) -> tuple[float, int]:
         """Return the energy, of the whole body, that one degree more takes away from the last solution."""
         fine = self._fine

@@ -13,6 +13,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline import compat
+from pipeline.stages import stage
 
 # Dofs up to which Cholesky is faster than conjugate gradients, measured: docs/performance.md.
 DIRECT_LIMIT = {1: 12_000, 2: 4_000, 3: 4_000}
@@ -42,6 +43,7 @@ def is_direct(method: str, dofs: int, degree: int) -> bool:
 class LinearSolver:
     """A KSP for one operator, with everything that it needs; ``close`` frees it."""
 
+    @stage("set-up")
     def __init__(self, levels: list[Level], *, direct: bool, tolerance: float):
         self._levels = levels
         self._owned: list[Any] = []
@@ -72,6 +74,7 @@ class LinearSolver:
             self._clear_options()
         self.setup_seconds = time.perf_counter() - start
 
+    @stage("iterations")
     def solve(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> int:
         """Improve ``solution`` and return the iterations; collective. A direct solve does not look at what it holds.
 
@@ -170,6 +173,7 @@ def rigid_body_modes(space: Any) -> PETSc.NullSpace:
     return modes
 
 
+@stage("interpolation")
 def _transfer(coarse: Level, fine: Level) -> PETSc.Mat:
     """Interpolation between degrees that neither reads nor writes prescribed dofs."""
     matrix = compat.interpolation_matrix(coarse.space, fine.space)

@@ -32,6 +32,7 @@ from pipeline.solve.mixed_space import MixedSpace
 from pipeline.solve.saddle import Pair, Saddle, SaddleSolver
 from pipeline.solve.solution import BALANCE_LIMIT, FloatArray, Solution, global_sum, largest_strain
 from pipeline.solve.space import ConstrainedSpace, Contact
+from pipeline.stages import stage
 
 # λ₀/μ = 1 (ν = ¼): small enough for the multigrid, large enough for the pressure's mass to be a good preconditioner.
 _LAME = (1.0, 1.0)
@@ -120,6 +121,7 @@ class MixedBody:
         )  # fmt: skip
         return self._estimate(solution, forces.work, c) if estimate else solution
 
+    @stage("error bar")
     def _estimate(self, solution: Solution, work: float, c: float) -> Solution:
         """Return ``solution``, whose F·d is ``work`` for μ = 1, with its error bar; collective."""
         start = time.perf_counter()
@@ -136,6 +138,7 @@ class MixedBody:
             estimate_iterations=iterations, time_estimate=time.perf_counter() - start,
         )  # fmt: skip
 
+    @stage("iterations")
     def _correct(self, space: MixedSpace, solver: SaddleSolver, c: float, unknown: Pair, tolerance: float) -> int:
         """Solve for what is zero where displacements are prescribed, then add those; return the iterations."""
         with space.pair() as rhs:
@@ -179,6 +182,7 @@ class MixedBody:
         """How many times the modelled part makes up the whole body."""
         return 2.0 ** len(self._body.mirrored)
 
+    @stage("spaces, forms")
     def _space(self, degree: int) -> MixedSpace:
         """Return the spaces of elements of ``degree``, made when first asked for; collective."""
         if degree not in self._spaces:
@@ -186,6 +190,7 @@ class MixedBody:
             self._stack.callback(self._spaces[degree].close)
         return self._spaces[degree]
 
+    @stage("assembly, set-up")
     def _solver(self, degree: int, *, direct: bool) -> tuple[SaddleSolver, float]:
         """Return the solver for elements of ``degree``, and the seconds that its assembly took; collective."""
         space = self._space(degree)

@@ -10,6 +10,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from pipeline.mesh.distribute import BodyMesh
+from pipeline.stages import stage
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -50,6 +51,7 @@ def global_sum(comm: MPI.Comm, values: FloatArray) -> FloatArray:
     return total
 
 
+@stage("strain")
 def largest_strain(mean_strain: tuple[Any, Any], body: BodyMesh) -> float:
     """Return the largest principal strain, by magnitude, of the strain averaged over each cell; collective.
 

@@ -16,6 +16,7 @@ from pipeline.mesh.distribute import BodyMesh
 from pipeline.scene.model import FIXED, MIRROR, PROBE
 from pipeline.solve.forms import elastic_forms
 from pipeline.solve.linear import SolveError
+from pipeline.stages import stage
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ class ConstrainedSpace:
     that this rank owns.
     """
 
+    @stage("spaces, forms")
     def __init__(self, body: BodyMesh, degree: int, contact: Contact):
         """Collective.
 
@@ -95,6 +97,7 @@ class ConstrainedSpace:
         finally:
             vector.destroy()
 
+    @stage("assembly")
     def operator(self, lame: tuple[float, float], *, shared: bool, blocked: bool) -> tuple[PETSc.Mat, float]:
         """Return K with μ on the diagonal of prescribed dofs, and the seconds that one assembly takes; collective.
 
@@ -133,6 +136,7 @@ class ConstrainedSpace:
         with values.localForm() as local:
             self.forms.displacement.x.array[:] = local.array
 
+    @stage("residuals")
     def apply(self, result: PETSc.Vec, lame: tuple[float, float]) -> None:
         """Add K u, with the unmodified operator, to ``result``; collective."""
         self.forms.set_lame(*lame)

@@ -1,0 +1,135 @@
+"""What a step will take: a law for the seconds of each stage, fitted to what earlier cases took.
+
+    log t = a + b log(tetrahedra) + c log(1 - 2 ν)
+
+for meshing, for solving and for the error bar, of each kind of element. Where nothing is on record the law is the one
+below; a few observations move it a little, many determine it (ridge regression about the law below).
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from math import exp, log
+from typing import Any
+
+import numpy as np
+
+from pipeline.plan import estimate
+from pipeline.plan.steps import MeshStep, Solve
+from pipeline.study.sweep import Case
+
+STAGES = ("mesh", "solve", "bar")
+# What ranks are worth on one solve: n of them are as good as n^0.8.
+_PARALLEL = 0.8
+# Seconds on one core of 2020s hardware: for each tetrahedron; and of the mixed element, as a multiple.
+_MESH, _MIXED = 2e-5, 1.3
+_SOLVE = {1: 7e-6, 2: 6e-5, 3: 3.5e-4, 4: 1.4e-3}
+_MERIDIAN = 0.5
+# How fast iterations grow on the way to incompressible.
+_LOCKING = -0.35
+# Observations that weigh as much as the law above, for its factor and for its exponents.
+_WEIGHT = np.diag([0.5, 5.0, 5.0])
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What one case took (s), by stage, and what was known of it before: see :func:`features`."""
+
+    kind: str
+    cells: float
+    poisson: float
+    seconds: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class StepEstimate:
+    """What a mesh step will take: elements of the part that is modelled, seconds on one rank, bytes."""
+
+    kind: str  # mesh | meridian
+    solves: int
+    operators: int
+    cells: float
+    seconds: float
+    memory: float
+    case: str
+
+
+@dataclass(frozen=True)
+class CostModel:
+    """The fitted laws, on how many observations, and by what factor they are typically wrong."""
+
+    laws: Mapping[tuple[str, str], Any] = field(default_factory=dict)
+    count: int = 0
+    error: float = 2.0
+
+    def seconds(self, stage: str, kind: str, cells: float, poisson: float) -> float:
+        """Return the seconds on one rank of a stage."""
+        law = self.laws.get((stage, kind))
+        return exp(float((_prior(stage, kind) if law is None else law) @ _row(cells, poisson)))
+
+    def step(self, step: MeshStep) -> StepEstimate:
+        """Estimate one mesh step: its mesh, its assemblies, its solves with their error bars."""
+        title = step.solves[0].label
+        if len(step.solves) > 1:
+            title += f" and {len(step.solves) - 1} more"
+        if step.axisymmetric:
+            seconds = len(step.solves) * self.seconds("solve", "meridian", 1.0, 0.0)
+            return StepEstimate("meridian", len(step.solves), len(step.solves), 1e3, seconds, 3e8, title)
+        kind, cells, _ = features(step.solves[0])
+        seconds = self.seconds("mesh", kind, cells, 0.0)
+        for solve in step.solves:
+            kind, _, poisson = features(solve)
+            seconds += sum(self.seconds(stage, kind, cells, poisson) for stage in ("solve", "bar"))
+        memory = estimate.case_memory(step.case, 0.5 ** len(step.mirrors))
+        return StepEstimate("mesh", len(step.solves), len(step.operators), cells, seconds, memory, title)
+
+
+def features(solve: Solve) -> tuple[str, float, float]:
+    """Return what a solve's cost depends on: kind of element, tetrahedra (estimated) of the part modelled, ν."""
+    case = solve.case
+    if solve.axisymmetric:
+        return "meridian", 1.0, 0.0
+    return f"{case.element} {case.mesh.degree}", estimate.cells(case) * 0.5 ** len(solve.mirrors), _poisson(case)
+
+
+def speed_up(ranks: int) -> float:
+    """Return how many times faster ``ranks`` ranks are than one, on one solve."""
+    return ranks**_PARALLEL
+
+
+def fit(observations: Iterable[Observation]) -> CostModel:
+    """Return the model that fits ``observations``; its error is that of each from the others (leave one out)."""
+    laws, wrong, count = {}, [], 0
+    groups: dict[tuple[str, str], list[tuple[Any, float]]] = {}
+    for seen in observations:
+        count += 1
+        for stage, seconds in seen.seconds.items():
+            if seconds > 0:
+                groups.setdefault((stage, seen.kind), []).append((_row(seen.cells, seen.poisson), log(seconds)))
+    for (stage, kind), found in groups.items():
+        prior = _prior(stage, kind)
+        rows, logs = np.array([row for row, _ in found]), np.array([value for _, value in found])
+        inverse = np.linalg.inv(rows.T @ rows + _WEIGHT)
+        laws[stage, kind] = law = prior + inverse @ rows.T @ (logs - rows @ prior)
+        leverage = np.einsum("ij,jk,ik->i", rows, inverse, rows)
+        if stage == "solve":
+            wrong += list(np.abs(logs - rows @ law) / (1 - leverage))
+    return CostModel(laws, count, exp(float(np.median(wrong)))) if wrong else CostModel(laws, count)
+
+
+def _row(cells: float, poisson: float) -> Any:
+    return np.array([1.0, log(cells / 1e4), log((1 - 2 * poisson) / 0.4)])
+
+
+def _poisson(case: Case) -> float:
+    """Return ν, as far as the cost depends on it: that of the mixed element does not."""
+    return 0.3 if case.element == "mixed" else case.material.poisson
+
+
+def _prior(stage: str, kind: str) -> Any:
+    if kind == "meridian":
+        return np.array([log(_MERIDIAN), 0.0, 0.0])
+    if stage == "mesh":
+        return np.array([log(1e4 * _MESH), 1.0, 0.0])
+    element, degree = kind.split()
+    per_cell = _SOLVE[int(degree) + (stage == "bar")] * (_MIXED if element == "mixed" else 1.0)
+    return np.array([log(1e4 * per_cell), 1.0, 0.0 if element == "mixed" else _LOCKING])
