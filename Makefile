@@ -16,7 +16,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's own mpirun: another one on PATH would not fit Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies test test-debian13 verify benchmark stress lint format clean
+.PHONY: help setup study studies test test-debian13 verify benchmark stress soak lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -49,6 +49,9 @@ benchmark: setup ## work against precision: results/work_precision.nc and its fi
 
 stress: setup ## numerical stability: a matrix of extremes (10 minutes)
 	$(EPSMESH) stress
+
+soak: setup ## two thousand meshes in one process: memory stays flat (15 minutes)
+	$(MPI_ENV) $(PYTHON) -m benchmarks.soak
 
 lint: setup ## ruff, mypy and the layers of the imports
 	.venv/bin/ruff check

@@ -11,6 +11,7 @@ from pipeline.plan.schedule import schedule
 from pipeline.plan.steps import Solve, mesh_steps
 from pipeline.run.compile import prepare
 from pipeline.run.groups import run_phase
+from pipeline.run.memory import keep_imports
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.progress import Progress, Silent
 from pipeline.run.provenance import provenance
@@ -30,6 +31,7 @@ def execute(
     ``known`` are rank 0's records of what the plan takes from the store; meshes are kept in ``cache``. Returns the
     number of cases that failed, the same on every rank: each has a record with its message, and the rest went on.
     """
+    keep_imports()
     desk = _Desk(plan, keep if comm.rank == 0 else None, progress, comm.bcast(dict(known or {})))
 
     def make(group: MPI.Comm, post: Keep) -> StepRunner:

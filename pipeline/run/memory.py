@@ -1,10 +1,29 @@
-"""Peak memory of a stretch of work."""
+"""Peak memory of a stretch of work, and what is given back after it."""
 
+import ctypes
+import gc
 from contextlib import suppress
 from pathlib import Path
 
 import psutil
 from mpi4py import MPI
+
+from pipeline.stages import stage
+
+
+def keep_imports() -> None:
+    """Take what is loaded by now out of the reach of the garbage collector: each collection walks through the rest."""
+    if not gc.get_freeze_count():
+        gc.collect()
+        gc.freeze()
+
+
+@stage("garbage")
+def give_back() -> None:
+    """Free what nobody refers to, and return it to the system, where the C library can."""
+    gc.collect()  # dolfinx's meshes hold communicators, and Python's cycles hold the meshes
+    with suppress(AttributeError, OSError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 class PeakMemory:

@@ -1,6 +1,5 @@
 """Carry out the steps of a plan on one communicator: mesh, operators, solves, and a record of each."""
 
-import gc
 import statistics
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,7 +17,7 @@ from pipeline.plan.steps import MeshStep, OperatorStep, Solve, mesh_steps
 from pipeline.plan.symmetry import model_planes
 from pipeline.run.compile import prepare
 from pipeline.run.measure import TIMES, add_times, record_of, record_of_meridian
-from pipeline.run.memory import PeakMemory
+from pipeline.run.memory import PeakMemory, give_back
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import meridian_of, mesh_case, on_first_rank
 from pipeline.run.progress import Progress
@@ -31,7 +30,6 @@ from pipeline.solve.linear import SolveError, is_direct
 from pipeline.solve.mixed import MixedBody
 from pipeline.solve.solution import Solution
 from pipeline.solve.space import Contact
-from pipeline.stages import stage
 from pipeline.study.sweep import Case
 
 # An error bar above this says that the force is not known.
@@ -66,8 +64,7 @@ class StepRunner:
         Those that miss their goal are tried again at once, with the next mesh.
         """
         self._run(step)
-        with stage("garbage"):  # dolfinx's meshes hold communicators, and Python's cycles hold the meshes
-            gc.collect()
+        give_back()
         if self._retries:
             retries, self._retries = tuple(self._retries), []
             prepare(self.comm, retries)
@@ -175,7 +172,7 @@ class StepRunner:
         with _body(mesh, solve.case, shared=False) as body:
             record = self._solve(solve, body, mesh, seconds, memory)
         del mesh, body
-        gc.collect()
+        give_back()
         return record
 
     def _mesh(self, case: Case, mirrors: tuple[str, ...]) -> tuple[BodyMesh, float]:
