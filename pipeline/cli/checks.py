@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipeline.cli.console import print_json
+from pipeline.cli.console import load_solvers, print_json
 from pipeline.cli.words import DEFAULT_OUTPUT, DONE, SOME_FAILED, Json, Output, fail
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ def verify(
     if coverage:
         from pipeline.verify.coverage import Coverage, trials
 
+        load_solvers()
         found = Coverage(tuple(_told(trials(comm, count, seed), _trial, speaks and not as_json)))
         right = found.is_met
         summary = {
@@ -53,6 +54,7 @@ def verify(
     else:
         from pipeline.verify import rows
 
+        load_solvers()
         if speaks and not as_json:
             print(_ROW.format("", "scene", "path", "reference", "value", "error", "bar", "source"))
         table = list(_told(rows(comm, quick=quick), _row, speaks and not as_json))
@@ -79,6 +81,7 @@ def benchmark(
     """
     from benchmarks.work_precision import main
 
+    load_solvers()
     for path in main(output, repeats, quick=quick):
         print(path)
 
@@ -104,6 +107,7 @@ def stress(
     from benchmarks.stress import line, run, summary, to_json
     from benchmarks.stress.report import heading
 
+    load_solvers()
     speaks = MPI.COMM_WORLD.rank == 0
     if speaks and not as_json:
         print(heading())

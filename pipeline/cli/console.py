@@ -2,11 +2,19 @@
 
 import json
 import os
+import signal
 import sys
 from math import isfinite
 from typing import Any, TextIO
 
 _COLOURS = {"red": "31", "yellow": "33"}
+
+
+def load_solvers() -> None:
+    """Load what solves, and leave Ctrl-C to Python: gmsh takes it for itself as it loads."""
+    import pipeline.run.execute  # noqa: F401
+
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def paint(text: str, colour: str, stream: TextIO) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipeline.cli.console import print_json
-from pipeline.cli.words import DEFAULT_OUTPUT, SOME_FAILED, Json, fail
+from pipeline.cli.words import DEFAULT_OUTPUT, SOME_FAILED, Json, check_store, fail
 
 if TYPE_CHECKING:
     from pipeline.run.store import Store
@@ -84,6 +84,7 @@ def _open(path: Path) -> "Store":
 
     if not path.exists():
         fail(f"{path}: there is no such store")
+    check_store(path)
     try:
         opened = Store(path)
     except StoreError as wrong:

@@ -26,6 +26,7 @@ from pipeline.cli.words import (
     Without,
     axes_of,
     check_names,
+    check_store,
     fail,
     load_all,
     stored_records,
@@ -86,6 +87,8 @@ def run(
     Example: mpirun -n 4 epsmesh run studies/figure3.toml
     """
     studies, left_out = load_all(files), check_names(without)
+    if store:
+        check_store(store)
     from mpi4py import MPI
 
     from pipeline import workflow
@@ -162,9 +165,12 @@ def plot(
 
     from pipeline.report.figures import draw
 
-    with xr.open_dataset(path) as dataset:
-        for picture in draw(dataset.load(), path.with_suffix("")):
-            print(picture)
+    try:
+        dataset = xr.load_dataset(path, engine="netcdf4")
+    except (OSError, ValueError) as wrong:
+        fail(f"{path}: is no dataset that can be read: {getattr(wrong, 'strerror', None) or wrong}")
+    for picture in draw(dataset, path.with_suffix("")):
+        print(picture)
 
 
 def version(as_json: Json = False) -> None:

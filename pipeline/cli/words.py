@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pipeline.run.record import Record
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+_SQLITE = b"SQLite format 3\0"
 DEFAULT_OUTPUT, DEFAULT_MESHES = Path("results"), Path("meshes/cache")
 
 Files = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Study files (TOML).", show_default=False)]
@@ -69,6 +70,7 @@ def stored_records(path: Path, plan: Plan) -> dict[str, "Record"]:
     """Return the records of a plan's cases and of their F_exact that are in the store at ``path``."""
     from pipeline.run.store import Store, StoreError
 
+    check_store(path)
     try:
         store = Store(path)
     except StoreError as problem:
@@ -76,6 +78,17 @@ def stored_records(path: Path, plan: Plan) -> dict[str, "Record"]:
     records = store.get({*plan.keys, *plan.reference_keys})
     store.close()
     return records
+
+
+def check_store(path: Path) -> None:
+    """Exit if the file at ``path`` is plainly something else than a case store: a damaged one is moved aside."""
+    if path.is_dir():
+        fail(f"--store {path}: is a folder; a case store is a file, such as {path / 'cases.sqlite'}")
+    if path.is_file() and path.suffix not in (".sqlite", ".db"):
+        with path.open("rb") as file:
+            start = file.read(len(_SQLITE))
+        if start and start != _SQLITE:
+            fail(f"--store {path}: is not a case store")
 
 
 def axes_of(study: Study) -> str:
