@@ -8,7 +8,7 @@ from pipeline.plan.describe import estimate_step
 from pipeline.plan.plan import Plan
 
 # The estimates count for as much as this share of the whole, measured.
-_TRUST = 0.02
+_TRUST = 0.005
 # What is overdue is not finished: this share of what was expected is still to come.
 _LEAST = 0.05
 
