@@ -4,17 +4,24 @@ from collections.abc import Callable
 
 import typer
 
-from pipeline.cli import checks, plan, store, study
+from pipeline.cli import checks, new, plan, store, study
+from pipeline.cli.console import make_patient
+
+_HELP = """How fine must a mesh be, and where, for the reaction force of a surgical tool?
+
+Example: epsmesh new mine && epsmesh run studies/mine.toml
+
+Exit status: 0 done, 1 some cases failed, 2 the input is wrong, 130 interrupted."""
 
 app = typer.Typer(
-    help="How fine must a mesh be, and where, for the reaction force of a surgical tool?",
+    help=_HELP,
     no_args_is_help=True,
     add_completion=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
 _COMMANDS: tuple[Callable[..., None], ...] = (
-    study.validate, plan.plan, study.run, study.status, plan.explain, study.plot,
+    new.new, study.validate, plan.plan, study.run, study.status, plan.explain, study.plot,
     checks.verify, checks.stress, checks.benchmark, study.version,
 )  # fmt: skip
 for _command in _COMMANDS:
@@ -24,4 +31,5 @@ app.add_typer(store.app, name="store")
 
 def main() -> None:
     """Run the command ``epsmesh``."""
+    make_patient()
     app(prog_name="epsmesh")

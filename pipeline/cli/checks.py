@@ -1,12 +1,12 @@
 """The commands that put the program itself to the test: verify, stress and benchmark."""
 
-import json
 from collections.abc import Iterable
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipeline.cli.console import load_solvers, print_json
 from pipeline.cli.words import DEFAULT_OUTPUT, DONE, SOME_FAILED, Json, Output, fail
 
 if TYPE_CHECKING:
@@ -18,14 +18,14 @@ Quick = Annotated[bool, typer.Option("--quick", help="A few rows of each kind.")
 
 def verify(
     coverage: Annotated[bool, typer.Option("--coverage", help="Random scenes: do the error bars hold?")] = False,
-    count: Annotated[int, typer.Option(help="Number of random scenes.", min=1)] = 160,
-    seed: Annotated[int, typer.Option(help="Seed of the random scenes.")] = 2026,
+    count: Annotated[int, typer.Option(metavar="N", help="Number of random scenes.", min=1)] = 160,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the random scenes.")] = 2026,
     quick: Quick = False,
     as_json: Json = False,
 ) -> None:
-    """Compare forces with closed forms, published tables and manufactured solutions.
+    """Compare forces with closed forms and published tables.
 
-    Exit status 1 if any row is out.
+    Manufactured solutions too, and the program's other paths.     Exit status 1 if any row is out.
 
     Example: epsmesh verify
 
@@ -38,13 +38,14 @@ def verify(
     if coverage:
         from pipeline.verify.coverage import Coverage, trials
 
+        load_solvers()
         found = Coverage(tuple(_told(trials(comm, count, seed), _trial, speaks and not as_json)))
         right = found.is_met
         summary = {
             "cases": len(found.trials), "held": found.held, "median_bar_over_error": found.ratio, "met": right,
         }  # fmt: skip
         if speaks and as_json:
-            print(json.dumps({**summary, "trials": [asdict(trial) for trial in found.trials]}, indent=2))
+            print_json({**summary, "trials": [asdict(trial) for trial in found.trials]})
         elif speaks:
             print(
                 f"{found.held:.1%} of {len(found.trials)} error bars hold the truth (95 % asked for); median of "
@@ -53,12 +54,13 @@ def verify(
     else:
         from pipeline.verify import rows
 
+        load_solvers()
         if speaks and not as_json:
             print(_ROW.format("", "scene", "path", "reference", "value", "error", "bar", "source"))
         table = list(_told(rows(comm, quick=quick), _row, speaks and not as_json))
         right = all(row.is_right for row in table)
         if speaks and as_json:
-            print(json.dumps([{**asdict(r), "error": r.error, "right": r.is_right} for r in table], indent=2))
+            print_json([{**asdict(r), "error": r.error, "right": r.is_right} for r in table])
         elif speaks:
             out = sum(not row.is_right for row in table)
             print(f"{len(table)} rows, {out} out" if out else f"{len(table)} rows, all right")
@@ -67,29 +69,34 @@ def verify(
 
 def benchmark(
     output: Output = DEFAULT_OUTPUT,
-    repeats: Annotated[int, typer.Option(help="Runs of each point; the median counts.", min=1)] = 3,
+    repeats: Annotated[int, typer.Option(metavar="N", help="Runs of each point; the median counts.", min=1)] = 3,
     quick: Quick = False,
 ) -> None:
-    """Measure the error of F against run time and unknowns, for every kind of element and mesh.
+    """Measure the error of F against run time and unknowns.
 
-    Writes work_precision.nc and its figure. Wants an idle machine, and takes ten minutes.
+    For every kind of element and mesh. Writes work_precision.nc and its figure. Wants an idle machine, and takes ten
+    minutes.
 
     Example: epsmesh benchmark
     """
     from benchmarks.work_precision import main
 
+    load_solvers()
     for path in main(output, repeats, quick=quick):
         print(path)
 
 
 def stress(
-    names: Annotated[list[str] | None, typer.Argument(help="Rows to run [default: all].", show_default=False)] = None,
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="ROW...", help="Rows to run [default: all].", show_default=False)
+    ] = None,
     quick: Quick = False,
     as_json: Json = False,
 ) -> None:
-    """Put extremes of every input to the program, against references and invariances.
+    """Put extremes of every input to the program.
 
-    Exit status 1 if any cell fails: that is, returns a wrong number with a good status.
+    Results are held against references and invariances. Exit status 1 if any cell fails: that is, returns a wrong
+    number with a good status.
 
     Example: epsmesh stress
 
@@ -100,6 +107,7 @@ def stress(
     from benchmarks.stress import line, run, summary, to_json
     from benchmarks.stress.report import heading
 
+    load_solvers()
     speaks = MPI.COMM_WORLD.rank == 0
     if speaks and not as_json:
         print(heading())

@@ -1,18 +1,20 @@
 """The commands that tell what a run would do, before it is begun."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipeline.cli.console import print_json
 from pipeline.cli.words import (
     DEFAULT_OUTPUT,
     File,
     Json,
     Output,
+    Quiet,
     StoreFile,
+    Verbose,
     Without,
     axes_of,
     check_names,
@@ -23,6 +25,7 @@ from pipeline.cli.words import (
 )
 from pipeline.plan.describe import story, summary
 from pipeline.plan.plan import Plan, declare, make_plan
+from pipeline.run.remaining import format_seconds
 from pipeline.study.sweep import Case, Study, format_label
 
 if TYPE_CHECKING:
@@ -37,10 +40,14 @@ def plan(
     output: Output = DEFAULT_OUTPUT,
     store: StoreFile = None,
     without: Without = None,
-    ranks: Annotated[int, typer.Option(help="Ranks that the run will have.", min=1)] = 1,
+    ranks: Annotated[int, typer.Option(metavar="N", help="Ranks that the run will have.", min=1)] = 1,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
     as_json: Json = False,
 ) -> None:
-    """Show what a study needs done, what is struck out and why, and what it will take.
+    """Show what a study needs done, and what is struck out.
+
+    With the reasons, and an estimate of time and memory.
 
     Example: epsmesh plan studies/figure3.toml
 
@@ -50,37 +57,48 @@ def plan(
     made, _ = _planned(study, output, store, check_names(without))
     found = summary(made, ranks)
     if as_json:
-        print(json.dumps(found, indent=2))
+        print_json(found)
+        return
+    exact = f" ({found['exact']} of them for F_exact)" if found["exact"] else ""
+    to_do = f"{found['meshes']} meshes, {found['operators']} operators, {found['solves']} solves{exact}"
+    on = f"on {ranks} {'rank' if ranks == 1 else 'ranks'}"
+    cost = f"{format_seconds(found['seconds'])} {on}, {found['memory'] / 1e9:.1f} GB for the largest step"
+    if quiet:
+        print(f"{file}: {found['cases']} cases; to do: {to_do}{f'; {cost}' if found['steps'] else ''}")
         return
     warn(study)
     print(f"{study.title}: {found['cases']} cases{axes_of(study)}")
     for struck in found["struck"]:
         print(f"  {struck['name']:13} {struck['count']:6}  {struck['reason']}")
-    exact = f" ({found['exact']} of them for F_exact)" if found["exact"] else ""
-    print(f"  to do: {found['meshes']} meshes, {found['operators']} operators, {found['solves']} solves{exact}")
+    print(f"  to do: {to_do}")
     if found["steps"]:
-        ground = f"fitted to {found['fitted_to']} cases on record" if found["fitted_to"] else "nothing on record yet"
-        on = "1 rank" if ranks == 1 else f"{ranks} ranks"
-        print(
-            f"  estimate: {_seconds(found['seconds'])} on {on}, {found['memory'] / 1e9:.1f} GB for the largest step"
-            f" ({ground}; a step's time is typically right within a factor of {found['factor']:.1f})"
-        )
-        steps = sorted(found["steps"], key=lambda step: -step["seconds"])
-        for step in steps[:_MOST_STEPS]:
-            print(_line(step))
-        if len(steps) > _MOST_STEPS:
-            print(f"    … and {len(steps) - _MOST_STEPS} smaller steps")
+        print(f"  estimate: {cost}")
+        ground = f"{found['fitted_to']} cases on record" if found["fitted_to"] else "no case on record yet"
+        print(f"    ({ground}; a step's time is typically right within a factor of {found['factor']:.1f})")
+        _list_steps(found["steps"], None if verbose else _MOST_STEPS)
+
+
+def _list_steps(steps: list[dict[str, Any]], most: int | None) -> None:
+    """Print a line for each step, the costliest first."""
+    for step in sorted(steps, key=lambda step: -step["seconds"])[:most]:
+        print(_line(step))
+    if most is not None and len(steps) > most:
+        print(f"    … and {len(steps) - most} smaller steps: --verbose lists them")
 
 
 def explain(
     file: File,
-    case: Annotated[str, typer.Argument(help='A case: "poisson=0.3, epsilon=10 mm", or its number.')] = "0",
+    case: Annotated[
+        str, typer.Argument(metavar="CASE", help='A case: "poisson=0.3, epsilon=10 mm", or its number.')
+    ] = "0",
     output: Output = DEFAULT_OUTPUT,
     store: StoreFile = None,
     without: Without = None,
     as_json: Json = False,
 ) -> None:
-    """Tell one case's story: its steps, what it shares, where its record came from, what a change would cost.
+    """Tell one case's story: its steps and where its force is from.
+
+    Also what it shares with others, and what a change would cost.
 
     Example: epsmesh explain studies/figure3.toml "poisson=0.3, epsilon=10 mm, outside=free"
     """
@@ -94,7 +112,7 @@ def explain(
                            "force_error": record.force_error, "seconds": record.time_total,
                            **record.provenance}  # fmt: skip
     if as_json:
-        print(json.dumps(found, indent=2))
+        print_json(found)
         return
     print(found["case"])
     for name, value in found.items():
@@ -155,14 +173,10 @@ def _squeezed(text: Any) -> str:
         return number
 
 
-def _seconds(value: float) -> str:
-    return f"{value:.1f} s" if value < 100 else f"{value / 60:.0f} min"
-
-
 def _line(step: dict[str, Any]) -> str:
     size, gigabytes, ranks = f"{step['cells']:9.0f} cells", step["memory"] / 1e9, step["ranks"]
     on = f"on {ranks} rank" + "s" * (ranks > 1)
     return (
-        f"    {step['kind']:8} {size} {step['solves']:4} solves {_seconds(step['seconds']):>8} {on}"
+        f"    {step['kind']:8} {size} {step['solves']:4} solves {format_seconds(step['seconds']):>8} {on}"
         f" {gigabytes:5.1f} GB  {step['case']}"
     )

@@ -1,20 +1,22 @@
 """The commands that look after the case store and the mesh cache."""
 
-import json
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipeline.cli.words import DEFAULT_OUTPUT, SOME_FAILED, Json, fail
+from pipeline.cli.console import print_json
+from pipeline.cli.words import DEFAULT_OUTPUT, SOME_FAILED, Json, check_store, fail
 
 if TYPE_CHECKING:
     from pipeline.run.store import Store
 
-app = typer.Typer(no_args_is_help=True, help="Look after the case store: list, prune, verify.")
+app = typer.Typer(
+    no_args_is_help=True, help="Look after the case store: list, prune, verify.\n\nExample: epsmesh store list"
+)
 
-StoreFile = Annotated[Path, typer.Option("--store", help="The case store.")]
+StoreFile = Annotated[Path, typer.Option("--store", metavar="FILE", help="The case store.")]
 DEFAULT_STORE = DEFAULT_OUTPUT / "cases.sqlite"
 
 
@@ -34,7 +36,7 @@ def list_records(store: StoreFile = DEFAULT_STORE, as_json: Json = False) -> Non
         "seconds": sum(r.time_total for r in rows if r.is_ok),
     }  # fmt: skip
     if as_json:
-        print(json.dumps(content, indent=2))
+        print_json(content)
         return
     print(f"{store}: {len(rows)} records, {content['bytes'] / 1e6:.1f} MB, {content['seconds']:.0f} s of work")
     for name in ("status", "origin", "versions"):
@@ -45,7 +47,9 @@ def list_records(store: StoreFile = DEFAULT_STORE, as_json: Json = False) -> Non
 @app.command()
 def prune(
     store: StoreFile = DEFAULT_STORE,
-    days: Annotated[float | None, typer.Option(help="Remove what was stored longer ago.", min=0)] = None,
+    days: Annotated[
+        float | None, typer.Option(metavar="DAYS", help="Remove what was stored longer ago.", min=0)
+    ] = None,
     failed: Annotated[bool, typer.Option("--failed", help="Remove failed cases.")] = False,
 ) -> None:
     """Remove records that are old or failed, and those that cannot be read.
@@ -80,6 +84,7 @@ def _open(path: Path) -> "Store":
 
     if not path.exists():
         fail(f"{path}: there is no such store")
+    check_store(path)
     try:
         opened = Store(path)
     except StoreError as wrong:

@@ -1,14 +1,17 @@
 """The commands that run studies and show what came of them."""
 
-import json
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipeline import __version__, stages
+from pipeline import __version__
+from pipeline.cli.console import error, print_json
+from pipeline.cli.outcome import announce, as_data, conclude, print_stages
 from pipeline.cli.words import (
     BAD_INPUT,
+    DEFAULT_MESHES,
     DEFAULT_OUTPUT,
     DONE,
     INTERRUPTED,
@@ -17,11 +20,13 @@ from pipeline.cli.words import (
     Files,
     Json,
     Output,
+    Quiet,
     StoreFile,
+    Verbose,
     Without,
     axes_of,
     check_names,
-    error,
+    check_store,
     fail,
     load_all,
     stored_records,
@@ -33,7 +38,6 @@ from pipeline.study.problems import StudyError
 
 if TYPE_CHECKING:
     from pipeline.run.progress import Terminal
-    from pipeline.workflow import Opened, Outcome
 
 
 def validate(files: Files, as_json: Json = False) -> None:
@@ -58,60 +62,73 @@ def validate(files: Files, as_json: Json = False) -> None:
             warn(study)
             print(f"{file}: fine; {cases} cases{axes_of(study)}")
     if as_json:
-        print(json.dumps(report, indent=2))
+        print_json(report)
     raise typer.Exit(BAD_INPUT if failed else DONE)
 
 
 def run(
     files: Files,
-    output: Annotated[Path, typer.Option(help="Folder for <study>.nc and the figure.")] = DEFAULT_OUTPUT,
+    output: Annotated[Path, typer.Option(metavar="DIR", help="Folder for <study>.nc and the figure.")] = DEFAULT_OUTPUT,
     store: StoreFile = None,
-    meshes: Annotated[Path, typer.Option(help="Folder of the meshes that are kept.")] = Path("meshes/cache"),
+    meshes: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the meshes that are kept.")] = DEFAULT_MESHES,
     fresh: Annotated[bool, typer.Option("--fresh", help="Compute again what is stored.")] = False,
     without: Without = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    as_json: Json = False,
     profile: Annotated[bool, typer.Option("--profile", help="Print where the time went (on the first rank).")] = False,
 ) -> None:
     """Run studies: forces, timings, dataset and figure. Under mpirun, on all ranks.
 
-    Cases that are stored already are read back, so an interrupted run goes on where it was.
+    Cases that are stored already are read back, so an interrupted run goes on where it was. With --json standard
+    output holds one object, at the end; progress goes to standard error.
 
     Example: epsmesh run studies/figure3.toml
 
     Example: mpirun -n 4 epsmesh run studies/figure3.toml
     """
     studies, left_out = load_all(files), check_names(without)
+    if store:
+        check_store(store)
     from mpi4py import MPI
 
     from pipeline import workflow
     from pipeline.run.store import StoreError
 
-    comm, failed = MPI.COMM_WORLD, False
-    speaks = comm.rank == 0
+    comm, found = MPI.COMM_WORLD, list[dict[str, Any]]()
+    speaks, failed = comm.rank == 0, False
     for study in studies:
+        start = time.monotonic()
         try:
             plan, opened = workflow.prepare(
                 study, comm, store or output / "cases.sqlite", fresh=fresh, without=left_out, meshes=meshes
             )
             if speaks:
-                _announce(plan, opened, quiet)
+                announce(plan, opened, quiet=quiet or as_json, verbose=verbose)
+            progress = _progress(plan, verbose=verbose) if speaks and not quiet else None
             with workflow.abort_on_exception(comm):
-                outcome = workflow.run(plan, opened, comm, output, _progress(plan) if speaks and not quiet else None)
+                outcome = workflow.run(plan, opened, comm, output, progress)
         except StoreError as wrong:
             fail(str(wrong))
         if speaks:
-            _conclude(plan, outcome, quiet)
-        if outcome.interrupted:
-            workflow.end_ranks(comm, INTERRUPTED)
-            raise typer.Exit(INTERRUPTED)
+            seconds = time.monotonic() - start
+            conclude(plan, opened, outcome, seconds, quiet=quiet or as_json)
+            found.append(as_data(plan, opened, outcome, seconds))
         failed = failed or outcome.counts["failed"] > 0
-    if profile and speaks:
-        _print_stages()
-    raise typer.Exit(SOME_FAILED if failed else DONE)
+        if outcome.interrupted:
+            break
+    ended = INTERRUPTED if outcome.interrupted else SOME_FAILED if failed else DONE
+    if speaks and profile:
+        print_stages()
+    if speaks and as_json:
+        print_json({"status": ended, "studies": found})
+    if outcome.interrupted:
+        workflow.end_ranks(comm, INTERRUPTED)
+    raise typer.Exit(ended)
 
 
 def status(file: File, output: Output = DEFAULT_OUTPUT, store: StoreFile = None, as_json: Json = False) -> None:
-    """Say which cases of a study are done, failed, or still to be run.
+    """Say which cases are done, failed, or still to be run.
 
     Example: epsmesh status studies/figure3.toml
     """
@@ -127,7 +144,7 @@ def status(file: File, output: Output = DEFAULT_OUTPUT, store: StoreFile = None,
         if record and record.status == "failed":
             failed.append({"case": str(case), "message": record.message})
     if as_json:
-        print(json.dumps({"file": str(file), **counts, "failures": failed}, indent=2))
+        print_json({"file": str(file), **counts, "failures": failed})
         return
     print(f"{file}: {counts['ok']} done, {counts['failed']} failed, {counts['pending']} pending{axes_of(study)}")
     for failure in failed:
@@ -135,7 +152,9 @@ def status(file: File, output: Output = DEFAULT_OUTPUT, store: StoreFile = None,
 
 
 def plot(
-    file: Annotated[Path, typer.Argument(help="A dataset (.nc), or a study file whose dataset exists.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A dataset (.nc), or a study file whose dataset exists.")
+    ],
     output: Output = DEFAULT_OUTPUT,
 ) -> None:
     """Draw the figure of a dataset again, as PNG and SVG.
@@ -149,57 +168,32 @@ def plot(
 
     from pipeline.report.figures import draw
 
-    with xr.open_dataset(path) as dataset:
-        for picture in draw(dataset.load(), path.with_suffix("")):
-            print(picture)
+    try:
+        dataset = xr.load_dataset(path, engine="netcdf4")
+    except (OSError, ValueError) as wrong:
+        fail(f"{path}: is no dataset that can be read: {getattr(wrong, 'strerror', None) or wrong}")
+    for picture in draw(dataset, path.with_suffix("")):
+        print(picture)
 
 
-def version() -> None:
-    """Print the versions of the program and of the libraries that a force depends on."""
+def version(as_json: Json = False) -> None:
+    """Print the versions that a force depends on.
+
+    Example: epsmesh version --json
+    """
     from pipeline.run.provenance import provenance
 
-    for name, value in {"version_epsmesh": __version__, **provenance(ranks=1)}.items():
-        if name.startswith("version_"):
-            print(f"{name.removeprefix('version_'):10} {value}")
-
-
-def _progress(plan: Plan) -> "Terminal":
-    from pipeline.run.progress import Terminal
-
-    return Terminal(len(plan.solves))
-
-
-def _print_stages() -> None:
-    for name, seconds, share in stages.table():
-        print(f"{seconds:10.2f} s  {100 * share:5.1f} %  {name}")
-
-
-def _announce(plan: Plan, opened: "Opened", quiet: bool) -> None:
-    """Say, before the run, what is to be done and what is not, and why."""
-    if opened.notice:
-        error(opened.notice)
-    if quiet:
+    known = {"version_epsmesh": __version__, **provenance(ranks=1)}
+    versions = {k.removeprefix("version_"): v for k, v in known.items() if k.startswith("version_")}
+    if as_json:
+        print_json(versions)
         return
-    study = plan.study
-    warn(study)
-    print(f"{study.title}: {len(plan.keys)} cases{axes_of(study)}")
-    for struck in plan.struck:
-        print(f"  {struck.name:13} {struck.count:6}  {struck.reason}")
-    if study.solve.timing:
-        print(f"  timing: every case afresh and alone, median of {study.solve.repeats}; nothing is struck out")
-    if plan.solves:
-        print(f"  to do: {len(plan.meshes)} meshes, {len(plan.solves)} solves", flush=True)
+    for name, value in versions.items():
+        print(f"{name:10} {value}")
 
 
-def _conclude(plan: Plan, outcome: "Outcome", quiet: bool) -> None:
-    """Say, after the run, what came of it and where it is."""
-    study = plan.study
-    for case, message in outcome.failures:
-        error(f"failed: {case}: {message}")
-    if not quiet:
-        counts = ", ".join(f"{count} {state}" for state, count in outcome.counts.items() if count)
-        print(f"{study.file}: {counts}; wrote {', '.join(map(str, outcome.files))}", flush=True)
-    if outcome.interrupted:
-        done = len(plan.keys) - outcome.counts["pending"]
-        again = f"`epsmesh run {study.file}` goes on from there"
-        error(f"interrupted: {done} of {len(plan.keys)} cases are on record; {again}")
+def _progress(plan: Plan, *, verbose: bool) -> "Terminal":
+    from pipeline.run.progress import Terminal
+    from pipeline.run.remaining import Remaining, expectations
+
+    return Terminal(len(plan.solves), Remaining(expectations(plan)), verbose=verbose)

@@ -1,16 +1,16 @@
 """What every command says and takes: options, errors, exit statuses. Only the command line prints and exits."""
 
 import os
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
+from pipeline.cli.console import error, warning
 from pipeline.plan.cost import CostModel
 from pipeline.plan.plan import Plan
 from pipeline.study.load import load
-from pipeline.study.problems import StudyError
+from pipeline.study.problems import StudyError, nearest
 from pipeline.study.schema import REDUCTIONS
 from pipeline.study.sweep import Study
 
@@ -18,16 +18,33 @@ if TYPE_CHECKING:
     from pipeline.run.record import Record
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-DEFAULT_OUTPUT = Path("results")
+_SQLITE = b"SQLite format 3\0"
+DEFAULT_OUTPUT, DEFAULT_MESHES = Path("results"), Path("meshes/cache")
 
-Files = Annotated[list[Path], typer.Argument(help="Study files (TOML).", show_default=False)]
-File = Annotated[Path, typer.Argument(help="A study file (TOML).", show_default=False)]
-Output = Annotated[Path, typer.Option(help="Folder of the results.")]
-StoreFile = Annotated[Path | None, typer.Option("--store", help="Case store [default: OUTPUT/cases.sqlite].")]
+Files = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Study files (TOML).", show_default=False)]
+File = Annotated[Path, typer.Argument(metavar="FILE", help="A study file (TOML).", show_default=False)]
+Output = Annotated[Path, typer.Option(metavar="DIR", help="Folder of the results.")]
+StoreFile = Annotated[
+    Path | None, typer.Option("--store", metavar="FILE", help="Case store [default: DIR/cases.sqlite].")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the least: errors, and what was asked for.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print more: every step, every case.")]
+
+
+def reductions(incomplete: str) -> list[str]:
+    """Return the reductions whose names begin so, for the shell to complete."""
+    return [name for name in REDUCTIONS if name.startswith(incomplete)]
+
+
 Without = Annotated[
     list[str] | None,
-    typer.Option(help=f"A reduction not to use; may be repeated: {', '.join(REDUCTIONS)}.", show_default=False),
+    typer.Option(
+        metavar="NAME",
+        help=f"A reduction not to use; may be repeated: {', '.join(REDUCTIONS)}.",
+        show_default=False,
+        autocompletion=reductions,
+    ),
 ]
 
 
@@ -56,6 +73,7 @@ def stored_records(path: Path, plan: Plan) -> tuple[dict[str, "Record"], CostMod
         return {}, CostModel()
     from pipeline.run.store import Store, StoreError
 
+    check_store(path)
     try:
         store = Store(path)
     except StoreError as problem:
@@ -63,6 +81,17 @@ def stored_records(path: Path, plan: Plan) -> tuple[dict[str, "Record"], CostMod
     records, cost = store.get({*plan.keys, *plan.reference_keys}), store.cost_model()
     store.close()
     return records, cost
+
+
+def check_store(path: Path) -> None:
+    """Exit if the file at ``path`` is plainly something else than a case store: a damaged one is moved aside."""
+    if path.is_dir():
+        fail(f"--store {path}: is a folder; a case store is a file, such as {path / 'cases.sqlite'}")
+    if path.is_file() and path.suffix not in (".sqlite", ".db"):
+        with path.open("rb") as file:
+            start = file.read(len(_SQLITE))
+        if start and start != _SQLITE:
+            fail(f"--store {path}: is not a case store")
 
 
 def axes_of(study: Study) -> str:
@@ -73,13 +102,8 @@ def axes_of(study: Study) -> str:
 
 def warn(study: Study) -> None:
     """Print the warnings of a study."""
-    for warning in study.warnings:
-        error(f"warning: {warning}")
-
-
-def error(text: str) -> None:
-    """Print to standard error."""
-    print(text, file=sys.stderr, flush=True)
+    for text in study.warnings:
+        warning(text)
 
 
 def fail(text: str) -> NoReturn:
@@ -99,5 +123,5 @@ def check_names(without: list[str] | None) -> tuple[str, ...]:
     """Return the names of reductions, or exit if there is none of such a name."""
     unknown = [name for name in without or () if name not in REDUCTIONS]
     if unknown:
-        fail(f"--without {unknown[0]}: no reduction is called so; there are {', '.join(REDUCTIONS)}")
+        fail(f"--without {unknown[0]}: no reduction is called so; {nearest(unknown[0], REDUCTIONS)}")
     return tuple(without or ())

@@ -1,9 +1,15 @@
-"""Progress on long work: a bar where someone watches, a plain line a case where output goes to a file."""
+"""Progress on long work: one line where someone watches, a plain line now and then where output goes to a file."""
 
 import sys
 import time
 from types import TracebackType
 from typing import Any, Protocol
+
+from pipeline.run.remaining import Remaining, format_seconds
+
+# In a file a line is written for each of these shares of the work, and when this many seconds went by without one.
+_SHARE, _SILENCE = 0.05, 30.0
+_MESHING = "meshing: "
 
 
 class Progress(Protocol):
@@ -27,23 +33,38 @@ class Silent:
 
 
 class Terminal:
-    """Progress for people, as a context manager: rich's bar on a terminal, else plain lines."""
+    """Progress for people, as a context manager: rich's bar on a terminal, else plain lines.
 
-    def __init__(self, total: int):
+    ``remaining`` tells the time left, of the whole and of the step under way; ``verbose`` gives every case its line.
+    """
+
+    def __init__(self, total: int, remaining: Remaining | None = None, *, verbose: bool = False):
         self._total, self._count, self._start = total, 0, time.monotonic()
+        self._remaining, self._verbose = remaining, verbose
+        self._told, self._told_count = self._start, 0
+        self._step: int | None = None
         self._bar: Any = None
         self._task: Any = None
 
     def __enter__(self) -> "Terminal":
         if sys.stderr.isatty() and self._total:
             from rich.console import Console
-            from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+            from rich.progress import BarColumn, MofNCompleteColumn, ProgressColumn, TextColumn
             from rich.progress import Progress as Bar
             from rich.table import Column
+            from rich.text import Text
 
-            numbers = (MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
+            class Times(ProgressColumn):
+                """Time gone and time left, as of now."""
+
+                def render(column, _: Any) -> Text:
+                    return Text(self._times())
+
             # What is being worked on gives way to the numbers where the terminal is narrow.
-            words = TextColumn("{task.description}", table_column=Column(ratio=1, no_wrap=True, overflow="ellipsis"))
+            words = TextColumn(
+                "{task.description}", markup=False, table_column=Column(ratio=1, no_wrap=True, overflow="ellipsis")
+            )
+            numbers = (MofNCompleteColumn(), Times(table_column=Column(no_wrap=True)))
             console = Console(stderr=True)
             self._bar = Bar(BarColumn(bar_width=20), *numbers, words, console=console, transient=True, expand=True)
             self._bar.start()
@@ -59,16 +80,46 @@ class Terminal:
     def done(self, label: str, failed: str = "") -> None:
         """Count a case."""
         self._count += 1
+        if self._remaining is not None:
+            self._remaining.done(label, counts=not failed)
+            self._step = self._remaining.step_of(label)
         if self._bar is not None:
             self._bar.advance(self._task)
-            if failed:
-                self._bar.console.print(f"failed: {label}: {failed}", style="red", markup=False, highlight=False)
-            return
-        seconds = time.monotonic() - self._start
-        text = f"[{self._count}/{self._total}] {seconds:.1f} s  {label}"
-        print(f"{text}  FAILED: {failed}" if failed else text, file=sys.stderr, flush=True)
+        if self._is_worth_a_line() or failed:
+            self._line(f"{label}  FAILED: {failed}" if failed else label, "red" if failed else "")
 
     def note(self, text: str) -> None:
         """Show what is being worked on."""
+        step = self._remaining.step_of(text.removeprefix(_MESHING)) if self._remaining is not None else None
+        self._step = self._step if step is None else step
         if self._bar is not None:
             self._bar.update(self._task, description=text)
+        elif self._verbose or time.monotonic() - self._told > _SILENCE:
+            self._line(f"… {text}")
+
+    def _is_worth_a_line(self) -> bool:
+        if self._verbose:
+            return True
+        if self._bar is not None:
+            return False
+        enough = self._count - self._told_count >= _SHARE * self._total or self._count == self._total
+        return enough or time.monotonic() - self._told > _SILENCE
+
+    def _line(self, text: str, style: str = "") -> None:
+        self._told, self._told_count = time.monotonic(), self._count
+        line = f"[{self._count}/{self._total}] {self._times()}  {text}"
+        if self._bar is not None:
+            self._bar.console.print(line, style=style, markup=False, highlight=False, soft_wrap=True)
+        else:
+            print(line, file=sys.stderr, flush=True)
+
+    def _times(self) -> str:
+        gone = format_seconds(time.monotonic() - self._start)
+        if self._remaining is None or self._count == self._total:
+            return gone
+        left = f"{gone}, about {format_seconds(self._remaining.seconds())} left"
+        if self._step is None or self._remaining.steps == 1 or self._bar is None:
+            return left
+        step = f"step {self._step + 1}/{self._remaining.steps}"
+        seconds = self._remaining.step_seconds(self._step)
+        return f"{left} ({step}: {format_seconds(seconds)})" if seconds > 0 else left

@@ -1,0 +1,83 @@
+"""How the command line speaks: colour where a person watches, plain text elsewhere; nobody listening ends nothing."""
+
+import json
+import os
+import signal
+import sys
+from math import isfinite
+from typing import Any, TextIO
+
+_COLOURS = {"red": "31", "yellow": "33"}
+
+
+def load_solvers() -> None:
+    """Load what solves, and leave Ctrl-C to Python: gmsh takes it for itself as it loads."""
+    import pipeline.run.execute  # noqa: F401
+
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def paint(text: str, colour: str, stream: TextIO) -> str:
+    """Return ``text`` in a colour if ``stream`` is a terminal and the environment does not ask for none."""
+    plain = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb" or not stream.isatty()
+    return text if plain else f"\033[{_COLOURS[colour]}m{text}\033[0m"
+
+
+def error(text: str) -> None:
+    """Print to standard error, in red."""
+    print(paint(text, "red", sys.stderr), file=sys.stderr, flush=True)
+
+
+def warning(text: str) -> None:
+    """Print a warning to standard error, in yellow."""
+    print(paint(f"warning: {text}", "yellow", sys.stderr), file=sys.stderr, flush=True)
+
+
+def print_json(value: Any) -> None:
+    """Print ``value`` as JSON, with null for what JSON has no number for."""
+    print(json.dumps(_plain(value), indent=2, ensure_ascii=False), flush=True)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(v) for key, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    return None if isinstance(value, float) and not isfinite(value) else value
+
+
+class Patient:
+    """A stream whose reader may go away: what is then written is dropped, and the command goes on to its end."""
+
+    def __init__(self, stream: TextIO):
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write ``text``, or drop it."""
+        try:
+            return self._stream.write(text)
+        except BrokenPipeError:
+            self._drop()
+            return len(text)
+
+    def flush(self) -> None:
+        """Flush, or drop what is left."""
+        try:
+            self._stream.flush()
+        except BrokenPipeError:
+            self._drop()
+
+    def _drop(self) -> None:
+        # What the buffer still holds must go somewhere when Python ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+def make_patient() -> None:
+    """Let standard output and error outlive their readers: ``epsmesh plan … | head``."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is not None and not stream.isatty():
+            setattr(sys, name, Patient(stream))

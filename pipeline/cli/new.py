@@ -1,0 +1,70 @@
+"""The command that begins a study file."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pipeline.cli.words import fail
+from pipeline.study.problems import nearest
+from pipeline.study.starter import examples, starter
+
+_FOLDER = Path("studies")
+
+
+def _names(incomplete: str) -> list[str]:
+    """Return the names of known studies that begin so, for the shell to complete."""
+    return [name for name in _known() if name.startswith(incomplete)]
+
+
+def new(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the study, or a path ending in .toml.")],
+    like: Annotated[
+        str | None,
+        typer.Option(
+            metavar="STUDY",
+            help="Begin with a copy of this study: a name in studies/, or a path.",
+            show_default=False,
+            autocompletion=_names,
+        ),
+    ] = None,
+) -> None:
+    """Begin a study file: studies/NAME.toml. An existing file is left alone.
+
+    Without --like it is a small study in which every key is explained.
+
+    Example: epsmesh new mine
+
+    Example: epsmesh new mine --like figure3
+    """
+    path = Path(name) if name.endswith(".toml") else _FOLDER / f"{name}.toml"
+    if path.stem != path.stem.strip() or not path.stem.replace("-", "").replace("_", "").replace(".", "").isalnum():
+        fail(f"NAME = {name!r}: must be letters, digits, - and _: results are called after it")
+    text = starter(path.stem) if like is None else _copy_of(like)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        fail(f"{path}: exists already, and is left alone; give another name")
+    except OSError as problem:
+        fail(f"{path}: {problem.strerror or problem}")
+    print(f"{path}: edit it, then `epsmesh plan {path}` and `epsmesh run {path}`")
+
+
+def _copy_of(like: str) -> str:
+    """Return the text of a study given by name or path."""
+    known = _known()
+    path = known.get(like, Path(like))
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as problem:
+        if path.suffix == ".toml" or len(path.parts) > 1:
+            reason = getattr(problem, "strerror", None) or "is not UTF-8 text"
+            fail(f"--like {like}: {reason}")
+        fail(f"--like {like}: there is no study of that name; {nearest(like, known)}")
+
+
+def _known() -> dict[str, Path]:
+    """Return the studies at hand by name: those of the folder studies/ here, then those that came with the program."""
+    return examples() | {path.stem: path for path in sorted(_FOLDER.glob("*.toml"))}

@@ -1,0 +1,49 @@
+"""A first study file, with every key that there is explained; and the studies that come with the program."""
+
+import json
+import textwrap
+from pathlib import Path
+
+from pipeline.study.keys import SECTION_TEXTS, Key, keys_of
+from pipeline.study.schema import SECTIONS
+
+# The studies of the checkout, which are installed with the package.
+EXAMPLES = Path(__file__).parent / "examples"
+_WIDTH = 110
+
+
+def starter(name: str) -> str:
+    """Return the text of a study of a disc on a box that takes seconds; what is optional is there as comments."""
+    lines = [
+        "# A list where one value is expected is a sweep, and a dimension of the dataset. Lengths and pressures carry",
+        "# their units. Behind each key stands what it takes; keys that are commented out may be left out.",
+        f"title = {json.dumps(name, ensure_ascii=False)}",
+    ]
+    for section in SECTIONS:
+        lines += ["", *_comment(SECTION_TEXTS.get(section, "")), f"[{section}]"]
+        keys = keys_of(section)
+        chosen = next((json.loads(key.words.example) for key in keys if key.name == "shape"), "")
+        for key in keys:
+            lines += _lines(key, chosen)
+    return "\n".join(lines) + "\n"
+
+
+def examples() -> dict[str, Path]:
+    """Return the studies that come with the program, by name."""
+    return {path.stem: path for path in sorted(EXAMPLES.glob("*.toml"))}
+
+
+def _lines(key: Key, chosen: str) -> list[str]:
+    """Return a key's comment and its line; the line is a comment, too, where the starter does without."""
+    belongs = not key.shapes or chosen in key.shapes
+    shape = "" if belongs else f"{' or '.join(key.shapes).capitalize()}. "
+    mark = "" if key.words.is_used and belongs else "# "
+    default = f"; default {key.default}" if key.default and not key.default.startswith("required") else ""
+    line, takes = f"{mark}{key.name} = {key.words.example}", f"{key.takes}{default}"
+    if len(line) + len(takes) + 4 > _WIDTH:
+        return [*_comment(f"{shape}{key.words.text} ({takes})"), line]
+    return [*_comment(f"{shape}{key.words.text}"), f"{line}  # {takes}"]
+
+
+def _comment(text: str) -> list[str]:
+    return textwrap.wrap(text, _WIDTH, initial_indent="# ", subsequent_indent="# ", break_on_hyphens=False)

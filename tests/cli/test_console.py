@@ -1,0 +1,135 @@
+"""How the command line speaks: to people, to files, to scripts, and to nobody."""
+
+import json
+import os
+import pty
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from pipeline.cli import app
+from tests.test_cli import ENVIRONMENT, ROOT, SMALL, epsmesh
+
+COMMANDS = sorted(command.name or command.callback.__name__ for command in app.registered_commands)
+
+
+def on_terminal(*arguments: str, **environment: str) -> str:
+    """Return what a command writes to a terminal."""
+    leader, follower = pty.openpty()
+    settings = {**ENVIRONMENT, "TERM": "xterm", "PYTHONPATH": str(ROOT), **environment}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "pipeline", *arguments], stdout=follower, stderr=follower, cwd=ROOT, env=settings
+    )
+    os.close(follower)
+    text = b""
+    while True:
+        try:
+            read = os.read(leader, 4096)
+        except OSError:  # the other end is closed
+            break
+        text += read
+    os.close(leader)
+    process.wait(timeout=60)
+    return text.decode()
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help_with_an_example(command):
+    shown = CliRunner().invoke(app, [command, "--help"])
+    assert shown.exit_code == 0
+    assert "Example: " in shown.stdout
+    assert f"epsmesh {command}" in shown.stdout
+
+
+def test_help_imports_neither_solvers_nor_what_is_slow():
+    code = "import sys, pipeline.cli; print(*sys.modules)"
+    modules = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT).stdout
+    slow = {"dolfinx", "gmsh", "petsc4py", "mpi4py", "matplotlib", "xarray", "pandas", "rich", "jinja2"}
+    assert not slow & set(modules.split())
+
+
+def test_misspelt_commands_options_and_reductions_get_the_nearest(tmp_path):
+    invoke = CliRunner().invoke
+    assert "'plan'" in invoke(app, ["pln"]).stderr
+    assert "--json" in invoke(app, ["plan", "x.toml", "--jsn"]).stderr
+    file = tmp_path / "small.toml"
+    file.write_text(SMALL)
+    refused = invoke(app, ["plan", str(file), "--without", "symetry"])
+    assert (refused.exit_code, "did you mean `symmetry`?" in refused.stderr) == (2, True)
+
+
+def test_colour_on_terminals_only_and_not_where_it_is_unwanted(tmp_path):
+    file = tmp_path / "bad.toml"
+    file.write_text("[body]\n")
+    assert "\033[31m" in on_terminal("validate", str(file))
+    assert "\033[" not in on_terminal("validate", str(file), NO_COLOR="1")
+    assert "\033[" not in on_terminal("validate", str(file), TERM="dumb")
+    assert "\033[" not in epsmesh("validate", file).stderr
+
+
+@pytest.mark.parametrize("lines", [0, 1])
+def test_a_reader_that_goes_away_is_no_error(lines):
+    command = [sys.executable, "-u", "-m", "pipeline", "plan", "studies/figure3.toml", "--verbose"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT)
+    assert process.stdout is not None
+    assert process.stderr is not None
+    for _ in range(lines):
+        process.stdout.readline()
+    process.stdout.close()
+    assert process.stderr.read() == ""
+    assert process.wait(timeout=60) == 0
+
+
+def test_json_of_a_run_is_one_object_with_what_failed_and_why(tmp_path):
+    file = tmp_path / "small.toml"
+    small = SMALL.replace('["coarse", "free"]', '"fixed"').replace('"4 mm", "6 mm"', '"2 mm", "6 mm"')
+    file.write_text(f"{small.replace('[0.3, 0.4]', '0.3')}[solve]\nexact = false\n")
+    done = epsmesh("run", file, "--output", tmp_path, "--meshes", tmp_path / "meshes", "--json")
+    found = json.loads(done.stdout)
+    assert found["status"] == done.returncode == 1
+    (study,) = found["studies"]
+    assert (study["cases"], study["ok"], study["failed"], study["pending"]) == (3, 2, 1, 0)
+    assert {"touches the held face" in failure["message"] for failure in study["failures"]} == {True}
+    assert all(Path(name).exists() for name in study["files"])
+    assert study["seconds"] > 0
+    again = epsmesh("run", file, "--output", tmp_path, "--meshes", tmp_path / "meshes")
+    line = again.stdout.splitlines()[-1]
+    assert "2 ok, 1 failed (" in line
+    assert "(2 read back); wrote" in line
+    assert "touches the held face" in line
+
+
+def test_quiet_and_verbose_plans():
+    shown = [CliRunner().invoke(app, ["plan", str(ROOT / "studies" / "figure3.toml"), *more]).stdout
+             for more in (["-q"], [], ["-v"])]  # fmt: skip
+    quiet, usual, verbose = (len(text.splitlines()) for text in shown)
+    assert quiet == 1
+    assert usual < verbose
+    assert "smaller steps" in shown[1]
+    assert "smaller steps" not in shown[2]
+
+
+def test_shell_completes_commands_and_names_and_leaves_files_to_the_shell():
+    def completed(*words: str) -> list[str]:
+        environment = {"_EPSMESH_COMPLETE": "complete_bash", "COMP_WORDS": " ".join(("epsmesh", *words)),
+                       "COMP_CWORD": str(len(words))}  # fmt: skip
+        return CliRunner().invoke(app, prog_name="epsmesh", env=environment).stdout.split()
+
+    assert completed("val") == ["validate"]
+    assert "symmetry" in completed("plan", "--without", "sy")
+    assert "figure3" in completed("new", "mine", "--like", "fig")
+    assert completed("run", "stud") == []
+
+
+def test_what_is_no_store_is_left_alone(tmp_path):
+    letter = tmp_path / "letter.txt"
+    letter.write_text("Dear reader")
+    for command in (["store", "list"], ["store", "prune"], ["status", "studies/quick.toml"]):
+        refused = epsmesh(*command, "--store", letter)
+        assert refused.returncode == 2
+        assert "is not a case store" in refused.stderr
+    assert letter.read_text() == "Dear reader"
+    assert epsmesh("plot", letter.rename(tmp_path / "letter.nc")).returncode == 2

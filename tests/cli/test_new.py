@@ -1,0 +1,92 @@
+"""``epsmesh new``: study files that run as they are, and explain themselves."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from pipeline.cli import app
+from pipeline.plan.plan import make_plan
+from pipeline.study.keys import SECTION_TEXTS, TEXTS, keys_of
+from pipeline.study.load import load, parse
+from pipeline.study.schema import SECTIONS
+from pipeline.study.starter import examples, starter
+
+STUDIES = Path(__file__).parents[2] / "studies"
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path, monkeypatch):
+    """Outside of the checkout."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def new(*arguments):
+    return CliRunner().invoke(app, ["new", *arguments])
+
+
+def test_every_key_of_the_schema_has_words_and_an_example():
+    for section in SECTIONS:
+        assert SECTION_TEXTS[section]
+        for key in keys_of(section):
+            assert key.words.text, f"pipeline/study/keys.py says nothing of {section}.{key.name}"
+            assert key.words.example, f"pipeline/study/keys.py has no example of {section}.{key.name}"
+
+
+def test_no_words_for_keys_that_are_gone():
+    assert set(TEXTS) == {f"{section}.{key.name}" for section in SECTIONS for key in keys_of(section)}
+
+
+def test_starter_is_a_study_with_every_key():
+    text = starter("mine")
+    study = parse(tomllib.loads(text), file="mine.toml", text=text)
+    assert len(make_plan(study).keys) > 1
+    assert not study.warnings
+    for section in SECTIONS:
+        for key in keys_of(section):
+            assert f"\n{key.name} = " in text or f"\n# {key.name} = " in text
+
+
+@pytest.mark.parametrize("key", ["mesh.rim", "mesh.growth", "probe.contact", "solve.timing", "plan.stop_when"])
+def test_what_the_starter_leaves_out_can_be_let_in(key):
+    section, name = key.split(".")
+    lines = starter("mine").splitlines()
+    table = lines.index(f"[{section}]")
+    place = next(i for i in range(table, len(lines)) if lines[i].startswith(f"# {name} = "))
+    lines[place] = lines[place].removeprefix("# ")
+    study = parse(tomllib.loads("\n".join(lines)), file="mine.toml")
+    assert name in next(iter(study.sections[section])).model_fields_set
+
+
+def test_new_writes_a_study_and_leaves_an_existing_one_alone(elsewhere):
+    assert new("mine").exit_code == 0
+    file = elsewhere / "studies" / "mine.toml"
+    assert load(file).title == "mine"
+    file.write_text("changed")
+    again = new("mine")
+    assert again.exit_code == 2
+    assert "exists already" in again.stderr
+    assert file.read_text() == "changed"
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in STUDIES.glob("*.toml")))
+def test_like_copies_the_studies_that_come_with_the_program(elsewhere, name):
+    assert new("mine", "--like", name).exit_code == 0
+    assert (elsewhere / "studies" / "mine.toml").read_text() == (STUDIES / f"{name}.toml").read_text()
+
+
+def test_like_takes_a_path_and_a_study_of_the_folder(elsewhere):
+    assert new("deep/first.toml").exit_code == 0
+    assert new("second", "--like", "deep/first.toml").exit_code == 0
+    assert new("third", "--like", "second").exit_code == 0
+    assert (elsewhere / "studies" / "third.toml").read_text() == starter("first")
+
+
+def test_unknown_studies_and_bad_names_are_named():
+    assert "did you mean `figure3`?" in new("mine", "--like", "figur3").stderr
+    assert "no/such.toml" in new("mine", "--like", "no/such.toml").stderr
+    bad = new("a/b c")
+    assert (bad.exit_code, "letters, digits" in bad.stderr) == (2, True)
+    assert "figure3" in examples()
