@@ -82,7 +82,7 @@ def explain(
     Example: epsmesh explain studies/figure3.toml "poisson=0.3, epsilon=10 mm, outside=free"
     """
     (study,) = load_all([file])
-    chosen = _find(study, case)
+    chosen = find_case(study, case)
     made, records = _planned(study, output, store, check_names(without))
     found = story(made, declare(study), chosen.index)
     record = records.get(found["key"])
@@ -117,7 +117,7 @@ def _planned(
     return make_plan(study, done, without) if done else bare, records
 
 
-def _find(study: Study, text: str) -> Case:
+def find_case(study: Study, text: str) -> Case:
     """Return the case of a number, or of labels; fail with what there is to choose from."""
     cases = list(study.cases())
     if text.strip().isdigit():

@@ -127,7 +127,7 @@ class _Runner:
         bodies: list[Body] = []
         shared = len(step.solves) > 1
         if not self._guard(
-            step.solves, lambda: bodies.append(_body(mesh, step.case, shared=shared, reuse=self._plan.reuse))
+            step.solves, lambda: bodies.append(body_of(mesh, step.case, shared=shared, reuse=self._plan.reuse))
         ):
             return
         with bodies[0] as body:
@@ -153,24 +153,14 @@ class _Runner:
     def _solve(self, solve: Solve, body: Body, mesh: BodyMesh, seconds: float, memory: PeakMemory) -> Record:
         case, degree = solve.case, solve.case.mesh.degree
         direct = is_direct(case.solve.method, body.dofs, degree)
-        self._check_memory(estimate.solving_memory(body.dofs, degree, direct=direct), "solving")
+        check_memory(self.comm, estimate.solving_memory(body.dofs, degree, direct=direct), "solving")
         missing = ""
         untimed = solve.is_reference or not self.timed
         if untimed:
-            missing = self._lacks_memory(estimate.enriched_memory(body.dofs, degree), "the error bar")
+            missing = _lacks_memory(self.comm, estimate.enriched_memory(body.dofs, degree), "the error bar")
         wanted = untimed and not missing
-        solution = self._solution(case, body, wanted)
+        solution = solve_body(case, body, estimate=wanted)
         return replace(self._stamp(record_of(solve, solution, mesh.cells, seconds), memory), message=missing)
-
-    def _solution(self, case: Case, body: Body, estimate: bool) -> Solution:
-        """Solve; where iterations do not converge and the system is small, directly."""
-        lame, method, tolerance = case.material.lame, case.solve.method, case.solve.tolerance
-        try:
-            return body.solve(lame, method=method, tolerance=tolerance, estimate=estimate)
-        except SolveError:
-            if method != "auto" or body.dofs > _MOST_DIRECT:
-                raise
-            return body.solve(lame, method="direct", tolerance=tolerance, estimate=estimate)
 
     def _solve_meridian(self, solve: Solve, memory: PeakMemory) -> Record:
         """Solve a round scene in two dimensions, on the first rank; collective."""
@@ -203,7 +193,7 @@ class _Runner:
     def _compute(self, solve: Solve, memory: PeakMemory) -> Record:
         """Compute one case afresh, mesh and all; collective."""
         mesh, seconds = self._mesh(solve.case, solve.mirrors)
-        with _body(mesh, solve.case, shared=False) as body:
+        with body_of(mesh, solve.case, shared=False) as body:
             record = self._solve(solve, body, mesh, seconds, memory)
         del mesh, body
         gc.collect()
@@ -212,19 +202,8 @@ class _Runner:
     def _mesh(self, case: Case, mirrors: tuple[str, ...]) -> tuple[BodyMesh, float]:
         """Return the distributed mesh of a case and the seconds that it took; collective."""
         self._progress.note(f"meshing: {case}")
-        self._check_memory(estimate.case_memory(case, share=0.5 ** len(mirrors)), "this case")
+        check_memory(self.comm, estimate.case_memory(case, share=0.5 ** len(mirrors)), "this case")
         return mesh_case(case, mirrors, self.comm, self._cache)
-
-    def _check_memory(self, needed: float, what: str) -> None:
-        if message := self._lacks_memory(needed, what):
-            raise CaseFailure(f"{message}: use larger elements, or a smaller epsilon")
-
-    def _lacks_memory(self, needed: float, what: str) -> str:
-        """Return what to say if ``needed`` bytes are too much, the same on every rank; collective."""
-        available = self.comm.bcast(psutil.virtual_memory().available if self.comm.rank == 0 else None)
-        if needed <= _MEMORY_SHARE * available:
-            return ""
-        return f"{what} needs about {needed / 1e9:.1f} GB of memory, {available / 1e9:.1f} GB are available"
 
     def _record_one(self, solve: Solve, compute: Callable[[], Record]) -> None:
         """Compute and keep a record; if that fails, keep a record of the failure."""
@@ -276,8 +255,38 @@ class _Runner:
         self._progress.done(solve.label, record.message if record.status == "failed" else "")
 
 
-def _body(mesh: BodyMesh, case: Case, *, shared: bool, reuse: bool = False) -> Body:
+def body_of(mesh: BodyMesh, case: Case, *, shared: bool, reuse: bool = False) -> Body:
+    """Return what solves ``case`` on its mesh, by the elements that suit it; collective."""
     contact = Contact(case.probe.travel, case.probe.contact == "bonded")
     if case.element == "mixed":
         return MixedBody(mesh, case.mesh.degree, contact)
     return ElasticBody(mesh, case.mesh.degree, contact, shared=shared, reuse=reuse)
+
+
+def solve_body(case: Case, body: Body, *, estimate: bool) -> Solution:
+    """Solve a case; where iterations do not converge and the system is small, directly. Collective."""
+    lame, method, tolerance = case.material.lame, case.solve.method, case.solve.tolerance
+    try:
+        return body.solve(lame, method=method, tolerance=tolerance, estimate=estimate)
+    except SolveError:
+        if method != "auto" or body.dofs > _MOST_DIRECT:
+            raise
+        return body.solve(lame, method="direct", tolerance=tolerance, estimate=estimate)
+
+
+def check_memory(comm: MPI.Comm, needed: float, what: str) -> None:
+    """Refuse what needs more bytes of memory than there are; collective.
+
+    Raises:
+        CaseFailure: on every rank.
+    """
+    if message := _lacks_memory(comm, needed, what):
+        raise CaseFailure(f"{message}: use larger elements, or a smaller epsilon")
+
+
+def _lacks_memory(comm: MPI.Comm, needed: float, what: str) -> str:
+    """Return what to say if ``needed`` bytes are too much, the same on every rank; collective."""
+    available = comm.bcast(psutil.virtual_memory().available if comm.rank == 0 else None)
+    if needed <= _MEMORY_SHARE * available:
+        return ""
+    return f"{what} needs about {needed / 1e9:.1f} GB of memory, {available / 1e9:.1f} GB are available"
