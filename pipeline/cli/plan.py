@@ -1,6 +1,7 @@
 """The commands that tell what a run would do, before it is begun."""
 
 import json
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -127,7 +128,8 @@ def find_case(study: Study, text: str) -> Case:
         return cases[number]
     wanted: dict[str, str] = {}
     names = [axis.name for axis in study.axes]
-    for part in text.split(","):
+    # A label may hold commas itself: what separates is a comma before a name.
+    for part in re.split(r",(?=\s*\w+\s*=)", text):
         name, _, value = (word.strip() for word in part.partition("="))
         if name not in names:
             fail(f"case {text!r}: nothing called {name!r} is swept; swept are {', '.join(names) or 'no keys'}")

@@ -22,7 +22,7 @@ _WIDTH, _HEIGHT = 6.0, 3.6
 _DOTS = 200
 # Panels as shares of the figure: left, bottom, width, height.
 _WHOLE, _CLOSE = (0.01, 0.19, 0.60, 0.70), (0.63, 0.19, 0.36, 0.70)
-_BAR = (0.1, 0.115, 0.42, 0.03)
+_BAR = (0.1, 0.115, 0.4, 0.03)
 _STYLE = {"font.size": 8, "axes.linewidth": 0.6}
 # Displacements are drawn so large that the largest is about this share of the body's smallest extent.
 _VISIBLE = 0.15
@@ -73,7 +73,8 @@ def _compose(
             axes.spines[:].set_visible(close)
             axes.spines[:].set_color("#777777")
         _add_scale(figure, colouring, quantity)
-        figure.legend(handles=_lines(fields), loc="lower right", bbox_to_anchor=(0.99, 0.02), frameon=False, ncols=2)
+        figure.legend(handles=_lines(fields), loc="lower right", bbox_to_anchor=(0.99, 0.02), frameon=False, ncols=2,
+                      handlelength=1.5)  # fmt: skip
         figure.text(0.012, 0.965, shorten(words[0], _LONGEST, placeholder=" …"), fontweight="bold", va="center")
         figure.text(0.012, 0.915, words[1], va="center")
         figure.text(0.99, 0.915, "close to the probe", ha="right", va="center")

@@ -51,7 +51,10 @@ class OpenedBody:
         self._axis, self._sign = (0, -1) if fields.planes == ("x",) else (1, 1)
         self._contact = MM * fields.contact
         grid = self._opened(self._grid())
-        surface = grid.extract_surface(algorithm="dataset_surface")
+        # A clipped body's faces turn either way: the angle between two of them would not tell an edge.
+        surface = grid.extract_surface(algorithm="dataset_surface").compute_normals(
+            point_normals=False, split_vertices=False, auto_orient_normals=True
+        )
         footprint = self._opened(self._footprint()).extract_surface(algorithm="dataset_surface")
         edge = footprint.extract_feature_edges(
             boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False
@@ -73,7 +76,7 @@ class OpenedBody:
             lighting=False, show_scalar_bar=False, show_edges=True, edge_color=INK, edge_opacity=0.5 if close else 0.3,
             line_width=1.2,
         )  # fmt: skip
-        self._add_lines(plotter, _outline(self._fields), OUTLINE, 1.5)
+        plotter.add_mesh(_outline(self._fields), color=OUTLINE, line_width=1.5, lighting=False)
         self._add_lines(plotter, self._sharp, INK, 2)
         self._add_lines(plotter, self._ring, INK, 5)
         self._add_lines(plotter, self._edge, FOOTPRINT, 5 if close else 3)
@@ -142,8 +145,10 @@ class OpenedBody:
             plotter.camera.parallel_scale = _CLOSE * MM * self._fields.case.probe.circumradius
             plotter.camera.clipping_range = (0.01, 10 * self._surface.length)
         else:
-            plotter.reset_camera()
-            plotter.camera.zoom(1.3)
+            # A column would be small in the picture of the whole body.
+            column = self._fields.case.is_truncated
+            plotter.reset_camera(bounds=self._surface.bounds if column else None)
+            plotter.camera.zoom(1.0 if column else 1.3)
 
 
 def _moved(part: Any, factor: float) -> Any:
