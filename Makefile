@@ -21,7 +21,7 @@ MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-setup: ## install what is missing (root or sudo for Debian's packages)
+setup: ## install what is missing (root or sudo for Debian's packages); EXTRAS=view: pictures of cases, too
 	@scripts/setup.sh
 
 study: setup ## run one study: make study STUDY=studies/quick.toml NP=2

@@ -77,6 +77,19 @@ def geometry_dofs(mesh: Any) -> np.ndarray:
     return array.reshape(topology.size_local + topology.num_ghosts, -1)
 
 
+def cell_dofs(space: Any) -> np.ndarray:
+    """Return the dofs, in blocks, of each local cell (owned and ghosts), shape (cells, blocks per cell)."""
+    dofs = space.dofmap.list
+    topology = space.mesh.topology.index_map(space.mesh.topology.dim)
+    array = dofs.array if hasattr(dofs, "array") else np.asarray(dofs)
+    return array.reshape(topology.size_local + topology.num_ghosts, -1)
+
+
+def original_cells(mesh: Any) -> np.ndarray:
+    """Return, for each local cell, its number in the arrays that the mesh was made of."""
+    return np.asarray(mesh.topology.original_cell_index, dtype=np.int64)
+
+
 def vector_space(mesh: Any, degree: int) -> Any:
     """Return the continuous vector Lagrange space of ``degree`` on ``mesh``."""
     if hasattr(fem, "functionspace"):

@@ -12,6 +12,12 @@ packages=(
 )
 python=/usr/bin/python3
 venv=.venv
+# EXTRAS=view adds what draws pictures of a case. A venv that has it keeps it.
+extras=dev
+if [[ ${EXTRAS:-} == view ]] || compgen -G "$venv/lib/python*/site-packages/pyvista" >/dev/null; then
+    extras=dev,view
+    packages+=(libegl1)
+fi
 stamp=$venv/.epsmesh-setup
 
 fail() { echo "setup: $*" >&2; exit 1; }
@@ -49,7 +55,7 @@ fi
 
 # ---- venv ---------------------------------------------------------------------------------------------
 # The stamp says for which project file, interpreter and folder the venv was last made complete.
-state=$({ cat pyproject.toml scripts/setup.sh; readlink -f "$python"; pwd; } | sha256sum)
+state=$({ cat pyproject.toml scripts/setup.sh; readlink -f "$python"; pwd; echo "$extras"; } | sha256sum)
 [[ -f $stamp && $(<"$stamp") == "$state" && -x $venv/bin/epsmesh ]] && exit 0
 
 if [[ $(readlink -f "$venv/bin/python" 2>/dev/null) != $(readlink -f "$python") ]]; then
@@ -69,7 +75,7 @@ for name in ("numpy", "scipy", "matplotlib", "netCDF4", "mpi4py", "petsc4py", "p
         pass
 PYTHON
 # A pip configured for --user would install beside the venv.
-PIP_USER=0 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input -c "$constraints" -e '.[dev]' ||
+PIP_USER=0 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input -c "$constraints" -e ".[$extras]" ||
     fail "pip could not install the project"
 
 # ---- check --------------------------------------------------------------------------------------------

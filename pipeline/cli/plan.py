@@ -1,5 +1,6 @@
 """The commands that tell what a run would do, before it is begun."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -103,7 +104,7 @@ def explain(
     Example: epsmesh explain studies/figure3.toml "poisson=0.3, epsilon=10 mm, outside=free"
     """
     (study,) = load_all([file])
-    chosen = _find(study, case)
+    chosen = find_case(study, case)
     made, records = _planned(study, output, store, check_names(without))
     found = story(made, declare(study), chosen.index)
     record = records.get(found["key"])
@@ -137,7 +138,7 @@ def _planned(
     return replace(make_plan(study, done, without) if done else bare, cost=cost), records
 
 
-def _find(study: Study, text: str) -> Case:
+def find_case(study: Study, text: str) -> Case:
     """Return the case of a number, or of labels; fail with what there is to choose from."""
     cases = list(study.cases())
     if text.strip().isdigit():
@@ -147,7 +148,8 @@ def _find(study: Study, text: str) -> Case:
         return cases[number]
     wanted: dict[str, str] = {}
     names = [axis.name for axis in study.axes]
-    for part in text.split(","):
+    # A label may hold commas itself: what separates is a comma before a name.
+    for part in re.split(r",(?=\s*\w+\s*=)", text):
         name, _, value = (word.strip() for word in part.partition("="))
         if name not in names:
             fail(f"case {text!r}: nothing called {name!r} is swept; swept are {', '.join(names) or 'no keys'}")

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.mesh.curve import EDGES
-from pipeline.mesh.generate import IntArray, MeshArrays
+from pipeline.mesh.generate import FloatArray, IntArray, MeshArrays
 from pipeline.scene.model import MIRROR
 
 # Reflection turns tetrahedra inside out: corners 2 and 3 change places, and with them their edges' mid nodes.
@@ -23,13 +23,18 @@ def reflect(mesh: MeshArrays, planes: tuple[str, ...]) -> MeshArrays:
     return mesh
 
 
+def reflect_vectors(mesh: MeshArrays, vectors: FloatArray, planes: tuple[str, ...]) -> FloatArray:
+    """Return a vector field (n, 3), its own mirror image, at the points of ``reflect(mesh, planes)``."""
+    for plane in planes:
+        images = vectors[~_on_plane(mesh, plane)]
+        images[:, "xy".index(plane)] *= -1
+        vectors, mesh = np.vstack([vectors, images]), _reflect_once(mesh, plane)
+    return vectors
+
+
 def _reflect_once(mesh: MeshArrays, plane: str) -> MeshArrays:
     axis, name = "xy".index(plane), MIRROR[plane]
-    points = mesh.points.copy()
-    # Facets hold corners only: mid nodes in the plane are those between two corners in it.
-    on_plane = np.zeros(len(points), dtype=bool)
-    on_plane[mesh.facets[name]] = True
-    on_plane |= _mid_nodes_within(mesh.cells, on_plane)
+    points, on_plane = mesh.points.copy(), _on_plane(mesh, plane)
     points[on_plane, axis] = 0.0
     image = np.where(on_plane, np.arange(len(points)), len(points) + np.cumsum(~on_plane) - 1)
     mirrored = points[~on_plane]
@@ -42,6 +47,14 @@ def _reflect_once(mesh: MeshArrays, plane: str) -> MeshArrays:
         facets=facets,
         rim=np.union1d(mesh.rim, image[mesh.rim]),
     )
+
+
+def _on_plane(mesh: MeshArrays, plane: str) -> np.ndarray:
+    """Mark the points in a plane that bounds the mesh."""
+    # Facets hold corners only: mid nodes in the plane are those between two corners in it.
+    marked = np.zeros(len(mesh.points), dtype=bool)
+    marked[mesh.facets[MIRROR[plane]]] = True
+    return marked | _mid_nodes_within(mesh.cells, marked)
 
 
 def _mid_nodes_within(cells: IntArray, corner: np.ndarray) -> np.ndarray:

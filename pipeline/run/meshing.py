@@ -34,15 +34,15 @@ def mesh_case(
     Raises:
         MeshError: on every rank.
     """
-    arrays = on_first_rank(comm, lambda: _cached_arrays(case, mirrors, cache))
+    arrays = on_first_rank(comm, lambda: cached_arrays(case, mirrors, cache))
     start = MPI.Wtime()
     mesh = distribute(comm, arrays)
     making = comm.bcast(arrays.seconds if arrays is not None else 0.0)
     return mesh, making + comm.allreduce(MPI.Wtime() - start, op=MPI.MAX)
 
 
-def _cached_arrays(case: Case, mirrors: tuple[str, ...], cache: MeshCache | None) -> MeshArrays:
-    """Return the mesh from the cache, or made and put there."""
+def cached_arrays(case: Case, mirrors: tuple[str, ...], cache: MeshCache | None) -> MeshArrays:
+    """Return the mesh of a case from the cache, or made and put there."""
     if cache is None:
         return mesh_arrays(case, mirrors)
     path = cache.path(case, mirrors)

@@ -6,7 +6,6 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 
-import psutil
 from mpi4py import MPI
 
 from pipeline.mesh.distribute import BodyMesh
@@ -15,6 +14,7 @@ from pipeline.plan import estimate
 from pipeline.plan.plan import Plan
 from pipeline.plan.steps import MeshStep, OperatorStep, Solve, mesh_steps
 from pipeline.plan.symmetry import model_planes
+from pipeline.run.body import Body, CaseFailure, body_of, check_memory, lacks_memory, solve_body
 from pipeline.run.compile import prepare
 from pipeline.run.measure import TIMES, add_times, record_of, record_of_meridian
 from pipeline.run.memory import PeakMemory, give_back
@@ -27,24 +27,11 @@ from pipeline.run.reduce import reduced_records
 from pipeline.solve.axisymmetric import solve_axisymmetric
 from pipeline.solve.elasticity import ElasticBody
 from pipeline.solve.linear import SolveError, is_direct
-from pipeline.solve.mixed import MixedBody
-from pipeline.solve.solution import Solution
-from pipeline.solve.space import Contact
 from pipeline.study.sweep import Case
 
 # An error bar above this says that the force is not known.
 _WORST_BAR = 0.5
-# Unknowns up to which a direct solve is a way out where iterations do not converge.
-_MOST_DIRECT = 60_000
-# A case may take this share of the memory that is free when it begins.
-_MEMORY_SHARE = 0.9
-
 Keep = Callable[[Record], None]
-Body = ElasticBody | MixedBody
-
-
-class CaseFailure(Exception):
-    """A case cannot be computed, for a reason that all ranks have agreed on."""
 
 
 class StepRunner:
@@ -93,7 +80,7 @@ class StepRunner:
         bodies: list[Body] = []
         shared = len(step.solves) > 1
         if not self._guard(
-            step.solves, lambda: bodies.append(_body(mesh, step.case, shared=shared, reuse=self._plan.reuse))
+            step.solves, lambda: bodies.append(body_of(mesh, step.case, shared=shared, reuse=self._plan.reuse))
         ):
             return
         with bodies[0] as body:
@@ -119,24 +106,14 @@ class StepRunner:
     def _solve(self, solve: Solve, body: Body, mesh: BodyMesh, seconds: float, memory: PeakMemory) -> Record:
         case, degree = solve.case, solve.case.mesh.degree
         direct = is_direct(case.solve.method, body.dofs, degree)
-        self._check_memory(estimate.solving_memory(body.dofs, degree, direct=direct), "solving")
+        check_memory(self.comm, estimate.solving_memory(body.dofs, degree, direct=direct), "solving")
         missing = ""
         untimed = solve.is_reference or not self._timed
         if untimed:
-            missing = self._lacks_memory(estimate.enriched_memory(body.dofs, degree), "the error bar")
+            missing = lacks_memory(self.comm, estimate.enriched_memory(body.dofs, degree), "the error bar")
         wanted = untimed and not missing
-        solution = self._solution(case, body, wanted)
+        solution = solve_body(case, body, estimate=wanted)
         return replace(self._stamp(record_of(solve, solution, mesh.cells, seconds), memory), message=missing)
-
-    def _solution(self, case: Case, body: Body, estimate: bool) -> Solution:
-        """Solve; where iterations do not converge and the system is small, directly."""
-        lame, method, tolerance = case.material.lame, case.solve.method, case.solve.tolerance
-        try:
-            return body.solve(lame, method=method, tolerance=tolerance, estimate=estimate)
-        except SolveError:
-            if method != "auto" or body.dofs > _MOST_DIRECT:
-                raise
-            return body.solve(lame, method="direct", tolerance=tolerance, estimate=estimate)
 
     def _solve_meridian(self, solve: Solve, memory: PeakMemory) -> Record:
         """Solve a round scene in two dimensions, on the first rank; collective."""
@@ -169,7 +146,7 @@ class StepRunner:
     def _compute(self, solve: Solve, memory: PeakMemory) -> Record:
         """Compute one case afresh, mesh and all; collective."""
         mesh, seconds = self._mesh(solve.case, solve.mirrors)
-        with _body(mesh, solve.case, shared=False) as body:
+        with body_of(mesh, solve.case, shared=False) as body:
             record = self._solve(solve, body, mesh, seconds, memory)
         del mesh, body
         give_back()
@@ -178,19 +155,8 @@ class StepRunner:
     def _mesh(self, case: Case, mirrors: tuple[str, ...]) -> tuple[BodyMesh, float]:
         """Return the distributed mesh of a case and the seconds that it took; collective."""
         self._progress.note(f"meshing: {case}")
-        self._check_memory(estimate.case_memory(case, share=0.5 ** len(mirrors)), "this case")
+        check_memory(self.comm, estimate.case_memory(case, share=0.5 ** len(mirrors)), "this case")
         return mesh_case(case, mirrors, self.comm, self._cache)
-
-    def _check_memory(self, needed: float, what: str) -> None:
-        if message := self._lacks_memory(needed, what):
-            raise CaseFailure(f"{message}: use larger elements, or a smaller epsilon")
-
-    def _lacks_memory(self, needed: float, what: str) -> str:
-        """Return what to say if ``needed`` bytes are too much, the same on every rank; collective."""
-        available = self.comm.bcast(psutil.virtual_memory().available if self.comm.rank == 0 else None)
-        if needed <= _MEMORY_SHARE * available:
-            return ""
-        return f"{what} needs about {needed / 1e9:.1f} GB of memory, {available / 1e9:.1f} GB are available"
 
     def _record_one(self, solve: Solve, compute: Callable[[], Record]) -> None:
         """Compute and keep a record; if that fails, keep a record of the failure."""
@@ -238,10 +204,3 @@ class StepRunner:
         self._records[record.key] = record
         if self.comm.rank == 0:
             self._keep(record)
-
-
-def _body(mesh: BodyMesh, case: Case, *, shared: bool, reuse: bool = False) -> Body:
-    contact = Contact(case.probe.travel, case.probe.contact == "bonded")
-    if case.element == "mixed":
-        return MixedBody(mesh, case.mesh.degree, contact)
-    return ElasticBody(mesh, case.mesh.degree, contact, shared=shared, reuse=reuse)

@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
@@ -20,7 +21,7 @@ from pipeline.solve.enrich import energy_decrement
 from pipeline.solve.error import error_bar
 from pipeline.solve.forms import mean_strain_form
 from pipeline.solve.linear import Level, LinearSolver, SolveError, is_direct
-from pipeline.solve.solution import BALANCE_LIMIT, FloatArray, Solution, global_sum, largest_strain
+from pipeline.solve.solution import BALANCE_LIMIT, FloatArray, Solution, global_sum, largest_strain, principal_strains
 from pipeline.solve.space import ConstrainedSpace, Contact
 from pipeline.stages import stage
 
@@ -119,6 +120,10 @@ class ElasticBody:
     def multiplicity(self) -> float:
         """How many times the modelled part makes up the whole body."""
         return 2.0 ** len(self._body.mirrored)
+
+    def fields(self) -> tuple[Any, FloatArray]:
+        """Return the last solution's displacement (m) and the principal strains of each owned cell; collective."""
+        return self._fine.forms.displacement, principal_strains(self._strain, self._body)
 
     def largest_strain(self, displacement: PETSc.Vec) -> float:
         """Return the largest principal strain of ``displacement``; collective."""

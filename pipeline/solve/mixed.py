@@ -21,6 +21,7 @@ import time
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from math import inf
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +31,7 @@ from pipeline.solve.forms import mean_strain_form
 from pipeline.solve.linear import Level, SolveError
 from pipeline.solve.mixed_space import MixedSpace
 from pipeline.solve.saddle import Pair, Saddle, SaddleSolver
-from pipeline.solve.solution import BALANCE_LIMIT, FloatArray, Solution, global_sum, largest_strain
+from pipeline.solve.solution import BALANCE_LIMIT, FloatArray, Solution, global_sum, largest_strain, principal_strains
 from pipeline.solve.space import ConstrainedSpace, Contact
 from pipeline.stages import stage
 
@@ -120,6 +121,10 @@ class MixedBody:
             assemble, solver.setup_seconds, seconds,
         )  # fmt: skip
         return self._estimate(solution, forces.work, c) if estimate else solution
+
+    def fields(self) -> tuple[Any, FloatArray]:
+        """Return the last solution's displacement (m) and the principal strains of each owned cell; collective."""
+        return self._fine.displacements.forms.displacement, principal_strains(self._strain, self._body)
 
     @stage("error bar")
     def _estimate(self, solution: Solution, work: float, c: float) -> Solution:

@@ -52,14 +52,17 @@ def global_sum(comm: MPI.Comm, values: FloatArray) -> FloatArray:
 
 
 @stage("strain")
-def largest_strain(mean_strain: tuple[Any, Any], body: BodyMesh) -> float:
-    """Return the largest principal strain, by magnitude, of the strain averaged over each cell; collective.
+def principal_strains(mean_strain: tuple[Any, Any], body: BodyMesh) -> FloatArray:
+    """Return the principal strains, ascending, of the strain averaged over each owned cell, shape (cells, 3).
 
-    ``mean_strain`` are the forms of :func:`pipeline.solve.forms.mean_strain_form`.
+    ``mean_strain`` are the forms of :func:`pipeline.solve.forms.mean_strain_form`. Collective.
     """
     integral, volume = (fem.assemble_vector(form) for form in mean_strain)
-    owned = body.owned_cells
-    tensors = [np.asarray(v.array).reshape(-1, 3, 3)[:owned] for v in (integral, volume)]
-    principal = np.linalg.eigvalsh(tensors[0] / tensors[1])
-    local = float(np.abs(principal).max()) if owned else 0.0
+    tensors = [np.asarray(v.array).reshape(-1, 3, 3)[: body.owned_cells] for v in (integral, volume)]
+    return np.asarray(np.linalg.eigvalsh(tensors[0] / tensors[1]))
+
+
+def largest_strain(mean_strain: tuple[Any, Any], body: BodyMesh) -> float:
+    """Return the largest of :func:`principal_strains`, by magnitude; collective."""
+    local = float(np.abs(principal_strains(mean_strain, body)).max(initial=0.0))
     return float(body.comm.allreduce(local, op=MPI.MAX))

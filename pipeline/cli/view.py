@@ -1,0 +1,118 @@
+"""The command that shows one case: pictures of mesh and deformation, and files for ParaView."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from pipeline.cli.plan import find_case
+from pipeline.cli.words import DEFAULT_OUTPUT, SOME_FAILED, File, Output, error, fail, load_all
+from pipeline.study.sweep import Case, Study
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from pipeline.view.fields import Fields
+
+
+def view(
+    file: File,
+    case: Annotated[str, typer.Argument(help='A case: "poisson=0.3, epsilon=10 mm", or its number.')] = "0",
+    output: Output = DEFAULT_OUTPUT,
+    mesh_only: Annotated[bool, typer.Option("--mesh-only", help="Mesh, but do not solve.")] = False,
+    export: Annotated[
+        Literal["vtu", "xdmf"] | None, typer.Option(help="Write a file for ParaView, and no pictures.")
+    ] = None,
+    meshes: Annotated[Path, typer.Option(help="Folder of the meshes that are kept.")] = Path("meshes/cache"),
+) -> None:
+    """Show one case: its mesh by element size, cut open, and the body as the probe deforms it.
+
+    Writes <study>_<number>_mesh.png and <study>_<number>_deformed.png, or with --export <study>_<number>.vtu.
+
+    Example: epsmesh view studies/figure3.toml "poisson=0.3, epsilon=10 mm, outside=coarse"
+
+    Example: epsmesh view studies/figure3.toml 12 --mesh-only
+
+    Example: epsmesh view studies/figure3.toml 12 --export vtu
+    """
+    (study,) = load_all([file])
+    chosen = find_case(study, case)
+    if not export and (missing := _missing()):
+        fail(f"pictures need {missing}; --export vtu writes a file for ParaView without it")
+    from mpi4py import MPI
+
+    from pipeline.workflow import abort_on_exception
+
+    comm = MPI.COMM_WORLD
+    with abort_on_exception(comm):
+        fields = _fields(study, chosen, comm, mesh_only, meshes)
+        if fields is not None:
+            stem = output / f"{study.name}_{_number(study, chosen)}"
+            _write(study, fields, stem, export)
+
+
+def _fields(study: Study, case: Case, comm: "MPI.Comm", mesh_only: bool, meshes: Path) -> "Fields | None":
+    """Return the case's fields, on the first rank; if it cannot be computed, exit on all of them."""
+    from pipeline.mesh.generate import MeshError
+    from pipeline.run.body import CaseFailure
+    from pipeline.run.mesh_cache import MeshCache
+    from pipeline.solve.linear import SolveError
+    from pipeline.view.compute import compute_fields, solve_to_view
+
+    note = error if comm.rank == 0 else _say_nothing
+    note(str(case))
+    try:
+        return compute_fields(solve_to_view(study, case), comm, mesh_only=mesh_only, cache=MeshCache(meshes), note=note)
+    except (CaseFailure, MeshError, SolveError) as failure:
+        note(f"failed: {failure}")
+    except (MemoryError, RuntimeError) as failure:
+        if comm.size > 1:
+            raise
+        note(f"failed: {type(failure).__name__}: {failure}")
+    raise typer.Exit(SOME_FAILED)
+
+
+def _write(study: Study, fields: "Fields", stem: Path, export: str | None) -> None:
+    """Write what was asked for, and say what is in it."""
+    unknowns = f", {fields.dofs:,} unknowns" if fields.dofs else ""
+    print(f"{len(fields.cells):,} elements{unknowns}")
+    if export:
+        from pipeline.view.export import write_fields
+
+        print(f"wrote {write_fields(fields, stem.with_name(f'{stem.name}.{export}'))}")
+        return
+    from pipeline.view.picture import draw_deformed, draw_mesh
+
+    title = str(fields.case) if study.axes else study.title
+    print(f"wrote {draw_mesh(fields, stem.with_name(f'{stem.name}_mesh.png'), title)}")
+    if fields.displacement is not None:
+        path, factor = draw_deformed(fields, stem.with_name(f"{stem.name}_deformed.png"), title)
+        print(f"wrote {path} (displacement {factor:,.0f} × as large)")
+
+
+def _number(study: Study, case: Case) -> int:
+    """Return the case's number, counted from 0, the last axis fastest."""
+    number = 0
+    for position, length in zip(case.index, study.shape, strict=True):
+        number = number * length + position
+    return number
+
+
+def _missing() -> str:
+    """Return what pictures need and this machine lacks, and how to install it, or nothing."""
+    import ctypes
+    import os
+    from importlib.util import find_spec
+
+    if find_spec("pyvista") is None:
+        return "PyVista (`make setup EXTRAS=view`, or `pip install '.[view]'` in the project's folder)"
+    if not os.environ.get("DISPLAY"):
+        # VTK ends the process, without a word, where it finds nothing to draw with.
+        try:
+            ctypes.CDLL("libEGL.so.1")
+        except OSError:
+            return "libEGL to draw without a display (`make setup EXTRAS=view`, or `apt-get install libegl1`)"
+    return ""
+
+
+def _say_nothing(_: str) -> None: ...

@@ -1,0 +1,1 @@
+"""One case to look at: its mesh and its displacement, as pictures and as files for ParaView."""

@@ -1,0 +1,129 @@
+"""From a case to the fields that show it: meshed, solved if asked for, gathered on the first rank, made whole."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from threadpoolctl import threadpool_limits
+
+from pipeline import compat
+from pipeline.mesh.distribute import BodyMesh, distribute
+from pipeline.mesh.generate import MeshArrays
+from pipeline.mesh.reflect import reflect, reflect_vectors
+from pipeline.plan import estimate
+from pipeline.plan.plan import declare, first_attempts
+from pipeline.plan.steps import Solve
+from pipeline.plan.symmetry import mirror_planes, model_planes
+from pipeline.run.body import Body, body_of, check_memory, solve_body
+from pipeline.run.compile import prepare
+from pipeline.run.mesh_cache import MeshCache
+from pipeline.run.meshing import cached_arrays, on_first_rank
+from pipeline.solve.linear import is_direct
+from pipeline.study.sweep import Case, Study
+from pipeline.view.fields import Fields, FloatArray, IntArray
+
+Note = Callable[[str], None]
+
+
+def solve_to_view(study: Study, case: Case) -> Solve:
+    """Return how ``case`` is computed to be looked at: in three dimensions, on what symmetry leaves of the body."""
+    solves = first_attempts(declare(study)).solves
+    solve = next(solve for solve in solves if case.index in solve.serves)
+    return replace(solve, mirrors=model_planes(case.probe)) if case.mesh.model == "auto" else solve
+
+
+def compute_fields(
+    solve: Solve, comm: MPI.Comm, *, mesh_only: bool = False, cache: MeshCache | None = None,
+    note: Note = lambda text: None,
+) -> Fields | None:  # fmt: skip
+    """Return the fields of a case, on rank 0 (None elsewhere); collective.
+
+    Where an accuracy is asked for, they are those of the first mesh that proves it, or of the finest that is tried;
+    of the first mesh if ``mesh_only``. ``note`` is told, on every rank, what is being worked on.
+
+    Raises:
+        CaseFailure, MeshError, SolveError: on every rank, with what to tell the user.
+    """
+    # A rank is one thread, as in a run.
+    with threadpool_limits(limits=1, user_api="blas"):
+        if mesh_only:
+            arrays = _arrays(solve, comm, cache, note)
+            return _whole(solve, arrays) if arrays is not None else None
+        while True:
+            fields, bar = _attempt(solve, comm, cache, note)
+            if solve.goal is None or 0 <= bar <= solve.goal or not solve.later:
+                return fields
+            solve = solve.again()
+
+
+def _attempt(solve: Solve, comm: MPI.Comm, cache: MeshCache | None, note: Note) -> tuple[Fields | None, float]:
+    """Solve on one mesh; return the fields on rank 0, and the error bar of F."""
+    case = solve.case
+    arrays = _arrays(solve, comm, cache, note)
+    prepare(comm, [solve])
+    mesh = distribute(comm, arrays)
+    with body_of(mesh, case, shared=False) as body:
+        direct = is_direct(case.solve.method, body.dofs, case.mesh.degree)
+        check_memory(comm, estimate.solving_memory(body.dofs, case.mesh.degree, direct=direct), "solving")
+        note(f"solving for {body.dofs} unknowns")
+        solution = solve_body(case, body, estimate=solve.goal is not None)
+        points = comm.bcast(len(arrays.points) if arrays is not None else 0)
+        displacement, strain = _gathered(mesh, body, points)
+    if arrays is None:
+        return None, solution.bar
+    return replace(_whole(solve, arrays, displacement, strain), dofs=solution.dofs), solution.bar
+
+
+def _arrays(solve: Solve, comm: MPI.Comm, cache: MeshCache | None, note: Note) -> MeshArrays | None:
+    """Return, on rank 0, the mesh of the part of the body that is modelled."""
+    check_memory(comm, estimate.case_memory(solve.case, share=0.5 ** len(solve.mirrors)), "this case")
+    note("meshing")
+    return on_first_rank(comm, lambda: cached_arrays(solve.case, solve.mirrors, cache))
+
+
+def _gathered(mesh: BodyMesh, body: Body, points: int) -> tuple[FloatArray, FloatArray]:
+    """Return, on rank 0, the displacement of every point of the mesh as it was made, and the strain of every cell.
+
+    A displacement of higher degree is interpolated to the order of the mesh: exact at its nodes.
+    """
+    displacement, principal = body.fields()
+    owned = mesh.owned_cells
+    order = 1 if compat.geometry_dofs(mesh.mesh).shape[1] == 4 else 2
+    nodal = fem.Function(compat.vector_space(mesh.mesh, order))
+    nodal.interpolate(displacement)
+    # Nodes of the geometry and dofs of that order come in the same order within a cell.
+    nodes = compat.geometry_dofs(mesh.mesh)[:owned].reshape(-1)
+    dofs = compat.cell_dofs(nodal.function_space)[:owned].reshape(-1)
+    numbers, first = np.unique(_input_numbers(mesh.mesh)[nodes], return_index=True)
+    values = np.asarray(nodal.x.array).reshape(-1, 3)[dofs[first]]
+    strain = np.abs(principal).max(axis=1)
+    at_points = _assembled(mesh.comm, points, numbers, values)
+    return at_points, _assembled(mesh.comm, mesh.cells, compat.original_cells(mesh.mesh)[:owned], strain)
+
+
+def _input_numbers(mesh: Any) -> IntArray:
+    return np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
+
+
+def _assembled(comm: MPI.Comm, size: int, numbers: IntArray, values: FloatArray) -> FloatArray:
+    """Return, on rank 0, one array of every rank's ``values``, each at its number; collective."""
+    result = np.empty((size if comm.rank == 0 else 0, *values.shape[1:]))
+    for place, content in comm.gather((numbers, values)) or ():
+        result[place] = content
+    return result
+
+
+def _whole(
+    solve: Solve, arrays: MeshArrays, displacement: FloatArray | None = None, strain: FloatArray | None = None
+) -> Fields:
+    """Reflect what was modelled into the whole body."""
+    case, mirrors = solve.case, solve.mirrors
+    if displacement is not None:
+        displacement = reflect_vectors(arrays, displacement, mirrors)
+    if strain is not None:
+        strain = np.tile(strain, 2 ** len(mirrors))
+    whole = reflect(arrays, mirrors)
+    return Fields(case, whole.points, whole.cells, whole.facets, mirror_planes(case.probe), displacement, strain)

@@ -1,0 +1,105 @@
+"""Pictures of one case: its mesh cut open, and the body as the probe deforms it, whole and close to the probe."""
+
+from math import floor, inf, log10
+from pathlib import Path
+from textwrap import shorten
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullFormatter
+
+from pipeline.report.figures import save
+from pipeline.view.fields import Fields
+from pipeline.view.scene import FOOTPRINT, INK, MM, Colouring, OpenedBody
+
+# Inches, at 200 dots each: 1200 × 720 pixels.
+_WIDTH, _HEIGHT = 6.0, 3.6
+_DOTS = 200
+# Panels as shares of the figure: left, bottom, width, height.
+_WHOLE, _CLOSE = (0.01, 0.19, 0.60, 0.70), (0.63, 0.19, 0.36, 0.70)
+_BAR = (0.1, 0.115, 0.4, 0.03)
+_STYLE = {"font.size": 8, "axes.linewidth": 0.6}
+# Displacements are drawn so large that the largest is about this share of the body's smallest extent.
+_VISIBLE = 0.15
+# Letters of a title that fit the width.
+_LONGEST = 92
+# Below this (m) displacements are read in µm.
+_SMALL = 1e-4
+
+
+def draw_mesh(fields: Fields, path: Path, title: str) -> Path:
+    """Draw the mesh, cut open through the contact and coloured by element size, to ``path``."""
+    sizes = MM * fields.sizes
+    colouring = Colouring(sizes, "viridis", (float(sizes.min()), float(sizes.max())), logarithmic=True)
+    words = f"{len(fields.cells):,} elements" + (", fine everywhere" if fields.epsilon == inf else "")
+    return _compose(fields, OpenedBody(fields, colouring), colouring, "element size (mm)", (title, words), path)
+
+
+def draw_deformed(fields: Fields, path: Path, title: str) -> tuple[Path, float]:
+    """Draw the deformed body, coloured by displacement; return the file, and the factor that makes it visible.
+
+    Raises:
+        ValueError: if the fields hold no displacement.
+    """
+    if fields.displacement is None:
+        raise ValueError("the case has been meshed only: there is no displacement to draw")
+    moved = np.linalg.norm(fields.displacement, axis=1)
+    largest = float(moved.max())
+    factor = _round_down(_VISIBLE * float(np.ptp(fields.points, axis=0).min()) / largest)
+    unit, scale = ("µm", 1e6) if largest < _SMALL else ("mm", MM)
+    colouring = Colouring(scale * moved, "YlGnBu", (0.0, scale * largest))
+    words = "true to scale" if factor == 1 else f"displacement drawn {factor:,.0f} × as large"
+    body = OpenedBody(fields, colouring, factor)
+    return _compose(fields, body, colouring, f"displacement ({unit})", (title, words), path), factor
+
+
+def _compose(
+    fields: Fields, body: OpenedBody, colouring: Colouring, quantity: str, words: tuple[str, str], path: Path
+) -> Path:
+    """Put the two views, the scale of colours and the words together."""
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(_WIDTH, _HEIGHT))
+        FigureCanvasAgg(figure)
+        for place, close in ((_WHOLE, False), (_CLOSE, True)):
+            size = round(place[2] * _WIDTH * _DOTS), round(place[3] * _HEIGHT * _DOTS)
+            axes = figure.add_axes(place)
+            axes.imshow(body.render(size, close=close), aspect="auto", interpolation="none")
+            axes.set(xticks=[], yticks=[])
+            axes.spines[:].set_visible(close)
+            axes.spines[:].set_color("#777777")
+        _add_scale(figure, colouring, quantity)
+        figure.legend(handles=_lines(fields), loc="lower right", bbox_to_anchor=(0.99, 0.02), frameon=False, ncols=2,
+                      handlelength=1.5)  # fmt: skip
+        figure.text(0.012, 0.965, shorten(words[0], _LONGEST, placeholder=" …"), fontweight="bold", va="center")
+        figure.text(0.012, 0.915, words[1], va="center")
+        figure.text(0.99, 0.915, "close to the probe", ha="right", va="center")
+        return save(figure, path)
+
+
+def _add_scale(figure: Figure, colouring: Colouring, quantity: str) -> None:
+    norm = (LogNorm if colouring.logarithmic else Normalize)(*colouring.limits)
+    bar = figure.colorbar(
+        ScalarMappable(norm, colouring.cmap), cax=figure.add_axes(_BAR), orientation="horizontal", label=quantity
+    )
+    if colouring.logarithmic:
+        bar.ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        bar.ax.xaxis.set_major_formatter("{x:g}")
+        bar.ax.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _lines(fields: Fields) -> list[Line2D]:
+    lines = [Line2D([], [], color=FOOTPRINT, linewidth=1.6, label="edge of the probe")]
+    if fields.epsilon < inf:
+        lines.insert(0, Line2D([], [], color=INK, linewidth=1.6, label=f"ε = {MM * fields.epsilon:g} mm"))
+    return lines
+
+
+def _round_down(value: float) -> float:
+    """Return the largest of 1, 2, 5, 10, 20, … that is at most ``value``, and 1 if there is none."""
+    power = 10.0 ** floor(log10(max(value, 1.0)))
+    return power * max(step for step in (1, 2, 5) if step * power <= max(value, 1.0))

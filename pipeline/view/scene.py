@@ -1,0 +1,171 @@
+"""The three-dimensional scene of a picture: the body cut open, ε and footprint upon it, seen from two distances."""
+
+import os
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.scene.model import PROBE
+from pipeline.study.schema import Box, Cylinder
+from pipeline.view.fields import Fields
+
+# On a machine without a display VTK would ask for one first, and complain.
+if not os.environ.get("DISPLAY"):
+    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+import pyvista as pv
+
+INK, OUTLINE, FOOTPRINT = "#111111", "#b5b5b5", "#e8110f"
+MM = 1e3
+# How often the triangles at ε are halved, so that its outline is smooth on coarse ones.
+_HALVINGS = 3
+# Half the height of the close-up, in radii of the footprint.
+_CLOSE = 2.2
+# Edges of the outline of a round body.
+_ROUND = 200
+# Degrees between the faces at an edge of the body.
+_SHARP = 40
+# From where the picture is taken: in front of the cut, beside it, above.
+_FROM = (1.0, 0.45, 0.6)
+
+
+@dataclass(frozen=True)
+class Colouring:
+    """What colours the body: a value for each point or each cell, and the map from values to colours."""
+
+    values: npt.NDArray[np.float64]
+    cmap: str
+    limits: tuple[float, float]
+    logarithmic: bool = False
+
+
+class OpenedBody:
+    """The part of a case's body behind the plane through the contact, deformed by ``factor`` times its displacement.
+
+    Lengths are in mm, as people read them.
+    """
+
+    def __init__(self, fields: Fields, colouring: Colouring, factor: float = 0.0):
+        self._fields, self._colouring = fields, colouring
+        self._axis, self._sign = (0, -1) if fields.planes == ("x",) else (1, 1)
+        self._contact = MM * fields.contact
+        grid = self._opened(self._grid())
+        # A clipped body's faces turn either way: the angle between two of them would not tell an edge.
+        surface = grid.extract_surface(algorithm="dataset_surface").compute_normals(
+            point_normals=False, split_vertices=False, auto_orient_normals=True
+        )
+        footprint = self._opened(self._footprint()).extract_surface(algorithm="dataset_surface")
+        edge = footprint.extract_feature_edges(
+            boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False
+        )
+        sharp = surface.extract_feature_edges(
+            _SHARP, boundary_edges=False, feature_edges=True, manifold_edges=False, non_manifold_edges=False
+        )
+        parts = surface, sharp, edge, self._at_epsilon(surface)
+        self._surface, self._sharp, self._edge, self._ring = (_moved(part, factor) for part in parts)
+
+    def render(self, size: tuple[int, int], *, close: bool) -> npt.NDArray[np.uint8]:
+        """Return a picture of ``size`` pixels (width, height), of the whole or ``close`` to the probe."""
+        plotter = pv.Plotter(off_screen=True, window_size=size)
+        plotter.background_color = "white"
+        plotter.enable_anti_aliasing("ssaa")
+        colours = self._colouring
+        plotter.add_mesh(
+            self._surface, scalars="value", cmap=colours.cmap, clim=colours.limits, log_scale=colours.logarithmic,
+            lighting=False, show_scalar_bar=False, show_edges=True, edge_color=INK, edge_opacity=0.5 if close else 0.3,
+            line_width=1.2,
+        )  # fmt: skip
+        plotter.add_mesh(_outline(self._fields), color=OUTLINE, line_width=1.5, lighting=False)
+        self._add_lines(plotter, self._sharp, INK, 2)
+        self._add_lines(plotter, self._ring, INK, 5)
+        self._add_lines(plotter, self._edge, FOOTPRINT, 5 if close else 3)
+        self._aim(plotter, close=close)
+        image = np.asarray(plotter.screenshot(return_img=True))
+        plotter.close()
+        return image
+
+    def _grid(self) -> Any:
+        fields, values = self._fields, self._colouring.values
+        corners = fields.cells[:, :4]
+        cells = np.hstack([np.full((len(corners), 1), 4), corners])
+        grid = pv.UnstructuredGrid(cells, np.full(len(cells), pv.CellType.TETRA), MM * fields.points)
+        (grid.point_data if len(values) == len(fields.points) else grid.cell_data)["value"] = values
+        self._add_shift(grid)
+        return grid
+
+    def _footprint(self) -> Any:
+        facets = self._fields.facets[PROBE]
+        patch = pv.PolyData(MM * self._fields.points, np.hstack([np.full((len(facets), 1), 3), facets]))
+        self._add_shift(patch)
+        return patch
+
+    def _add_shift(self, part: Any) -> None:
+        if self._fields.displacement is not None:
+            part.point_data["shift"] = MM * self._fields.displacement
+
+    def _opened(self, part: Any) -> Any:
+        """Take away what is in front of the cut: whole elements where they end in it."""
+        axis, sign = self._axis, self._sign
+        if "xy"[axis] in self._fields.planes:
+            return part.extract_cells(np.flatnonzero(sign * part.cell_centers().points[:, axis] > 0))
+        return part.clip(normal=-sign * np.eye(3)[axis], origin=self._contact)
+
+    def _at_epsilon(self, surface: Any) -> Any:
+        """Return the lines at the distance ε from the contact on a surface: an arc on the top, and one in the cut."""
+        epsilon, surface = MM * self._fields.epsilon, surface.triangulate()
+        distance = np.linalg.norm(surface.points - self._contact, axis=1)[surface.regular_faces]
+        near = (distance.min(axis=1) <= epsilon) & (distance.max(axis=1) >= epsilon)
+        # An element at ε may have its corners outside and its middle within.
+        near |= np.abs(distance.min(axis=1) - epsilon) < np.ptp(distance, axis=1)
+        if not np.isfinite(epsilon) or not near.any():
+            return pv.PolyData()
+        patch = surface.extract_cells(np.flatnonzero(near)).extract_surface(algorithm="dataset_surface")
+        patch = patch.subdivide(_HALVINGS, "linear")
+        return patch.contour([epsilon], scalars=np.linalg.norm(patch.points - self._contact, axis=1))
+
+    def _add_lines(self, plotter: Any, lines: Any, colour: str, width: float) -> None:
+        if lines.n_points:
+            # A little nearer to the eye, so that the surface does not hide half of each line.
+            lines = lines.translate(2e-3 * self._surface.length * self._towards_eye())
+            plotter.add_mesh(lines, color=colour, line_width=width, lighting=False)
+
+    def _towards_eye(self) -> npt.NDArray[np.float64]:
+        front, up = -self._sign * np.eye(3)[self._axis], np.eye(3)[2]
+        direction = sum(share * vector for share, vector in zip(_FROM, (front, np.cross(up, front), up), strict=True))
+        return np.asarray(direction / np.linalg.norm(direction))
+
+    def _aim(self, plotter: Any, *, close: bool) -> None:
+        centre = self._contact if close else np.array(self._surface.center)
+        plotter.camera.focal_point = centre
+        plotter.camera.position = centre + 2 * self._surface.length * self._towards_eye()
+        plotter.camera.up = (0, 0, 1)
+        plotter.enable_parallel_projection()
+        if close:
+            plotter.camera.parallel_scale = _CLOSE * MM * self._fields.case.probe.circumradius
+            plotter.camera.clipping_range = (0.01, 10 * self._surface.length)
+        else:
+            # A column would be small in the picture of the whole body.
+            column = self._fields.case.is_truncated
+            plotter.reset_camera(bounds=self._surface.bounds if column else None)
+            plotter.camera.zoom(1.0 if column else 1.3)
+
+
+def _moved(part: Any, factor: float) -> Any:
+    if factor and part.n_points:
+        part.points = part.points + factor * part.point_data["shift"]
+    return part
+
+
+def _outline(fields: Fields) -> Any:
+    """Return the edges of the whole body, of which a column or the part behind the cut is shown."""
+    body = fields.case.body
+    if isinstance(body, Box):
+        x, y, z = (MM * length for length in body.size)
+        return pv.Box((-x / 2, x / 2, -y / 2, y / 2, -z, 0)).extract_all_edges()
+    assert isinstance(body, Cylinder)
+    radius, height = MM * body.radius, MM * body.height
+    shape = pv.Cylinder(
+        center=(0, 0, -height / 2), direction=(0, 0, 1), radius=radius, height=height, resolution=_ROUND
+    )
+    return shape.extract_feature_edges(boundary_edges=True, feature_edges=True, manifold_edges=False)

@@ -1,0 +1,77 @@
+"""``epsmesh view`` as a person uses it."""
+
+import importlib.util
+
+import pytest
+from mpi4py import MPI
+from typer.testing import CliRunner
+
+from pipeline.cli import app
+
+pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="one process")
+
+STUDY = """
+title = "small"
+[body]
+shape = "box"
+size = ["20 mm", "20 mm", "10 mm"]
+[material]
+young = "10 kPa"
+poisson = 0.3
+[[probe]]
+name = "disc, blunt"
+shape = "disc"
+radius = "2 mm"
+depth = "0.1 mm"
+[[probe]]
+name = "disc, thin"
+shape = "disc"
+radius = "1 mm"
+depth = "0.1 mm"
+[mesh]
+epsilon = ["2 mm", "4 mm"]
+fine = "2 mm"
+coarse = "4 mm"
+rim = "0.5 mm"
+outside = ["coarse", "fixed"]
+"""
+
+
+@pytest.fixture
+def view(tmp_path):
+    file = tmp_path / "small.toml"
+    file.write_text(STUDY)
+    folders = ["--output", str(tmp_path / "out"), "--meshes", str(tmp_path / "meshes")]
+    return lambda *arguments: CliRunner().invoke(app, ["view", str(file), *arguments, *folders])
+
+
+@pytest.mark.parametrize("kind", ["vtu", "xdmf"])
+def test_export_writes_a_file_named_after_the_case(view, tmp_path, kind):
+    done = view("probe=disc, thin, epsilon=4 mm, outside=coarse", "--export", kind, "--mesh-only")
+    assert done.exit_code == 0, done.output
+    assert [path.name for path in (tmp_path / "out").iterdir()] == [f"small_6.{kind}"]
+    assert f"small_6.{kind}" in done.output
+
+
+def test_missing_pyvista_is_named_with_what_installs_it(view, monkeypatch):
+    found = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *more: None if name == "pyvista" else found(name))
+    done = view("0")
+    assert done.exit_code == 2
+    assert "pip install '.[view]'" in done.output
+    assert "--export" in done.output
+
+
+def test_case_that_cannot_be_solved_ends_with_1_and_says_why(view, tmp_path):
+    done = view("probe=disc, blunt, epsilon=2 mm, outside=fixed", "--export", "vtu")
+    assert done.exit_code == 1
+    assert "failed: the probe's footprint touches the held face" in done.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_case_that_is_not_there_is_refused(view):
+    done = view("epsilon=5 mm", "--export", "vtu")
+    assert done.exit_code == 2
+    assert "there are epsilon = 2 mm, 4 mm" in done.output
+    assert view("99", "--export", "vtu").exit_code == 2
+    assert view("0", "--export", "stl").exit_code == 2

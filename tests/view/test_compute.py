@@ -1,0 +1,122 @@
+"""The fields to look at are those of the solver: conditions, symmetry, ranks."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from pipeline.run.execute import CaseFailure
+from pipeline.scene.model import FIXED, PROBE
+from pipeline.view.compute import compute_fields, solve_to_view
+from tests.cases import BLADE, solve, study
+
+WORLD = MPI.COMM_WORLD
+
+
+def fields(comm=MPI.COMM_SELF, mesh_only=False, **changes):
+    made = study(**changes)
+    (case,) = made.cases()
+    return compute_fields(solve_to_view(made, case), comm, mesh_only=mesh_only)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"mesh": {"degree": 1, "rim": "0.5 mm"}},
+        {"mesh": {"degree": 3}},
+        {"material": {"poisson": 0.49}},
+        {"probe": {"at": ["5 mm", "-3 mm"]}},
+        {"mesh": {"epsilon": "8 mm", "outside": "fixed"}},
+        {"probe": BLADE | {"slice": "0.1 mm"}},
+    ],
+)
+def test_displacement_is_what_probe_and_support_prescribe(changes):
+    found = fields(**changes)
+    at = {name: found.displacement[np.unique(found.facets[name])] for name in (PROBE, FIXED)}
+    travel = np.broadcast_to(found.case.probe.travel, at[PROBE].shape)
+    np.testing.assert_allclose(at[PROBE], travel, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(at[FIXED], 0.0, atol=1e-12)
+    assert np.linalg.norm(found.displacement, axis=1).max() < 1.2 * np.linalg.norm(travel[0])
+
+
+@pytest.mark.parametrize("changes", [{}, {"material": {"poisson": 0.49}}])
+def test_strain_and_unknowns_are_the_record_s(changes):
+    found = fields(**changes)
+    (record,) = solve(**changes).values()
+    assert found.strain.max() == pytest.approx(record.max_strain, rel=1e-6)
+    assert (found.dofs, len(found.cells)) == (record.dofs, record.cells)
+
+
+def test_reflected_quarter_is_the_whole_model():
+    quarter, whole = fields(mesh={"model": "auto"}), fields(mesh={"model": "3d"})
+    np.testing.assert_array_equal(quarter.points, whole.points)
+    np.testing.assert_array_equal(quarter.cells, whole.cells)
+    scale = 0.2e-3
+    np.testing.assert_allclose(quarter.displacement, whole.displacement, atol=1e-6 * scale)
+    np.testing.assert_allclose(quarter.strain, whole.strain, rtol=1e-5, atol=1e-9)
+
+
+def test_round_scene_is_shown_in_three_dimensions():
+    body = {"shape": "cylinder", "radius": "20 mm", "height": "20 mm"}
+    made = study(body=body, plan={"without": []}, mesh={"epsilon": "8 mm", "outside": "free"})
+    (case,) = made.cases()
+    found = compute_fields(solve_to_view(made, case), MPI.COMM_SELF, mesh_only=True)
+    # What is kept is the column: the longest distance from its axis is ε.
+    assert np.hypot(*found.points[:, :2].T).max() == pytest.approx(8e-3, rel=1e-9)
+    assert np.ptp(found.points[:, 2]) == pytest.approx(20e-3, rel=1e-9)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("changes", [{}, {"mesh": {"degree": 3}}, {"material": {"poisson": 0.49}}])
+def test_ranks_agree(changes):
+    together = fields(WORLD, **changes)
+    if WORLD.rank:
+        assert together is None
+        return
+    alone = fields(**changes)
+    np.testing.assert_array_equal(together.cells, alone.cells)
+    np.testing.assert_allclose(together.displacement, alone.displacement, atol=1e-9)
+    np.testing.assert_allclose(together.strain, alone.strain, rtol=1e-4, atol=1e-7)
+
+
+def test_elements_are_small_within_epsilon():
+    found = fields(mesh_only=True, mesh={"epsilon": "8 mm", "fine": "2 mm", "coarse": "8 mm"})
+    inside = found.within_epsilon
+    assert np.quantile(found.sizes[inside], 0.95) < np.quantile(found.sizes[~inside], 0.05) * 2
+    assert np.median(found.sizes[inside]) < 0.5 * np.median(found.sizes[~inside])
+    # A regular tetrahedron of edge a has the volume a³/(6√2): together they are the body.
+    assert (found.sizes**3).sum() / (6 * np.sqrt(2)) == pytest.approx(40e-3 * 40e-3 * 20e-3, rel=1e-9)
+
+
+def test_nothing_is_solved_where_the_mesh_alone_is_asked_for(monkeypatch):
+    def refuse(*_, **__):
+        raise AssertionError("solved")
+
+    monkeypatch.setattr("pipeline.view.compute.solve_body", refuse)
+    found = fields(mesh_only=True)
+    assert found.displacement is None
+    assert found.strain is None
+    with pytest.raises(AssertionError, match="solved"):
+        fields()
+
+
+def test_accuracy_is_shown_on_the_mesh_that_proves_it():
+    none = dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))
+    changes = {"mesh": none | {"accuracy": "3 %"}}
+    made = study(**changes)
+    (case,) = made.cases()
+    # A first mesh that cannot do it is passed over.
+    first = solve_to_view(made, case)
+    poor = first.case.mesh.model_copy(update={"fine": 10e-3, "coarse": 10e-3, "rim": 2e-3, "degree": 2})
+    start = replace(first, case=replace(first.case, mesh=poor), later=(first.case.mesh, *first.later))
+    found = compute_fields(start, MPI.COMM_SELF)
+    assert found.case.mesh != poor
+    assert found.dofs == compute_fields(first, MPI.COMM_SELF).dofs
+
+
+@pytest.mark.mpi
+def test_what_does_not_fit_into_memory_is_refused():
+    with pytest.raises(CaseFailure, match="GB are available"):
+        fields(WORLD, mesh_only=True, mesh={"fine": "0.01 mm", "rim": "0.01 mm"})
