@@ -77,6 +77,14 @@ def geometry_dofs(mesh: Any) -> np.ndarray:
     return array.reshape(topology.size_local + topology.num_ghosts, -1)
 
 
+def cell_dofs(space: Any) -> np.ndarray:
+    """Return the dofs (blocks of a vector space) of each local cell, shape (cells, dofs per cell)."""
+    dofs = space.dofmap.list
+    array = dofs.array if hasattr(dofs, "array") else np.asarray(dofs)
+    topology = space.mesh.topology.index_map(space.mesh.topology.dim)
+    return array.reshape(topology.size_local + topology.num_ghosts, -1)
+
+
 def vector_space(mesh: Any, degree: int) -> Any:
     """Return the continuous vector Lagrange space of ``degree`` on ``mesh``."""
     if hasattr(fem, "functionspace"):
@@ -144,17 +152,6 @@ def assemble_matrix(form: Any, bcs: list[Any], diagonal: float, mat_type: str) -
     except BaseException:
         matrix.destroy()
         raise
-    return matrix
-
-
-def interpolation_matrix(coarse: Any, fine: Any) -> PETSc.Mat:
-    """Return the matrix that carries functions of ``coarse`` to ``fine``; collective."""
-    if hasattr(fem_petsc, "interpolation_matrix"):
-        matrix = fem_petsc.interpolation_matrix(coarse, fine)
-    else:
-        spaces = (getattr(space, "_cpp_object", space) for space in (coarse, fine))
-        matrix = dolfinx.cpp.fem.petsc.interpolation_matrix(*spaces)
-    matrix.assemble()
     return matrix
 
 
