@@ -1,54 +1,227 @@
-"""Cholesky or conjugate gradients? Time and memory of both, over sizes and degrees: ``python benchmarks/solvers.py``.
+"""Linear solvers in units of what they are made of, applications of the operator: ``python -m benchmarks.solvers``.
 
-From this come ``DIRECT_LIMIT`` in ``pipeline/solve/linear.py`` and the bytes per dof in ``pipeline/plan/estimate.py``.
-Each row is a process of its own, since a process's peak memory is that of its largest solve.
+A disc on a box, a quarter of it, graded to the probe's edge. Set-up and solve are in units of one application of the
+finest operator (a product with its blocked matrix), measured around them: so the figures mean the same on another
+machine, and on a busy one, as times are those of the processor. Each row is a process of its own, since a process's
+peak memory is that of its largest solve. From this come ``DIRECT_LIMIT`` in ``pipeline/solve/linear.py`` and
+``pipeline/solve/mixed.py``, and the bytes per dof in ``pipeline/plan/estimate.py``.
 """
 
 import argparse
+import itertools
+import json
 import statistics
 import subprocess
 import sys
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from math import exp, log
+from pathlib import Path
+from typing import Any
 
-SIZES = {1: (4.0, 2.0, 1.0, 0.7), 2: (8.0, 4.0, 2.0, 1.5), 3: (8.0, 5.0, 3.0, 2.5)}  # mm
+import numpy as np
+
+# Element size far from the probe and at its edge, mm.
+SMALL = {1: ((4, 2), (3, 1), (2, 0.8)), 2: ((10, 3), (8, 1), (5, 0.8)), 3: ((20, 4), (15, 3), (10, 2))}
+LARGE = {1: ((1, 0.2), (0.6, 0.2)), 2: ((1.7, 0.2), (1.0, 0.2), (0.63, 0.2)), 3: ((2.6, 0.3), (1.7, 0.2))}
+RATIOS = {"displacement": (0.3, 0.45, 0.49), "mixed": (0.45, 0.49, 0.4999)}
+YOUNG, DEPTH = 10e3, 0.2e-3
+COLUMNS = {
+    "element": "", "degree": "d", "poisson": "g", "dofs": "d", "method": "", "iterations": "d", "assemble": ".0f",
+    "setup": ".0f", "solve": ".0f", "total": ".0f", "application": ".2f", "bandwidth": ".2f", "bytes": ".0f",
+}  # fmt: skip
 
 
-def measure(degree: int, size: float, method: str, repeats: int) -> None:
-    """Solve one case ``repeats`` times and print a row of the table."""
+def measure(element: str, degree: int, poisson: float, size: tuple[float, float], method: str, repeats: int) -> None:
+    """Solve one case ``repeats`` times and print its row as JSON."""
     from mpi4py import MPI
+    from threadpoolctl import threadpool_limits
 
     from pipeline.run.memory import PeakMemory
-    from tests.cases import solve
+    from pipeline.run.meshing import mesh_case
+    from pipeline.solve.elasticity import ElasticBody
+    from pipeline.solve.mixed import MixedBody
+    from pipeline.solve.space import Contact
 
-    base = PeakMemory(MPI.COMM_SELF).peak()
-    mesh = {"fine": f"{size} mm", "coarse": f"{size} mm", "rim": f"{min(size, 1.0)} mm", "degree": degree}
-    runs = [next(iter(solve(mesh=mesh, solve={"method": method}).values())) for _ in range(repeats)]
-    seconds = statistics.median(run.time_setup + run.time_solve for run in runs)
-    run = runs[-1]
-    per_dof = (max(run.memory for run in runs) - base) / run.dofs
-    print(
-        f"| {degree} | {run.dofs:7d} | {run.cells / run.dofs:.2f} | {method:9} | {seconds:7.2f} | "
-        f"{run.iterations:3d} | {per_dof:6.0f} |",
-        flush=True,
-    )
+    with threadpool_limits(limits=1), ExitStack() as stack:
+        mesh, _ = mesh_case(_case(degree, size), ("x", "y"), MPI.COMM_SELF)
+        base = PeakMemory(MPI.COMM_SELF)
+        held = base.peak()
+        make = MixedBody if element == "mixed" else ElasticBody
+        body = stack.enter_context(make(mesh, degree, Contact((0.0, 0.0, -DEPTH), True)))
+        mu = YOUNG / (2 * (1 + poisson))
+        lame = 2 * mu * poisson / (1 - 2 * poisson), mu
+        run = _mixed_run if isinstance(body, MixedBody) else _elastic_run
+        matrix, once = run(body, lame, method, stack)
+        runs = []
+        for _ in range(repeats):
+            before = _application(matrix)
+            assemble, setup, solve, iterations = once()
+            unit = (before + _application(matrix)) / 2
+            runs.append((assemble / unit, setup / unit, solve / unit, unit))
+        assemble, setup, solve, unit = (statistics.median(values) for values in zip(*runs, strict=True))
+        moved = matrix.getInfo()["nz_used"] * (8 + 4 / 9) + 16 * matrix.getSize()[0]
+        row = {
+            "element": element, "degree": degree, "poisson": poisson, "dofs": body.dofs, "method": method,
+            "iterations": iterations, "assemble": assemble, "setup": setup, "solve": solve, "total": setup + solve,
+            "application": 1e3 * unit, "bandwidth": moved / unit / _stream(), "bytes": (base.peak() - held) / body.dofs,
+        }  # fmt: skip
+    print(json.dumps(row), flush=True)
+
+
+def _case(degree: int, size: tuple[float, float]) -> Any:
+    from pipeline.study.load import parse
+
+    content = {
+        "body": {"shape": "box", "size": ["60 mm", "60 mm", "20 mm"], "fixed": "bottom"},
+        "material": {"young": "10 kPa", "poisson": 0.3},
+        "probe": {"action": "pierce", "shape": "disc", "radius": "2 mm", "depth": "0.2 mm"},
+        "mesh": {
+            "epsilon": "full", "fine": f"{size[0]} mm", "coarse": "20 mm", "rim": f"{size[1]} mm", "growth": 0.5,
+            "degree": degree,
+        },
+    }  # fmt: skip
+    return parse(content).case(())
+
+
+def _elastic_run(body: Any, lame: tuple[float, float], method: str, stack: ExitStack) -> tuple[Any, Callable[[], Any]]:
+    """Return the blocked operator, and what assembles, sets up and solves once."""
+    from pipeline.solve.linear import LinearSolver
+    from pipeline.solve.solution import TOLERANCE
+
+    unit, _ = body.space.operator(lame, shared=False, blocked=body.space.degree > 1)
+    stack.callback(unit.destroy)
+
+    def once() -> tuple[float, float, float, int]:
+        start = time.process_time()
+        with body.solver(lame, method) as lent, body.space.vector() as rhs, body.space.vector() as unknown:
+            body.space.lift(rhs, lame)
+            made = time.process_time()
+            solver = LinearSolver(lent.levels, direct=method == "direct", tolerance=TOLERANCE)
+            ready = time.process_time()
+            iterations = solver.solve(rhs, unknown)
+            done = time.process_time()
+            solver.close()
+            return made - start - (ready - made), ready - made, done - ready, iterations
+
+    return unit, once
+
+
+def _mixed_run(body: Any, lame: tuple[float, float], method: str, stack: ExitStack) -> tuple[Any, Callable[[], Any]]:
+    """The same for mixed elements; a set-up that serves all ratios counts for one."""
+    from pipeline.solve.mixed import LAME, STRICTER
+    from pipeline.solve.saddle import SaddleSolver
+    from pipeline.solve.solution import TOLERANCE
+
+    direct, space, c = method == "direct", body.space, 1 / (lame[0] / lame[1] - LAME[0])
+    start = time.process_time()
+    saddle, _ = body.saddle(direct=direct)
+    assemble = time.process_time() - start
+    unit, _ = space.displacements.operator(LAME, shared=False, blocked=True)
+    stack.callback(unit.destroy)
+
+    def once() -> tuple[float, float, float, int]:
+        with space.pair() as rhs, space.pair() as unknown:
+            space.lift(rhs, LAME)
+            start = time.process_time()
+            with SaddleSolver(saddle, direct=direct) as solver:
+                ready = time.process_time()
+                iterations = solver.solve(c, rhs, unknown, STRICTER * TOLERANCE)
+                return assemble, ready - start, time.process_time() - ready, iterations
+
+    return unit, once
+
+
+def _application(matrix: Any, times: int = 9) -> float:
+    """Return the seconds of one product with ``matrix``."""
+    x, y = matrix.createVecs()
+    x.set(1.0)
+    seconds = []
+    for _ in range(times):
+        start = time.process_time()
+        matrix.mult(x, y)
+        seconds.append(time.process_time() - start)
+    x.destroy()
+    y.destroy()
+    return statistics.median(seconds)
+
+
+def _stream() -> float:
+    """Return the bandwidth of memory (bytes/s): a sum of two long arrays into a third."""
+    a, b, c = np.zeros(10_000_000), np.ones(10_000_000), np.ones(10_000_000)
+    seconds = []
+    for _ in range(7):
+        start = time.process_time()
+        np.add(b, c, out=a)
+        seconds.append(time.process_time() - start)
+    return 3 * a.nbytes / statistics.median(seconds)
+
+
+def crossovers(rows: list[dict[str, Any]]) -> dict[str, int]:
+    """Return the dofs at which both methods take the same time, for each element and degree, by interpolation."""
+    found = {}
+    for kind in sorted({(row["element"], row["degree"]) for row in rows}):
+        times: dict[int, dict[str, float]] = {}
+        for row in rows:
+            if (row["element"], row["degree"]) == kind and row["poisson"] == RATIOS[kind[0]][0]:
+                times.setdefault(row["dofs"], {})[row["method"]] = row["total"]
+        both = sorted((d, log(t["direct"] / t["iterative"])) for d, t in times.items() if len(t) == 2)
+        for (low, a), (high, b) in itertools.pairwise(both):
+            if a <= 0 < b:
+                found[f"{kind[0]} {kind[1]}"] = round(exp(log(low) + log(high / low) * a / (a - b)))
+    return found
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """Return the rows as a table of Markdown."""
+    lines = ["| " + " | ".join(COLUMNS) + " |", "|---" * len(COLUMNS) + "|"]
+    lines += ["| " + " | ".join(format(row[name], how) for name, how in COLUMNS.items()) + " |" for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def plan(largest: int) -> list[tuple[str, int, float, tuple[float, float], str]]:
+    """Return the rows to measure: element, degree, ratio, sizes, method; ``largest`` sizes of each element."""
+    todo = []
+    for degree, sizes in SMALL.items():
+        for element in ("displacement", "mixed")[: 1 if degree == 1 else 2]:
+            for size in sizes:
+                todo += [(element, degree, RATIOS[element][0], size, method) for method in ("direct", "iterative")]
+    for degree, sizes in LARGE.items():
+        for element in ("displacement", "mixed")[: 2 if degree == 2 else 1]:
+            for number, size in enumerate(sizes[:largest]):
+                ratios = RATIOS[element] if number < 2 and degree > 1 else RATIOS[element][:1]
+                todo += [(element, degree, poisson, size, "iterative") for poisson in ratios]
+    return todo
 
 
 def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--one", nargs=3, metavar=("DEGREE", "SIZE", "METHOD"))
+    """Measure, and write ``solvers.json`` and ``solvers.md``."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--one", help="a row, as JSON: what runs in a process of its own")
     parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument(
+        "--largest", type=int, default=3, help="how many of the large sizes; the third is a million dofs"
+    )
+    parser.add_argument("--output", type=Path, default=Path("results"))
     arguments = parser.parse_args()
     if arguments.one:
-        degree, size, method = arguments.one
-        measure(int(degree), float(size), method, arguments.repeats)
+        measure(*json.loads(arguments.one), repeats=arguments.repeats)
         return
-    names = ("degree", "dofs", "cells/dof", "method", "set-up + solve (s)", "iterations", "bytes/dof")
-    print(f"| {' | '.join(names)} |", "|---" * len(names) + "|", sep="\n", flush=True)
-    for degree, sizes in SIZES.items():
-        for size in sizes:
-            for method in ("direct", "iterative"):
-                row = [sys.executable, __file__, "--one", str(degree), str(size), method]
-                subprocess.run([*row, "--repeats", str(arguments.repeats)], check=False)
+    rows = []
+    for case in plan(arguments.largest):
+        command = [sys.executable, "-m", "benchmarks.solvers", "--one", json.dumps(case)]
+        done = subprocess.run([*command, "--repeats", str(arguments.repeats)], stdout=subprocess.PIPE, check=False)
+        if done.returncode:
+            print(f"failed: {case}", file=sys.stderr)
+            continue
+        rows.append(json.loads(done.stdout))
+        print(table(rows[-1:]).splitlines()[-1], flush=True)
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    crossed = crossovers(rows)
+    (arguments.output / "solvers.json").write_text(json.dumps({"rows": rows, "crossover": crossed}, indent=1))
+    said = "".join(f"- {name}: {dofs} dofs\n" for name, dofs in crossed.items())
+    (arguments.output / "solvers.md").write_text(f"{table(rows)}\nDirect and iterative take the same time at\n\n{said}")
 
 
 if __name__ == "__main__":

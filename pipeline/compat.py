@@ -160,17 +160,6 @@ def assemble_matrix(form: Any, bcs: list[Any], diagonal: float, mat_type: str) -
     return matrix
 
 
-def interpolation_matrix(coarse: Any, fine: Any) -> PETSc.Mat:
-    """Return the matrix that carries functions of ``coarse`` to ``fine``; collective."""
-    if hasattr(fem_petsc, "interpolation_matrix"):
-        matrix = fem_petsc.interpolation_matrix(coarse, fine)
-    else:
-        spaces = (getattr(space, "_cpp_object", space) for space in (coarse, fine))
-        matrix = dolfinx.cpp.fem.petsc.interpolation_matrix(*spaces)
-    matrix.assemble()
-    return matrix
-
-
 def versions() -> dict[str, str]:
     """Return the versions of the libraries that a force depends on."""
     petsc = ".".join(map(str, PETSc.Sys.getVersion()))

@@ -1,9 +1,9 @@
 """What solves a case on its mesh, if the memory is there for it."""
 
-import psutil
 from mpi4py import MPI
 
 from pipeline.mesh.distribute import BodyMesh
+from pipeline.run.memory import available_memory
 from pipeline.solve.elasticity import ElasticBody
 from pipeline.solve.linear import SolveError
 from pipeline.solve.mixed import MixedBody
@@ -54,7 +54,7 @@ def check_memory(comm: MPI.Comm, needed: float, what: str) -> None:
 
 def lacks_memory(comm: MPI.Comm, needed: float, what: str) -> str:
     """Return what to say if ``needed`` bytes are too much, the same on every rank; collective."""
-    available = comm.bcast(psutil.virtual_memory().available if comm.rank == 0 else None)
+    available = available_memory(comm)
     if needed <= _MEMORY_SHARE * available:
         return ""
     return f"{what} needs about {needed / 1e9:.1f} GB of memory, {available / 1e9:.1f} GB are available"

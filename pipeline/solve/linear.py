@@ -1,7 +1,7 @@
 """Linear solvers for elasticity: Cholesky by MUMPS, and conjugate gradients with multigrid.
 
-Multigrid goes down in degree (p, p - 1, …, 1) with Chebyshev smoothing, and from degree 1 by smoothed
-aggregation (PETSc's GAMG), which is told the rigid-body modes. Every solver has its own options prefix.
+Multigrid goes down in degree (p, p - 1, …, 1) with Chebyshev smoothing, and from degree 1 by hypre's BoomerAMG.
+Every solver has its own options prefix.
 """
 
 import itertools
@@ -12,12 +12,24 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from pipeline import compat
+from pipeline.solve.transfer import transfer
 from pipeline.stages import stage
 
 # Dofs up to which Cholesky is faster than conjugate gradients, measured: docs/performance.md.
 DIRECT_LIMIT = {1: 12_000, 2: 4_000, 3: 4_000}
 _MOST_ITERATIONS = 500
+
+# Measured: docs/solvers.md. Five steps find the largest eigenvalue to 15 %; two steps of smoothing on its upper nine
+# tenths take the fewest applications of the operator.
+_SMOOTHER = {
+    "ksp_type": "chebyshev", "ksp_max_it": 2, "ksp_chebyshev_esteig": "0,0.1,0,1.15", "ksp_chebyshev_esteig_steps": 5,
+    "pc_type": "pbjacobi",
+}  # fmt: skip
+# Symmetric: Gauss–Seidel down, backwards up. Four entries to a row of the interpolation keep the coarse levels sparse.
+_BOOMERAMG = {
+    "coarsen_type": "HMIS", "interp_type": "ext+i", "strong_threshold": 0.5, "P_max": 4, "no_CF": "",
+    "relax_type_down": "SOR/Jacobi", "relax_type_up": "backward-SOR/Jacobi",
+}  # fmt: skip
 
 _prefixes = itertools.count()
 
@@ -75,12 +87,16 @@ class LinearSolver:
         self.setup_seconds = time.perf_counter() - start
 
     @stage("iterations")
-    def solve(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> int:
+    def solve(self, rhs: PETSc.Vec, solution: PETSc.Vec, tolerance: float | None = None) -> int:
         """Improve ``solution`` and return the iterations; collective. A direct solve does not look at what it holds.
+
+        ``tolerance`` is another one than the solver was made with.
 
         Raises:
             SolveError: if PETSc reports anything but convergence.
         """
+        if tolerance is not None:
+            self.ksp.setTolerances(rtol=tolerance)
         try:
             self.ksp.setInitialGuessNonzero(self.ksp.getType() != "preonly")
             self.ksp.solve(rhs, solution)
@@ -92,6 +108,11 @@ class LinearSolver:
                 f"the linear solver did not converge: {reason_name(reason)} after {self.ksp.its} iterations"
             )
         return self.ksp.its
+
+    @property
+    def levels(self) -> list[Level]:
+        """The levels that it was made of."""
+        return self._levels
 
     @property
     def matrix(self) -> PETSc.Mat:
@@ -133,59 +154,25 @@ class LinearSolver:
     def _multigrid(self, pc: PETSc.PC) -> None:
         levels = self._levels
         if len(levels) == 1:
-            self._aggregation(pc, levels[0], self._prefix)
+            self._algebraic(pc, self._prefix)
             return
         pc.setType("mg")
         pc.setMGLevels(len(levels))
         pc.setMGType(PETSc.PC.MGType.MULTIPLICATIVE)
         for number, (coarse, fine) in enumerate(itertools.pairwise(levels), start=1):
-            pc.setMGInterpolation(number, self._own(_transfer(coarse, fine)))
-            smoother = pc.getMGSmoother(number)
-            smoother.setOperators(fine.matrix)
-            self._option(
-                f"{self._prefix}mg_levels_{number}_",
-                ksp_type="chebyshev", ksp_max_it=2, ksp_chebyshev_esteig="0,0.1,0,1.1",
-                ksp_chebyshev_esteig_steps=10, pc_type="pbjacobi",
-            )  # fmt: skip
+            pc.setMGInterpolation(number, self._own(transfer(coarse, fine)))
+            pc.getMGSmoother(number).setOperators(fine.matrix)
+            self._option(f"{self._prefix}mg_levels_{number}_", **_SMOOTHER)
         bottom = pc.getMGCoarseSolve()
         bottom.setOperators(levels[0].matrix)
         bottom.setType("preonly")
         bottom.setOptionsPrefix(self._prefix + "mg_coarse_")
-        self._aggregation(bottom.pc, levels[0], self._prefix + "mg_coarse_")
+        self._algebraic(bottom.pc, self._prefix + "mg_coarse_")
 
-    def _aggregation(self, pc: PETSc.PC, level: Level, prefix: str) -> None:
-        modes = self._own(rigid_body_modes(level.space))
-        level.matrix.setNearNullSpace(modes)
-        pc.setType("gamg")
-        self._option(
-            prefix, pc_gamg_threshold=0.01, mg_levels_ksp_type="chebyshev", mg_levels_ksp_max_it=2,
-            mg_levels_pc_type="jacobi",
-        )  # fmt: skip
-
-
-def rigid_body_modes(space: Any) -> PETSc.NullSpace:
-    """Return translations and rotations of ``space`` as a near-nullspace; the caller destroys it."""
-    index_map, bs = space.dofmap.index_map, space.dofmap.index_map_bs
-    coordinates = PETSc.Vec().createMPI((index_map.size_local * bs, None), bsize=bs, comm=space.mesh.comm)
-    coordinates.array[:] = space.tabulate_dof_coordinates()[: index_map.size_local].reshape(-1)
-    modes = PETSc.NullSpace().createRigidBody(coordinates)
-    coordinates.destroy()
-    return modes
-
-
-@stage("interpolation")
-def _transfer(coarse: Level, fine: Level) -> PETSc.Mat:
-    """Interpolation between degrees that neither reads nor writes prescribed dofs."""
-    matrix = compat.interpolation_matrix(coarse.space, fine.space)
-    columns, rows = matrix.createVecs()
-    for vector, level in ((rows, fine), (columns, coarse)):
-        owned = vector.getLocalSize()
-        vector.set(1.0)
-        vector.array[level.prescribed[level.prescribed < owned]] = 0.0
-    matrix.diagonalScale(rows, columns)
-    rows.destroy()
-    columns.destroy()
-    return matrix
+    def _algebraic(self, pc: PETSc.PC, prefix: str) -> None:
+        pc.setType("hypre")
+        pc.setHYPREType("boomeramg")
+        self._option(prefix, **{f"pc_hypre_boomeramg_{name}": value for name, value in _BOOMERAMG.items()})
 
 
 def reason_name(reason: int) -> str:

@@ -64,7 +64,7 @@ class SaddleSolver:
         start = time.perf_counter()
         with ExitStack() as stack:
             if not direct:
-                self._multigrid = LinearSolver(saddle.levels, direct=False, tolerance=1e-8)
+                self._multigrid = LinearSolver(saddle.levels, direct=False, tolerance=0.5)
                 stack.callback(self._multigrid.close)
                 self._mass = self._mass_solver(stack)
             self._stack = stack.pop_all()

@@ -1,7 +1,7 @@
 """What one solve gives, and what every kind of element needs to say it."""
 
 from dataclasses import dataclass
-from math import nan
+from math import isfinite, nan
 from typing import Any
 
 import numpy as np
@@ -14,9 +14,29 @@ from pipeline.stages import stage
 
 FloatArray = npt.NDArray[np.float64]
 
-# F·d = 2U and F_probe + F_support = 0 hold for the exact solution of the discrete system. Conjugate gradients
-# stopped at 1e-8 keep both to about 1e-8; what misses them by this much has not been solved.
+# F·d = 2U and F_probe + F_support = 0 hold for the exact solution of the discrete system, and are linear in the
+# solver's error: what misses them by this much has not been solved.
 BALANCE_LIMIT = 1e-6
+# The energy norm of the solver's error, relative: F, which is quadratic in it, then has no error above 1e-9 up to
+# ν = 0.49, and 1e-11 as a rule (docs/solvers.md).
+TOLERANCE = 1e-6
+# What a second round of iterations aims at, as a share of the limit, and the most by which it lowers the error.
+_AIM, _MOST = 0.3, 1e-2
+
+
+def rest(balance: float, tolerance: float) -> float:
+    """Return the share of the solver's error that may remain where forces do not balance, 1 if it is small enough.
+
+    It is, too, at a ``tolerance`` that was chosen loosely: that the forces do not balance is then no wonder.
+    """
+    if balance <= BALANCE_LIMIT or tolerance > TOLERANCE or not isfinite(balance):
+        return 1.0
+    return max(_AIM * BALANCE_LIMIT / balance, _MOST)
+
+
+def needed_tolerance(travel: tuple[float, float, float], tolerance: float) -> float:
+    """Return the tolerance to solve to: of a probe that slices, too, only the work is quadratic in the error."""
+    return 1e-2 * tolerance if np.count_nonzero(travel) > 1 else tolerance
 
 
 @dataclass(frozen=True)

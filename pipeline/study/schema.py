@@ -242,7 +242,7 @@ class Solve(Section):
     """How cases are solved and timed; ``exact`` asks for F_exact of every scene."""
 
     method: Literal["auto", "direct", "iterative"] = "auto"
-    tolerance: Annotated[float, Field(ge=1e-14, le=1e-3)] = 1e-8
+    tolerance: Annotated[float, Field(ge=1e-14, le=1e-3)] = 1e-6
     exact: bool = True
     timing: bool = False
     repeats: Annotated[int, Field(ge=1, le=1000)] = 3

@@ -161,8 +161,9 @@ def test_blade_direction_and_slice():
 def test_symmetric_part_gives_the_force_of_the_whole(planes, changes):
     """Half or quarter of the body, and the whole that it is reflected to: the same discrete solution."""
     mesh = changes.pop("mesh", {})
-    (part,) = solve(mesh=mesh, **changes).values()
-    (whole,) = solve(mesh=mesh | {"model": "3d"}, solve={"tolerance": 1e-10}, **changes).values()
+    # Force across the probe's axis is linear in the solver's error.
+    precise = {"solve": {"tolerance": 1e-10}}
+    part, whole = (next(iter(solve(mesh=mesh | m, **precise, **changes).values())) for m in ({}, {"model": "3d"}))
     assert part.origin == ("symmetric" if planes else "solved")
     assert whole.origin == "solved"
     assert (part.cells, part.dofs) == (whole.cells, whole.dofs)

@@ -1,0 +1,97 @@
+"""Interpolation between displacement spaces of different degrees on one mesh, as a matrix for multigrid.
+
+dolfinx's own matrix takes as long as half the multigrid solve, since it goes through the cells one by one.
+"""
+
+from typing import Any, Protocol
+
+import basix
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from pipeline import compat
+from pipeline.stages import stage
+
+# What interpolates to less than this does so by rounding.
+_NOTHING = 1e-12
+
+_IntArray = npt.NDArray[np.int32]
+
+
+class Side(Protocol):
+    """A space of vectors and its local dofs (unrolled) that are prescribed."""
+
+    @property
+    def space(self) -> Any: ...  # noqa: D102
+
+    @property
+    def prescribed(self) -> npt.NDArray[Any]: ...  # noqa: D102
+
+
+@stage("interpolation")
+def transfer(coarse: Side, fine: Side) -> PETSc.Mat:
+    """Return the interpolation from ``coarse`` to ``fine``, which neither reads nor writes prescribed dofs; collective.
+
+    The caller destroys the matrix.
+    """
+    dofmap, width = coarse.space.dofmap, fine.space.dofmap.index_map_bs
+    offsets, points, weights = _rows(coarse.space, fine.space)
+    # A row of blocks w I: ``width`` rows with the same weights, each on its own components.
+    count = np.repeat(np.diff(offsets), width)
+    start = np.concatenate([[0], np.cumsum(count)])
+    within = np.arange(start[-1]) - np.repeat(start[:-1], count)
+    entry = np.repeat(np.repeat(offsets[:-1], width), count) + within
+    component = np.repeat(np.tile(np.arange(width), len(offsets) - 1), count)
+    free = [_free(side) for side in (fine, coarse)]
+    row = np.repeat(np.arange(len(count)), count)
+    values = weights[entry] * free[0][row] * free[1][width * points[entry] + component]
+    columns = width * dofmap.index_map.local_to_global(points[entry].astype(np.int32)) + component
+    sizes = [width * side.space.dofmap.index_map.size_local for side in (fine, coarse)]
+    matrix = PETSc.Mat().createAIJ(
+        ((sizes[0], None), (sizes[1], None)), bsize=width, comm=fine.space.mesh.comm,
+        csr=(start.astype(PETSc.IntType), columns.astype(PETSc.IntType), values),
+    )  # fmt: skip
+    matrix.assemble()
+    return matrix
+
+
+def _rows(coarse: Any, fine: Any) -> tuple[npt.NDArray[np.int64], _IntArray, npt.NDArray[np.float64]]:
+    """Return the interpolation of scalars as sparse rows, one for each point of ``fine`` that this rank owns.
+
+    A point's row is that of any cell it belongs to.
+    """
+    local = _on_one_cell(compat.degree(coarse), compat.degree(fine))
+    few = [np.flatnonzero(np.abs(row) > _NOTHING) for row in local]
+    coarse_cells, fine_cells = (compat.cell_dofs(space) for space in (coarse, fine))
+    owned = fine.dofmap.index_map.size_local
+    place = np.zeros(owned, dtype=np.int64)
+    flat = fine_cells.reshape(-1)
+    mine = np.flatnonzero(flat < owned)
+    place[flat[mine]] = mine
+    cell, position = np.divmod(place, fine_cells.shape[1])
+    count = np.array([len(columns) for columns in few])[position]
+    offsets = np.concatenate([[0], np.cumsum(count)])
+    first = np.cumsum([0, *(len(columns) for columns in few)])[position]
+    entry = np.repeat(first - offsets[:-1], count) + np.arange(offsets[-1])
+    columns = np.concatenate(few)[entry]
+    weights = np.concatenate([row[columns] for row, columns in zip(local, few, strict=True)])[entry]
+    return offsets, coarse_cells[np.repeat(cell, count), columns], weights
+
+
+def _on_one_cell(coarse: int, fine: int) -> npt.NDArray[np.float64]:
+    """Return the values of the functions of degree ``coarse`` at the points of ``fine`` on the reference cell."""
+    low, high = (
+        basix.create_element(
+            basix.ElementFamily.P, basix.CellType.tetrahedron, degree, basix.LagrangeVariant.gll_warped
+        )
+        for degree in (coarse, fine)
+    )
+    return np.asarray(low.tabulate(0, high.points)[0, :, :, 0])
+
+
+def _free(side: Side) -> npt.NDArray[np.float64]:
+    dofmap = side.space.dofmap
+    free = np.ones(dofmap.index_map_bs * (dofmap.index_map.size_local + dofmap.index_map.num_ghosts))
+    free[side.prescribed] = 0.0
+    return free
