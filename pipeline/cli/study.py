@@ -80,12 +80,10 @@ def run(
     Example: mpirun -n 4 epsmesh run studies/figure3.toml
     """
     studies, left_out = load_all(files), check_names(without)
-    from mpi4py import MPI
-
     from pipeline import workflow
     from pipeline.run.store import StoreError
 
-    comm, failed = MPI.COMM_WORLD, False
+    comm, failed = workflow.world(), False
     speaks = comm.rank == 0
     for study in studies:
         try:

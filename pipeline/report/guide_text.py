@@ -5,7 +5,7 @@ from math import inf, isfinite
 
 from pipeline.report.correction import Correction
 from pipeline.report.guide import Guide
-from pipeline.report.settings import Labels, words
+from pipeline.report.settings import SYMBOLS, Labels, words
 from pipeline.report.verdict import Verdict
 from pipeline.study.sweep import format_label
 
@@ -31,7 +31,8 @@ def _answer(guide: Guide) -> list[str]:
         if guide.best:
             lines += _details(guide.best, guide)
     else:
-        what = "Smallest ε" if isfinite(guide.accuracy) else "Most accurate"
+        smallest = "Smallest ε" if "epsilon" in guide.answer.labels else "Fewest unknowns"
+        what = smallest if isfinite(guide.accuracy) else "Most accurate"
         lines = [f"{what}: {words(guide.answer.labels)}", *_details(guide.answer, guide)]
         if guide.lean and guide.lean is not guide.answer and guide.lean.dofs < guide.answer.dofs:
             lines.append(f"Fewest unknowns: {words(guide.lean.labels)} ({cost(guide.lean)})")
@@ -77,10 +78,8 @@ def _per_outside(guide: Guide) -> list[str]:
     rows = [["outside", "smallest ε", "worst error", "smallest ε with F / r", "r", "worst error"]]
     for name, (plain, corrected) in answers.items():
         row = [name, _short(plain), percent(plain.error) if plain else ""]
-        law = corrected.correction if corrected else None
-        rows.append(
-            row + ([_short(corrected), f"{law.r:.4g}", percent(law.error)] if corrected and law else ["none", "", ""])
-        )
+        law = corrected.correction if corrected else Correction()
+        rows.append([*row, _short(corrected), *((f"{law.r:.4g}", percent(law.error)) if corrected else ("", ""))])
     return table(rows)
 
 
@@ -110,7 +109,7 @@ def _constancy(guide: Guide) -> list[str]:
         return []
     ratio = "F/F_max" if guide.has_full else "F/F_exact"
     heads = _heads(guide)
-    rows = [[*heads, "least", "most", "most - least", "relative", *(f"by {name}" for name in names)]]
+    rows = [[*heads, "least", "most", "most - least", "relative", *(f"by {SYMBOLS.get(name, name)}" for name in names)]]
     for v in _sorted(guide):
         if v.is_judged and isfinite(v.spread.most):
             over = dict(v.spread.over)
@@ -123,7 +122,7 @@ def _constancy(guide: Guide) -> list[str]:
 def _heads(guide: Guide) -> list[str]:
     """Return the names of what the settings differ in, ε last."""
     labels = guide.verdicts[0].labels
-    return sorted(({"epsilon": "ε"}.get(name, name) for name in labels), key="ε".__eq__) or ["setting"]
+    return sorted((SYMBOLS.get(name, name) for name in labels), key="ε".__eq__) or ["setting"]
 
 
 def _cells(verdict: Verdict) -> list[str]:
@@ -167,9 +166,8 @@ def elements(mesh: Labels) -> str:
         parts.append(f"{format_label('fine', mesh['fine'])} {'everywhere' if full else 'within ε'}")
         parts += [] if full else [f"{format_label('coarse', mesh['coarse'])} far away"]
         rim = mesh["rim"]
-        parts.append(
-            "a tenth of the probe's half width at its edge" if rim is None else f"{1e3 * rim:g} mm at its edge"
-        )
+        edge = "a tenth of its half width" if rim is None else f"{1e3 * rim:g} mm"
+        parts.append(f"{edge} at the probe's edge")
         parts.append(f"growth {mesh['growth']:g}, degree {mesh['degree']}, element {mesh['element']}")
     return ", ".join(parts) or words(mesh)
 

@@ -16,7 +16,9 @@ from pipeline.study.schema import Mesh
 from pipeline.study.sweep import Case, Study, format_label
 
 # The dimensions that say how a scene is meshed ("mesh": an array of tables); every other one belongs to the scene.
-MESH_AXES = ("mesh", *(name for name in Mesh.model_fields if name != "name"))
+MESH_AXES = ("mesh", "mesh_accuracy", *(key for key in Mesh.model_fields if key not in ("name", "accuracy")))
+# What people call them.
+SYMBOLS = {"epsilon": "ε", "poisson": "ν", "young": "E", "mesh_accuracy": "accuracy"}
 Labels = dict[str, Any]
 
 
@@ -105,14 +107,13 @@ def study_of(dataset: xr.Dataset) -> Study | None:
         return None
 
 
-def words(labels: Labels, *, joined: str = ", ") -> str:
-    """Write labels as people read them; outside needs no name, nor do tables, whose names say what they are."""
+def words(labels: Labels) -> str:
+    """Write labels as people read them."""
     parts = []
     for name, value in labels.items():
         text = format_label(name, value)
-        symbol = {"epsilon": "ε", "poisson": "ν", "young": "E"}.get(name, name)
-        parts.append(f"outside {text}" if name == "outside" else f"{symbol} = {text}")
-    return joined.join(parts) or "the one setting"
+        parts.append(f"outside {text}" if name == "outside" else f"{SYMBOLS.get(name, name)} = {text}")
+    return ", ".join(parts) or "the one setting"
 
 
 def _labels(dataset: xr.Dataset, dims: list[str]) -> list[Labels]:
