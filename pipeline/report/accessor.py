@@ -65,28 +65,33 @@ class Accessor:
         previous = best.groupby([frame[d] for d in scene], sort=False).shift() if scene else best.shift()
         return frame[~(frame["error"] >= previous)].reset_index(drop=True)
 
-    def plot_ratio(self, ax: "Axes | None" = None, variable: str = "force_ratio", **labels: Any) -> "Axes":
+    def plot_ratio(
+        self, ax: "Axes | None" = None, variable: str = "force_ratio", by: str | None = None, **labels: Any
+    ) -> "Axes":
         """Draw F/F_max, or another ``variable``, against ε (mm), and return the axes; ``labels`` select.
 
-        A curve for each combination of what else is swept; if these are many, a band for each mesh setting, from the
-        least to the most over the scenes. Full order is not on the axis: it is F/F_max = 1.
+        A curve for each combination of what else is swept; if these are many, a band for each mesh setting and each
+        value of ``by``, from the least to the most over the other scenes. Full order is not on the axis: it is
+        F/F_max = 1.
 
         Raises:
-            ValueError: if ε is not swept.
+            ValueError: if ε, or ``by``, is not swept.
         """
         import matplotlib.pyplot as plt  # noqa: PLC0415 (slow to load)
 
         data = self._dataset[variable].sel(labels)
         if "epsilon" not in data.dims:
             raise ValueError("the dataset has no dimension epsilon to draw against")
+        if by is not None and by not in data.dims:
+            raise ValueError(f"by = {by!r}: no such dimension is left; there are {', '.join(map(str, data.dims))}")
         if ax is None:
             ax = plt.figure(figsize=(5, 3.4), layout="constrained").subplots()
         data = data.isel(epsilon=np.isfinite(data["epsilon"].values)).sortby("epsilon")
         others = [str(d) for d in data.dims if d != "epsilon"]
-        if np.prod([data.sizes[d] for d in others]) <= _MOST_CURVES or set(others) <= set(MESH_AXES):
+        if np.prod([data.sizes[d] for d in others]) <= _MOST_CURVES or {*others} <= {*MESH_AXES, by}:
             _draw_curves(ax, data, others)
         else:
-            _draw_bands(ax, data, others)
+            _draw_bands(ax, data, others, by)
         if variable == "force_ratio":
             ax.axhline(1.0, color="black", linewidth=0.7)
         ax.set_xlabel("ε (mm)")
@@ -105,12 +110,12 @@ def _draw_curves(ax: "Axes", data: xr.DataArray, dims: list[str]) -> None:
         ax.plot(x, data.sel(labels).values, label=words(labels) if labels else "", **style)
 
 
-def _draw_bands(ax: "Axes", data: xr.DataArray, dims: list[str]) -> None:
+def _draw_bands(ax: "Axes", data: xr.DataArray, dims: list[str], by: str | None) -> None:
     from pipeline.report.figures import COLOURS, MARKERS  # noqa: PLC0415 (matplotlib is slow to load)
 
     x = 1e3 * data["epsilon"].values
-    scene = [d for d in dims if d not in MESH_AXES]
-    for number, labels in enumerate(_combinations(data, [d for d in dims if d in MESH_AXES])):
+    scene = [d for d in dims if d not in (*MESH_AXES, by)]
+    for number, labels in enumerate(_combinations(data, [d for d in dims if d not in scene])):
         chosen = data.sel(labels)
         colour = COLOURS[number % len(COLOURS)]
         ax.fill_between(x, chosen.min(scene).values, chosen.max(scene).values, color=colour, alpha=0.25, linewidth=0)

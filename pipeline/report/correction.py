@@ -16,9 +16,10 @@ class Correction:
     """r of a mesh setting and its relative residuals, the largest over the scenes.
 
     ``residual`` is that of the scenes that r was taken from; ``left_out`` that of each scene by the r of all the
-    others; ``unseen`` that of the scenes with one value of a scene parameter (one ν, one probe, …) by the r of those
-    without it, the worst over parameters and values; ``error`` adds the error bars to the worst of these. NaN
-    where there is nothing left to take r from.
+    others, which tells little where scenes have twins (F/F_exact is the same for every Young's modulus); ``unseen``
+    that of the scenes with one value of a scene parameter (one ν, one probe, …) by the r of those without it, the worst
+    over parameters and values; ``error`` adds the error bars to the worst of these. NaN where there is nothing left to
+    take r from.
     """
 
     r: float = nan

@@ -45,7 +45,10 @@ def _answer(guide: Guide) -> list[str]:
             f"{percent(law.error)} on scenes that r was not taken from, {cost(corrected)}"
         )
     else:
-        lines.append("With the correction F_exact ≈ F / r: nothing can be said; it takes more than one scene")
+        few = "nothing can be said: it takes more than one scene"
+        lines.append(
+            f"With the correction F_exact ≈ F / r: {few if guide.scenes == 1 else 'no setting does that either'}"
+        )
     return lines
 
 
@@ -85,19 +88,19 @@ def _per_outside(guide: Guide) -> list[str]:
 
 def _settings(guide: Guide) -> list[str]:
     """Return the table of all settings: error, cost, and the law of correction."""
-    rows = [[*_heads(guide), "worst error", "time", "unknowns", "r", "residual", "left out", "unseen"]]
+    rows = [[*_heads(guide), "worst error", "usual", "time", "unknowns", "r", "residual", "left out", "unseen"]]
     for v in _sorted(guide):
         row = _cells(v)
         if not v.is_judged:
             rows.append([*row, f"not judged: {v.missing} of {guide.scenes} scenes not computed"])
             continue
         law = v.correction
-        row += [percent(v.error), time(v.seconds), f"{v.dofs:,.0f}"]
+        row += [percent(v.error), time(v.usual), time(v.seconds), f"{v.dofs:,.0f}"]
         rows.append([*row, f"{law.r:.4f}", percent(law.residual), percent(law.left_out), percent(law.unseen)])
     legend = [
-        "Largest over the scenes; error with, the last three without error bars. r: F_exact ≈ F / r; residual: on the",
-        "scenes that r is taken from; left out: on each scene, r taken from the others; unseen: on the scenes with one",
-        "value of a parameter (one ν, one probe, …), r taken from those without it.",
+        "Largest over the scenes (usual: median of the time); error with, the last three without error bars.",
+        "r: F_exact ≈ F / r; residual: on the scenes that r is taken from; left out: on each scene, r taken from the",
+        "others; unseen: on the scenes with one value of a parameter (one ν, one probe, …), r taken from the rest.",
     ]
     return [*table(rows, len(_heads(guide))), *legend]
 
@@ -174,7 +177,8 @@ def elements(mesh: Labels) -> str:
 
 def cost(verdict: Verdict) -> str:
     """Return unknowns, elements and time, the largest over the scenes."""
-    return f"up to {verdict.dofs:,.0f} unknowns, {verdict.cells:,.0f} elements, {time(verdict.seconds)}"
+    times = f"{time(verdict.seconds)} (usually {time(verdict.usual)})"
+    return f"up to {verdict.dofs:,.0f} unknowns, {verdict.cells:,.0f} elements, {times}"
 
 
 def percent(share: float) -> str:

@@ -34,8 +34,8 @@ class Verdict:
     """What a mesh setting is worth over the scenes.
 
     ``deviation`` is the worst |F/F_exact - 1|, ``error`` the worst with the error bars; ``limit`` the scene that has
-    it, its ``force`` and ``exact`` in N. ``seconds``, ``dofs`` and ``cells`` are the largest over the scenes. A
-    setting with ``missing`` scenes is not judged: its errors are those of the rest.
+    it, its ``force`` and ``exact`` in N. ``seconds``, ``dofs`` and ``cells`` are the largest over the scenes, ``usual``
+    is the median of the seconds. A setting with ``missing`` scenes is not judged: its errors are those of the rest.
     """
 
     labels: Labels
@@ -47,6 +47,7 @@ class Verdict:
     force: float = nan
     exact: float = nan
     seconds: float = nan
+    usual: float = nan
     dofs: float = nan
     cells: float = nan
     spread: Spread = field(default_factory=Spread)
@@ -77,6 +78,7 @@ def judge(table: Table, row: int) -> Verdict:
     return Verdict(
         labels, mesh, missing, float(deviation.max()), float(deviation[worst] + bar[worst]), table.scenes[scene],
         float(table.force[row, scene]), float(table.exact[row, scene]), float(table.seconds[row, use].max()),
+        float(np.median(table.seconds[row, use])),
         float(table.dofs[row, use].max()), float(table.cells[row, use].max()), spread(share[row, use], axes),
         correction.fit(ratio, bar, axes),
     )  # fmt: skip

@@ -65,10 +65,20 @@ def test_many_scenes_are_drawn_as_bands():
     assert len(axes.collections) == 3
     words = [text.get_text() for text in axes.get_legend().get_texts()]
     assert words[1] == "outside free: median and range of 8 scenes"
+    data = dataset()
+    axes = data.epsmesh.plot_ratio(by="probe")
+    words = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert "probe = scalpel, outside free: median and range of 2 scenes" in words
+    band = axes.collections[words.index("probe = scalpel, outside free: median and range of 2 scenes")]
+    here = data["force_ratio"].sel(probe="scalpel", outside="free", epsilon=4e-3)
+    at = band.get_paths()[0].vertices
+    assert {round(y, 9) for x, y in at if x == 4.0} == {round(float(y), 9) for y in here}
     many = synthetic(mesh={"epsilon": EPSILONS, "degree": [1, 2, 3], "outside": ["coarse", "free", "fixed"]})
     assert len(many.epsmesh.plot_ratio().get_lines()) == 9 + 1
     with pytest.raises(ValueError, match="no dimension epsilon"):
         synthetic().epsmesh.plot_ratio()
+    with pytest.raises(ValueError, match="by = 'body'"):
+        data.epsmesh.plot_ratio(by="body")
 
 
 def test_guide_is_that_of_the_command():

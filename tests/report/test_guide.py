@@ -63,7 +63,9 @@ def test_budget_alone_and_with_an_accuracy():
     assert guide(dataset(), budget="35ms").answer.labels == {"outside": "free", "epsilon": 6e-3}
     assert guide(dataset(), "5%", "35ms").answer is None
     assert guide(dataset(), "5%", "35ms").best.labels == {"outside": "free", "epsilon": 6e-3}
-    assert "the quickest takes 20 ms" in str(guide(dataset(), "5%", "1ms"))
+    text = str(guide(dataset(), "5%", "1ms"))
+    assert "the quickest takes 20 ms" in text
+    assert "With the correction F_exact ≈ F / r: no setting does that either" in text
 
 
 def test_correction_takes_what_the_scenes_have_in_common():
