@@ -151,13 +151,16 @@ def _mesh(dataset: xr.Dataset, study: Study | None, labels: Labels) -> Labels:
     """Return ε, outside, element sizes (m) and elements of a setting, as far as they are known; a rim left to the
     program is None.
     """
-    if study is None or tuple(axis.name for axis in study.axes) != dataset["force"].dims:
+    if study is None:
         return dict(labels)
-    position = {
-        dim: next(i for i, value in enumerate(dataset[dim].values) if _plain(value) == label)
-        for dim, label in labels.items()
-    }
-    case: Case = study.case(tuple(position.get(axis.name, 0) for axis in study.axes))
+    # Of a dataset that somebody has selected from, a label may be left as a coordinate without dimension.
+    known = {name: _plain(dataset[name].values[()]) for name in dataset.coords if dataset[name].ndim == 0} | labels
+    index = []
+    for axis in study.axes:
+        if axis.section == "mesh" and known.get(axis.name) not in axis.labels:
+            return dict(labels)
+        index.append(axis.labels.index(known[axis.name]) if axis.section == "mesh" else 0)
+    case: Case = study.case(tuple(index))
     mesh = case.mesh
     if mesh.accuracy is not None:
         return {"accuracy": mesh.accuracy, "outside": mesh.outside}

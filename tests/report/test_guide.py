@@ -203,6 +203,21 @@ def test_what_is_swept_of_the_mesh_is_part_of_the_setting(old, new, labels):
     assert len(found.verdicts) == 4 * 7
 
 
+def test_part_of_a_dataset_has_a_guide_of_its_own():
+    data = dataset()
+    some = guide(data.sel(probe=["needle"], outside=["free"], epsilon=[10e-3, inf]), "6%")
+    assert some.scenes == 2
+    assert some.answer.labels == {"outside": "free", "epsilon": 10e-3}
+    assert some.answer.mesh["outside"] == "free"
+    assert some.answer.mesh["epsilon"] == 10e-3
+    one = guide(data.sel(probe="needle", outside="free"), "6%")
+    assert one.answer.labels == {"epsilon": 10e-3}
+    assert one.answer.mesh == some.answer.mesh
+    without = guide(data.sel(probe="needle", outside="free").drop_vars("outside"), "6%")
+    assert without.answer.mesh == {"epsilon": 10e-3}
+    assert "ε = 10 mm" in str(without)
+
+
 def test_meshes_from_an_accuracy_and_from_tables():
     sizes = TEXT.split("[mesh]")[0]
     found = guide(dataset(sizes + '[mesh]\naccuracy = ["1 %", "0.3 %"]\n', ratio=lambda case: 1.001), "5%")
