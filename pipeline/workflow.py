@@ -49,6 +49,11 @@ class Outcome:
     interrupted: bool
 
 
+def world() -> MPI.Comm:
+    """Return the communicator of all ranks: what a run is given, unless its caller says otherwise."""
+    return MPI.COMM_WORLD
+
+
 def prepare(
     study: Study,
     comm: MPI.Comm,

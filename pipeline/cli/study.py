@@ -90,12 +90,10 @@ def run(
     studies, left_out = load_all(files), check_names(without)
     if store:
         check_store(store)
-    from mpi4py import MPI
-
     from pipeline import workflow
     from pipeline.run.store import StoreError
 
-    comm, found = MPI.COMM_WORLD, list[dict[str, Any]]()
+    comm, found = workflow.world(), list[dict[str, Any]]()
     speaks, failed = comm.rank == 0, False
     for study in studies:
         start = time.monotonic()

@@ -45,7 +45,7 @@ def canonical(value: float) -> float:
 
 def parse_quantity(text: Any, unit: str) -> float:
     """Read ``"10 mm"`` into a number in the SI ``unit``; a bare number is refused, never guessed."""
-    example = {"m": "10 mm", "Pa": "10 kPa", "": "1 %"}[unit]
+    example = {"m": "10 mm", "Pa": "10 kPa", "s": "10 ms", "": "1 %"}[unit]
     allowed = f'a number with a unit as text, such as "{example}"'
     if not isinstance(text, str):
         raise PydanticCustomError("quantity", "{allowed}", {"allowed": allowed})
@@ -53,7 +53,7 @@ def parse_quantity(text: Any, unit: str) -> float:
         quantity = _registry().Quantity(text)
         magnitude = float(quantity.to(unit).magnitude)
     except pint.DimensionalityError:
-        kind = {"m": "a length", "Pa": "a pressure", "": "a share"}[unit]
+        kind = {"m": "a length", "Pa": "a pressure", "s": "a time", "": "a share"}[unit]
         raise PydanticCustomError("quantity", "{allowed}", {"allowed": f'{kind}, such as "{example}"'}) from None
     except Exception:  # pint raises many kinds, down to tokenizer errors, on text that is no quantity
         raise PydanticCustomError("quantity", "{allowed}", {"allowed": allowed}) from None

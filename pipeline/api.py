@@ -1,0 +1,136 @@
+"""The program from Python: a study that plans and runs itself. What `import pipeline` offers; see docs/python.md."""
+
+import warnings
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pipeline.plan.describe import summary
+from pipeline.plan.plan import Plan, make_plan
+from pipeline.run.progress import Terminal
+from pipeline.study.load import load
+from pipeline.study.sweep import Study as Declared
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from mpi4py import MPI
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study file that was found to make sense; ``declared`` holds its axes, cases and sections."""
+
+    declared: Declared
+
+    @staticmethod
+    def load(path: str | Path) -> "Study":
+        """Read the study file at ``path``.
+
+        Raises:
+            StudyError: with every problem of the file.
+        """
+        return Study(load(path))
+
+    @property
+    def name(self) -> str:
+        """Name of its dataset, without the ending."""
+        return self.declared.name
+
+    @property
+    def title(self) -> str:
+        """Title, as figures bear it."""
+        return self.declared.title
+
+    @property
+    def shape(self) -> dict[str, int]:
+        """The dimensions of the dataset and their lengths."""
+        return {axis.name: len(axis) for axis in self.declared.axes}
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is allowed in the file, and yet doubtful."""
+        return self.declared.warnings
+
+    def plan(self, *, store: str | Path | None = None, without: Collection[str] = ()) -> Plan:
+        """Return what a run has to do, and what was struck out and why; nothing is computed.
+
+        What is on record in ``store``, if it exists, need not be done; ``without`` names reductions not to use.
+
+        Raises:
+            StoreError: if the store cannot be read.
+            ValueError: if ``without`` holds an unknown name.
+        """
+        bare = make_plan(self.declared, without=without)
+        if store is None or not Path(store).is_file():
+            return bare
+        return make_plan(self.declared, _keys_on_record(Path(store), bare), without)
+
+    def summary(self, **options: Any) -> dict[str, Any]:
+        """Return the plan as plain data with estimates of time and memory: what ``epsmesh plan --json`` prints."""
+        return summary(self.plan(**options))
+
+    def run(
+        self,
+        comm: "MPI.Comm | None" = None,
+        *,
+        output: str | Path = "results",
+        store: str | Path | None = None,
+        meshes: str | Path | None = None,
+        fresh: bool = False,
+        without: Collection[str] = (),
+        progress: bool = False,
+    ) -> "xr.Dataset":
+        """Run the study on the ranks of ``comm`` (all there are) and return its dataset on each of them; collective.
+
+        Writes ``<study>.nc`` and its figure into ``output``, and records into ``store`` (``cases.sqlite`` in
+        ``output``), where a later run finds them; meshes are kept in ``meshes`` if that is given. ``fresh`` computes
+        again what is stored. Cases that fail do not end the run: they have status "failed" and a message, and a
+        RuntimeWarning counts them.
+
+        Raises:
+            StoreError: on every rank, if the store cannot be used.
+            KeyboardInterrupt: if the run was interrupted; what was finished is on record.
+        """
+        from pipeline import workflow  # noqa: PLC0415 (MPI starts as it is imported)
+        from pipeline.report import accessor  # noqa: F401, PLC0415 (registers dataset.epsmesh)
+
+        comm = workflow.world() if comm is None else comm
+        path = Path(store) if store else Path(output) / "cases.sqlite"
+        kept = Path(meshes) if meshes else None
+        plan, opened = workflow.prepare(self.declared, comm, path, fresh=fresh, without=without, meshes=kept)
+        shown = Terminal(len(plan.solves)) if progress and comm.rank == 0 else None
+        with workflow.abort_on_exception(comm):
+            outcome = workflow.run(plan, opened, comm, Path(output), shown)
+            if outcome.interrupted:
+                workflow.end_ranks(comm, 130)
+                raise KeyboardInterrupt
+            dataset = comm.bcast(open_dataset(outcome.files[0]) if comm.rank == 0 else None)
+        if outcome.failures:
+            case, message = outcome.failures[0]
+            text = f"{self.name}: {len(outcome.failures)} failed, the first: {case}: {message}"
+            warnings.warn(text, RuntimeWarning, stacklevel=2)
+        return dataset
+
+
+def open_dataset(path: str | Path, output: str | Path = "results") -> "xr.Dataset":
+    """Return the dataset at ``path``, or that of a study file in ``output``, in memory and with ``dataset.epsmesh``.
+
+    Raises:
+        DatasetError: if there is none, or if it is not a study's.
+    """
+    from pipeline.report import accessor  # noqa: F401, PLC0415 (registers dataset.epsmesh)
+    from pipeline.report.read import read  # noqa: PLC0415 (xarray is slow to load)
+
+    return read(path, output)
+
+
+def _keys_on_record(path: Path, plan: Plan) -> list[str]:
+    from pipeline.run.store import Store  # noqa: PLC0415
+
+    opened = Store(path)
+    try:
+        records = opened.get({*plan.keys, *plan.reference_keys})
+    finally:
+        opened.close()
+    return [key for key, record in records.items() if record.is_ok]

@@ -1,0 +1,57 @@
+"""The command that answers from a dataset how large ε must be."""
+
+import json
+from math import isfinite
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from pipeline.cli.words import DEFAULT_OUTPUT, DONE, SOME_FAILED, Json, Output, fail
+
+
+def guide(
+    file: Annotated[Path, typer.Argument(help="A dataset (.nc), or a study file whose dataset exists.")],
+    accuracy: Annotated[str | None, typer.Option(help='How near F must be to F_exact: "5%".')] = None,
+    budget: Annotated[str | None, typer.Option(help='How long a case may take: "10ms".')] = None,
+    output: Output = DEFAULT_OUTPUT,
+    as_json: Json = False,
+) -> None:
+    """Say how small ε may be for an accuracy, or what is best within a budget, over all scenes of a study.
+
+    Exit status 1 if no mesh setting of the study does what is asked.
+
+    Example: epsmesh guide studies/figure3.toml --accuracy 5%
+
+    Example: epsmesh guide results/figure3.nc --budget 500ms --json
+    """
+    if accuracy is None and budget is None:
+        fail("give --accuracy, such as 5%, or --budget, such as 10ms, or both")
+    from pipeline.report.guide import guide as make_guide
+    from pipeline.report.guide import quantity
+    from pipeline.report.read import read
+    from pipeline.report.settings import DatasetError
+
+    for name, value, unit in (("--accuracy", accuracy, ""), ("--budget", budget, "s")):
+        try:
+            if value is not None:
+                quantity(name, value, unit)
+        except ValueError as wrong:
+            fail(str(wrong))
+    try:
+        found = make_guide(read(file, output), accuracy, budget)
+    except DatasetError as wrong:
+        fail(str(wrong) if str(wrong).startswith(str(file)) else f"{file}: {wrong}")
+    print(json.dumps(plain(found.to_dict()), indent=2, ensure_ascii=False) if as_json else found)
+    raise typer.Exit(DONE if found.answer else SOME_FAILED)
+
+
+def plain(value: Any) -> Any:
+    """Return ``value`` as JSON takes it: NaN is null, and an infinite ε is "full"."""
+    if isinstance(value, dict):
+        return {
+            key: "full" if key == "epsilon" and item == float("inf") else plain(item) for key, item in value.items()
+        }
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    return None if isinstance(value, float) and not isfinite(value) else value

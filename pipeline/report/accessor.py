@@ -1,0 +1,129 @@
+"""What a dataset can do by itself, as ``dataset.epsmesh``: table, picture, Pareto front, guide."""
+
+import itertools
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from pipeline.report.guide import Guide, guide
+from pipeline.report.settings import MESH_AXES, words
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+# More curves than this are drawn as bands, from the least to the most over the scenes.
+_MOST_CURVES = 7
+
+
+@xr.register_dataset_accessor("epsmesh")
+class Accessor:
+    """Questions that a study's dataset answers: ``dataset.epsmesh``."""
+
+    def __init__(self, dataset: xr.Dataset):
+        self._dataset = dataset
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Return a pandas frame with a row for each case and a column for each variable, SI units.
+
+        Labels are columns as well; the components of the force are ``force_x``, ``force_y`` and ``force_z``. The
+        frame's ``attrs["units"]`` holds the unit of each column that has one.
+        """
+        data = self._dataset.drop_vars(["component", "force_vector"], errors="ignore")
+        if "force_vector" in self._dataset:
+            for i, name in enumerate("xyz"):
+                data[f"force_{name}"] = self._dataset["force_vector"].isel(component=i, drop=True)
+        dims = list(self._dataset["force"].dims)
+        if dims:
+            frame = data.to_dataframe(dim_order=dims).reset_index()
+        else:
+            frame = data.expand_dims("case").to_dataframe().reset_index(drop=True)
+        units = {str(n): v.attrs["units"] for n, v in self._dataset.variables.items() if "units" in v.attrs}
+        units |= {f"force_{name}": units["force"] for name in "xyz"}
+        frame.attrs["units"] = {name: units[name] for name in frame.columns if name in units}
+        return frame
+
+    def guide(self, accuracy: str | float | None = None, budget: str | float | None = None) -> Guide:
+        """Return the smallest ε for an ``accuracy`` ("5 %"), or the best setting within a ``budget`` ("10 ms").
+
+        See :func:`pipeline.report.guide.guide`; printed, the guide is the text of ``epsmesh guide``.
+        """
+        return guide(self._dataset, accuracy, budget)
+
+    def pareto(self) -> "pd.DataFrame":
+        """Return, scene by scene, the cases that no other case of the scene beats in both time and error.
+
+        A row of :meth:`to_frame` with ``error`` = |F/F_exact - 1| added, by scene and from the fastest on.
+        """
+        frame = self.to_frame()
+        frame["error"] = (frame["accuracy"] - 1).abs()
+        frame = frame[(frame["status"] == "ok") & frame["error"].notna() & frame["time_total"].notna()]
+        scene = [str(d) for d in self._dataset["force"].dims if d not in MESH_AXES]
+        frame = frame.sort_values([*scene, "time_total", "error"], kind="stable")
+        best = frame.groupby(scene, sort=False)["error"].cummin() if scene else frame["error"].cummin()
+        previous = best.groupby([frame[d] for d in scene], sort=False).shift() if scene else best.shift()
+        return frame[~(frame["error"] >= previous)].reset_index(drop=True)
+
+    def plot_ratio(
+        self, ax: "Axes | None" = None, variable: str = "force_ratio", by: str | None = None, **labels: Any
+    ) -> "Axes":
+        """Draw F/F_max, or another ``variable``, against ε (mm), and return the axes; ``labels`` select.
+
+        A curve for each combination of what else is swept; if these are many, a band for each mesh setting and each
+        value of ``by``, from the least to the most over the other scenes. Full order is not on the axis: it is
+        F/F_max = 1.
+
+        Raises:
+            ValueError: if ε, or ``by``, is not swept.
+        """
+        import matplotlib.pyplot as plt  # noqa: PLC0415 (slow to load)
+
+        data = self._dataset[variable].sel(labels)
+        if "epsilon" not in data.dims:
+            raise ValueError("the dataset has no dimension epsilon to draw against")
+        if by is not None and by not in data.dims:
+            raise ValueError(f"by = {by!r}: no such dimension is left; there are {', '.join(map(str, data.dims))}")
+        if ax is None:
+            ax = plt.figure(figsize=(5, 3.4), layout="constrained").subplots()
+        data = data.isel(epsilon=np.isfinite(data["epsilon"].values)).sortby("epsilon")
+        others = [str(d) for d in data.dims if d != "epsilon"]
+        if np.prod([data.sizes[d] for d in others]) <= _MOST_CURVES or {*others} <= {*MESH_AXES, by}:
+            _draw_curves(ax, data, others)
+        else:
+            _draw_bands(ax, data, others, by)
+        if variable == "force_ratio":
+            ax.axhline(1.0, color="black", linewidth=0.7)
+        ax.set_xlabel("ε (mm)")
+        ax.set_ylabel({"force_ratio": "$F/F_{max}$", "accuracy": "$F/F_{exact}$"}.get(variable, variable))
+        if ax.get_legend_handles_labels()[1]:
+            ax.legend(fontsize=8)
+        return ax
+
+
+def _draw_curves(ax: "Axes", data: xr.DataArray, dims: list[str]) -> None:
+    from pipeline.report.figures import COLOURS, MARKERS  # noqa: PLC0415 (matplotlib is slow to load)
+
+    x = 1e3 * data["epsilon"].values
+    for number, labels in enumerate(_combinations(data, dims)):
+        style = {"color": COLOURS[number % len(COLOURS)], "marker": MARKERS[number % len(MARKERS)], "markersize": 4}
+        ax.plot(x, data.sel(labels).values, label=words(labels) if labels else "", **style)
+
+
+def _draw_bands(ax: "Axes", data: xr.DataArray, dims: list[str], by: str | None) -> None:
+    from pipeline.report.figures import COLOURS, MARKERS  # noqa: PLC0415 (matplotlib is slow to load)
+
+    x = 1e3 * data["epsilon"].values
+    scene = [d for d in dims if d not in (*MESH_AXES, by)]
+    for number, labels in enumerate(_combinations(data, [d for d in dims if d not in scene])):
+        chosen = data.sel(labels)
+        colour = COLOURS[number % len(COLOURS)]
+        ax.fill_between(x, chosen.min(scene).values, chosen.max(scene).values, color=colour, alpha=0.25, linewidth=0)
+        style = {"color": colour, "marker": MARKERS[number % len(MARKERS)], "markersize": 4}
+        count = int(np.prod([data.sizes[d] for d in scene]))
+        name = f"{words(labels)}: " if labels else ""
+        ax.plot(x, chosen.median(scene).values, label=f"{name}median and range of {count} scenes", **style)
+
+
+def _combinations(data: xr.DataArray, dims: list[str]) -> list[dict[str, Any]]:
+    return [dict(zip(dims, values, strict=True)) for values in itertools.product(*(data[d].values for d in dims))]

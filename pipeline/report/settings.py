@@ -1,0 +1,169 @@
+"""A dataset as a table: a row for each mesh setting, a column for each scene, and why a cell cannot be judged."""
+
+import itertools
+import tomllib
+from dataclasses import dataclass
+from functools import cached_property
+from math import isinf
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from pipeline.study.load import parse
+from pipeline.study.problems import StudyError
+from pipeline.study.schema import Mesh
+from pipeline.study.sweep import Case, Study, format_label
+
+# The dimensions that say how a scene is meshed ("mesh": an array of tables); every other one belongs to the scene.
+MESH_AXES = ("mesh", "mesh_accuracy", *(key for key in Mesh.model_fields if key not in ("name", "accuracy")))
+# What people call them.
+SYMBOLS = {"epsilon": "ε", "poisson": "ν", "young": "E", "mesh_accuracy": "accuracy"}
+Labels = dict[str, Any]
+
+
+class DatasetError(Exception):
+    """A dataset that cannot answer what is asked of it."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Mesh settings (rows) against scenes (columns); all arrays have that shape, NaN where ``why`` is not empty.
+
+    ``ratio`` is F/F_exact and ``bar`` what the error bars of both add to its distance from 1; ``share`` is F/F_max;
+    ``seconds`` what a case costs alone, ``dofs`` and ``cells`` those of the whole body.
+    """
+
+    settings: tuple[Labels, ...]
+    scenes: tuple[Labels, ...]
+    axes: dict[str, np.ndarray]  # scene axis: the position of each scene's label
+    force: np.ndarray
+    exact: np.ndarray
+    ratio: np.ndarray
+    bar: np.ndarray
+    share: np.ndarray
+    seconds: np.ndarray
+    dofs: np.ndarray
+    cells: np.ndarray
+    why: np.ndarray
+    meshes: tuple[Labels, ...]  # element sizes of each setting: what is swept and what is not
+
+    @cached_property
+    def is_judged(self) -> np.ndarray:
+        """Where there is a force, its error bar and F_exact (settings × scenes)."""
+        return np.asarray(self.why == "")
+
+    @cached_property
+    def lost(self) -> np.ndarray:
+        """The scenes that no setting can be judged on: claims leave them out."""
+        return np.asarray(~self.is_judged.any(axis=0))
+
+    @cached_property
+    def missing(self) -> np.ndarray:
+        """For each setting, the number of scenes, of those that are not lost, that it cannot be judged on."""
+        return np.asarray((~self.is_judged & ~self.lost).sum(axis=1))
+
+
+def arrange(dataset: xr.Dataset) -> Table:
+    """Return the table of ``dataset``.
+
+    Raises:
+        DatasetError: if it holds no F_exact.
+    """
+    if "force_exact" not in dataset or not bool(np.isfinite(dataset["force_exact"]).any()):
+        raise DatasetError(
+            "the dataset holds no F_exact, which errors are measured against: "
+            "run its study with `exact = true` in [solve]"
+        )
+    dims = [str(dim) for dim in dataset["force"].dims]
+    rows, columns = [d for d in dims if d in MESH_AXES], [d for d in dims if d not in MESH_AXES]
+    settings, scenes = _labels(dataset, rows), _labels(dataset, columns)
+    keep = _distinct(settings)
+
+    def matrix(name: str) -> np.ndarray:
+        values = dataset[name].transpose(*rows, *columns).values
+        return np.asarray(values.reshape(len(settings), len(scenes))[keep])
+
+    why = _reasons(matrix("status"), matrix("message"), matrix("force_error"), matrix("force_exact"))
+    blank = np.where(why == "", 0.0, np.nan)
+    force, exact = matrix("force") + blank, matrix("force_exact") + blank
+    bars = matrix("force_error") + matrix("force_exact_error")
+    counts = np.indices([dataset.sizes[d] for d in columns]).reshape(len(columns), len(scenes))
+    study = study_of(dataset)
+    return Table(
+        tuple(settings[i] for i in keep), tuple(scenes), dict(zip(columns, counts, strict=True)), force, exact,
+        force / exact, force / exact * bars, matrix("force_ratio") + blank, matrix("time_total") + blank,
+        matrix("dofs") + blank, matrix("cells") + blank, why,
+        tuple(_mesh(dataset, study, settings[i]) for i in keep),
+    )  # fmt: skip
+
+
+def study_of(dataset: xr.Dataset) -> Study | None:
+    """Return the study whose text the dataset carries, or None if this version does not read it."""
+    text = str(dataset.attrs.get("study", ""))
+    try:
+        return parse(tomllib.loads(text), text=text)
+    except (StudyError, tomllib.TOMLDecodeError):
+        return None
+
+
+def words(labels: Labels) -> str:
+    """Write labels as people read them."""
+    parts = []
+    for name, value in labels.items():
+        text = format_label(name, value)
+        parts.append(f"outside {text}" if name == "outside" else f"{SYMBOLS.get(name, name)} = {text}")
+    return ", ".join(parts) or "the one setting"
+
+
+def _labels(dataset: xr.Dataset, dims: list[str]) -> list[Labels]:
+    values = ([_plain(value) for value in dataset[dim].values] for dim in dims)
+    return [dict(zip(dims, labels, strict=True)) for labels in itertools.product(*values)]
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _distinct(settings: list[Labels]) -> list[int]:
+    """Return which settings to keep: at full order nothing is outside, so that one value of it stands for all."""
+    seen, keep = [], []
+    for number, labels in enumerate(settings):
+        same = {k: v for k, v in labels.items() if k != "outside"} if isinf(labels.get("epsilon", 0)) else labels
+        if same not in seen:
+            seen.append(same)
+            keep.append(number)
+    return keep
+
+
+def _reasons(status: np.ndarray, message: np.ndarray, bar: np.ndarray, exact: np.ndarray) -> np.ndarray:
+    """Return, cell by cell, why a case cannot be judged; "" if it can."""
+    why = np.full(status.shape, "", dtype=object)
+    told = np.where(message == "", "", ": " + message.astype(object))
+    why[~np.isfinite(exact)] = "F_exact is not known"
+    why[~(bar >= 0)] = ("no error bar" + told)[~(bar >= 0)]
+    for state, text in (("failed", "failed"), ("skipped", "skipped"), ("pending", "not yet run")):
+        why[status == state] = (text + told)[status == state]
+    return why
+
+
+def _mesh(dataset: xr.Dataset, study: Study | None, labels: Labels) -> Labels:
+    """Return ε, outside, element sizes (m) and elements of a setting, as far as they are known; a rim left to the
+    program is None.
+    """
+    if study is None:
+        return dict(labels)
+    # Of a dataset that somebody has selected from, a label may be left as a coordinate without dimension.
+    known = {name: _plain(dataset[name].values[()]) for name in dataset.coords if dataset[name].ndim == 0} | labels
+    index = []
+    for axis in study.axes:
+        if axis.section == "mesh" and known.get(axis.name) not in axis.labels:
+            return dict(labels)
+        index.append(axis.labels.index(known[axis.name]) if axis.section == "mesh" else 0)
+    case: Case = study.case(tuple(index))
+    mesh = case.mesh
+    if mesh.accuracy is not None:
+        return {"accuracy": mesh.accuracy, "outside": mesh.outside}
+    outside = {"outside": mesh.outside} if not isinf(mesh.epsilon) else {}
+    return {"epsilon": mesh.epsilon, **outside, "fine": mesh.fine, "coarse": mesh.coarse, "rim": mesh.rim,
+            "growth": mesh.growth, "degree": mesh.degree, "element": mesh.element}  # fmt: skip

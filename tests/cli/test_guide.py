@@ -1,0 +1,69 @@
+"""`epsmesh guide` as a person and as a script use it."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from pipeline.cli import app
+from pipeline.report.dataset import write
+from tests.report.known import dataset
+
+
+def call(*arguments: object):
+    return CliRunner().invoke(app, ["guide", *map(str, arguments)], catch_exceptions=False)
+
+
+@pytest.fixture
+def results(tmp_path):
+    write(dataset(), tmp_path / "known.nc")
+    return tmp_path
+
+
+def test_answer_from_a_dataset_and_from_its_study(results):
+    done = call(results / "known.nc", "--accuracy", "5%")
+    assert done.exit_code == 0
+    assert "Smallest ε: outside coarse, ε = 4 mm" in done.stdout
+    assert call("anywhere/known.toml", "--accuracy", "5%", "--output", results).stdout == done.stdout
+
+
+def test_json_is_for_scripts(results):
+    content = json.loads(call(results / "known.nc", "--accuracy", "5%", "--budget", "100ms", "--json").stdout)
+    assert content["answer"]["epsilon"] == 4e-3
+    assert content["accuracy"] == pytest.approx(0.05)
+    assert content["answer"]["error"] + 0.0249 == pytest.approx(content["accuracy"], abs=1e-4)
+    assert len(content["settings"]) == 7
+
+
+def test_what_no_setting_reaches_ends_with_1(results):
+    done = call(results / "known.nc", "--accuracy", "0.4%")
+    assert done.exit_code == 1
+    assert "No setting of this study does that" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("known.nc",), "give --accuracy, such as 5%, or --budget, such as 10ms"),
+        (
+            ("known.nc", "--accuracy", "5 mm"),
+            "--accuracy = '5 mm': must be a number with a unit as text, such as \"5 %\"",
+        ),
+        (("known.nc", "--accuracy", "120%"), 'must be more than "0 %" and less than "100 %"'),
+        (("known.nc", "--budget", "10"), "--budget = '10': must be a number with a unit as text, such as \"10 ms\""),
+        (("none.nc", "--accuracy", "5%"), "none.nc: no such dataset; make it with `epsmesh run none.toml`"),
+        (("bad.nc", "--accuracy", "5%"), "bad.nc: cannot be read as netCDF"),
+        (("old.nc", "--accuracy", "5%"), "old.nc: the dataset holds no F_exact"),
+    ],
+)
+def test_bad_input_ends_with_2(results, arguments, message):
+    (results / "bad.nc").write_text("this is no dataset")
+    write(dataset(exact=lambda case: False), results / "old.nc")
+    done = call(results / arguments[0], *arguments[1:])
+    assert done.exit_code == 2
+    assert message in done.stderr
+    assert not done.stdout
+
+
+def test_help_has_an_example():
+    assert "Example: epsmesh guide studies/figure3.toml --accuracy 5%" in call("--help").stdout

@@ -1,0 +1,271 @@
+"""The guide: worst cases over scenes, nothing claimed of cases that were not computed, and the law of correction."""
+
+import json
+from math import inf, isnan, nan
+
+import numpy as np
+import pytest
+
+from pipeline.cli.guide import plain
+from pipeline.report.correction import fit, r_without
+from pipeline.report.guide import guide, quantity
+from pipeline.report.settings import DatasetError, arrange
+from tests.report.known import BAR, EXACT_BAR, TEXT, dataset
+from tests.report.synthetic import FIGURE
+from tests.report.synthetic import dataset as synthetic
+
+BARS = BAR + EXACT_BAR
+
+
+def test_smallest_epsilon_is_of_the_worst_scene_with_error_bars():
+    found = guide(dataset(), "5%")
+    assert found.scenes == 4
+    assert (found.answer.labels["outside"], found.answer.labels["epsilon"]) == ("coarse", 4e-3)
+    assert found.answer.error == pytest.approx(0.02 + 1.02 * BARS)
+    free, _ = found.of_each_outside()["free"]
+    assert free.labels["epsilon"] == inf
+    worst = next(v for v in found.verdicts if v.labels == {"outside": "free", "epsilon": 10e-3})
+    assert worst.deviation == pytest.approx(0.06)
+    assert worst.error == pytest.approx(0.06 + 0.94 * BARS)
+    assert worst.limit == {"poisson": 0.4, "probe": "scalpel"}
+    assert worst.force / worst.exact == pytest.approx(0.94)
+    assert guide(dataset(), worst.error + 1e-9).of_each_outside()["free"][0] is not None
+    assert guide(dataset(), worst.error + 1e-9).of_each_outside()["free"][0].labels["epsilon"] == 10e-3
+    assert guide(dataset(), worst.error - 1e-9).of_each_outside()["free"][0].labels["epsilon"] == inf
+
+
+def test_error_bars_decide():
+    assert guide(dataset(), "2.5%").answer.labels["epsilon"] == inf
+    assert guide(dataset(bar=0.0), "2.5%").answer.labels["epsilon"] == 4e-3
+
+
+def test_setting_that_is_right_by_chance_is_not_the_answer():
+    """F passes through F_exact at ε = 4 mm, and is wrong again beyond: 4 mm is no guideline."""
+    curve = {4e-3: 1.0, 6e-3: 1.2, 10e-3: 1.03, inf: 1.01}
+    found = guide(dataset(ratio=lambda case: curve[inf if case.is_full else case.mesh.epsilon]), "5%")
+    assert found.answer.labels["epsilon"] == 10e-3
+
+
+def test_what_cannot_be_reached_is_said_plainly():
+    found = guide(dataset(), "0.4%")
+    assert found.answer is None
+    assert found.corrected is None
+    assert found.best.labels["epsilon"] == inf
+    text = str(found)
+    assert "No setting of this study does that; best reached: outside coarse, ε = full" in text
+    assert "no setting does that either" in text
+
+
+def test_budget_alone_and_with_an_accuracy():
+    quick = guide(dataset(), budget="45 ms")
+    assert quick.answer.labels == {"outside": "coarse", "epsilon": 4e-3}
+    assert quick.answer.seconds <= 45e-3
+    assert guide(dataset(), budget="35ms").answer.labels == {"outside": "free", "epsilon": 6e-3}
+    assert guide(dataset(), "5%", "35ms").answer is None
+    assert guide(dataset(), "5%", "35ms").best.labels == {"outside": "free", "epsilon": 6e-3}
+    text = str(guide(dataset(), "5%", "1ms"))
+    assert "the quickest takes 20 ms" in text
+    assert "With the correction F_exact ≈ F / r: no setting does that either" in text
+
+
+def test_correction_takes_what_the_scenes_have_in_common():
+    found = guide(dataset(), "5%")
+    law = next(v for v in found.verdicts if v.labels == {"outside": "free", "epsilon": 4e-3}).correction
+    assert law.r == pytest.approx((0.5 + 0.47) / 2)
+    assert law.mean == pytest.approx(0.485)
+    assert law.residual == pytest.approx(0.5 / 0.485 - 1)
+    assert law.left_out == pytest.approx(0.5 / 0.48 - 1)
+    # r of the needle (0.5, 0.49) on the scalpel's 0.47, and the other way round: 0.5 by the r of 0.48 and 0.47.
+    assert law.unseen == pytest.approx(0.5 / 0.475 - 1)
+    assert law.error == pytest.approx(0.5 / 0.475 - 1 + 0.5 / 0.475 * BARS)
+    free = found.of_each_outside()["free"]
+    assert free[0].labels["epsilon"] == inf
+    assert free[1].labels["epsilon"] == 6e-3
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_correction_against_brute_force(seed):
+    random = np.random.default_rng(seed)
+    size = int(random.integers(2, 12))
+    values = np.round(random.uniform(0.1, 3, size), int(random.integers(1, 8)))  # some stand more than once
+    labels, factor = random.integers(0, 4, size), random.uniform(0.5, 1.5)
+    law = fit(values, 0 * values, {"p": labels})
+    assert law.residual <= np.abs(values / (factor * law.r) - 1).max() + 1e-12
+    for i, r in enumerate(r_without(values, labels)):
+        others = values[labels != labels[i]]
+        assert isnan(r) if not others.size else r == pytest.approx((others.min() + others.max()) / 2)
+    one_out = [(np.delete(values, i).min() + np.delete(values, i).max()) / 2 for i in range(len(values))]
+    assert law.left_out == pytest.approx(np.abs(values / one_out - 1).max())
+    assert law.error >= law.left_out - 1e-12
+    assert not law.unseen > law.error + 1e-12
+
+
+def test_one_scene_has_no_law():
+    law = fit(np.array([0.9]), np.array([0.01]), {})
+    assert law.r == pytest.approx(0.9)
+    assert isnan(law.left_out)
+    assert isnan(law.error)
+    one = TEXT.replace("[0.3, 0.4]", "0.3").split("[[probe]]")
+    found = guide(dataset(one[0] + "[[probe]]" + one[1] + "[mesh]" + one[2].split("[mesh]")[1]), "5%")
+    assert found.scenes == 1
+    assert found.corrected is None
+    assert "it takes more than one scene" in str(found)
+
+
+@pytest.mark.parametrize("state", ["failed", "skipped", "pending"])
+def test_settings_that_lack_a_case_are_not_judged(state):
+    def status(case):
+        lacks = case.mesh.epsilon == 4e-3 and case.mesh.outside == "coarse" and case.material.poisson > 0.35
+        return state if lacks else "ok"
+
+    found = guide(dataset(status=status), "5%")
+    assert found.answer.labels == {"outside": "coarse", "epsilon": 6e-3}
+    lacking = next(v for v in found.verdicts if v.labels == {"outside": "coarse", "epsilon": 4e-3})
+    assert not lacking.is_judged
+    assert lacking.missing == 2
+    assert not found.lost
+    text = str(found)
+    assert "not judged: 2 of 4 scenes not computed" in text
+    assert {"failed": "2 failed: so it went", "skipped": "2 skipped", "pending": "2 not yet run"}[state] in text
+
+
+def test_scenes_that_were_never_computed_are_left_out_and_named():
+    data = dataset(exact=lambda case: case.material.poisson < 0.35)
+    found = guide(data, "5%")
+    assert found.scenes == 2
+    assert {scene["poisson"] for scene in found.lost} == {0.4}
+    assert "nothing is claimed of them: 2 scenes" in str(found)
+    assert "F_exact is not known" in str(found)
+    assert all(v.limit["poisson"] == 0.3 for v in found.verdicts)
+
+
+def test_without_error_bars_nothing_is_judged():
+    with pytest.raises(DatasetError, match="no error bar"):
+        guide(dataset(bar=nan), "5%")
+    with pytest.raises(DatasetError, match="holds no F_exact"):
+        guide(dataset(exact=lambda case: False), "5%")
+    with pytest.raises(DatasetError, match=r"no case can be judged: .* failed"):
+        guide(dataset(status=lambda case: "failed"), "5%")
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_whatever_fails_the_answer_holds_for_every_scene_that_it_claims(seed):
+    random = np.random.default_rng(seed)
+    accuracy = random.uniform(0.01, 0.6)
+    data = dataset(status=lambda case: random.choice(["ok", "ok", "ok", "failed"]))
+    try:
+        found = guide(data, accuracy)
+    except DatasetError:
+        assert not (data["status"] == "ok").any()
+        return
+    if found.answer is None:
+        return
+    chosen = data.sel(found.answer.labels)
+    error = abs(chosen["accuracy"] - 1) + chosen["accuracy"] * (chosen["force_error"] + chosen["force_exact_error"])
+    computed = int((chosen["status"] == "ok").sum())
+    assert computed == found.scenes
+    assert float(error.max()) <= accuracy
+    assert found.scenes + len(found.lost) == 4
+
+
+def test_constancy_is_told_apart_by_parameter():
+    found = guide(dataset(), "5%")
+    free = next(v for v in found.verdicts if v.labels == {"outside": "free", "epsilon": 4e-3})
+    assert free.spread.least == pytest.approx(0.47 / 1.01)
+    assert free.spread.width == pytest.approx(0.03 / 1.01)
+    assert free.spread.relative == pytest.approx(0.03 / 0.485)
+    assert dict(free.spread.over) == pytest.approx({"poisson": 0.01 / 1.01, "probe": 0.02 / 1.01})
+    coarse = next(v for v in found.verdicts if v.labels == {"outside": "coarse", "epsilon": 4e-3})
+    assert coarse.spread.width == pytest.approx(0, abs=1e-12)
+
+
+def test_full_order_counts_once_and_without_it_ratios_are_to_the_exact_force():
+    assert sum(v.labels["epsilon"] == inf for v in guide(dataset(), "5%").verdicts) == 1
+    found = guide(dataset(TEXT.replace(', "full"', "")), "5%")
+    assert not found.has_full
+    assert found.verdicts[0].spread.most == pytest.approx(1.02)
+    assert "How constant is F/F_exact" in str(found)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "labels"),
+    [
+        ('fine = "2 mm"', 'fine = ["1 mm", "2 mm"]\nrim = ["0.1 mm", "0.2 mm"]', ("fine", "rim")),
+        ('coarse = "8 mm"', 'coarse = "8 mm"\ndegree = [2, 3]\ngrowth = [0.4, 0.5]', ("degree", "growth")),
+        ('coarse = "8 mm"', 'coarse = ["6 mm", "8 mm"]\nelement = ["displacement", "mixed"]', ("coarse", "element")),
+    ],
+)
+def test_what_is_swept_of_the_mesh_is_part_of_the_setting(old, new, labels):
+    found = guide(dataset(TEXT.replace(old, new)), "5%")
+    assert found.scenes == 4
+    assert {*labels, "epsilon", "outside"} == set(found.answer.labels)
+    assert all(found.answer.mesh[name] == found.answer.labels[name] for name in labels)
+    assert len(found.verdicts) == 4 * 7
+
+
+def test_part_of_a_dataset_has_a_guide_of_its_own():
+    data = dataset()
+    some = guide(data.sel(probe=["needle"], outside=["free"], epsilon=[10e-3, inf]), "6%")
+    assert some.scenes == 2
+    assert some.answer.labels == {"outside": "free", "epsilon": 10e-3}
+    assert some.answer.mesh["outside"] == "free"
+    assert some.answer.mesh["epsilon"] == 10e-3
+    one = guide(data.sel(probe="needle", outside="free"), "6%")
+    assert one.answer.labels == {"epsilon": 10e-3}
+    assert one.answer.mesh == some.answer.mesh
+    without = guide(data.sel(probe="needle", outside="free").drop_vars("outside"), "6%")
+    assert without.answer.mesh == {"epsilon": 10e-3}
+    assert "ε = 10 mm" in str(without)
+
+
+def test_meshes_from_an_accuracy_and_from_tables():
+    sizes = TEXT.split("[mesh]")[0]
+    found = guide(dataset(sizes + '[mesh]\naccuracy = ["1 %", "0.3 %"]\n', ratio=lambda case: 1.001), "5%")
+    assert found.answer.labels == {"mesh_accuracy": 0.01}
+    assert "chosen by the program for an accuracy of 1 %" in str(found)
+    table = '[[mesh]]\nname = "{0}"\nepsilon = "{1} mm"\nfine = "2 mm"\ncoarse = "8 mm"\noutside = "free"\n'
+    found = guide(dataset(sizes + table.format("a", 10) + table.format("b", 6)), "10%")
+    assert found.answer.labels == {"mesh": "a"}
+    assert found.answer.mesh["epsilon"] == 10e-3
+
+
+def test_elements_are_told():
+    text = str(guide(dataset(TEXT + 'rim = "0.1 mm"\n'), "5%"))
+    assert "2 mm within ε, 8 mm far away, 0.1 mm at the probe's edge, growth 0.5, degree 2, element auto" in text
+    assert "up to 40,000 unknowns, 4,000 elements, 40 ms" in text
+    assert "F = 13.26 mN, F_exact = 13 mN at ν = 0.3, probe = needle" in text
+
+
+def test_json_and_rows_hold_the_same(tmp_path):
+    found = guide(dataset(), "5%")
+    content = json.loads(json.dumps(plain(found.to_dict()), allow_nan=False))
+    assert content["answer"] == plain(found.rows()[0])
+    assert content["answer"]["keeps"]
+    assert content["settings"][3]["epsilon"] == "full"
+    assert content["outside"]["free"]["corrected"]["epsilon"] == 6e-3
+    assert [row["epsilon"] for row in found.rows()[:4]] == [4e-3, 6e-3, 10e-3, inf]
+    assert content["budget"] is None
+
+
+def test_table_of_a_dataset_is_its_own_numbers():
+    data = synthetic(**FIGURE | {"solve": {"exact": True}}).assign(force_exact=lambda d: 0.03 + 0 * d["force"])
+    data["force_exact_error"] = 0 * data["force"]
+    table = arrange(data)
+    assert table.ratio.shape == (3 * 7 - 2, 8)
+    for row, labels in enumerate(table.settings):
+        for column, scene in enumerate(table.scenes):
+            assert table.force[row, column] == float(data["force"].sel(labels | scene))
+
+
+@pytest.mark.parametrize("value", ["five", "0 %", "100%", "3 mm", -1.0, "", "nan"])
+def test_accuracy_that_makes_no_sense_is_refused(value):
+    with pytest.raises(ValueError, match="accuracy"):
+        quantity("accuracy", value, "")
+
+
+def test_quantities():
+    assert quantity("accuracy", "5%", "") == pytest.approx(0.05)
+    assert quantity("budget", "10ms", "s") == pytest.approx(0.01)
+    assert quantity("budget", 0.5, "s") == 0.5
+    with pytest.raises(ValueError, match="give an accuracy"):
+        guide(dataset())

@@ -1,0 +1,127 @@
+"""The program from Python: the same as the command line, serial and on ranks, with exceptions for what is wrong."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import pipeline
+from pipeline.plan.plan import Plan
+
+WORLD = MPI.COMM_WORLD
+TEXT = """
+title = "small"
+[body]
+shape = "box"
+size = ["20 mm", "20 mm", "10 mm"]
+[material]
+young = ["10 kPa", "20 kPa"]
+poisson = 0.3
+[probe]
+shape = "disc"
+radius = "2 mm"
+depth = "0.1 mm"
+[mesh]
+epsilon = ["4 mm", "full"]
+fine = "3 mm"
+coarse = "5 mm"
+rim = "0.5 mm"
+outside = "free"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder that all ranks share, with a study in it."""
+    shared = WORLD.bcast(tmp_path)
+    if WORLD.rank == 0:
+        (shared / "small.toml").write_text(TEXT)
+    WORLD.barrier()
+    yield shared
+    WORLD.barrier()
+
+
+@pytest.mark.mpi
+def test_study_runs_and_every_rank_has_the_dataset(folder):
+    study = pipeline.load(folder / "small.toml")
+    assert study.shape == {"young": 2, "epsilon": 2}
+    data = study.run(WORLD, output=folder / "out", store=folder / "kept.sqlite")
+    assert (data["status"] == "ok").all()
+    np.testing.assert_allclose(data["force"].sel(young=20e3), 2 * data["force"].sel(young=10e3))
+    forces = WORLD.allgather(data["force"].values.tolist())
+    assert all(force == forces[0] for force in forces)
+    assert int(data.attrs["ranks"]) == WORLD.size
+    assert data.epsmesh.guide("50%").answer is not None
+    assert (folder / "out" / "small.nc").exists()
+    assert not (folder / "out" / "cases.sqlite").exists()
+    again = study.run(WORLD, output=folder / "out", store=folder / "kept.sqlite")
+    assert set(np.unique(again["origin"])) == {"stored"}
+    np.testing.assert_array_equal(again["force"], data["force"])
+    assert not study.plan(store=folder / "kept.sqlite").solves
+    opened = pipeline.open(folder / "small.toml", folder / "out")
+    np.testing.assert_array_equal(opened["force"], data["force"])
+
+
+@pytest.mark.mpi
+def test_store_that_cannot_be_used_is_an_exception_on_every_rank(folder):
+    with pytest.raises(pipeline.StoreError, match="cannot be"):
+        pipeline.load(folder / "small.toml").run(WORLD, output=folder, store=folder / "small.toml" / "no.sqlite")
+
+
+@pytest.mark.mpi
+def test_failed_cases_are_counted_in_a_warning(folder):
+    if WORLD.rank == 0:
+        (folder / "small.toml").write_text(TEXT.replace('"free"', '"fixed"').replace("4 mm", "2 mm"))
+    WORLD.barrier()
+    study = pipeline.load(folder / "small.toml")
+    if WORLD.rank == 0:
+        with pytest.warns(RuntimeWarning, match=r"2 failed, the first: .*touches the held face"):
+            data = study.run(WORLD, output=folder)
+    else:
+        data = study.run(WORLD, output=folder)
+    assert (data["status"].sel(epsilon=2e-3) == "failed").all()
+    assert (data["status"].sel(epsilon=np.inf) == "ok").all()
+
+
+def test_plan_says_what_a_run_would_do(tmp_path):
+    (tmp_path / "small.toml").write_text(TEXT)
+    study = pipeline.load(str(tmp_path / "small.toml"))
+    assert (study.name, study.title, study.warnings) == ("small", "small", ())
+    plan = study.plan()
+    assert isinstance(plan, Plan)
+    assert {"scaling", "symmetry"} <= {struck.name for struck in plan.struck}
+    assert len(study.plan(without=["scaling"]).solves) == 2 * 2 + 1
+    assert study.summary(store=tmp_path / "none.sqlite")["solves"] == len(plan.solves) == 3
+    assert not (tmp_path / "none.sqlite").exists()
+    with pytest.raises(ValueError, match="no reduction is called magic"):
+        study.plan(without=["magic"])
+
+
+def test_what_is_wrong_is_raised(tmp_path):
+    (tmp_path / "bad.toml").write_text(TEXT.replace('"2 mm"', "2"))
+    with pytest.raises(pipeline.StudyError, match=r"probe.radius = 2: must be a number with a unit"):
+        pipeline.load(tmp_path / "bad.toml")
+    with pytest.raises(pipeline.DatasetError, match="make it with `epsmesh run"):
+        pipeline.open(tmp_path / "bad.toml", tmp_path)
+    (tmp_path / "bad.nc").write_text("no netCDF")
+    with pytest.raises(pipeline.DatasetError, match=r"bad.nc: cannot be read as netCDF"):
+        pipeline.open(tmp_path / "bad.nc")
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        pipeline.nothing  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    ("code", "heavy"),
+    [
+        ("pass", {"numpy", "xarray", "pydantic", "mpi4py", "dolfinx", "matplotlib", "gmsh"}),
+        ("pipeline.load('studies/quick.toml').plan()", {"xarray", "mpi4py", "dolfinx", "matplotlib", "gmsh"}),
+    ],
+)
+def test_what_answers_at_once_imports_little(code, heavy):
+    command = f"import sys, pipeline; {code}; print(sorted({heavy} & set(sys.modules)))"
+    root = Path(__file__).parents[1]
+    done = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=True, cwd=root)
+    assert done.stdout.strip() == "[]"
