@@ -131,26 +131,6 @@ def status(file: File, output: Output = DEFAULT_OUTPUT, store: StoreFile = None,
         print(f"  failed: {failure['case']}: {failure['message']}")
 
 
-def plot(
-    file: Annotated[Path, typer.Argument(help="A dataset (.nc), or a study file whose dataset exists.")],
-    output: Output = DEFAULT_OUTPUT,
-) -> None:
-    """Draw the figure of a dataset again, as PNG and SVG.
-
-    Example: epsmesh plot results/figure3.nc
-    """
-    path = file if file.suffix == ".nc" else output / f"{file.stem}.nc"
-    if not path.exists():
-        fail(f"{path}: no such dataset; make it with `epsmesh run {file}`")
-    import xarray as xr
-
-    from pipeline.report.figures import draw
-
-    with xr.open_dataset(path) as dataset:
-        for picture in draw(dataset.load(), path.with_suffix("")):
-            print(picture)
-
-
 def version() -> None:
     """Print the versions of the program and of the libraries that a force depends on."""
     from pipeline.run.provenance import provenance

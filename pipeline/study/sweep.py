@@ -9,7 +9,7 @@ from typing import Any
 
 from pipeline.study.schema import AnyBody, AnyProbe, Material, Mesh, Planning, Section, Solve
 
-# Keys that body and probe both have, or that are a variable of the dataset: their dimension says whose it is.
+# Keys that both body and probe have, or a variable of the dataset: their dimension says whose it is.
 _AMBIGUOUS = ("radius", "shape", "accuracy")
 
 _PARTS = ("body", "material", "probe", "mesh", "solve")
@@ -138,7 +138,7 @@ def format_label(name: str, value: float | int | str) -> str:
         return value
     if value == inf:
         return "full"
-    if name == "mesh_accuracy":
+    if name in ("accuracy", "mesh_accuracy"):
         return f"{100 * value:.3g} %"
     if name == "young":
         return f"{value / 1e3:g} kPa"

@@ -46,7 +46,7 @@ def _draw_against(ax: Axes, dataset: xr.Dataset, dim: str, width: float) -> None
         words = f"at {choices(dataset, layout.fixed)}"
         ax.set_title(textwrap.fill(words, max(16, int(17 * width))), fontsize=7, color=QUIET)
     if len(layout.curves) > 1:
-        ax.legend(fontsize=6.5, framealpha=0.75, borderpad=0.3, handlelength=1.6)
+        ax.legend(loc="lower right", fontsize=6.5, framealpha=0.75, borderpad=0.3, handlelength=1.6)
     _from_zero(ax)
 
 
