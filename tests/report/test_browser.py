@@ -154,6 +154,7 @@ def test_prints(browser, path):
     browser.open(path, "#status=failed")
     assert browser.pdf().startswith(b"%PDF")
     browser.call("Emulation.setEmulatedMedia", media="print", features=[])
+    assert browser.ask("getComputedStyle(document.querySelector('#cases .wide')).maxHeight") == "none"
     assert browser.ask("getComputedStyle(document.querySelector('.filters')).display") == "none"
     assert luminance(browser.ask("getComputedStyle(document.body).backgroundColor")) == 1
     browser.look_like(1280, 900)

@@ -14,6 +14,7 @@ from pipeline.report.figures.style import FAILED, QUIET, finish, look, new_figur
 from pipeline.report.words import choices
 
 _COLUMNS, _MOST_PANELS, _MOST_CURVES = 3, 6, 4
+_LEGEND_ROOM = 0.25  # of a panel's height, above the points
 
 
 def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
@@ -45,9 +46,11 @@ def _draw_against(ax: Axes, dataset: xr.Dataset, dim: str, width: float) -> None
     if layout.fixed:
         words = f"at {choices(dataset, layout.fixed)}"
         ax.set_title(textwrap.fill(words, max(16, int(17 * width))), fontsize=7, color=QUIET)
-    if len(layout.curves) > 1:
-        ax.legend(loc="lower right", fontsize=6.5, framealpha=0.75, borderpad=0.3, handlelength=1.6)
     _from_zero(ax)
+    if len(layout.curves) > 1:
+        low, high = ax.get_ylim()
+        ax.set_ylim(low, high + _LEGEND_ROOM * (high - low))
+        ax.legend(loc="upper center", ncol=2, fontsize=6.5, frameon=False, handlelength=1.6, columnspacing=1.0)
 
 
 def _draw_one(ax: Axes, dataset: xr.Dataset) -> None:

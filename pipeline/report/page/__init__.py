@@ -68,12 +68,10 @@ def guide_rows(dataset: xr.Dataset) -> list[dict[str, str]]:
 
 def _figures(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the figures that suit the study, as SVG to stand in the page, with what they show."""
-    kinds = [kind for kind in choose(dataset) if kind != "nothing"]
-    return [
-        {
-            "kind": kind,
-            "caption": (FIGURES[kind].__doc__ or "").strip().rstrip("."),
-            "svg": inline_svg(figure(dataset, kind, titled=False), kind),
-        }
-        for kind in kinds
-    ]
+    found = []
+    for kind in choose(dataset):
+        if kind != "nothing":
+            svg, width = inline_svg(figure(dataset, kind, titled=False), kind)
+            caption = (FIGURES[kind].__doc__ or "").strip().rstrip(".")
+            found.append({"kind": kind, "caption": caption, "svg": svg, "width": width})
+    return found

@@ -52,9 +52,11 @@ def provenance(dataset: xr.Dataset) -> list[tuple[str, str]]:
     """Return with what, where and when the dataset was computed."""
     attributes = {str(name): str(value) for name, value in dataset.attrs.items() if str(value)}
     versions = [(name.removeprefix("version_"), v) for name, v in attributes.items() if name.startswith("version_")]
+    for name in ("start", "end"):
+        attributes[name] = attributes.get(name, "").replace("T", " ")
     known = (("git_commit", "git commit"), ("host", "host"), ("ranks", "ranks"), ("start", "start"), ("end", "end"),
              ("study_hash", "study hash"))  # fmt: skip
-    return versions + [(text, attributes[name]) for name, text in known if name in attributes]
+    return versions + [(text, attributes[name]) for name, text in known if attributes.get(name)]
 
 
 def reproduce(dataset: xr.Dataset, name: str) -> list[str]:

@@ -17,8 +17,8 @@ _THEME = {colour: f"var(--curve-{i})" for i, colour in enumerate(COLOURS, start=
 _COLOUR = re.compile("|".join(_THEME))
 
 
-def inline_svg(figure: Figure, name: str) -> Markup:
-    """Return ``figure`` as an ``<svg>`` element; ``name`` goes before every name in it."""
+def inline_svg(figure: Figure, name: str) -> tuple[Markup, int]:
+    """Return ``figure`` as an ``<svg>`` element, and its width (CSS pixels); ``name`` goes before every name in it."""
     with mpl.rc_context(STYLE):
         buffer = StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None})
@@ -27,7 +27,8 @@ def inline_svg(figure: Figure, name: str) -> Markup:
     text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text, flags=re.DOTALL)
     text = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{name}-", text)
     head, rest = text.split(">", 1)
-    width = float(re.findall(r'width="([\d.]+)pt"', head)[0])
+    points = float(re.findall(r'width="([\d.]+)pt"', head)[0])
+    width = round(points * 4 / 3)
     head = re.sub(r' (width|height)="[^"]*"', "", head)
-    head = f'{head} style="max-width: {width * 4 / 3:.0f}px; min-width: {width:.0f}px" aria-hidden="true"'
-    return Markup(f"{head}>{_COLOUR.sub(lambda found: _THEME[found[0]], rest)}".strip())
+    head = f'{head} style="max-width: {width}px; min-width: {points:.0f}px" aria-hidden="true"'
+    return Markup(f"{head}>{_COLOUR.sub(lambda found: _THEME[found[0]], rest)}".strip()), width

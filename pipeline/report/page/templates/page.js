@@ -11,6 +11,7 @@
   const byName = new Map(columns.map((column) => [column.name, column]));
   const heads = new Map([...table.tHead.rows[0].cells].map((head) => [head.dataset.name, head]));
   const nothing = () => ({ sort: "", order: "up", filters: {}, text: "", full: false, rows: step });
+  const most = 3000; // rows that a phone can still lay out
   let state = nothing();
 
   const textOf = (column, row) => {
@@ -25,7 +26,7 @@
     found.order = given.get("order") === "down" ? "down" : "up";
     found.text = given.get("text") || "";
     found.full = given.get("columns") === "all";
-    found.rows = Math.max(step, Number.parseInt(given.get("rows"), 10) || 0);
+    found.rows = Math.min(most, Math.max(step, Number.parseInt(given.get("rows"), 10) || 0));
     for (const column of columns) {
       const word = given.get(column.name);
       if (column.is_filter && column.words.includes(word)) found.filters[column.name] = word;
@@ -97,10 +98,11 @@
     const many = found.length === order.length ? `${order.length} cases` : `${found.length} matching of ${order.length} cases`;
     const message = shown.length < found.length ? `Shown: the first ${shown.length} of ${many}` : `Shown: ${many}`;
     document.getElementById("shown").textContent = `${message}, ${how}.`;
-    further.parentElement.hidden = shown.length === found.length;
-    further.textContent = `show ${Math.min(step, found.length - shown.length)} more`;
-    all.textContent = `show all ${found.length}`;
-    all.onclick = () => change({ rows: found.length });
+    const limit = Math.min(most, found.length);
+    further.parentElement.hidden = shown.length === limit;
+    further.textContent = `show ${Math.min(step, limit - shown.length)} more`;
+    all.textContent = limit < found.length ? `show the first ${limit}` : `show all ${limit}`;
+    all.onclick = () => change({ rows: limit });
   }
 
   // The form says what is chosen, whoever chose it.
@@ -148,7 +150,7 @@
     fill();
   });
   form.addEventListener("submit", (event) => event.preventDefault());
-  further.addEventListener("click", () => change({ rows: state.rows + step }));
+  further.addEventListener("click", () => change({ rows: Math.min(most, state.rows + step) }));
 
   function follow() {
     if (!location.hash.includes("=")) return;
