@@ -96,7 +96,14 @@ def _round_numbers(low: float, high: float, most: int) -> list[float]:
     """Return round numbers from ``low`` to ``high``, as many as are allowed."""
     exponents = range(int(np.floor(np.log10(low))) - 1, int(np.ceil(np.log10(high))) + 1)
     ticks: list[float] = []
-    for steps, stride in (((1, 2, 5), 1), ((1, 3), 1), ((1,), 1), ((1,), 2), ((1,), 4)):
+    for steps, stride in (
+        ((1, 1.5, 2, 3, 4, 5, 6, 8), 1),
+        ((1, 2, 5), 1),
+        ((1, 3), 1),
+        ((1,), 1),
+        ((1,), 2),
+        ((1,), 4),
+    ):
         ticks = [m * 10.0**e for e in exponents if e % stride == 0 for m in steps]
         ticks = [tick for tick in ticks if low / 1.05 <= tick <= 1.05 * high]
         if len(ticks) <= most:

@@ -21,7 +21,7 @@ def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     """The force with its error bar, one panel for each swept quantity, the others at the values that it names."""
     swept = [str(dim) for dim in dataset["force"].dims if dataset.sizes[dim] > 1]
     dims = swept[:_MOST_PANELS] or [str(dim) for dim in dataset["force"].dims[:1]]
-    columns = min(max(len(dims), 1), _COLUMNS)
+    columns = 2 if len(dims) == 4 else min(max(len(dims), 1), _COLUMNS)
     rows = -(-max(len(dims), 1) // columns)
     figure = new_figure({1: 4.8, 2: 6.4}.get(columns, 8.4), 2.6 * rows + 0.7)
     axes = figure.subplots(rows, columns, squeeze=False)

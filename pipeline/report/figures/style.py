@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 WIDTH, PANEL_HEIGHT = 7.1, 1.75  # inches: the width of a page's text
 # From dark to light, told apart by the colour-blind and in grey; markers tell them apart as well.
-COLOURS = ("#00204d", "#1f5fa8", "#2a9d8f", "#b87d00", "#b0413e", "#7b5ea7", "#777777")
+COLOURS = ("#00204d", "#1f5fa8", "#2a9d8f", "#b87d00", "#b0413e", "#9030f0", "#480000")
 MARKERS = "osD^vPX"
 CLAIM, FAILED, QUIET, LINE, GRID, PAPER = "#d81b60", "#c62828", "#555555", "#000000", "#dddddd", "#ffffff"
 STYLE = {"font.size": 8, "axes.titlesize": 8, "legend.fontsize": 7.5, "svg.fonttype": "none", "axes.grid": True,
