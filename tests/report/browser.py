@@ -21,7 +21,7 @@ class Browser:
     """
 
     def __init__(self, folder: Path):
-        assert CHROMIUM
+        assert CHROMIUM, "chromium is not installed"
         their_input, self._output = os.pipe()
         self._input, their_output = os.pipe()
         options = ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run",

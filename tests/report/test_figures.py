@@ -1,5 +1,6 @@
 """Figures: any study gets those that suit it, with what a reader needs on them."""
 
+import itertools
 import warnings
 
 import numpy as np
@@ -9,6 +10,7 @@ from pipeline.report.figures import KINDS, choose, draw, lacks
 from pipeline.report.figures.accuracy import front
 from pipeline.report.figures.axis import horizontal
 from pipeline.report.figures.layout import arrange
+from pipeline.report.figures.style import COLOURS
 from tests.report.synthetic import EPSILONS, FIGURE, dataset
 
 EXACT = {"exact": True}
@@ -132,6 +134,29 @@ def test_front_holds_what_nothing_beats():
     assert set(best) == {*np.flatnonzero(known)} - {*beaten}
     assert (np.diff(seconds[best]) > 0).all()
     assert (np.diff(error[best]) < 0).all()
+
+
+def test_colours_are_told_apart_by_the_colour_blind():
+    """CIE 1976 distances, seen with and without each kind of colour blindness (Machado et al. 2009, in full)."""
+    protan = [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]]
+    deutan = [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.01182, 0.04294, 0.968881]]
+    tritan = [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.3039]]
+    for vision in (np.eye(3), protan, deutan, tritan):
+        seen = [lab(np.clip(np.array(vision) @ linear(colour), 0, 1)) for colour in COLOURS]
+        assert min(np.linalg.norm(one - other) for one, other in itertools.combinations(seen, 2)) > 20
+
+
+def linear(colour):
+    """Return the linear red, green and blue of ``#rrggbb``."""
+    values = np.array([int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)])
+    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+
+
+def lab(rgb):
+    """Return CIE L*a*b* of linear sRGB, for daylight."""
+    xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]) @ rgb
+    x, y, z = (np.cbrt(value) if value > 0.008856 else 7.787 * value + 16 / 116 for value in xyz / (0.9505, 1, 1.089))
+    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
 
 
 def test_earlier_figure_survives_a_failed_drawing(tmp_path):

@@ -7,7 +7,8 @@ from matplotlib.figure import Figure
 
 from pipeline.report.figures.axis import bounds, log_axis
 from pipeline.report.figures.convergence import mark_floor, notes
-from pipeline.report.figures.layout import Selection, arrange, mesh_dimensions, with_error
+from pipeline.report.figures.dimensions import mesh_dimensions, with_error
+from pipeline.report.figures.layout import Selection, arrange
 from pipeline.report.figures.panels import grid, panels
 from pipeline.report.figures.style import PAPER, finish, look
 from pipeline.report.words import choices, number, symbol

@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from pipeline.report.figures.layout import mesh_dimensions, refinements
+from pipeline.report.figures.dimensions import mesh_dimensions, refinements
 
 # What can be drawn on request: the last two are parts of "epsilon".
 KINDS = ("epsilon", "exact", "convergence", "accuracy", "force", "nothing", "ratio", "speedup")

@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.report.figures.axis import bounds, log_axis
-from pipeline.report.figures.layout import Layout, arrange, main_dimension, refinements, with_error
+from pipeline.report.figures.dimensions import main_dimension, refinements, with_error
+from pipeline.report.figures.layout import Layout, arrange
 from pipeline.report.figures.panels import Panel, draw_curves, grid, panels
 from pipeline.report.figures.style import QUIET, finish, look
 

@@ -5,7 +5,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from pipeline.report.figures.axis import log_axis
-from pipeline.report.figures.layout import arrange, main_dimension
+from pipeline.report.figures.dimensions import main_dimension
+from pipeline.report.figures.layout import arrange
 from pipeline.report.figures.panels import draw_curves, grid, panels
 from pipeline.report.figures.style import LINE, QUIET, finish
 
