@@ -34,7 +34,9 @@ endif
 studies: setup ## run every study in studies/
 	$(EPSMESH) run studies/*.toml
 
-test: setup ## run the tests, serial and on 2 ranks
+# The browser is for the tests of the report alone, which are left out where there is none.
+test: ## run the tests, serial and on 2 ranks
+	@scripts/setup.sh chromium
 	$(PYTHON) -m pytest $(PYTEST_ARGS) </dev/null
 	$(MPIRUN) 2 scripts/one-voice.sh $(PYTHON) -m mpi4py -m pytest -m mpi -p no:cacheprovider $(PYTEST_ARGS) </dev/null $(NONE_OK)
 

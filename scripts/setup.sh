@@ -1,6 +1,7 @@
 #!/bin/bash
 # Install what is missing: Debian packages, then a venv that sees them, then this project in it.
 # Idempotent, and done in a fraction of a second when nothing is missing.
+# Debian packages named on the command line are installed too, where that is possible without asking.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -26,24 +27,31 @@ fail() { echo "setup: $*" >&2; exit 1; }
 missing() {
     local installed
     # dpkg-query fails when any of them is unknown; what it prints of the others still counts.
-    installed=$(dpkg-query -W -f '${db:Status-Abbrev}${Package}\n' "${packages[@]}" 2>/dev/null | sed -n 's/^ii *//p') || true
-    for package in "${packages[@]}"; do
+    installed=$(dpkg-query -W -f '${db:Status-Abbrev}${Package}\n' "$@" 2>/dev/null | sed -n 's/^ii *//p') || true
+    for package in "$@"; do
         grep -qx -- "$package" <<<"$installed" || echo "$package"
     done
 }
 
 command -v dpkg-query >/dev/null || fail "this needs Debian 12 or 13: its packages hold dolfinx, PETSc and gmsh"
-mapfile -t wanted < <(missing)
+mapfile -t wanted < <(missing "${packages[@]}" "$@")
+mapfile -t needed < <(missing "${packages[@]}")
 if ((${#wanted[@]})); then
-    install="apt-get install -y --no-install-recommends ${wanted[*]}"
+    install="apt-get install -y --no-install-recommends ${needed[*]}"
     if ((EUID == 0)); then
         as_root=(env)
     elif command -v sudo >/dev/null && { sudo -n true 2>/dev/null || [[ -t 0 ]]; }; then
         as_root=(sudo)
+    elif ((!${#needed[@]})); then
+        echo "setup: without root, going on without ${wanted[*]}" >&2
+        wanted=()
     else
         fail "Debian packages are missing and this is neither root nor sudo. Ask an administrator to run:
     apt-get update && $install"
     fi
+fi
+if ((${#wanted[@]})); then
+    install="apt-get install -y --no-install-recommends ${wanted[*]}"
     echo "setup: installing ${#wanted[@]} Debian packages: ${wanted[*]}"
     log=$(mktemp)
     export DEBIAN_FRONTEND=noninteractive

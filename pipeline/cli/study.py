@@ -149,31 +149,6 @@ def status(file: File, output: Output = DEFAULT_OUTPUT, store: StoreFile = None,
         print(f"  failed: {failure['case']}: {failure['message']}")
 
 
-def plot(
-    file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A dataset (.nc), or a study file whose dataset exists.")
-    ],
-    output: Output = DEFAULT_OUTPUT,
-) -> None:
-    """Draw the figure of a dataset again, as PNG and SVG.
-
-    Example: epsmesh plot results/figure3.nc
-    """
-    path = file if file.suffix == ".nc" else output / f"{file.stem}.nc"
-    if not path.exists():
-        fail(f"{path}: no such dataset; make it with `epsmesh run {file}`")
-    import xarray as xr
-
-    from pipeline.report.figures import draw
-
-    try:
-        dataset = xr.load_dataset(path, engine="netcdf4")
-    except (OSError, ValueError) as wrong:
-        fail(f"{path}: is no dataset that can be read: {getattr(wrong, 'strerror', None) or wrong}")
-    for picture in draw(dataset, path.with_suffix("")):
-        print(picture)
-
-
 def version(as_json: Json = False) -> None:
     """Print the versions that a force depends on.
 

@@ -102,7 +102,7 @@ class Accessor:
 
 
 def _draw_curves(ax: "Axes", data: xr.DataArray, dims: list[str]) -> None:
-    from pipeline.report.figures import COLOURS, MARKERS  # noqa: PLC0415 (matplotlib is slow to load)
+    from pipeline.report.figures.style import COLOURS, MARKERS  # noqa: PLC0415 (matplotlib is slow to load)
 
     x = 1e3 * data["epsilon"].values
     for number, labels in enumerate(_combinations(data, dims)):
@@ -111,7 +111,7 @@ def _draw_curves(ax: "Axes", data: xr.DataArray, dims: list[str]) -> None:
 
 
 def _draw_bands(ax: "Axes", data: xr.DataArray, dims: list[str], by: str | None) -> None:
-    from pipeline.report.figures import COLOURS, MARKERS  # noqa: PLC0415 (matplotlib is slow to load)
+    from pipeline.report.figures.style import COLOURS, MARKERS  # noqa: PLC0415 (matplotlib is slow to load)
 
     x = 1e3 * data["epsilon"].values
     scene = [d for d in dims if d not in (*MESH_AXES, by)]

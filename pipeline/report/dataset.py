@@ -1,5 +1,6 @@
 """The dataset of a study: every record in its place, with labels, units and provenance."""
 
+import json
 import os
 from collections.abc import Mapping
 from math import isinf, nan
@@ -13,7 +14,7 @@ from pipeline import __version__
 from pipeline.plan.key import digest
 from pipeline.plan.plan import Plan
 from pipeline.run.record import Record
-from pipeline.study.sweep import Axis, Case, Study
+from pipeline.study.sweep import Axis, Case
 
 # name: (units, long_name) of the variables taken as they are from the records
 _FLOATS = {
@@ -40,7 +41,12 @@ _COUNTS = {
     "cells": ("1", "elements of the whole body"),
     "iterations": ("1", "iterations of the linear solver"),
 }
-_TEXTS = {"status": "ok, failed, skipped, or pending where not yet run", "message": "why a case failed or was skipped"}
+_TEXTS = {
+    "status": "ok, failed, skipped, or pending where not yet run",
+    "message": "why a case failed or was skipped",
+    "origin": "how the force was obtained",
+    "force_exact_message": "why there is no force_exact",
+}
 _AXES = {
     "epsilon": "radius of the fine mesh round the contact (infinite: full order)",
     "fine": "element size within epsilon of the contact",
@@ -55,6 +61,11 @@ _AXES = {
     "body": "body",
     "depth": "depth to which the probe is pushed",
     "contact": "contact between probe and tissue",
+    "mesh_accuracy": "accuracy asked for",
+    "body_radius": "radius of the body",
+    "probe_radius": "radius of the probe",
+    "body_shape": "shape of the body",
+    "probe_shape": "shape of the probe",
 }
 _MISSING = -1  # of counts, which have no NaN
 
@@ -85,12 +96,16 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     variables["force_vector"] = (
         (*dims, "component"), vectors, {"units": "N", "long_name": "force of the tissue on the probe"},
     )  # fmt: skip
-    variables["status"] = (dims, array([r.status if r else "pending" for r in flat], object), _text("status"))
-    variables["message"] = (dims, array([r.message if r else "" for r in flat], object), _text("message"))
-    origin = [_origin(plan, key, record) for key, record in zip(plan.keys, flat, strict=True)]
-    variables["origin"] = (dims, array(origin, object), {"long_name": "how the force was obtained"})
+    texts = {
+        "status": [r.status if r else "pending" for r in flat],
+        "message": [r.message if r else "" for r in flat],
+        "origin": [_origin(plan, key, record) for key, record in zip(plan.keys, flat, strict=True)],
+        "force_exact_message": [r.message if r else "" for r in exact],
+    }
+    for name, words in texts.items():
+        variables[name] = (dims, array(words, object), {"long_name": _TEXTS[name]})
     coordinates = {axis.name: _coordinate(axis) for axis in study.axes} | {"component": ["x", "y", "z"]}
-    dataset = xr.Dataset(variables, coordinates, _attributes(study, flat, run or {}))
+    dataset = xr.Dataset(variables, coordinates, _attributes(plan, flat, run or {}))
     return _add_ratios(dataset)
 
 
@@ -148,12 +163,9 @@ def _coordinate(axis: Axis) -> Any:
     return (axis.name, values, attributes)
 
 
-def _text(name: str) -> dict[str, str]:
-    return {"long_name": _TEXTS[name]}
-
-
-def _attributes(study: Study, records: list[Record | None], run: Mapping[str, Any]) -> dict[str, Any]:
+def _attributes(plan: Plan, records: list[Record | None], run: Mapping[str, Any]) -> dict[str, Any]:
     """Return the dataset's attributes: what does not vary by case."""
+    study = plan.study
     seen: dict[str, list[Any]] = {}
     for record in records:
         for name, value in (record.provenance if record else {}).items():
@@ -166,6 +178,8 @@ def _attributes(study: Study, records: list[Record | None], run: Mapping[str, An
         "title": study.title,
         "study": study.text,
         "study_hash": digest(study.text),
+        "study_file": Path(study.file).name,
+        "reductions": json.dumps([vars(struck) for struck in plan.struck], ensure_ascii=False),
         "epsilon_is_full": int(all(isinf(epsilon) for epsilon in epsilons)),
         "timing": int(study.solve.timing),
         "version_epsmesh": __version__,

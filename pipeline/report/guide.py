@@ -151,6 +151,6 @@ def _listed(counts: Counter[Any]) -> str:
 
 def _timing(dataset: xr.Dataset) -> str:
     """Say what the times are worth: where they were taken, and whether every case ran afresh and alone."""
-    ranks = int(dataset.attrs.get("ranks", 1))
-    where = f"{ranks} rank{'s' * (ranks != 1)} of {dataset.attrs.get('host', 'an unnamed machine')}"
+    ranks = str(dataset.attrs.get("ranks", 1))  # "1, 2" where groups of ranks differed
+    where = f"{ranks} rank{'s' * (ranks != '1')} of {dataset.attrs.get('host', 'an unnamed machine')}"
     return f"{where}, {'every case afresh and alone' if dataset.attrs.get('timing') else 'no timing study'}"

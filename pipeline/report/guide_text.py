@@ -12,7 +12,7 @@ from pipeline.study.sweep import format_label
 
 def text(guide: Guide) -> str:
     """Return the answer, the settings, the law of correction and what is left out, as lines."""
-    parts = [[guide.title], _question(guide), _answer(guide), _per_outside(guide), _settings(guide)]
+    parts = [[guide.title], _question(guide), answer(guide), _per_outside(guide), _settings(guide)]
     parts += [_constancy(guide), _left_out(guide)]
     return "\n\n".join("\n".join(part) for part in parts if part and part[0])
 
@@ -25,7 +25,8 @@ def _question(guide: Guide) -> list[str]:
     return [f"Asked for: {', '.join(wanted)}, over {scenes}."]
 
 
-def _answer(guide: Guide) -> list[str]:
+def answer(guide: Guide) -> list[str]:
+    """Return the chosen setting, what it costs and what limits it, and the one with the law of correction."""
     if guide.answer is None:
         lines = [f"No setting of this study does that{_nearest(guide)}"]
         if guide.best:
@@ -88,9 +89,9 @@ def _per_outside(guide: Guide) -> list[str]:
 
 def _settings(guide: Guide) -> list[str]:
     """Return the table of all settings: error, cost, and the law of correction."""
-    rows = [[*_heads(guide), "worst error", "usual", "time", "unknowns", "r", "residual", "left out", "unseen"]]
-    for v in _sorted(guide):
-        row = _cells(v)
+    rows = [[*heads(guide), "worst error", "usual", "time", "unknowns", "r", "residual", "left out", "unseen"]]
+    for v in in_order(guide):
+        row = cells_of(v)
         if not v.is_judged:
             rows.append([*row, f"not judged: {v.missing} of {guide.scenes} scenes not computed"])
             continue
@@ -102,7 +103,7 @@ def _settings(guide: Guide) -> list[str]:
         "r: F_exact ≈ F / r; residual: on the scenes that r is taken from; left out: on each scene, r taken from the",
         "others; unseen: on the scenes with one value of a parameter (one ν, one probe, …), r taken from the rest.",
     ]
-    return [*table(rows, len(_heads(guide))), *legend]
+    return [*table(rows, len(heads(guide))), *legend]
 
 
 def _constancy(guide: Guide) -> list[str]:
@@ -111,31 +112,38 @@ def _constancy(guide: Guide) -> list[str]:
     if not names:
         return []
     ratio = "F/F_max" if guide.has_full else "F/F_exact"
-    heads = _heads(guide)
-    rows = [[*heads, "least", "most", "most - least", "relative", *(f"by {SYMBOLS.get(name, name)}" for name in names)]]
-    for v in _sorted(guide):
+    names_of = heads(guide)
+    rows = [
+        [*names_of, "least", "most", "most - least", "relative", *(f"by {SYMBOLS.get(name, name)}" for name in names)]
+    ]
+    for v in in_order(guide):
         if v.is_judged and isfinite(v.spread.most):
             over = dict(v.spread.over)
             row = [number(v.spread.least), number(v.spread.most), number(v.spread.width), percent(v.spread.relative)]
-            rows.append([*_cells(v), *row, *(number(over[name]) for name in names)])
+            rows.append([*cells_of(v), *row, *(number(over[name]) for name in names)])
     title = f"How constant is {ratio} over the scenes? By a parameter: the largest change it makes, all else held."
-    return [title, *table(rows, len(heads))] if len(rows) > 1 else []
+    return [title, *table(rows, len(names_of))] if len(rows) > 1 else []
 
 
-def _heads(guide: Guide) -> list[str]:
+def _by(names: Sequence[str]) -> list[str]:
+    return [f"by {SYMBOLS.get(name, name)}" for name in names]
+
+
+def heads(guide: Guide) -> list[str]:
     """Return the names of what the settings differ in, ε last."""
     labels = guide.verdicts[0].labels
     return sorted((SYMBOLS.get(name, name) for name in labels), key="ε".__eq__) or ["setting"]
 
 
-def _cells(verdict: Verdict) -> list[str]:
+def cells_of(verdict: Verdict) -> list[str]:
+    """Return a setting under :func:`heads`."""
     labels = verdict.labels
     full = {"outside": "any"} if labels.get("epsilon") == inf and "outside" in labels else {}
     names = sorted(labels, key="epsilon".__eq__)
     return [full.get(name) or format_label(name, labels[name]) for name in names] or ["the only one"]
 
 
-def _sorted(guide: Guide) -> list[Verdict]:
+def in_order(guide: Guide) -> list[Verdict]:
     """Return the verdicts with ε running fastest, full order last."""
 
     def place(verdict: Verdict) -> tuple[bool, str, float]:

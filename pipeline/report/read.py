@@ -32,6 +32,6 @@ def read(file: str | Path, output: str | Path = "results") -> xr.Dataset:
         dataset = xr.load_dataset(path)
     except (OSError, ValueError) as error:
         raise DatasetError(f"{path}: cannot be read as netCDF: {str(error).splitlines()[0]}") from None
-    if missing := {"force", "status", "time_total"} - set(dataset.data_vars):
+    if missing := {"force", "status", "time_total", "force_ratio"} - set(dataset.data_vars):
         raise DatasetError(f"{path}: not a study's dataset: it has no {', '.join(sorted(missing))}")
     return dataset

@@ -213,7 +213,7 @@ class Mesh(Section):
     epsilon: Epsilon = inf
     fine: Length = inf
     coarse: Length = inf
-    rim: Length | None = None
+    rim: Annotated[Length | None, Field(json_schema_extra={"unit": "m"})] = None
     growth: Annotated[float, Field(gt=0, le=2)] = 0.5
     outside: Literal["coarse", "free", "fixed"] = "coarse"
     degree: Literal[1, 2, 3] = 2

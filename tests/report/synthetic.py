@@ -22,7 +22,7 @@ def dataset(failed: int = 0, pending: int = 0, **changes):
         ratio = {"coarse": 1 + 0.3 * np.exp(-epsilon / 4e-3), "free": 1 - np.exp(-epsilon / 5e-3),
                  "fixed": 1 + 9 * np.exp(-epsilon / 4e-3)}["coarse" if case.is_full else case.mesh.outside]  # fmt: skip
         force = 0.02 * ratio * (1 + case.material.poisson)
-        seconds = 4 * (epsilon / 40e-3) ** 1.5
+        seconds = 4 * (epsilon / 40e-3) ** (1.5 + 0.2 * case.material.poisson + 500 * case.probe.depth)
         records[solve.key] = Record(
             solve.key, "ok", young=case.material.young, depth=case.probe.depth, force=force,
             force_error=0.01, force_vector=(0.0, 0.0, force), energy=force * 1e-4,

@@ -1,5 +1,7 @@
 """The dataset: dimensions of the study, SI units, ratios to the full order of the same scene."""
 
+import json
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -39,6 +41,24 @@ def test_failed_and_pending_cases_have_no_force():
     assert (np.isnan(data["force"]) == (data["status"] != "ok")).all()
     assert set(np.unique(data["status"])) == {"ok", "failed", "pending"}
     assert (data["message"].where(data["status"] == "failed", "it went wrong") == "it went wrong").all()
+
+
+def test_swept_accuracy_and_reached_accuracy_are_told_apart():
+    data = dataset(
+        material={"poisson": [0.3, 0.4]}, solve={"exact": True},
+        mesh={"epsilon": None, "fine": None, "coarse": None, "rim": None, "growth": None, "accuracy": ["5 %", "1 %"]},
+    )  # fmt: skip
+    assert data["accuracy"].dims == data["force"].dims == ("poisson", "mesh_accuracy")
+    assert list(data["mesh_accuracy"].values) == [0.05, 0.01]
+    assert np.isfinite(data["accuracy"]).all()
+
+
+def test_what_was_struck_out_and_why_is_kept():
+    data = dataset(material={"young": ["1 kPa", "2 kPa", "4 kPa"]})
+    struck = {item["name"]: item for item in json.loads(data.attrs["reductions"])}
+    assert struck["scaling"]["count"] == 2
+    assert "proportional" in struck["scaling"]["reason"]
+    assert data.attrs["study_file"] == "study"
 
 
 def test_written_file_opens_with_xarray_alone(tmp_path):

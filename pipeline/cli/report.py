@@ -1,0 +1,79 @@
+"""The commands that show a dataset: figures, report."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pipeline.cli.console import error
+from pipeline.cli.words import DEFAULT_OUTPUT, Output, fail
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Dataset = Annotated[Path, typer.Argument(help="A dataset (.nc), or a study file whose dataset exists.")]
+
+
+def plot(
+    file: Dataset,
+    output: Output = DEFAULT_OUTPUT,
+    kind: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A figure to draw; may be repeated: epsilon, ratio, speedup, exact, convergence, accuracy, force. "
+            "Default: all that suit the study.",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Draw the figures of a dataset, as PNG and SVG, beside it.
+
+    The study's main figure is <study>.png, the others <study>_<kind>.png.
+
+    Example: epsmesh plot results/figure3.nc
+
+    Example: epsmesh plot studies/figure3.toml --kind accuracy --kind exact
+    """
+    path, dataset = _read(file, output)
+    from pipeline.report.figures import KINDS, choose, complete, draw, lacks
+
+    for name in kind or ():
+        if name not in KINDS:
+            fail(f"--kind {name}: no figure is called so; there are {', '.join(KINDS)}")
+        if lack := lacks(complete(dataset), name):
+            fail(f"{path}: --kind {name} {lack}; its figures are {', '.join(choose(complete(dataset)))}")
+    for picture in draw(dataset, path.with_suffix(""), kinds=kind or choose(complete(dataset))):
+        print(picture)
+
+
+def report(file: Dataset, output: Output = DEFAULT_OUTPUT) -> None:
+    """Write the report of a dataset, one HTML page that needs nothing else, beside it: <study>.html.
+
+    It holds the figures, a table of the cases to sort and filter, what failed or was skipped and why, the study file,
+    and how to run it again.
+
+    Example: epsmesh report results/figure3.nc
+    """
+    path, dataset = _read(file, output)
+    if file.suffix != ".nc":
+        _compare(file, path, dataset)
+    from pipeline.report.page import write_page
+
+    print(write_page(dataset, path.with_suffix(".html")))
+
+
+def _read(file: Path, output: Path) -> "tuple[Path, xr.Dataset]":
+    """Return the dataset that ``file`` names, in memory, and where it is; exit if there is none."""
+    from pipeline.report.read import dataset_path, read
+    from pipeline.report.settings import DatasetError
+
+    try:
+        return dataset_path(file, output), read(file, output)
+    except DatasetError as wrong:
+        fail(str(wrong))
+
+
+def _compare(file: Path, path: Path, dataset: "xr.Dataset") -> None:
+    """Warn if the study file is not the one that the dataset was made from."""
+    if file.is_file() and file.read_text(encoding="utf-8", errors="replace") != dataset.attrs.get("study"):
+        error(f"warning: {file} has changed since {path} was made; the report shows the study as it was run")

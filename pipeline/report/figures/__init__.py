@@ -1,0 +1,64 @@
+"""The figures of a study, drawn from its dataset alone."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from pipeline.report.figures.accuracy import accuracy
+from pipeline.report.figures.choose import KINDS, choose, lacks
+from pipeline.report.figures.convergence import convergence
+from pipeline.report.figures.epsilon import epsilon, ratio, speedup
+from pipeline.report.figures.exact import exact
+from pipeline.report.figures.force import force, nothing
+from pipeline.report.figures.style import STYLE, save
+
+__all__ = ["FIGURES", "KINDS", "STYLE", "choose", "draw", "figure", "lacks", "save"]
+
+FIGURES: dict[str, Callable[[xr.Dataset, str, str], Figure]] = {
+    "epsilon": epsilon, "exact": exact, "convergence": convergence, "accuracy": accuracy, "force": force,
+    "nothing": nothing, "ratio": ratio, "speedup": speedup,
+}  # fmt: skip
+# Variables that datasets of earlier versions lack.
+_LATER = ("force_error", "force_exact", "force_exact_error", "accuracy")
+
+
+def draw(
+    dataset: xr.Dataset, stem: Path, formats: Sequence[str] = ("png", "svg"), kinds: Sequence[str] | None = None
+) -> list[Path]:
+    """Draw figures of ``dataset``, by default its main one; return the files written.
+
+    The main figure goes to ``<stem>.png`` and ``.svg``, those of other ``kinds`` to ``<stem>_<kind>.png`` and ``.svg``.
+    """
+    main = choose(complete(dataset))[0]
+    paths = []
+    for kind in [main] if kinds is None else kinds:
+        name = stem.name if kind == main else f"{stem.name}_{kind}"
+        with mpl.rc_context(STYLE):
+            drawn = figure(dataset, kind)
+            paths += [save(drawn, stem.with_name(f"{name}.{suffix}")) for suffix in formats]
+    return paths
+
+
+def figure(dataset: xr.Dataset, kind: str, *, titled: bool = True) -> Figure:
+    """Draw the figure of one ``kind``, with the study's title or without."""
+    # A title is no formula, whatever stands in it.
+    title = str(dataset.attrs.get("title", "")).replace("$", r"\$") if titled else ""
+    with mpl.rc_context(STYLE):
+        return FIGURES[kind](complete(dataset), title, _missing(dataset))
+
+
+def complete(dataset: xr.Dataset) -> xr.Dataset:
+    """Return ``dataset`` with the variables that an earlier version did not write, empty."""
+    return dataset.assign({name: dataset["force"] * np.nan for name in _LATER if name not in dataset})
+
+
+def _missing(dataset: xr.Dataset) -> str:
+    """Say which cases have no force."""
+    words = {"failed": "failed (×)", "skipped": "skipped", "pending": "not yet run"}
+    counts = {word: int((dataset["status"] == state).sum()) for state, word in words.items()}
+    text = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
+    return f"cases: {text}" if text else ""

@@ -1,0 +1,86 @@
+"""Error of F against the time it takes, with the cases that no other one beats in both."""
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pipeline.report.figures.axis import bounds, log_axis
+from pipeline.report.figures.convergence import mark_floor, notes
+from pipeline.report.figures.dimensions import mesh_dimensions, with_error
+from pipeline.report.figures.layout import Selection, arrange
+from pipeline.report.figures.panels import grid, panels
+from pipeline.report.figures.style import PAPER, finish, look
+from pipeline.report.words import choices, number, symbol
+
+_MOST_NAMED = 6
+# Share of a panel's height that two names keep apart.
+_APART = 0.06
+
+
+def accuracy(dataset: xr.Dataset, title: str, warning: str) -> Figure:
+    """The error of F over run time: every case a point, each scene's Pareto front a line, with its meshes named."""
+    reference, data = with_error(dataset)
+    meshes = mesh_dimensions(data)
+    layout = arrange(data, ("error",), None, flat=meshes)
+    figure = grid(layout, ("error",), height=2.7, share="y")
+    for panel in panels(figure, data, layout, ("error",)):
+        limits = bounds(panel.data["time_total"].values, 1.4)
+        log_axis(panel.ax, *limits, which="x")
+        # Names are written left of the points: the first ones need room.
+        panel.ax.set_xlim(limits[0] / (limits[1] / limits[0]) ** 0.2, limits[1])
+        for position, curve in enumerate(layout.curves):
+            named = position == len(layout.curves) - 1
+            _draw_scene(panel.ax, panel.data.sel(curve), position, choices(data, curve), meshes if named else [])
+        panel.ax.set_title(panel.title)
+        mark_floor(panel.ax, panel.data)
+        if panel.is_last:
+            panel.ax.set_xlabel("run time of the case (s)")
+        if panel.is_first:
+            panel.ax.set_ylabel(f"$|F/F_{{{reference}}}-1|$ (%)")
+    log_axis(figure.axes[0], *bounds(100 * data["error"].values, 1.6))
+    what = "lines: cases that no other beats in both"
+    labels = f"their {', '.join(symbol(data[name]) for name in meshes)} at the points"
+    finish(figure, title, notes(reference, f"{what}, {labels}", layout.note), warning)
+    return figure
+
+
+def _draw_scene(ax: Axes, scene: xr.Dataset, position: int, label: str, named: list[str]) -> None:
+    """Draw the cases of one scene, those on its front strong, and name the meshes of the front."""
+    flat = scene.stack(case=list(scene["error"].dims)) if scene["error"].dims else scene.expand_dims("case")
+    seconds, error = flat["time_total"].values, 100 * flat["error"].values
+    best = front(seconds, error)
+    style = look(position)
+    ax.plot(seconds, error, **style, linestyle="none", alpha=0.35, markeredgewidth=0)
+    ax.plot(seconds[best], error[best], **style, label=label or None, drawstyle="steps-post")
+    for i in _some(best, error):
+        words = _name_of({name: flat[name].values[i] for name in named}, scene)
+        place = {"xytext": (-4, -3), "textcoords": "offset points", "ha": "right", "va": "top"}
+        ground = {"facecolor": PAPER, "alpha": 0.75, "linewidth": 0, "pad": 0.6}
+        ax.annotate(words, (seconds[i], error[i]), fontsize=6.5, color=style["color"], bbox=ground, **place)
+
+
+def _name_of(mesh: Selection, scene: xr.Dataset) -> str:
+    """Name a mesh by what is swept; what is outside does not matter to the full order."""
+    if mesh.get("epsilon") == np.inf:
+        mesh.pop("outside", None)
+    return ", ".join(number(scene[name], value) for name, value in mesh.items())
+
+
+def _some(best: np.ndarray, error: np.ndarray) -> list[int]:
+    """Return the cases of a front whose names do not cover one another, first and last before the others."""
+    height = np.log10(np.where(error > 0, error, np.nan))
+    span = float(np.nanmax(height) - np.nanmin(height)) if np.isfinite(height).any() else 0.0
+    chosen: list[int] = []
+    for i in (*best[:1], *best[:0:-1]):
+        if all(abs(height[i] - height[j]) > _APART * span for j in chosen):
+            chosen.append(int(i))
+    return chosen[:_MOST_NAMED]
+
+
+def front(seconds: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """Return the indices of the cases that no other one beats in both time and error, the fastest first."""
+    order = np.lexsort((error, seconds))
+    order = order[np.isfinite(seconds[order]) & np.isfinite(error[order])]
+    best = np.minimum.accumulate(error[order])
+    return order[error[order] < np.concatenate([[np.inf], best[:-1]])]

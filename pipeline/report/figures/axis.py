@@ -1,0 +1,120 @@
+"""The axes of a figure: where values stand, which of them are written out."""
+
+import textwrap
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+
+from pipeline.report.words import heading, is_numeric, number, scale
+
+# Values that span more than this are shown on a logarithmic axis.
+_LONG = 30.0
+
+
+@dataclass(frozen=True)
+class Horizontal:
+    """A horizontal axis: positions of the values (in the units people read), their texts, and the heading."""
+
+    positions: np.ndarray
+    texts: tuple[str, ...]
+    heading: str
+    is_log: bool = False
+    joins: bool = True  # whether a line may join its points: numbers yes, words no
+
+    def finish(self, ax: Axes, width: float, *, last: bool = True) -> None:
+        """Write as many values as fit ``width`` inches, first and last before the others."""
+        x = self._even(self.positions)
+        span = float(np.ptp(x)) or 1.0
+        if self.is_log:
+            ax.set_xscale("log")
+        chosen = self._chosen(x, span, width)
+        slanted = not chosen
+        chosen = chosen or list(range(len(x)))
+        ticks = [float(self.positions[i]) for i in chosen]
+        labels = [self.texts[i] for i in chosen] if last else [""] * len(chosen)
+        turned = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"} if slanted and last else {}
+        ax.set_xticks(ticks, labels, **turned)
+        ax.set_xticks([], minor=True)
+        margin = 0.05 * span if self.joins else 0.5
+        low, high = x.min() - margin, x.max() + margin
+        ax.set_xlim(*((10**low, 10**high) if self.is_log else (low, high)))
+        if last:
+            ax.set_xlabel(textwrap.fill(self.heading, max(14, int(15 * width))))
+
+    def _even(self, x: np.ndarray) -> np.ndarray:
+        return np.log10(x) if self.is_log else x
+
+    def _chosen(self, x: np.ndarray, span: float, width: float) -> list[int]:
+        """Return which values are written, the largest first; none if they are words that do not all fit."""
+        chosen: list[int] = []
+        for i in np.argsort(-x, kind="stable"):
+            room = 0.08 + 0.035 * (len(self.texts[i]) + len(self.texts[chosen[-1]])) if chosen else 0.0
+            if not chosen or (x[chosen[-1]] - x[i]) / span * 0.9 * width > room:
+                chosen.append(int(i))
+        return chosen if self.joins or len(chosen) == len(self.texts) else []
+
+
+def horizontal(coordinate: xr.DataArray) -> Horizontal:
+    """Return the axis for a dimension: numbers to scale, with full order a step past the largest, or words in a row."""
+    values = coordinate.values
+    if not is_numeric(coordinate):
+        row = np.arange(len(values), dtype=float)
+        return Horizontal(row, tuple(map(str, values)), heading(coordinate), joins=False)
+    factor, unit = scale(coordinate)
+    finite = values[np.isfinite(values)].astype(float) * factor
+    if not finite.size:
+        return Horizontal(np.zeros(len(values)), ("full",) * len(values), heading(coordinate))
+    is_log = bool(finite.min() > 0 and finite.max() > _LONG * finite.min())
+    if is_log:
+        past = finite.max() * (finite.max() / finite.min()) ** 0.15
+    else:
+        past = finite.max() + 0.2 * max(np.ptp(finite), finite.max() / 3)
+    positions = np.where(np.isfinite(values), values * factor, past)
+    texts = tuple(number(coordinate, value).removesuffix(f" {unit}") for value in values)
+    return Horizontal(positions, texts, heading(coordinate), is_log)
+
+
+def log_axis(ax: Axes, low: float, high: float, which: str = "y") -> None:
+    """Make an axis logarithmic from ``low`` to ``high``, with round numbers written out."""
+    ticks = _round_numbers(low, high, most=8 if which == "y" else 4)
+    texts = [f"{tick / 1000:g}k" if tick >= 1e4 else f"{tick:g}" for tick in ticks]
+    if which == "y":
+        ax.set_yscale("log")
+        ax.set_yticks(ticks, texts)
+        ax.set_yticks([], minor=True)
+        ax.set_ylim(low, high)
+    else:
+        ax.set_xscale("log")
+        ax.set_xticks(ticks, texts)
+        ax.set_xticks([], minor=True)
+        ax.set_xlim(low, high)
+
+
+def _round_numbers(low: float, high: float, most: int) -> list[float]:
+    """Return round numbers from ``low`` to ``high``, as many as are allowed."""
+    exponents = range(int(np.floor(np.log10(low))) - 1, int(np.ceil(np.log10(high))) + 1)
+    ticks: list[float] = []
+    for steps, stride in (
+        ((1, 1.5, 2, 3, 4, 5, 6, 8), 1),
+        ((1, 2, 5), 1),
+        ((1, 3), 1),
+        ((1,), 1),
+        ((1,), 2),
+        ((1,), 4),
+    ):
+        ticks = [m * 10.0**e for e in exponents if e % stride == 0 for m in steps]
+        ticks = [tick for tick in ticks if low / 1.05 <= tick <= 1.05 * high]
+        if len(ticks) <= most:
+            break
+    return ticks
+
+
+def bounds(values: np.ndarray, margin: float = 1.25) -> tuple[float, float]:
+    """Return limits of a logarithmic axis that holds the positive ones of ``values``, at least half a decade."""
+    known = values[np.isfinite(values) & (values > 0)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.1, 1.0)
+    if high < 3 * low:
+        low, high = low / (3 * low / high) ** 0.5, high * (3 * low / high) ** 0.5
+    return low / margin, high * margin

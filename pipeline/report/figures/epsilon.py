@@ -1,0 +1,77 @@
+"""F/F_max and speed-up against ε: the paper's figure."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pipeline.report.figures.axis import log_axis
+from pipeline.report.figures.layout import arrange
+from pipeline.report.figures.panels import draw_curves, grid, panels
+from pipeline.report.figures.style import CLAIM, LINE, finish
+
+# The paper's claims: 80 % of F_max at ε = 10 mm, 50 times faster.
+CLAIM_EPSILON, CLAIM_RATIO, CLAIM_SPEEDUP = 10e-3, 0.8, 50.0
+
+
+def epsilon(dataset: xr.Dataset, title: str, warning: str) -> Figure:
+    """F/F_max, and below it the speed-up, against ε."""
+    return _against_epsilon(dataset, ("force_ratio", "speedup"), title, warning)
+
+
+def ratio(dataset: xr.Dataset, title: str, warning: str) -> Figure:
+    """F/F_max against ε."""
+    return _against_epsilon(dataset, ("force_ratio",), title, warning)
+
+
+def speedup(dataset: xr.Dataset, title: str, warning: str) -> Figure:
+    """Speed-up over the full order against ε."""
+    return _against_epsilon(dataset, ("speedup",), title, warning)
+
+
+def _against_epsilon(dataset: xr.Dataset, quantities: Sequence[str], title: str, warning: str) -> Figure:
+    layout = arrange(dataset, quantities, "epsilon")
+    figure = grid(layout, quantities)
+    for panel in panels(figure, dataset, layout, quantities):
+        x = draw_curves(panel, layout).positions
+        if panel.quantity == "force_ratio":
+            _mark_ratio(panel.ax, x)
+        else:
+            _mark_speedup(panel.ax, first=panel.is_first)
+        if panel.is_first:
+            panel.ax.set_ylabel("$F/F_{max}$" if panel.quantity == "force_ratio" else "speed-up $t_{full}/t$")
+    finish(figure, title, layout.note, warning)
+    return figure
+
+
+def _mark_ratio(ax: Axes, x: np.ndarray) -> None:
+    """Mark F = F_max, and the paper's 80 % at 10 mm."""
+    ax.axhline(1.0, color=LINE, linewidth=0.7)
+    low, high = ax.get_ylim()
+    if high > 3:
+        log_axis(ax, min(0.7, low), high)
+    else:
+        low, high = min(low, CLAIM_RATIO), max(high, 1.02)
+        ax.set_ylim(low - 0.1 * (high - low), high)
+    if x.min() <= 1e3 * CLAIM_EPSILON <= x.max():
+        star = {"marker": "*", "markersize": 9, "markeredgecolor": "white", "markeredgewidth": 0.5, "linestyle": "none"}
+        point = (1e3 * CLAIM_EPSILON, CLAIM_RATIO)
+        ax.plot(*point, color=CLAIM, zorder=5, **star)
+        place = {"xytext": (6, -2), "textcoords": "offset points", "va": "center"}
+        ax.annotate("paper: 80 %", point, color=CLAIM, fontsize=7, zorder=5, **place)
+
+
+def _mark_speedup(ax: Axes, *, first: bool) -> None:
+    """Mark the paper's 50-fold speed-up where the curves come near it."""
+    ax.set_yscale("log")
+    low, high = ax.get_ylim()
+    if high > CLAIM_SPEEDUP / 3:
+        high = max(high, 1.6 * CLAIM_SPEEDUP)
+        ax.axhline(CLAIM_SPEEDUP, color=CLAIM, linewidth=0.8, linestyle=":")
+        if first:
+            place = {"xytext": (-2, 2), "textcoords": "offset points", "ha": "right"}
+            spot = (1, CLAIM_SPEEDUP)
+            ax.annotate("paper: 50 ×", spot, xycoords=("axes fraction", "data"), color=CLAIM, fontsize=7, **place)
+    log_axis(ax, max(low, 1e-3), high)

@@ -1,0 +1,81 @@
+"""The force against everything that a study sweeps, and what there is to say where no case has one."""
+
+import textwrap
+from collections import Counter
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pipeline.report.figures.layout import arrange
+from pipeline.report.figures.panels import Panel, draw_curves
+from pipeline.report.figures.style import FAILED, QUIET, finish, look, new_figure
+from pipeline.report.words import choices
+
+_COLUMNS, _MOST_PANELS, _MOST_CURVES = 3, 6, 4
+_LEGEND_ROOM = 0.25  # of a panel's height, above the points
+
+
+def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
+    """The force with its error bar, one panel for each swept quantity, the others at the values that it names."""
+    swept = [str(dim) for dim in dataset["force"].dims if dataset.sizes[dim] > 1]
+    dims = swept[:_MOST_PANELS] or [str(dim) for dim in dataset["force"].dims[:1]]
+    columns = 2 if len(dims) == 4 else min(max(len(dims), 1), _COLUMNS)
+    rows = -(-max(len(dims), 1) // columns)
+    figure = new_figure({1: 4.8, 2: 6.4}.get(columns, 8.4), 2.6 * rows + 0.7)
+    axes = figure.subplots(rows, columns, squeeze=False)
+    for ax in axes.ravel()[max(len(dims), 1) :]:
+        ax.remove()
+    width = figure.get_figwidth() / columns - 0.6
+    for dim, ax in zip(dims, axes.ravel(), strict=False):
+        _draw_against(ax, dataset, dim, width)
+    if not dims:
+        _draw_one(axes[0, 0], dataset)
+    for ax in axes[:, 0]:
+        ax.set_ylabel("reaction force F (mN)")
+    left_out = f"; not shown: against {', '.join(swept[_MOST_PANELS:])}" if swept[_MOST_PANELS:] else ""
+    finish(figure, title, f"bars: 95 % error bars{left_out}", warning, legend=False)
+    return figure
+
+
+def _draw_against(ax: Axes, dataset: xr.Dataset, dim: str, width: float) -> None:
+    layout = arrange(dataset, ("force",), dim, most=(_MOST_CURVES, 1, 1))
+    panel = Panel(ax, dataset.sel(layout.at), "force", "", width, is_first=True, is_last=True)
+    draw_curves(panel, layout, factor=1e3, errors="force_error")
+    if layout.fixed:
+        words = f"at {choices(dataset, layout.fixed)}"
+        ax.set_title(textwrap.fill(words, max(16, int(17 * width))), fontsize=7, color=QUIET)
+    _from_zero(ax)
+    if len(layout.curves) > 1:
+        low, high = ax.get_ylim()
+        ax.set_ylim(low, high + _LEGEND_ROOM * (high - low))
+        ax.legend(loc="upper center", ncol=2, fontsize=6.5, frameon=False, handlelength=1.6, columnspacing=1.0)
+
+
+def _draw_one(ax: Axes, dataset: xr.Dataset) -> None:
+    value = 1e3 * float(dataset["force"])
+    bar = np.nan_to_num(abs(value) * float(dataset["force_error"]))
+    ax.errorbar([0], [value], [bar], capsize=3, linestyle="none", **look(0))
+    ax.set_xticks([0], [f"{value:.4g} mN ± {100 * float(dataset['force_error']):.2g} %"])
+    _from_zero(ax)
+
+
+def _from_zero(ax: Axes) -> None:
+    """Let the axis begin at zero, where forces are positive: a small change then looks small."""
+    low, high = ax.get_ylim()
+    if high > 0 and low > -0.05 * high:
+        ax.set_ylim(0, 1.02 * high)
+
+
+def nothing(dataset: xr.Dataset, title: str, warning: str) -> Figure:
+    """Say, where no case has a force, how many failed and of what."""
+    states = Counter(map(str, dataset["status"].values.ravel()))
+    messages = Counter(str(m) for m in dataset["message"].values.ravel() if m)
+    lines = [f"No case has a force: {', '.join(f'{count} {state}' for state, count in states.items())}."]
+    lines += [f"{count} ×  {message}" for message, count in messages.most_common(4)]
+    text = "\n".join(textwrap.fill(line, 62, subsequent_indent="      ") for line in lines)
+    figure = new_figure(4.8, 1.0 + 0.17 * text.count("\n"))
+    figure.text(0.04, 0.5, text, va="center", color=FAILED)
+    finish(figure, title)
+    return figure

@@ -1,0 +1,86 @@
+"""A grid of panels: a curve for each choice, an axis that all share."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pipeline.report.figures.axis import Horizontal, horizontal
+from pipeline.report.figures.layout import Layout, title_of
+from pipeline.report.figures.style import FAILED, PANEL_HEIGHT, WIDTH, look, new_figure
+from pipeline.report.words import choices
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One panel: its axes, the part of the dataset it shows, which quantity, and where in the grid it is."""
+
+    ax: Axes
+    data: xr.Dataset
+    quantity: str
+    title: str
+    width: float
+    is_first: bool
+    is_last: bool
+
+
+def grid(layout: Layout, quantities: Sequence[str], height: float = PANEL_HEIGHT, share: str = "x") -> Figure:
+    """Return a figure with room for every row, column and quantity of ``layout``, whose panels ``share`` x or y."""
+    rows, columns = len(layout.rows) * len(quantities), len(layout.columns)
+    figure = new_figure(_width(columns), height * rows + 1.0 + (0.5 if rows == 1 else 0.0))
+    figure.subplots(rows, columns, squeeze=False, sharex=share == "x", sharey=share == "y")
+    return figure
+
+
+def panels(figure: Figure, dataset: xr.Dataset, layout: Layout, quantities: Sequence[str]) -> Iterator[Panel]:
+    """Yield the panels of a figure made by :func:`grid`, row by row."""
+    columns = len(layout.columns)
+    width = _width(columns) / columns - 0.55
+    for number, ax in enumerate(figure.axes):
+        line, column = divmod(number, columns)
+        row, quantity = divmod(line, len(quantities))
+        choice = layout.rows[row] | layout.columns[column]
+        title = title_of(dataset, layout.rows[row], layout.columns[column]) if quantity == 0 else ""
+        last = line == len(figure.axes) // columns - 1
+        yield Panel(ax, dataset.sel(layout.at | choice), quantities[quantity], title, width, column == 0, last)
+
+
+def draw_curves(panel: Panel, layout: Layout, factor: float = 1.0, errors: str = "") -> Horizontal:
+    """Draw the panel's quantity, times ``factor``, against the layout's dimension, with bars of relative ``errors``."""
+    assert layout.x is not None
+    axis = horizontal(panel.data[layout.x])
+    for position, curve in enumerate(layout.curves):
+        line = panel.data.sel(curve)
+        y = line[panel.quantity].values * factor
+        known = np.isfinite(y)
+        style = look(position) | ({} if axis.joins and len(axis.positions) > 1 else {"linestyle": "none"})
+        label = choices(panel.data, curve) if known.any() else None
+        x = axis.positions + _aside(axis, position, len(layout.curves), bool(errors))
+        if errors:
+            bars = np.nan_to_num(np.abs(y * line[errors].values))[known]
+            panel.ax.errorbar(x[known], y[known], bars, label=label, capsize=2, elinewidth=0.8, **style)
+        else:
+            panel.ax.plot(x[known], y[known], label=label, **style)
+        failed = line["status"].values == "failed"
+        if failed.any():
+            place = {"transform": panel.ax.get_xaxis_transform(), "zorder": 6}
+            panel.ax.plot(x[failed], np.full(failed.sum(), 0.04), "x", color=FAILED, markersize=5, **place)
+    if panel.title:
+        panel.ax.set_title(panel.title)
+    axis.finish(panel.ax, panel.width, last=panel.is_last)
+    return axis
+
+
+def _aside(axis: Horizontal, position: int, count: int, has_bars: bool) -> float:
+    """Return how far beside its value a point stands, so that words' points and error bars do not hide one another."""
+    share = position / (count - 1) - 0.5 if count > 1 else 0.0
+    if not axis.joins:
+        return 0.3 * share
+    return 0.03 * share * float(np.ptp(axis.positions)) if has_bars and not axis.is_log else 0.0
+
+
+def _width(columns: int) -> float:
+    return max(WIDTH * columns / 3, 4.4)

@@ -1,0 +1,75 @@
+"""What all figures share: colours, sizes, files."""
+
+import os
+import textwrap
+from pathlib import Path
+from typing import Any
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+WIDTH, PANEL_HEIGHT = 7.1, 1.75  # inches: the width of a page's text
+# From dark to light, told apart by the colour-blind and in grey; markers tell them apart as well.
+COLOURS = ("#00204d", "#1f5fa8", "#2a9d8f", "#b87d00", "#b0413e", "#9030f0", "#480000")
+MARKERS = "osD^vPX"
+CLAIM, FAILED, QUIET, LINE, GRID, PAPER = "#d81b60", "#c62828", "#555555", "#000000", "#dddddd", "#ffffff"
+STYLE = {"font.size": 8, "axes.titlesize": 8, "legend.fontsize": 7.5, "svg.fonttype": "none", "axes.grid": True,
+          "grid.linewidth": 0.4, "grid.color": GRID, "lines.linewidth": 1.2, "lines.markersize": 3.5,
+          "svg.hashsalt": "epsmesh"}  # fmt: skip
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Return an empty figure of a size in inches, whose parts make room for each other."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def look(position: int) -> dict[str, str]:
+    """Return colour and marker of the curve at ``position``."""
+    return {"color": COLOURS[position % len(COLOURS)], "marker": MARKERS[position % len(MARKERS)]}
+
+
+def finish(figure: Figure, title: str, note: str = "", warning: str = "", *, legend: bool = True) -> None:
+    """Add title, legend, and the notes below: what is shown of a large study, and what is missing."""
+    if title:
+        figure.suptitle(_wrapped(title, figure, 9.5), fontsize=9.5, fontweight="bold")
+    lines, bottom = [], 0.0
+    for text, colour in ((note, QUIET), (warning, FAILED)):
+        for line in reversed(_wrapped(text, figure, 7).splitlines()):
+            lines.append((line, colour))
+    for line, colour in lines:
+        figure.text(0.01, (0.04 + bottom) / figure.get_figheight(), line, fontsize=7, color=colour, va="bottom")
+        bottom += 0.14
+    entries: dict[str, Any] = {}
+    for ax in figure.axes if legend else ():
+        handles, labels = ax.get_legend_handles_labels()
+        entries = dict(zip(labels, handles, strict=True)) | entries
+    labels = list(entries)
+    if len(labels) > 1:
+        columns = max(1, min(len(labels), int(figure.get_figwidth() / (0.45 + 0.068 * max(map(len, labels))))))
+        anchor = (0.5, bottom / figure.get_figheight())
+        figure.legend(
+            list(entries.values()), labels, loc="lower center", ncol=columns, frameon=False, bbox_to_anchor=anchor
+        )
+        bottom += 0.12 + 0.16 * -(-len(labels) // columns)
+    share = (bottom + 0.02) / figure.get_figheight()
+    figure.get_layout_engine().set(rect=(0, share, 1, 1 - share))
+
+
+def save(figure: Figure, path: Path) -> Path:
+    """Write ``figure`` to ``path``, in place of an earlier one only once it is whole."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        # Without a date, the same dataset gives the same file.
+        figure.savefig(temporary, dpi=200, metadata={"Date": None} if path.suffix == ".svg" else None)
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return path
+
+
+def _wrapped(text: str, figure: Figure, size: float) -> str:
+    """Break ``text`` where it would be wider than the figure."""
+    return textwrap.fill(text, max(20, int(figure.get_figwidth() * 72 / (0.62 * size))))

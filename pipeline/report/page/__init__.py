@@ -1,0 +1,65 @@
+"""The report of a study: one HTML page that holds all it needs, made from the dataset alone."""
+
+import os
+from base64 import b64encode
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import xarray as xr
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from pipeline.report.figures import FIGURES, choose, complete, figure
+from pipeline.report.page.cases import FIRST_ROWS, case_table
+from pipeline.report.page.facts import facts, failures, provenance, reproduce, without_exact
+from pipeline.report.page.guideline import guide_section
+from pipeline.report.page.inline import inline_svg
+from pipeline.report.page.skipped import origins, skipped, struck
+
+_TEMPLATES = Path(__file__).parent / "templates"
+
+
+def write_page(dataset: xr.Dataset, path: Path) -> Path:
+    """Write the report of ``dataset`` to ``path``, in place of an earlier one only once it is whole."""
+    text = render(dataset, path.stem)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        temporary.write_text(text, encoding="utf-8")
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return path
+
+
+def render(dataset: xr.Dataset, name: str) -> str:
+    """Return the report of ``dataset`` as HTML; ``name`` is the study's, for files and commands."""
+    dataset = complete(dataset)
+    script = (_TEMPLATES / "page.js").read_text(encoding="utf-8")
+    study = str(dataset.attrs.get("study", ""))
+    table = case_table(dataset)
+    environment = Environment(
+        loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
+    return environment.get_template("page.html.j2").render(
+        title=dataset.attrs.get("title", name), name=name, style=(_TEMPLATES / "page.css").read_text(encoding="utf-8"),
+        script=script, script_hash=b64encode(sha256(script.encode()).digest()).decode(),
+        facts=facts(dataset), failures=failures(dataset), without_exact=without_exact(dataset),
+        figures=_figures(dataset), guide=guide_section(dataset), table=table, first_rows=FIRST_ROWS,
+        struck=struck(dataset), origins=origins(dataset), skipped=skipped(dataset),
+        study=study, study_link=f"data:text/plain;charset=utf-8,{quote(study)}",
+        provenance=provenance(dataset), commands=reproduce(dataset, name),
+    )  # fmt: skip
+
+
+def _figures(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return the figures that suit the study, as SVG to stand in the page, with what they show."""
+    found = []
+    for kind in choose(dataset):
+        if kind != "nothing":
+            svg, width = inline_svg(figure(dataset, kind, titled=False), kind)
+            caption = (FIGURES[kind].__doc__ or "").strip().rstrip(".")
+            found.append({"kind": kind, "caption": caption, "svg": svg, "width": width})
+    return found

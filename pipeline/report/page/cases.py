@@ -1,0 +1,129 @@
+"""The table of cases: columns in the units people read, rows in the order in which a reader needs them."""
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from markupsafe import Markup
+
+from pipeline.report.words import is_numeric, number, scale, symbol
+
+# Rows in the page before anybody asks for more; the script's number, too.
+FIRST_ROWS = 200
+_STATES = ("failed", "pending", "skipped", "ok")  # the order of the rows
+# name: heading, whether it is shown at first
+_QUANTITIES = {
+    "force": ("F", True), "force_error": ("± F", True), "force_ratio": ("F/F_max", True),
+    "accuracy": ("F/F_exact", True), "force_exact_error": ("± F_exact", False), "speedup": ("speed-up", True),
+    "time_total": ("time", True), "dofs": ("unknowns", False), "cells": ("cells", False),
+    "iterations": ("iterations", False), "time_mesh": ("mesh", False), "time_assemble": ("assembly", False),
+    "time_setup": ("set-up", False), "time_solve": ("solve", False), "time_error": ("error bar", False),
+    "memory": ("memory", False), "max_strain": ("largest strain", False), "energy": ("energy", False),
+    "balance": ("imbalance", False),
+}  # fmt: skip
+_DIGITS = 4
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: ``values`` are numbers (None: none) or, where there are ``words``, the index of a word.
+
+    ``keys`` sort the words of a swept number; ``hint`` is the long name; ``is_first`` columns are shown at first.
+    """
+
+    name: str
+    heading: str
+    values: list[float | int | None]
+    hint: str = ""
+    words: list[str] | None = None
+    keys: list[float] | None = None
+    is_filter: bool = False
+    is_first: bool = True
+
+    def text(self, row: int) -> str:
+        """Return what stands in a row."""
+        value = self.values[row]
+        if self.words is not None:
+            return self.words[int(value or 0)]
+        return "" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+@dataclass(frozen=True)
+class Table:
+    """The table of cases; ``order`` lists the rows with failed ones first."""
+
+    columns: list[Column]
+    order: list[int]
+
+    @property
+    def json(self) -> Markup:
+        """The table as JSON that can stand in a ``<script>`` element."""
+        content = {"columns": [vars(column) for column in self.columns], "order": self.order, "rows": FIRST_ROWS}
+        text = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+        for sign in "<>&\u2028\u2029":
+            text = text.replace(sign, f"\\u{ord(sign):04x}")
+        return Markup(text)
+
+    @property
+    def filters(self) -> list[Column]:
+        """The columns by whose words cases can be chosen."""
+        return [column for column in self.columns if column.is_filter]
+
+
+def case_table(dataset: xr.Dataset) -> Table:
+    """Return the table of the cases of ``dataset``."""
+    dims = [str(dim) for dim in dataset["status"].dims]
+    size = dataset["status"].size
+    states = [str(state) for state in dataset["status"].values.ravel()]
+    numbers = Column("case", "case", list(range(size)), "the number by which `epsmesh explain` knows it")
+    axes = [_axis(dataset, dim, position, dims) for position, dim in enumerate(dims)]
+    quantities = [_quantity(dataset[name].transpose(*dims), name) for name in _QUANTITIES if name in dataset]
+    status = _texts("status", "status", states, "ok, failed, skipped, or pending where not yet run", is_filter=True)
+    origin = _texts("origin", "origin", dataset["origin"].transpose(*dims).values.ravel(), "how F was obtained",
+                    is_filter=True, is_first=False)  # fmt: skip
+    message = _texts("message", "message", dataset["message"].transpose(*dims).values.ravel(), "why there is no force")
+    known = [column for column in quantities if any(value is not None for value in column.values)]
+    told = [column for column in (origin, message) if any(column.words or ())]
+    rank = {state: position for position, state in enumerate(_STATES)}
+    order = sorted(range(size), key=lambda row: rank.get(states[row], 0))
+    return Table([numbers, status, *axes, *known, *told], order)
+
+
+def _axis(dataset: xr.Dataset, dim: str, position: int, dims: list[str]) -> Column:
+    coordinate = dataset[dim]
+    codes = np.indices([dataset.sizes[d] for d in dims])[position].ravel()
+    values = coordinate.values
+    keys = [min(float(value), 1e300) for value in values] if is_numeric(coordinate) else None
+    hint = str(coordinate.attrs.get("long_name", dim))
+    words = [number(coordinate, value) for value in values]
+    return Column(dim, symbol(coordinate), codes.tolist(), hint, words, keys, is_filter=True)
+
+
+def _quantity(array: xr.DataArray, name: str) -> Column:
+    heading, is_first = _QUANTITIES[name]
+    factor, unit = scale(array)
+    hint = str(array.attrs.get("long_name", name))
+    if np.issubdtype(array.dtype, np.integer):
+        values: list[Any] = [int(value) if value >= 0 else None for value in array.values.ravel()]
+    else:
+        flat = array.values.ravel()
+        values = [_rounded(value, name, factor) if np.isfinite(value) else None for value in flat]
+    return Column(name, f"{heading} ({unit})" if unit else heading, values, hint, is_first=is_first)
+
+
+def _rounded(value: float, name: str, factor: float) -> float | int:
+    if name in ("dofs", "cells", "iterations"):
+        return int(value)
+    # Ratios near 1 are told apart by what they differ from it.
+    return float(f"{value * factor:.{_DIGITS + 2 if name in ('force_ratio', 'accuracy') else _DIGITS}g}")
+
+
+def _texts(
+    name: str, heading: str, values: Any, hint: str, *, is_filter: bool = False, is_first: bool = True
+) -> Column:
+    texts = [str(value) for value in values]
+    words = list(dict.fromkeys(texts))
+    codes = {word: code for code, word in enumerate(words)}
+    return Column(name, heading, [codes[text] for text in texts], hint, words, is_filter=is_filter, is_first=is_first)

@@ -1,0 +1,104 @@
+"""What a report says first: how many cases, what failed, where it was computed, how to run it again."""
+
+from collections import defaultdict
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from pipeline.report.words import choices
+
+# Cases that a message names; the table shows all of them.
+_MOST_NAMED = 5
+_STATES = {"ok": "with a force", "failed": "failed", "skipped": "skipped", "pending": "not yet run"}
+
+
+def facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
+    """Return the headlines of a study: name and value."""
+    counts = {word: int((dataset["status"] == state).sum()) for state, word in _STATES.items()}
+    found = [("cases", f"{dataset['status'].size}"), *((word, f"{count}") for word, count in counts.items() if count)]
+    force = dataset["force"].values * 1e3
+    if np.isfinite(force).any():
+        low, high = np.nanmin(force), np.nanmax(force)
+        found.append(("force", f"{low:.3g} mN" if high - low < 5e-4 * high else f"{low:.3g} to {high:.3g} mN"))
+    for name, text, scale, unit in (("force_error", "largest error bar", 100, " %"),
+                                    ("balance", "worst imbalance", 1, ""),
+                                    ("speedup", "largest speed-up", 1, " ×")):  # fmt: skip
+        values = dataset[name].values * scale if name in dataset else np.array([np.nan])
+        if np.isfinite(values).any() and not (name == "speedup" and np.nanmax(values) == 1):
+            found.append((text, f"{np.nanmax(values):.2g}{unit}"))
+    if taken := _taken(dataset):
+        found.append(("run", taken))
+    return found
+
+
+def failures(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return the messages of failed cases, the most frequent first, with some of their cases."""
+    return _by_message(dataset, "failed", "message")
+
+
+def without_exact(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return why scenes have no F_exact, with some of their cases."""
+    return _by_message(dataset, "", "force_exact_message") if "force_exact_message" in dataset else []
+
+
+def by_status(dataset: xr.Dataset, status: str) -> list[dict[str, Any]]:
+    """Return the messages of the cases of a status, with some of their cases."""
+    return _by_message(dataset, status, "message")
+
+
+def provenance(dataset: xr.Dataset) -> list[tuple[str, str]]:
+    """Return with what, where and when the dataset was computed."""
+    attributes = {str(name): str(value) for name, value in dataset.attrs.items() if str(value)}
+    versions = [(name.removeprefix("version_"), v) for name, v in attributes.items() if name.startswith("version_")]
+    for name in ("start", "end"):
+        attributes[name] = attributes.get(name, "").replace("T", " ")
+    known = (("git_commit", "git commit"), ("host", "host"), ("ranks", "ranks"), ("start", "start"), ("end", "end"),
+             ("study_hash", "study hash"))  # fmt: skip
+    return versions + [(text, attributes[name]) for name, text in known if attributes.get(name)]
+
+
+def reproduce(dataset: xr.Dataset, name: str) -> list[str]:
+    """Return the commands that make the dataset and this page again."""
+    commit = str(dataset.attrs.get("git_commit", ""))
+    ranks = str(dataset.attrs.get("ranks", "1"))
+    file = str(dataset.attrs.get("study_file", f"{name}.toml"))
+    lines = []
+    if commit and "," not in commit:
+        changed = "  # and changes that were not committed" if commit.endswith("+") else ""
+        lines.append(f"git checkout {commit.rstrip('+')}{changed}")
+    launcher = f"mpirun -n {ranks} " if ranks.isdigit() and int(ranks) > 1 else ""
+    return [*lines, "make setup", f"{launcher}.venv/bin/epsmesh run {file} --fresh",
+            f".venv/bin/epsmesh report results/{name}.nc"]  # fmt: skip
+
+
+def _by_message(dataset: xr.Dataset, status: str, variable: str) -> list[dict[str, Any]]:
+    dims = [str(dim) for dim in dataset["status"].dims]
+    states, messages = dataset["status"].values, dataset[variable].transpose(*dims).values
+    found: dict[str, list[tuple[int, ...]]] = defaultdict(list)
+    for index in np.ndindex(states.shape):
+        if messages[index] if not status else states[index] == status:
+            found[str(messages[index])].append(index)
+    groups = sorted(found.items(), key=lambda item: -len(item[1]))
+    return [
+        {"message": message or "no message", "count": len(cases), "more": max(0, len(cases) - _MOST_NAMED),
+         "cases": [_name(dataset, dims, index) for index in cases[:_MOST_NAMED]]}
+        for message, cases in groups
+    ]  # fmt: skip
+
+
+def _name(dataset: xr.Dataset, dims: list[str], index: tuple[int, ...]) -> str:
+    return choices(dataset, {dim: dataset[dim].values[i] for dim, i in zip(dims, index, strict=True)}) or "the one case"
+
+
+def _taken(dataset: xr.Dataset) -> str:
+    """Return how long the last run took, '' where it only read back what was stored."""
+    try:
+        start, end = (datetime.fromisoformat(str(dataset.attrs[name])) for name in ("start", "end"))
+    except (KeyError, ValueError):
+        return ""
+    seconds = (end - start).total_seconds()
+    if seconds < 1:
+        return ""
+    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"

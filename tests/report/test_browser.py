@@ -1,0 +1,171 @@
+"""The report in a real browser: sorting, filtering, links, themes, phone, print; nothing loaded, no complaint."""
+
+import os
+
+import pytest
+from mpi4py import MPI
+
+from pipeline.report.page import write_page
+from tests.report.browser import CHROMIUM, Browser
+from tests.report.synthetic import EPSILONS, dataset
+
+pytestmark = [
+    pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts processes itself"),
+    pytest.mark.skipif(CHROMIUM is None and not os.environ.get("CI"), reason="chromium is not installed"),
+]
+NASTY = "a < b & <script>c</script>"
+CELLS = "[...document.querySelectorAll('#table tbody tr')].map(r => [...r.cells].map(c => c.textContent))"
+HEADS = "[...document.querySelectorAll('#table th')].map(h => h.dataset.name)"
+SORTED = "Object.fromEntries([...document.querySelectorAll('#table th')].map(h => [h.dataset.name, h.ariaSort]))"
+SHOWN = "document.getElementById('shown').textContent"
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    with Browser(tmp_path_factory.mktemp("profile")) as found:
+        found.look_like(1280, 900)
+        yield found
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    """The report of 14 cases for each of 20 ν, 280 in all, of which 2 failed and 2 were not run."""
+    data = dataset(
+        failed=2, pending=2, material={"poisson": [round(0.02 * i, 2) for i in range(20)]},
+        mesh={"epsilon": EPSILONS, "outside": ["coarse", "free"]},
+    )  # fmt: skip
+    return write_page(data.assign_attrs(title=NASTY), tmp_path_factory.mktemp("page") / "a.html")
+
+
+def column(browser, name):
+    position = browser.ask(HEADS).index(name)
+    return [row[position] for row in browser.ask(CELLS)]
+
+
+def test_opens_from_a_file_without_complaint_or_request(browser, path):
+    browser.open(path)
+    assert browser.ask("document.title") == NASTY
+    assert browser.ask("document.querySelector('h1').textContent") == NASTY
+    assert browser.ask("document.querySelectorAll('svg').length") >= 3
+    assert column(browser, "status")[:5] == ["failed", "failed", "pending", "pending", "ok"]
+    assert browser.messages == []
+    assert browser.requests == [path.as_uri()]
+
+
+def test_the_page_cannot_load_or_run_anything_else(browser, path):
+    browser.open(path)
+    browser.ask("void (document.body.innerHTML += '<img src=https://example.org/x.png><img src=x onerror=hit=1>')")
+    browser.ask("new Promise(done => setTimeout(done, 200))")
+    assert browser.ask("typeof hit") == "undefined"
+    assert any("Content Security Policy" in message for message in browser.messages)
+
+
+def test_address_sorts(browser, path):
+    browser.open(path, "#sort=force&order=down&columns=all")
+    forces = [float(value) for value in column(browser, "force") if value]
+    assert len(forces) > 150
+    assert forces == sorted(forces, reverse=True)
+    assert browser.ask(SORTED)["force"] == "descending"
+    assert {*browser.ask(SORTED).values()} == {"descending", "none"}
+    assert browser.ask("getComputedStyle(document.querySelector('td.dofs')).display") == "table-cell"
+
+
+def test_swept_numbers_sort_as_numbers_and_full_order_last(browser, path):
+    browser.open(path, "#sort=epsilon&poisson=0.3&outside=free")
+    assert column(browser, "epsilon") == [*EPSILONS[:-1], "full"]
+
+
+def test_address_filters(browser, path):
+    browser.open(path, "#status=ok&epsilon=10%20mm&outside=free")
+    assert {*column(browser, "epsilon")} == {"10 mm"}
+    assert {*column(browser, "outside")} == {"free"}
+    assert browser.ask(SHOWN).startswith(f"Shown: {len(column(browser, 'case'))} matching of 280 cases")
+    assert browser.ask("document.querySelector('select[name=epsilon]').value") == "10 mm"
+
+
+def test_what_the_address_cannot_mean_is_left_out(browser, path):
+    browser.open(path, "#sort=nothing&epsilon=11%20mm&rows=-5&status=ok")
+    assert {*column(browser, "status")} == {"ok"}
+    assert len(column(browser, "case")) == 200
+    assert browser.messages == []
+
+
+def test_text_finds_messages(browser, path):
+    browser.open(path, "#text=WENT%20wrong")
+    assert column(browser, "status") == ["failed", "failed"]
+    browser.open(path, "#text=no+such+thing")
+    assert browser.ask(CELLS) == []
+    assert browser.ask(SHOWN).startswith("Shown: 0 matching of 280 cases")
+
+
+def test_hands_sort_filter_and_clear(browser, path):
+    browser.open(path)
+    browser.ask("document.querySelector('th[data-name=poisson] button').click()")
+    assert column(browser, "poisson")[0] == "0"
+    browser.ask("document.querySelector('th[data-name=poisson] button').click()")
+    assert column(browser, "poisson")[0] == "0.38"
+    choose = "e => { e.value = 'free'; e.dispatchEvent(new Event('input', {bubbles: true})); }"
+    browser.ask(f"({choose})(document.querySelector('select[name=outside]'))")
+    assert {*column(browser, "outside")} == {"free"}
+    assert browser.ask("location.hash") == "#outside=free&sort=poisson&order=down"
+    browser.ask("document.querySelector('button[type=reset]').click()")
+    assert browser.ask(SHOWN) == "Shown: the first 200 of 280 cases, failed ones first."
+    assert browser.ask(SORTED)["poisson"] == "none"
+
+
+def test_links_of_failures_show_them(browser, path):
+    browser.open(path)
+    browser.ask("document.querySelector('#failures a').click()")
+    browser.ask("new Promise(done => setTimeout(done, 100))")
+    assert column(browser, "status") == ["failed", "failed"]
+
+
+def test_large_studies_show_a_part_and_more_when_asked(browser, path):
+    browser.open(path)
+    assert len(browser.ask(CELLS)) == 200
+    browser.ask("document.getElementById('further').click()")
+    assert len(browser.ask(CELLS)) == 280
+    assert browser.ask(SHOWN) == "Shown: 280 cases, failed ones first."
+    assert browser.ask("document.getElementById('further').offsetParent") is None
+
+
+@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize("width", [375, 1280])
+def test_fits_the_screen_with_enough_contrast(browser, path, width, dark):
+    browser.look_like(width, 800, dark=dark)
+    browser.open(path)
+    assert browser.ask("document.documentElement.scrollWidth") <= width
+    colours = "[...document.querySelectorAll(SELECTOR)].map(e => getComputedStyle(e).color)"
+    ground = luminance(browser.ask("getComputedStyle(document.body).backgroundColor"))
+    assert (ground < 0.1) == dark
+    for selector in ("p", "td", "tr.failed td", "tr.pending td", "figcaption", "dt", "a"):
+        for colour in {*browser.ask(colours.replace("SELECTOR", f"'{selector}'"))}:
+            assert contrast(luminance(colour), ground) >= 4.5, (selector, colour)
+    strokes = "[...document.querySelectorAll('svg path[style*=\"--curve\"]')].map(e => getComputedStyle(e).stroke)"
+    found = {*browser.ask(strokes)} - {"none"}
+    assert len(found) >= 6
+    for colour in found:
+        assert contrast(luminance(colour), ground) >= 3, colour
+    browser.look_like(1280, 900)
+
+
+def test_prints(browser, path):
+    browser.look_like(1280, 900, dark=True)
+    browser.open(path, "#status=failed")
+    assert browser.pdf().startswith(b"%PDF")
+    browser.call("Emulation.setEmulatedMedia", media="print", features=[])
+    assert browser.ask("getComputedStyle(document.querySelector('#cases .wide')).maxHeight") == "none"
+    assert browser.ask("getComputedStyle(document.querySelector('.filters')).display") == "none"
+    assert luminance(browser.ask("getComputedStyle(document.body).backgroundColor")) == 1
+    browser.look_like(1280, 900)
+
+
+def luminance(colour):
+    """Return the relative luminance of ``rgb(r, g, b)``."""
+    parts = [int(part) / 255 for part in colour[colour.index("(") + 1 : -1].split(",")[:3]]
+    linear = [p / 12.92 if p <= 0.03928 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
+    return sum(weight * part for weight, part in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
+
+
+def contrast(one, other):
+    return (max(one, other) + 0.05) / (min(one, other) + 0.05)

@@ -1,0 +1,216 @@
+"""The report's page: what it holds, that text stays text, that it needs nothing else."""
+
+import re
+import subprocess
+import sys
+import tomllib
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from pipeline.cli import app
+from pipeline.report import page
+from pipeline.report.dataset import write
+from pipeline.report.guide import guide
+from pipeline.report.page import render, write_page
+from pipeline.report.page.cases import case_table
+from pipeline.report.page.guideline import ACCURACY, Section, guide_section
+from pipeline.report.page.skipped import struck
+from tests.report import known
+from tests.report.synthetic import dataset
+
+NASTY = """</script><script>alert(1)</script><b onclick="x">&amp; "quoted" 'text' \u2028"""
+SWEEP = {
+    "material": {"poisson": [0.3, 0.4]},
+    "mesh": {"epsilon": ["4 mm", "10 mm", "full"], "outside": ["coarse", "free"]},
+}
+# Attributes through which a page loads something.
+_LOADS = {"src", "srcset", "action", "formaction", "poster", "background", "ping", "cite", "data"}
+
+
+class Reader(HTMLParser):
+    """Collects tags with their attributes, and the texts."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.texts, self.ids = [], [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+        self.ids += [value for name, value in attributes if name == "id"]
+
+    def handle_data(self, data):
+        self.texts.append(data)
+
+
+def command(*arguments):
+    return CliRunner().invoke(app, [*map(str, arguments)])
+
+
+def small(**attributes):
+    return dataset(failed=2, pending=1, **SWEEP).assign_attrs(attributes)
+
+
+@pytest.fixture(scope="module")
+def nasty():
+    data = small(title=NASTY, study=f'title = """{NASTY}"""', host=NASTY, reductions="not JSON")
+    data["message"] = data["message"].where(data["message"] != "it went wrong", NASTY)
+    return render(data, "<name>")
+
+
+def test_what_comes_from_the_study_stays_text(nasty):
+    read = Reader(nasty)
+    scripts = [attributes for tag, attributes in read.tags if tag == "script"]
+    assert scripts == [{"type": "application/json", "id": "data"}, {}]
+    assert not any(name.startswith("on") for _, attributes in read.tags for name in attributes)
+    assert not any(tag == "b" for tag, _ in read.tags)
+    text = "".join(read.texts)
+    assert text.count(NASTY) >= 4  # heading, title, failure, study
+
+
+def test_page_needs_nothing_else(nasty):
+    read = Reader(nasty)
+    assert not any(tag in ("link", "img", "iframe", "object", "embed", "video", "audio") for tag, _ in read.tags)
+    for tag, attributes in read.tags:
+        assert not _LOADS & set(attributes), (tag, attributes)
+        assert all(attributes.get(key, "#").startswith(("#", "data:text/plain")) for key in ("href", "xlink:href"))
+    assert not re.findall(r"@import|url\((?!#)", nasty)
+    assert any("default-src 'none'" in attributes.get("content", "") for _, attributes in read.tags)
+
+
+def test_names_in_the_page_are_unique(nasty):
+    ids = Reader(nasty).ids
+    assert len(ids) == len(set(ids))
+
+
+def test_failures_come_first_and_say_why():
+    data = small()
+    table = case_table(data)
+    states = [data["status"].values.ravel()[row] for row in table.order]
+    count = states.count("failed")
+    assert count >= 2
+    assert set(states[:count]) == {"failed"}
+    assert sorted(table.order) == list(range(data["status"].size))
+    text = render(data, "small")
+    assert text.index("it went wrong") < text.index("<svg") < text.index('id="table"')
+
+
+def test_table_says_what_the_dataset_says():
+    data = small()
+    columns = {column.name: column for column in case_table(data).columns}
+    row = int(np.ravel_multi_index((1, 1, 1), data["status"].shape))
+    case = data.isel(poisson=1, epsilon=1, outside=1)
+    shown = {name: column.text(row) for name, column in columns.items()}
+    assert (shown["epsilon"], shown["poisson"], shown["outside"]) == ("10 mm", "0.4", "free")
+    assert float(shown["force"]) == pytest.approx(1e3 * float(case["force"]), rel=1e-3)
+    assert float(shown["force_error"]) == pytest.approx(1)  # %
+    assert shown["dofs"] == "1000"
+    assert "accuracy" not in columns  # no F_exact was asked for
+    assert columns["epsilon"].words[-1] == "full"
+    assert columns["epsilon"].keys[-1] == max(columns["epsilon"].keys)
+
+
+def test_a_written_dataset_gives_the_same_table(tmp_path):
+    import xarray as xr
+
+    data = small()
+    write(data, tmp_path / "small.nc")
+    assert case_table(xr.load_dataset(tmp_path / "small.nc")).json == case_table(data).json
+
+
+def test_what_was_struck_out_is_told_for_earlier_datasets_too():
+    text = """
+[body]
+shape = "box"
+size = ["20 mm", "20 mm", "10 mm"]
+[material]
+young = ["10 kPa", "20 kPa", "30 kPa"]
+poisson = 0.3
+[probe]
+shape = "disc"
+radius = "2 mm"
+depth = "0.1 mm"
+[mesh]
+epsilon = "full"
+fine = "2 mm"
+coarse = "4 mm"
+"""
+    assert tomllib.loads(text)
+    data = small(study=text)
+    del data.attrs["reductions"]
+    found = {item["name"]: item for item in struck(data)}
+    assert found["scaling"]["count"] == 2
+    assert "proportional" in found["scaling"]["reason"]
+    assert struck(small(study="not a study", reductions="")) == []
+
+
+def test_a_guide_stands_in_the_page_where_there_is_one(monkeypatch):
+    section = Section(("Smallest ε: <10 mm",), ({"ε": "10 mm", "error": "< 5 %"}, {"ε": "20 mm", "error": "1 %"}))
+    monkeypatch.setattr(page, "guide_section", lambda _: section)
+    text = render(small(), "small")
+    assert re.search(r'<section id="guide">.*Smallest ε: &lt;10 mm.*<td>&lt; 5 %</td>', text, re.DOTALL)
+    monkeypatch.setattr(page, "guide_section", lambda _: None)
+    assert 'id="guide"' not in render(small(), "small")
+
+
+def test_the_guide_of_the_page_is_that_of_the_command():
+    assert guide_section(small()) is None  # F_exact is not known
+    section, found = guide_section(known.dataset()), guide(known.dataset(), ACCURACY)
+    assert section is not None
+    assert len(section.rows) == len(found.verdicts)
+    assert section.lines[0] in str(found)
+
+
+@pytest.mark.parametrize("study", [{}, {"failed": 99}, {"mesh": {"outside": ["coarse", "free"], "epsilon": "8 mm"}}])
+def test_every_study_gets_a_page(study, tmp_path):
+    path = write_page(dataset(**study), tmp_path / "deep" / "a.html")
+    assert 'id="table"' in path.read_text()
+    assert [p.name for p in path.parent.iterdir()] == ["a.html"]
+
+
+def test_report_is_made_without_the_solver(tmp_path):
+    """It answers at once: no dolfinx, gmsh, PETSc or MPI is loaded."""
+    write(small(study="title = 'x'"), tmp_path / "small.nc")
+    code = (
+        "import sys; from pathlib import Path; from pipeline.cli.report import report;"
+        f"report(Path({str(tmp_path / 'small.nc')!r}));"
+        "assert not {'dolfinx', 'gmsh', 'petsc4py', 'mpi4py'} & set(sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == str(tmp_path / "small.html")
+    assert "it went wrong" in (tmp_path / "small.html").read_text()
+
+
+def test_commands_take_a_study_file(tmp_path):
+    write(dataset().assign_attrs(study="title = 'x'"), tmp_path / "small.nc")
+    study = tmp_path / "small.toml"
+    study.write_text("title = 'y'")
+    done = command("report", study, "--output", tmp_path)
+    assert (done.exit_code, done.stdout.strip()) == (0, str(tmp_path / "small.html"))
+    assert "has changed since" in done.stderr
+    done = command("plot", study, "--output", tmp_path)
+    assert done.stdout.split() == [str(tmp_path / f"small.{suffix}") for suffix in ("png", "svg")]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["report", "none.nc"], "no such dataset; make it with `epsmesh run none.toml`"),
+        (["report", "pyproject.toml", "--output", "/nowhere"], "no such dataset"),
+        (["report", "{bad}"], "cannot be read as netCDF"),
+        (["plot", "{other}"], "not a study's dataset: it has no force"),
+        (["plot", "{good}", "--kind", "pie"], "no figure is called so; there are epsilon"),
+        (["plot", "{good}", "--kind", "exact"], "needs a swept quantity, and F_exact"),
+    ],
+)
+def test_bad_input_is_told(arguments, words, tmp_path):
+    files = {name: tmp_path / f"{name}.nc" for name in ("bad", "other", "good")}
+    files["bad"].write_text("not netCDF")
+    write(small()[["energy"]], files["other"])
+    write(small(), files["good"])
+    done = command(*(argument.format(**files) for argument in arguments))
+    assert done.exit_code == 2
+    assert words in done.stderr
