@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import typer
 
-from pipeline.cli import checks, plan, store, study
+from pipeline.cli import checks, merge, plan, store, study
 
 app = typer.Typer(
     help="How fine must a mesh be, and where, for the reaction force of a surgical tool?",
@@ -14,7 +14,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 _COMMANDS: tuple[Callable[..., None], ...] = (
-    study.validate, plan.plan, study.run, study.status, plan.explain, study.plot,
+    study.validate, plan.plan, study.run, merge.merge, study.status, plan.explain, study.plot,
     checks.verify, checks.stress, checks.benchmark, study.version,
 )  # fmt: skip
 for _command in _COMMANDS:

@@ -21,6 +21,7 @@ from pipeline.cli.words import (
     Without,
     axes_of,
     check_names,
+    check_shard,
     error,
     fail,
     load_all,
@@ -28,6 +29,7 @@ from pipeline.cli.words import (
     warn,
 )
 from pipeline.plan.plan import Plan, make_plan
+from pipeline.plan.shard import Shard
 from pipeline.study.load import load
 from pipeline.study.problems import StudyError
 
@@ -69,17 +71,25 @@ def run(
     meshes: Annotated[Path, typer.Option(help="Folder of the meshes that are kept.")] = Path("meshes/cache"),
     fresh: Annotated[bool, typer.Option("--fresh", help="Compute again what is stored.")] = False,
     without: Without = None,
+    shard: Annotated[
+        str | None,
+        typer.Option(metavar="I/N", help="Do part I of N only, for `epsmesh merge`; kept in OUTPUT/shards."),
+    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
     """Run studies: forces, timings, dataset and figure. Under mpirun, on all ranks.
 
-    Cases that are stored already are read back, so an interrupted run goes on where it was.
+    Cases that are stored already are read back, so an interrupted run goes on where it was. With --shard I/N no dataset
+    is written: N such runs, which need not know of each other, do the study, and `epsmesh merge` brings them together.
 
     Example: epsmesh run studies/figure3.toml
 
     Example: mpirun -n 4 epsmesh run studies/figure3.toml
+
+    Example: epsmesh run studies/figure3.toml --shard 3/8
     """
     studies, left_out = load_all(files), check_names(without)
+    part = check_shard(shard, studies)
     from mpi4py import MPI
 
     from pipeline import workflow
@@ -89,8 +99,17 @@ def run(
     speaks = comm.rank == 0
     for study in studies:
         try:
+            main = output / "cases.sqlite"
+            path = store or (part.store(output, study) if part else main)
             plan, opened = workflow.prepare(
-                study, comm, store or output / "cases.sqlite", fresh=fresh, without=left_out, meshes=meshes
+                study,
+                comm,
+                path,
+                fresh=fresh,
+                without=left_out,
+                meshes=meshes,
+                shard=part,
+                beside=main if part else None,
             )
             if speaks:
                 _announce(plan, opened, quiet)
@@ -99,7 +118,7 @@ def run(
         except StoreError as wrong:
             fail(str(wrong))
         if speaks:
-            _conclude(plan, outcome, quiet)
+            _conclude(plan, outcome, part, path, quiet)
         if outcome.interrupted:
             workflow.end_ranks(comm, INTERRUPTED)
             raise typer.Exit(INTERRUPTED)
@@ -183,15 +202,21 @@ def _announce(plan: Plan, opened: "Opened", quiet: bool) -> None:
         print(f"  to do: {len(plan.meshes)} meshes, {len(plan.solves)} solves", flush=True)
 
 
-def _conclude(plan: Plan, outcome: "Outcome", quiet: bool) -> None:
+def _conclude(plan: Plan, outcome: "Outcome", shard: Shard | None, store: Path, quiet: bool) -> None:
     """Say, after the run, what came of it and where it is."""
     study = plan.study
     for case, message in outcome.failures:
         error(f"failed: {case}: {message}")
+    name = f"{study.file}, shard {shard}" if shard else study.file
     if not quiet:
         counts = ", ".join(f"{count} {state}" for state, count in outcome.counts.items() if count)
-        print(f"{study.file}: {counts}; wrote {', '.join(map(str, outcome.files))}", flush=True)
+        where = f"in {store}; when all shards are done: `epsmesh merge {study.file}`"
+        wrote = where if shard else f"wrote {', '.join(map(str, outcome.files))}"
+        # A shard may hold F_exact and no case, or nothing where there are fewer steps than shards.
+        idle = "F_exact" if plan.part else "nothing to do"
+        print(f"{name}: {counts or idle}; {wrote}", flush=True)
     if outcome.interrupted:
-        done = len(plan.keys) - outcome.counts["pending"]
-        again = f"`epsmesh run {study.file}` goes on from there"
-        error(f"interrupted: {done} of {len(plan.keys)} cases are on record; {again}")
+        cases = sum(outcome.counts.values())
+        done = cases - outcome.counts["pending"]
+        again = f"`epsmesh run {study.file}{f' --shard {shard}' if shard else ''}` goes on from there"
+        error(f"interrupted: {done} of {cases} cases are on record; {again}")
