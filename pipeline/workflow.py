@@ -64,8 +64,8 @@ def prepare(
     """Open the case store and plan, on every rank alike, what is not on record; collective.
 
     ``fresh`` computes again what is stored; a timing study always does, but for F_exact. ``without`` names reductions
-    that are not to be used. A ``shard`` plans its own part only; the store ``beside`` its own is read, never
-    written.
+    that are not to be used. A ``shard`` plans its own part only, and reads, but never writes, the store ``beside``
+    its own, too.
 
     Raises:
         StoreError: on every rank, if the store cannot be used.
@@ -80,7 +80,8 @@ def prepare(
                 wanted = {*keys, *declared.reference_keys}
                 found = opened.store.get(wanted)
                 opened.records = {key: record for key, record in found.items() if record.status == "ok"}
-                opened.records = _known_beside(beside, wanted) | opened.records
+                if shard is not None:
+                    opened.records = _known_beside(beside, wanted) | opened.records
         except StoreError as error:
             message = str(error)
     message, stored = comm.bcast((message, sorted(opened.records)))
