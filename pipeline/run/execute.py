@@ -7,7 +7,6 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 
-import psutil
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
@@ -19,7 +18,7 @@ from pipeline.plan.steps import MeshStep, OperatorStep, Solve, mesh_steps
 from pipeline.plan.symmetry import model_planes
 from pipeline.run.compile import prepare
 from pipeline.run.measure import TIMES, add_times, record_of, record_of_meridian
-from pipeline.run.memory import PeakMemory
+from pipeline.run.memory import PeakMemory, available_memory
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import meridian_of, mesh_case, on_first_rank
 from pipeline.run.progress import Progress, Silent
@@ -221,7 +220,7 @@ class _Runner:
 
     def _lacks_memory(self, needed: float, what: str) -> str:
         """Return what to say if ``needed`` bytes are too much, the same on every rank; collective."""
-        available = self.comm.bcast(psutil.virtual_memory().available if self.comm.rank == 0 else None)
+        available = available_memory(self.comm)
         if needed <= _MEMORY_SHARE * available:
             return ""
         return f"{what} needs about {needed / 1e9:.1f} GB of memory, {available / 1e9:.1f} GB are available"
