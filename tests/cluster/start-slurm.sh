@@ -60,6 +60,7 @@ MpiDefault=none
 ReturnToService=2
 SlurmdTimeout=60
 KillWait=5
+MinJobAge=3600
 SchedulerParameters=batch_sched_delay=0,sched_interval=2,bf_interval=2
 $(for i in "${!names[@]}"; do
     echo "NodeName=${names[i]} NodeHostname=$host NodeAddr=127.0.0.1 Port=${ports[i + 1]} CPUs=$cpus RealMemory=16000 State=UNKNOWN"
