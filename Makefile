@@ -16,7 +16,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's own mpirun: another one on PATH would not fit Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies test test-debian13 verify benchmark stress soak lint format clean
+.PHONY: help setup study studies test test-debian13 slurm-test verify benchmark stress soak lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -42,6 +42,9 @@ test: ## run the tests, serial and on 2 ranks
 
 test-debian13: ## run the tests on Debian 13, in a root of its own (needs root)
 	@scripts/test-debian13.sh
+
+slurm-test: setup ## run the job scripts on a Slurm of two virtual nodes, installed and started here (needs root)
+	$(PYTHON) -m pytest -m slurm $(PYTEST_ARGS) </dev/null
 
 verify: setup ## forces against closed forms, tables and the program's other paths
 	$(EPSMESH) verify

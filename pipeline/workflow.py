@@ -14,11 +14,13 @@ from mpi4py import MPI
 
 from pipeline.plan.cost import CostModel
 from pipeline.plan.plan import Plan, make_plan
-from pipeline.report.dataset import build, write
+from pipeline.plan.shard import Shard
+from pipeline.report.publish import publish
+from pipeline.run.merge import read
+from pipeline.run.outcome import count_states, failures
 from pipeline.run.progress import Silent, Terminal
 from pipeline.run.record import Record
 from pipeline.run.store import Store, StoreError
-from pipeline.stages import stage
 from pipeline.study.sweep import Study
 
 # Seconds that the first rank has, when a parallel run is interrupted, to write what is finished.
@@ -62,11 +64,14 @@ def prepare(
     fresh: bool = False,
     without: Collection[str] = (),
     meshes: Path | None = None,
+    shard: Shard | None = None,
+    beside: Path | None = None,
 ) -> tuple[Plan, Opened]:
     """Open the case store and plan, on every rank alike, what is not on record; collective.
 
     ``fresh`` computes again what is stored; a timing study always does, but for F_exact. ``without`` names reductions
-    that are not to be used.
+    that are not to be used. A ``shard`` plans its own part only, and reads, but never writes, the store ``beside``
+    its own, too.
 
     Raises:
         StoreError: on every rank, if the store cannot be used.
@@ -77,20 +82,23 @@ def prepare(
             opened.store = Store(store_path)
             cost = opened.store.cost_model()
             if not fresh:
-                declared = make_plan(study, without=without)
+                declared = make_plan(study, without=without, shard=shard)
                 keys = () if study.solve.timing else declared.keys
-                found = opened.store.get({*keys, *declared.reference_keys})
+                wanted = {*keys, *declared.reference_keys}
+                found = opened.store.get(wanted)
                 opened.records = {key: record for key, record in found.items() if record.status == "ok"}
+                if shard is not None:
+                    opened.records = _known_beside(beside, wanted) | opened.records
         except StoreError as error:
             message = str(error)
     message, stored, cost = comm.bcast((message, sorted(opened.records), cost))
     if message:
         raise StoreError(message)
-    return replace(make_plan(study, stored, without), cost=cost), opened
+    return replace(make_plan(study, stored, without, shard), cost=cost), opened
 
 
 def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Terminal | None = None) -> Outcome:
-    """Carry out ``plan`` and write ``<study>.nc`` and its figure into ``output``; collective.
+    """Carry out ``plan`` and write ``<study>.nc`` and its figure into ``output``, unless it is a shard's; collective.
 
     Ctrl-C, and the request to end that mpirun or a batch system sends, end it with what is finished written.
     """
@@ -106,24 +114,12 @@ def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Term
     files: tuple[Path, ...] = ()
     if opened.store is not None:
         opened.store.close()
-        files = _write(plan, opened.records, {"start": start, "end": _now()}, output)
-    states = [opened.records[key].status if key in opened.records else "pending" for key in plan.keys]
-    counts = {state: states.count(state) for state in ("ok", "skipped", "failed", "pending")}
+        if plan.part is None:
+            files = publish(plan, opened.records, {"start": start, "end": _now()}, output)
+    counts = count_states(plan, opened.records)
     if not interrupted:
         counts = comm.bcast(counts)
-    cases = zip(plan.keys, plan.study.cases(), strict=True)
-    failures = tuple(
-        (str(case), opened.records[key].message)
-        for key, case in cases
-        if key in opened.records and opened.records[key].status == "failed"
-    )
-    return Outcome(counts, failures + _without_exact(plan, opened.records), files, interrupted)
-
-
-def _without_exact(plan: Plan, records: dict[str, Record]) -> tuple[tuple[str, str], ...]:
-    """Return the scenes whose F_exact could not be found, and why: their cases are none the worse for it."""
-    failed = {key: records[key].message for key in plan.reference_keys if key in records and not records[key].is_ok}
-    return tuple((f"F_exact ({key[:6]})", message) for key, message in failed.items())
+    return Outcome(counts, failures(plan, opened.records), files, interrupted)
 
 
 def end_ranks(comm: MPI.Comm, status: int) -> None:
@@ -167,16 +163,6 @@ def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | No
         execute(plan, comm, keep, progress or Silent(), opened.records, cache)
 
 
-@stage("dataset, figure")
-def _write(plan: Plan, records: dict[str, Record], attributes: dict[str, str], output: Path) -> tuple[Path, ...]:
-    from pipeline.report.figures import draw  # noqa: PLC0415 (matplotlib is slow to load, and wanted last)
-
-    path = output / f"{plan.study.name}.nc"
-    dataset = build(plan, records, attributes)
-    write(dataset, path)
-    return (path, *draw(dataset, path.with_suffix("")))
-
-
 @contextmanager
 def _interruptible() -> Iterator[list[int]]:
     """Turn the signals that ask the program to end into KeyboardInterrupt; yield the list of those received.
@@ -195,6 +181,16 @@ def _interruptible() -> Iterator[list[int]]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _known_beside(path: Path | None, keys: Collection[str]) -> dict[str, Record]:
+    """Return the forces on record in another store; without a readable one the work is done again, no more."""
+    try:
+        rows = read(path) if path and path.exists() else []
+        records = (Record.from_json(text) for key, text, _ in rows if key in keys)
+        return {record.key: record for record in records if record.is_ok}
+    except (StoreError, ValueError, TypeError, KeyError):
+        return {}
 
 
 def _now() -> str:

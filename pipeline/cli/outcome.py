@@ -7,6 +7,7 @@ from pipeline import stages
 from pipeline.cli.console import error
 from pipeline.cli.words import axes_of, warn
 from pipeline.plan.plan import Plan
+from pipeline.plan.shard import Shard
 from pipeline.run.remaining import format_seconds
 
 if TYPE_CHECKING:
@@ -53,7 +54,9 @@ def as_data(plan: Plan, opened: "Opened", outcome: "Outcome", seconds: float) ->
     }
 
 
-def conclude(plan: Plan, opened: "Opened", outcome: "Outcome", seconds: float, *, quiet: bool) -> None:
+def conclude(
+    plan: Plan, opened: "Opened", outcome: "Outcome", seconds: float, shard: Shard | None, *, quiet: bool
+) -> None:
     """Say, after the run, what came of it and where it is."""
     for case, message in outcome.failures[:_MOST_FAILURES]:
         error(f"failed: {case}: {message}")
@@ -61,11 +64,12 @@ def conclude(plan: Plan, opened: "Opened", outcome: "Outcome", seconds: float, *
     if len(outcome.failures) > _MOST_FAILURES:
         error(f"… and {len(outcome.failures) - _MOST_FAILURES} more: `epsmesh status {study.file}` lists them")
     if not quiet:
-        print(_line(plan, opened, outcome, seconds), flush=True)
+        print(_line(plan, opened, outcome, seconds, shard), flush=True)
     if outcome.interrupted:
-        done = len(plan.keys) - outcome.counts["pending"]
-        again = f"`epsmesh run {study.file}` goes on from there"
-        error(f"interrupted: {done} of {len(plan.keys)} cases are on record; {again}")
+        cases = sum(outcome.counts.values())
+        done = cases - outcome.counts["pending"]
+        again = f"`epsmesh run {study.file}{f' --shard {shard}' if shard else ''}` goes on from there"
+        error(f"interrupted: {done} of {cases} cases are on record; {again}")
 
 
 def print_stages() -> None:
@@ -74,7 +78,7 @@ def print_stages() -> None:
         print(f"{seconds:10.2f} s  {100 * share:5.1f} %  {name}")
 
 
-def _line(plan: Plan, opened: "Opened", outcome: "Outcome", seconds: float) -> str:
+def _line(plan: Plan, opened: "Opened", outcome: "Outcome", seconds: float, shard: Shard | None) -> str:
     """Return one line: cases done, failed, skipped and why, where the files are, and how long it took."""
     counts = []
     for state, count in outcome.counts.items():
@@ -86,8 +90,13 @@ def _line(plan: Plan, opened: "Opened", outcome: "Outcome", seconds: float) -> s
         counts.append(f"{count} {state}{f' ({why}{more})' if why and state in ('failed', 'skipped') else ''}")
     stored = sum(key in plan.stored for key in plan.keys)
     read_back = f" ({stored} read back)" if stored else ""
-    files = ", ".join(map(str, outcome.files))
     found = ", ".join(counts)
+    if shard:
+        # A shard may hold F_exact and no case, or nothing where there are fewer steps than shards.
+        found = found if sum(outcome.counts.values()) else "F_exact" if plan.part else "nothing to do"
+        where = f"kept for `epsmesh merge {plan.study.file}`, when all shards are done"
+        return f"{plan.study.file}, shard {shard}: {found}{read_back}; {where}; {format_seconds(seconds)}"
+    files = ", ".join(map(str, outcome.files))
     return f"{plan.study.file}: {found}{read_back}; wrote {files}; {format_seconds(seconds)}"
 
 

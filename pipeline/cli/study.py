@@ -26,6 +26,7 @@ from pipeline.cli.words import (
     Without,
     axes_of,
     check_names,
+    check_shard,
     check_store,
     fail,
     load_all,
@@ -73,6 +74,10 @@ def run(
     meshes: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the meshes that are kept.")] = DEFAULT_MESHES,
     fresh: Annotated[bool, typer.Option("--fresh", help="Compute again what is stored.")] = False,
     without: Without = None,
+    shard: Annotated[
+        str | None,
+        typer.Option(metavar="I/N", help="Do part I of N only, for `epsmesh merge`; kept in OUTPUT/shards."),
+    ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
     as_json: Json = False,
@@ -83,13 +88,19 @@ def run(
     Cases that are stored already are read back, so an interrupted run goes on where it was. With --json standard
     output holds one object, at the end; progress goes to standard error.
 
+    With --shard I/N no dataset is written: N such runs, which need not know of each other, do the study, and
+    `epsmesh merge` brings them together.
+
     Example: epsmesh run studies/figure3.toml
 
     Example: mpirun -n 4 epsmesh run studies/figure3.toml
+
+    Example: epsmesh run studies/figure3.toml --shard 3/8
     """
     studies, left_out = load_all(files), check_names(without)
     if store:
         check_store(store)
+    part = check_shard(shard, studies)
     from pipeline import workflow
     from pipeline.run.store import StoreError
 
@@ -98,8 +109,17 @@ def run(
     for study in studies:
         start = time.monotonic()
         try:
+            main = output / "cases.sqlite"
+            path = store or (part.store(output, study) if part else main)
             plan, opened = workflow.prepare(
-                study, comm, store or output / "cases.sqlite", fresh=fresh, without=left_out, meshes=meshes
+                study,
+                comm,
+                path,
+                fresh=fresh,
+                without=left_out,
+                meshes=meshes,
+                shard=part,
+                beside=main if part else None,
             )
             if speaks:
                 announce(plan, opened, quiet=quiet or as_json, verbose=verbose)
@@ -110,7 +130,7 @@ def run(
             fail(str(wrong))
         if speaks:
             seconds = time.monotonic() - start
-            conclude(plan, opened, outcome, seconds, quiet=quiet or as_json)
+            conclude(plan, opened, outcome, seconds, part, quiet=quiet or as_json)
             found.append(as_data(plan, opened, outcome, seconds))
         failed = failed or outcome.counts["failed"] > 0
         if outcome.interrupted:

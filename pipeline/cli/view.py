@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from pipeline.cli.console import error
 from pipeline.cli.plan import find_case
-from pipeline.cli.words import DEFAULT_OUTPUT, SOME_FAILED, File, Output, error, fail, load_all
+from pipeline.cli.words import DEFAULT_OUTPUT, SOME_FAILED, File, Output, fail, load_all
 from pipeline.study.sweep import Case, Study
 
 if TYPE_CHECKING:

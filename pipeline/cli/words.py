@@ -9,6 +9,7 @@ import typer
 from pipeline.cli.console import error, warning
 from pipeline.plan.cost import CostModel
 from pipeline.plan.plan import Plan
+from pipeline.plan.shard import Shard, parse_shard, reason_against
 from pipeline.study.load import load
 from pipeline.study.problems import StudyError, nearest
 from pipeline.study.schema import REDUCTIONS
@@ -125,3 +126,17 @@ def check_names(without: list[str] | None) -> tuple[str, ...]:
     if unknown:
         fail(f"--without {unknown[0]}: no reduction is called so; {nearest(unknown[0], REDUCTIONS)}")
     return tuple(without or ())
+
+
+def check_shard(text: str | None, studies: list[Study]) -> Shard | None:
+    """Return the shard that ``--shard`` names, or exit if it names none or a study cannot be dealt out."""
+    if text is None:
+        return None
+    try:
+        shard = parse_shard(text)
+    except ValueError as problem:
+        fail(f"--shard: {problem}")
+    reasons = [f"{study.file}: {reason}" for study in studies if (reason := reason_against(study))]
+    if reasons:
+        fail("\n".join(reasons))
+    return shard

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 from pipeline.plan.cost import CostModel
 from pipeline.plan.key import case_key, normalised, reference_key
@@ -11,6 +12,9 @@ from pipeline.plan.symmetry import is_round, model_planes
 from pipeline.study.schema import Mesh
 from pipeline.study.schema import Solve as Solving
 from pipeline.study.sweep import Case, Study
+
+if TYPE_CHECKING:
+    from pipeline.plan.shard import Shard
 
 # F_exact is to have errors well below the study's: this relative error, or this share of what a study asks for.
 EXACT, _EXACT_SHARE = 1e-3, 0.3
@@ -31,7 +35,8 @@ class Plan:
 
     ``keys`` holds, for each case in order, the key of its record, ``reference_keys`` that of its scene's F_exact.
     ``stored`` are the keys that were on record; ``shared`` says that solves share meshes and assembly, ``reuse`` that
-    they begin from their neighbours' solutions; ``cost`` estimates what steps take.
+    they begin from their neighbours' solutions; ``cost`` estimates what steps take. Of a plan that is one shard's,
+    ``part`` are the keys that are its own.
     """
 
     study: Study
@@ -43,6 +48,7 @@ class Plan:
     shared: bool = False
     reuse: bool = False
     cost: CostModel = field(default_factory=CostModel)
+    part: frozenset[str] | None = None
 
     @property
     def meshes(self) -> tuple[MeshStep, ...]:
@@ -64,16 +70,20 @@ def _declared(case: Case) -> Solve:
     return Solve(case_key(case), case, (case.index,), goal=case.mesh.accuracy)
 
 
-def make_plan(study: Study, stored: Collection[str] = (), without: Collection[str] = ()) -> Plan:
+def make_plan(
+    study: Study, stored: Collection[str] = (), without: Collection[str] = (), shard: "Shard | None" = None
+) -> Plan:
     """Return the plan of ``study`` with everything avoidable struck out; ``stored`` are the keys on record.
 
     ``without`` names reductions to leave out, besides those that the study itself leaves out; "all" is all of them. A
-    timing study strikes nothing: each of its cases runs afresh and alone.
+    timing study strikes nothing: each of its cases runs afresh and alone. A ``shard`` takes its part of what the study
+    needs before what is stored is struck out, so that all of them deal alike.
 
     Raises:
         ValueError: if ``without`` holds an unknown name.
     """
     from pipeline.plan.reduce import REDUCTIONS, strike_stored  # noqa: PLC0415 (they are functions of plans)
+    from pipeline.plan.shard import take  # noqa: PLC0415 (so is this)
 
     left_out = {*without, *study.planning.without}
     if unknown := left_out - {*REDUCTIONS, "stored", "all"}:
@@ -84,6 +94,8 @@ def make_plan(study: Study, stored: Collection[str] = (), without: Collection[st
             if name not in left_out:
                 plan = reduction(plan)
     plan = ask_for_exact(plan)
+    if shard is not None:
+        plan = take(plan, shard)
     return plan if left_out & {"stored", "all"} else strike_stored(plan, frozenset(stored))
 
 

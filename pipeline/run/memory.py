@@ -2,6 +2,7 @@
 
 import ctypes
 import gc
+import os
 import resource
 from collections.abc import Iterator
 from contextlib import suppress
@@ -49,12 +50,12 @@ class PeakMemory:
 def available_memory(comm: MPI.Comm) -> float:
     """Return the bytes that the ranks together may still take, the same on every rank; collective.
 
-    What their machines have free, or the containers that they run in, or the limits of the processes leave, if less.
+    What their machines have free, or, if less, what their containers, Slurm's grant or the limits of the processes leave.
     """
     machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
     is_first = machine.rank == 0
     machine.Free()
-    free = min(psutil.virtual_memory().available, container_room()) if is_first else 0.0
+    free = min(psutil.virtual_memory().available, container_room(), _granted()) if is_first else 0.0
     return float(min(comm.allreduce(free), comm.allreduce(_room_of_process())))
 
 
@@ -98,6 +99,13 @@ def _room_of_group(folder: Path, limit_name: str, usage_name: str, cache_name: s
 def _room_of_process() -> float:
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     return inf if limit == resource.RLIM_INFINITY else float(limit - psutil.Process().memory_info().vms)
+
+
+def _granted() -> float:
+    """Return the bytes of this machine that Slurm grants the job, less what this process holds: more would end it."""
+    each_cpu = float(os.environ.get("SLURM_MEM_PER_CPU") or 0) * float(os.environ.get("SLURM_CPUS_ON_NODE") or 1)
+    granted = 1e6 * (float(os.environ.get("SLURM_MEM_PER_NODE") or 0) or each_cpu)  # 0: all there is
+    return max(0.0, granted - psutil.Process().memory_info().rss) if granted else inf
 
 
 def _peak_of_process() -> int:

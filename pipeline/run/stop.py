@@ -1,6 +1,6 @@
 """An early stop along ε: once F stays near F_exact, larger ε are not run."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 
 from pipeline.plan.plan import Plan
 from pipeline.plan.steps import Solve
@@ -41,6 +41,15 @@ def reason_to_skip(plan: Plan, solve: Solve, find: Callable[[str], Record | None
     if len(last) < _IN_A_ROW or not all(last):
         return ""
     return f"F is within {100 * limit:g} % of F_exact up to ε = {1e3 * near[-1][1]:g} mm: larger ε are not run"
+
+
+def skipped(plan: Plan, records: Mapping[str, Record]) -> dict[str, Record]:
+    """Return, by key, what is to be known of the solves that need not be run, given the ``records`` of others."""
+    known = dict(records)
+    for solve in (solve for wave in waves(plan, plan.solves) for solve in wave if solve.key not in records):
+        if reason := reason_to_skip(plan, solve, known.get):
+            known[solve.key] = Record(solve.key, SKIPPED, reason)
+    return {key: record for key, record in known.items() if key not in records}
 
 
 def _smaller(plan: Plan, solve: Solve) -> list[tuple[float, str, str]]:

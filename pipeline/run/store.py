@@ -3,7 +3,7 @@
 import sqlite3
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from math import isfinite
 from pathlib import Path
 
@@ -13,9 +13,11 @@ from pipeline.stages import stage
 
 _SCHEMA = "CREATE TABLE IF NOT EXISTS records (key TEXT PRIMARY KEY, record TEXT NOT NULL, stored REAL NOT NULL)"
 # Two runs may share a store: each write takes milliseconds, so half a minute means that something hangs.
-_PATIENCE = 30.0
+PATIENCE = 30.0
 # Records that the cost model is fitted to: the newest.
 _RECENT = 500
+
+Row = tuple[str, str, float]  # key, record as text, seconds since 1970 at which it was stored
 
 
 class StoreError(Exception):
@@ -47,7 +49,7 @@ class Store:
             raise StoreError(f"the case store {path} cannot be made: {error.strerror}") from error
 
     def _open(self) -> sqlite3.Connection:
-        database = sqlite3.connect(self.path, timeout=_PATIENCE, isolation_level=None)
+        database = sqlite3.connect(self.path, timeout=PATIENCE, isolation_level=None)
         try:
             database.execute("PRAGMA synchronous = FULL")
             database.execute(_SCHEMA)
@@ -70,6 +72,32 @@ class Store:
         except sqlite3.Error as error:
             raise StoreError(f"the case store {self.path} cannot be written: {error}") from error
 
+    @contextmanager
+    def transaction(self) -> Iterator[None]:
+        """Do several writes as one: all of them or, after an exception, none.
+
+        Raises:
+            StoreError: if the file cannot be read or written.
+        """
+        try:
+            self._database.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+            except BaseException:
+                self._database.execute("ROLLBACK")
+                raise
+            self._database.execute("COMMIT")
+        except sqlite3.Error as error:
+            raise StoreError(f"the case store {self.path} cannot be read or written: {error}") from error
+
+    def put_rows(self, rows: Iterable[Row]) -> None:
+        """Write rows of another store, times and all, in place of earlier ones of the same keys."""
+        self._database.executemany("INSERT OR REPLACE INTO records VALUES (?, ?, ?)", rows)
+
+    def rows(self) -> list[Row]:
+        """Return what is on disk as it is, in the order of the keys."""
+        return self._database.execute("SELECT key, record, stored FROM records ORDER BY key").fetchall()
+
     def get(self, keys: Iterable[str]) -> dict[str, Record]:
         """Return the records on disk among ``keys``.
 
@@ -88,7 +116,7 @@ class Store:
 
     def records(self) -> Iterator[Record]:
         """Yield every record that can be read."""
-        for _, text in self._rows():
+        for _, text, _ in self.rows():
             with suppress(ValueError, TypeError, KeyError):
                 yield Record.from_json(text)
 
@@ -106,7 +134,7 @@ class Store:
         (state,) = self._database.execute("PRAGMA integrity_check").fetchone()
         if state != "ok":
             yield f"the file: {state}"
-        for key, text in self._rows():
+        for key, text, _ in self.rows():
             try:
                 record = Record.from_json(text)
             except (ValueError, TypeError, KeyError) as error:
@@ -123,7 +151,7 @@ class Store:
         Returns their number.
         """
         gone = []
-        for key, text, stored in self._database.execute("SELECT key, record, stored FROM records").fetchall():
+        for key, text, stored in self.rows():
             try:
                 is_ok = Record.from_json(text).is_ok
             except (ValueError, TypeError, KeyError):
@@ -134,9 +162,6 @@ class Store:
         self._database.executemany("DELETE FROM records WHERE key = ?", [(key,) for key in gone])
         self._database.execute("VACUUM")
         return len(gone)
-
-    def _rows(self) -> list[tuple[str, str]]:
-        return self._database.execute("SELECT key, record FROM records ORDER BY key").fetchall()
 
     def close(self) -> None:
         """Close the file."""

@@ -33,7 +33,7 @@ def test_damaged_store_is_moved_aside(tmp_path):
 def test_locked_store_is_not_taken_for_damaged(tmp_path, monkeypatch):
     path = tmp_path / "cases.sqlite"
     Store(path).close()
-    monkeypatch.setattr("pipeline.run.store._PATIENCE", 0.05)
+    monkeypatch.setattr("pipeline.run.store.PATIENCE", 0.05)
     other = sqlite3.connect(path, isolation_level=None)
     other.execute("BEGIN EXCLUSIVE")
     with pytest.raises(StoreError, match="locked"):

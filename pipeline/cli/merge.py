@@ -1,0 +1,155 @@
+"""The command that brings the shards of a study together."""
+
+import json
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pipeline.cli.console import error
+from pipeline.cli.words import (
+    DEFAULT_OUTPUT,
+    DONE,
+    SOME_FAILED,
+    File,
+    Json,
+    Output,
+    StoreFile,
+    Without,
+    check_names,
+    fail,
+    load_all,
+)
+from pipeline.plan.plan import Plan, make_plan
+from pipeline.plan.shard import deal, shard_of, stores_of
+from pipeline.study.sweep import Study
+
+if TYPE_CHECKING:
+    from pipeline.run.merge import Source
+    from pipeline.run.record import Record
+
+# Longer lists of pending cases than this are cut.
+_MOST_CASES = 10
+
+
+def merge(
+    file: File,
+    stores: Annotated[
+        list[Path] | None, typer.Argument(help="Stores of shards [default: OUTPUT/shards/<study>.*.sqlite].")
+    ] = None,
+    output: Output = DEFAULT_OUTPUT,
+    store: StoreFile = None,
+    without: Without = None,
+    as_json: Json = False,
+) -> None:
+    """Bring the shards of a study together in the case store, and write its dataset and figure.
+
+    Of two records of one case that with a force is kept, else the one stored last; merging again changes nothing. The
+    shards' files stay as they are. Exit status 1 if cases failed or are pending, or if a shard's store is damaged.
+
+    Example: epsmesh merge studies/figure3.toml
+    """
+    (study,) = load_all([file])
+    paths = _stores(study, stores, output)
+    plan = make_plan(study, without=check_names(without))
+    sources, records = _merged(paths, store or output / "cases.sqlite", plan)
+    problems = [problem for source in sources for problem in source.problems]
+    for problem in problems:
+        error(problem)
+
+    from pipeline.report.publish import publish
+    from pipeline.run.outcome import count_states, failures
+
+    counts, failed = count_states(plan, records), failures(plan, records)
+    files = publish(plan, records, _dates(records), output)
+    missing = frozenset(solve.key for solve in plan.solves if solve.key not in records)
+    again = _completing(plan, missing, paths, [word for name in without or () for word in ("--without", name)])
+    if as_json:
+        found: dict[str, Any] = {
+            "file": str(file), **counts,
+            "shards": [{"file": str(s.path), "records": s.records, "taken": s.taken} for s in sources],
+            "problems": problems, "failures": [{"case": case, "message": message} for case, message in failed],
+            "again": again, "files": [str(path) for path in files],
+        }  # fmt: skip
+        print(json.dumps(found, indent=2))
+    else:
+        for source in sources:
+            print(f"{source.path}: {source.records} records, {source.taken} of them new")
+        for case, message in failed:
+            error(f"failed: {case}: {message}")
+        told = ", ".join(f"{count} {state}" for state, count in counts.items() if count)
+        print(f"{file}: {told}; wrote {', '.join(map(str, files))}", flush=True)
+        _tell_pending(plan, missing, again)
+    raise typer.Exit(SOME_FAILED if problems or missing or counts["failed"] else DONE)
+
+
+def _stores(study: Study, given: list[Path] | None, output: Path) -> list[Path]:
+    """Return the stores to be merged, or exit if one is not there, or none."""
+    absent = [path for path in given or () if not path.is_file()]
+    if absent:
+        fail("\n".join(f"{path}: there is no such store" for path in absent))
+    found = given or stores_of(output, study)
+    if not found:
+        folder = output / "shards"
+        fail(f"{folder}: no stores of {study.file}; `epsmesh run {study.file} --shard 1/4` and so on make them")
+    return found
+
+
+def _merged(paths: list[Path], path: Path, plan: Plan) -> tuple[tuple["Source", ...], dict[str, "Record"]]:
+    """Merge into the store at ``path`` and return the plan's records, with those of cases that need not be run."""
+    from pipeline.run import merge as merging
+    from pipeline.run.stop import skipped
+    from pipeline.run.store import Store, StoreError
+
+    if path.resolve() in [source.resolve() for source in paths]:
+        fail(f"{path}: this store is what the others are merged into; it cannot be one of them")
+    try:
+        store = Store(path)
+        if store.notice:
+            error(store.notice)
+        sources = merging.merge(paths, store)
+        records = store.get({*plan.keys, *plan.reference_keys})
+        store.close()
+    except StoreError as problem:
+        fail(str(problem))
+    return sources, records | skipped(plan, records)
+
+
+def _dates(records: dict[str, "Record"]) -> dict[str, str]:
+    """Return when the first and the last record was made."""
+    dates = sorted(str(date) for record in records.values() if (date := record.provenance.get("date")))
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    return {"start": dates[0] if dates else now, "end": dates[-1] if dates else now}
+
+
+def _completing(plan: Plan, missing: frozenset[str], paths: list[Path], options: list[str]) -> list[str]:
+    """Return the commands that compute what is missing: the shards it is in, of the deal that was run last."""
+    if not missing:
+        return []
+    words = ["epsmesh", "run", plan.study.file, *options]
+    latest = max(paths, key=lambda path: path.stat().st_mtime if shard_of(path) else -1.0)
+    shard = shard_of(latest)
+    if shard is None:
+        return [" ".join(words)]
+    parts = deal(plan, shard.count)
+    numbers = [number for number, part in enumerate(parts, start=1) if part & missing]
+    commands = [" ".join([*words, "--shard", f"{number}/{shard.count}"]) for number in numbers]
+    if not options:
+        array = ",".join(map(str, numbers))
+        commands.append(f"SHARDS={shard.count} sbatch --array={array} scripts/slurm/shards.sbatch {plan.study.file}")
+    return commands
+
+
+def _tell_pending(plan: Plan, missing: frozenset[str], again: list[str]) -> None:
+    """Say which cases are not on record, and what to do."""
+    if not missing:
+        return
+    labels = [solve.label for solve in plan.solves if solve.key in missing]
+    for label in labels[:_MOST_CASES]:
+        error(f"pending: {label}")
+    if len(labels) > _MOST_CASES:
+        error(f"pending: … and {len(labels) - _MOST_CASES} more")
+    error("to complete them, then merge again:")
+    for command in again:
+        error(f"  {command}")

@@ -1,0 +1,141 @@
+"""A plan dealt out to shards that never speak to each other: each makes the same deal, and takes its own part of it."""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from heapq import heapify, heapreplace
+from pathlib import Path
+
+from pipeline.plan.cost import CostModel
+from pipeline.plan.plan import Plan
+from pipeline.plan.steps import MeshStep
+from pipeline.study.sweep import Study
+
+_NAME = re.compile(r"\.(\d+)-of-(\d+)\.sqlite$")
+
+
+@dataclass(frozen=True)
+class Shard:
+    """One of ``count`` parts of a study; ``number`` counts from 1."""
+
+    number: int
+    count: int
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.count}"
+
+    def store(self, output: Path, study: Study) -> Path:
+        """Return the file of the shard's own store: no two jobs write one file."""
+        return output / "shards" / f"{study.name}.{self.number}-of-{self.count}.sqlite"
+
+
+def parse_shard(text: str) -> Shard:
+    """Return the shard that ``text``, "i/n", names.
+
+    Raises:
+        ValueError: if it names none.
+    """
+    match = re.fullmatch(r"(\d+)/(\d+)", text.strip(), re.ASCII)
+    if match:
+        shard = Shard(int(match[1]), int(match[2]))
+        if 1 <= shard.number <= shard.count:
+            return shard
+    raise ValueError(f"{text!r} is no shard; give i/n, part i of n, with 1 <= i <= n: 3/8")
+
+
+def shard_of(path: Path) -> Shard | None:
+    """Return the shard whose store a file is, by its name."""
+    match = _NAME.search(path.name)
+    return Shard(int(match[1]), int(match[2])) if match else None
+
+
+def stores_of(output: Path, study: Study) -> list[Path]:
+    """Return the stores of a study's shards below ``output``, whatever the number of shards they are of."""
+    folder = output / "shards"
+    found = sorted(folder.iterdir()) if folder.is_dir() else []
+    return [path for path in found if shard_of(path) and _NAME.sub("", path.name) == study.name]
+
+
+def reason_against(study: Study) -> str:
+    """Return why a study cannot be dealt out, if it cannot."""
+    if study.solve.timing:
+        return "solve.timing = true compares times, which must come from one machine: run it without --shard"
+    return ""
+
+
+def take(plan: Plan, shard: Shard) -> Plan:
+    """Return the plan with what is ``shard``'s; ``plan`` must be made without a look at any store."""
+    part = deal(plan, shard.count)[shard.number - 1]
+    solves = tuple(solve for solve in plan.solves if solve.key in part)
+    reason = f"This is shard {shard}: the others see to the rest."
+    return replace(plan, solves=solves, part=part).struck_by("shard", len(plan.solves) - len(solves), reason)
+
+
+def deal(plan: Plan, count: int) -> tuple[frozenset[str], ...]:
+    """Return the keys of the solves of each of ``count`` shards: costliest first, always to whoever has least to do."""
+    parts: tuple[set[str], ...] = tuple(set() for _ in range(count))
+    loads = [(0, number) for number in range(count)]
+    heapify(loads)
+    # Sorting is stable: equally costly ones stay in the study's order.
+    for cost, keys in sorted(_units(plan), key=lambda unit: -unit[0]):
+        load, number = loads[0]
+        parts[number].update(keys)
+        heapreplace(loads, (load + cost, number))
+    return tuple(map(frozenset, parts))
+
+
+def _units(plan: Plan) -> list[tuple[int, list[str]]]:
+    """Return what must stay together, with its cost: keys that share a mesh, or that wait for each other."""
+    steps = plan.meshes
+    groups = _Groups()
+    for step in steps:
+        groups.join(solve.key for solve in step.solves)
+    for keys in _waiting(plan):
+        groups.join(keys)
+    costs: dict[str, int] = {}
+    members: dict[str, list[str]] = {}
+    for step in steps:
+        keys = [solve.key for solve in step.solves]
+        root = groups.root(keys[0])
+        costs[root] = costs.get(root, 0) + _cost(step)
+        members.setdefault(root, []).extend(keys)
+    return [(costs[root], keys) for root, keys in members.items()]
+
+
+def _waiting(plan: Plan) -> Iterable[list[str]]:
+    """Yield the keys, for an early stop along ε, of cases that differ in ε only, and of their F_exact."""
+    position = next((i for i, axis in enumerate(plan.study.axes) if axis.path == "mesh.epsilon"), None)
+    if plan.study.planning.stop_when is None or position is None or not plan.reference_keys:
+        return ()
+    chains: dict[tuple[int, ...], list[str]] = {}
+    for case, key, exact in zip(plan.study.cases(), plan.keys, plan.reference_keys, strict=True):
+        others = (*case.index[:position], *case.index[position + 1 :])
+        chains.setdefault(others, []).extend((key, exact))
+    return chains.values()
+
+
+def _cost(step: MeshStep) -> int:
+    """Return the estimated milliseconds of a step, alike for every shard.
+
+    By the law that knows no records, to three digits: the last ones may differ between machines.
+    """
+    return max(1, round(1000 * float(f"{CostModel().step(step).seconds:.3g}")))
+
+
+class _Groups:
+    """Keys that belong together, because they were joined, one with the other or through others."""
+
+    def __init__(self) -> None:
+        self._parents: dict[str, str] = {}
+
+    def root(self, key: str) -> str:
+        """Return the key that stands for the group of ``key``."""
+        while (parent := self._parents.setdefault(key, key)) != key:
+            self._parents[key] = key = self._parents[parent]
+        return key
+
+    def join(self, keys: Iterable[str]) -> None:
+        """Make one group of the groups of ``keys``."""
+        first, *others = map(self.root, keys)
+        for other in others:
+            self._parents[self.root(other)] = self.root(first)

@@ -1,0 +1,30 @@
+"""What came of a study: how many of its cases are in which state, and what failed."""
+
+from collections.abc import Iterator, Mapping
+
+from pipeline.plan.plan import Plan
+from pipeline.run.record import Record
+from pipeline.study.sweep import Case
+
+
+def count_states(plan: Plan, records: Mapping[str, Record]) -> dict[str, int]:
+    """Return the number of a plan's cases in each state; of a shard's plan, of its own cases."""
+    states = [records[key].status if key in records else "pending" for key, _ in _cases(plan)]
+    return {state: states.count(state) for state in ("ok", "skipped", "failed", "pending")}
+
+
+def failures(plan: Plan, records: Mapping[str, Record]) -> tuple[tuple[str, str], ...]:
+    """Return (case, message) of what failed, and of F_exact that could not be found: no case is the worse for that."""
+    failed = [
+        (str(case), records[key].message)
+        for key, case in _cases(plan)
+        if key in records and records[key].status == "failed"
+    ]
+    exact = {key: records[key].message for key in plan.reference_keys if key in records and not records[key].is_ok}
+    return (*failed, *((f"F_exact ({key[:6]})", message) for key, message in exact.items()))
+
+
+def _cases(plan: Plan) -> Iterator[tuple[str, Case]]:
+    for key, case in zip(plan.keys, plan.study.cases(), strict=True):
+        if plan.part is None or key in plan.part:
+            yield key, case

@@ -1,0 +1,36 @@
+#!/bin/bash
+# Run epsmesh on every task of a Slurm job; where it is interrupted, put the job back into the queue to go on later.
+# The job scripts in this folder end in it. EPSMESH names another command than .venv/bin/epsmesh.
+set -u
+most_restarts=20 # a case that takes longer than the job's time limit would come back for ever
+restarts=${SLURM_RESTART_COUNT:-0}
+
+# A rank is one thread. Debian's Open MPI as root asks to be sure.
+export OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+
+# A restarted job counts its steps from 0 again, and what a killed step has left (sockets and folders named after job and
+# step) would stop the next of that number: it gets one that was not used before.
+for ((i = 0; i < restarts; i++)); do
+    srun --mpi=none --nodes=1 --ntasks=1 true </dev/null
+done
+
+# PMIx is what Open MPI speaks: with Slurm's other plugins no task would start. srun has status 0 where it could not
+# start any, so the first one, which is on this node, leaves a mark.
+mark=$(mktemp -u)
+srun --mpi=pmix --kill-on-bad-exit=1 \
+    bash -c '((SLURM_PROCID)) || : >"$0"; exec "$@"' "$mark" "${EPSMESH:-.venv/bin/epsmesh}" "$@" </dev/null
+status=$?
+if [[ ! -e $mark ]]; then
+    echo "the job's step did not start (srun: status $status)" >&2
+    status=130
+fi
+rm -f "$mark"
+
+# 130: SIGTERM came, before the time limit or from `scancel --signal=TERM`. What is finished is on disk. Plain `scancel`
+# ends this script as well, and after a node's failure or a preemption Slurm itself restarts the job.
+if ((status == 130 && restarts < most_restarts)); then
+    echo "interrupted; the job goes back into the queue"
+    # Slurm then ends this script; one that ended by itself before could be taken for a job that failed.
+    scontrol requeue "$SLURM_JOB_ID" && sleep 300
+fi
+exit "$status"

@@ -1,0 +1,37 @@
+"""Datasets of one study, run in different ways: what must agree in them."""
+
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+# Times, memory, iterations and round-off say how the work was done.
+HOW = {"speedup", "memory", "iterations", "balance"}
+
+
+def assert_same(one: Path, two: Path, *, rtol: float = 1e-7, alike: bool = True) -> None:
+    """Assert that two datasets hold the same, but for what tells how the work was done.
+
+    ``alike``: none of it was read back from a store, and it was done on as many ranks.
+    """
+    first, second = xr.load_dataset(one), xr.load_dataset(two)
+    assert set(first) == set(second)
+    assert first.sizes == second.sizes
+    for name in set(first) - HOW:
+        if str(name).startswith("time_") or (name == "origin" and not alike):
+            continue
+        if first[name].dtype == object:
+            assert (first[name] == second[name]).all(), name
+        else:
+            largest = float(np.nanmax(np.abs(second[name].values), initial=0.0))
+            # The sweeps of an error bar are preconditioned rank by rank.
+            close = rtol if alike or not str(name).endswith("_error") else 1e-2
+            np.testing.assert_allclose(first[name], second[name], rtol=close, atol=close * largest, err_msg=str(name))
+    attributes = ["study", "study_hash", "title", "epsilon_is_full", "version_dolfinx", "host"]
+    for name in [*attributes, "ranks"] if alike else attributes:
+        assert first.attrs[name] == second.attrs[name], name
+
+
+def all_done(path: Path) -> bool:
+    """Tell whether every case of a dataset has a force, or needs none."""
+    return set(np.unique(xr.load_dataset(path)["status"])) <= {"ok", "skipped"}

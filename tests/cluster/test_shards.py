@@ -1,0 +1,160 @@
+"""Shards on the command line: run one by one and merged they give what one run gives, and what is missing is told."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from mpi4py import MPI
+from typer.testing import CliRunner, Result
+
+from pipeline.cli import app
+from tests.cluster.compare import all_done, assert_same
+
+pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="runs studies by itself")
+
+SMALL = """
+title = "small"
+[body]
+shape = "box"
+size = ["20 mm", "20 mm", "10 mm"]
+[material]
+young = ["5 kPa", "10 kPa"]
+poisson = [0.3, 0.4]
+[probe]
+shape = "disc"
+radius = "2 mm"
+depth = "0.1 mm"
+[mesh]
+epsilon = ["4 mm", "6 mm", "full"]
+fine = "2 mm"
+coarse = "4 mm"
+rim = "0.5 mm"
+growth = 0.8
+outside = ["coarse", "free"]
+[solve]
+exact = false
+"""
+
+
+def epsmesh(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module")
+def meshes(tmp_path_factory):
+    return tmp_path_factory.mktemp("meshes")
+
+
+def run(study: Path, output: Path, meshes: Path, *options: object) -> Result:
+    return epsmesh("run", study, "--output", output, "--meshes", meshes, *options)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory, meshes):
+    """Return the study and the folder of its results, run in one go."""
+    folder = tmp_path_factory.mktemp("whole")
+    study = folder / "small.toml"
+    study.write_text(SMALL)
+    assert run(study, folder, meshes, "--quiet").exit_code == 0
+    return study, folder
+
+
+def test_a_lost_shard_is_told_and_completed(whole, meshes, tmp_path):
+    study, folder = whole
+    for number in (1, 3):
+        done = run(study, tmp_path, meshes, "--shard", f"{number}/3")
+        assert done.exit_code == 0, done.output
+        assert f"shard {number}/3" in done.stdout
+        assert "epsmesh merge" in done.stdout
+    assert not (tmp_path / "small.nc").exists()
+    partial = epsmesh("merge", study, "--output", tmp_path, "--json")
+    assert partial.exit_code == 1
+    found = json.loads(partial.stdout)
+    assert found["pending"] > 0
+    assert found["again"][0] == f"epsmesh run {study} --shard 2/3"
+    assert found["again"][1] == f"SHARDS=3 sbatch --array=2 scripts/slurm/shards.sbatch {study}"
+    assert int((xr.load_dataset(tmp_path / "small.nc")["status"] == "pending").sum()) == found["pending"]
+    told = epsmesh("merge", study, "--output", tmp_path)
+    assert f"{found['pending']} pending" in told.output
+    assert "--shard 2/3" in told.output
+    assert run(study, tmp_path, meshes, "--shard", "2/3").exit_code == 0
+    for _ in range(2):
+        assert epsmesh("merge", study, "--output", tmp_path).exit_code == 0
+        assert all_done(tmp_path / "small.nc")
+        assert_same(tmp_path / "small.nc", folder / "small.nc")
+    # What is merged is not computed again, by no other deal.
+    again = run(study, tmp_path, meshes, "--shard", "1/2")
+    assert "to do" not in again.stdout
+    assert "stored" in again.stdout
+
+
+def test_more_shards_than_steps(whole, meshes, tmp_path):
+    study, folder = whole
+    outputs = [run(study, tmp_path, meshes, "--shard", f"{number}/12").stdout for number in range(1, 13)]
+    assert sum("nothing to do" in output for output in outputs) >= 3
+    merged = epsmesh("merge", study, "--output", tmp_path)
+    assert merged.exit_code == 0, merged.output
+    assert_same(tmp_path / "small.nc", folder / "small.nc")
+
+
+def test_early_stop_in_shards(whole, meshes, tmp_path):
+    """Which cases are skipped is decided within a shard, and told in the merged dataset."""
+    study = tmp_path / "small.toml"
+    study.write_text(SMALL.replace("exact = false", '[plan]\nstop_when = "8 %"'))
+    outputs = [run(study, tmp_path, meshes, "--shard", f"{number}/2") for number in (1, 2)]
+    assert [output.exit_code for output in outputs] == [0, 0]
+    assert epsmesh("merge", study, "--output", tmp_path).exit_code == 0
+    assert run(study, tmp_path / "whole", meshes).exit_code == 0
+    assert_same(tmp_path / "small.nc", tmp_path / "whole" / "small.nc")
+    assert "skipped" in np.unique(xr.load_dataset(tmp_path / "small.nc")["status"])
+
+
+def test_damaged_and_failed(whole, meshes, tmp_path):
+    study, folder = whole
+    copy = tmp_path / "copy.sqlite"
+    shutil.copy(folder / "cases.sqlite", copy)
+    damaged = tmp_path / "damaged.sqlite"
+    damaged.write_bytes(b"no database at all" * 99)
+    found = epsmesh("merge", study, copy, damaged, "--output", tmp_path)
+    assert found.exit_code == 1
+    assert f"{damaged}: damaged, left out" in found.output
+    assert damaged.read_bytes().startswith(b"no database")
+    assert_same(tmp_path / "small.nc", folder / "small.nc")
+    # A support that the small column touches: its cases fail, in the shard and in what is merged.
+    study = tmp_path / "failing.toml"
+    study.write_text(SMALL.replace('["coarse", "free"]', '"fixed"').replace('"4 mm"', '"2 mm"', 1))
+    assert 1 in {run(study, tmp_path, meshes, "--shard", f"{number}/2").exit_code for number in (1, 2)}
+    merged = epsmesh("merge", study, "--output", tmp_path)
+    assert merged.exit_code == 1
+    assert "touches the held face" in merged.output
+    assert "pending" not in merged.output
+
+
+def test_help_has_examples():
+    assert "Example: epsmesh merge" in epsmesh("merge", "--help").stdout
+    assert "--shard 3/8" in epsmesh("run", "--help").stdout
+
+
+def test_wrong_input(whole, tmp_path):
+    study, folder = whole
+    for text in ("0/3", "4/3", "three", "3"):
+        wrong = epsmesh("run", study, "--output", tmp_path, "--shard", text)
+        assert wrong.exit_code == 2
+        assert f"--shard: {text!r} is no shard; give i/n" in wrong.output
+    timed = tmp_path / "timed.toml"
+    timed.write_text(SMALL.replace("exact = false", "timing = true"))
+    wrong = epsmesh("run", timed, "--output", tmp_path, "--shard", "1/2")
+    assert wrong.exit_code == 2
+    assert "one machine" in wrong.output
+    for stores, message in (
+        ([], "--shard 1/4"),
+        ([tmp_path / "absent.sqlite"], "there is no such store"),
+        ([folder / "cases.sqlite", "--store", folder / "cases.sqlite"], "cannot be one of them"),
+    ):
+        wrong = epsmesh("merge", study, "--output", tmp_path, *stores)
+        assert wrong.exit_code == 2
+        assert message in wrong.output
+    assert {path.name for path in tmp_path.iterdir()} == {"timed.toml"}
