@@ -69,7 +69,7 @@ for name in ("numpy", "scipy", "matplotlib", "netCDF4", "mpi4py", "petsc4py", "p
         pass
 PYTHON
 # A pip configured for --user would install beside the venv.
-PIP_USER=0 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input -c "$constraints" -e '.[dev]' ||
+PIP_USER=0 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input -c "$constraints" -e '.[dev,docs]' ||
     fail "pip could not install the project"
 
 # ---- check --------------------------------------------------------------------------------------------
