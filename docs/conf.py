@@ -18,9 +18,11 @@ extensions = ["myst_parser"]
 exclude_patterns = ["_build"]
 myst_heading_anchors = 3
 nitpicky = True
+smartquotes = False  # options begin with two hyphens
 html_theme = "furo"
 html_title = "epsmesh"
 html_theme_options = {"navigation_with_keys": True}
+html_static_path, html_css_files = ["_static"], ["tables.css"]
 html_copy_source = False
 html_show_copyright = False
 
