@@ -37,13 +37,13 @@ def pages() -> list[Path]:
     return [page for page in PAGES if not set(made) & set(page.relative_to(ROOT).parts)]
 
 
-def blocks(page: Path) -> list[Block]:
-    """Return the blocks of a page that are commands or Python, in order."""
+def blocks(page: Path, languages: tuple[str, ...] = (*SHELLS, PYTHON)) -> list[Block]:
+    """Return the blocks of a page, in order: commands and Python, unless other ``languages`` are given."""
     text = page.read_text(encoding="utf-8")
     found = []
     for match in _FENCE.finditer(text):
         comments, language, code = match.groups()
-        if language in (*SHELLS, PYTHON):
+        if language in languages:
             line = text[: match.start(2)].count("\n") + 1
             found.append(_block(page, line, language, code, _MARK.findall(comments)))
     return found

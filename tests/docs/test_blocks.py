@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,8 @@ from mpi4py import MPI
 
 from pipeline.cli import app
 from pipeline.report.dataset import write
+from pipeline.study.load import parse
+from pipeline.study.starter import starter
 from tests.docs.blocks import PYTHON, ROOT, Block, blocks, missing, pages
 from tests.report.synthetic import FIGURE, dataset
 from tests.test_cli import ENVIRONMENT
@@ -88,6 +91,16 @@ def test_blocks_of_a_page_run(page, checkout):
         assert done.returncode == block.status, f"{block}\n{block.text}\n{done.stdout}\n{done.stderr}"
         absent = missing(block.expected, done.stdout + done.stderr)
         assert not absent, f"{block}: no line {absent!r} in\n{done.stdout}\n{done.stderr}"
+
+
+@pytest.mark.parametrize("block", [b for page in pages() for b in blocks(page, ("toml",))], ids=str)
+def test_pieces_of_studies_are_valid(block):
+    """Each, put into the study that ``epsmesh new`` writes, makes a study."""
+    study = tomllib.loads(starter("mine"))
+    for name, piece in tomllib.loads(block.text).items():
+        whole = not isinstance(piece, dict) or "shape" in piece
+        study[name] = piece if whole else {**study.get(name, {}), **piece}
+    assert parse(study, file=str(block)).shape
 
 
 def test_few_blocks_are_not_run_and_all_say_why():
