@@ -36,7 +36,7 @@ studies: setup ## run every study in studies/
 	$(EPSMESH) run studies/*.toml
 
 docs: setup ## build the documentation; a warning is an error
-	$(PYTHON) -m sphinx -W --keep-going -n -q -b html docs $(DOCS)
+	$(PYTHON) -m sphinx -W --keep-going -n -q -E -a -b html docs $(DOCS)
 	@echo $(DOCS)/index.html
 
 test: setup ## run the tests, serial and on 2 ranks
