@@ -9,6 +9,7 @@ PYTEST_ARGS ?=
 # A selection of tests may hold none for 2 ranks (pytest's status 5); the whole suite may not.
 NONE_OK = $(if $(PYTEST_ARGS),|| [ $$? -eq 5 ])
 
+DOCS := docs/_build/html
 PYTHON := .venv/bin/python
 EPSMESH := .venv/bin/epsmesh
 # One thread a rank; Open MPI asks before it runs as root, or on more ranks than there are cores.
@@ -16,7 +17,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's own mpirun: another one on PATH would not fit Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies test test-debian13 slurm-test verify benchmark stress soak lint format clean
+.PHONY: help setup study studies docs test test-debian13 slurm-test verify benchmark stress soak lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -33,6 +34,10 @@ endif
 
 studies: setup ## run every study in studies/
 	$(EPSMESH) run studies/*.toml
+
+docs: setup ## build the documentation; a warning is an error
+	$(PYTHON) -m sphinx -W --keep-going -n -q -E -a -b html docs $(DOCS)
+	@echo $(DOCS)/index.html
 
 # The browser is for the tests of the report alone, which are left out where there is none.
 test: ## run the tests, serial and on 2 ranks
@@ -69,5 +74,5 @@ format: setup ## let ruff mend and format
 	.venv/bin/ruff format
 
 clean: ## remove caches and the venv; results stay
-	rm -rf .venv .pytest_cache .mypy_cache .ruff_cache .import_linter_cache *.egg-info
+	rm -rf docs/_build docs/reference .venv .pytest_cache .mypy_cache .ruff_cache .import_linter_cache *.egg-info
 	find . -name __pycache__ -type d -not -path './.cache/*' -prune -exec rm -rf {} +

@@ -119,13 +119,17 @@ def explain(
     for name, value in found.items():
         if name == "case" or not value:
             continue
-        lines = [f"{k}: {v}" for k, v in value.items()] if isinstance(value, dict) else value
+        lines = [f"{k}: {_short(v)}" for k, v in value.items()] if isinstance(value, dict) else value
         if isinstance(lines, list):
             print(f"  {name.replace('_', ' ')}:")
             for line in lines:
                 print(f"    {line}")
         else:
             print(f"  {name.replace('_', ' ')}: {value}")
+
+
+def _short(value: Any) -> Any:
+    return f"{value:.6g}" if isinstance(value, float) else value
 
 
 def _planned(

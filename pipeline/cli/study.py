@@ -30,6 +30,7 @@ from pipeline.cli.words import (
     check_store,
     fail,
     load_all,
+    meant,
     stored_records,
     warn,
 )
@@ -55,7 +56,7 @@ def validate(files: Files, as_json: Json = False) -> None:
             failed = True
             report.append({"file": str(file), "errors": [str(p) for p in wrong.problems], "warnings": []})
             if not as_json:
-                error(str(wrong))
+                error(f"{wrong}{meant(file)}")
             continue
         cases = len(make_plan(study).keys)
         report.append({"file": str(file), "errors": [], "warnings": list(study.warnings), "cases": cases})
@@ -123,6 +124,8 @@ def run(
             )
             if speaks:
                 announce(plan, opened, quiet=quiet or as_json, verbose=verbose)
+                if as_json and not quiet:
+                    warn(study)
             progress = _progress(plan, verbose=verbose) if speaks and not quiet else None
             with workflow.abort_on_exception(comm):
                 outcome = workflow.run(plan, opened, comm, output, progress)

@@ -1,5 +1,6 @@
 """What every command says and takes: options, errors, exit statuses. Only the command line prints and exits."""
 
+import difflib
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
@@ -56,7 +57,7 @@ def load_all(files: list[Path]) -> list[Study]:
         try:
             studies.append(load(file))
         except StudyError as problem:
-            messages.append(str(problem))
+            messages.append(f"{problem}{meant(file)}")
     names = [study.name for study in studies]
     messages += [
         f"{s.file}: another study given is called {s.name}, too: both would write {s.name}.nc"
@@ -66,6 +67,15 @@ def load_all(files: list[Path]) -> list[Study]:
     if messages:
         fail("\n".join(messages))
     return studies
+
+
+def meant(file: Path) -> str:
+    """Return ``; did you mean …?`` for a study file that is not there, if one like it is."""
+    if file.exists():
+        return ""
+    known = {path.stem: path for path in (*file.parent.glob("*.toml"), *Path("studies").glob("*.toml"))}
+    close = difflib.get_close_matches(file.stem, known, n=1, cutoff=0.5)
+    return f"; did you mean {known[close[0]]}?" if close else ""
 
 
 def stored_records(path: Path, plan: Plan) -> tuple[dict[str, "Record"], CostModel]:

@@ -50,7 +50,7 @@ class PeakMemory:
 def available_memory(comm: MPI.Comm) -> float:
     """Return the bytes that the ranks together may still take, the same on every rank; collective.
 
-    What their machines have free, or, if less, what their containers, Slurm's grant or the limits of the processes leave.
+    What their machines have free, or, if less, what containers, Slurm's grant or the limits of the processes leave.
     """
     machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
     is_first = machine.rank == 0

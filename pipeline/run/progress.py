@@ -9,6 +9,8 @@ from pipeline.run.remaining import Remaining, format_seconds
 
 # In a file a line is written for each of these shares of the work, and when this many seconds went by without one.
 _SHARE, _SILENCE = 0.05, 30.0
+# Refreshes of the line on a terminal, per second: what is solved meanwhile should not notice.
+_REFRESH = 2
 _MESHING = "meshing: "
 
 
@@ -66,7 +68,15 @@ class Terminal:
             )
             numbers = (MofNCompleteColumn(), Times(table_column=Column(no_wrap=True)))
             console = Console(stderr=True)
-            self._bar = Bar(BarColumn(bar_width=20), *numbers, words, console=console, transient=True, expand=True)
+            self._bar = Bar(
+                BarColumn(bar_width=20),
+                *numbers,
+                words,
+                console=console,
+                transient=True,
+                expand=True,
+                refresh_per_second=_REFRESH,
+            )
             self._bar.start()
             self._task = self._bar.add_task("", total=self._total)
         return self
@@ -121,5 +131,5 @@ class Terminal:
         if self._step is None or self._remaining.steps == 1 or self._bar is None:
             return left
         step = f"step {self._step + 1}/{self._remaining.steps}"
-        seconds = self._remaining.step_seconds(self._step)
-        return f"{left} ({step}: {format_seconds(seconds)})" if seconds > 0 else left
+        seconds = self._remaining.seconds(self._step)
+        return f"{left} ({step}: {format_seconds(seconds)})" if seconds > 0.05 else left

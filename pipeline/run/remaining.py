@@ -1,13 +1,16 @@
 """How long a run will still take: the plan's estimates, corrected by what has been measured in the run so far."""
 
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from pipeline.plan.plan import Plan
 
 # The estimates count for as much as this share of the whole, measured.
 _TRUST = 0.005
+# Neighbours in a study are alike: with each solve that is measured, those before it count this much less.
+_MEMORY = 0.95
 # What is overdue is not finished: this share of what was expected is still to come.
 _LEAST = 0.05
 
@@ -40,39 +43,40 @@ class Remaining:
     """
 
     def __init__(self, expected: Mapping[str, Expected], clock: Callable[[], float] = time.monotonic):
-        self._expected, self._pending, self._clock = dict(expected), dict(expected), clock
+        self._expected, self._pending, self._clock = dict(expected), set(expected), clock
         self._trust = max(_TRUST * sum(e.seconds for e in expected.values()), 1e-6)
         self._measured: dict[str, float] = {}
         self._estimated: dict[str, float] = {}
+        # Estimated seconds that are still to come by kind, of the whole (None) and of each step.
+        self._to_come: dict[int | None, dict[str, float]] = {None: defaultdict(float)}
+        for e in expected.values():
+            for step in (None, e.step):
+                self._to_come.setdefault(step, defaultdict(float))[e.kind] += e.seconds
+        self.steps = len(self._to_come) - 1
         self._last = clock()
-
-    @property
-    def steps(self) -> int:
-        """How many steps there are."""
-        return len({expected.step for expected in self._expected.values()})
 
     def done(self, label: str, *, counts: bool = True) -> None:
         """Take note that a solve is finished; one that failed ``counts`` for nothing in the factors."""
-        now, expected = self._clock(), self._pending.pop(label, None)
-        if expected and counts:
-            self._measured[expected.kind] = self._measured.get(expected.kind, 0.0) + now - self._last
-            self._estimated[expected.kind] = self._estimated.get(expected.kind, 0.0) + expected.seconds
+        now = self._clock()
+        if label in self._pending:
+            self._pending.remove(label)
+            expected = self._expected[label]
+            for step in (None, expected.step):
+                self._to_come[step][expected.kind] -= expected.seconds
+            for sums, seconds in ((self._measured, now - self._last), (self._estimated, expected.seconds)):
+                if counts:
+                    sums[expected.kind] = _MEMORY * sums.get(expected.kind, 0.0) + seconds
         self._last = now
-
-    def seconds(self) -> float:
-        """Return the seconds that are left of the whole run."""
-        return self._left(self._pending.values())
 
     def step_of(self, label: str) -> int | None:
         """Return the number of the step of a solve, from 0."""
         return self._expected[label].step if label in self._expected else None
 
-    def step_seconds(self, step: int) -> float:
-        """Return the seconds that are left of a step."""
-        return self._left([e for e in self._pending.values() if e.step == step])
-
-    def _left(self, pending: Collection[Expected]) -> float:
-        total = sum(self._factor(expected.kind) * expected.seconds for expected in pending)
+    def seconds(self, step: int | None = None) -> float:
+        """Return the seconds that are left of the whole run, or of a step."""
+        if not self._pending:
+            return 0.0
+        total = sum(self._factor(kind) * max(seconds, 0.0) for kind, seconds in self._to_come[step].items())
         return max(total - (self._clock() - self._last), _LEAST * total)
 
     def _factor(self, kind: str) -> float:

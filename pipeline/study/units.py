@@ -1,11 +1,13 @@
 """Quantities written with their unit, as text, and read into SI numbers."""
 
 from functools import cache
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import pint
 from pydantic import BeforeValidator, Field
 from pydantic_core import PydanticCustomError
+
+if TYPE_CHECKING:
+    import pint
 
 # The units a study file may use. A small registry loads in a millisecond, and a unit that makes no
 # sense here (light years, barn) is refused rather than converted.
@@ -31,7 +33,9 @@ _DIGITS = 12
 
 
 @cache
-def _registry() -> pint.UnitRegistry:
+def _registry() -> "pint.UnitRegistry":
+    import pint  # noqa: PLC0415 (a tenth of a second, which `--help` does without)
+
     registry = pint.UnitRegistry(None)
     for line in _DEFINITIONS:
         registry.define(line)
@@ -51,10 +55,12 @@ def parse_quantity(text: Any, unit: str) -> float:
         raise PydanticCustomError("quantity", "{allowed}", {"allowed": allowed})
     try:
         quantity = _registry().Quantity(text)
+        if not quantity.is_compatible_with(unit):
+            kind = {"m": "a length", "Pa": "a pressure", "s": "a time", "": "a share"}[unit]
+            raise PydanticCustomError("quantity", "{allowed}", {"allowed": f'{kind}, such as "{example}"'})
         magnitude = float(quantity.to(unit).magnitude)
-    except pint.DimensionalityError:
-        kind = {"m": "a length", "Pa": "a pressure", "s": "a time", "": "a share"}[unit]
-        raise PydanticCustomError("quantity", "{allowed}", {"allowed": f'{kind}, such as "{example}"'}) from None
+    except PydanticCustomError:
+        raise
     except Exception:  # pint raises many kinds, down to tokenizer errors, on text that is no quantity
         raise PydanticCustomError("quantity", "{allowed}", {"allowed": allowed}) from None
     if not abs(magnitude) < float("inf"):

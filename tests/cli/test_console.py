@@ -57,6 +57,9 @@ def test_misspelt_commands_options_and_reductions_get_the_nearest(tmp_path):
     assert "--json" in invoke(app, ["plan", "x.toml", "--jsn"]).stderr
     file = tmp_path / "small.toml"
     file.write_text(SMALL)
+    for command in ("validate", "plan", "run", "status"):
+        absent = invoke(app, [command, str(tmp_path / "smal.toml")])
+        assert (absent.exit_code, f"did you mean {file}?" in absent.stderr) == (2, True)
     refused = invoke(app, ["plan", str(file), "--without", "symetry"])
     assert (refused.exit_code, "did you mean `symmetry`?" in refused.stderr) == (2, True)
 

@@ -30,7 +30,7 @@ def test_begins_with_the_estimates_and_follows_what_is_measured():
     assert left.seconds() == pytest.approx(15, rel=0.05)
     clock.now += 2
     assert left.seconds() == pytest.approx(13, rel=0.05)
-    assert 0 < left.step_seconds(2) < 3
+    assert 0 < left.seconds(step=2) < 3
 
 
 def test_kinds_of_work_have_factors_of_their_own():

@@ -1,0 +1,131 @@
+"""The reference pages, written from the code when the documentation is built: study keys, dataset, commands."""
+
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from pipeline.cli import app
+from pipeline.plan.plan import make_plan
+from pipeline.report.dataset import build
+from pipeline.study.keys import SECTION_TEXTS, keys_of
+from pipeline.study.load import parse
+from pipeline.study.schema import SECTIONS
+from pipeline.study.starter import starter
+
+
+def write_reference(folder: Path) -> None:
+    """Write ``study.md``, ``dataset.md`` and ``commands.md`` into ``folder``, where they differ from what is there."""
+    folder.mkdir(exist_ok=True)
+    for name, text in {"study": study_page(), "dataset": dataset_page(), "commands": commands_page()}.items():
+        path = folder / f"{name}.md"
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")
+
+
+def study_page() -> str:
+    """Return the page of every key of a study file."""
+    lines = [
+        "# Study file", "",
+        "TOML. A list where one value is expected is a sweep, and a dimension of the dataset; so is an array of tables "
+        "(`[[probe]]`), labelled by the tables' `name`. Quantities are text with a unit (`\"10 mm\"`, `\"12 kPa\"`, "
+        "`\"1 %\"`): prefixes of metre and pascal, `bar`, and `%`. `title` stands before the sections.",
+    ]  # fmt: skip
+    for section in SECTIONS:
+        lines += [
+            "",
+            f"## `[{section}]`",
+            "",
+            SECTION_TEXTS[section],
+            "",
+            *_table(("key", "takes", "default", "meaning")),
+        ]
+        for key in keys_of(section):
+            default = key.default or "required"
+            shown = default if key.words.default or not key.default else f"`{default}`"
+            text = f"*{', '.join(key.shapes)}*: {key.words.text}" if key.shapes else key.words.text
+            lines.append(_row(f"`{key.name}`", f"`{key.takes}`", shown, text))
+    return "\n".join(lines) + "\n"
+
+
+def dataset_page() -> str:
+    """Return the page of every variable of a dataset."""
+    dataset = build(make_plan(parse(tomllib.loads(starter("study")))), {})
+    lines = [
+        "# Dataset", "",
+        "`results/<study>.nc`: netCDF4, SI units, CF attributes. Its dimensions are what the study sweeps, in the "
+        "file's order, with coordinates named like the keys of `body`, `material`, `probe` and `mesh`. An array of "
+        "tables gives the dimension `probe` or `body`; a radius or shape is `probe_radius`, `body_radius`. `epsilon` "
+        "is infinite for the full order.", "",
+        *_table(("variable", "unit", "meaning")),
+    ]  # fmt: skip
+    for name, variable in sorted(dataset.data_vars.items()):
+        unit = variable.attrs.get("units", "text")
+        lines.append(_row(f"`{name}`", "" if unit == "1" else unit, variable.attrs.get("long_name", "")))
+    lines += [
+        "", "Values are missing (NaN; -1 for counts) where a case failed, was skipped or has not been run.", "",
+        "Attributes of the dataset: the study's text (`study`) and its hash, versions of the program and its "
+        "libraries, git commit, host, ranks, start and end.",
+    ]  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+def commands_page() -> str:
+    """Return the page of every command with its arguments and options."""
+    root = typer.main.get_command(app)
+    lines = [
+        "# Commands", "",
+        "`epsmesh COMMAND --help` says the same. `python -m pipeline` is the command, too.", "",
+        "Exit status: 0 done, 1 some cases failed, 2 the input is wrong, 130 interrupted. "
+        "Errors and progress go to standard error. Colour is for terminals; `NO_COLOR=1` does without.",
+    ]  # fmt: skip
+    for name, command in _commands(root):
+        lines += ["", f"## `epsmesh {name}`", "", *_help(command.help or "")]
+        rows = [row for parameter in command.params if (row := _parameter(parameter))]
+        if rows:
+            lines += [*_table(("", "meaning", "default")), *rows]
+    return "\n".join(lines) + "\n"
+
+
+def _commands(group: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from _commands(command, f"{prefix}{name} ")
+        else:
+            yield f"{prefix}{name}", command
+
+
+def _help(text: str) -> list[str]:
+    """Return a help text with its examples as a block."""
+    paragraphs = [" ".join(paragraph.split()) for paragraph in text.split("\n\n")]
+    examples = [p.removeprefix("Example: ") for p in paragraphs if p.startswith("Example: ")]
+    lines = [line for p in paragraphs if not p.startswith("Example: ") for line in (_escaped(p), "")]
+    return [*lines, "```text", *examples, "```", ""]
+
+
+def _parameter(parameter: Any) -> str:
+    if "--help" in parameter.opts:
+        return ""
+    required = parameter.param_type_name == "argument"
+    name = parameter.metavar or parameter.opts[0].upper() if required else ", ".join(reversed(parameter.opts))
+    if not required and parameter.metavar:
+        name = f"{name} {parameter.metavar}"
+    default = parameter.default
+    shown = "" if default in (None, False) or parameter.required else f"`{default}`"
+    return _row(f"`{name}`", _escaped(parameter.help or ""), "required" if parameter.required else shown)
+
+
+def _table(heads: tuple[str, ...]) -> list[str]:
+    return [_row(*heads), _row(*("---" for _ in heads))]
+
+
+def _row(*cells: str) -> str:
+    return "| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |"
+
+
+def _escaped(text: str) -> str:
+    """Keep ``<study>`` from being taken for HTML, and file patterns for emphasis."""
+    return re.sub(r"([<*_\[\]])", r"\\\1", text)

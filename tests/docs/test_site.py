@@ -1,0 +1,59 @@
+"""The site builds without a warning, and the reference holds everything that the code has."""
+
+import subprocess
+import sys
+
+import pytest
+from mpi4py import MPI
+
+from pipeline.cli import app
+from pipeline.plan.plan import make_plan
+from pipeline.report.dataset import build
+from pipeline.study.keys import keys_of
+from pipeline.study.schema import SECTIONS
+from tests.cases import study
+from tests.docs.blocks import ROOT
+
+pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="once is enough")
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    pytest.importorskip("sphinx", reason="the documentation's packages are not installed")
+    out = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-n", "-q", "-b", "html", ROOT / "docs", out]
+    done = subprocess.run([*command, "-d", out / "doctrees"], capture_output=True, text=True, check=False, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+    return out
+
+
+def reference(site, name):
+    return (site / "reference" / f"{name}.html").read_text(encoding="utf-8")
+
+
+def test_every_key_is_in_the_reference(site):
+    page = reference(site, "study")
+    for section in SECTIONS:
+        for key in keys_of(section):
+            assert f'<code class="docutils literal notranslate"><span class="pre">{key.name}</span></code>' in page
+
+
+def test_every_variable_of_a_dataset_has_units_and_a_meaning_and_is_in_the_reference(site):
+    page = reference(site, "dataset")
+    for name, variable in build(make_plan(study(mesh={"epsilon": ["4 mm", "full"]})), {}).variables.items():
+        if name == "component":
+            continue
+        assert variable.attrs.get("long_name"), f"{name} has no long_name"
+        assert variable.dtype == object or "units" in variable.attrs, f"{name} has no units"
+        assert f">{name}<" in page
+
+
+def test_every_command_and_option_has_help_and_is_in_the_reference(site):
+    import typer
+
+    page = reference(site, "commands")
+    for command in typer.main.get_command(app).commands.values():
+        for leaf in getattr(command, "commands", {None: command}).values():
+            assert f'<span class="pre">{leaf.name}</span>' in page
+            for parameter in leaf.params:
+                assert getattr(parameter, "help", None), f"{leaf.name} {parameter.name} has no help"
