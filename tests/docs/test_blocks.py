@@ -10,11 +10,10 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
-from pipeline.cli import app
 from pipeline.report.dataset import write
 from pipeline.study.load import parse
 from pipeline.study.starter import starter
-from tests.docs.blocks import PYTHON, ROOT, Block, blocks, missing, pages
+from tests.docs.blocks import PYTHON, ROOT, blocks, missing, pages
 from tests.report.synthetic import FIGURE, dataset
 from tests.test_cli import ENVIRONMENT
 
@@ -74,7 +73,7 @@ def python(root: Path, text: str) -> subprocess.CompletedProcess[str]:
 def test_blocks_of_a_page_run(page, checkout):
     session = ""  # what a reader has typed into Python so far
     for block in blocks(page):
-        if block.why_not or is_awaited(block):
+        if block.why_not:
             continue
         if block.language == PYTHON:
             session += block.text
