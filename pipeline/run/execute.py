@@ -18,7 +18,7 @@ from pipeline.plan.steps import MeshStep, OperatorStep, Solve, mesh_steps
 from pipeline.plan.symmetry import model_planes
 from pipeline.run.compile import prepare
 from pipeline.run.measure import TIMES, add_times, record_of, record_of_meridian
-from pipeline.run.memory import PeakMemory, available_memory
+from pipeline.run.memory import FreeMemory, PeakMemory
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import meridian_of, mesh_case, on_first_rank
 from pipeline.run.progress import Progress, Silent
@@ -88,6 +88,7 @@ class _Runner:
         self._plan, self._keep, self._progress = plan, keep, progress
         self._cache = None if self.timed else cache
         self._provenance = provenance(comm.size)
+        self._memory = FreeMemory(comm)
         self._retries: list[Solve] = []
         self._attempts: dict[str, list[Record]] = {}
 
@@ -124,7 +125,10 @@ class _Runner:
 
     def _run_operator(self, step: OperatorStep, mesh: BodyMesh, mesh_seconds: float, memory: PeakMemory) -> None:
         bodies: list[Body] = []
-        shared = len(step.solves) > 1
+        # Assembling both parts of the operator costs as much as assembling it twice, and memory for three.
+        degree = step.case.mesh.degree
+        needed = estimate.enriched_memory(estimate.dofs(mesh.cells, degree), degree, parts=True)
+        shared = len(step.solves) > 2 and not self._lacks_memory(needed, "")
         if not self._guard(
             step.solves, lambda: bodies.append(_body(mesh, step.case, shared=shared, reuse=self._plan.reuse))
         ):
@@ -220,7 +224,7 @@ class _Runner:
 
     def _lacks_memory(self, needed: float, what: str) -> str:
         """Return what to say if ``needed`` bytes are too much, the same on every rank; collective."""
-        available = available_memory(self.comm)
+        available = self._memory.available()
         if needed <= _MEMORY_SHARE * available:
             return ""
         return f"{what} needs about {needed / 1e9:.1f} GB of memory, {available / 1e9:.1f} GB are available"
