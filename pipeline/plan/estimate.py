@@ -6,9 +6,10 @@ from pipeline.study.sweep import Case
 
 # Volume of gmsh's mean tetrahedron in units of the cube of the size asked for: measured, docs/performance.md.
 _TETRAHEDRON = 0.21
-# Bytes for each dof at the peak of a solve: the two parts of the operator, their sum, multigrid; or the factor of a
-# system of 50,000 dofs. Measured: docs/performance.md.
-_BYTES_PER_DOF = {"iterative": {1: 3000, 2: 3500, 3: 6000, 4: 9000}, "direct": {1: 9000, 2: 9000, 3: 10_000}}
+# Bytes for each dof at the peak of a solve: the operator and multigrid, or the factor of a system of 50,000 dofs; and
+# what two more matrices take. Measured: docs/solvers.md.
+_BYTES_PER_DOF = {"iterative": {1: 2500, 2: 1900, 3: 2000, 4: 2800}, "direct": {1: 9000, 2: 9000, 3: 10_000}}
+_BYTES_OF_PARTS = {1: 1000, 2: 1500, 3: 2200, 4: 3300}
 _BASE = 200e6
 # Dofs for each tetrahedron on large meshes, three components.
 _DOFS_PER_CELL = {1: 0.55, 2: 4.4, 3: 15.0, 4: 35.0}
@@ -40,18 +41,23 @@ def cells(case: Case) -> float:
     return total / _TETRAHEDRON
 
 
-def solving_memory(dofs: float, degree: int, *, direct: bool) -> float:
-    """Estimate the bytes that a solve takes, all ranks together."""
-    per_dof = _BYTES_PER_DOF["direct" if direct else "iterative"][degree]
+def dofs(count: float, degree: int) -> float:
+    """Estimate the unknowns on ``count`` tetrahedra."""
+    return _DOFS_PER_CELL[degree] * count
+
+
+def solving_memory(dofs: float, degree: int, *, direct: bool, parts: bool = False) -> float:
+    """Estimate the bytes that a solve takes, all ranks together; ``parts`` keeps A_λ and A_μ for the next ν."""
+    per_dof = _BYTES_PER_DOF["direct" if direct else "iterative"][degree] + parts * _BYTES_OF_PARTS[degree]
     # Fill of a factorisation in 3D grows like dofs^(4/3); the figure above is for 50,000.
     growth = (dofs / 50_000) ** (1 / 3) if direct else 1.0
     return _BASE + per_dof * growth * dofs
 
 
-def enriched_memory(dofs: float, degree: int) -> float:
+def enriched_memory(dofs: float, degree: int, *, parts: bool = False) -> float:
     """Estimate the bytes that an error bar takes: a solve of one degree more than that of ``dofs`` unknowns."""
     growth = _DOFS_PER_CELL[degree + 1] / _DOFS_PER_CELL[degree]
-    return solving_memory(growth * dofs, degree + 1, direct=False)
+    return solving_memory(growth * dofs, degree + 1, direct=False, parts=parts)
 
 
 def case_memory(case: Case, share: float = 1.0) -> float:
@@ -60,6 +66,5 @@ def case_memory(case: Case, share: float = 1.0) -> float:
     ``share`` is the part of the body that is modelled.
     """
     count = share * cells(case)
-    dofs = _DOFS_PER_CELL[case.mesh.degree] * count
-    solving = solving_memory(dofs, case.mesh.degree, direct=case.solve.method == "direct")
+    solving = solving_memory(dofs(count, case.mesh.degree), case.mesh.degree, direct=case.solve.method == "direct")
     return max(_BASE + _BYTES_PER_CELL * count, solving)

@@ -1,9 +1,7 @@
 """What solves a case on its mesh, if the memory is there for it."""
 
-from mpi4py import MPI
-
 from pipeline.mesh.distribute import BodyMesh
-from pipeline.run.memory import available_memory
+from pipeline.run.memory import FreeMemory
 from pipeline.solve.elasticity import ElasticBody
 from pipeline.solve.linear import SolveError
 from pipeline.solve.mixed import MixedBody
@@ -42,19 +40,19 @@ def solve_body(case: Case, body: Body, *, estimate: bool) -> Solution:
         return body.solve(lame, method="direct", tolerance=tolerance, estimate=estimate)
 
 
-def check_memory(comm: MPI.Comm, needed: float, what: str) -> None:
+def check_memory(free: FreeMemory, needed: float, what: str) -> None:
     """Refuse what needs more bytes of memory than there are; collective.
 
     Raises:
         CaseFailure: on every rank.
     """
-    if message := lacks_memory(comm, needed, what):
+    if message := lacks_memory(free, needed, what):
         raise CaseFailure(f"{message}: use larger elements, or a smaller epsilon")
 
 
-def lacks_memory(comm: MPI.Comm, needed: float, what: str) -> str:
+def lacks_memory(free: FreeMemory, needed: float, what: str) -> str:
     """Return what to say if ``needed`` bytes are too much, the same on every rank; collective."""
-    available = available_memory(comm)
+    available = free.available()
     if needed <= _MEMORY_SHARE * available:
         return ""
     return f"{what} needs about {needed / 1e9:.1f} GB of memory, {available / 1e9:.1f} GB are available"

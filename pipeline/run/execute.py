@@ -10,7 +10,7 @@ from pipeline.plan.schedule import schedule
 from pipeline.plan.steps import Solve, mesh_steps
 from pipeline.run.compile import prepare
 from pipeline.run.groups import run_phase
-from pipeline.run.memory import available_memory, keep_imports
+from pipeline.run.memory import FreeMemory, keep_imports
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.progress import Progress, Silent
 from pipeline.run.provenance import provenance
@@ -41,7 +41,7 @@ def execute(
         for wave in waves(plan, plan.solves):
             todo = tuple(solve for solve in wave if not desk.skips(solve))
             prepare(comm, todo)
-            memory = available_memory(comm)
+            memory = FreeMemory(comm).available()
             steps = mesh_steps(todo, shared=plan.shared)
             for phase in schedule(steps, comm.size, plan.cost, memory, apart=plan.study.solve.timing):
                 run_phase(comm, phase, make, desk.take)

@@ -47,16 +47,23 @@ class PeakMemory:
         return float(self._comm.allreduce(_peak_of_process()))
 
 
-def available_memory(comm: MPI.Comm) -> float:
-    """Return the bytes that the ranks together may still take, the same on every rank; collective.
+class FreeMemory:
+    """What the ranks together may still take."""
 
-    What their machines have free, or, if less, what containers, Slurm's grant or the limits of the processes leave.
-    """
-    machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
-    is_first = machine.rank == 0
-    machine.Free()
-    free = min(psutil.virtual_memory().available, container_room(), _granted()) if is_first else 0.0
-    return float(min(comm.allreduce(free), comm.allreduce(_room_of_process())))
+    def __init__(self, comm: MPI.Comm):
+        """Collective."""
+        self._comm = comm
+        machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
+        self._is_first = machine.rank == 0
+        machine.Free()
+
+    def available(self) -> float:
+        """Return it in bytes, the same on every rank; collective.
+
+        What the machines have free, or, if less, what containers, Slurm's grant or the limits of the processes leave.
+        """
+        free = min(psutil.virtual_memory().available, container_room(), _granted()) if self._is_first else 0.0
+        return float(min(self._comm.allreduce(free), self._comm.allreduce(_room_of_process())))
 
 
 def container_room(table: Path = Path("/proc/self/cgroup"), root: Path = Path("/sys/fs/cgroup")) -> float:

@@ -17,7 +17,7 @@ from pipeline.plan.symmetry import model_planes
 from pipeline.run.body import Body, CaseFailure, body_of, check_memory, lacks_memory, solve_body
 from pipeline.run.compile import prepare
 from pipeline.run.measure import TIMES, add_times, record_of, record_of_meridian
-from pipeline.run.memory import PeakMemory, give_back
+from pipeline.run.memory import FreeMemory, PeakMemory, give_back
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import meridian_of, mesh_case, on_first_rank
 from pipeline.run.progress import Progress
@@ -42,6 +42,7 @@ class StepRunner:
         self._plan, self._keep, self._progress = plan, keep, progress
         self._cache = None if self._timed else cache
         self._provenance = provenance(comm.size)
+        self._free = FreeMemory(comm)
         self._retries: list[Solve] = []
         self._attempts: dict[str, list[Record]] = {}
 
@@ -78,7 +79,10 @@ class StepRunner:
 
     def _run_operator(self, step: OperatorStep, mesh: BodyMesh, mesh_seconds: float, memory: PeakMemory) -> None:
         bodies: list[Body] = []
-        shared = len(step.solves) > 1
+        # Assembling both parts of the operator costs as much as assembling it twice, and memory for three.
+        degree = step.case.mesh.degree
+        needed = estimate.enriched_memory(estimate.dofs(mesh.cells, degree), degree, parts=True)
+        shared = len(step.solves) > 2 and not lacks_memory(self._free, needed, "")
         if not self._guard(
             step.solves, lambda: bodies.append(body_of(mesh, step.case, shared=shared, reuse=self._plan.reuse))
         ):
@@ -106,11 +110,11 @@ class StepRunner:
     def _solve(self, solve: Solve, body: Body, mesh: BodyMesh, seconds: float, memory: PeakMemory) -> Record:
         case, degree = solve.case, solve.case.mesh.degree
         direct = is_direct(case.solve.method, body.dofs, degree)
-        check_memory(self.comm, estimate.solving_memory(body.dofs, degree, direct=direct), "solving")
+        check_memory(self._free, estimate.solving_memory(body.dofs, degree, direct=direct), "solving")
         missing = ""
         untimed = solve.is_reference or not self._timed
         if untimed:
-            missing = lacks_memory(self.comm, estimate.enriched_memory(body.dofs, degree), "the error bar")
+            missing = lacks_memory(self._free, estimate.enriched_memory(body.dofs, degree), "the error bar")
         wanted = untimed and not missing
         solution = solve_body(case, body, estimate=wanted)
         return replace(self._stamp(record_of(solve, solution, mesh.cells, seconds), memory), message=missing)
@@ -155,7 +159,7 @@ class StepRunner:
     def _mesh(self, case: Case, mirrors: tuple[str, ...]) -> tuple[BodyMesh, float]:
         """Return the distributed mesh of a case and the seconds that it took; collective."""
         self._progress.note(f"meshing: {case}")
-        check_memory(self.comm, estimate.case_memory(case, share=0.5 ** len(mirrors)), "this case")
+        check_memory(self._free, estimate.case_memory(case, share=0.5 ** len(mirrors)), "this case")
         return mesh_case(case, mirrors, self.comm, self._cache)
 
     def _record_one(self, solve: Solve, compute: Callable[[], Record]) -> None:

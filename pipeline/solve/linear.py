@@ -15,8 +15,8 @@ from petsc4py import PETSc
 from pipeline.solve.transfer import transfer
 from pipeline.stages import stage
 
-# Dofs up to which Cholesky is faster than conjugate gradients, measured: docs/performance.md.
-DIRECT_LIMIT = {1: 12_000, 2: 4_000, 3: 4_000}
+# Dofs up to which Cholesky is faster than conjugate gradients, measured: docs/solvers.md.
+DIRECT_LIMIT = {1: 5_000, 2: 1_500, 3: 1_500}
 _MOST_ITERATIONS = 500
 
 # Measured: docs/solvers.md. Five steps find the largest eigenvalue to 15 %; two steps of smoothing on its upper nine

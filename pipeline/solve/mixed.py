@@ -47,8 +47,8 @@ from pipeline.stages import stage
 
 # λ₀/μ = 1 (ν = ¼): small enough for the multigrid, large enough for the pressure's mass to be a good preconditioner.
 LAME = (1.0, 1.0)
-# Dofs up to which a direct solve is faster, measured for degrees 2 and 3.
-DIRECT_LIMIT = 2_500
+# Dofs up to which a direct solve is faster, measured for degrees 2 and 3 (docs/solvers.md).
+DIRECT_LIMIT = 1_500
 # Relative energy norm of the error to which the solution of degree k + 1 is found for the error bar.
 _ESTIMATE_TOLERANCE = 0.1
 # Forces balance at a tenth of the tolerance that F needs: three iterations more, less than to find out and go on.

@@ -35,22 +35,24 @@ def transfer(coarse: Side, fine: Side) -> PETSc.Mat:
 
     The caller destroys the matrix.
     """
-    dofmap, width = coarse.space.dofmap, fine.space.dofmap.index_map_bs
+    width = fine.space.dofmap.index_map_bs
     offsets, points, weights = _rows(coarse.space, fine.space)
-    # A row of blocks w I: ``width`` rows with the same weights, each on its own components.
-    count = np.repeat(np.diff(offsets), width)
-    start = np.concatenate([[0], np.cumsum(count)])
-    within = np.arange(start[-1]) - np.repeat(start[:-1], count)
-    entry = np.repeat(np.repeat(offsets[:-1], width), count) + within
-    component = np.repeat(np.tile(np.arange(width), len(offsets) - 1), count)
-    free = [_free(side) for side in (fine, coarse)]
-    row = np.repeat(np.arange(len(count)), count)
-    values = weights[entry] * free[0][row] * free[1][width * points[entry] + component]
-    columns = width * dofmap.index_map.local_to_global(points[entry].astype(np.int32)) + component
+    count = np.diff(offsets)
+    row = np.repeat(np.arange(len(count), dtype=np.int32), count)
+    first = width * coarse.space.dofmap.index_map.local_to_global(points)
+    columns, values = np.empty(width * len(row), dtype=PETSc.IntType), np.empty(width * len(row))
+    free_row, free_column = (_free(side) for side in (fine, coarse))
+    # A point has ``width`` rows with the same weights, each for its own component.
+    place = np.arange(len(row)) + (width - 1) * offsets[row]
+    for component in range(width):
+        columns[place] = first + component
+        values[place] = weights * free_row[width * row + component] * free_column[width * points + component]
+        place += count[row]
+    start = np.concatenate([[0], np.cumsum(np.repeat(count, width))]).astype(PETSc.IntType)
     sizes = [width * side.space.dofmap.index_map.size_local for side in (fine, coarse)]
     matrix = PETSc.Mat().createAIJ(
         ((sizes[0], None), (sizes[1], None)), bsize=width, comm=fine.space.mesh.comm,
-        csr=(start.astype(PETSc.IntType), columns.astype(PETSc.IntType), values),
+        csr=(start, columns, values),
     )  # fmt: skip
     matrix.assemble()
     return matrix

@@ -19,6 +19,7 @@ from pipeline.plan.steps import Solve
 from pipeline.plan.symmetry import mirror_planes, model_planes
 from pipeline.run.body import Body, body_of, check_memory, solve_body
 from pipeline.run.compile import prepare
+from pipeline.run.memory import FreeMemory
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import cached_arrays, on_first_rank
 from pipeline.solve.linear import is_direct
@@ -67,7 +68,7 @@ def _attempt(solve: Solve, comm: MPI.Comm, cache: MeshCache | None, note: Note) 
     mesh = distribute(comm, arrays)
     with body_of(mesh, case, shared=False) as body:
         direct = is_direct(case.solve.method, body.dofs, case.mesh.degree)
-        check_memory(comm, estimate.solving_memory(body.dofs, case.mesh.degree, direct=direct), "solving")
+        check_memory(FreeMemory(comm), estimate.solving_memory(body.dofs, case.mesh.degree, direct=direct), "solving")
         note(f"solving for {body.dofs} unknowns")
         solution = solve_body(case, body, estimate=solve.goal is not None)
         points = comm.bcast(len(arrays.points) if arrays is not None else 0)
@@ -79,7 +80,7 @@ def _attempt(solve: Solve, comm: MPI.Comm, cache: MeshCache | None, note: Note) 
 
 def _arrays(solve: Solve, comm: MPI.Comm, cache: MeshCache | None, note: Note) -> MeshArrays | None:
     """Return, on rank 0, the mesh of the part of the body that is modelled."""
-    check_memory(comm, estimate.case_memory(solve.case, share=0.5 ** len(solve.mirrors)), "this case")
+    check_memory(FreeMemory(comm), estimate.case_memory(solve.case, share=0.5 ** len(solve.mirrors)), "this case")
     note("meshing")
     return on_first_rank(comm, lambda: cached_arrays(solve.case, solve.mirrors, cache))
 

@@ -7,7 +7,7 @@ from math import inf
 import pytest
 from mpi4py import MPI
 
-from pipeline.run.memory import available_memory, container_room
+from pipeline.run.memory import FreeMemory, container_room
 
 V2 = ("memory.max", "memory.current", "inactive_file", "")
 V1 = ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file", "memory")
@@ -49,15 +49,15 @@ def test_limit_of_the_process():
     limit = 3_000_000_000
     code = (
         f"import resource; resource.setrlimit(resource.RLIMIT_AS, ({limit}, {limit}));"
-        "from mpi4py import MPI; from pipeline.run.memory import available_memory;"
-        "print(available_memory(MPI.COMM_SELF))"
+        "from mpi4py import MPI; from pipeline.run.memory import FreeMemory;"
+        "print(FreeMemory(MPI.COMM_SELF).available())"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert 0 < float(done.stdout) < min(limit, available_memory(MPI.COMM_SELF) + 1e9)
+    assert 0 < float(done.stdout) < min(limit, FreeMemory(MPI.COMM_SELF).available() + 1e9)
 
 
 @pytest.mark.mpi
 def test_ranks_agree():
-    found = MPI.COMM_WORLD.allgather(available_memory(MPI.COMM_WORLD))
+    found = MPI.COMM_WORLD.allgather(FreeMemory(MPI.COMM_WORLD).available())
     assert len(set(found)) == 1
     assert found[0] > 0

@@ -4,7 +4,7 @@ import psutil
 import pytest
 from mpi4py import MPI
 
-from pipeline.run.memory import available_memory
+from pipeline.run.memory import FreeMemory
 from tests.cases import solve
 
 
@@ -17,22 +17,22 @@ def outside_slurm(monkeypatch):
 @pytest.mark.mpi
 def test_machines_count_once():
     total = psutil.virtual_memory().total
-    assert 0 < available_memory(MPI.COMM_WORLD) <= total
+    assert 0 < FreeMemory(MPI.COMM_WORLD).available() <= total
 
 
 def test_what_slurm_grants(monkeypatch):
-    free = available_memory(MPI.COMM_SELF)
+    free = FreeMemory(MPI.COMM_SELF).available()
     resident = psutil.Process().memory_info().rss
     granted = resident / 1e6 + 100
     monkeypatch.setenv("SLURM_MEM_PER_NODE", str(granted))
-    assert available_memory(MPI.COMM_SELF) == pytest.approx(100e6, rel=0.5)
+    assert FreeMemory(MPI.COMM_SELF).available() == pytest.approx(100e6, rel=0.5)
     monkeypatch.setenv("SLURM_MEM_PER_NODE", "0")
-    assert available_memory(MPI.COMM_SELF) > 0.5 * free
+    assert FreeMemory(MPI.COMM_SELF).available() > 0.5 * free
     monkeypatch.setenv("SLURM_MEM_PER_CPU", str(granted / 2))
     monkeypatch.setenv("SLURM_CPUS_ON_NODE", "2")
-    assert available_memory(MPI.COMM_SELF) == pytest.approx(100e6, rel=0.5)
+    assert FreeMemory(MPI.COMM_SELF).available() == pytest.approx(100e6, rel=0.5)
     monkeypatch.setenv("SLURM_MEM_PER_CPU", "1")
-    assert available_memory(MPI.COMM_SELF) == 0.0
+    assert FreeMemory(MPI.COMM_SELF).available() == 0.0
 
 
 def test_a_case_that_needs_more_than_granted_fails_with_its_reason(monkeypatch):
