@@ -17,16 +17,18 @@ _CLOSE = 1e-6
 
 def solve(
     scene: Scene, threads: int, *, order: int, rim: float, maxh: float, grading: float, levels: int,
-    factor: float = 0.15, safety: float = 2.0, solver: str = "sparsecholesky",
+    factor: float = 0.15, safety: float = 2.0, corners: bool = True,
+    solver: str = "sparsecholesky",
 ) -> Answer:  # fmt: skip
-    """Return F: ``order`` p, elements of ``rim`` half widths at the probe's edge, growing by ``grading`` to ``maxh`` mm.
+    """Return F: order p, elements of ``rim`` half widths at the probe's edge, growing by ``grading`` to ``maxh`` mm.
 
-    The edge is then refined ``levels`` times towards itself, each time by ``factor``. ``solver``: "sparsecholesky",
+    The edge, and with ``corners`` a blade's corners, are then refined ``levels`` times towards themselves, each time by
+    ``factor``. ``solver``: "sparsecholesky",
     or "bddc" for conjugate gradients with that preconditioner.
     """
     ng.SetNumThreads(threads)
     parts = Parts()
-    mesh = _mesh(scene, rim * scene.half_width, maxh, grading, safety)
+    mesh = _mesh(scene, rim * scene.half_width, maxh, grading, safety, corners)
     if levels:
         mesh.RefineHP(levels, factor)
     mesh.Curve(order)
@@ -37,14 +39,14 @@ def solve(
         return _force(scene, mesh, order, solver, parts)
 
 
-def _mesh(scene: Scene, rim: float, maxh: float, grading: float, safety: float = 2.0) -> Any:
-    geometry = OCCGeometry(_shape(scene, rim))
+def _mesh(scene: Scene, rim: float, maxh: float, grading: float, safety: float = 2.0, corners: bool = True) -> Any:
+    geometry = OCCGeometry(_shape(scene, rim, corners))
     # Netgen's own threads wait by spinning, which costs more than all of such a mesh.
     sizes = {"maxh": maxh, "grading": grading, "curvaturesafety": safety}
     return ng.Mesh(geometry.GenerateMesh(**sizes, parallel_meshing=False, nthreads=1))
 
 
-def _shape(scene: Scene, rim: float) -> Any:
+def _shape(scene: Scene, rim: float, corners: bool) -> Any:
     """Return the part of the body that symmetry leaves, with the footprint in its surface and all faces named."""
     if scene.body[0] == "box":
         _, length, width, height = scene.body
@@ -68,7 +70,7 @@ def _shape(scene: Scene, rim: float) -> Any:
     for edge in shape.edges:
         if edge.name == "rim":
             edge.maxh, edge.hpref = rim, 1
-            if scene.probe[0] == "blade":
+            if corners and scene.probe[0] == "blade":
                 for vertex in edge.vertices:
                     vertex.hpref = 1
     return shape

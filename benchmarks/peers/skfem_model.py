@@ -174,7 +174,7 @@ def _prescribed(scene: Scene, basis: Basis) -> tuple[np.ndarray, np.ndarray]:
     if scene.probe[0] == "disc":
         below = np.hypot(*offset) < scene.probe[1] + _CLOSE
     else:
-        below = (offset.T < np.array(scene.probe[1:]) / 2 + _CLOSE).all(axis=1)
+        below = (np.array(scene.probe[1:]) / 2 + _CLOSE > offset.T).all(axis=1)
     probe = below & (np.abs(z) < _CLOSE)
     held = np.zeros((len(z), 3), dtype=bool)
     held[probe | (z < -scene.height + _CLOSE)] = True
@@ -204,9 +204,8 @@ def _solve_pardiso(matrix: sp.csr_matrix, rhs: np.ndarray, _: None) -> np.ndarra
 
 
 def _solve_cholmod(matrix: sp.csr_matrix, rhs: np.ndarray, _: None) -> np.ndarray:
-    from cvxopt import cholmod
+    from cvxopt import cholmod, spmatrix
     from cvxopt import matrix as dense
-    from cvxopt import spmatrix
 
     lower = sp.tril(matrix, format="coo")
     solution = dense(rhs)
