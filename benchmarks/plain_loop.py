@@ -4,8 +4,8 @@ Every case is meshed, assembled and solved by itself (:mod:`benchmarks.plain_cas
 no F_exact, no file is written. The program runs the same study with all of that, as ``epsmesh run --fresh`` does,
 start-up included, and once more without F_exact. Compiled forms are in their caches for both.
 
-``python -m benchmarks.plain_loop [STUDY]`` wants an idle machine, and takes an hour or two for figure3.toml; ``--sample 24``
-times so many cases, spread over the sizes of meshes, and extrapolates.
+``python -m benchmarks.plain_loop [STUDY]`` wants an idle machine, and takes an hour or two for figure3.toml;
+``--sample 24`` times so many cases, spread over the sizes of meshes, and extrapolates.
 """
 
 import argparse

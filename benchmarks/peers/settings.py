@@ -18,12 +18,43 @@ def _grid(**choices: tuple[Any, ...]) -> Settings:
 GRIDS: dict[str, Settings] = {
     "NGSolve": _grid(
         order=(2, 3, 4), rim=(0.5, 1.0), maxh=(25, 50), grading=(0.3, 0.5, 0.8), levels=(2, 3), factor=(0.15, 0.25),
-        safety=(1.0, 2.0), solver=("sparsecholesky",),
+        safety=(1.0, 2.0), corners=(True, False), solver=("sparsecholesky", "bddc"),
     ),
     "scikit-fem": _grid(
-        rim=(0.1, 0.05, 0.025), growth=(0.5, 0.35, 0.25, 0.18), quarter=(True, False), solver=("pardiso",)
+        rim=(0.1, 0.05, 0.025), growth=(0.5, 0.35, 0.25, 0.18), quarter=(True, False), solver=("pardiso", "cholmod", "amg")
     ),
 }  # fmt: skip
 
-# p, rim, maxh, grading, levels, safety
-_NGSOLVE: dict[str, tuple[tuple[float, ...], ...]] = {}
+_NAMES = ("order", "rim", "maxh", "grading", "levels", "safety", "corners")
+
+
+def _ngsolve(*rows: tuple[float, ...]) -> Settings:
+    return tuple(dict(zip(_NAMES, row, strict=False)) for row in rows)
+
+
+def _skfem(*rows: tuple[float, float]) -> Settings:
+    return tuple({"rim": rim, "growth": growth, "quarter": True} for rim, growth in rows)
+
+
+LADDERS: dict[str, dict[str, Settings]] = {
+    "NGSolve": {
+        "disc": _ngsolve(
+            (3, 1, 30, 0.3, 2, 1.0), (3, 0.6, 30, 0.3, 2, 1.0), (4, 1, 30, 0.6, 2, 1.0), (4, 1, 30, 0.4, 2, 1.0),
+            (4, 1, 30, 0.3, 2, 1.0), (4, 0.6, 30, 0.3, 2, 1.0), (4, 0.7, 20, 0.25, 3, 1.5), (5, 1, 30, 0.3, 2, 1.0),
+        ),
+        "blade": _ngsolve(
+            (3, 2, 30, 0.5, 2, 1.0, False), (3, 2, 30, 0.4, 2, 1.0, False), (3, 1, 30, 0.5, 2, 1.0, False),
+            (3, 1, 30, 0.4, 2, 1.0, False), (4, 2, 30, 0.4, 2, 1.0, False), (4, 1, 30, 0.5, 2, 1.0, False),
+            (4, 1, 30, 0.4, 2, 1.0, True), (4, 0.5, 50, 0.5, 2, 1.0, True),
+        ),
+        "cylinder": _ngsolve(
+            (3, 1, 25, 0.5, 2, 1.0), (3, 1, 25, 0.4, 2, 1.5), (3, 1, 25, 0.3, 2, 2.0), (4, 1, 25, 0.4, 2, 1.0),
+            (4, 1, 25, 0.5, 2, 1.0), (4, 1, 25, 0.4, 2, 1.5), (4, 0.5, 50, 0.5, 3, 2.0), (4, 1, 25, 0.3, 2, 2.0),
+        ),
+    },
+    "scikit-fem": {
+        "disc": _skfem((0.2, 0.35), (0.1, 0.25), (0.05, 0.25), (0.05, 0.2)),
+        "blade": _skfem((0.2, 0.35), (0.1, 0.25), (0.05, 0.25), (0.05, 0.2), (0.025, 0.18)),
+        "cylinder": _skfem((0.2, 0.35), (0.1, 0.25), (0.1, 0.22), (0.05, 0.25), (0.05, 0.2), (0.025, 0.18)),
+    },
+}  # fmt: skip
