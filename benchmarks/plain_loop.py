@@ -53,8 +53,9 @@ def run_program(study: Study, folder: Path, *, exact: bool) -> dict[str, Any]:
     """Run the program afresh on a study; return seconds, processor seconds, and the dataset's path."""
     text = study.text
     if not exact:
-        head = "[solve]\nexact = false\n"
-        text = text.replace("[solve]\n", head) if re.search(r"^\[solve\]$", text, re.MULTILINE) else f"{text}\n{head}"
+        text = re.sub(r"^exact\b.*$", "", text, flags=re.MULTILINE)
+        text, found = re.subn(r"^\[solve\]", "[solve]\nexact = false", text, flags=re.MULTILINE)
+        text = text if found else f"{text}\n[solve]\nexact = false\n"
     file = folder / f"{study.name}.toml"
     file.write_text(text)
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()

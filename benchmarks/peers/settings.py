@@ -17,18 +17,19 @@ def _grid(**choices: tuple[Any, ...]) -> Settings:
 
 GRIDS: dict[str, Settings] = {
     "NGSolve": _grid(
-        order=(2, 3, 4), rim=(0.5, 1.0), maxh=(25, 50), grading=(0.3, 0.5, 0.8), levels=(2, 3), factor=(0.15, 0.25),
-        safety=(1.0, 2.0), corners=(True, False), solver=("sparsecholesky", "bddc"),
+        order=(2, 3, 4), rim=(0.5, 1, 2), maxh=(30,), grading=(0.3, 0.4, 0.5, 0.8), levels=(1, 2, 3),
+        safety=(1.0, 1.5, 2.0), corners=(True,), solver=("sparsecholesky", "bddc"),
     ),
     "scikit-fem": _grid(
-        rim=(0.1, 0.05, 0.025), growth=(0.5, 0.35, 0.25, 0.18), quarter=(True, False), solver=("pardiso", "cholmod", "amg")
+        rim=(0.1, 0.05, 0.025), growth=(0.5, 0.35, 0.25, 0.18), quarter=(True, False),
+        solver=("pardiso", "cholmod", "amg"),
     ),
 }  # fmt: skip
 
-_NAMES = ("order", "rim", "maxh", "grading", "levels", "safety", "corners")
+_NAMES = ("order", "rim", "maxh", "grading", "levels", "safety", "corners", "solver")
 
 
-def _ngsolve(*rows: tuple[float, ...]) -> Settings:
+def _ngsolve(*rows: tuple[float | str, ...]) -> Settings:
     return tuple(dict(zip(_NAMES, row, strict=False)) for row in rows)
 
 
@@ -40,12 +41,13 @@ LADDERS: dict[str, dict[str, Settings]] = {
     "NGSolve": {
         "disc": _ngsolve(
             (3, 1, 30, 0.3, 2, 1.0), (3, 0.6, 30, 0.3, 2, 1.0), (4, 1, 30, 0.6, 2, 1.0), (4, 1, 30, 0.4, 2, 1.0),
-            (4, 1, 30, 0.3, 2, 1.0), (4, 0.6, 30, 0.3, 2, 1.0), (4, 0.7, 20, 0.25, 3, 1.5), (5, 1, 30, 0.3, 2, 1.0),
+            (4, 1, 30, 0.3, 2, 1.0), (4, 0.6, 30, 0.3, 2, 1.0), (4, 0.6, 30, 0.3, 2, 1.0, True, "bddc"),
+            (4, 0.7, 20, 0.25, 3, 1.5),
         ),
         "blade": _ngsolve(
             (3, 2, 30, 0.5, 2, 1.0, False), (3, 2, 30, 0.4, 2, 1.0, False), (3, 1, 30, 0.5, 2, 1.0, False),
             (3, 1, 30, 0.4, 2, 1.0, False), (4, 2, 30, 0.4, 2, 1.0, False), (4, 1, 30, 0.5, 2, 1.0, False),
-            (4, 1, 30, 0.4, 2, 1.0, True), (4, 0.5, 50, 0.5, 2, 1.0, True),
+            (4, 1, 30, 0.4, 2, 1.0, True), (4, 0.5, 50, 0.5, 2, 1.0, True), (4, 1, 30, 0.4, 2, 1.0, True, "bddc"),
         ),
         "cylinder": _ngsolve(
             (3, 1, 25, 0.5, 2, 1.0), (3, 1, 25, 0.4, 2, 1.5), (3, 1, 25, 0.3, 2, 2.0), (4, 1, 25, 0.4, 2, 1.0),
@@ -53,7 +55,7 @@ LADDERS: dict[str, dict[str, Settings]] = {
         ),
     },
     "scikit-fem": {
-        "disc": _skfem((0.2, 0.35), (0.1, 0.25), (0.05, 0.25), (0.05, 0.2)),
+        "disc": _skfem((0.2, 0.35), (0.1, 0.25), (0.05, 0.25)),
         "blade": _skfem((0.2, 0.35), (0.1, 0.25), (0.05, 0.25), (0.05, 0.2), (0.025, 0.18)),
         "cylinder": _skfem((0.2, 0.35), (0.1, 0.25), (0.1, 0.22), (0.05, 0.25), (0.05, 0.2), (0.025, 0.18)),
     },

@@ -1,10 +1,12 @@
 """The plain loop solves the program's cases, on its sizes, to like forces; a sample stands for the whole study."""
 
 import pytest
+import xarray as xr
 from mpi4py import MPI
 
 from benchmarks import plain_loop
 from benchmarks.plain_case import MOST_DIRECT, solve
+from pipeline.study.load import load
 from tests import cases
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="times one process")
@@ -50,15 +52,24 @@ def test_totals_count_what_a_case_stands_for():
     assert sum(found["parts"].values()) == pytest.approx(7 * sum(solved.parts.values()))
 
 
-def test_the_program_is_run_with_and_without_f_exact(tmp_path):
-    study = cases.study(mesh={**MESH, "epsilon": "full", "outside": "coarse"}, solve=None)
-    assert "exact" not in study.text
-    import xarray as xr
+STUDY = """
+body = {shape = "box", size = ["40 mm", "40 mm", "20 mm"], fixed = "bottom"}
+material = {young = "10 kPa", poisson = 0.3}
+probe = {action = "pierce", shape = "disc", radius = "3 mm", depth = "0.2 mm"}
+mesh = {epsilon = "full", fine = "6 mm", coarse = "8 mm", rim = "1 mm", growth = 0.8}
+[solve]
+exact = true
+tolerance = 1e-8
+"""
 
+
+def test_the_program_is_run_with_and_without_f_exact(tmp_path):
+    file = tmp_path / "small.toml"
+    file.write_text(STUDY)
     for exact in (True, False):
         place = tmp_path / str(exact)
         place.mkdir()
-        found = plain_loop.run_program(study, place, exact=exact)
+        found = plain_loop.run_program(load(file), place, exact=exact)
         with xr.open_dataset(found["dataset"]) as data:
             assert bool(data["force_exact"].notnull().all()) is exact
         assert found["cpu"] > 0
