@@ -30,7 +30,7 @@ def main() -> int:
     runs: list[Run] = []
     failures: list[dict[str, Any]] = []
     for program, job in _jobs(options):
-        for answer in ask(program, job):
+        for answer in _answers(program, job):
             if "failed" in answer:
                 failures.append({"program": program, "scene": job["scene"], **answer})
                 print(f"{program}, {job['scene']}: {answer['setting']}: {answer['failed']}", file=sys.stderr)
@@ -75,6 +75,14 @@ def _settings(program: str, scene: str, threads: int) -> Settings:
     if program != "program":
         return LADDERS[program][scene]
     return PROGRAM + (MERIDIAN if SCENES[scene].body[0] == "cylinder" and threads == 1 else ())
+
+
+def _answers(program: str, job: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield a program's answers; if it breaks down, that is the last of them: the others go on."""
+    try:
+        yield from ask(program, job)
+    except RuntimeError as error:
+        yield {"setting": {}, "failed": str(error)}
 
 
 def _run(program: str, job: dict[str, Any], answer: dict[str, Any], truths: dict[str, Truth]) -> Run:

@@ -55,13 +55,17 @@ def _timed(solve: Solve, scene: Scene, threads: int, setting: dict[str, Any]) ->
     return {"seconds": time.perf_counter() - start, "cpu": time.process_time() - cpu, **asdict(answer)}
 
 
-def serve(solve: Solve) -> None:
-    """Answer the job on standard input. What the libraries themselves print goes to standard error."""
-    job = json.load(sys.stdin)
+def serve(solve: Solve, share: Callable[[Any], Any] = lambda job: job, *, speaks: bool = True) -> None:
+    """Answer the job on standard input. What the libraries themselves print goes to standard error.
+
+    Of several ranks the one that ``speaks`` reads and answers; ``share`` gives the others what it read.
+    """
+    job = share(json.load(sys.stdin) if speaks else None)
     out = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
     for answer in answers(solve, job):
-        print(json.dumps(answer), file=out, flush=True)
+        if speaks:
+            print(json.dumps(answer), file=out, flush=True)
 
 
 class Parts:
