@@ -40,7 +40,7 @@ def main() -> int:
     found = standings(runs)
     texts = [truths_table(truths), table(found), breakdown(found)]
     if options.cpu:
-        texts.insert(2, "Processor time instead of time:\n\n" + table(found, "cpu"))
+        texts.insert(2, "Processor time instead of time:\n\n" + table(standings(runs, "cpu")))
     options.output.mkdir(parents=True, exist_ok=True)
     (options.output / "peers.md").write_text("\n\n".join(texts) + "\n")
     content = to_json(truths, runs, machine() | {"repeats": options.repeats}, failures)

@@ -22,7 +22,8 @@ def draw(runs: Sequence[Run], path: Path) -> Path:
     """Draw the runs on one thread: all as marks, the best of each program joined."""
     names = list(dict.fromkeys(run.scene for run in runs))
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(2.6 * len(names) + 0.9, 3.4))
+        width = 2.6 * len(names) + 0.9 + 1.2 * (len(names) == 1)
+        figure = Figure(figsize=(width, 3.4))
         FigureCanvasAgg(figure)
         panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
         for axes, name in zip(panels, names, strict=True):
@@ -32,7 +33,7 @@ def draw(runs: Sequence[Run], path: Path) -> Path:
         panels[0].set_ylabel("|true error of F| (%)")
         known = {label: h for axes in panels for h, label in zip(*axes.get_legend_handles_labels(), strict=True)}
         figure.legend(known.values(), known.keys(), loc="lower center", ncol=len(known))
-        figure.subplots_adjust(left=0.09, right=0.98, top=0.9, bottom=0.26, wspace=0.08)
+        figure.subplots_adjust(left=0.65 / width, right=1 - 0.15 / width, top=0.9, bottom=0.26, wspace=0.08)
         return save(figure, path)
 
 

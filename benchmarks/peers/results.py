@@ -28,6 +28,10 @@ class Run:
     parts: dict[str, float]
     all_seconds: list[float]
 
+    def on(self, clock: str) -> float:
+        """Return what it took by ``clock``: "seconds", or "cpu" (of two ranks, the first one's)."""
+        return self.cpu if clock == "cpu" else self.seconds
+
     @property
     def asked(self) -> float | None:
         """The accuracy that this program was asked for."""
@@ -42,6 +46,7 @@ class Standing:
     scene: str
     threads: int
     target: float
+    clock: str
     asked: Run | None
     hindsight: Run | None
     meridian: Run | None
@@ -50,16 +55,17 @@ class Standing:
     @property
     def best_peer(self) -> Run | None:
         """The fastest peer."""
-        return _fastest(run for run in self.peers.values() if run)
+        return _fastest((run for run in self.peers.values() if run), self.clock)
 
-    def ratio(self, clock: str = "seconds") -> float | None:
-        """Return this program's time, asked for the accuracy, over the best peer's, by ``clock``."""
+    @property
+    def ratio(self) -> float | None:
+        """This program's time, asked for the accuracy, over the best peer's."""
         best = self.best_peer
-        return getattr(self.asked, clock) / getattr(best, clock) if self.asked and best else None
+        return self.asked.on(self.clock) / best.on(self.clock) if self.asked and best else None
 
 
-def standings(runs: Sequence[Run]) -> list[Standing]:
-    """Return who stands where, for every scene, number of threads and accuracy that was run."""
+def standings(runs: Sequence[Run], clock: str = "seconds") -> list[Standing]:
+    """Return who stands where by ``clock``, for every scene, number of threads and accuracy that was run."""
     found = []
     for name, threads in dict.fromkeys((run.scene, run.threads) for run in runs):
         here = [run for run in runs if (run.scene, run.threads) == (name, threads)]
@@ -68,36 +74,38 @@ def standings(runs: Sequence[Run]) -> list[Standing]:
             own = [run for run in good if run.program == "program"]
             flat = [run for run in own if run.setting.get("model") == "auto"]
             own = [run for run in own if run not in flat]
-            peers = {peer: _fastest(run for run in good if run.program == peer) for peer in PEERS}
+            peers = {peer: _fastest((run for run in good if run.program == peer), clock) for peer in PEERS}
             asked = next((run for run in own if run.asked == target), None)
-            found.append(Standing(name, threads, target, asked, _fastest(own), _fastest(flat), peers))
+            found.append(
+                Standing(name, threads, target, clock, asked, _fastest(own, clock), _fastest(flat, clock), peers)
+            )
     return found
 
 
-def _fastest(runs: Iterable[Run]) -> Run | None:
-    return min(runs, key=lambda run: run.seconds, default=None)
+def _fastest(runs: Iterable[Run], clock: str) -> Run | None:
+    return min(runs, key=lambda run: run.on(clock), default=None)
 
 
-def table(found: Sequence[Standing], clock: str = "seconds") -> str:
-    """Return the standings in markdown; ``clock`` is "seconds" or "cpu"."""
+def table(found: Sequence[Standing]) -> str:
+    """Return the standings in markdown."""
     names = ("scene", "threads", "true error", "program, asked", "program, hindsight", "meridian", *PEERS)
     lines = [f"| {' | '.join(names)} | asked / best peer |", "|---" * (len(names) + 1) + "|"]
     for s in found:
         cells = [SCENES[s.scene].title, str(s.threads), f"{100 * s.target:g} %"]
-        cells += [_cell(run, clock) for run in (s.asked, s.hindsight, s.meridian, *s.peers.values())]
-        ratio = s.ratio(clock)
+        cells += [_cell(run, s.clock) for run in (s.asked, s.hindsight, s.meridian, *s.peers.values())]
+        ratio = s.ratio
         verdict = "" if ratio is None else f"{ratio:.2f}{'' if ratio <= GOAL else ' (missed)'}"
         lines.append(f"| {' | '.join(cells)} | {verdict} |")
     return "\n".join(lines)
 
 
 def _cell(run: Run | None, clock: str) -> str:
-    return f"{getattr(run, clock):.2f} s ({100 * abs(run.error):.2f} %)" if run else "—"
+    return f"{run.on(clock):.2f} s ({100 * abs(run.error):.2f} %)" if run else "—"
 
 
 def breakdown(found: Sequence[Standing]) -> str:
     """Return, in markdown, where the time of this program goes, and of the best peer."""
-    lines = ["| scene | true error | who | setting | seconds | parts |", "|---" * 6 + "|"]
+    lines = ["| scene | threads | true error | who | setting | seconds | parts |", "|---" * 7 + "|"]
     for s in found:
         for who, run in (("program, asked", s.asked), ("best peer", s.best_peer)):
             if run:
@@ -105,6 +113,7 @@ def breakdown(found: Sequence[Standing]) -> str:
                 setting = ", ".join(f"{key} {value}" for key, value in run.setting.items())
                 cells = (
                     s.scene,
+                    str(s.threads),
                     f"{100 * s.target:g} %",
                     f"{who} ({run.program})",
                     setting,
@@ -130,8 +139,8 @@ def to_json(
 ) -> dict[str, Any]:
     """Return all of it as JSON's types."""
     ratios = [
-        {"scene": s.scene, "threads": s.threads, "target": s.target, "ratio": s.ratio(), "ratio_cpu": s.ratio("cpu")}
-        for s in standings(runs)
+        {"scene": s.scene, "threads": s.threads, "target": s.target, "ratio": s.ratio, "ratio_cpu": by_cpu.ratio}
+        for s, by_cpu in zip(standings(runs), standings(runs, "cpu"), strict=True)
     ]
     return {
         "machine": machine, "goal": GOAL, "ratios": ratios, "failures": failures,
