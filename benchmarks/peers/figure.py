@@ -7,6 +7,7 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from benchmarks.peers.results import TARGETS, Run
 from benchmarks.peers.scenes import SCENES
@@ -47,6 +48,10 @@ def _panel(axes: Axes, runs: Sequence[Run]) -> None:
             axes.plot(*_points(_front(mine)), line, color=colour, marker=marker, label=label)
     axes.set_xscale("log")
     axes.set_yscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
 
 
 def _points(runs: Sequence[Run]) -> tuple[list[float], list[float]]:
