@@ -5,6 +5,8 @@ SHELL := /bin/bash
 STUDY ?= studies/figure3.toml
 NP ?= 1
 PYTEST_ARGS ?=
+PEERS_ARGS ?=
+LOOP_ARGS ?=
 
 # A selection of tests may hold none for 2 ranks (pytest's status 5); the whole suite may not.
 NONE_OK = $(if $(PYTEST_ARGS),|| [ $$? -eq 5 ])
@@ -17,7 +19,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's own mpirun: another one on PATH would not fit Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies docs test test-debian13 slurm-test verify benchmark stress soak lint format clean
+.PHONY: help setup study studies docs test test-debian13 slurm-test verify benchmark peers plain-loop stress soak lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -56,6 +58,13 @@ verify: setup ## forces against closed forms, tables and the program's other pat
 
 benchmark: setup ## work against precision: results/work_precision.nc and its figure (an idle machine, 10 minutes)
 	$(EPSMESH) benchmark
+
+peers: setup ## NGSolve and scikit-fem against this program, time to a true error (an idle machine): results/peers.md
+	@scripts/peers.sh
+	$(PYTHON) -m benchmarks.peers $(PEERS_ARGS)
+
+plain-loop: setup ## a study as a plain FEniCSx script runs it, against this program (idle, an hour or two)
+	$(PYTHON) -m benchmarks.plain_loop $(STUDY) $(LOOP_ARGS)
 
 stress: setup ## numerical stability: a matrix of extremes (10 minutes)
 	$(EPSMESH) stress

@@ -1,0 +1,27 @@
+"""What measured times belong to."""
+
+import platform
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from pipeline import compat
+
+
+def machine() -> dict[str, Any]:
+    """Return processor, cores, memory, load, date and versions."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        processor = next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        processor = platform.processor()
+    return {
+        "processor": processor,
+        "cores": psutil.cpu_count() or 0,
+        "memory_bytes": psutil.virtual_memory().total,
+        "load": psutil.getloadavg()[0],
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        **{f"version_{name}": text for name, text in compat.versions().items()},
+    }

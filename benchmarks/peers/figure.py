@@ -1,0 +1,73 @@
+"""Error against time, one panel for each scene."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from benchmarks.peers.results import TARGETS, Run
+from benchmarks.peers.scenes import SCENES
+from pipeline.report.figures import STYLE, save
+
+_LOOKS = {
+    "this program": ("#d81b60", "-", "*"), "this program, meridian": ("#2a9d8f", "-", "D"),
+    "NGSolve": ("#1f5fa8", "-", "o"), "scikit-fem": ("#c98a00", "-", "s"),
+}  # fmt: skip
+
+
+def draw(runs: Sequence[Run], path: Path) -> Path:
+    """Draw the runs on one thread: all as marks, the best of each program joined."""
+    names = list(dict.fromkeys(run.scene for run in runs))
+    with mpl.rc_context(STYLE):
+        width = 2.6 * len(names) + 0.9 + 1.2 * (len(names) == 1)
+        figure = Figure(figsize=(width, 3.4))
+        FigureCanvasAgg(figure)
+        panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
+        for axes, name in zip(panels, names, strict=True):
+            _panel(axes, [run for run in runs if run.scene == name and run.threads == 1])
+            axes.set_title(f"{SCENES[name].title}, ν = {SCENES[name].poisson:g}", fontsize=8)
+            axes.set_xlabel("time from geometry to F (s)")
+        panels[0].set_ylabel("|true error of F| (%)")
+        known = {label: h for axes in panels for h, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+        figure.legend(known.values(), known.keys(), loc="lower center", ncol=len(known))
+        figure.subplots_adjust(left=0.65 / width, right=1 - 0.15 / width, top=0.9, bottom=0.26, wspace=0.08)
+        return save(figure, path)
+
+
+def _panel(axes: Axes, runs: Sequence[Run]) -> None:
+    for target in TARGETS:
+        axes.axhline(100 * target, color="#bbbbbb", linewidth=0.6, zorder=0)
+    for label, (colour, line, marker) in _LOOKS.items():
+        mine = [run for run in runs if _label(run) == label]
+        if mine:
+            axes.plot(*_points(mine), marker, color=colour, markersize=3, alpha=0.45)
+            axes.plot(*_points(_front(mine)), line, color=colour, marker=marker, label=label)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _points(runs: Sequence[Run]) -> tuple[list[float], list[float]]:
+    return [run.seconds for run in runs], [100 * abs(run.error) for run in runs]
+
+
+def _label(run: Run) -> str:
+    if run.program != "program":
+        return run.program
+    return "this program, meridian" if run.setting.get("model") == "auto" else "this program"
+
+
+def _front(runs: Sequence[Run]) -> list[Run]:
+    """Return the runs that no faster one beats."""
+    front: list[Run] = []
+    for run in sorted(runs, key=lambda r: r.seconds):
+        if not front or abs(run.error) < abs(front[-1].error):
+            front.append(run)
+    return front

@@ -1,0 +1,133 @@
+"""The scenes in NGSolve, as one who knows it would: curved elements, hp-refined rim, condensation, a part by symmetry.
+
+``python -m benchmarks.peers.ngsolve_model`` answers a job (:mod:`benchmarks.peers.worker`).
+"""
+
+from math import pi
+from typing import Any
+
+import ngsolve as ng
+from netgen.occ import Axes, Box, Cylinder, Glue, OCCGeometry, Pnt, WorkPlane, X, Z
+
+from benchmarks.peers.scenes import Scene
+from benchmarks.peers.worker import Answer, Parts, serve
+
+_CLOSE = 1e-6
+
+
+def solve(
+    scene: Scene, threads: int, *, order: int, rim: float, maxh: float, grading: float, levels: int,
+    factor: float = 0.15, safety: float = 2.0, corners: bool = True,
+    solver: str = "sparsecholesky",
+) -> Answer:  # fmt: skip
+    """Return F: order p, elements of ``rim`` half widths at the probe's edge, growing by ``grading`` to ``maxh`` mm.
+
+    The edge, and with ``corners`` a blade's corners, are then refined ``levels`` times towards themselves, each time by
+    ``factor``. ``solver``: "sparsecholesky",
+    or "bddc" for conjugate gradients with that preconditioner.
+    """
+    ng.SetNumThreads(threads)
+    parts = Parts()
+    mesh = _mesh(scene, rim * scene.half_width, maxh, grading, safety, corners)
+    if levels:
+        mesh.RefineHP(levels, factor)
+    mesh.Curve(order)
+    parts.end("mesh")
+    if threads == 1:
+        return _force(scene, mesh, order, solver, parts)
+    with ng.TaskManager():
+        return _force(scene, mesh, order, solver, parts)
+
+
+def _mesh(scene: Scene, rim: float, maxh: float, grading: float, safety: float = 2.0, corners: bool = True) -> Any:
+    geometry = OCCGeometry(_shape(scene, rim, corners))
+    # Netgen's own threads wait by spinning, which costs more than all of such a mesh.
+    sizes = {"maxh": maxh, "grading": grading, "curvaturesafety": safety}
+    return ng.Mesh(geometry.GenerateMesh(**sizes, parallel_meshing=False, nthreads=1))
+
+
+def _shape(scene: Scene, rim: float, corners: bool) -> Any:
+    """Return the part of the body that symmetry leaves, with the footprint in its surface and all faces named."""
+    if scene.body[0] == "box":
+        _, length, width, height = scene.body
+        reach = max(length, width)
+        body = Box(Pnt(-length / 2, -width / 2, -height), Pnt(length / 2, width / 2, 0))
+    else:
+        _, reach, height = scene.body
+        body = Cylinder(Pnt(0, 0, -height), Z, reach, height)
+    footprint = _footprint(scene)
+    footprint.edges.name = "rim"
+    if scene.planes:
+        low = [0.0 if axis in scene.planes else -2.0 * reach for axis in "xy"]
+        half = Box(Pnt(*low, -2 * height), Pnt(2 * reach, 2 * reach, height))
+        body, footprint = body * half, footprint * half
+    for face in footprint.faces:
+        face.name = "probe"
+    shape = Glue([body, footprint])
+    for face in shape.faces:
+        if face.name != "probe":
+            face.name = _name(face, height, scene.planes)
+    for edge in shape.edges:
+        if edge.name == "rim":
+            edge.maxh, edge.hpref = rim, 1
+            if corners and scene.probe[0] == "blade":
+                for vertex in edge.vertices:
+                    vertex.hpref = 1
+    return shape
+
+
+def _footprint(scene: Scene) -> Any:
+    x, y = scene.at
+    plane = WorkPlane(Axes((x, y, 0), Z, X))
+    if scene.probe[0] == "disc":
+        return plane.Circle(scene.probe[1]).Face()
+    return plane.RectangleC(*scene.probe[1:]).Face()
+
+
+def _name(face: Any, height: float, planes: tuple[str, ...]) -> str:
+    low, high = face.bounding_box
+    if abs(low.z + height) < _CLOSE and abs(high.z + height) < _CLOSE:
+        return "fixed"
+    for axis in planes:
+        if abs(getattr(low, axis)) < _CLOSE and abs(getattr(high, axis)) < _CLOSE:
+            return f"mirror_{axis}"
+    return "free"
+
+
+def _force(scene: Scene, mesh: Any, order: int, solver: str, parts: Parts) -> Answer:
+    mu = 1 / (2 * (1 + scene.poisson))
+    lam = 2 * mu * scene.poisson / (1 - 2 * scene.poisson)
+    mirrors = {f"dirichlet{axis}": f"mirror_{axis}" for axis in scene.planes}
+    space = ng.VectorH1(mesh, order=order, dirichlet="probe|fixed", **mirrors)
+    u, v = space.TnT()
+    strain, test = ng.Sym(ng.Grad(u)), ng.Sym(ng.Grad(v))
+    stiffness = ng.BilinearForm(space, symmetric=True, condense=True)
+    stiffness += (2 * mu * ng.InnerProduct(strain, test) + lam * ng.div(u) * ng.div(v)) * ng.dx
+    preconditioner = ng.Preconditioner(stiffness, "bddc") if solver == "bddc" else None
+    stiffness.Assemble()
+    parts.end("assemble")
+    displacement = ng.GridFunction(space)
+    displacement.Set(ng.CF((0, 0, -1)), definedon=mesh.Boundaries("probe"))
+    free = space.FreeDofs(coupling=True)
+    residual = (-stiffness.mat * displacement.vec).Evaluate()
+    if preconditioner is not None:
+        inverse = ng.krylovspace.CGSolver(stiffness.mat, preconditioner.mat, tol=1e-5, maxiter=500)
+    else:
+        inverse = stiffness.mat.Inverse(free, inverse=solver)
+    displacement.vec.data += inverse * residual
+    # What was condensed carries no residual: the energy, F·d, is that of the coupling unknowns.
+    work = ng.InnerProduct(displacement.vec, (stiffness.mat * displacement.vec).Evaluate())
+    parts.end("solve")
+    return Answer(2 ** len(scene.planes) * work, space.ndof, parts.seconds)
+
+
+def area(scene: Scene, **sizes: float) -> float:
+    """Return the area (mm²) of the meshed footprint over the true one: that geometry and names are right."""
+    mesh = _mesh(scene, sizes["rim"] * scene.half_width, sizes["maxh"], sizes["grading"])
+    mesh.Curve(3)
+    found = ng.Integrate(1.0, mesh, definedon=mesh.Boundaries("probe")) * 2 ** len(scene.planes)
+    return found / (pi * scene.probe[1] ** 2 if scene.probe[0] == "disc" else scene.probe[1] * scene.probe[2])
+
+
+if __name__ == "__main__":
+    serve(solve)

@@ -1,0 +1,55 @@
+"""Processes of the programs that are compared: how each is started, and what it answers."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+PEERS_PYTHON = ROOT / ".venv-peers" / "bin" / "python"
+MODULES = {"program": "program", "NGSolve": "ngsolve_model", "scikit-fem": "skfem_model"}
+PEERS = ("NGSolve", "scikit-fem")
+# Debian's own mpirun: another one on PATH would not fit Debian's mpi4py.
+_MPIRUN = ("/usr/bin/mpirun", "--oversubscribe", "-n")
+
+
+def ask(program: str, job: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield a program's answers to ``job``, as soon as each exists; its threads, or ranks, are the job's.
+
+    Raises:
+        RuntimeError: with the end of what it said, if it breaks down, or its venv is not there.
+    """
+    if program in PEERS and not PEERS_PYTHON.exists():
+        raise RuntimeError(f"{PEERS_PYTHON} is not there: scripts/peers.sh makes it")
+    python = str(PEERS_PYTHON if program in PEERS else sys.executable)
+    ranks = job.get("threads", 1) if program == "program" else 1
+    launcher = [*_MPIRUN, str(ranks)] if ranks > 1 else []
+    command = [*launcher, python, "-m", f"benchmarks.peers.{MODULES[program]}"]
+    with (
+        TemporaryFile("w+") as errors,
+        subprocess.Popen(
+            command, cwd=ROOT, env=_environment(job), stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors,
+            text=True,
+        ) as process,
+    ):  # fmt: skip
+        assert process.stdin is not None
+        assert process.stdout is not None
+        process.stdin.write(json.dumps(job))
+        process.stdin.close()
+        for line in process.stdout:
+            yield json.loads(line)
+        if process.wait():
+            errors.seek(0)
+            raise RuntimeError(f"{program} ended with status {process.returncode}: {errors.read()[-2000:]}")
+
+
+def _environment(job: dict[str, Any]) -> dict[str, str]:
+    """One thread for every library that would take more; ranks and NGSolve's tasks are counted apart."""
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    path = os.pathsep.join(part for part in (str(ROOT), os.environ.get("PYTHONPATH", "")) if part)
+    return os.environ | dict.fromkeys(names, "1") | root | {"PYTHONPATH": path}

@@ -1,0 +1,68 @@
+"""The scenes in this program, from the study to the record, error bar and second tries included.
+
+``python -m benchmarks.peers.program`` answers a job (:mod:`benchmarks.peers.worker`).
+"""
+
+from typing import Any
+
+from mpi4py import MPI
+
+from benchmarks.peers.scenes import Scene
+from benchmarks.peers.worker import Answer, serve
+from pipeline.plan.plan import make_plan
+from pipeline.run.execute import compute
+from pipeline.run.measure import TIMES
+from pipeline.run.record import Record
+from pipeline.study.load import parse
+from pipeline.study.sweep import Study
+
+YOUNG, DEPTH = 1e4, 1e-4  # Pa, m: F is proportional to both
+_MM = 1e-3
+
+
+def solve(scene: Scene, threads: int, *, accuracy: str, model: str = "3d", **mesh: Any) -> Answer:
+    """Return F, asked for to ``accuracy``: ``model`` "3d" uses mirror symmetry, "auto" axisymmetry, too.
+
+    ``threads`` are ranks here, those of the world.
+    """
+    assert threads == MPI.COMM_WORLD.size
+    record = record_of(scene, model, {"accuracy": accuracy, **mesh})
+    force = record.force / (YOUNG * DEPTH * _MM)
+    return Answer(force, record.dofs, {name.removeprefix("time_"): getattr(record, name) for name in TIMES})
+
+
+def record_of(scene: Scene, model: str, mesh: dict[str, Any]) -> Record:
+    """Return the record of a scene with a ``mesh`` section; collective on the world.
+
+    Raises:
+        RuntimeError: if the program missed the accuracy.
+    """
+    without = ("axisymmetric",) if model == "3d" else ()
+    (record,) = compute(make_plan(study(scene, mesh), without=without), MPI.COMM_WORLD).values()
+    if not record.is_ok:
+        raise RuntimeError(record.message)
+    return record
+
+
+def study(scene: Scene, mesh: dict[str, Any]) -> Study:
+    """Return the study of a scene, whose one case is solved, and nothing else."""
+    body: dict[str, Any] = {"shape": scene.body[0]}
+    probe: dict[str, Any] = {"shape": scene.probe[0], "depth": f"{DEPTH * 1e3} mm", "at": _mm(*scene.at)}
+    body |= {"size": _mm(*scene.body[1:])} if scene.body[0] == "box" else _named(scene.body, "radius", "height")
+    probe |= _named(scene.probe, "radius") if scene.probe[0] == "disc" else _named(scene.probe, "length", "width")
+    return parse({
+        "body": body, "probe": probe, "material": {"young": f"{YOUNG} Pa", "poisson": scene.poisson}, "mesh": mesh,
+        "solve": {"exact": False},
+    })  # fmt: skip
+
+
+def _mm(*lengths: float) -> list[str]:
+    return [f"{length} mm" for length in lengths]
+
+
+def _named(shape: tuple[Any, ...], *names: str) -> dict[str, str]:
+    return dict(zip(names, _mm(*shape[1:]), strict=True))
+
+
+if __name__ == "__main__":
+    serve(solve, MPI.COMM_WORLD.bcast, speaks=MPI.COMM_WORLD.rank == 0)

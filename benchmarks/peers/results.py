@@ -1,0 +1,148 @@
+"""What the runs say: the fastest of each program that reaches a true error, tables, JSON."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from benchmarks.peers.processes import PEERS
+from benchmarks.peers.scenes import SCENES
+from benchmarks.peers.truth import Truth
+
+TARGETS = (1e-2, 3e-3, 1e-3)
+GOAL = 0.5  # this program's time over the best peer's
+
+
+@dataclass(frozen=True)
+class Run:
+    """One setting of one program: medians of its runs. ``error`` is relative to the truth."""
+
+    scene: str
+    program: str
+    threads: int
+    setting: dict[str, Any]
+    force: float
+    error: float
+    seconds: float
+    cpu: float
+    dofs: int
+    parts: dict[str, float]
+    all_seconds: list[float]
+
+    def on(self, clock: str) -> float:
+        """Return what it took by ``clock``: "seconds", or "cpu" (of two ranks, the first one's)."""
+        return self.cpu if clock == "cpu" else self.seconds
+
+    @property
+    def asked(self) -> float | None:
+        """The accuracy that this program was asked for."""
+        text = self.setting.get("accuracy")
+        return float(text.split()[0]) / 100 if text else None
+
+
+@dataclass(frozen=True)
+class Standing:
+    """The fastest runs within a true error: this program's as asked for it, and in hindsight, and each peer's."""
+
+    scene: str
+    threads: int
+    target: float
+    clock: str
+    asked: Run | None
+    hindsight: Run | None
+    meridian: Run | None
+    peers: dict[str, Run | None]
+
+    @property
+    def best_peer(self) -> Run | None:
+        """The fastest peer."""
+        return _fastest((run for run in self.peers.values() if run), self.clock)
+
+    @property
+    def ratio(self) -> float | None:
+        """This program's time, asked for the accuracy, over the best peer's."""
+        best = self.best_peer
+        return self.asked.on(self.clock) / best.on(self.clock) if self.asked and best else None
+
+
+def standings(runs: Sequence[Run], clock: str = "seconds") -> list[Standing]:
+    """Return who stands where by ``clock``, for every scene, number of threads and accuracy that was run."""
+    found = []
+    for name, threads in dict.fromkeys((run.scene, run.threads) for run in runs):
+        here = [run for run in runs if (run.scene, run.threads) == (name, threads)]
+        for target in TARGETS:
+            good = [run for run in here if abs(run.error) <= target]
+            own = [run for run in good if run.program == "program"]
+            flat = [run for run in own if run.setting.get("model") == "auto"]
+            own = [run for run in own if run not in flat]
+            peers = {peer: _fastest((run for run in good if run.program == peer), clock) for peer in PEERS}
+            asked = next((run for run in own if run.asked == target), None)
+            found.append(
+                Standing(name, threads, target, clock, asked, _fastest(own, clock), _fastest(flat, clock), peers)
+            )
+    return found
+
+
+def _fastest(runs: Iterable[Run], clock: str) -> Run | None:
+    return min(runs, key=lambda run: run.on(clock), default=None)
+
+
+def table(found: Sequence[Standing]) -> str:
+    """Return the standings in markdown."""
+    names = ("scene", "threads", "true error", "program, asked", "program, hindsight", "meridian", *PEERS)
+    lines = [f"| {' | '.join(names)} | asked / best peer |", "|---" * (len(names) + 1) + "|"]
+    for s in found:
+        cells = [SCENES[s.scene].title, str(s.threads), f"{100 * s.target:g} %"]
+        cells += [_cell(run, s.clock) for run in (s.asked, s.hindsight, s.meridian, *s.peers.values())]
+        ratio = s.ratio
+        verdict = "" if ratio is None else f"{ratio:.2f}{'' if ratio <= GOAL else ' (missed)'}"
+        lines.append(f"| {' | '.join(cells)} | {verdict} |")
+    return "\n".join(lines)
+
+
+def _cell(run: Run | None, clock: str) -> str:
+    return f"{run.on(clock):.2f} s ({100 * abs(run.error):.2f} %)" if run else "—"
+
+
+def breakdown(found: Sequence[Standing]) -> str:
+    """Return, in markdown, where the time of this program goes, and of the best peer."""
+    lines = ["| scene | threads | true error | who | setting | seconds | parts |", "|---" * 7 + "|"]
+    for s in found:
+        for who, run in (("program, asked", s.asked), ("best peer", s.best_peer)):
+            if run:
+                parts = ", ".join(f"{name} {seconds:.2f}" for name, seconds in run.parts.items())
+                setting = ", ".join(f"{key} {value}" for key, value in run.setting.items())
+                cells = (
+                    s.scene,
+                    str(s.threads),
+                    f"{100 * s.target:g} %",
+                    f"{who} ({run.program})",
+                    setting,
+                    f"{run.seconds:.2f}",
+                    parts,
+                )
+                lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def truths_table(truths: dict[str, Truth]) -> str:
+    """Return, in markdown, what F is and who says so."""
+    lines = ["| scene | F/(E·d·mm) | bar | sources | |", "|---|---|---|---|---|"]
+    for name, truth in truths.items():
+        sources = ", ".join(f"{who} {force:.6f} ± {100 * bar:.2g} %" for who, (force, bar) in truth.sources.items())
+        verdict = "agree" if truth.agree else "DO NOT AGREE"
+        lines.append(f"| {SCENES[name].title} | {truth.force:.6f} | {100 * truth.bar:.2g} % | {sources} | {verdict} |")
+    return "\n".join(lines)
+
+
+def to_json(
+    truths: dict[str, Truth], runs: Sequence[Run], machine: dict[str, Any], failures: list[Any]
+) -> dict[str, Any]:
+    """Return all of it as JSON's types."""
+    ratios = [
+        {"scene": s.scene, "threads": s.threads, "target": s.target, "ratio": s.ratio, "ratio_cpu": by_cpu.ratio}
+        for s, by_cpu in zip(standings(runs), standings(runs, "cpu"), strict=True)
+    ]
+    return {
+        "machine": machine, "goal": GOAL, "ratios": ratios, "failures": failures,
+        "truths": {name: asdict(truth) for name, truth in truths.items()}, "runs": [asdict(run) for run in runs],
+    }  # fmt: skip

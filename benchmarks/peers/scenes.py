@@ -1,0 +1,50 @@
+"""The scenes that all programs are given, without any of their libraries. Lengths in mm, F in units of E·d·mm."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A body held at its bottom, and a bonded footprint on its top face z = 0 pushed down by d.
+
+    ``body`` is ("box", length, width, height), centred on the z axis, or ("cylinder", radius, height); ``probe`` is
+    ("disc", radius) or ("blade", length along x, width); ``truth`` is F, converged, and its
+    relative bar.
+    """
+
+    name: str
+    title: str
+    body: tuple[str, float, float] | tuple[str, float, float, float]
+    probe: tuple[str, float] | tuple[str, float, float]
+    poisson: float
+    truth: tuple[float, float]
+    at: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def planes(self) -> tuple[str, ...]:
+        """Planes of mirror symmetry, "x" for x = 0: all bodies and probes here have both, but for their place."""
+        return tuple(axis for axis, place in zip("xy", self.at, strict=True) if place == 0.0)
+
+    @property
+    def half_width(self) -> float:
+        """Half of the probe's least width, to which all sizes at its edge are given."""
+        return self.probe[1] if self.probe[0] == "disc" else self.probe[-1] / 2
+
+    @property
+    def height(self) -> float:
+        """Thickness of the body."""
+        return self.body[-1]
+
+
+SCENES = {
+    scene.name: scene
+    for scene in (
+        # NGSolve's orders 3 to 5 extrapolated; this program's agree: ``python -m benchmarks.peers --truth``.
+        Scene(
+            "disc", "disc off the centre of a box", ("box", 60, 60, 20), ("disc", 2), 0.45, (5.5635, 1.5e-4), (10, 5)
+        ),
+        Scene("blade", "blade on a box", ("box", 60, 60, 20), ("blade", 6, 1), 0.3, (4.02343, 5e-5)),
+        # Axisymmetric, converged to 1e-7: docs/accuracy.md.
+        Scene("cylinder", "disc on a cylinder", ("cylinder", 50, 50), ("disc", 3), 0.45, (7.943726, 1e-7)),
+    )
+}

@@ -1,0 +1,64 @@
+"""F of a scene converged by two programs that share nothing, each with its bar."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from benchmarks.peers.processes import ask
+from benchmarks.peers.scenes import SCENES, Scene
+
+# NGSolve: one mesh, refined to a two-thousandth of its size at the rim, ever higher orders.
+_MESH = {"rim": 0.7, "maxh": 20, "grading": 0.4, "levels": 4, "factor": 0.15}
+_ORDERS = (3, 4, 5)
+_PROGRAM = {"accuracy": "0.05 %"}
+
+
+@dataclass(frozen=True)
+class Truth:
+    """F (E·d·mm), its relative bar, and what each program makes of it."""
+
+    force: float
+    bar: float
+    sources: dict[str, tuple[float, float]]
+
+    @property
+    def agree(self) -> bool:
+        """Whether every two sources agree within their bars."""
+        found = list(self.sources.values())
+        return all(abs(a / b - 1) <= bar_a + bar_b for a, bar_a in found for b, bar_b in found)
+
+
+def known(scene: Scene) -> Truth:
+    """Return what was found before."""
+    return Truth(*scene.truth, {"stored": scene.truth})
+
+
+def converge(name: str) -> Truth:
+    """Return the truth of a scene, NGSolve's and this program's, and what is stored of it.
+
+    Raises:
+        RuntimeError: if a program breaks down.
+    """
+    sources = {"stored": SCENES[name].truth, "NGSolve": _ngsolve(name), "program": _program(name)}
+    best = min(sources.values(), key=lambda found: found[1])
+    return Truth(*best, sources)
+
+
+def _ngsolve(name: str) -> tuple[float, float]:
+    """Return F and its bar: F falls with the order, and its steps by a factor that they show themselves."""
+    settings = [_MESH | {"order": p} for p in _ORDERS]
+    forces = [_done(answer) for answer in ask("NGSolve", {"scene": name, "settings": settings, "warm": False})]
+    before, last = forces[-3] - forces[-2], forces[-2] - forces[-1]
+    rest = last * last / (before - last)
+    # The rest of a geometric sequence, half of it in doubt.
+    return forces[-1] - rest, 0.5 * rest / forces[-1]
+
+
+def _program(name: str) -> tuple[float, float]:
+    (answer,) = ask("program", {"scene": name, "settings": [_PROGRAM], "warm": False})
+    return _done(answer), float(_PROGRAM["accuracy"].split()[0]) / 100
+
+
+def _done(answer: dict[str, Any]) -> float:
+    if "failed" in answer:
+        raise RuntimeError(f"{answer['setting']}: {answer['failed']}")
+    return float(answer["force"])

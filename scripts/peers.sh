@@ -1,0 +1,18 @@
+#!/bin/bash
+# Make .venv-peers, the programs that `make peers` compares this one with. They come from PyPI, and bring their own numpy.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+venv=.venv-peers
+wanted=(ngsolve==6.2.2608 scikit-fem==12.0.2 scipy gmsh pypardiso cvxopt pyamg)
+stamp=$venv/.epsmesh-peers
+
+state=$(sha256sum <scripts/peers.sh)
+[[ -f $stamp && $(<"$stamp") == "$state" ]] && exit 0
+echo "peers: making $venv"
+/usr/bin/python3 -m venv --clear "$venv"
+# A pip configured for --user would install beside the venv.
+PIP_USER=0 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input --only-binary :all: "${wanted[@]}"
+"$venv/bin/python" -c 'import cvxopt, gmsh, ngsolve, pyamg, pypardiso, skfem'
+echo "$state" >"$stamp"
+echo "peers: done"
