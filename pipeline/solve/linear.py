@@ -25,9 +25,9 @@ _SMOOTHER = {
     "ksp_type": "chebyshev", "ksp_max_it": 2, "ksp_chebyshev_esteig": "0,0.1,0,1.15", "ksp_chebyshev_esteig_steps": 5,
     "pc_type": "pbjacobi",
 }  # fmt: skip
-# Symmetric: Gauss–Seidel down, backwards up. Four entries to a row of the interpolation keep the coarse levels sparse.
+# Symmetric: Gauss–Seidel down, backwards up. Three entries to a row of the interpolation keep the coarse levels sparse.
 _BOOMERAMG = {
-    "coarsen_type": "HMIS", "interp_type": "ext+i", "strong_threshold": 0.5, "P_max": 4, "no_CF": "",
+    "coarsen_type": "HMIS", "interp_type": "ext+i", "strong_threshold": 0.5, "P_max": 3, "no_CF": "",
     "relax_type_down": "SOR/Jacobi", "relax_type_up": "backward-SOR/Jacobi",
 }  # fmt: skip
 
