@@ -13,20 +13,30 @@ from pipeline.solve.forms import compile_elastic, compiling, one_cell
 from pipeline.solve.mixed_forms import mixed_forms
 from pipeline.stages import stage
 
+# What this process has seen to.
+_compiled: set[tuple[str, int]] = set()
+
 
 @stage("compiler")
 def prepare(comm: MPI.Comm, solves: Collection[Solve]) -> None:
     """Compile what ``solves`` need and the cache does not have; collective."""
     if comm.rank == 0:
-        meshed = [solve.case for solve in solves if not solve.axisymmetric]
-        with compiling():
-            for degree, element in sorted({(case.mesh.degree, case.element) for case in meshed}):
-                compile_elastic(degree, straight=degree == 1)
-                if element == "mixed":
-                    _compile_mixed(degree)
-            if len(meshed) < len(solves):
-                compile_axisymmetric()
+        needed = {("axisymmetric", 0) if s.axisymmetric else (s.case.element, s.case.mesh.degree) for s in solves}
+        if missing := needed - _compiled:
+            with compiling():
+                for element, degree in sorted(missing):
+                    _compile(element, degree)
+            _compiled.update(missing)
     comm.barrier()
+
+
+def _compile(element: str, degree: int) -> None:
+    if element == "axisymmetric":
+        compile_axisymmetric()
+        return
+    compile_elastic(degree, straight=degree == 1)
+    if element == "mixed":
+        _compile_mixed(degree)
 
 
 def _compile_mixed(degree: int) -> None:
