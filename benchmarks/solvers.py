@@ -91,7 +91,6 @@ def _elastic_run(body: Any, lame: tuple[float, float], method: str, stack: ExitS
     from pipeline.solve.solution import TOLERANCE
 
     unit, _ = body.space.operator(lame, shared=False, blocked=body.space.degree > 1)
-    stack.callback(unit.destroy)
 
     def once() -> tuple[float, float, float, int]:
         start = time.process_time()
@@ -119,7 +118,6 @@ def _mixed_run(body: Any, lame: tuple[float, float], method: str, stack: ExitSta
     saddle, _ = body.saddle(direct=direct)
     assemble = time.process_time() - start
     unit, _ = space.displacements.operator(LAME, shared=False, blocked=True)
-    stack.callback(unit.destroy)
 
     def once() -> tuple[float, float, float, int]:
         with space.pair() as rhs, space.pair() as unknown:

@@ -90,6 +90,13 @@ def original_cells(mesh: Any) -> np.ndarray:
     return np.asarray(mesh.topology.original_cell_index, dtype=np.int64)
 
 
+def cell_tags(mesh: Any, values: np.ndarray) -> Any:
+    """Return tags of all local cells (owned and ghosts)."""
+    return dolfinx.mesh.meshtags(
+        mesh, mesh.topology.dim, np.arange(len(values), dtype=np.int32), values.astype(np.int32)
+    )
+
+
 def vector_space(mesh: Any, degree: int) -> Any:
     """Return the continuous vector Lagrange space of ``degree`` on ``mesh``."""
     if hasattr(fem, "functionspace"):
@@ -169,10 +176,16 @@ def form(expression: Any, cache: str) -> Any:
         logging.disable(before)
 
 
-def assemble_matrix(form: Any, bcs: list[Any], diagonal: float, mat_type: str) -> PETSc.Mat:
-    """Assemble a matrix with the rows and columns of ``bcs`` replaced by ``diagonal``; collective."""
-    matrix = fem_petsc.create_matrix(form, mat_type)
+def assemble_matrix(
+    form: Any, bcs: list[Any], diagonal: float, mat_type: str, into: PETSc.Mat | None = None
+) -> PETSc.Mat:
+    """Assemble a matrix with the rows and columns of ``bcs`` replaced by ``diagonal``; collective.
+
+    ``into`` is a matrix of the same form, of ``mat_type``, whose values go.
+    """
+    matrix = fem_petsc.create_matrix(form, mat_type) if into is None else into
     try:
+        matrix.zeroEntries()
         fem_petsc.assemble_matrix(matrix, form, bcs=bcs, **{_DIAGONAL: diagonal})
         matrix.assemble()
     except BaseException:

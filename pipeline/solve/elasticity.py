@@ -84,7 +84,7 @@ class ElasticBody:
             if self._reuse and self.correction is not None:
                 unknown.array[:] = self.correction
             assemble = time.perf_counter() - start
-            levels, seconds = self._hierarchy(lame, stack, direct=direct)
+            levels, seconds = self._hierarchy(lame, direct=direct)
             assemble += seconds
             tolerance = needed_tolerance(self._contact.travel, tolerance)
             solver = LinearSolver(levels, direct=direct, tolerance=tolerance)
@@ -123,7 +123,10 @@ class ElasticBody:
         """
         direct = is_direct(method, self.dofs, self.space.degree)
         with ExitStack() as stack:
-            solver = LinearSolver(self._hierarchy(lame, stack, direct=direct)[0], direct=direct, tolerance=0.5)
+            levels = [replace(level, matrix=level.matrix.copy()) for level in self._hierarchy(lame, direct=direct)[0]]
+            for level in levels:  # the next solve's operators take the place of the spaces' own
+                stack.callback(level.matrix.destroy)
+            solver = LinearSolver(levels, direct=direct, tolerance=0.5)
             stack.callback(solver.close)
             yield solver
 
@@ -146,10 +149,10 @@ class ElasticBody:
         self._fine.set_displacement(displacement)
         return largest_strain(self._strain, self._body)
 
-    def _hierarchy(self, lame: tuple[float, float], stack: ExitStack, *, direct: bool) -> tuple[list[Level], float]:
+    def _hierarchy(self, lame: tuple[float, float], *, direct: bool) -> tuple[list[Level], float]:
         """Return the levels of multigrid, or the one of a direct solve, and the seconds that one assembly takes."""
         spaces = [self._fine] if direct else [*self._coarser(), self._fine]
-        found = [self._level(space, lame, stack, blocked=not direct) for space in spaces]
+        found = [self._level(space, lame, blocked=not direct) for space in spaces]
         return [level for level, _ in found], sum(seconds for _, seconds in found)
 
     def _coarser(self) -> list[ConstrainedSpace]:
@@ -158,12 +161,9 @@ class ElasticBody:
             self._levels = [ConstrainedSpace(self._body, d, self._contact) for d in range(1, self._fine.degree)]
         return self._levels
 
-    def _level(
-        self, space: ConstrainedSpace, lame: tuple[float, float], stack: ExitStack, *, blocked: bool
-    ) -> tuple[Level, float]:
+    def _level(self, space: ConstrainedSpace, lame: tuple[float, float], *, blocked: bool) -> tuple[Level, float]:
         blocked = blocked and space.degree > 1
         matrix, seconds = space.operator(lame, shared=self._shared, blocked=blocked)
-        stack.callback(matrix.destroy)
         return Level(space.space, matrix, space.prescribed), seconds
 
     @stage("error bar")
@@ -174,8 +174,8 @@ class ElasticBody:
             self._finer = ConstrainedSpace(self._body, fine.degree + 1, self._contact)
         finer = self._finer
         if len(levels) == 1:
-            levels = [*(self._level(space, lame, stack, blocked=True)[0] for space in self._coarser()), *levels]
-        level, _ = self._level(finer, lame, stack, blocked=True)
+            levels = [*(self._level(space, lame, blocked=True)[0] for space in self._coarser()), *levels]
+        level, _ = self._level(finer, lame, blocked=True)
         solver = LinearSolver([*levels, level], direct=False, tolerance=0.5)
         stack.callback(solver.close)
         finer.forms.displacement.interpolate(fine.forms.displacement)

@@ -240,6 +240,5 @@ class MixedBody:
                 space = ConstrainedSpace(self._body, degree, self._contact)
                 self._stack.callback(space.close)
             matrix, seconds = space.operator(LAME, shared=False, blocked=blocked)
-            self._stack.callback(matrix.destroy)
             self._levels[degree, blocked] = Level(space.space, matrix, space.prescribed), seconds
         return self._levels[degree, blocked]

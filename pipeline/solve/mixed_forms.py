@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from pipeline import compat
 from pipeline.mesh.distribute import distribute
-from pipeline.solve.forms import form_cache, one_cell, quadrature_degree
+from pipeline.solve.forms import dx, form_cache, one_cell
 
 
 @dataclass(frozen=True)
@@ -36,13 +36,12 @@ def mixed_forms(displacement: Any, pressures: Any) -> MixedForms:
     u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
     p, q = ufl.TrialFunction(pressures), ufl.TestFunction(pressures)
     pressure = fem.Function(pressures)
-    dx = ufl.dx(metadata={"quadrature_degree": quadrature_degree(space)})
-    cache = str(form_cache())
+    measure, cache = dx(space), str(form_cache())
     return MixedForms(
-        coupling=compat.form(q * ufl.div(u) * dx, cache),
-        mass=compat.form(p * q * dx, cache),
-        dilation=compat.form(q * ufl.div(displacement) * dx, cache),
-        pull=compat.form(pressure * ufl.div(v) * dx, cache),
+        coupling=compat.form(q * ufl.div(u) * measure, cache),
+        mass=compat.form(p * q * measure, cache),
+        dilation=compat.form(q * ufl.div(displacement) * measure, cache),
+        pull=compat.form(pressure * ufl.div(v) * measure, cache),
         pressure=pressure,
     )
 

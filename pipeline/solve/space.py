@@ -51,6 +51,7 @@ class ConstrainedSpace:
         self.forms = elastic_forms(space)
         self._parts: tuple[PETSc.Mat, PETSc.Mat] | None = None
         self._part_seconds = 0.0
+        self._operators: dict[str, PETSc.Mat] = {}
         probe, fixed = (_points(space, body, name) for name in (PROBE, FIXED))
         planes = _planes(space, body)
         if self.comm.allreduce(len(np.intersect1d(probe, fixed))):
@@ -82,10 +83,11 @@ class ConstrainedSpace:
         return 3 * whole_points(self.space, self._body)
 
     def close(self) -> None:
-        """Free the parts of the operator."""
-        for part in self._parts or ():
-            part.destroy()
+        """Free the operator and its parts."""
+        for matrix in (*(self._parts or ()), *self._operators.values()):
+            matrix.destroy()
         self._parts = None
+        self._operators.clear()
 
     @contextmanager
     def vector(self) -> Iterator[PETSc.Vec]:
@@ -101,19 +103,25 @@ class ConstrainedSpace:
     def operator(self, lame: tuple[float, float], *, shared: bool, blocked: bool) -> tuple[PETSc.Mat, float]:
         """Return K with μ on the diagonal of prescribed dofs, and the seconds that one assembly takes; collective.
 
-        ``shared`` keeps A_λ and A_μ for the next pair of λ and μ. The caller destroys the matrix.
+        ``shared`` keeps A_λ and A_μ for the next pair of λ and μ. The matrix is the space's, and the next one takes its
+        place: finding out where its entries are is a third of an assembly.
         """
         mat_type = "baij" if blocked else "aij"
         start = time.perf_counter()
         if not shared:
-            matrix = self._assemble(lame, lame[1], mat_type)
+            found = self._operators.get(mat_type)
+            self._operators[mat_type] = matrix = self._assemble(lame, lame[1], mat_type, found)
             return matrix, time.perf_counter() - start
         if self._parts is not None and self._parts[0].getType().endswith("baij") != blocked:
             self.close()
         if self._parts is None:
-            self._parts = self._assemble((1.0, 0.0), 0.0, mat_type), self._assemble((0.0, 1.0), 1.0, mat_type)
+            first = self._assemble((1.0, 0.0), 0.0, mat_type)
+            self._parts = first, self._assemble((0.0, 1.0), 1.0, mat_type, first.duplicate())
             self._part_seconds = (time.perf_counter() - start) / 2
-        matrix = self._parts[0].copy()
+        if mat_type not in self._operators:
+            self._operators[mat_type] = self._parts[0].duplicate()
+        matrix = self._operators[mat_type]
+        self._parts[0].copy(matrix, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         matrix.scale(lame[0])
         matrix.axpy(lame[1], self._parts[1], structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         _mark(matrix)
@@ -143,9 +151,11 @@ class ConstrainedSpace:
         fem_petsc.assemble_vector(result, self.forms.action)
         result.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
 
-    def _assemble(self, lame: tuple[float, float], diagonal: float, mat_type: str) -> PETSc.Mat:
+    def _assemble(
+        self, lame: tuple[float, float], diagonal: float, mat_type: str, into: PETSc.Mat | None = None
+    ) -> PETSc.Mat:
         self.forms.set_lame(*lame)
-        matrix = compat.assemble_matrix(self.forms.stiffness, self._conditions, diagonal, mat_type)
+        matrix = compat.assemble_matrix(self.forms.stiffness, self._conditions, diagonal, mat_type, into)
         _mark(matrix)
         return matrix
 
