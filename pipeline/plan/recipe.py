@@ -1,8 +1,8 @@
 """Which mesh gives the accuracy that was asked for: elements, rim and growth, cheapest first.
 
 The error of F comes from the probe's edge and from what the elements can follow between there and the support: both
-scale with the probe, hardly with the body. What an error bar costs and leaves was measured on cylinders
-(docs/accuracy.md); the bar of the case itself decides whether its mesh was good enough, or the next one is tried.
+scale with the probe, hardly with the body. What error bars to expect was measured (docs/accuracy.md); the bar of the
+case itself decides whether its mesh was good enough, or the next one is tried.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,10 @@ from pipeline.study.sweep import Case
 
 @dataclass(frozen=True)
 class Recipe:
-    """``rim`` is in units of the probe's half width, ``bar`` the relative error bar to expect at ν = 0.3."""
+    """``rim`` is in units of the probe's half width, ``bar`` the relative error bar to expect.
+
+    That is for a disc on a deep body at ν = 0.3; see :func:`_expected` for others.
+    """
 
     degree: int
     rim: float
@@ -24,17 +27,27 @@ class Recipe:
 
 
 LADDER = (
-    Recipe(2, 0.2, 0.5, 3.0e-3),
-    Recipe(2, 0.1, 0.4, 1.4e-3),
-    Recipe(3, 0.2, 0.5, 7.7e-4),
-    Recipe(3, 0.1, 0.4, 3.2e-4),
-    Recipe(3, 0.05, 0.35, 1.6e-4),
-    Recipe(3, 0.025, 0.3, 8.0e-5),
+    Recipe(2, 0.4, 0.7, 4.6e-3),
+    Recipe(2, 0.3, 0.6, 3.2e-3),
+    Recipe(2, 0.2, 0.5, 2.0e-3),
+    Recipe(2, 0.15, 0.45, 1.4e-3),
+    Recipe(3, 0.3, 0.6, 9.0e-4),
+    Recipe(3, 0.2, 0.5, 5.3e-4),
+    Recipe(3, 0.15, 0.45, 3.5e-4),
+    Recipe(3, 0.1, 0.4, 2.0e-4),
+    Recipe(3, 0.05, 0.35, 1.0e-4),
+    Recipe(3, 0.025, 0.3, 5.0e-5),
 )
+# Blades are as accurate with this share of the bars.
+_BLADE = 0.75
+# Bars grow by 1 + 10 a/H with the half width a of the probe and the thickness H of the body, as far as was measured.
+_THICKNESS, _THINNEST = 10.0, 0.15
+# Those of the mixed element are larger than those of the displacement element at ν = 0.3, by degree.
+_MIXED = {2: 1.2, 3: 1.05}
 # Bars of displacement elements grow like (1 - 2 ν)^-0.35 on the way to locking; measured from ν = 0.3 to 0.49.
 _LOCKING = 0.35
 # A bar is expected to be met if the mesh should give this share of it.
-_MARGIN = 0.8
+_MARGIN = 0.9
 # Elements between the probe's edge and a held face beside it.
 _ACROSS_GAP = 3
 # Elements through the thickness of a layer, near the probe.
@@ -46,16 +59,20 @@ def meshes_for(case: Case, accuracy: float) -> tuple[Mesh, ...]:
 
     What the study file gives of rim, growth, degree and sizes is kept.
     """
-    expected = [recipe.bar * _growth_with_poisson(case) for recipe in LADDER]
+    expected = [_expected(case, recipe) for recipe in LADDER]
     first = next((i for i, bar in enumerate(expected) if bar <= _MARGIN * accuracy), len(LADDER) - 1)
     meshes = [_mesh(case, recipe) for recipe in LADDER[first:]]
     return tuple(dict.fromkeys(meshes))
 
 
-def _growth_with_poisson(case: Case) -> float:
+def _expected(case: Case, recipe: Recipe) -> float:
+    """Return the error bar to expect of a recipe."""
+    shape = 1.0 if case.probe.shape == "disc" else _BLADE
+    thickness = 1 + _THICKNESS * min(case.probe.half_width / case.body.height, _THINNEST)
     if case.element == "mixed":
-        return 1.0
-    return float(((1 - 2 * case.material.poisson) / 0.4) ** -_LOCKING)
+        return recipe.bar * shape * thickness * _MIXED[recipe.degree]
+    locking = ((1 - 2 * case.material.poisson) / 0.4) ** -_LOCKING
+    return float(recipe.bar * shape * thickness * locking)
 
 
 def _mesh(case: Case, recipe: Recipe) -> Mesh:
