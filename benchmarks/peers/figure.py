@@ -34,7 +34,7 @@ def draw(runs: Sequence[Run], path: Path) -> Path:
         panels[0].set_ylabel("|true error of F| (%)")
         known = {label: h for axes in panels for h, label in zip(*axes.get_legend_handles_labels(), strict=True)}
         figure.legend(known.values(), known.keys(), loc="lower center", ncol=len(known))
-        figure.subplots_adjust(left=0.65 / width, right=1 - 0.15 / width, top=0.9, bottom=0.26, wspace=0.08)
+        figure.subplots_adjust(left=0.85 / width, right=1 - 0.15 / width, top=0.9, bottom=0.26, wspace=0.08)
         return save(figure, path)
 
 
