@@ -183,9 +183,10 @@ def test_run_killed_at_random_moments_yields_the_same_dataset(small, tmp_path, s
         if whole[name].dtype == object:
             assert (killed[name] == whole[name]).all()
         else:
-            np.testing.assert_allclose(
-                killed[name], whole[name], rtol=1e-7, atol=1e-7 * float(np.abs(whole[name]).max())
-            )
+            # The largest strain is linear in the solver's error, which depends on where a solve begins.
+            close = 1e-4 if name == "max_strain" else 1e-7
+            scale = float(np.abs(whole[name]).max())
+            np.testing.assert_allclose(killed[name], whole[name], rtol=close, atol=close * scale, err_msg=name)
 
 
 def test_plan_explain_and_store(small, tmp_path):

@@ -63,11 +63,11 @@ def test_cases_of_an_early_stop_wait_in_one_shard():
 
 
 def test_meridians_are_dealt_singly():
-    """Each has a mesh of its own, though they make one step."""
+    """Each has a mesh of its own."""
     poisson = [0.1, 0.2, 0.3, 0.4]
     plan = make_plan(study(**ROUND, material={"poisson": poisson}, plan={"without": []}))
     assert all(solve.axisymmetric for solve in plan.solves)
-    assert len(mesh_steps(plan.solves)) == 1
+    assert len(mesh_steps(plan.solves)) == 4
     assert [len(part) for part in deal(plan, 4)] == [1, 1, 1, 1]
 
 
