@@ -9,9 +9,7 @@ below; a few observations move it a little, many determine it (ridge regression 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import exp, log
-from typing import Any
-
-import numpy as np
+from statistics import median
 
 from pipeline.plan import estimate
 from pipeline.plan.steps import MeshStep, Solve
@@ -27,7 +25,9 @@ _MERIDIAN = 0.5
 # How fast iterations grow on the way to incompressible.
 _LOCKING = -0.35
 # Observations that weigh as much as the law above, for its factor and for its exponents.
-_WEIGHT = np.diag([0.5, 5.0, 5.0])
+_WEIGHT = (0.5, 5.0, 5.0)
+
+_Numbers = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -57,14 +57,14 @@ class StepEstimate:
 class CostModel:
     """The fitted laws, on how many observations, and by what factor they are typically wrong."""
 
-    laws: Mapping[tuple[str, str], Any] = field(default_factory=dict)
+    laws: Mapping[tuple[str, str], _Numbers] = field(default_factory=dict)
     count: int = 0
     error: float = 2.0
 
     def seconds(self, stage: str, kind: str, cells: float, poisson: float) -> float:
         """Return the seconds on one rank of a stage."""
-        law = self.laws.get((stage, kind))
-        return exp(float((_prior(stage, kind) if law is None else law) @ _row(cells, poisson)))
+        law = self.laws.get((stage, kind)) or _prior(stage, kind)
+        return exp(sum(a * b for a, b in zip(law, _row(cells, poisson), strict=True)))
 
     def step(self, step: MeshStep) -> StepEstimate:
         """Estimate one mesh step: its mesh, its assemblies, its solves with their error bars."""
@@ -98,26 +98,34 @@ def speed_up(ranks: int) -> float:
 
 def fit(observations: Iterable[Observation]) -> CostModel:
     """Return the model that fits ``observations``; its error is that of each from the others (leave one out)."""
-    laws, wrong, count = {}, [], 0
-    groups: dict[tuple[str, str], list[tuple[Any, float]]] = {}
+    laws, wrong, count = dict[tuple[str, str], _Numbers](), list[float](), 0
+    groups: dict[tuple[str, str], list[tuple[_Numbers, float]]] = {}
     for seen in observations:
         count += 1
         for stage, seconds in seen.seconds.items():
             if seconds > 0:
                 groups.setdefault((stage, seen.kind), []).append((_row(seen.cells, seen.poisson), log(seconds)))
     for (stage, kind), found in groups.items():
-        prior = _prior(stage, kind)
-        rows, logs = np.array([row for row, _ in found]), np.array([value for _, value in found])
-        inverse = np.linalg.inv(rows.T @ rows + _WEIGHT)
-        laws[stage, kind] = law = prior + inverse @ rows.T @ (logs - rows @ prior)
-        leverage = np.einsum("ij,jk,ik->i", rows, inverse, rows)
+        laws[stage, kind], residuals = _ridge(_prior(stage, kind), found)
         if stage == "solve":
-            wrong += list(np.abs(logs - rows @ law) / (1 - leverage))
-    return CostModel(laws, count, exp(float(np.median(wrong)))) if wrong else CostModel(laws, count)
+            wrong += residuals
+    return CostModel(laws, count, exp(median(wrong))) if wrong else CostModel(laws, count)
 
 
-def _row(cells: float, poisson: float) -> Any:
-    return np.array([1.0, log(cells / 1e4), log((1 - 2 * poisson) / 0.4)])
+def _ridge(prior: _Numbers, found: list[tuple[_Numbers, float]]) -> tuple[_Numbers, list[float]]:
+    """Return the law that fits rows and logarithms, and how far each is from the law of the others (leave one out)."""
+    import numpy as np  # noqa: PLC0415 (most commands have nothing to fit)
+
+    rows, logs = np.array([row for row, _ in found]), np.array([value for _, value in found])
+    inverse = np.linalg.inv(rows.T @ rows + np.diag(_WEIGHT))
+    law = np.array(prior) + inverse @ rows.T @ (logs - rows @ np.array(prior))
+    leverage = np.einsum("ij,jk,ik->i", rows, inverse, rows)
+    a, b, c = map(float, law)
+    return (a, b, c), list(map(float, np.abs(logs - rows @ law) / (1 - leverage)))
+
+
+def _row(cells: float, poisson: float) -> _Numbers:
+    return 1.0, log(cells / 1e4), log((1 - 2 * poisson) / 0.4)
 
 
 def _poisson(case: Case) -> float:
@@ -125,11 +133,11 @@ def _poisson(case: Case) -> float:
     return 0.3 if case.element == "mixed" else case.material.poisson
 
 
-def _prior(stage: str, kind: str) -> Any:
+def _prior(stage: str, kind: str) -> _Numbers:
     if kind == "meridian":
-        return np.array([log(_MERIDIAN), 0.0, 0.0])
+        return log(_MERIDIAN), 0.0, 0.0
     if stage == "mesh":
-        return np.array([log(1e4 * _MESH), 1.0, 0.0])
+        return log(1e4 * _MESH), 1.0, 0.0
     element, degree = kind.split()
     per_cell = _SOLVE[int(degree) + (stage == "bar")] * (_MIXED if element == "mixed" else 1.0)
-    return np.array([log(1e4 * per_cell), 1.0, 0.0 if element == "mixed" else _LOCKING])
+    return log(1e4 * per_cell), 1.0, 0.0 if element == "mixed" else _LOCKING
