@@ -56,8 +56,16 @@ slurm-test: setup ## run the job scripts on a Slurm of two virtual nodes, instal
 verify: setup ## forces against closed forms, tables and the program's other paths
 	$(EPSMESH) verify
 
-benchmark: setup ## work against precision: results/work_precision.nc and its figure (an idle machine, 10 minutes)
+benchmark: setup ## every table of docs/performance.md, into results/ (an idle machine, two to three hours)
 	$(EPSMESH) benchmark
+	$(PYTHON) -m benchmarks.start_up
+	$(PYTHON) -m benchmarks.ranks
+	$(PYTHON) -m benchmarks.solvers
+	$(PYTHON) -m benchmarks.scaling
+	$(PYTHON) -m benchmarks.reductions
+	$(PYTHON) -m benchmarks.plain_loop --sample 24
+	@scripts/peers.sh
+	$(PYTHON) -m benchmarks.peers
 
 peers: setup ## NGSolve and scikit-fem against this program, time to a true error (an idle machine): results/peers.md
 	@scripts/peers.sh
