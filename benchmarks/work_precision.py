@@ -5,23 +5,20 @@ The scene is one of which F is known to 1e-7, a disc of 3 mm on a cylinder of R 
 """
 
 import itertools
-import platform
 import statistics
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import psutil
 import xarray as xr
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
+from benchmarks.machine import machine
 from benchmarks.work_precision_figure import draw
-from pipeline import compat
 from pipeline.mesh.meridian import Meridian
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import write
@@ -167,24 +164,7 @@ def dataset(points: list[Point], repeats: int) -> xr.Dataset:
         attributes = {"units": unit, "long_name": names[name]}
         variables[name] = (("elements", "poisson", "level"), values, attributes)
     coordinates = {"elements": methods, "poisson": list(POISSON), "level": list(levels)}
-    return xr.Dataset(variables, coordinates, _machine() | {"repeats": repeats})
-
-
-def _machine() -> dict[str, Any]:
-    """What the times belong to."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-        processor = next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
-        processor = platform.processor()
-    return {
-        "title": "Work against precision",
-        "processor": processor,
-        "cores": psutil.cpu_count() or 0,
-        "memory_bytes": psutil.virtual_memory().total,
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        **{f"version_{name}": text for name, text in compat.versions().items()},
-    }
+    return xr.Dataset(variables, coordinates, {"title": "Work against precision"} | machine() | {"repeats": repeats})
 
 
 def main(output: Path, repeats: int, *, quick: bool = False) -> list[Path]:
