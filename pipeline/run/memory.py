@@ -14,6 +14,7 @@ from mpi4py import MPI
 
 from pipeline.stages import stage
 
+_C = ctypes.CDLL(None)
 # A limit of cgroup v1 above this is none.
 _NO_LIMIT = 2**60
 
@@ -29,8 +30,8 @@ def keep_imports() -> None:
 def give_back() -> None:
     """Free what nobody refers to, and return it to the system, where the C library can."""
     gc.collect()  # dolfinx's meshes hold communicators, and Python's cycles hold the meshes
-    with suppress(AttributeError, OSError):
-        ctypes.CDLL(None).malloc_trim(0)
+    with suppress(AttributeError):
+        _C.malloc_trim(0)
 
 
 class PeakMemory:
