@@ -1,6 +1,7 @@
 """Share the steps of a phase between groups of ranks: each takes the next one when it is free.
 
 Which step is next is a counter that lives on the first rank and that any rank can fetch and raise without its help.
+Where MPI has no such one-sided communication between machines, the steps are dealt out in turn, costliest first.
 Records travel to the first rank, which alone writes to the store; it takes them in between its own solves.
 """
 
@@ -42,7 +43,8 @@ def run_phase(
             runner.run(step)
         return
     group = comm.Split(comm.rank // phase.size, comm.rank)
-    with Mailbox(comm, keep) as mailbox, Counter(comm) as counter:
+    groups = -(-comm.size // phase.size)
+    with Mailbox(comm, keep) as mailbox, Counter(comm, comm.rank // phase.size, groups) as counter:
         runner = make(group, mailbox.post)
         while (number := group.bcast(counter.next() if group.rank == 0 else None)) < len(phase.steps):
             runner.run(phase.steps[number])
@@ -51,27 +53,41 @@ def run_phase(
 
 
 class Counter:
-    """Hands out 0, 1, 2, …, each number to one rank; a context manager, collective to enter and to leave."""
+    """Hands out 0, 1, 2, …, each number to one rank; a context manager, collective to enter and to leave.
 
-    def __init__(self, comm: MPI.Comm):
+    ``number`` of ``count`` is who asks, for turns where there is no one-sided communication.
+    """
+
+    def __init__(self, comm: MPI.Comm, number: int, count: int):
         self._comm = MPI.Intracomm(comm)
+        self._turn, self._count = number, count
+        self._window: MPI.Win | None = None
 
     def __enter__(self) -> "Counter":
         size = np.dtype(np.int64).itemsize
-        self._window = MPI.Win.Allocate(size if self._comm.rank == 0 else 0, size, comm=self._comm)
-        if self._comm.rank == 0:
-            self._window.Lock(0)
-            self._window.Put(np.zeros(1, np.int64), 0)
-            self._window.Unlock(0)
-        self._comm.barrier()
+        try:
+            window = MPI.Win.Allocate(size if self._comm.rank == 0 else 0, size, comm=self._comm)
+        except MPI.Exception:  # Open MPI over TCP with threads
+            window = None
+        everywhere = self._comm.allreduce(window is not None, op=MPI.LAND)
+        if window is not None and everywhere:
+            self._window = window
+            if self._comm.rank == 0:
+                window.Lock(0)
+                window.Put(np.zeros(1, np.int64), 0)
+                window.Unlock(0)
+            self._comm.barrier()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None:
+        if kind is None and self._window is not None:
             self._window.Free()
 
     def next(self) -> int:
         """Return the next number."""
+        if self._window is None:
+            self._turn += self._count
+            return self._turn - self._count
         one, number = np.ones(1, np.int64), np.zeros(1, np.int64)
         self._window.Lock(0)
         self._window.Fetch_and_op(one, number, 0)

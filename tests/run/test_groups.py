@@ -7,18 +7,30 @@ from mpi4py import MPI
 from pipeline.plan.cost import CostModel
 from pipeline.plan.plan import make_plan
 from pipeline.plan.schedule import Phase, schedule
+from pipeline.run import groups
 from pipeline.run.execute import compute
 from pipeline.run.groups import Counter, Mailbox, run_phase
 from pipeline.run.record import Record
 from tests.cases import study
+
+
+class NoWindow:
+    @staticmethod
+    def Allocate(*_, **__):
+        raise MPI.Exception(MPI.ERR_WIN)
+
 
 WORLD, COST = MPI.COMM_WORLD, CostModel()
 MANY = {"probe": {"radius": [f"{2 + 0.1 * i:.1f} mm" for i in range(5)]}}
 
 
 @pytest.mark.mpi
-def test_every_number_is_handed_out_once():
-    with Counter(WORLD) as counter:
+@pytest.mark.parametrize("one_sided", [True, False])
+def test_every_number_is_handed_out_once(one_sided, monkeypatch):
+    """Without one-sided communication, as Open MPI has none over TCP, in turns."""
+    if not one_sided:
+        monkeypatch.setattr(groups.MPI, "Win", NoWindow)
+    with Counter(WORLD, WORLD.rank, WORLD.size) as counter:
         mine = [counter.next() for _ in range(50)]
     every = sorted(number for numbers in WORLD.allgather(mine) for number in numbers)
     assert every == list(range(50 * WORLD.size))
