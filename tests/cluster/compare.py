@@ -26,6 +26,8 @@ def assert_same(one: Path, two: Path, *, rtol: float = 1e-7, alike: bool = True)
             largest = float(np.nanmax(np.abs(second[name].values), initial=0.0))
             # The sweeps of an error bar are preconditioned rank by rank.
             close = rtol if alike or not str(name).endswith("_error") else 1e-2
+            # The largest strain is linear in the solver's error, which depends on where a solve begins.
+            close = 1e-4 if name == "max_strain" else close
             np.testing.assert_allclose(first[name], second[name], rtol=close, atol=close * largest, err_msg=str(name))
     attributes = ["study", "study_hash", "title", "epsilon_is_full", "version_dolfinx", "host"]
     for name in [*attributes, "ranks"] if alike else attributes:
