@@ -34,7 +34,7 @@ def execute(
     desk = _Desk(plan, keep if comm.rank == 0 else None, progress, comm.bcast(dict(known or {})))
 
     def make(group: MPI.Comm, post: Keep) -> StepRunner:
-        return StepRunner(plan, group, post, progress, cache)
+        return StepRunner(plan, group, post, progress, cache, comm.size)
 
     # A rank is one thread: OpenBLAS's own would wait for work by spinning, and take the other ranks' cores.
     with threadpool_limits(limits=1, user_api="blas"):

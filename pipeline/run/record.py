@@ -14,7 +14,7 @@ class Record:
     ``young`` (Pa) and ``depth`` (m) are those it was computed for. ``force_vector`` is the force of the tissue on the
     probe; ``force`` its part against the probe's advance, and ``force_error`` the relative 95 % error bar on that, on
     which ``time_error`` seconds were spent. ``kind``, ``planned_cells`` and ``poisson`` are what its cost was estimated
-    from (:mod:`pipeline.plan.cost`).
+    from (:mod:`pipeline.plan.cost`), ``group`` the ranks that computed it.
     """
 
     key: str
@@ -41,6 +41,7 @@ class Record:
     kind: str = ""
     planned_cells: float = nan
     poisson: float = nan
+    group: int = 1
     provenance: dict[str, str | int] = field(default_factory=dict)
 
     @property
@@ -57,7 +58,7 @@ class Record:
         """Return what the case took, on one rank, or None if that is not known."""
         if not self.is_ok or not self.kind or self.origin not in ("solved", "symmetric", "axisymmetric"):
             return None
-        faster = speed_up(int(self.provenance.get("ranks", 1)))
+        faster = speed_up(self.group)
         solve = self.time_assemble + self.time_setup + self.time_solve
         if self.kind == "meridian":
             seconds = {"solve": self.time_mesh + solve}

@@ -35,13 +35,16 @@ Keep = Callable[[Record], None]
 
 
 class StepRunner:
-    """Carries out mesh steps on one communicator. ``keep`` is called on its rank 0 with each record."""
+    """Carries out mesh steps on one communicator. ``keep`` is called on its rank 0 with each record.
 
-    def __init__(self, plan: Plan, comm: MPI.Comm, keep: Keep, progress: Progress, cache: MeshCache | None):
+    ``ranks`` is how many the whole run has.
+    """
+
+    def __init__(self, plan: Plan, comm: MPI.Comm, keep: Keep, progress: Progress, cache: MeshCache | None, ranks: int):
         self.comm, self._timed, self._records = comm, plan.study.solve.timing, dict[str, Record]()
         self._plan, self._keep, self._progress = plan, keep, progress
         self._cache = None if self._timed else cache
-        self._provenance = provenance(comm.size)
+        self._provenance = provenance(ranks)
         self._free = FreeMemory(comm)
         self._retries: list[Solve] = []
         self._attempts: dict[str, list[Record]] = {}
@@ -131,7 +134,7 @@ class StepRunner:
 
     def _stamp(self, record: Record, memory: PeakMemory) -> Record:
         date = datetime.now(UTC).isoformat(timespec="seconds")
-        return replace(record, memory=memory.peak(), provenance=self._provenance | {"date": date})
+        return replace(record, memory=memory.peak(), group=self.comm.size, provenance=self._provenance | {"date": date})
 
     def _repeat(self, solve: Solve, memory: PeakMemory) -> Record:
         """Compute a case afresh several times; its times are the medians. The error bar comes after them."""
