@@ -25,15 +25,15 @@ def verify(
 ) -> None:
     """Compare forces with closed forms and published tables.
 
-    Manufactured solutions too, and the program's other paths.     Exit status 1 if any row is out.
+    Manufactured solutions too, and the program's other paths. Exit status 1 if any row is out.
 
     Example: epsmesh verify
 
     Example: epsmesh verify --coverage
     """
-    from mpi4py import MPI
+    from pipeline.workflow import world
 
-    comm = MPI.COMM_WORLD
+    comm = world()
     speaks = comm.rank == 0
     if coverage:
         from pipeline.verify.coverage import Coverage, trials
@@ -102,17 +102,17 @@ def stress(
 
     Example: epsmesh stress poisson layer
     """
-    from mpi4py import MPI
-
     from benchmarks.stress import line, run, summary, to_json
     from benchmarks.stress.report import heading
+    from pipeline.workflow import world
 
     load_solvers()
-    speaks = MPI.COMM_WORLD.rank == 0
+    comm = world()
+    speaks = comm.rank == 0
     if speaks and not as_json:
         print(heading())
     try:
-        results = list(_told(run(MPI.COMM_WORLD, names, quick=quick), line, speaks and not as_json))
+        results = list(_told(run(comm, names, quick=quick), line, speaks and not as_json))
     except ValueError as wrong:
         fail(str(wrong))
     if speaks:

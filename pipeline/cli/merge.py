@@ -1,13 +1,12 @@
 """The command that brings the shards of a study together."""
 
-import json
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipeline.cli.console import error
+from pipeline.cli.console import error, print_json
 from pipeline.cli.words import (
     DEFAULT_OUTPUT,
     DONE,
@@ -72,7 +71,7 @@ def merge(
             "problems": problems, "failures": [{"case": case, "message": message} for case, message in failed],
             "again": again, "files": [str(path) for path in files],
         }  # fmt: skip
-        print(json.dumps(found, indent=2))
+        print_json(found)
     else:
         for source in sources:
             print(f"{source.path}: {source.records} records, {source.taken} of them new")

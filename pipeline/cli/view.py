@@ -40,11 +40,9 @@ def view(
     chosen = find_case(study, case)
     if not export and (missing := _missing()):
         fail(f"pictures need {missing}; --export vtu writes a file for ParaView without it")
-    from mpi4py import MPI
+    from pipeline.workflow import abort_on_exception, world
 
-    from pipeline.workflow import abort_on_exception
-
-    comm = MPI.COMM_WORLD
+    comm = world()
     with abort_on_exception(comm):
         fields = _fields(study, chosen, comm, mesh_only, meshes)
         if fields is not None:

@@ -81,9 +81,7 @@ def mesh_steps(solves: Collection[Solve], *, shared: bool = True) -> tuple[MeshS
     if not shared:
         return tuple(MeshStep((OperatorStep((solve,)),)) for solve in solves)
     steps = []
-    for group in _grouped(
-        solves, lambda solve: ((solve.axisymmetric and solve.key) or mesh_key(solve.case), solve.mirrors)
-    ):
+    for group in _grouped(solves, _mesh_of):
         operators = _grouped(group, lambda solve: operator_key(solve.case))
         steps.append(MeshStep(tuple(OperatorStep(found) for found in operators)))
     return tuple(steps)

@@ -125,10 +125,6 @@ def _constancy(guide: Guide) -> list[str]:
     return [title, *table(rows, len(names_of))] if len(rows) > 1 else []
 
 
-def _by(names: Sequence[str]) -> list[str]:
-    return [f"by {SYMBOLS.get(name, name)}" for name in names]
-
-
 def heads(guide: Guide) -> list[str]:
     """Return the names of what the settings differ in, ε last."""
     labels = guide.verdicts[0].labels

@@ -2,15 +2,12 @@
 
 from collections.abc import Collection
 
-from dolfinx import fem
 from mpi4py import MPI
 
-from pipeline import compat
-from pipeline.mesh.distribute import distribute
 from pipeline.plan.steps import Solve
 from pipeline.solve.axisymmetric import compile_axisymmetric
-from pipeline.solve.forms import compile_elastic, compiling, one_cell
-from pipeline.solve.mixed_forms import mixed_forms
+from pipeline.solve.forms import compile_elastic, compiling
+from pipeline.solve.mixed_forms import compile_mixed
 from pipeline.stages import stage
 
 # What this process has seen to.
@@ -36,11 +33,4 @@ def _compile(element: str, degree: int) -> None:
         return
     compile_elastic(degree, straight=degree == 1)
     if element == "mixed":
-        _compile_mixed(degree)
-
-
-def _compile_mixed(degree: int) -> None:
-    """Compile what couples displacement and pressure, of ``degree`` and of one more for the error bar."""
-    mesh = distribute(MPI.COMM_SELF, one_cell(straight=False)).mesh
-    for level in (degree, degree + 1):
-        mixed_forms(fem.Function(compat.vector_space(mesh, level)), compat.scalar_space(mesh, level - 1))
+        compile_mixed(degree)
