@@ -20,7 +20,7 @@ from petsc4py import PETSc
 from pipeline import compat
 from pipeline.mesh.size import Sizes, set_size_field
 from pipeline.scene.model import FIXED, PROBE, Scene, build
-from pipeline.solve.forms import form_cache
+from pipeline.solve.cache import form_cache
 from pipeline.study.schema import Cylinder
 from pipeline.study.sweep import Case
 

@@ -43,13 +43,14 @@ def measure(element: str, degree: int, poisson: float, size: tuple[float, float]
     from pipeline.solve.elasticity import ElasticBody
     from pipeline.solve.mixed import MixedBody
     from pipeline.solve.space import Contact
+    from pipeline.solve.spaces import Spaces
 
     with threadpool_limits(limits=1), ExitStack() as stack:
         mesh, _ = mesh_case(_case(degree, size), ("x", "y"), MPI.COMM_SELF)
         base = PeakMemory(MPI.COMM_SELF)
         held = base.peak()
         make = MixedBody if element == "mixed" else ElasticBody
-        body = stack.enter_context(make(mesh, degree, Contact((0.0, 0.0, -DEPTH), True)))
+        body = stack.enter_context(make(stack.enter_context(Spaces(mesh)), degree, Contact((0.0, 0.0, -DEPTH), True)))
         mu = YOUNG / (2 * (1 + poisson))
         lame = 2 * mu * poisson / (1 - 2 * poisson), mu
         run = _mixed_run if isinstance(body, MixedBody) else _elastic_run

@@ -3,6 +3,7 @@
 Everything is decided by what a library offers, never by its version number.
 """
 
+import ctypes
 import inspect
 import logging
 import signal
@@ -11,6 +12,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import basix
+import cffi
 import dolfinx
 import gmsh
 import numpy as np
@@ -27,6 +29,7 @@ _JIT = {
         ("ffcx", "form_compiler_options", "form_compiler_params"),
     )
 }
+_PETSC = ctypes.CDLL(PETSc.__file__)  # petsc4py has no way to the blocks of a matrix
 _DIAGONAL = "diag" if "diag" in inspect.signature(fem_petsc.assemble_matrix).parameters else "diagonal"
 
 
@@ -144,6 +147,8 @@ def cellwise_tensor_space(mesh: Any) -> Any:
 
 _jit = dolfinx.jit.ffcx_jit
 _compiled: dict[str, Any] = {}
+_kernels: dict[int, int] = {}
+_FFI = cffi.FFI()
 
 
 def _remember(comm: MPI.Comm, expression: Any, *args: Any, **options: Any) -> Any:
@@ -160,20 +165,62 @@ def _remember(comm: MPI.Comm, expression: Any, *args: Any, **options: Any) -> An
     return _compiled[key]
 
 
-dolfinx.jit.ffcx_jit = _remember
+def _compile(comm: MPI.Comm, expression: Any, *args: Any, **options: Any) -> Any:
+    """Compile, and put the kernels that are asked for in the place of the generated ones."""
+    found = _remember(comm, expression, *args, **options)
+    if _kernels and isinstance(expression, ufl.Form):
+        of = found[0]
+        if hasattr(of, "form_integrals"):  # since 0.7; integrals over cells come first
+            count, marks, integrals = of.form_integral_offsets[1], of.form_integral_ids, of.form_integrals
+        else:
+            count, marks, integrals = of.num_integrals(0), of.integral_ids(0), of.integrals(0)
+        for i in range(count):
+            if marks[i] in _kernels:
+                integrals[i].tabulate_tensor_float64 = _FFI.cast("void*", _kernels[marks[i]])
+    return found
 
 
-def form(expression: Any, cache: str) -> Any:
-    """Compile ``expression``, with the generated code in the folder ``cache``; collective."""
+dolfinx.jit.ffcx_jit = _compile
+
+
+def form(expression: Any, cache: str, kernels: dict[int, int] | None = None) -> Any:
+    """Compile ``expression``, with the generated code in the folder ``cache``; collective.
+
+    ``kernels`` are addresses of kernels for integrals over cells, by the mark of the cells (-1: all): they are used
+    in place of the generated ones, now and whenever this process compiles the same expression again.
+    """
     jit = {"cache_dir": cache, "cffi_extra_compile_args": ["-O2", "-march=native"], "timeout": 120}
     options = {"jit": jit, "ffcx": {}}
-    # The compiler's own words go to the root logger: not for those who wait for a force.
+    with quiet_compiler(), _using(kernels or {}):
+        return fem.form(expression, **{name: options[key] for name, key in _JIT.items()})
+
+
+@contextmanager
+def _using(kernels: dict[int, int]) -> Iterator[None]:
+    _kernels.update(kernels)
+    try:
+        yield
+    finally:
+        _kernels.clear()
+
+
+@contextmanager
+def quiet_compiler() -> Iterator[None]:
+    """Keep the compiler's own words, which go to the root logger, from those who wait for a force."""
     before = logging.root.manager.disable
     logging.disable(logging.INFO)
     try:
-        return fem.form(expression, **{name: options[key] for name, key in _JIT.items()})
+        yield
     finally:
         logging.disable(before)
+
+
+def dirichletbc(value: Any, dofs: np.ndarray, space: Any) -> Any:
+    """Return a condition on ``dofs`` of ``space``.
+
+    dolfinx 0.5 finds out by an error, which takes as long as a small solve, that it wants the C++ object.
+    """
+    return fem.dirichletbc(value, dofs, space._cpp_object if hasattr(fem.bcs, "DirichletBCMetaClass") else space)
 
 
 def assemble_matrix(
@@ -186,12 +233,43 @@ def assemble_matrix(
     matrix = fem_petsc.create_matrix(form, mat_type) if into is None else into
     try:
         matrix.zeroEntries()
-        fem_petsc.assemble_matrix(matrix, form, bcs=bcs, **{_DIAGONAL: diagonal})
-        matrix.assemble()
+        add_matrix(matrix, form, bcs, diagonal)
     except BaseException:
         matrix.destroy()
         raise
     return matrix
+
+
+def add_matrix(matrix: PETSc.Mat, form: Any, bcs: list[Any], diagonal: float) -> None:
+    """Add ``form`` to a matrix, but for the rows and columns of ``bcs``, whose diagonal is set; collective."""
+    fem_petsc.assemble_matrix(matrix, form, bcs=bcs, **{_DIAGONAL: diagonal})
+    matrix.assemble()
+
+
+def blocked_matrix(offsets: np.ndarray, columns: np.ndarray) -> PETSc.Mat:
+    """Return a matrix of zeros, of type seqbaij, with blocks of 3 × 3 in sparse rows; columns ascend in each row."""
+    size, indices = 3 * (len(offsets) - 1), columns.astype(PETSc.IntType, copy=False)
+    matrix = PETSc.Mat().createBAIJ(
+        ((size, None), (size, None)), 3, nnz=np.diff(offsets).astype(PETSc.IntType), comm=MPI.COMM_SELF
+    )
+    if _PETSC.MatSeqBAIJSetColumnIndices(ctypes.c_void_p(matrix.handle), ctypes.c_void_p(indices.ctypes.data)):
+        raise RuntimeError("PETSc does not take the pattern of a matrix")
+    matrix.assemble()
+    matrix.zeroEntries()
+    return matrix
+
+
+@contextmanager
+def blocks(matrix: PETSc.Mat, count: int) -> Iterator[np.ndarray]:
+    """Lend the ``count`` blocks of 3 × 3, by columns, of a matrix of type seqbaij, shape (count, 9), to write to."""
+    handle, values = ctypes.c_void_p(matrix.handle), ctypes.POINTER(ctypes.c_double)()
+    if _PETSC.MatSeqBAIJGetArray(handle, ctypes.byref(values)):
+        raise RuntimeError("PETSc does not lend the blocks of its matrix")
+    try:
+        yield np.ctypeslib.as_array(values, (count, 9))
+    finally:
+        _PETSC.MatSeqBAIJRestoreArray(handle, ctypes.byref(values))
+        matrix.assemble()  # what was made of the values before is void
 
 
 def versions() -> dict[str, str]:

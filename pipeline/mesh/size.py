@@ -41,16 +41,16 @@ class Sizes:
 def set_size_field(sizes: Sizes, probe: AnyProbe, scale: float) -> None:
     """Make ``sizes`` the background field of gmsh's current model, whose unit is ``scale`` metres."""
     unit = 1 / scale
-    terms = [f"{unit * sizes.rim:.15g}+{sizes.growth:.15g}*{_rim_distance(probe, unit)}"]
+    terms = [f"{unit * sizes.rim:.12g}+{sizes.growth:.12g}*{_rim_distance(probe, unit)}"]
     if sizes.epsilon == inf:
-        terms.append(f"{unit * sizes.fine:.15g}")
+        terms.append(f"{unit * sizes.fine:.12g}")
     else:
         x, y = (unit * c for c in probe.at)
-        outside = f"Max(Sqrt((x-({x:.15g}))^2+(y-({y:.15g}))^2+z^2)-{unit * sizes.epsilon:.15g},0)"
-        terms.append(f"{unit * sizes.fine:.15g}+{sizes.growth:.15g}*{outside}")
-        terms.append(f"{unit * sizes.coarse:.15g}")
+        outside = f"Max(Sqrt((x-({x:.12g}))^2+(y-({y:.12g}))^2+z^2)-{unit * sizes.epsilon:.12g},0)"
+        terms.append(f"{unit * sizes.fine:.12g}+{sizes.growth:.12g}*{outside}")
+        terms.append(f"{unit * sizes.coarse:.12g}")
     if sizes.column < inf:
-        terms.append(f"{unit * sizes.column / _EDGES_PER_RADIUS:.15g}")
+        terms.append(f"{unit * sizes.column / _EDGES_PER_RADIUS:.12g}")
     field = gmsh.model.mesh.field
     tags = []
     for term in terms:
@@ -63,13 +63,13 @@ def set_size_field(sizes: Sizes, probe: AnyProbe, scale: float) -> None:
 
 def _rim_distance(probe: AnyProbe, unit: float) -> str:
     """Write the distance from (x, y, z) to the edge of the footprint as a gmsh expression."""
-    x, y = (f"({c}-({unit * a:.15g}))" for c, a in zip("xy", probe.at, strict=True))
+    x, y = (f"({c}-({unit * a:.12g}))" for c, a in zip("xy", probe.at, strict=True))
     if isinstance(probe, Disc):
-        return f"Sqrt((Sqrt({x}^2+{y}^2)-{unit * probe.radius:.15g})^2+z^2)"
+        return f"Sqrt((Sqrt({x}^2+{y}^2)-{unit * probe.radius:.12g})^2+z^2)"
     assert isinstance(probe, Blade)
     tx, ty = probe.along
-    p = f"(Fabs({x}*({tx:.15g})+{y}*({ty:.15g}))-{unit * probe.length / 2:.15g})"
-    q = f"(Fabs({y}*({tx:.15g})-{x}*({ty:.15g}))-{unit * probe.width / 2:.15g})"
+    p = f"(Fabs({x}*({tx:.12g})+{y}*({ty:.12g}))-{unit * probe.length / 2:.12g})"
+    q = f"(Fabs({y}*({tx:.12g})-{x}*({ty:.12g}))-{unit * probe.width / 2:.12g})"
     # Signed distance to a rectangle in its plane; its magnitude is the distance to the edge line.
     in_plane = f"(Sqrt(Max({p},0)^2+Max({q},0)^2)+Min(Max({p},{q}),0))"
     return f"Sqrt({in_plane}^2+z^2)"

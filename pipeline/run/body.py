@@ -1,12 +1,12 @@
 """What solves a case on its mesh, if the memory is there for it."""
 
-from pipeline.mesh.distribute import BodyMesh
 from pipeline.run.memory import FreeMemory
 from pipeline.solve.elasticity import ElasticBody
 from pipeline.solve.linear import SolveError
 from pipeline.solve.mixed import MixedBody
 from pipeline.solve.solution import Solution
 from pipeline.solve.space import Contact
+from pipeline.solve.spaces import Spaces
 from pipeline.study.sweep import Case
 
 # Unknowns up to which a direct solve is a way out where iterations do not converge.
@@ -21,12 +21,12 @@ class CaseFailure(Exception):
     """A case cannot be computed, for a reason that all ranks have agreed on."""
 
 
-def body_of(mesh: BodyMesh, case: Case, *, shared: bool, reuse: bool = False) -> Body:
-    """Return what solves ``case`` on its mesh, by the elements that suit it; collective."""
+def body_of(spaces: Spaces, case: Case, *, shared: bool, reuse: bool = False) -> Body:
+    """Return what solves ``case`` in the spaces of its mesh, by the elements that suit it; collective."""
     contact = Contact(case.probe.travel, case.probe.contact == "bonded")
     if case.element == "mixed":
-        return MixedBody(mesh, case.mesh.degree, contact)
-    return ElasticBody(mesh, case.mesh.degree, contact, shared=shared, reuse=reuse)
+        return MixedBody(spaces, case.mesh.degree, contact)
+    return ElasticBody(spaces, case.mesh.degree, contact, shared=shared, reuse=reuse)
 
 
 def solve_body(case: Case, body: Body, *, estimate: bool) -> Solution:

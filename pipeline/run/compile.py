@@ -6,8 +6,10 @@ from mpi4py import MPI
 
 from pipeline.plan.steps import Solve
 from pipeline.solve.axisymmetric import compile_axisymmetric
-from pipeline.solve.forms import compile_elastic, compiling
+from pipeline.solve.cache import compiling
+from pipeline.solve.forms import compile_elastic
 from pipeline.solve.mixed_forms import compile_mixed
+from pipeline.solve.straight.pattern import library
 from pipeline.stages import stage
 
 # What this process has seen to.
@@ -31,6 +33,7 @@ def _compile(element: str, degree: int) -> None:
     if element == "axisymmetric":
         compile_axisymmetric()
         return
+    library()
     compile_elastic(degree, straight=degree == 1)
     if element == "mixed":
         compile_mixed(degree)

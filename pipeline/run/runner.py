@@ -27,6 +27,7 @@ from pipeline.run.reduce import reduced_records
 from pipeline.solve.axisymmetric import solve_axisymmetric
 from pipeline.solve.elasticity import ElasticBody
 from pipeline.solve.linear import SolveError, is_direct
+from pipeline.solve.spaces import Spaces
 from pipeline.study.sweep import Case
 
 # An error bar above this says that the force is not known.
@@ -77,17 +78,19 @@ class StepRunner:
         if not self._guard(step.solves, lambda: meshed.append(self._mesh(step.case, step.mirrors))):
             return
         ((mesh, seconds),) = meshed
-        for operator in step.operators:
-            self._run_operator(operator, mesh, seconds, memory)
+        with Spaces(mesh) as spaces:
+            for operator in step.operators:
+                self._run_operator(operator, spaces, seconds, memory)
 
-    def _run_operator(self, step: OperatorStep, mesh: BodyMesh, mesh_seconds: float, memory: PeakMemory) -> None:
-        bodies: list[Body] = []
-        # Assembling both parts of the operator costs as much as assembling it twice, and memory for three.
+    def _run_operator(self, step: OperatorStep, spaces: Spaces, mesh_seconds: float, memory: PeakMemory) -> None:
+        bodies, mesh = list[Body](), spaces.body
+        # Assembling both parts of the operator costs as much as assembling it twice, and memory for three; on one rank
+        # assembly is so fast that they are never worth it.
         degree = step.case.mesh.degree
         needed = estimate.enriched_memory(estimate.dofs(mesh.cells, degree), degree, parts=True)
-        shared = len(step.solves) > 2 and not lacks_memory(self._free, needed, "")
+        shared = self.comm.size > 1 and len(step.solves) > 2 and not lacks_memory(self._free, needed, "")
         if not self._guard(
-            step.solves, lambda: bodies.append(body_of(mesh, step.case, shared=shared, reuse=self._plan.reuse))
+            step.solves, lambda: bodies.append(body_of(spaces, step.case, shared=shared, reuse=self._plan.reuse))
         ):
             return
         with bodies[0] as body:
@@ -153,9 +156,9 @@ class StepRunner:
     def _compute(self, solve: Solve, memory: PeakMemory) -> Record:
         """Compute one case afresh, mesh and all; collective."""
         mesh, seconds = self._mesh(solve.case, solve.mirrors)
-        with body_of(mesh, solve.case, shared=False) as body:
+        with Spaces(mesh) as spaces, body_of(spaces, solve.case, shared=False) as body:
             record = self._solve(solve, body, mesh, seconds, memory)
-        del mesh, body
+        del mesh, spaces, body
         give_back()
         return record
 

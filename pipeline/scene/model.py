@@ -52,6 +52,10 @@ class Scene:
         """Metres in one unit of the model."""
         return self.extent / _BODY_SIZE
 
+    def units(self, length: float) -> float:
+        """Return a length (m) in units of the model, to twelve digits: similar bodies make the same model."""
+        return float(f"{length / self.scale:.12g}")
+
     @property
     def is_cut(self) -> bool:
         """Whether a column is cut out of the body."""
@@ -77,18 +81,18 @@ def build(scene: Scene) -> list[int]:
     Raises:
         SceneError: if the kernel fails, or no footprint or no support is left.
     """
-    occ, unit = gmsh.model.occ, 1 / scene.scale
+    occ, unit = gmsh.model.occ, scene.units
     volumes = [(3, _add_body(scene.body, unit))]
-    x, y = (unit * c for c in scene.probe.at)
-    height = unit * scene.body.height
+    x, y = (unit(c) for c in scene.probe.at)
+    height = unit(scene.body.height)
     if scene.is_cut:
-        column = (3, occ.addCylinder(x, y, -height, 0, 0, height, unit * scene.column))
+        column = (3, occ.addCylinder(x, y, -height, 0, 0, height, unit(scene.column)))
         volumes, _ = occ.intersect(volumes, [column])
     if scene.mirrors:
         volumes, _ = occ.intersect(volumes, [(3, _add_positive_side(scene))])
-    tools = [(2, _add_footprint(scene, unit))]
+    tools = [(2, _add_footprint(scene))]
     if isinstance(scene.body.fixed, Below):
-        tools.append((2, _add_level(scene, unit)))
+        tools.append((2, _add_level(scene)))
     _, children = occ.fragment(volumes, tools)
     occ.synchronize()
     # Pieces of a tool that stick out of the body bound no volume: drop them.
@@ -120,37 +124,37 @@ def _add_positive_side(scene: Scene) -> int:
     return gmsh.model.occ.addBox(*low, -size, size - low[0], size - low[1], 2 * size)
 
 
-def _add_body(body: AnyBody, unit: float) -> int:
+def _add_body(body: AnyBody, unit: Callable[[float], float]) -> int:
     occ = gmsh.model.occ
     if isinstance(body, Box):
-        a, b, c = (unit * s for s in body.size)
+        a, b, c = (unit(s) for s in body.size)
         return occ.addBox(-a / 2, -b / 2, -c, a, b, c)
-    return occ.addCylinder(0, 0, -unit * body.height, 0, 0, unit * body.height, unit * body.radius)
+    return occ.addCylinder(0, 0, -unit(body.height), 0, 0, unit(body.height), unit(body.radius))
 
 
-def _add_footprint(scene: Scene, unit: float) -> int:
-    occ, probe = gmsh.model.occ, scene.probe
-    x, y = (unit * c for c in probe.at)
+def _add_footprint(scene: Scene) -> int:
+    occ, probe, unit = gmsh.model.occ, scene.probe, scene.units
+    x, y = (unit(c) for c in probe.at)
     if isinstance(probe, Blade):
-        a, b = unit * probe.length, unit * probe.width
+        a, b = unit(probe.length), unit(probe.width)
         tag = occ.addRectangle(x - a / 2, y - b / 2, 0, a, b)
         occ.rotate([(2, tag)], x, y, 0, 0, 0, 1, float(np.arctan2(probe.along[1], probe.along[0])))
         return tag
-    radius = unit * scene.rim_radius
+    radius = unit(scene.rim_radius)
     return occ.addDisk(x, y, 0, radius, radius)
 
 
-def _add_level(scene: Scene, unit: float) -> int:
+def _add_level(scene: Scene) -> int:
     """Add the horizontal plane below which the body is held, so that its edge is in the mesh."""
     fixed = scene.body.fixed
     assert isinstance(fixed, Below)
     size = 3 * _BODY_SIZE
-    return gmsh.model.occ.addRectangle(-size / 2, -size / 2, unit * fixed.below, size, size)
+    return gmsh.model.occ.addRectangle(-size / 2, -size / 2, scene.units(fixed.below), size, size)
 
 
 def _name_groups(scene: Scene, footprint: list[int]) -> None:
     """Put every volume and every boundary face into its physical group."""
-    model, unit = gmsh.model, 1 / scene.scale
+    model = gmsh.model
     volumes = model.getEntities(3)
     groups: dict[str, list[int]] = {PROBE: list(footprint), FIXED: [], FREE: [], CUT: []}
     groups |= {MIRROR[plane]: [] for plane in scene.mirrors}
@@ -158,7 +162,7 @@ def _name_groups(scene: Scene, footprint: list[int]) -> None:
     for _, tag in model.getBoundary(volumes, combined=True, oriented=False):
         if tag in footprint:
             continue
-        points = _sample(tag) / unit
+        points = _sample(tag) * scene.scale
         name = next((name for name, test in tests if test(points)), FREE)
         groups[FIXED if name == CUT and scene.column_fixed else name].append(tag)
     if not groups[FIXED]:

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.enrich import energy_decrement
 from pipeline.solve.error import error_bar
 from pipeline.solve.forms import mean_strain_form
@@ -33,27 +32,25 @@ from pipeline.solve.solution import (
     rest,
 )
 from pipeline.solve.space import ConstrainedSpace, Contact
+from pipeline.solve.spaces import Spaces
 from pipeline.stages import stage
 
 
 class ElasticBody:
-    """A mesh, a degree and a contact: solves for any λ and μ, sharing the assembly. A context manager."""
+    """The spaces of a mesh, a degree and a contact: solves for any λ and μ. A context manager."""
 
-    def __init__(self, body: BodyMesh, degree: int, contact: Contact, *, shared: bool = False, reuse: bool = False):
+    def __init__(self, spaces: Spaces, degree: int, contact: Contact, *, shared: bool = False, reuse: bool = False):
         """Prepare; ``shared`` assembles A_λ and A_μ apart, once, for many pairs of λ and μ. Collective.
 
-        ``reuse`` begins each solve from the solution of the one before.
+        ``reuse`` begins each solve from the solution of the one before. What the spaces hold is freed with them.
 
         Raises:
             SolveError: if footprint and support share a point: no displacement satisfies both.
         """
         self._shared, self._reuse = shared, reuse
         self.correction: FloatArray | None = None  # the last solution less the prescribed displacements, owned dofs
-        self._body = body
-        self._contact = contact
-        self._levels: list[ConstrainedSpace] = []
-        self._finer: ConstrainedSpace | None = None
-        self._fine = ConstrainedSpace(body, degree, contact)
+        self._spaces, self._body, self._contact = spaces, spaces.body, contact
+        self._fine = spaces.get(degree, contact)
         self._strain = mean_strain_form(self._fine.space, self._fine.forms.displacement)
         self.dofs = self._fine.dofs
 
@@ -61,9 +58,7 @@ class ElasticBody:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for space in (*self._levels, self._fine, self._finer):
-            if space is not None:
-                space.close()
+        self.correction = None
 
     def solve(
         self, lame: tuple[float, float], *, method: str = "auto", tolerance: float = TOLERANCE, estimate: bool = False
@@ -156,10 +151,8 @@ class ElasticBody:
         return [level for level, _ in found], sum(seconds for _, seconds in found)
 
     def _coarser(self) -> list[ConstrainedSpace]:
-        """Return the spaces of lower degree, made when first asked for; collective."""
-        if not self._levels:
-            self._levels = [ConstrainedSpace(self._body, d, self._contact) for d in range(1, self._fine.degree)]
-        return self._levels
+        """Return the spaces of lower degree; collective."""
+        return [self._spaces.get(degree, self._contact) for degree in range(1, self._fine.degree)]
 
     def _level(self, space: ConstrainedSpace, lame: tuple[float, float], *, blocked: bool) -> tuple[Level, float]:
         blocked = blocked and space.degree > 1
@@ -170,9 +163,7 @@ class ElasticBody:
     def _decrement(self, lame: tuple[float, float], levels: list[Level], stack: ExitStack) -> tuple[float, int]:
         """Return the energy, of the whole body, that one degree more takes away from the last solution."""
         fine = self._fine
-        if self._finer is None:
-            self._finer = ConstrainedSpace(self._body, fine.degree + 1, self._contact)
-        finer = self._finer
+        finer = self._spaces.get(fine.degree + 1, self._contact)
         if len(levels) == 1:
             levels = [*(self._level(space, lame, blocked=True)[0] for space in self._coarser()), *levels]
         level, _ = self._level(finer, lame, blocked=True)

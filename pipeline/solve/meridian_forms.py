@@ -18,7 +18,7 @@ from dolfinx import fem
 
 from pipeline import compat
 from pipeline.mesh.generate import FloatArray, IntArray
-from pipeline.solve.forms import form_cache
+from pipeline.solve.cache import form_cache
 
 
 class MeridianForms:

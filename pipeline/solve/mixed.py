@@ -25,7 +25,6 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.error import error_bar
 from pipeline.solve.forms import mean_strain_form
 from pipeline.solve.linear import Level, SolveError
@@ -42,7 +41,8 @@ from pipeline.solve.solution import (
     principal_strains,
     rest,
 )
-from pipeline.solve.space import ConstrainedSpace, Contact
+from pipeline.solve.space import Contact
+from pipeline.solve.spaces import Spaces
 from pipeline.stages import stage
 
 # λ₀/μ = 1 (ν = ¼): small enough for the multigrid, large enough for the pressure's mass to be a good preconditioner.
@@ -67,20 +67,20 @@ class _Forces:
 
 
 class MixedBody:
-    """A mesh, a degree k and a contact: solves for any λ > μ, infinity too, sharing all assembly.
+    """The spaces of a mesh, a degree k and a contact: solves for any λ > μ, infinity too, sharing all assembly.
 
     A context manager, which frees what it made.
     """
 
-    def __init__(self, body: BodyMesh, degree: int, contact: Contact):
-        """Prepare; collective.
+    def __init__(self, spaces: Spaces, degree: int, contact: Contact):
+        """Prepare; collective. Until its end, nobody else may ask the spaces for an operator.
 
         Raises:
             SolveError: if footprint and support share a point: no displacement satisfies both.
         """
-        self._body, self._contact = body, contact
+        self._spaces, self._body, self._contact = spaces, spaces.body, contact
         self._stack = ExitStack()
-        self._spaces: dict[int, MixedSpace] = {}
+        self._mixed: dict[int, MixedSpace] = {}
         self._levels: dict[tuple[int, bool], tuple[Level, float]] = {}
         self._solvers: dict[tuple[int, bool], SaddleSolver] = {}
         self._degree = degree
@@ -200,10 +200,10 @@ class MixedBody:
     @stage("spaces, forms")
     def _space(self, degree: int) -> MixedSpace:
         """Return the spaces of elements of ``degree``, made when first asked for; collective."""
-        if degree not in self._spaces:
-            self._spaces[degree] = MixedSpace(self._body, degree, self._contact)
-            self._stack.callback(self._spaces[degree].close)
-        return self._spaces[degree]
+        if degree not in self._mixed:
+            self._mixed[degree] = MixedSpace(self._body, self._spaces.get(degree, self._contact))
+            self._stack.callback(self._mixed[degree].close)
+        return self._mixed[degree]
 
     @property
     def space(self) -> MixedSpace:
@@ -233,12 +233,7 @@ class MixedBody:
     def _level(self, degree: int, *, blocked: bool) -> tuple[Level, float]:
         """Return K₀ for μ = 1 in displacements of ``degree``, and the seconds that its assembly took; collective."""
         if (degree, blocked) not in self._levels:
-            spaces = self._spaces
-            if degree in spaces:
-                space = spaces[degree].displacements
-            else:
-                space = ConstrainedSpace(self._body, degree, self._contact)
-                self._stack.callback(space.close)
+            space = self._spaces.get(degree, self._contact)
             matrix, seconds = space.operator(LAME, shared=False, blocked=blocked)
             self._levels[degree, blocked] = Level(space.space, matrix, space.prescribed), seconds
         return self._levels[degree, blocked]

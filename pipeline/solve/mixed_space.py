@@ -10,9 +10,12 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.mesh.distribute import BodyMesh
-from pipeline.solve.mixed_forms import mixed_forms
+from pipeline.solve.forms import curved_cells
+from pipeline.solve.mixed_forms import MixedForms
 from pipeline.solve.saddle import Pair
-from pipeline.solve.space import ConstrainedSpace, Contact, whole_points
+from pipeline.solve.space import ConstrainedSpace, whole_points
+from pipeline.solve.straight import mixed as straight
+from pipeline.solve.straight import suits
 
 
 class MixedSpace:
@@ -22,16 +25,12 @@ class MixedSpace:
     of the saddle point are then of like magnitude in any unit of length.
     """
 
-    def __init__(self, body: BodyMesh, degree: int, contact: Contact):
-        """Collective.
-
-        Raises:
-            SolveError: if the footprint and the support share a point.
-        """
-        self.comm, self.degree = body.comm, degree
-        self.displacements = ConstrainedSpace(body, degree, contact)
-        self.pressures = compat.scalar_space(body.mesh, degree - 1)
-        self.forms = mixed_forms(self.displacements.forms.displacement, self.pressures)
+    def __init__(self, body: BodyMesh, displacements: ConstrainedSpace):
+        """Add the pressures to the ``displacements`` on a mesh; collective."""
+        self.comm, self.degree = body.comm, displacements.degree
+        self.displacements = displacements
+        self.pressures = compat.scalar_space(body.mesh, displacements.degree - 1)
+        self.forms = MixedForms(displacements.forms.displacement, self.pressures)
         index_map = self.pressures.dofmap.index_map
         self._owned, self._size = index_map.size_local, index_map.size_global
         self._ghosts = np.asarray(index_map.ghosts, dtype=PETSc.IntType)
@@ -39,7 +38,9 @@ class MixedSpace:
         self.whole_dofs = self.displacements.whole_dofs + whole_points(self.pressures, body)
         with ExitStack() as stack:
             start = time.perf_counter()
-            self.mass, self.coupling = (_assemble(form, stack) for form in (self.forms.mass, self.forms.coupling))
+            self.mass, self.coupling = self._matrices(body)
+            stack.callback(self.mass.destroy)
+            stack.callback(self.coupling.destroy)
             self._mask_coupling()
             diagonal = self.mass.getDiagonal()
             self.unit = (diagonal.sum() / self._size) ** (-1 / 3)
@@ -50,9 +51,8 @@ class MixedSpace:
             self._stack = stack.pop_all()
 
     def close(self) -> None:
-        """Free the matrices."""
+        """Free the matrices that pressures take part in."""
         self._stack.close()
-        self.displacements.close()
 
     @contextmanager
     def pair(self) -> Iterator[Pair]:
@@ -100,6 +100,18 @@ class MixedSpace:
         """Take the prescribed displacements out of ``unknown`` again."""
         unknown[0].array[:] -= self.displacements.held[: self.displacements.owned]
 
+    def _matrices(self, body: BodyMesh) -> tuple[PETSc.Mat, PETSc.Mat]:
+        """Return M and B, without conditions; collective."""
+        if not suits(self.displacements.space):
+            return _assemble(self.forms.mass), _assemble(self.forms.coupling)
+        curved = curved_cells(body.mesh)
+        mass = straight.mass(self.pressures, curved)
+        coupling = straight.coupling(self.pressures, self.displacements.space, curved)
+        if curved is not None and curved.any():
+            compat.add_matrix(mass, self.forms.curved_mass, [], 1.0)
+            compat.add_matrix(coupling, self.forms.curved_coupling, [], 1.0)
+        return mass, coupling
+
     def _dilate(self, result: PETSc.Vec) -> None:
         fem_petsc.assemble_vector(result, self.forms.dilation)
         result.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
@@ -113,7 +125,5 @@ class MixedSpace:
         free.destroy()
 
 
-def _assemble(form: object, stack: ExitStack) -> PETSc.Mat:
-    matrix = compat.assemble_matrix(form, [], 1.0, "aij")
-    stack.callback(matrix.destroy)
-    return matrix
+def _assemble(form: object) -> PETSc.Mat:
+    return compat.assemble_matrix(form, [], 1.0, "aij")

@@ -14,8 +14,10 @@ from petsc4py import PETSc
 from pipeline import compat
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.scene.model import FIXED, MIRROR, PROBE
-from pipeline.solve.forms import elastic_forms
+from pipeline.solve.forms import ElasticForms, curved_cells
 from pipeline.solve.linear import SolveError
+from pipeline.solve.straight import suits
+from pipeline.solve.straight.stiffness import StraightStiffness
 from pipeline.stages import stage
 
 
@@ -48,22 +50,23 @@ class ConstrainedSpace:
         index_map = space.dofmap.index_map
         self.owned, self.dofs = 3 * index_map.size_local, 3 * index_map.size_global
         self._ghosts = np.asarray(index_map.ghosts, dtype=PETSc.IntType)
-        self.forms = elastic_forms(space)
+        self.forms = ElasticForms(space)
         self._parts: tuple[PETSc.Mat, PETSc.Mat] | None = None
         self._part_seconds = 0.0
         self._operators: dict[str, PETSc.Mat] = {}
+        self._straight: StraightStiffness | None = None
         probe, fixed = (_points(space, body, name) for name in (PROBE, FIXED))
         planes = _planes(space, body)
         if self.comm.allreduce(len(np.intersect1d(probe, fixed))):
             raise SolveError("the probe's footprint touches the held face: no displacement satisfies both conditions")
         travel = np.array(contact.travel, dtype=PETSc.ScalarType)
-        self._conditions = [fem.dirichletbc(np.zeros(3, dtype=PETSc.ScalarType), fixed, space)]
+        self._conditions = [compat.dirichletbc(np.zeros(3, dtype=PETSc.ScalarType), fixed, space)]
         components = range(3) if contact.bonded else [2]
         for c in components:
-            self._conditions.append(fem.dirichletbc(travel[c], 3 * probe + c, space.sub(c)))
+            self._conditions.append(compat.dirichletbc(np.asarray(travel[c]), 3 * probe + c, space.sub(c)))
         mirrored = [3 * plane + axis for axis, plane in zip(body.mirrored, planes, strict=True)]
         for axis, dofs in zip(body.mirrored, mirrored, strict=True):
-            self._conditions.append(fem.dirichletbc(PETSc.ScalarType(0), dofs, space.sub(axis)))
+            self._conditions.append(compat.dirichletbc(np.zeros((), dtype=PETSc.ScalarType), dofs, space.sub(axis)))
         self.held = np.zeros(3 * (index_map.size_local + index_map.num_ghosts))
         unrolled = [3 * probe + c for c in components]
         for c, dofs in zip(components, unrolled, strict=True):
@@ -155,8 +158,23 @@ class ConstrainedSpace:
         self, lame: tuple[float, float], diagonal: float, mat_type: str, into: PETSc.Mat | None = None
     ) -> PETSc.Mat:
         self.forms.set_lame(*lame)
-        matrix = compat.assemble_matrix(self.forms.stiffness, self._conditions, diagonal, mat_type, into)
+        if mat_type == "baij" and suits(self.space):
+            matrix = self._assemble_blocks(lame, diagonal, into)
+        else:
+            matrix = compat.assemble_matrix(self.forms.stiffness, self._conditions, diagonal, mat_type, into)
         _mark(matrix)
+        return matrix
+
+    def _assemble_blocks(self, lame: tuple[float, float], diagonal: float, into: PETSc.Mat | None) -> PETSc.Mat:
+        """Assemble the straight cells, which are most, the fast way, and dolfinx the others."""
+        curved = curved_cells(self._body.mesh)
+        if self._straight is None:
+            self._straight = StraightStiffness(self.space, curved, self.prescribed)
+        matrix = self._straight.matrix() if into is None else into
+        matrix.zeroEntries()
+        if curved is not None and curved.any():
+            compat.add_matrix(matrix, self.forms.curved_stiffness, self._conditions, diagonal)
+        self._straight.add(matrix, lame, diagonal)
         return matrix
 
 

@@ -19,8 +19,9 @@ from pipeline import compat
 from pipeline.mesh.distribute import distribute
 from pipeline.plan.plan import make_plan
 from pipeline.run.meshing import mesh_arrays
-from pipeline.solve.forms import elastic_forms, form_cache
-from pipeline.solve.mixed_forms import mixed_forms
+from pipeline.solve.cache import form_cache
+from pipeline.solve.forms import ElasticForms
+from pipeline.solve.mixed_forms import MixedForms
 from pipeline.study.load import parse
 from pipeline.verify.row import Row
 
@@ -67,13 +68,13 @@ def _patch(degree: int, *, mixed: bool) -> float:
     (solve,) = [s for s in make_plan(study).solves if not s.is_reference]
     body = distribute(MPI.COMM_SELF, mesh_arrays(solve.case, ("x", "y")))
     space = compat.vector_space(body.mesh, degree)
-    forms = elastic_forms(space)
+    forms = ElasticForms(space)
     forms.set_lame(1.0, 1.0)
     gradient = np.array([[0.2, 0.5, -0.3], [0.1, -0.4, 0.7], [0.6, 0.3, 0.9]])
     forms.displacement.interpolate(lambda x: gradient @ x)
     parts = [forms.action]
     if mixed:
-        coupled = mixed_forms(forms.displacement, compat.scalar_space(body.mesh, degree - 1))
+        coupled = MixedForms(forms.displacement, compat.scalar_space(body.mesh, degree - 1))
         coupled.pressure.x.array[:] = np.trace(gradient)
         parts.append(coupled.pull)
     vectors = [fem.assemble_vector(part) for part in parts]
@@ -109,7 +110,7 @@ def _manufactured(degree: int, cubes: int, *, poisson: float, mixed: bool) -> fl
     mesh = dolfinx.mesh.create_unit_cube(MPI.COMM_SELF, cubes, cubes, cubes)
     lame_lambda = 1.0 if mixed else 2 * poisson / (1 - 2 * poisson)
     space = compat.vector_space(mesh, degree)
-    forms = elastic_forms(space)
+    forms = ElasticForms(space)
     forms.set_lame(lame_lambda, 1.0)
     exact = _exact(mesh, 0.0 if mixed else lame_lambda)
     cache = str(form_cache())
@@ -118,7 +119,7 @@ def _manufactured(degree: int, cubes: int, *, poisson: float, mixed: bool) -> fl
     blocks = [[_sparse(forms.stiffness)]]
     rhs = np.array(fem.assemble_vector(load).array)
     if mixed:
-        coupling = _sparse(mixed_forms(forms.displacement, compat.scalar_space(mesh, degree - 1)).coupling)
+        coupling = _sparse(MixedForms(forms.displacement, compat.scalar_space(mesh, degree - 1)).coupling)
         blocks = [[blocks[0][0], coupling.T], [coupling, None]]
         rhs = np.concatenate([rhs, np.zeros(coupling.shape[0])])
     matrix = sp.bmat(blocks, format="csc")

@@ -23,6 +23,7 @@ from pipeline.run.memory import FreeMemory
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import cached_arrays, on_first_rank
 from pipeline.solve.linear import is_direct
+from pipeline.solve.spaces import Spaces
 from pipeline.study.sweep import Case, Study
 from pipeline.view.fields import Fields, FloatArray, IntArray
 
@@ -66,7 +67,7 @@ def _attempt(solve: Solve, comm: MPI.Comm, cache: MeshCache | None, note: Note) 
     arrays = _arrays(solve, comm, cache, note)
     prepare(comm, [solve])
     mesh = distribute(comm, arrays)
-    with body_of(mesh, case, shared=False) as body:
+    with Spaces(mesh) as spaces, body_of(spaces, case, shared=False) as body:
         direct = is_direct(case.solve.method, body.dofs, case.mesh.degree)
         check_memory(FreeMemory(comm), estimate.solving_memory(body.dofs, case.mesh.degree, direct=direct), "solving")
         note(f"solving for {body.dofs} unknowns")

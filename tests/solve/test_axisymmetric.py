@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.mesh.meridian import Grading, Meridian, generate_meridian
 from pipeline.solve.axisymmetric import compile_axisymmetric, solve_axisymmetric
-from pipeline.solve.forms import compiling
+from pipeline.solve.cache import compiling
 from pipeline.solve.linear import SolveError
 
 # F / (E d · 1 mm) of the cylinder R = H = 50 mm under a disc of 3 mm, by another program, converged to 1e-7.

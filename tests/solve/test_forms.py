@@ -13,7 +13,8 @@ from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.mesh.generate import generate
 from pipeline.mesh.size import Sizes
 from pipeline.scene.model import Scene
-from pipeline.solve.forms import elastic_forms, form_cache, strain
+from pipeline.solve.cache import form_cache
+from pipeline.solve.forms import ElasticForms, strain
 from tests.cases import study
 
 LAME = (2.0, 1.0)
@@ -36,7 +37,7 @@ def boundary_dofs(space) -> np.ndarray:
 def test_patch(degree):
     """A linear displacement leaves no force on any inner dof, on a graded mesh with curved elements."""
     space = compat.vector_space(make_mesh(degree, 5e-3, 0.5e-3).mesh, degree)
-    forms = elastic_forms(space)
+    forms = ElasticForms(space)
     forms.set_lame(*LAME)
     gradient = np.array([[0.3, -0.2, 0.1], [0.4, 0.1, -0.5], [0.2, 0.6, -0.3]])
     forms.displacement.interpolate(lambda x: gradient @ x)
@@ -51,7 +52,7 @@ def manufactured_error(degree: int, size: float) -> tuple[float, int]:
     """Return the energy-norm error of a smooth displacement, held on the whole boundary, and the number of cells."""
     body = make_mesh(degree, size, size)
     space = compat.vector_space(body.mesh, degree)
-    forms = elastic_forms(space)
+    forms = ElasticForms(space)
     forms.set_lame(*LAME)
     k = 2 * np.pi / 40e-3
 

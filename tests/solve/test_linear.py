@@ -6,13 +6,14 @@ from pipeline.solve.elasticity import ElasticBody
 from pipeline.solve.linear import SolveError
 from pipeline.solve.solution import BALANCE_LIMIT
 from pipeline.solve.space import Contact
+from pipeline.solve.spaces import Spaces
 from tests.solve.test_mixed import DEPTH, contact, lame, make_mesh
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3])
 @pytest.mark.parametrize("poisson", [0.0, 0.3, 0.49])
 def test_default_tolerance_is_enough_for_f(degree, poisson):
-    with ElasticBody(make_mesh(mesh={"degree": min(degree, 2)}), degree, contact()) as body:
+    with ElasticBody(Spaces(make_mesh(mesh={"degree": min(degree, 2)})), degree, contact()) as body:
         usual = body.solve(lame(poisson), method="iterative")
         direct = body.solve(lame(poisson), method="direct")
     assert usual.reaction[2] == pytest.approx(direct.reaction[2], rel=1e-8)
@@ -23,13 +24,13 @@ def test_default_tolerance_is_enough_for_f(degree, poisson):
 def test_force_of_a_probe_that_slices_is_as_exact():
     """Its force along the axis is not the work alone, and linear in the solver's error."""
     slicing = Contact((DEPTH / 2, 0.0, -DEPTH), True)
-    with ElasticBody(make_mesh(mirrors=("y",)), 2, slicing) as body:
+    with ElasticBody(Spaces(make_mesh(mirrors=("y",))), 2, slicing) as body:
         usual, direct = (body.solve(lame(0.45), method=method) for method in ("iterative", "direct"))
     assert usual.reaction == pytest.approx(direct.reaction, rel=1e-7, abs=1e-7 * direct.reaction[2])
 
 
 def test_forces_that_do_not_balance_are_a_failure():
-    with ElasticBody(make_mesh(), 2, contact()) as body, pytest.raises(SolveError, match="do not balance"):
+    with ElasticBody(Spaces(make_mesh()), 2, contact()) as body, pytest.raises(SolveError, match="do not balance"):
         body.solve(lame(0.3), method="iterative", tolerance=1e-3)
 
 
@@ -38,7 +39,7 @@ def test_iterations_do_not_grow_with_the_mesh(degree):
     counts, dofs = [], []
     for rim, fine in (("1 mm", "5 mm"), ("0.25 mm", "2.5 mm")):
         mesh = make_mesh(mesh={"rim": rim, "fine": fine, "growth": 0.5, "degree": degree})
-        with ElasticBody(mesh, degree, contact()) as body:
+        with ElasticBody(Spaces(mesh), degree, contact()) as body:
             counts.append(body.solve(lame(0.3), method="iterative").iterations)
             dofs.append(body.dofs)
     assert dofs[1] > 4 * dofs[0]

@@ -18,6 +18,7 @@ from pipeline.solve.linear import SolveError
 from pipeline.solve.mixed import MixedBody, Solution
 from pipeline.solve.mixed_space import MixedSpace
 from pipeline.solve.space import Contact
+from pipeline.solve.spaces import Spaces
 from tests.cases import study
 
 DEPTH = 0.2e-3
@@ -48,7 +49,7 @@ def contact(bonded: bool = True, depth: float = DEPTH) -> Contact:
 
 
 def solve(body: BodyMesh, poisson: float, degree: int = 2, *, bonded: bool = True, **options: Any) -> Solution:
-    with MixedBody(body, degree, contact(bonded)) as mixed:
+    with MixedBody(Spaces(body), degree, contact(bonded)) as mixed:
         return mixed.solve(lame(poisson), **options)
 
 
@@ -56,7 +57,7 @@ def solve(body: BodyMesh, poisson: float, degree: int = 2, *, bonded: bool = Tru
 def test_patch(degree):
     """A linear displacement with its constant pressure is in equilibrium, on curved, quarter-point elements."""
     body = make_mesh()
-    space = MixedSpace(body, degree, contact())
+    space = MixedSpace(body, Spaces(body).get(degree, contact()))
     gradient = np.array([[0.3, -0.2, 0.1], [0.4, 0.1, -0.5], [0.2, 0.6, -0.1]])
     u = space.displacements.forms.displacement
     u.interpolate(lambda x: gradient @ x)
@@ -90,7 +91,7 @@ def test_cylinder_is_within_the_bar(name, poisson):
 def test_agrees_with_displacement_elements(degree):
     body = make_mesh(mesh={"rim": "0.5 mm"})
     mixed = solve(body, 0.4, degree, estimate=True)
-    with ElasticBody(body, degree, contact()) as elastic:
+    with ElasticBody(Spaces(body), degree, contact()) as elastic:
         other = elastic.solve(lame(0.4), estimate=True)
     bars = mixed.bar * mixed.reaction[2] + error_bar(other.decrement, degree) * other.reaction[2]
     assert mixed.reaction[2] == pytest.approx(other.reaction[2], abs=bars)
@@ -129,7 +130,7 @@ def test_force_is_quadratic_in_the_tolerance():
 
 def test_incompressible_is_the_limit():
     """F is linear in 1 - 2ν towards ½, on one mesh and with one assembly."""
-    with MixedBody(make_mesh(), 2, contact()) as body:
+    with MixedBody(Spaces(make_mesh()), 2, contact()) as body:
         near, nearer, limit = (body.solve(lame(0.5 - x)).reaction[2] for x in (2e-5, 1e-5, 0.0))
     assert limit == pytest.approx(2 * nearer - near, rel=1e-8)
     assert limit == pytest.approx(near, rel=1e-4)
@@ -141,7 +142,7 @@ def test_iterations_are_bounded(bonded):
     counts, dofs = [], []
     for rim, fine in (("1 mm", "5 mm"), ("0.25 mm", "3 mm")):
         body = make_mesh(mesh={"rim": rim, "fine": fine, "growth": 0.5})
-        with MixedBody(body, 2, contact(bonded)) as mixed:
+        with MixedBody(Spaces(body), 2, contact(bonded)) as mixed:
             counts.append([mixed.solve(lame(nu), method="iterative").iterations for nu in (0.4, 0.45, 0.4999, 0.5)])
             dofs.append(mixed.dofs)
     assert dofs[1] > 3 * dofs[0]
@@ -156,7 +157,7 @@ def test_units_do_not_matter(method):
     numbers = []
     for young, size in ((1e-3, 1.0), (YOUNG, 1.0), (1e12, 1.0), (YOUNG, 0.025), (YOUNG, 250.0)):
         body = distribute(MPI.COMM_SELF, replace(arrays, points=size * arrays.points))
-        with MixedBody(body, 2, contact(depth=DEPTH * size)) as mixed:
+        with MixedBody(Spaces(body), 2, contact(depth=DEPTH * size)) as mixed:
             s = mixed.solve(lame(0.4999, young), method=method, estimate=True)
         unit = young * (DEPTH * size) * size
         numbers.append((s.reaction[2] / unit, s.energy / unit / (DEPTH * size), s.max_strain, s.decrement, s.bar))

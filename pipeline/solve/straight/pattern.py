@@ -1,0 +1,97 @@
+"""Which entries an operator has, and which of them each cell adds to."""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import basix
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+
+from pipeline import compat
+from pipeline.solve.straight.native import Library
+
+IntArray = npt.NDArray[np.int32]
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+_DECLARATIONS = """
+void find_entries(int rows, int height, int width, const int* dofs, const int* offsets, const int* columns,
+                  const int* first_visit, const int* visits, int* entry, int* places);
+void add_stiffness(int count, const int* which, int points, const double* corners, const int* dofs, const int* places,
+                   const double* S, const double* free, double lambda, double mu, double* blocks);
+void add_products(int count, const int* which, int pairs, int terms, int size, const double* factors, const double* R,
+                  const int* places, double* values);
+extern const double *tensors_2, *tensors_3, *tensors_4;
+void kernel_2(double* A, const double* w, const double* c, const double* x, const int* l, const uint8_t* p);
+void kernel_3(double* A, const double* w, const double* c, const double* x, const int* l, const uint8_t* p);
+void kernel_4(double* A, const double* w, const double* c, const double* x, const int* l, const uint8_t* p);
+"""
+
+
+@cache
+def library() -> Library:
+    """Return the functions of ``kernels.c``, compiled if they are not yet."""
+    return Library("kernels.c", _DECLARATIONS)
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Sparse rows of points (``offsets``, ``columns``), and ``places``, the entry of each pair of each cell's points.
+
+    ``places`` has the shape (cells, points of the rows' space, points of the columns' space).
+    """
+
+    offsets: IntArray
+    columns: IntArray
+    places: IntArray
+
+
+def pattern(rows: Any, columns: Any) -> Pattern:
+    """Return the pattern of an operator between two spaces of one process: points couple that share a cell."""
+    (row_dofs, visited), (column_dofs, touched) = (_cells_and_points(space) for space in (rows, columns))
+    graph = visited.T.tocsr() @ touched
+    graph.sort_indices()
+    (count, height), width = row_dofs.shape, column_dofs.shape[1]
+    visited.data = np.arange(row_dofs.size, dtype=np.int32)
+    visits = visited.T.tocsr()
+    places = np.empty((count, height, width), dtype=np.int32)
+    library()(
+        "find_entries", graph.shape[0], height, width, column_dofs, graph.indptr, graph.indices, visits.indptr,
+        visits.data, np.empty(graph.shape[1], dtype=np.int32), places,
+    )  # fmt: skip
+    return Pattern(graph.indptr, graph.indices, places)
+
+
+def straight_cells(curved: BoolArray | None, count: int) -> IntArray:
+    """Return the numbers of those of ``count`` cells that are not ``curved``, None if none is."""
+    every = np.arange(count, dtype=np.int32)
+    return every if curved is None else every[~curved]
+
+
+def corners(mesh: Any) -> FloatArray:
+    """Return the corners of each cell, shape (cells, 4, 3)."""
+    return np.ascontiguousarray(mesh.geometry.x[compat.geometry_dofs(mesh)[:, :4]])
+
+
+def reference(degree: int, quadrature: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return weights, values (q, i) and gradients (a, q, i) of the functions of ``degree`` on the reference cell.
+
+    The points integrate polynomials of degree ``quadrature``.
+    """
+    element = basix.create_element(
+        basix.ElementFamily.P, basix.CellType.tetrahedron, degree, basix.LagrangeVariant.gll_warped
+    )
+    points, weights = basix.make_quadrature(basix.CellType.tetrahedron, quadrature)
+    table = element.tabulate(1, points)[:, :, :, 0]
+    return weights, table[0], table[1:4]
+
+
+def _cells_and_points(space: Any) -> tuple[IntArray, Any]:
+    """Return the points of each cell, as an array and as a sparse matrix of cells × points."""
+    dofs = np.ascontiguousarray(compat.cell_dofs(space))
+    count, width = dofs.shape
+    offsets = np.arange(0, dofs.size + 1, width, dtype=np.int32)
+    shape = count, space.dofmap.index_map.size_local
+    return dofs, sp.csr_matrix((np.ones(dofs.size, dtype=np.bool_), dofs.reshape(-1), offsets), shape=shape)

@@ -1,0 +1,70 @@
+"""The stiffness λ A_λ + μ A_μ of straight cells, in 3 × 3 blocks."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from pipeline import compat
+from pipeline.solve.straight.pattern import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    corners,
+    library,
+    pattern,
+    reference,
+    straight_cells,
+)
+
+
+class StraightStiffness:
+    """The straight cells of a space of displacements, and the pattern of the operator on all of its cells.
+
+    ``curved`` tells for each cell whether it is left to others, None if none is; ``prescribed`` are the dofs
+    (unrolled) whose rows and columns the operator does not have.
+    """
+
+    def __init__(self, space: Any, curved: BoolArray | None, prescribed: IntArray):
+        self._dofs = np.ascontiguousarray(compat.cell_dofs(space))
+        self._which = straight_cells(curved, len(self._dofs))
+        self._corners = corners(space.mesh)
+        self._tensors = _reference_tensors(compat.degree(space))
+        self._pattern = pattern(space, space)
+        points = space.dofmap.index_map.size_local
+        self._free = np.ones(3 * points)
+        self._free[prescribed] = 0.0
+        self._prescribed = prescribed
+        diagonal = np.empty(points, dtype=np.int32)
+        diagonal[self._dofs] = self._pattern.places.diagonal(axis1=1, axis2=2)
+        self._diagonal = diagonal[prescribed // 3]
+
+    def matrix(self) -> PETSc.Mat:
+        """Return a matrix of zeros for the operator on all cells; the caller destroys it."""
+        return compat.blocked_matrix(self._pattern.offsets, self._pattern.columns)
+
+    def add(self, matrix: PETSc.Mat, lame: tuple[float, float], diagonal: float) -> None:
+        """Add the straight cells to ``matrix``, which has this pattern; set the diagonal of prescribed dofs."""
+        with compat.blocks(matrix, len(self._pattern.columns)) as blocks:
+            library()(
+                "add_stiffness", len(self._which), self._which, self._dofs.shape[1], self._corners, self._dofs,
+                self._pattern.places, self._tensors, self._free, *lame, blocks,
+            )  # fmt: skip
+            blocks[self._diagonal, 4 * (self._prescribed % 3)] = diagonal
+
+
+@cache
+def cell_kernel(degree: int) -> int:
+    """Return the address of a kernel for the stiffness of a straight cell, of the constants λ and μ, for dolfinx."""
+    library().set(f"tensors_{degree}", _reference_tensors(degree))
+    return library().address(f"kernel_{degree}")
+
+
+@cache
+def _reference_tensors(degree: int) -> FloatArray:
+    """Return ∫ ∂_a φ_i ∂_b φ_j on the reference cell, shape (3, 3, pairs i <= j)."""
+    weights, _, gradients = reference(degree, 2 * degree - 2)
+    tensors = np.einsum("q,aqi,bqj->abij", weights, gradients, gradients)
+    i, j = np.triu_indices(tensors.shape[-1])
+    return np.ascontiguousarray(tensors[:, :, i, j])

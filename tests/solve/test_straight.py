@@ -1,0 +1,97 @@
+"""Operators made of tensors of the reference cell are those that dolfinx makes of forms, entry by entry."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from pipeline import compat
+from pipeline.mesh.distribute import distribute
+from pipeline.mesh.generate import MeshArrays
+from pipeline.solve.elasticity import ElasticBody
+from pipeline.solve.forms import curved_cells
+from pipeline.solve.mixed import MixedBody
+from pipeline.solve.mixed_space import MixedSpace
+from pipeline.solve.space import ConstrainedSpace
+from pipeline.solve.spaces import Spaces
+from pipeline.solve.straight import DEGREES, suits
+from pipeline.solve.straight.pattern import pattern
+from tests.solve.test_mixed import contact, lame, make_mesh
+
+EVERY = pytest.mark.parametrize("degree", DEGREES)
+
+
+def assert_equal(found: PETSc.Mat, wanted: PETSc.Mat) -> None:
+    size = wanted.norm(PETSc.NormType.INFINITY)
+    difference = wanted.copy()
+    difference.axpy(-1.0, found)
+    assert difference.norm(PETSc.NormType.INFINITY) <= 1e-12 * size
+    assert found.getInfo()["nz_used"] == wanted.getInfo()["nz_used"]
+
+
+@EVERY
+@pytest.mark.parametrize("mirrors", [(), ("x", "y")])
+@pytest.mark.parametrize("bonded", [True, False])
+def test_stiffness_is_that_of_the_form(degree, mirrors, bonded):
+    mesh = make_mesh(mirrors=mirrors)
+    curved = curved_cells(mesh.mesh)
+    assert curved.any()
+    assert not curved.all()
+    space = ConstrainedSpace(mesh, degree, contact(bonded))
+    assert suits(space.space)
+    for pair in ((1.7, 0.9), (0.3, 2.0)):  # the second takes the first one's place
+        matrix, _ = space.operator(pair, shared=False, blocked=True)
+        space.forms.set_lame(*pair)
+        assert_equal(matrix, compat.assemble_matrix(space.forms.stiffness, space._conditions, pair[1], "baij"))
+    diagonal = matrix.getDiagonal().array[space.prescribed]
+    assert np.all(diagonal == pair[1])
+    space.close()
+
+
+@EVERY
+def test_stiffness_without_curved_cells(degree):
+    mesh = make_mesh(mesh={"degree": 1})
+    assert curved_cells(mesh.mesh) is None
+    space = ConstrainedSpace(mesh, degree, contact())
+    matrix, _ = space.operator((2.0, 1.0), shared=False, blocked=True)
+    space.forms.set_lame(2.0, 1.0)
+    assert_equal(matrix, compat.assemble_matrix(space.forms.stiffness, space._conditions, 1.0, "baij"))
+
+
+@EVERY
+def test_what_pressures_take_part_in_is_that_of_the_forms(degree):
+    mesh = make_mesh()
+    space = MixedSpace(mesh, ConstrainedSpace(mesh, degree, contact()))
+    for found, form in zip(space._matrices(mesh), (space.forms.mass, space.forms.coupling), strict=True):
+        assert_equal(found, compat.assemble_matrix(form, [], 1.0, "aij"))
+
+
+def test_a_point_of_very_many_cells():
+    """The number of cells that a pair of points shares is counted in no small integer."""
+    count = 512  # a fan around the edge from (0, 0, 0) to (0, 0, 1)
+    angle = 2 * np.pi * np.arange(count) / count
+    ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=1)
+    points = np.vstack([[[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]], ring])
+    around = np.arange(count)
+    cells = np.stack([np.zeros(count), np.ones(count), 2 + around, 2 + (around + 1) % count], axis=1).astype(np.int64)
+    body = distribute(MPI.COMM_SELF, MeshArrays(points, cells, {"fixed": cells[:1, 1:]}, np.array([0]), 0.0))
+    space = compat.vector_space(body.mesh, 2)
+    found = pattern(space, space)
+    dofs = compat.cell_dofs(space)
+    assert np.array_equal(found.columns[found.places], np.broadcast_to(dofs[:, None, :], found.places.shape))
+    rows = np.searchsorted(found.offsets, found.places, side="right") - 1
+    assert np.array_equal(rows, np.broadcast_to(dofs[:, :, None], found.places.shape))
+
+
+@pytest.mark.mpi
+@pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="several processes leave the assembly to dolfinx")
+@pytest.mark.parametrize(("kind", "poisson"), [(ElasticBody, 0.3), (MixedBody, 0.49)])
+def test_force_is_that_of_several_processes(kind, poisson):
+    forces = []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        with Spaces(make_mesh(comm)) as spaces, kind(spaces, 2, contact()) as body:
+            assert suits(spaces.get(2, contact()).space) == (comm.size == 1)
+            forces.append(body.solve(lame(poisson), method="iterative", estimate=True))
+    alone, together = forces
+    assert together.reaction[2] == pytest.approx(alone.reaction[2], rel=1e-9)
+    assert together.bar == pytest.approx(alone.bar, rel=0.05)
