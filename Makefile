@@ -11,6 +11,9 @@ LOOP_ARGS ?=
 # A selection of tests may hold none for 2 ranks (pytest's status 5); the whole suite may not.
 NONE_OK = $(if $(PYTEST_ARGS),|| [ $$? -eq 5 ])
 
+# Large arrays on huge pages, where the C library is asked for them: a tenth of a run's time (docs/performance.md).
+export GLIBC_TUNABLES ?= glibc.malloc.hugetlb=1
+
 DOCS := docs/_build/html
 PYTHON := .venv/bin/python
 EPSMESH := .venv/bin/epsmesh
@@ -56,16 +59,16 @@ slurm-test: setup ## run the job scripts on a Slurm of two virtual nodes, instal
 verify: setup ## forces against closed forms, tables and the program's other paths
 	$(EPSMESH) verify
 
-benchmark: setup ## every table of docs/performance.md, into results/ (an idle machine, two to three hours)
-	$(EPSMESH) benchmark
+benchmark: setup ## every table of docs/performance.md, into results/ (an idle machine, an hour and a half)
+	@scripts/peers.sh
 	$(PYTHON) -m benchmarks.start_up
 	$(PYTHON) -m benchmarks.ranks
+	$(PYTHON) -m benchmarks.peers
+	$(PYTHON) -m benchmarks.plain_loop --sample 24
 	$(PYTHON) -m benchmarks.solvers
 	$(PYTHON) -m benchmarks.scaling
+	$(EPSMESH) benchmark
 	$(PYTHON) -m benchmarks.reductions
-	$(PYTHON) -m benchmarks.plain_loop --sample 24
-	@scripts/peers.sh
-	$(PYTHON) -m benchmarks.peers
 
 peers: setup ## NGSolve and scikit-fem against this program, time to a true error (an idle machine): results/peers.md
 	@scripts/peers.sh

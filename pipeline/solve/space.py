@@ -107,7 +107,7 @@ class ConstrainedSpace:
         """Return K with μ on the diagonal of prescribed dofs, and the seconds that one assembly takes; collective.
 
         ``shared`` keeps A_λ and A_μ for the next pair of λ and μ. The matrix is the space's, and the next one takes its
-        place: finding out where its entries are is a third of an assembly.
+        place: finding out where its entries are takes longer than an assembly.
         """
         mat_type = "baij" if blocked else "aij"
         start = time.perf_counter()

@@ -5,7 +5,8 @@ set -u
 most_restarts=20 # a case that takes longer than the job's time limit would come back for ever
 restarts=${SLURM_RESTART_COUNT:-0}
 
-# A rank is one thread. Debian's Open MPI as root asks to be sure.
+# A rank is one thread, its large arrays on huge pages. Debian's Open MPI as root asks to be sure.
+export GLIBC_TUNABLES=${GLIBC_TUNABLES-glibc.malloc.hugetlb=1}
 export OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 
 # A restarted job counts its steps from 0 again, and what a killed step has left (sockets and folders named after job and
