@@ -148,6 +148,7 @@ def cellwise_tensor_space(mesh: Any) -> Any:
 _jit = dolfinx.jit.ffcx_jit
 _compiled: dict[str, Any] = {}
 _kernels: dict[int, int] = {}
+_name = [""]
 _FFI = cffi.FFI()
 
 
@@ -158,7 +159,7 @@ def _remember(comm: MPI.Comm, expression: Any, *args: Any, **options: Any) -> An
     """
     if comm.size > 1:
         return _jit(comm, expression, *args, **options)
-    known = expression.signature() if isinstance(expression, ufl.Form) else repr(expression)
+    known = (_name[-1] or expression.signature()) if isinstance(expression, ufl.Form) else repr(expression)
     key = f"{type(expression).__name__} {known} {args} {options}"
     if key not in _compiled:
         _compiled[key] = _jit(comm, expression, *args, **options)
@@ -183,25 +184,28 @@ def _compile(comm: MPI.Comm, expression: Any, *args: Any, **options: Any) -> Any
 dolfinx.jit.ffcx_jit = _compile
 
 
-def form(expression: Any, cache: str, kernels: dict[int, int] | None = None) -> Any:
+def form(expression: Any, cache: str, name: str = "", kernels: dict[int, int] | None = None) -> Any:
     """Compile ``expression``, with the generated code in the folder ``cache``; collective.
 
+    ``name`` tells it from all others with other code in this process; without one, UFL finds out in a millisecond.
     ``kernels`` are addresses of kernels for integrals over cells, by the mark of the cells (-1: all): they are used
     in place of the generated ones, now and whenever this process compiles the same expression again.
     """
     jit = {"cache_dir": cache, "cffi_extra_compile_args": ["-O2", "-march=native"], "timeout": 120}
     options = {"jit": jit, "ffcx": {}}
-    with quiet_compiler(), _using(kernels or {}):
+    with quiet_compiler(), _using(kernels or {}, name):
         return fem.form(expression, **{name: options[key] for name, key in _JIT.items()})
 
 
 @contextmanager
-def _using(kernels: dict[int, int]) -> Iterator[None]:
+def _using(kernels: dict[int, int], name: str) -> Iterator[None]:
     _kernels.update(kernels)
+    _name.append(name)
     try:
         yield
     finally:
         _kernels.clear()
+        _name.pop()
 
 
 @contextmanager
@@ -246,13 +250,16 @@ def add_matrix(matrix: PETSc.Mat, form: Any, bcs: list[Any], diagonal: float) ->
     matrix.assemble()
 
 
-def blocked_matrix(offsets: np.ndarray, columns: np.ndarray) -> PETSc.Mat:
-    """Return a matrix of zeros, of type seqbaij, with blocks of 3 × 3 in sparse rows; columns ascend in each row."""
-    size, indices = 3 * (len(offsets) - 1), columns.astype(PETSc.IntType, copy=False)
-    matrix = PETSc.Mat().createBAIJ(
-        ((size, None), (size, None)), 3, nnz=np.diff(offsets).astype(PETSc.IntType), comm=MPI.COMM_SELF
-    )
-    if _PETSC.MatSeqBAIJSetColumnIndices(ctypes.c_void_p(matrix.handle), ctypes.c_void_p(indices.ctypes.data)):
+def sparse_matrix(offsets: np.ndarray, columns: np.ndarray, block: int) -> PETSc.Mat:
+    """Return a square matrix of zeros in sparse rows, whose columns ascend; collective on one process.
+
+    Of type seqbaij if rows and columns are of blocks of ``block``, else (1) seqaij, for vectors of three components.
+    """
+    count, size, indices = np.diff(offsets), block * (len(offsets) - 1), columns.astype(PETSc.IntType, copy=False)
+    create, kind = (PETSc.Mat().createBAIJ, "SeqBAIJ") if block > 1 else (PETSc.Mat().createAIJ, "SeqAIJ")
+    matrix = create(((size, None), (size, None)), 3, nnz=count.astype(PETSc.IntType), comm=MPI.COMM_SELF)
+    fill = getattr(_PETSC, f"Mat{kind}SetColumnIndices")
+    if fill(ctypes.c_void_p(matrix.handle), ctypes.c_void_p(indices.ctypes.data)):
         raise RuntimeError("PETSc does not take the pattern of a matrix")
     matrix.assemble()
     matrix.zeroEntries()
@@ -260,15 +267,16 @@ def blocked_matrix(offsets: np.ndarray, columns: np.ndarray) -> PETSc.Mat:
 
 
 @contextmanager
-def blocks(matrix: PETSc.Mat, count: int) -> Iterator[np.ndarray]:
-    """Lend the ``count`` blocks of 3 × 3, by columns, of a matrix of type seqbaij, shape (count, 9), to write to."""
+def entries(matrix: PETSc.Mat, count: int) -> Iterator[np.ndarray]:
+    """Lend the ``count`` entries of a matrix, seqaij or seqbaij, there block by block by columns, to write to."""
+    kind = {"seqaij": "SeqAIJ", "seqbaij": "SeqBAIJ"}[matrix.getType()]
     handle, values = ctypes.c_void_p(matrix.handle), ctypes.POINTER(ctypes.c_double)()
-    if _PETSC.MatSeqBAIJGetArray(handle, ctypes.byref(values)):
-        raise RuntimeError("PETSc does not lend the blocks of its matrix")
+    if getattr(_PETSC, f"Mat{kind}GetArray")(handle, ctypes.byref(values)):
+        raise RuntimeError("PETSc does not lend the entries of its matrix")
     try:
-        yield np.ctypeslib.as_array(values, (count, 9))
+        yield np.ctypeslib.as_array(values, (count,))
     finally:
-        _PETSC.MatSeqBAIJRestoreArray(handle, ctypes.byref(values))
+        getattr(_PETSC, f"Mat{kind}RestoreArray")(handle, ctypes.byref(values))
         matrix.assemble()  # what was made of the values before is void
 
 

@@ -5,6 +5,7 @@ at a quarter of its length, a quadratic element contains r^½ (R. S. Barsoum, In
 """
 
 from dataclasses import replace
+from functools import cache
 from itertools import combinations
 
 import numpy as np
@@ -109,13 +110,17 @@ def _folded(corners: FloatArray, middle: FloatArray) -> np.ndarray:
     if curved.any():
         nodes = np.concatenate([corners[curved], middle[curved]], axis=1)
         straight = np.linalg.det(corners[curved, 1:] - corners[curved, :1])
-        least = np.min([np.linalg.det(np.einsum("nk,cni->cki", g, nodes)) for g in _gradients()], axis=0)
+        least = np.linalg.det(np.einsum("gnk,cni->gcki", _gradients(), nodes)).min(axis=0)
         result[curved] = least < _LEAST_JACOBIAN * straight
     return result
 
 
-def _gradients() -> list[FloatArray]:
-    """Gradients (10, 3) of the quadratic shape functions at interior points near every corner, and between."""
+@cache
+def _gradients() -> FloatArray:
+    """Return gradients of the quadratic shape functions at interior points near every corner, and between.
+
+    Their shape is (points, 10, 3).
+    """
     weights = [np.full(4, 0.25)]
     for corner in range(4):
         weights += [np.where(np.arange(4) == corner, w, (1 - w) / 3) for w in (0.9, 0.7)]
@@ -127,4 +132,4 @@ def _gradients() -> list[FloatArray]:
         corner_part = (4 * w - 1)[:, None] * slope
         edge_part = np.array([4 * (w[i] * slope[j] + w[j] * slope[i]) for i, j in EDGES])
         gradients.append(np.vstack([corner_part, edge_part]))
-    return gradients
+    return np.array(gradients)

@@ -46,7 +46,7 @@ def use_symmetry(plan: Plan) -> Plan:
 
 
 def share_meshes(plan: Plan) -> Plan:
-    """Cases on the same geometry and sizes share one mesh, and what is set up on it if they differ in the material only."""
+    """Cases on the same geometry and sizes share one mesh, and its set-up if they differ in the material only."""
     plan = replace(plan, shared=True)
     return plan.struck_by("sharing", len(plan.solves) - len(mesh_steps(plan.solves)), _reason(share_meshes))
 

@@ -2,6 +2,7 @@
 
 import platform
 import subprocess
+from functools import cache
 from pathlib import Path
 
 from pipeline import __version__, compat
@@ -19,8 +20,9 @@ def provenance(ranks: int) -> dict[str, str | int]:
     }
 
 
+@cache
 def git_commit() -> str:
-    """Return the commit of the program's checkout, with ``+`` if files differ from it, or ''."""
+    """Return the commit of the checkout that this process was loaded from, with ``+`` if files differ, or ''."""
     folder = Path(__file__).resolve().parents[2]
     if not (folder / ".git").exists():
         return ""

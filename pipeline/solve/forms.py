@@ -6,6 +6,7 @@ compiled form, so that no value of them is ever compiled in.
 
 from functools import cached_property
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +25,7 @@ from pipeline.solve.straight.stiffness import cell_kernel
 # Marks of cells, and the bulge of an edge, in units of its length, that rounding may leave.
 _ALL, _NEITHER, _STRAIGHT, _CURVED = -1, 0, 1, 2
 _FLAT = 1e-9
+_curved: WeakKeyDictionary[Any, npt.NDArray[np.bool_] | None] = WeakKeyDictionary()
 
 
 class ElasticForms:
@@ -45,17 +47,17 @@ class ElasticForms:
     @cached_property
     def stiffness(self) -> Any:
         """K."""
-        return self._form(ufl.TrialFunction(self._space), dx(self._space), self._kernels())
+        return self._form("stiffness", ufl.TrialFunction(self._space), dx(self._space), self._kernels())
 
     @cached_property
     def curved_stiffness(self) -> Any:
         """The part of K from cells with curved edges: the same code, but no other cell is marked for it."""
-        return self._form(ufl.TrialFunction(self._space), dx(self._space, curved_only=True))
+        return self._form("stiffness", ufl.TrialFunction(self._space), dx(self._space, curved_only=True))
 
     @cached_property
     def action(self) -> Any:
         """K u."""
-        return self._form(self.displacement, dx(self._space))
+        return self._form("action", self.displacement, dx(self._space))
 
     def _kernels(self) -> dict[int, int]:
         """Return a kernel for the straight cells, which takes a twelfth of the time of the generated one."""
@@ -64,10 +66,10 @@ class ElasticForms:
             return {}
         return {_ALL if curved_cells(mesh) is None else _STRAIGHT: cell_kernel(degree)}
 
-    def _form(self, u: Any, measure: Any, kernels: dict[int, int] | None = None) -> Any:
+    def _form(self, name: str, u: Any, measure: Any, kernels: dict[int, int] | None = None) -> Any:
         v, (lame_lambda, lame_mu) = ufl.TestFunction(self._space), self.lame
         energy = lame_lambda * ufl.div(u) * ufl.div(v) + 2 * lame_mu * ufl.inner(strain(u), strain(v))
-        return compat.form(energy * measure, str(form_cache()), kernels)
+        return compat.form(energy * measure, str(form_cache()), form_name(name, self._space), kernels)
 
 
 def dx(space: Any, *, curved_only: bool = False) -> Any:
@@ -86,8 +88,20 @@ def dx(space: Any, *, curved_only: bool = False) -> Any:
     return measure(_STRAIGHT, metadata=exact) + measure(_CURVED, metadata=enough)
 
 
+def form_name(name: str, *spaces: Any) -> str:
+    """Return a name for a form with the measure of :func:`dx`: its code depends on elements and coordinates alone."""
+    mesh = spaces[0].mesh
+    return " ".join([name, *(repr(s.ufl_element()) for s in spaces), f"{compat.geometry_dofs(mesh).shape[1]} nodes"])
+
+
 def curved_cells(mesh: Any) -> npt.NDArray[np.bool_] | None:
     """Tell which local cells have a mid node away from the middle of its edge, None if cells have no mid nodes."""
+    if mesh not in _curved:
+        _curved[mesh] = _find_curved(mesh)
+    return _curved[mesh]
+
+
+def _find_curved(mesh: Any) -> npt.NDArray[np.bool_] | None:
     nodes = compat.geometry_dofs(mesh)
     if nodes.shape[1] == 4:
         return None
@@ -109,7 +123,10 @@ def mean_strain_form(space: Any, displacement: Any) -> tuple[Any, Any]:
     measure, cache = dx(space), str(form_cache())
     one = ufl.as_tensor(np.ones((3, 3)).tolist())
     integrands = (ufl.inner(strain(displacement), test), ufl.inner(one, test))
-    integral, volume = (compat.form(integrand * measure, cache) for integrand in integrands)
+    integral, volume = (
+        compat.form(integrand * measure, cache, form_name(name, space, tensors))
+        for name, integrand in zip(("mean strain", "volume"), integrands, strict=True)
+    )
     return integral, volume
 
 

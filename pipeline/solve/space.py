@@ -158,19 +158,21 @@ class ConstrainedSpace:
         self, lame: tuple[float, float], diagonal: float, mat_type: str, into: PETSc.Mat | None = None
     ) -> PETSc.Mat:
         self.forms.set_lame(*lame)
-        if mat_type == "baij" and suits(self.space):
-            matrix = self._assemble_blocks(lame, diagonal, into)
+        if suits(self.space):
+            matrix = self._assemble_alone(lame, diagonal, mat_type, into)
         else:
             matrix = compat.assemble_matrix(self.forms.stiffness, self._conditions, diagonal, mat_type, into)
         _mark(matrix)
         return matrix
 
-    def _assemble_blocks(self, lame: tuple[float, float], diagonal: float, into: PETSc.Mat | None) -> PETSc.Mat:
-        """Assemble the straight cells, which are most, the fast way, and dolfinx the others."""
+    def _assemble_alone(
+        self, lame: tuple[float, float], diagonal: float, mat_type: str, into: PETSc.Mat | None
+    ) -> PETSc.Mat:
+        """Assemble on one process: the straight cells, which are most, the fast way, and dolfinx the others."""
         curved = curved_cells(self._body.mesh)
         if self._straight is None:
             self._straight = StraightStiffness(self.space, curved, self.prescribed)
-        matrix = self._straight.matrix() if into is None else into
+        matrix = self._straight.matrix(mat_type) if into is None else into
         matrix.zeroEntries()
         if curved is not None and curved.any():
             compat.add_matrix(matrix, self.forms.curved_stiffness, self._conditions, diagonal)

@@ -11,7 +11,7 @@ from petsc4py import PETSc
 
 from pipeline import compat
 
-DEGREES = (2, 3, 4)
+DEGREES = (1, 2, 3, 4)
 
 
 def has_kernel(degree: int) -> bool:

@@ -159,7 +159,7 @@ static void add_cell(int points, const double* S, double* restrict A, const doub
         }
 }
 
-const double *tensors_2, *tensors_3, *tensors_4; /* S of each degree, to be set before its kernel is used */
+const double *tensors_1, *tensors_2, *tensors_3, *tensors_4; /* S of each degree, to be set before its kernel is used */
 
 #define KERNEL(degree, points)                                                                                         \
   void kernel_##degree(double* restrict A, const double* restrict w, const double* restrict c,                         \
@@ -167,6 +167,7 @@ const double *tensors_2, *tensors_3, *tensors_4; /* S of each degree, to be set 
   {                                                                                                                    \
     add_cell(points, tensors_##degree, A, c, x);                                                                       \
   }
+KERNEL(1, 4)
 KERNEL(2, 10)
 KERNEL(3, 20)
 KERNEL(4, 35)

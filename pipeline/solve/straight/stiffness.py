@@ -38,20 +38,47 @@ class StraightStiffness:
         self._prescribed = prescribed
         diagonal = np.empty(points, dtype=np.int32)
         diagonal[self._dofs] = self._pattern.places.diagonal(axis1=1, axis2=2)
-        self._diagonal = diagonal[prescribed // 3]
+        self._diagonal = diagonal[prescribed // 3], 4 * (prescribed % 3)
+        self._positions: IntArray | None = None
 
-    def matrix(self) -> PETSc.Mat:
-        """Return a matrix of zeros for the operator on all cells; the caller destroys it."""
-        return compat.blocked_matrix(self._pattern.offsets, self._pattern.columns)
+    def matrix(self, mat_type: str) -> PETSc.Mat:
+        """Return a matrix of zeros, "baij" or "aij", for the operator on all cells; the caller destroys it."""
+        offsets, columns = self._pattern.offsets, self._pattern.columns
+        if mat_type == "baij":
+            return compat.sparse_matrix(offsets, columns, 3)
+        rows = np.repeat(3 * np.diff(offsets), 3)
+        unrolled = np.empty(9 * len(columns), dtype=np.int32)
+        unrolled[self._unblocked()] = np.repeat(3 * columns[:, None] + np.arange(3, dtype=np.int32), 3, axis=1)
+        return compat.sparse_matrix(np.concatenate([[0], np.cumsum(rows)]), unrolled, 1)
 
     def add(self, matrix: PETSc.Mat, lame: tuple[float, float], diagonal: float) -> None:
         """Add the straight cells to ``matrix``, which has this pattern; set the diagonal of prescribed dofs."""
-        with compat.blocks(matrix, len(self._pattern.columns)) as blocks:
-            library()(
-                "add_stiffness", len(self._which), self._which, self._dofs.shape[1], self._corners, self._dofs,
-                self._pattern.places, self._tensors, self._free, *lame, blocks,
-            )  # fmt: skip
-            blocks[self._diagonal, 4 * (self._prescribed % 3)] = diagonal
+        count = 9 * len(self._pattern.columns)
+        with compat.entries(matrix, count) as entries:
+            if matrix.getType() == "seqbaij":
+                self._add(entries.reshape(-1, 9), lame, diagonal)
+                return
+            blocks = entries[self._unblocked()]
+            self._add(blocks, lame, diagonal)
+            entries[self._unblocked()] = blocks
+
+    def _add(self, blocks: FloatArray, lame: tuple[float, float], diagonal: float) -> None:
+        library()(
+            "add_stiffness", len(self._which), self._which, self._dofs.shape[1], self._corners, self._dofs,
+            self._pattern.places, self._tensors, self._free, *lame, blocks,
+        )  # fmt: skip
+        blocks[self._diagonal] = diagonal
+
+    def _unblocked(self) -> IntArray:
+        """Return where the entries of each block are in sparse rows without blocks, shape (blocks, 9), by columns."""
+        if self._positions is None:
+            offsets = self._pattern.offsets
+            width = np.diff(offsets)
+            row = np.repeat(np.arange(len(width), dtype=np.int32), width)
+            first = (6 * offsets[:-1])[row] + 3 * np.arange(len(row), dtype=np.int32)
+            column, line = np.divmod(np.arange(9, dtype=np.int32), 3)
+            self._positions = first[:, None] + line * (3 * width)[row][:, None] + column
+        return self._positions
 
 
 @cache
