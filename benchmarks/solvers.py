@@ -92,6 +92,8 @@ def _elastic_run(body: Any, lame: tuple[float, float], method: str, stack: ExitS
     from pipeline.solve.solution import TOLERANCE
 
     unit, _ = body.space.operator(lame, shared=False, blocked=body.space.degree > 1)
+    body.space.disown(unit)
+    stack.callback(unit.destroy)
 
     def once() -> tuple[float, float, float, int]:
         start = time.process_time()

@@ -118,8 +118,9 @@ class ElasticBody:
         """
         direct = is_direct(method, self.dofs, self.space.degree)
         with ExitStack() as stack:
-            levels = [replace(level, matrix=level.matrix.copy()) for level in self._hierarchy(lame, direct=direct)[0]]
-            for level in levels:  # the next solve's operators take the place of the spaces' own
+            levels, _ = self._hierarchy(lame, direct=direct)
+            for level in levels:  # the next solve's operators would take their place
+                self._spaces.get(level.degree, self._contact).disown(level.matrix)
                 stack.callback(level.matrix.destroy)
             solver = LinearSolver(levels, direct=direct, tolerance=0.5)
             stack.callback(solver.close)

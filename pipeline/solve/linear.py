@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
+from pipeline import compat
 from pipeline.solve.transfer import transfer
 from pipeline.stages import stage
 
@@ -45,6 +46,11 @@ class Level:
     space: Any
     matrix: PETSc.Mat
     prescribed: np.ndarray
+
+    @property
+    def degree(self) -> int:
+        """Polynomial degree of the space."""
+        return compat.degree(self.space)
 
 
 def is_direct(method: str, dofs: int, degree: int) -> bool:
