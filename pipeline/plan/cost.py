@@ -20,7 +20,7 @@ STAGES = ("mesh", "solve", "bar")
 _PARALLEL = 0.8
 # Seconds on one core of 2020s hardware: for each tetrahedron; and of the mixed element, as a multiple.
 _MESH, _MIXED = 2e-5, 1.3
-_SOLVE = {1: 7e-6, 2: 6e-5, 3: 3.5e-4, 4: 1.4e-3}
+_SOLVE = {1: 5e-6, 2: 2e-5, 3: 5e-5, 4: 1.6e-4}
 _MERIDIAN = 0.5
 # How fast iterations grow on the way to incompressible.
 _LOCKING = -0.35
