@@ -132,6 +132,13 @@ def cellwise_vector_space(mesh: Any, size: int) -> Any:
     return fem.VectorFunctionSpace(mesh, ("DG", 0), dim=size)
 
 
+def reference_element(degree: int) -> Any:
+    """Return the element of a scalar Lagrange space on the reference tetrahedron, as dolfinx makes it."""
+    return basix.create_element(
+        basix.ElementFamily.P, basix.CellType.tetrahedron, degree, basix.LagrangeVariant.gll_warped
+    )
+
+
 def degree(space: Any) -> int:
     """Return the polynomial degree of a Lagrange space."""
     value = space.ufl_element().degree
@@ -251,7 +258,7 @@ def add_matrix(matrix: PETSc.Mat, form: Any, bcs: list[Any], diagonal: float) ->
 
 
 def sparse_matrix(offsets: np.ndarray, columns: np.ndarray, block: int) -> PETSc.Mat:
-    """Return a square matrix of zeros in sparse rows, whose columns ascend; collective on one process.
+    """Return a square matrix of zeros, of this process alone, in sparse rows whose columns ascend.
 
     Of type seqbaij if rows and columns are of blocks of ``block``, else (1) seqaij, for vectors of three components.
     """

@@ -5,7 +5,6 @@ dolfinx's own matrix takes as long as half the multigrid solve, since it goes th
 
 from typing import Any, Protocol
 
-import basix
 import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
@@ -83,12 +82,7 @@ def _rows(coarse: Any, fine: Any) -> tuple[npt.NDArray[np.int64], _IntArray, npt
 
 def _on_one_cell(coarse: int, fine: int) -> npt.NDArray[np.float64]:
     """Return the values of the functions of degree ``coarse`` at the points of ``fine`` on the reference cell."""
-    low, high = (
-        basix.create_element(
-            basix.ElementFamily.P, basix.CellType.tetrahedron, degree, basix.LagrangeVariant.gll_warped
-        )
-        for degree in (coarse, fine)
-    )
+    low, high = (compat.reference_element(degree) for degree in (coarse, fine))
     return np.asarray(low.tabulate(0, high.points)[0, :, :, 0])
 
 

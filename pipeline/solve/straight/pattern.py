@@ -81,11 +81,8 @@ def reference(degree: int, quadrature: int) -> tuple[FloatArray, FloatArray, Flo
 
     The points integrate polynomials of degree ``quadrature``.
     """
-    element = basix.create_element(
-        basix.ElementFamily.P, basix.CellType.tetrahedron, degree, basix.LagrangeVariant.gll_warped
-    )
     points, weights = basix.make_quadrature(basix.CellType.tetrahedron, quadrature)
-    table = element.tabulate(1, points)[:, :, :, 0]
+    table = compat.reference_element(degree).tabulate(1, points)[:, :, :, 0]
     return weights, table[0], table[1:4]
 
 

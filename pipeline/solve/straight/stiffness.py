@@ -1,6 +1,6 @@
 """The stiffness λ A_λ + μ A_μ of straight cells, in 3 × 3 blocks."""
 
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -35,11 +35,9 @@ class StraightStiffness:
         points = space.dofmap.index_map.size_local
         self._free = np.ones(3 * points)
         self._free[prescribed] = 0.0
-        self._prescribed = prescribed
         diagonal = np.empty(points, dtype=np.int32)
         diagonal[self._dofs] = self._pattern.places.diagonal(axis1=1, axis2=2)
         self._diagonal = diagonal[prescribed // 3], 4 * (prescribed % 3)
-        self._positions: IntArray | None = None
 
     def matrix(self, mat_type: str) -> PETSc.Mat:
         """Return a matrix of zeros, "baij" or "aij", for the operator on all cells; the caller destroys it."""
@@ -48,7 +46,7 @@ class StraightStiffness:
             return compat.sparse_matrix(offsets, columns, 3)
         rows = np.repeat(3 * np.diff(offsets), 3)
         unrolled = np.empty(9 * len(columns), dtype=np.int32)
-        unrolled[self._unblocked()] = np.repeat(3 * columns[:, None] + np.arange(3, dtype=np.int32), 3, axis=1)
+        unrolled[self._unblocked] = np.repeat(3 * columns[:, None] + np.arange(3, dtype=np.int32), 3, axis=1)
         return compat.sparse_matrix(np.concatenate([[0], np.cumsum(rows)]), unrolled, 1)
 
     def add(self, matrix: PETSc.Mat, lame: tuple[float, float], diagonal: float) -> None:
@@ -58,9 +56,9 @@ class StraightStiffness:
             if matrix.getType() == "seqbaij":
                 self._add(entries.reshape(-1, 9), lame, diagonal)
                 return
-            blocks = entries[self._unblocked()]
+            blocks = entries[self._unblocked]
             self._add(blocks, lame, diagonal)
-            entries[self._unblocked()] = blocks
+            entries[self._unblocked] = blocks
 
     def _add(self, blocks: FloatArray, lame: tuple[float, float], diagonal: float) -> None:
         library()(
@@ -69,16 +67,15 @@ class StraightStiffness:
         )  # fmt: skip
         blocks[self._diagonal] = diagonal
 
+    @cached_property
     def _unblocked(self) -> IntArray:
-        """Return where the entries of each block are in sparse rows without blocks, shape (blocks, 9), by columns."""
-        if self._positions is None:
-            offsets = self._pattern.offsets
-            width = np.diff(offsets)
-            row = np.repeat(np.arange(len(width), dtype=np.int32), width)
-            first = (6 * offsets[:-1])[row] + 3 * np.arange(len(row), dtype=np.int32)
-            column, line = np.divmod(np.arange(9, dtype=np.int32), 3)
-            self._positions = first[:, None] + line * (3 * width)[row][:, None] + column
-        return self._positions
+        """Where the entries of each block are in sparse rows without blocks, shape (blocks, 9), by columns."""
+        offsets = self._pattern.offsets
+        width = np.diff(offsets)
+        row = np.repeat(np.arange(len(width), dtype=np.int32), width)
+        first = (6 * offsets[:-1])[row] + 3 * np.arange(len(row), dtype=np.int32)
+        column, line = np.divmod(np.arange(9, dtype=np.int32), 3)
+        return np.asarray(first[:, None] + line * (3 * width)[row][:, None] + column)
 
 
 @cache
