@@ -9,6 +9,9 @@ import psutil
 
 from pipeline import compat
 
+# One thread a rank; Open MPI asks before it runs as root.
+MPI_ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+
 
 def machine() -> dict[str, Any]:
     """Return processor, cores, memory, load, date and versions."""

@@ -18,6 +18,7 @@ from typing import Any
 from mpi4py import MPI
 
 from benchmarks import soak
+from benchmarks.machine import MPI_ENVIRONMENT
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.run.execute import compute
 from pipeline.study.load import parse
@@ -53,11 +54,8 @@ def measure(name: str) -> dict[str, Any]:
 
 
 def _run(name: str, ranks: int) -> dict[str, Any]:
-    environment = os.environ | {
-        "OMP_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    }  # fmt: skip
     command = ["/usr/bin/mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, "-m", "benchmarks.ranks", name]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    done = subprocess.run(command, env=os.environ | MPI_ENVIRONMENT, capture_output=True, text=True, check=True)
     found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     return found
 

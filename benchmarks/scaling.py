@@ -17,9 +17,10 @@ from math import inf, log
 from pathlib import Path
 from typing import Any
 
+from benchmarks.machine import MPI_ENVIRONMENT
+
 # Element size far from the probe (mm), for about 100,000, 500,000 and 2,000,000 dofs.
 SIZES = {"small": 2.5, "middle": 1.35, "large": 0.82}
-_MPI = {"OMP_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 # Whether the error bar is computed, too.
 _MODELS = {"3d": False, "auto": True}
 STUDY = """
@@ -77,7 +78,7 @@ def measure(
     module = [sys.executable, "-m", "mpi4py", "-m", "benchmarks.scaling"]
     command = [*module, "--here", str(file), str(output), str(int(bar))]
     many = ["/usr/bin/mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
-    subprocess.run([*many, *command], check=False, env=os.environ | _MPI)
+    subprocess.run([*many, *command], check=False, env=os.environ | MPI_ENVIRONMENT)
     with xr.open_dataset(output / "scaling.nc") as dataset:
         found = {name: dataset[name].values.reshape(-1)[0] for name in dataset.data_vars}
     row: dict[str, Any] = {

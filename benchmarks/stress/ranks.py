@@ -10,6 +10,7 @@ from typing import Any
 
 from mpi4py import MPI
 
+from benchmarks.machine import MPI_ENVIRONMENT
 from pipeline.plan.plan import make_plan
 from pipeline.run.execute import compute
 from pipeline.run.record import Record
@@ -33,7 +34,7 @@ def why_not(comm: MPI.Comm) -> str:
 def compute_on(ranks: int, scene: dict[str, Any]) -> Record:
     """Return the record of a study of one case, computed on so many ranks."""
     environment = {k: v for k, v in os.environ.items() if not k.startswith(_LAUNCHER)}
-    environment |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMP_NUM_THREADS": "1"}
+    environment |= MPI_ENVIRONMENT
     command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, "-m", __name__, json.dumps(scene)]
     try:
         done = subprocess.run(
