@@ -6,7 +6,7 @@ compile once.
 
 import time
 from dataclasses import dataclass
-from math import inf
+from math import inf, isfinite
 from typing import Any
 
 import gmsh
@@ -21,7 +21,6 @@ from pipeline import compat
 from pipeline.mesh.size import Sizes, set_size_field
 from pipeline.scene.model import FIXED, PROBE, Scene, build
 from pipeline.solve.cache import form_cache
-from pipeline.study.schema import Cylinder
 from pipeline.study.sweep import Case
 
 _CG = {"ksp_type": "cg", "ksp_rtol": 1e-8}
@@ -100,10 +99,10 @@ def make_mesh(case: Case) -> tuple[Any, dict[str, np.ndarray]]:
     settings, probe = case.mesh, case.probe
     epsilon = inf if case.is_full else settings.epsilon
     column = inf if settings.outside == "coarse" else epsilon
-    side = min(column, case.body.radius) if isinstance(case.body, Cylinder) else column
+    side = min(column, case.body.bend)
     rim = settings.rim_size(probe.half_width)
     sizes = Sizes(epsilon, settings.fine, settings.coarse, rim, settings.growth, side)
-    scene = Scene(case.body, probe, column, settings.outside == "fixed", sizes.rim_segments(probe))
+    scene = Scene(case.body, probe, case.column, settings.outside == "fixed", sizes.rim_segments(probe))
     with compat.gmsh_session():
         for name in ("SizeExtendFromBoundary", "SizeFromPoints", "SizeFromCurvature"):
             gmsh.option.setNumber(f"Mesh.Mesh{name}", 0)
@@ -112,9 +111,9 @@ def make_mesh(case: Case) -> tuple[Any, dict[str, np.ndarray]]:
         rim_curves = build(scene)
         if scene.rim_segments and len(rim_curves) == 1:
             gmsh.model.mesh.setTransfiniteCurve(rim_curves[0], scene.rim_segments + 1)
-        set_size_field(sizes, probe, scene.scale)
+        set_size_field(sizes, probe, scene.frame, scene.scale)
         gmsh.model.mesh.generate(3)
-        if scene.is_cut or isinstance(case.body, Cylinder):
+        if scene.is_cut or isfinite(case.body.bend):
             gmsh.model.mesh.setOrder(2)  # a column with flat sides is a thinner one: F would be 1 % low
         groups = {gmsh.model.getPhysicalName(2, tag): tag for _, tag in gmsh.model.getPhysicalGroups(2)}
         mesh, tags = _model_to_mesh()
@@ -138,7 +137,7 @@ def _conditions(space: Any, facets: dict[str, np.ndarray], case: Case) -> tuple[
     fixed, probe = (fem.locate_dofs_topological(space, 2, facets[name]) for name in (FIXED, PROBE))
     conditions = [fem.dirichletbc(np.zeros(3, dtype=PETSc.ScalarType), fixed, space)]
     if case.probe.contact == "bonded":
-        conditions.append(fem.dirichletbc(np.array(case.probe.travel, dtype=PETSc.ScalarType), probe, space))
+        conditions.append(fem.dirichletbc(np.array(case.travel, dtype=PETSc.ScalarType), probe, space))
     else:
         conditions.append(fem.dirichletbc(PETSc.ScalarType(-case.probe.depth), 3 * probe + 2, space.sub(2)))
     return conditions, probe

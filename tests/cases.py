@@ -44,8 +44,7 @@ def solve(comm: MPI.Comm = MPI.COMM_SELF, **changes: Any) -> dict[tuple[int, ...
     plan = make_plan(study(**changes))
     records = compute(plan, comm)
     return {
-        case.index: records[key].scaled(case.material.young, case.probe.depth)
-        for case, key in zip(plan.study.cases(), plan.keys, strict=True)
+        case.index: records[key].scaled(case.scale) for case, key in zip(plan.study.cases(), plan.keys, strict=True)
     }
 
 

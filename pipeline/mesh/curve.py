@@ -13,10 +13,11 @@ import numpy as np
 from pipeline.mesh.generate import FloatArray, IntArray, MeshArrays
 from pipeline.scene.model import Scene
 from pipeline.stages import stage
-from pipeline.study.schema import Cylinder, Disc
 
 # Edges of the reference tetrahedron in the order of basix's quadratic nodes 4 to 9.
 EDGES = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
+# A point this near to a surface, in units of its size, is on it.
+_CLOSE = 1e-6
 # A cell is straightened where its Jacobian falls below this share of the straight cell's.
 _LEAST_JACOBIAN = 1e-3
 
@@ -42,26 +43,32 @@ def curve(mesh: MeshArrays, scene: Scene) -> MeshArrays:
 
 
 def _on_rim(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray) -> FloatArray:
-    """Move the mid nodes of edges along a round rim onto the circle."""
-    if not isinstance(scene.probe, Disc):
-        return middle
+    """Move the mid nodes of edges along a curved rim onto it, or onto the column where that cuts the footprint."""
     both = np.isin(edges, mesh.rim).all(axis=1) & np.isin(_key(mesh, edges), _facet_edges(mesh, ["probe"]))
-    radius = min(scene.probe.radius, scene.column)
-    return _project(middle, both, scene.probe.at, radius)
+    if not scene.probe.is_curved:
+        return middle
+    beyond = np.zeros(len(mesh.points), dtype=bool)
+    if scene.is_cut:
+        beyond[mesh.rim] = np.abs(scene.cut_face.distance(mesh.points[mesh.rim])) < _CLOSE * scene.column
+    of_column = both & beyond[edges].all(axis=1)
+    middle = middle.copy()
+    middle[of_column] = scene.cut_face.project(middle[of_column])
+    chosen = both & ~of_column
+    local = scene.frame.local(middle[chosen])
+    local[:, :2] = scene.probe.to_edge(local[:, :2])
+    middle[chosen] = scene.frame.world(local)
+    return middle
 
 
 def _on_sides(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray, keys: IntArray) -> FloatArray:
-    """Move the mid nodes of edges in a round side of the body, or of the column, onto that side."""
-    cylinders = []
-    if isinstance(scene.body, Cylinder):
-        cylinders.append(((0.0, 0.0), scene.body.radius))
-    if scene.is_cut:
-        cylinders.append((scene.probe.at, scene.column))
-    outer = np.isin(keys, _facet_edges(mesh, mesh.facets))
-    for centre, radius in cylinders:
-        distance = np.hypot(*(mesh.points[:, :2] - centre).T)
-        on_side = np.abs(distance - radius) < 1e-6 * radius
-        middle = _project(middle, outer & on_side[edges].all(axis=1), centre, radius)
+    """Move the mid nodes of edges in a curved surface of the body, or of the column, onto that surface."""
+    surfaces = [surface for group in scene.body.surfaces().values() for surface in group]
+    surfaces += [scene.cut_face] if scene.is_cut else []
+    outer, middle = np.isin(keys, _facet_edges(mesh, mesh.facets)), middle.copy()
+    for surface in (surface for surface in surfaces if surface.is_curved):
+        on_side = np.abs(surface.distance(mesh.points)) < _CLOSE * scene.body.extent
+        chosen = outer & on_side[edges].all(axis=1)
+        middle[chosen] = surface.project(middle[chosen])
     return middle
 
 
@@ -74,13 +81,6 @@ def _facet_edges(mesh: MeshArrays, names: object) -> IntArray:
     facets = np.concatenate([mesh.facets[name] for name in names])  # type: ignore[attr-defined]
     pairs = np.concatenate([np.sort(facets[:, pair], axis=1) for pair in combinations(range(3), 2)])
     return np.unique(_key(mesh, pairs))
-
-
-def _project(points: FloatArray, chosen: np.ndarray, centre: tuple[float, float], radius: float) -> FloatArray:
-    points = points.copy()
-    offset = points[chosen, :2] - centre
-    points[chosen, :2] = centre + radius * offset / np.linalg.norm(offset, axis=1, keepdims=True)
-    return points
 
 
 def _quarter_points(mesh: MeshArrays, edges: IntArray, middle: FloatArray) -> FloatArray:

@@ -60,7 +60,7 @@ def generate(scene: Scene, sizes: Sizes) -> MeshArrays:
         try:
             return _generate(scene, sizes, start)
         except MeshError:
-            sizes = replace(sizes, column=min(sizes.column, scene.extent / divisor))
+            sizes = replace(sizes, column=min(sizes.column, scene.body.extent / divisor))
     return _generate(scene, sizes, start)
 
 
@@ -71,7 +71,7 @@ def _generate(scene: Scene, sizes: Sizes, start: float) -> MeshArrays:
             if scene.rim_segments and len(rim_curves) == 1:
                 edges = scene.rim_segments // 2 ** len(scene.mirrors)
                 gmsh.model.mesh.setTransfiniteCurve(rim_curves[0], edges + 1)
-            set_size_field(sizes, scene.probe, scene.scale)
+            set_size_field(sizes, scene.probe, scene.frame, scene.scale)
             gmsh.model.mesh.generate(3)
         except SceneError as error:
             raise MeshError(str(error)) from None

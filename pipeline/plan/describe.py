@@ -62,7 +62,7 @@ def story(plan: Plan, declared: Plan, index: tuple[int, ...]) -> dict[str, Any]:
         "mesh_shared_with": [s.label for s in step.solves if s is not solve] if step else [],
         "reference_key": plan.reference_keys[position] if plan.reference_keys else "",
         "changes": {
-            "young, depth": "nothing: F is proportional to both" if _has(plan, "scaling") else "one solve",
+            ", ".join(case.proportional_to): "nothing: F is proportional" if _has(plan, "scaling") else "one solve",
             "poisson": "one solve, on the same mesh and assembly",
             "contact": "one assembly and one solve, on the same mesh",
             "body, probe, epsilon, fine, coarse, rim, growth, outside": "mesh, assembly and solve",

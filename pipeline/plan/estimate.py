@@ -20,23 +20,22 @@ _BYTES_PER_CELL = 1000
 def cells(case: Case) -> float:
     """Estimate the tetrahedra of the case's mesh, within about a factor of two."""
     mesh, probe, body = case.mesh, case.probe, case.body
-    rim, growth = mesh.rim_size(probe.half_width), mesh.growth
-    perimeter = 2 * pi * probe.half_width if probe.shape == "disc" else 4 * probe.circumradius
+    rim, growth, thickness = mesh.rim_size(probe.half_width), mesh.growth, body.thickness(case.frame)
     # Half discs round the rim: ∫ π s / (rim + growth s)³ ds up to the distance where the size is fine.
-    total = perimeter * pi * (1 / rim - 1 / mesh.fine) ** 2 * rim / (2 * growth**2) if rim < mesh.fine else 0.0
+    total = probe.perimeter * pi * (1 / rim - 1 / mesh.fine) ** 2 * rim / (2 * growth**2) if rim < mesh.fine else 0.0
     epsilon = min(mesh.epsilon, (3 * body.volume / (2 * pi)) ** (1 / 3))
     if case.is_full or mesh.epsilon == inf:
         return (total + body.volume / mesh.fine**3) / _TETRAHEDRON
     inside = min(2 / 3 * pi * epsilon**3, body.volume)
-    if mesh.outside != "coarse":
-        inside = min(inside, pi * mesh.epsilon**2 * body.height)
+    if case.is_truncated:
+        inside = min(inside, pi * mesh.epsilon**2 * thickness)
         # A column is resolved to half its radius all along.
-        total += min(pi * mesh.epsilon**2 * body.height, body.volume) / (mesh.epsilon / 2) ** 3
+        total += min(pi * mesh.epsilon**2 * thickness, body.volume) / (mesh.epsilon / 2) ** 3
     total += inside / mesh.fine**3
     # Shells of size fine + growth (r - ε) round the contact, then coarse.
     total += 2 * pi * epsilon**2 / (2 * growth * mesh.fine**2) + 4 * pi * epsilon / (growth**2 * mesh.fine)
     total += 2 * pi / growth**3 * log(max(mesh.coarse / mesh.fine, 1.0))
-    if mesh.outside == "coarse":
+    if not case.is_truncated:
         total += max(body.volume - inside, 0.0) / mesh.coarse**3
     return total / _TETRAHEDRON
 

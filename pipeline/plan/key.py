@@ -8,9 +8,11 @@ from math import inf
 from typing import Any
 
 from pipeline.plan.symmetry import mirror_planes, model_planes
-from pipeline.study.schema import AnyProbe, Mesh, Section
+from pipeline.shapes.probe import Probe
+from pipeline.shapes.section import Section
+from pipeline.study.schema import Mesh
 from pipeline.study.sweep import Case
-from pipeline.study.units import canonical
+from pipeline.units import canonical
 
 # Raise by hand when the same input gives another force: records made before are then not used any more.
 PHYSICS_VERSION = 5
@@ -21,14 +23,14 @@ _MANY = 200_000  # sections of a large study
 def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
     """Key of the case's record: all that its force depends on, defaults resolved, in SI units.
 
-    ``folded`` takes every ε past the body for the full order; ``scaled`` leaves out Young's modulus and depth, to which
-    the force is proportional. Timed cases are records of their own, each: they are never shared.
+    ``folded`` takes every ε past the body for the full order; ``scaled`` leaves out what the force is proportional to.
+    Timed cases are records of their own, each: they are never shared.
     """
     parts = [
         str(PHYSICS_VERSION),
         text_of(case.body),
-        text_of(case.material, ("young",) if scaled else ()),
-        text_of(case.probe, ("depth", "slice") if scaled else ()),
+        text_of(case.material, case.material.PROPORTIONAL_TO if scaled else ()),
+        text_of(case.probe, case.probe.PROPORTIONAL_TO if scaled else ()),
         str(slice_ratio(case.probe)) if scaled else "",
         _mesh_text(case.mesh, folded and case.is_full, case.probe.half_width, case.element),
         text_of(case.solve, ("timing", "repeats", "exact")),
@@ -41,10 +43,10 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
 def reference_key(case: Case, accuracy: float) -> str:
     """Key of F_exact of the case's scene, for E = 1 and depth = 1: of what F / (E d) depends on, no mesh."""
     probe = case.probe
-    ratio = 0.0 if _slides_along_a_mirror(probe) else slice_ratio(probe)
+    ratio = 0.0 if _slides_across_a_mirror(case) else slice_ratio(probe)
     parts = [
-        f"{PHYSICS_VERSION} exact {accuracy!r}", text_of(case.body), text_of(case.material, ("young",)),
-        text_of(probe, ("depth", "slice")), str(ratio),
+        f"{PHYSICS_VERSION} exact {accuracy!r}", text_of(case.body),
+        text_of(case.material, case.material.PROPORTIONAL_TO), text_of(probe, probe.PROPORTIONAL_TO), str(ratio),
     ]  # fmt: skip
     return digest("\n".join(parts))
 
@@ -65,13 +67,13 @@ def normalised(case: Case) -> Case:
     """Return the case with a Young's modulus of 1 Pa and a depth of 1 m: its force is F / (E d)."""
     travel = {"depth": 1.0}
     if getattr(case.probe, "slice", 0.0):
-        travel["slice"] = 0.0 if _slides_along_a_mirror(case.probe) else slice_ratio(case.probe)
+        travel["slice"] = 0.0 if _slides_across_a_mirror(case) else slice_ratio(case.probe)
     material = case.material.model_copy(update={"young": 1.0})
     return replace(case, material=material, probe=case.probe.model_copy(update=travel))
 
 
 @lru_cache(_MANY)
-def slice_ratio(probe: AnyProbe) -> float:
+def slice_ratio(probe: Probe) -> float:
     """Return how far the probe slices for each unit of depth."""
     return canonical(getattr(probe, "slice", 0.0) / probe.depth)
 
@@ -104,10 +106,9 @@ def _mesh_text(mesh: Mesh, is_full: bool, half_width: float, element: str) -> st
     return _text(content)
 
 
-@lru_cache(_MANY)
-def _slides_along_a_mirror(probe: AnyProbe) -> bool:
+def _slides_across_a_mirror(case: Case) -> bool:
     """Where a blade moves across a plane of symmetry, that movement takes no force along the axis."""
-    return mirror_planes(probe) != model_planes(probe)
+    return mirror_planes(case) != model_planes(case)
 
 
 def _text(content: dict[str, Any]) -> str:

@@ -130,4 +130,4 @@ def _reference(key: str, case: Case, accuracy: float) -> Solve:
     solve = Solve(key, whole, goal=accuracy, later=meshes_for(whole, accuracy), is_reference=True).again()
     if is_round(whole):
         return replace(solve, axisymmetric=True)
-    return replace(solve, mirrors=model_planes(whole.probe))
+    return replace(solve, mirrors=model_planes(whole))

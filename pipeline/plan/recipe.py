@@ -38,8 +38,6 @@ LADDER = (
     Recipe(3, 0.05, 0.35, 1.0e-4),
     Recipe(3, 0.025, 0.3, 5.0e-5),
 )
-# Blades are as accurate with this share of the bars.
-_BLADE = 0.75
 # Bars grow by 1 + 10 a/H with the half width a of the probe and the thickness H of the body, as far as was measured.
 _THICKNESS, _THINNEST = 10.0, 0.15
 # Those of the mixed element are larger than those of the displacement element at ν = 0.3, by degree.
@@ -67,8 +65,8 @@ def meshes_for(case: Case, accuracy: float) -> tuple[Mesh, ...]:
 
 def _expected(case: Case, recipe: Recipe) -> float:
     """Return the error bar to expect of a recipe."""
-    shape = 1.0 if case.probe.shape == "disc" else _BLADE
-    thickness = 1 + _THICKNESS * min(case.probe.half_width / case.body.height, _THINNEST)
+    shape = case.probe.EXPECTED_ERROR
+    thickness = 1 + _THICKNESS * min(case.probe.half_width / case.body.thickness(case.frame), _THINNEST)
     if case.element == "mixed":
         return recipe.bar * shape * thickness * _MIXED[recipe.degree]
     locking = ((1 - 2 * case.material.poisson) / 0.4) ** -_LOCKING
@@ -77,8 +75,8 @@ def _expected(case: Case, recipe: Recipe) -> float:
 
 def _mesh(case: Case, recipe: Recipe) -> Mesh:
     """Return the mesh section of a recipe for the body and probe of ``case``."""
-    given, probe, thickness = case.mesh, case.probe, case.body.height
-    reach = case.body.reach(probe.at) + thickness
+    given, probe, thickness = case.mesh, case.probe, case.body.thickness(case.frame)
+    reach = case.body.reach(case.frame) + thickness
     gaps = held_gaps(case.body, probe, given).values()
     sizes = {
         "fine": min(thickness / _THROUGH, reach),

@@ -121,7 +121,7 @@ def _joined(solves: Iterable[Solve]) -> tuple[tuple[int, ...], ...]:
 
 def _mirrored(solve: Solve) -> Solve:
     use = solve.case.mesh.model == "auto" and not solve.axisymmetric
-    return replace(solve, mirrors=model_planes(solve.case.probe)) if use else solve
+    return replace(solve, mirrors=model_planes(solve.case)) if use else solve
 
 
 def _suits_a_basis(operator: OperatorStep) -> bool:

@@ -145,8 +145,8 @@ def _add_ratios(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _scaled(record: Record | None, case: Case) -> Record | None:
-    """Return the record for the Young's modulus and the depth of ``case``."""
-    return record.scaled(case.material.young, case.probe.depth) if record else None
+    """Return the record for the scale of ``case``."""
+    return record.scaled(case.scale) if record else None
 
 
 def _origin(plan: Plan, key: str, record: Record | None) -> str:

@@ -15,7 +15,7 @@ import xarray as xr
 
 from pipeline.report.settings import DatasetError, Labels, arrange
 from pipeline.report.verdict import Verdict, choose, judge, keeps, most_accurate
-from pipeline.study.units import parse_quantity
+from pipeline.units import parse_quantity
 
 
 @dataclass(frozen=True)

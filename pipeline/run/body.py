@@ -23,7 +23,7 @@ class CaseFailure(Exception):
 
 def body_of(spaces: Spaces, case: Case, *, shared: bool, reuse: bool = False) -> Body:
     """Return what solves ``case`` in the spaces of its mesh, by the elements that suit it; collective."""
-    contact = Contact(case.probe.travel, case.probe.contact == "bonded")
+    contact = Contact(case.travel, case.probe.contact == "bonded")
     if case.element == "mixed":
         return MixedBody(spaces, case.mesh.degree, contact)
     return ElasticBody(spaces, case.mesh.degree, contact, shared=shared, reuse=reuse)

@@ -24,13 +24,13 @@ def record_of(solve: Solve, solution: Solution, cells: int, mesh_seconds: float)
     """
     case = solve.case
     kind, planned_cells, poisson = features(solve)
-    force = -sum(f * a for f, a in zip(solution.reaction, case.probe.axis, strict=True))
+    force = -sum(f * a for f, a in zip(solution.reaction, case.frame.axis, strict=True))
     record = Record(
         key=solve.key,
         status="ok",
         origin="symmetric" if solve.mirrors else "solved",
-        young=case.material.young,
-        depth=case.probe.depth,
+        young=case.scale.stress,
+        depth=case.scale.length,
         force=force,
         force_error=_relative_bar(case, solution, force),
         force_vector=solution.reaction,
@@ -58,8 +58,8 @@ def record_of_meridian(solve: Solve, solution: AxisymmetricSolution) -> Record:
         key=solve.key,
         status="ok",
         origin="axisymmetric",
-        young=solve.case.material.young,
-        depth=solve.case.probe.depth,
+        young=solve.case.scale.stress,
+        depth=solve.case.scale.length,
         force=solution.force,
         force_error=solution.force_error,
         force_vector=(0.0, 0.0, solution.force),
@@ -100,7 +100,7 @@ def _share_of_work(case: Case, solution: Solution, force: float) -> float:
     """
     if not getattr(case.probe, "slice", 0.0):
         return 1.0
-    if mirror_planes(case.probe) != model_planes(case.probe):
+    if mirror_planes(case) != model_planes(case):
         return _OTHER_MOVEMENT
     return 2 * solution.energy / abs(force * case.probe.depth)
 

@@ -5,16 +5,17 @@ from dataclasses import asdict, dataclass, field, replace
 from math import nan
 
 from pipeline.plan.cost import Observation, speed_up
+from pipeline.study.sweep import Scale
 
 
 @dataclass(frozen=True)
 class Record:
     """The result of one case; SI units, times in seconds, memory in bytes summed over ranks.
 
-    ``young`` (Pa) and ``depth`` (m) are those it was computed for. ``force_vector`` is the force of the tissue on the
-    probe; ``force`` its part against the probe's advance, and ``force_error`` the relative 95 % error bar on that, on
-    which ``time_error`` seconds were spent. ``kind``, ``planned_cells`` and ``poisson`` are what its cost was estimated
-    from (:mod:`pipeline.plan.cost`), ``group`` the ranks that computed it.
+    ``young`` (Pa) and ``depth`` (m) are the :class:`Scale` of the case it was computed for. ``force_vector`` is the
+    force of the tissue on the probe; ``force`` its part against the probe's advance, and ``force_error`` the relative
+    95 % error bar on that, on which ``time_error`` seconds were spent. ``kind``, ``planned_cells`` and ``poisson`` are
+    what its cost was estimated from (:mod:`pipeline.plan.cost`), ``group`` the ranks that computed it.
     """
 
     key: str
@@ -68,8 +69,9 @@ class Record:
             self.kind, self.planned_cells, self.poisson, {stage: faster * spent for stage, spent in seconds.items()}
         )
 
-    def scaled(self, young: float, depth: float) -> "Record":
-        """Return the record for another Young's modulus and depth, to which force and stress are proportional."""
+    def scaled(self, scale: Scale) -> "Record":
+        """Return the record of a case that differs from this one's in its ``scale`` only."""
+        young, depth = scale.stress, scale.length
         if (young, depth) == (self.young, self.depth) or not self.is_ok:
             return self
         stiffer, deeper = young / self.young, depth / self.depth

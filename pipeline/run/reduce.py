@@ -24,7 +24,7 @@ def reduced_records(
     solved: dict[float, Record] = {}
     found: dict[str, Reduced] = {}
     case = todo[0].case
-    with ReducedBasis(body, case.probe.travel, _ratio(todo[0]), case.solve.method) as basis:
+    with ReducedBasis(body, case.travel, _ratio(todo[0]), case.solve.method) as basis:
         ends = [todo[0], todo[-1]]
         while todo:
             following = ends.pop() if ends else max(todo, key=lambda s: found[s.key].bound if s.key in found else inf)
@@ -58,11 +58,10 @@ def _ratio(solve: Solve) -> float:
 
 def _record(solve: Solve, reduced: Reduced, source: Record, body: ElasticBody, basis: ReducedBasis) -> Record:
     """Return the record of an evaluation, which is for μ = 1."""
-    material, probe = solve.case.material, solve.case.probe
-    mu = material.lame[1]
+    scale, (_, mu) = solve.case.scale, solve.case.material.lame
     x, y, z = (mu * float(component) for component in reduced.reaction)
     return replace(
-        source, key=solve.key, origin="reduced", young=material.young, depth=probe.depth, force=z,
+        source, key=solve.key, origin="reduced", young=scale.stress, depth=scale.length, force=z,
         force_vector=(x, y, z), force_error=source.force_error + reduced.bound, energy=mu * reduced.twice_energy / 2,
         max_strain=body.largest_strain(basis.displacement(reduced)), balance=reduced.bound, iterations=0,
     )  # fmt: skip

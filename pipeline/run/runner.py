@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.mesh.generate import MeshError
+from pipeline.mesh.of_case import meridian_of
 from pipeline.plan import estimate
 from pipeline.plan.plan import Plan
 from pipeline.plan.steps import MeshStep, OperatorStep, Solve, mesh_steps
@@ -19,7 +20,7 @@ from pipeline.run.compile import prepare
 from pipeline.run.measure import TIMES, add_times, record_of, record_of_meridian
 from pipeline.run.memory import FreeMemory, PeakMemory, give_back
 from pipeline.run.mesh_cache import MeshCache
-from pipeline.run.meshing import meridian_of, mesh_case, on_first_rank
+from pipeline.run.meshing import mesh_case, on_first_rank
 from pipeline.run.progress import Progress
 from pipeline.run.provenance import provenance
 from pipeline.run.record import Record
@@ -130,7 +131,7 @@ class StepRunner:
         case = solve.case
         compute = partial(
             solve_axisymmetric, meridian_of(case), case.material.poisson, case.probe.contact == "bonded",
-            young=case.material.young, depth=case.probe.depth,
+            young=case.scale.stress, depth=case.scale.length,
         )  # fmt: skip
         record = on_first_rank(self.comm, lambda: record_of_meridian(solve, compute()))
         return self._stamp(self.comm.bcast(record), memory)
@@ -145,7 +146,7 @@ class StepRunner:
         medians = {n: statistics.median(getattr(r, n) for r in records) for n in TIMES}
         self._timed = False
         try:
-            bar = self._compute(replace(solve, mirrors=model_planes(solve.case.probe)), memory)
+            bar = self._compute(replace(solve, mirrors=model_planes(solve.case)), memory)
         finally:
             self._timed = True
         return replace(

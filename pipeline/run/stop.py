@@ -33,8 +33,7 @@ def reason_to_skip(plan: Plan, solve: Solve, find: Callable[[str], Record | None
             return record.message
         if record is None or exact is None or not (record.is_ok and exact.is_ok):
             return ""
-        young, depth = case.material.young, case.probe.depth
-        ratio = record.scaled(young, depth).force / exact.scaled(young, depth).force
+        ratio = record.scaled(case.scale).force / exact.scaled(case.scale).force
         near.append((abs(ratio - 1) <= limit, other))
     near.sort(key=lambda pair: pair[1])
     last = [is_near for is_near, _ in near[-_IN_A_ROW:]]

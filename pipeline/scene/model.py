@@ -6,14 +6,17 @@ millimetre and one of ten metres give OpenCASCADE the same numbers, and the same
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from math import inf, pi, sin, sqrt
+from functools import cached_property, partial
+from math import inf
 from typing import Any
 
 import gmsh
 import numpy as np
 
-from pipeline.study.schema import AnyBody, AnyProbe, Below, Blade, Box, Disc
+from pipeline.shapes.body import Body
+from pipeline.shapes.frame import Frame
+from pipeline.shapes.probe import Probe
+from pipeline.shapes.surface import Surface, Tube
 
 # Names of the physical groups. Every boundary face is in exactly one of them.
 TISSUE, PROBE, FIXED, FREE, CUT = "tissue", "probe", "fixed", "free", "cut"
@@ -32,8 +35,8 @@ class Scene:
     ``mirrors`` are the planes of symmetry, of which only the positive side is modelled.
     """
 
-    body: AnyBody
-    probe: AnyProbe
+    body: Body
+    probe: Probe
     column: float = inf
     column_fixed: bool = False
     rim_segments: int = 0
@@ -41,16 +44,14 @@ class Scene:
     mirrors: tuple[str, ...] = ()
 
     @property
-    def extent(self) -> float:
-        """Largest extent (m) of the body."""
-        if isinstance(self.body, Box):
-            return max(self.body.size)
-        return 2 * max(self.body.radius, self.body.height)
+    def frame(self) -> Frame:
+        """Where the probe meets the body."""
+        return self.probe.frame_on(self.body)
 
     @property
     def scale(self) -> float:
         """Metres in one unit of the model."""
-        return self.extent / _BODY_SIZE
+        return self.body.extent / _BODY_SIZE
 
     def units(self, length: float) -> float:
         """Return a length (m) in units of the model, to twelve digits: similar bodies make the same model."""
@@ -59,16 +60,17 @@ class Scene:
     @property
     def is_cut(self) -> bool:
         """Whether a column is cut out of the body."""
-        return self.column < self.body.reach(self.probe.at)
+        return self.column < inf
 
     @property
-    def rim_radius(self) -> float:
-        """Radius (m) of a disc's rim in the model: with straight elements, that of the polygon of equal area."""
-        assert isinstance(self.probe, Disc)
-        if not self.straight:
-            return self.probe.radius
-        angle = 2 * pi / self.rim_segments
-        return self.probe.radius * sqrt(angle / sin(angle))
+    def footprint(self) -> Probe:
+        """The probe as it is drawn: with straight elements, so large that the polygon along its rim has its area."""
+        return self.probe.inscribed(self.rim_segments) if self.straight and self.rim_segments else self.probe
+
+    @cached_property
+    def cut_face(self) -> Surface:
+        """The side of the column."""
+        return Tube(self.frame.point, self.frame.axis, self.column)
 
 
 class SceneError(Exception):
@@ -81,18 +83,14 @@ def build(scene: Scene) -> list[int]:
     Raises:
         SceneError: if the kernel fails, or no footprint or no support is left.
     """
-    occ, unit = gmsh.model.occ, scene.units
-    volumes = [(3, _add_body(scene.body, unit))]
-    x, y = (unit(c) for c in scene.probe.at)
-    height = unit(scene.body.height)
+    occ = gmsh.model.occ
+    volumes = [(3, scene.body.draw(occ, scene.units))]
     if scene.is_cut:
-        column = (3, occ.addCylinder(x, y, -height, 0, 0, height, unit(scene.column)))
-        volumes, _ = occ.intersect(volumes, [column])
+        volumes, _ = occ.intersect(volumes, [(3, _add_column(scene))])
     if scene.mirrors:
         volumes, _ = occ.intersect(volumes, [(3, _add_positive_side(scene))])
-    tools = [(2, _add_footprint(scene))]
-    if isinstance(scene.body.fixed, Below):
-        tools.append((2, _add_level(scene)))
+    tools = [(2, scene.footprint.draw(occ, scene.frame, scene.units))]
+    tools += [(2, _add_level(scene.units(height))) for height in scene.body.support.edges()]
     _, children = occ.fragment(volumes, tools)
     occ.synchronize()
     # Pieces of a tool that stick out of the body bound no volume: drop them.
@@ -124,32 +122,17 @@ def _add_positive_side(scene: Scene) -> int:
     return gmsh.model.occ.addBox(*low, -size, size - low[0], size - low[1], 2 * size)
 
 
-def _add_body(body: AnyBody, unit: Callable[[float], float]) -> int:
-    occ = gmsh.model.occ
-    if isinstance(body, Box):
-        a, b, c = (unit(s) for s in body.size)
-        return occ.addBox(-a / 2, -b / 2, -c, a, b, c)
-    return occ.addCylinder(0, 0, -unit(body.height), 0, 0, unit(body.height), unit(body.radius))
+def _add_column(scene: Scene) -> int:
+    """Add the cylinder round the probe's axis, through the tissue below the contact."""
+    frame, depth = scene.frame, scene.units(scene.body.thickness(scene.frame))
+    end = [scene.units(c) + depth * a for c, a in zip(frame.point, frame.axis, strict=True)]
+    return int(gmsh.model.occ.addCylinder(*end, *(depth * o for o in frame.outward), scene.units(scene.column)))
 
 
-def _add_footprint(scene: Scene) -> int:
-    occ, probe, unit = gmsh.model.occ, scene.probe, scene.units
-    x, y = (unit(c) for c in probe.at)
-    if isinstance(probe, Blade):
-        a, b = unit(probe.length), unit(probe.width)
-        tag = occ.addRectangle(x - a / 2, y - b / 2, 0, a, b)
-        occ.rotate([(2, tag)], x, y, 0, 0, 0, 1, float(np.arctan2(probe.along[1], probe.along[0])))
-        return tag
-    radius = unit(scene.rim_radius)
-    return occ.addDisk(x, y, 0, radius, radius)
-
-
-def _add_level(scene: Scene) -> int:
-    """Add the horizontal plane below which the body is held, so that its edge is in the mesh."""
-    fixed = scene.body.fixed
-    assert isinstance(fixed, Below)
+def _add_level(height: float) -> int:
+    """Add a horizontal plane, in the model's units, so that its edge on the body is in the mesh."""
     size = 3 * _BODY_SIZE
-    return gmsh.model.occ.addRectangle(-size / 2, -size / 2, scene.units(fixed.below), size, size)
+    return int(gmsh.model.occ.addRectangle(-size / 2, -size / 2, height, size, size))
 
 
 def _name_groups(scene: Scene, footprint: list[int]) -> None:
@@ -183,34 +166,16 @@ def _sample(face: int) -> Any:
 
 def _face_tests(scene: Scene) -> list[tuple[str, Callable[[Any], bool]]]:
     """Tests, in order, that tell which group a face belongs to from points (m) of its surface."""
-    body, (x, y) = scene.body, scene.probe.at
-    close = scene.scale * _CLOSE
+    close, surfaces = scene.scale * _CLOSE, scene.body.surfaces()
 
-    def near(values: Any, target: float) -> bool:
-        return bool(np.all(np.abs(values - target) < close))
+    def on_mirror(points: Any, axis: int) -> bool:
+        return bool(np.all(np.abs(points[:, axis]) < close))
 
-    def on_top(p: Any) -> bool:
-        return near(p[:, 2], 0.0)
+    def on_cut(points: Any) -> bool:
+        return scene.is_cut and bool(np.all(np.abs(scene.cut_face.distance(points)) < close))
 
-    def on_bottom(p: Any) -> bool:
-        return near(p[:, 2], -body.height)
-
-    def on_side(p: Any) -> bool:
-        if isinstance(body, Box):
-            return near(abs(p[:, 0]), body.size[0] / 2) or near(abs(p[:, 1]), body.size[1] / 2)
-        return near(np.hypot(p[:, 0], p[:, 1]), body.radius)
-
-    def on_cut(p: Any) -> bool:
-        return scene.is_cut and near(np.hypot(p[:, 0] - x, p[:, 1] - y), scene.column)
-
-    if isinstance(body.fixed, Below):
-        below = body.fixed.below
-        held = [lambda p: not on_cut(p) and bool(np.all(p[:, 2] < below + close))]
-    else:
-        held = [{"bottom": on_bottom, "sides": on_side}[part] for part in body.fixed.split("+")]
-
-    def on_mirror(p: Any, axis: int) -> bool:
-        return near(p[:, axis], 0.0)
+    def is_held(points: Any) -> bool:
+        return scene.body.support.holds(surfaces, points, close)
 
     mirrors = [(MIRROR[plane], partial(on_mirror, axis="xy".index(plane))) for plane in scene.mirrors]
-    return [*mirrors, (FREE, on_top), *((FIXED, test) for test in held), (CUT, on_cut)]
+    return [*mirrors, (CUT, on_cut), (FIXED, is_held)]

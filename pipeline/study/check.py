@@ -1,10 +1,18 @@
-"""Physical sense of a study: what cannot work is an error, what is doubtful a warning."""
+"""Physical sense of a study: what cannot work is an error, what is doubtful a warning.
+
+What makes no sense in a shape by itself, the shape reports; here is what must fit together.
+"""
 
 import itertools
-from math import hypot, isfinite
+from collections.abc import Sequence
+from math import isfinite
+from typing import cast
 
+from pipeline.shapes.body import Body
+from pipeline.shapes.probe import Probe
+from pipeline.shapes.section import Section, in_mm
 from pipeline.study.problems import Problems
-from pipeline.study.schema import AnyBody, AnyProbe, Below, Blade, Box, Material, Mesh, Section, Solve
+from pipeline.study.schema import Material, Mesh, Solve
 from pipeline.study.sweep import Axis
 
 # Linear elasticity: strain under the probe is of order depth / radius.
@@ -17,158 +25,101 @@ _LOCKING = {1: (0.45, 0.45), 2: (0.49, 0.495), 3: (0.49, 0.495)}
 _LEAST_MIXED = 0.25
 # A footprint this near the edge, in units of the body, touches it: the rest is rounding.
 _TOUCHING = 1e-9
-# Elements may be this much longer than a strip is wide.
-_LONGEST_NEEDLE = 200
 
 
 def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
-    """Check single sections, then pairs of sections that must fit each other."""
-    bodies, materials, probes, meshes = (sections[name] for name in ("body", "material", "probe", "mesh"))
-    for body in bodies:
-        _check_body(body, problems)  # type: ignore[arg-type]
+    """Check single sections, then those that must fit each other."""
+    bodies, probes = cast(Sequence[Body], sections["body"]), cast(Sequence[Probe], sections["probe"])
+    materials, meshes = cast(Sequence[Material], sections["material"]), cast(Sequence[Mesh], sections["mesh"])
     for probe in probes:
-        _check_probe(probe, problems)  # type: ignore[arg-type]
+        _check_depth(probe, problems)
+        probe.check(problems)
     for mesh in meshes:
-        _check_mesh(mesh, problems)  # type: ignore[arg-type]
-    for body, probe in itertools.product(bodies, probes):
-        _check_fit(body, probe, problems)  # type: ignore[arg-type]
+        _check_mesh(mesh, problems)
     for mesh, probe in itertools.product(meshes, probes):
-        _check_epsilon(mesh, probe, problems)  # type: ignore[arg-type]
+        _check_epsilon(mesh, probe, problems)
     for body, mesh in itertools.product(bodies, meshes):
-        _check_outside(body, mesh, problems)  # type: ignore[arg-type]
-        _check_strip(body, mesh, problems)  # type: ignore[arg-type]
-    for body, probe, mesh in itertools.product(bodies, probes, meshes):
-        _check_gap(body, probe, mesh, problems)  # type: ignore[arg-type]
+        body.support.check(body, mesh.fine, problems)
+        _check_outside(body, mesh, problems)
+    if not any(problem.key.startswith("probe.") for problem in problems.errors):  # they have a place
+        for body, probe in itertools.product(bodies, probes):
+            _check_fit(body, probe, problems)
+        for body, probe, mesh in itertools.product(bodies, probes, meshes):
+            _check_gap(body, probe, mesh, problems)
     for material, mesh in itertools.product(materials, meshes):
-        _check_locking(material, mesh, problems)  # type: ignore[arg-type]
+        _check_locking(material, mesh, problems)
     _check_reference(meshes, axes, problems)
-    (solve,) = sections["solve"]
-    assert isinstance(solve, Solve)
-    if "repeats" in solve.model_fields_set and not solve.timing:
-        problems.error("solve.repeats", solve.repeats, "only a timing study repeats its cases: add `timing = true`")
+    for solve in cast(Sequence[Solve], sections["solve"]):
+        if "repeats" in solve.model_fields_set and not solve.timing:
+            problems.error("solve.repeats", solve.repeats, "only a timing study repeats its cases: add `timing = true`")
 
 
-def _mm(length: float) -> str:
-    return f"{length * 1e3:.4g} mm"
-
-
-def _check_body(body: AnyBody, problems: Problems) -> None:
-    if isinstance(body.fixed, Below) and not -body.height < body.fixed.below < 0:
-        problems.error(
-            "body.fixed",
-            f"below {_mm(body.fixed.below)}",
-            f"must lie inside the body: between -{_mm(body.height)} and 0 mm",
-        )
-
-
-def _check_probe(probe: AnyProbe, problems: Problems) -> None:
+def _check_depth(probe: Probe, problems: Problems) -> None:
     if probe.depth > _LINEAR * probe.half_width:
         problems.warn(
             "probe.depth",
-            _mm(probe.depth),
-            f"is more than {_LINEAR:.0%} of the probe's half width {_mm(probe.half_width)}: linear elasticity is "
+            in_mm(probe.depth),
+            f"is more than {_LINEAR:.0%} of the probe's half width {in_mm(probe.half_width)}: linear elasticity is "
             "then an extrapolation (F stays proportional to depth)",
-        )
-    if not isinstance(probe, Blade):
-        return
-    if probe.direction[2] != 0 or hypot(*probe.direction) == 0 or not all(map(isfinite, probe.direction)):
-        problems.error("probe.direction", list(probe.direction), "must be a horizontal vector: [x, y, 0], not all zero")
-    if probe.slice > 0 and probe.action != "cut":
-        problems.error("probe.slice", _mm(probe.slice), 'only a cut slices: set action = "cut"')
-    if probe.slice > 0 and probe.contact == "frictionless":
-        problems.error(
-            "probe.slice", _mm(probe.slice), "a frictionless blade slides along without force: use contact = 'bonded'"
         )
 
 
 def _check_mesh(mesh: Mesh, problems: Problems) -> None:
     if mesh.fine > mesh.coarse:
-        problems.error("mesh.fine", _mm(mesh.fine), f"must be at most coarse = {_mm(mesh.coarse)}")
+        problems.error("mesh.fine", in_mm(mesh.fine), f"must be at most coarse = {in_mm(mesh.coarse)}")
     if mesh.rim is not None and mesh.rim > mesh.fine:
-        problems.error("mesh.rim", _mm(mesh.rim), f"must be at most fine = {_mm(mesh.fine)}")
+        problems.error("mesh.rim", in_mm(mesh.rim), f"must be at most fine = {in_mm(mesh.fine)}")
 
 
-def _check_fit(body: AnyBody, probe: AnyProbe, problems: Problems) -> None:
-    if isinstance(probe, Blade) and hypot(probe.direction[0], probe.direction[1]) == 0:
-        return
-    if _gap_to_side(body, probe) <= _TOUCHING * body.reach((0.0, 0.0)):
-        top = f"{_mm(body.size[0])} × {_mm(body.size[1])}" if isinstance(body, Box) else f"radius {_mm(body.radius)}"
+def _check_fit(body: Body, probe: Probe, problems: Problems) -> None:
+    if probe.gap(body, probe.frame_on(body)) <= _TOUCHING * body.extent:
         problems.error(
             "probe.at",
-            [_mm(x) for x in probe.at],
-            f"the footprint of the {probe.shape} must lie inside the body's top ({top}), not on or over its edge",
+            [in_mm(x) for x in probe.at],
+            f"the footprint of the {probe.shape} must lie inside the body's top ({body.face}), not on or over its edge",
         )
 
 
-def _gap_to_side(body: AnyBody, probe: AnyProbe) -> float:
-    """Distance (m) between the footprint and the edge of the body's top, negative outside."""
-    if not isinstance(probe, Blade):
-        return body.gap(probe.at) - probe.half_width
-    (tx, ty), half_l, half_w = probe.along, probe.length / 2, probe.width / 2
-    corners = [
-        (probe.at[0] + i * half_l * tx - j * half_w * ty, probe.at[1] + i * half_l * ty + j * half_w * tx)
-        for i in (-1, 1)
-        for j in (-1, 1)
-    ]
-    return min(body.gap(corner) for corner in corners)
-
-
-def held_gaps(body: AnyBody, probe: AnyProbe, mesh: Mesh) -> dict[str, float]:
+def held_gaps(body: Body, probe: Probe, mesh: Mesh) -> dict[str, float]:
     """Return the distances (m) between the probe's edge and the faces held beside it, by the key that sets them."""
-    gaps = {}
-    if isinstance(body.fixed, Below):
-        gaps["body.fixed"] = hypot(_gap_to_side(body, probe), body.fixed.below)
-    elif "sides" in body.fixed:
-        gaps["body.fixed"] = _gap_to_side(body, probe)
-    if mesh.outside == "fixed" and mesh.epsilon < body.reach(probe.at):
-        gaps["mesh.epsilon"] = mesh.epsilon - probe.circumradius
+    frame, gaps = probe.frame_on(body), {}
+    if (beside := body.support.gap(probe.gap(body, frame))) is not None:
+        gaps["body.fixed"] = beside
+    if mesh.outside == "fixed" and isfinite(column := mesh.column(body.reach(frame))):
+        gaps["mesh.epsilon"] = column - probe.circumradius
     return {key: gap for key, gap in gaps.items() if gap > 0}
 
 
-def _check_gap(body: AnyBody, probe: AnyProbe, mesh: Mesh, problems: Problems) -> None:
+def _check_gap(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
     """Between the probe and a held face there must be room for an element, or F is that of the element."""
     if mesh.accuracy is not None and "rim" not in mesh.model_fields_set:
         return
     for key, gap in held_gaps(body, probe, mesh).items():
         if gap < mesh.rim_size(probe.half_width):
             problems.error(
-                key, None, f"leaves {_mm(gap)} between the probe's edge and a held face, less than an element there: "
-                f"use a rim below {_mm(gap)}",
+                key, None, f"leaves {in_mm(gap)} between the probe's edge and a held face, less than an element there: "
+                f"use a rim below {in_mm(gap)}",
             )  # fmt: skip
 
 
-def _check_strip(body: AnyBody, mesh: Mesh, problems: Problems) -> None:
-    """A level that leaves a strip far thinner than the elements beside it makes needles of them."""
-    if not isinstance(body.fixed, Below) or not isfinite(mesh.fine):
-        return
-    strip = min(-body.fixed.below, body.height + body.fixed.below)
-    if 0 < strip < mesh.fine / _LONGEST_NEEDLE:
-        problems.error(
-            "body.fixed",
-            f"below {_mm(body.fixed.below)}",
-            f"leaves a strip of {_mm(strip)} at the side, too thin for elements of {_mm(mesh.fine)}: "
-            f"use fine = {_mm(_LONGEST_NEEDLE * strip)} at most, or another level",
-        )
-
-
-def _check_epsilon(mesh: Mesh, probe: AnyProbe, problems: Problems) -> None:
+def _check_epsilon(mesh: Mesh, probe: Probe, problems: Problems) -> None:
     if mesh.epsilon < probe.circumradius:
         problems.warn(
             "mesh.epsilon",
-            _mm(mesh.epsilon),
-            f"is less than the probe's radius {_mm(probe.circumradius)}: part of the contact lies outside the fine mesh"
-            + ("" if mesh.outside == "coarse" else ", and the column cuts the footprint off"),
+            in_mm(mesh.epsilon),
+            f"is less than the probe's radius {in_mm(probe.circumradius)}: part of the contact lies outside the fine "
+            "mesh" + ("" if mesh.outside == "coarse" else ", and the column cuts the footprint off"),
         )
     if mesh.rim_size(probe.half_width) > probe.half_width:
         problems.warn(
             "mesh.rim",
-            _mm(mesh.rim_size(probe.half_width)),
-            f"does not resolve the probe, whose half width is {_mm(probe.half_width)}: F may be far off",
+            in_mm(mesh.rim_size(probe.half_width)),
+            f"does not resolve the probe, whose half width is {in_mm(probe.half_width)}: F may be far off",
         )
 
 
-def _check_outside(body: AnyBody, mesh: Mesh, problems: Problems) -> None:
-    if mesh.outside == "free" and body.fixed == "sides" and isfinite(mesh.epsilon):
+def _check_outside(body: Body, mesh: Mesh, problems: Problems) -> None:
+    if mesh.outside == "free" and not body.support.holds_column() and isfinite(mesh.epsilon):
         problems.error(
             "mesh.outside",
             mesh.outside,
@@ -207,9 +158,9 @@ def _check_mixed(material: Material, mesh: Mesh, problems: Problems) -> None:
         )  # fmt: skip
 
 
-def _check_reference(meshes: tuple[Section, ...], axes: tuple[Axis, ...], problems: Problems) -> None:
-    if all(isfinite(mesh.epsilon) for mesh in meshes if isinstance(mesh, Mesh) and mesh.accuracy is None):
-        if any(isinstance(mesh, Mesh) and mesh.accuracy is not None for mesh in meshes):
+def _check_reference(meshes: Sequence[Mesh], axes: tuple[Axis, ...], problems: Problems) -> None:
+    if all(isfinite(mesh.epsilon) for mesh in meshes if mesh.accuracy is None):
+        if any(mesh.accuracy is not None for mesh in meshes):
             return
         swept = any(axis.name == "epsilon" for axis in axes)
         problems.warn(

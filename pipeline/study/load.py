@@ -2,14 +2,17 @@
 
 import itertools
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from pipeline.shapes.registry import LATER
+from pipeline.shapes.section import Section
 from pipeline.study.check import check_sense
 from pipeline.study.problems import Problem, Problems, StudyError, nearest
-from pipeline.study.schema import LATER, LATER_KEYS, LATER_SECTIONS, SECTIONS, SINGLE, Below, Mesh, Section
+from pipeline.study.schema import LATER_KEYS, LATER_SECTIONS, SECTIONS, SINGLE, Mesh
 from pipeline.study.sweep import Axis, Study
 
 # A label needs its section's axes only; more combinations than this in one section is a slip of the pen.
@@ -141,7 +144,7 @@ def _model(name: str, raw: dict[str, Any], problems: Problems, where: str = "") 
         if key in raw:
             problems.error(f"{where}.{key}", raw[key], "this key is not supported by this version")
     model = SECTIONS[name]
-    if not isinstance(model, dict):
+    if not isinstance(model, Mapping):
         return model
     shape = raw.get("shape")
     if isinstance(shape, str) and shape in model:
@@ -206,8 +209,8 @@ def _axis(
     unit = extra.get("unit", "")
     if isinstance(values[0], tuple):
         labels = [" ".join(str(part) for part in value) for value in raw]
-    elif any(isinstance(value, Below) for value in values):
-        labels = [f"below {value['below']}" if isinstance(value, dict) else value for value in raw]
+    elif any(isinstance(value, dict) for value in raw):
+        labels = [" ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else value for value in raw]
     else:
         labels = values
     for label in dict.fromkeys(labels):

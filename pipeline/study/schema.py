@@ -1,107 +1,17 @@
-"""The sections of a study file, one value a key: sweeps are taken apart before a section gets here.
+"""The sections of a study file that have no shape, and the table of all sections.
 
-All models are strict and frozen; lengths are in metres, pressures in pascal.
+One value a key: sweeps are taken apart before a section gets here. Bodies and probes are in :mod:`pipeline.shapes`.
 """
 
-from math import hypot, inf
+from collections.abc import Mapping
+from math import inf
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
-from pydantic_core import PydanticCustomError
+from pydantic import BeforeValidator, Field
 
-from pipeline.study.units import Coordinate, Length, Pressure, Share, Travel, parse_quantity
-
-
-class Section(BaseModel):
-    """A section of a study file."""
-
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid")
-
-    name: Annotated[str, Field(exclude=True)] = ""
-
-
-def _refuse(kind: str, later: tuple[str, ...], supported: tuple[str, ...]) -> BeforeValidator:
-    """Refuse by name what the format describes and this version cannot compute."""
-
-    def check(value: Any) -> Any:
-        if value in later:
-            message = f'{kind} "{value}" is not supported; supported: {", ".join(supported)}'
-            raise PydanticCustomError("not_supported", message)
-        return value
-
-    return BeforeValidator(check)
-
-
-# ---- bodies -----------------------------------------------------------------------------------------
-
-
-class Below(BaseModel):
-    """Support of everything below a height: ``fixed = {below = "-15 mm"}``."""
-
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid")
-    below: Coordinate
-
-
-def _fixed(value: Any) -> Any:
-    if isinstance(value, dict):
-        if set(value) != {"below"}:
-            raise PydanticCustomError("not_supported", 'a table here has the one key `below`: {below = "-15 mm"}')
-        return Below(below=value["below"])
-    if value not in ("bottom", "sides", "bottom+sides"):
-        raise PydanticCustomError("not_supported", "must be 'bottom', 'sides', 'bottom+sides' or {below = \"-15 mm\"}")
-    return value
-
-
-Fixed = Annotated[Literal["bottom", "sides", "bottom+sides"] | Below, BeforeValidator(_fixed)]
-
-
-class Box(Section):
-    """A box with its top face centred on the origin, tissue at z <= 0."""
-
-    shape: Literal["box"]
-    size: tuple[Length, Length, Length]
-    fixed: Fixed = "bottom"
-
-    @property
-    def height(self) -> float:
-        """Thickness of the tissue under the probe (m)."""
-        return self.size[2]
-
-    @property
-    def volume(self) -> float:
-        """Volume (m³)."""
-        return self.size[0] * self.size[1] * self.size[2]
-
-    def reach(self, at: tuple[float, float]) -> float:
-        """Largest horizontal distance from the axis through ``at`` to a point of the body (m)."""
-        return hypot(self.size[0] / 2 + abs(at[0]), self.size[1] / 2 + abs(at[1]))
-
-    def gap(self, at: tuple[float, float]) -> float:
-        """Distance from ``at`` to the edge of the top face, negative outside (m)."""
-        return min(self.size[0] / 2 - abs(at[0]), self.size[1] / 2 - abs(at[1]))
-
-
-class Cylinder(Section):
-    """A cylinder about the z axis with its top face in z = 0."""
-
-    shape: Literal["cylinder"]
-    radius: Length
-    height: Length
-    fixed: Fixed = "bottom"
-
-    @property
-    def volume(self) -> float:
-        """Volume (m³)."""
-        return 3.141592653589793 * self.radius**2 * self.height
-
-    def reach(self, at: tuple[float, float]) -> float:
-        """Largest horizontal distance from the axis through ``at`` to a point of the body (m)."""
-        return self.radius + hypot(*at)
-
-    def gap(self, at: tuple[float, float]) -> float:
-        """Distance from ``at`` to the edge of the top face, negative outside (m)."""
-        return self.radius - hypot(*at)
-
+from pipeline.shapes.registry import BODIES, PROBES
+from pipeline.shapes.section import Section, Words
+from pipeline.units import Length, Pressure, Share, parse_quantity
 
 # ---- material ---------------------------------------------------------------------------------------
 
@@ -109,88 +19,25 @@ class Cylinder(Section):
 class Material(Section):
     """Isotropic linear elasticity."""
 
-    young: Pressure
-    poisson: Annotated[float, Field(ge=0, le=0.5)]
+    young: Annotated[Pressure, Words("Young's modulus. F is proportional to it.", '"10 kPa"', is_used=True)]
+    poisson: Annotated[
+        float,
+        Field(ge=0, le=0.5),
+        Words(
+            "Poisson's ratio; 0.5 is incompressible. Elements of degree 1 take up to 0.45.",
+            "[0.30, 0.45]",
+            is_used=True,
+        ),
+    ]
+
+    # Keys that F is proportional to, if all of them change together.
+    PROPORTIONAL_TO: ClassVar[tuple[str, ...]] = ("young",)
 
     @property
     def lame(self) -> tuple[float, float]:
         """Lamé's λ and μ (Pa); λ is infinite for an incompressible material."""
         mu = self.young / (2 * (1 + self.poisson))
         return (2 * mu * self.poisson / (1 - 2 * self.poisson) if self.poisson < 0.5 else inf), mu
-
-
-# ---- probes -----------------------------------------------------------------------------------------
-
-Contact = Annotated[Literal["bonded", "frictionless"], _refuse("contact", ("unilateral",), ("bonded", "frictionless"))]
-
-
-class Probe(Section):
-    """What every probe has: how it moves, and where."""
-
-    shape: str
-    action: Literal["pierce", "cut"] = "pierce"
-    depth: Length
-    at: tuple[Coordinate, Coordinate] = (0.0, 0.0)
-    contact: Contact = "bonded"
-
-    @property
-    def axis(self) -> tuple[float, float, float]:
-        """Unit vector along which the probe advances: into the tissue."""
-        return (0.0, 0.0, -1.0)
-
-    @property
-    def travel(self) -> tuple[float, float, float]:
-        """Prescribed displacement of the footprint (m)."""
-        return (0.0, 0.0, -self.depth)
-
-
-class Disc(Probe):
-    """A flat round punch, such as the tip of a blunt needle."""
-
-    shape: Literal["disc"]
-    action: Literal["pierce"] = "pierce"
-    radius: Length
-
-    @property
-    def circumradius(self) -> float:
-        """Radius of the smallest circle round the footprint (m)."""
-        return self.radius
-
-    @property
-    def half_width(self) -> float:
-        """Half of the footprint's smallest extent (m)."""
-        return self.radius
-
-
-class Blade(Probe):
-    """A flat rectangular punch; its length lies along ``direction``."""
-
-    shape: Literal["blade"]
-    length: Length
-    width: Length
-    direction: tuple[float, float, float] = (1.0, 0.0, 0.0)
-    slice: Travel = 0.0
-
-    @property
-    def circumradius(self) -> float:
-        """Radius of the smallest circle round the footprint (m)."""
-        return hypot(self.length, self.width) / 2
-
-    @property
-    def half_width(self) -> float:
-        """Half of the footprint's smallest extent (m)."""
-        return min(self.length, self.width) / 2
-
-    @property
-    def along(self) -> tuple[float, float]:
-        """Unit vector along the blade, in the plane of the top."""
-        norm = hypot(self.direction[0], self.direction[1])
-        return self.direction[0] / norm, self.direction[1] / norm
-
-    @property
-    def travel(self) -> tuple[float, float, float]:
-        """Prescribed displacement of the footprint (m): down by the depth, along the blade by the slice."""
-        return self.slice * self.along[0], self.slice * self.along[1], -self.depth
 
 
 # ---- mesh and solver --------------------------------------------------------------------------------
@@ -203,22 +50,73 @@ def _epsilon(value: Any) -> float:
 Epsilon = Annotated[float, BeforeValidator(_epsilon), Field(gt=0, json_schema_extra={"unit": "m"})]
 
 
+_REQUIRED = "required, unless an accuracy is asked for"
+
+
 class Mesh(Section):
     """Element sizes and elements; ``epsilon`` is infinite for the full-order mesh.
 
     With an ``accuracy``, the largest relative error that F may have, what is not given is chosen.
     """
 
-    accuracy: Annotated[Share | None, Field(ge=1e-4, le=0.2)] = None
-    epsilon: Epsilon = inf
-    fine: Length = inf
-    coarse: Length = inf
-    rim: Annotated[Length | None, Field(json_schema_extra={"unit": "m"})] = None
-    growth: Annotated[float, Field(gt=0, le=2)] = 0.5
-    outside: Literal["coarse", "free", "fixed"] = "coarse"
-    degree: Literal[1, 2, 3] = 2
-    element: Literal["auto", "displacement", "mixed"] = "auto"
-    model: Literal["auto", "3d"] = "auto"
+    accuracy: Annotated[
+        Share | None,
+        Field(ge=1e-4, le=0.2),
+        Words(
+            "Largest relative error that F may have. Elements and sizes that are not given are then chosen, and a case "
+            "that cannot be shown to be that good fails.",
+            '"1 %"',
+            default="none: the sizes given are used",
+        ),
+    ] = None
+    epsilon: Annotated[
+        Epsilon,
+        Words(
+            'Radius round the contact within which the mesh is fine; "full" is fine everywhere, and F / F_max needs '
+            "it.",
+            '["4 mm", "7 mm", "10 mm", "15 mm", "full"]',
+            default=_REQUIRED,
+            is_used=True,
+        ),
+    ] = inf
+    fine: Annotated[Length, Words("Element size within epsilon.", '"2 mm"', default=_REQUIRED, is_used=True)] = inf
+    coarse: Annotated[Length, Words("Element size far away.", '"8 mm"', default=_REQUIRED, is_used=True)] = inf
+    rim: Annotated[
+        Length | None,
+        Field(json_schema_extra={"unit": "m"}),
+        Words(
+            "Element size at the probe's edge, where stresses are singular: F_max hangs on it more than on anything "
+            "else.",
+            '"0.2 mm"',
+            default="a tenth of the probe's half width, at most fine",
+        ),
+    ] = None
+    growth: Annotated[
+        float,
+        Field(gt=0, le=2),
+        Words("By how much an element may be larger for each unit of distance from the edge.", "0.5"),
+    ] = 0.5
+    outside: Annotated[
+        Literal["coarse", "free", "fixed"],
+        Words(
+            "What becomes of the body beyond epsilon: meshed coarsely; or cut away, which leaves a column whose side "
+            "is free of traction, or fixed.",
+            '["coarse", "free"]',
+            is_used=True,
+        ),
+    ] = "coarse"
+    degree: Annotated[Literal[1, 2, 3], Words("Degree of the displacement's polynomials.", "2")] = 2
+    element: Annotated[
+        Literal["auto", "displacement", "mixed"],
+        Words(
+            "Displacement only, or mixed with pressure, which does not lock; auto is mixed from poisson = 0.45 on.",
+            '"auto"',
+        ),
+    ] = "auto"
+    model: Annotated[
+        Literal["auto", "3d"],
+        Words("auto may use symmetry and two dimensions where the scene has them, 3d may not.", '"auto"'),
+    ] = "auto"
 
     # A tenth of the probe's half width puts F within about 1 % on the default elements (docs/accuracy.md).
     RIM_SHARE: ClassVar[float] = 0.1
@@ -231,6 +129,10 @@ class Mesh(Section):
         """Element size at the edge of a probe of that half width (m)."""
         return self.rim if self.rim is not None else min(self.fine, self.RIM_SHARE * half_width)
 
+    def column(self, reach: float) -> float:
+        """Return the radius (m) of what is kept of a body of that ``reach`` from the probe's axis; infinite if all."""
+        return inf if self.outside == "coarse" or self.epsilon >= reach else self.epsilon
+
     def element_for(self, poisson: float) -> Literal["displacement", "mixed"]:
         """Return the element for a Poisson's ratio; of degree 1 there is no stable mixed one."""
         if self.element != "auto":
@@ -241,11 +143,22 @@ class Mesh(Section):
 class Solve(Section):
     """How cases are solved and timed; ``exact`` asks for F_exact of every scene."""
 
-    method: Literal["auto", "direct", "iterative"] = "auto"
-    tolerance: Annotated[float, Field(ge=1e-14, le=1e-3)] = 1e-6
-    exact: bool = True
-    timing: bool = False
-    repeats: Annotated[int, Field(ge=1, le=1000)] = 3
+    method: Annotated[
+        Literal["auto", "direct", "iterative"],
+        Words("Factorisation or conjugate gradients; auto takes the faster.", '"auto"'),
+    ] = "auto"
+    tolerance: Annotated[
+        float,
+        Field(ge=1e-14, le=1e-3),
+        Words("Of the iterative solver, in its energy norm; the error of F is its square.", "1e-8"),
+    ] = 1e-6
+    exact: Annotated[bool, Words("Whether F_exact, F without mesh error, is computed for every scene.", "true")] = True
+    timing: Annotated[bool, Words("Solve every case afresh and alone, for timings to be compared.", "false")] = False
+    repeats: Annotated[
+        int,
+        Field(ge=1, le=1000),
+        Words("In a timing study: runs of each case, of whose times the median is kept.", "3"),
+    ] = 3
 
 
 REDUCTIONS = (
@@ -261,15 +174,27 @@ class Planning(Section):
     ``stop_when`` is how near to F_exact F must be, at two values of ε in a row, for larger ones not to be run.
     """
 
-    without: tuple[Literal[REDUCTIONS], ...] = ()  # type: ignore[valid-type]
-    tolerance: Annotated[float, Field(ge=1e-10, le=1e-2)] = 1e-6
-    stop_when: Annotated[Share | None, Field(gt=0, le=0.5)] = None
+    without: Annotated[
+        tuple[Literal[REDUCTIONS], ...],  # type: ignore[valid-type]
+        Words("Reductions not to be used: see what `epsmesh plan` strikes out.", "[]"),
+    ] = ()
+    tolerance: Annotated[
+        float,
+        Field(ge=1e-10, le=1e-2),
+        Words("Relative error of F that a reduced basis over many Poisson's ratios may cost.", "1e-6"),
+    ] = 1e-6
+    stop_when: Annotated[
+        Share | None,
+        Field(gt=0, le=0.5),
+        Words(
+            "Once F is this near to F_exact at two values of epsilon in a row, larger ones are not run.",
+            '"1 %"',
+            default="none: every epsilon is run",
+        ),
+    ] = None
 
 
-BODIES: dict[str, type[Section]] = {"box": Box, "cylinder": Cylinder}
-PROBES: dict[str, type[Section]] = {"disc": Disc, "blade": Blade}
-LATER = {"body": ("ellipsoid", "cad", "surface"), "probe": ("sphere", "cone", "wedge")}
-SECTIONS: dict[str, type[Section] | dict[str, type[Section]]] = {
+SECTIONS: dict[str, type[Section] | Mapping[str, type[Section]]] = {
     "body": BODIES,
     "material": Material,
     "probe": PROBES,
@@ -281,10 +206,7 @@ SECTIONS: dict[str, type[Section] | dict[str, type[Section]]] = {
 SINGLE = ("solve", "plan")
 # Keys of the format that this version does not compute: named as such, not as typing errors.
 LATER_KEYS = {
-    "body": ("layers", "inclusion"),
-    "probe": ("incision", "angle"),
+    "body": ("layers", "inclusion", "file"),
+    "probe": ("incision", "angle", "path"),
 }
 LATER_SECTIONS = ("load",)
-
-AnyBody = Box | Cylinder
-AnyProbe = Disc | Blade

@@ -7,7 +7,11 @@ from functools import cached_property
 from math import inf
 from typing import Any
 
-from pipeline.study.schema import AnyBody, AnyProbe, Material, Mesh, Planning, Section, Solve
+from pipeline.shapes.body import Body
+from pipeline.shapes.frame import Frame, Vector
+from pipeline.shapes.probe import Probe
+from pipeline.shapes.section import Section
+from pipeline.study.schema import Material, Mesh, Planning, Solve
 
 # Keys that both body and probe have, or a variable of the dataset: their dimension says whose it is.
 _AMBIGUOUS = ("radius", "shape", "accuracy")
@@ -41,14 +45,22 @@ class Axis:
 
 
 @dataclass(frozen=True)
+class Scale:
+    """What results are proportional to: F to stress (Pa) × length (m), energies to that × length, strains to length."""
+
+    stress: float
+    length: float
+
+
+@dataclass(frozen=True)
 class Case:
     """One scene with one mesh setting: yields one force."""
 
     index: tuple[int, ...]
     axes: tuple[Axis, ...]
-    body: AnyBody
+    body: Body
     material: Material
-    probe: AnyProbe
+    probe: Probe
     mesh: Mesh
     solve: Solve
 
@@ -58,15 +70,39 @@ class Case:
         return tuple((axis.name, axis.labels[i]) for axis, i in zip(self.axes, self.index, strict=True))
 
     @property
+    def frame(self) -> Frame:
+        """Where the probe meets the body."""
+        return self.probe.frame_on(self.body)
+
+    @property
+    def travel(self) -> Vector:
+        """Prescribed displacement (m) of the footprint."""
+        return self.probe.travel(self.frame)
+
+    @property
+    def proportional_to(self) -> tuple[str, ...]:
+        """The keys that F is proportional to, those of one section changing together."""
+        return *self.material.PROPORTIONAL_TO, *self.probe.PROPORTIONAL_TO
+
+    @property
+    def scale(self) -> Scale:
+        """The units in which its results do not depend on what they are proportional to."""
+        return Scale(self.material.young, self.probe.depth)
+
+    @property
     def is_full(self) -> bool:
         """Whether the mesh is fine everywhere: asked for as such, or with an ε past the whole body."""
-        reach = self.body.reach(self.probe.at)
-        return self.mesh.epsilon >= (reach**2 + self.body.height**2) ** 0.5
+        return self.mesh.epsilon >= self.body.farthest(self.frame)
+
+    @property
+    def column(self) -> float:
+        """Radius (m) of the piece of the body that is kept round the probe's axis; infinite if all of it is."""
+        return self.mesh.column(self.body.reach(self.frame))
 
     @property
     def is_truncated(self) -> bool:
         """Whether only a column of the body is kept."""
-        return self.mesh.outside != "coarse" and self.mesh.epsilon < self.body.reach(self.probe.at)
+        return self.column < inf
 
     @property
     def element(self) -> str:

@@ -17,8 +17,8 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.mesh.distribute import distribute
+from pipeline.mesh.of_case import mesh_arrays
 from pipeline.plan.plan import make_plan
-from pipeline.run.meshing import mesh_arrays
 from pipeline.solve.cache import form_cache
 from pipeline.solve.forms import ElasticForms
 from pipeline.solve.mixed_forms import MixedForms

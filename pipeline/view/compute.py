@@ -34,7 +34,7 @@ def solve_to_view(study: Study, case: Case) -> Solve:
     """Return how ``case`` is computed to be looked at: in three dimensions, on what symmetry leaves of the body."""
     solves = first_attempts(declare(study)).solves
     solve = next(solve for solve in solves if case.index in solve.serves)
-    return replace(solve, mirrors=model_planes(case.probe)) if case.mesh.model == "auto" else solve
+    return replace(solve, mirrors=model_planes(case)) if case.mesh.model == "auto" else solve
 
 
 def compute_fields(
@@ -128,4 +128,4 @@ def _whole(
     if strain is not None:
         strain = np.tile(strain, 2 ** len(mirrors))
     whole = reflect(arrays, mirrors)
-    return Fields(case, whole.points, whole.cells, whole.facets, mirror_planes(case.probe), displacement, strain)
+    return Fields(case, whole.points, whole.cells, whole.facets, mirror_planes(case), displacement, strain)

@@ -34,7 +34,7 @@ class Fields:
     @property
     def contact(self) -> FloatArray:
         """The point round which ε is measured (m)."""
-        return np.array([*self.case.probe.at, 0.0])
+        return np.array(self.case.frame.point)
 
     @property
     def epsilon(self) -> float:

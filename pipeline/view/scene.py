@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.scene.model import PROBE
-from pipeline.study.schema import Box, Cylinder
 from pipeline.view.fields import Fields
 
 # On a machine without a display VTK would ask for one first, and complain.
@@ -22,8 +21,6 @@ MM = 1e3
 _HALVINGS = 3
 # Half the height of the close-up, in radii of the footprint.
 _CLOSE = 2.2
-# Edges of the outline of a round body.
-_ROUND = 200
 # Degrees between the faces at an edge of the body.
 _SHARP = 40
 # From where the picture is taken: in front of the cut, beside it, above.
@@ -159,13 +156,4 @@ def _moved(part: Any, factor: float) -> Any:
 
 def _outline(fields: Fields) -> Any:
     """Return the edges of the whole body, of which a column or the part behind the cut is shown."""
-    body = fields.case.body
-    if isinstance(body, Box):
-        x, y, z = (MM * length for length in body.size)
-        return pv.Box((-x / 2, x / 2, -y / 2, y / 2, -z, 0)).extract_all_edges()
-    assert isinstance(body, Cylinder)
-    radius, height = MM * body.radius, MM * body.height
-    shape = pv.Cylinder(
-        center=(0, 0, -height / 2), direction=(0, 0, 1), radius=radius, height=height, resolution=_ROUND
-    )
-    return shape.extract_feature_edges(boundary_edges=True, feature_edges=True, manifold_edges=False)
+    return pv.merge([pv.lines_from_points(MM * line) for line in fields.case.body.outline()])

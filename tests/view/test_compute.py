@@ -35,7 +35,7 @@ def fields(comm=MPI.COMM_SELF, mesh_only=False, **changes):
 def test_displacement_is_what_probe_and_support_prescribe(changes):
     found = fields(**changes)
     at = {name: found.displacement[np.unique(found.facets[name])] for name in (PROBE, FIXED)}
-    travel = np.broadcast_to(found.case.probe.travel, at[PROBE].shape)
+    travel = np.broadcast_to(found.case.travel, at[PROBE].shape)
     np.testing.assert_allclose(at[PROBE], travel, rtol=0, atol=1e-12)
     np.testing.assert_allclose(at[FIXED], 0.0, atol=1e-12)
     assert np.linalg.norm(found.displacement, axis=1).max() < 1.2 * np.linalg.norm(travel[0])

@@ -1,0 +1,49 @@
+"""The mesh that a case asks for: its geometry and sizes, meshed where symmetry leaves something, and reflected."""
+
+from dataclasses import replace
+from math import inf
+from time import perf_counter
+
+from pipeline.mesh.curve import curve
+from pipeline.mesh.generate import MeshArrays, generate
+from pipeline.mesh.meridian import Meridian
+from pipeline.mesh.reflect import reflect
+from pipeline.mesh.size import Sizes
+from pipeline.plan.symmetry import mirror_planes
+from pipeline.scene.model import Scene
+from pipeline.study.sweep import Case
+
+
+def mesh_arrays(case: Case, mirrors: tuple[str, ...]) -> MeshArrays:
+    """Return the mesh of a case as arrays, of the part that ``mirrors`` leave of it."""
+    start = perf_counter()
+    straight, planes, sizes = case.mesh.degree == 1, mirror_planes(case), sizes_of(case)
+    segments = sizes.rim_segments(case.probe)
+    scene = Scene(case.body, case.probe, case.column, case.mesh.outside == "fixed", segments, straight, planes)
+    arrays = generate(scene, sizes)
+    arrays = arrays if straight else curve(arrays, scene)
+    whole = reflect(arrays, tuple(plane for plane in planes if plane not in mirrors))
+    return replace(whole, seconds=perf_counter() - start)
+
+
+def sizes_of(case: Case) -> Sizes:
+    """Return the element sizes of a case."""
+    mesh = case.mesh
+    epsilon = inf if case.is_full else mesh.epsilon
+    # A round side is resolved all along, the body's as well as the column's.
+    side = min(case.body.bend, inf if mesh.outside == "coarse" else epsilon)
+    return Sizes(epsilon, mesh.fine, mesh.coarse, mesh.rim_size(case.probe.half_width), mesh.growth, side)
+
+
+def meridian_of(case: Case) -> Meridian:
+    """Return the half plane of a round case.
+
+    Raises:
+        ValueError: if its body is not round.
+    """
+    body = case.body.half_plane()
+    if body is None:
+        raise ValueError(f"a {case.body.shape} has no half plane")
+    fixed = case.body.support.on_half_plane()
+    held = case.is_truncated and case.mesh.outside == "fixed"
+    return Meridian(body.radius, body.height, case.probe.circumradius, fixed, case.column, held)

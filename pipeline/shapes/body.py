@@ -1,0 +1,111 @@
+"""What every body tells of itself. There are no defaults: a body that leaves something out cannot be made."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated, Any
+
+from pipeline.shapes.arrays import FloatArray
+from pipeline.shapes.frame import Frame, Units, Vector
+from pipeline.shapes.section import Section, Words
+from pipeline.shapes.support import Fixed, Support, support_of
+from pipeline.shapes.surface import Surface
+
+
+@dataclass(frozen=True)
+class Rectangle:
+    """The half plane (r, z) of a body round about the z axis: r up to ``radius``, z from -``height`` to 0 (m)."""
+
+    radius: float
+    height: float
+
+
+class Body(Section, ABC):
+    """A piece of tissue in its own coordinates, and where it is held.
+
+    Places on it are given as the :class:`Frame` of the probe there.
+    """
+
+    shape: Annotated[str, Words("Shape of the body.", '"box"', is_used=True)]
+    fixed: Annotated[
+        Fixed,
+        Words("Where the body is held: on its bottom, its sides, both, or everywhere below a height.", '"bottom"'),
+    ] = "bottom"
+
+    @cached_property
+    def support(self) -> Support:
+        """What is held of its boundary."""
+        return support_of(self.fixed)
+
+    # ---- size -----------------------------------------------------------------------------------------
+
+    @property
+    @abstractmethod
+    def extent(self) -> float:
+        """Largest extent (m)."""
+
+    @property
+    @abstractmethod
+    def heights(self) -> tuple[float, float]:
+        """Lowest and highest z (m)."""
+
+    @property
+    @abstractmethod
+    def volume(self) -> float:
+        """Volume (m³)."""
+
+    # ---- under a probe --------------------------------------------------------------------------------
+
+    @abstractmethod
+    def frame(self, at: tuple[float, ...]) -> Frame:
+        """Return the place that the coordinates ``at`` (m) name."""
+
+    @abstractmethod
+    def thickness(self, frame: Frame) -> float:
+        """Return how far (m) the tissue reaches along a probe's axis."""
+
+    @abstractmethod
+    def reach(self, frame: Frame) -> float:
+        """Return the largest distance (m) of a point of the body from a probe's axis."""
+
+    @abstractmethod
+    def farthest(self, frame: Frame) -> float:
+        """Return a distance (m) from the point of contact within which the whole body lies."""
+
+    @abstractmethod
+    def gap(self, point: Vector) -> float:
+        """Return the distance (m) from a point of the face that is touched to the face's edge, negative outside."""
+
+    @property
+    @abstractmethod
+    def face(self) -> str:
+        """The size of the face that a probe touches, in words."""
+
+    # ---- symmetry -------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def mirror_planes(self) -> tuple[str, ...]:
+        """Return the planes, of x = 0 ("x") and y = 0 ("y"), in which its shape is its own image."""
+
+    @abstractmethod
+    def half_plane(self) -> Rectangle | None:
+        """Return its half plane if it is the same all round the z axis, None if it is not."""
+
+    # ---- geometry -------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def draw(self, kernel: Any, units: Units) -> int:
+        """Add it to a CAD ``kernel`` (gmsh's ``occ``), in the model's ``units``; return the tag of the volume."""
+
+    @abstractmethod
+    def surfaces(self) -> dict[str, tuple[Surface, ...]]:
+        """Return all the surfaces that bound it, by the names under which they can be held."""
+
+    @property
+    @abstractmethod
+    def bend(self) -> float:
+        """Radius (m) of the roundest of its sides, which elements must resolve; infinite if all are flat."""
+
+    @abstractmethod
+    def outline(self) -> list[FloatArray]:
+        """Return its edges as lines of points (n, 3), in m, for pictures."""

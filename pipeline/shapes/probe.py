@@ -1,0 +1,152 @@
+"""What every probe tells of itself. There are no defaults for what may be wrong silently."""
+
+from abc import ABC, abstractmethod
+from functools import lru_cache
+from math import hypot, isfinite
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+from pipeline.shapes.arrays import FloatArray
+from pipeline.shapes.body import Body
+from pipeline.shapes.frame import Frame, Units, Vector
+from pipeline.shapes.section import Problems, Section, Words, refuse
+from pipeline.units import Coordinate, Length
+
+# The candidates for mirror planes, by the coordinate that is zero on them, and their normals.
+PLANES: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)}
+_ALIGNED = 1e-12
+_MANY = 200_000  # pairs of body and probe of a large study
+
+Contact = Annotated[Literal["bonded", "frictionless"], refuse("contact", ("unilateral",), ("bonded", "frictionless"))]
+
+
+class Probe(Section, ABC):
+    """A tool whose flat footprint moves with it: where it touches, how it moves, and its shape.
+
+    A footprint is described in the probe's own coordinates, along and across it: see :class:`Frame`.
+    """
+
+    shape: Annotated[
+        str, Words("Shape of the footprint: a blunt needle's tip, or a blade's edge.", '"disc"', is_used=True)
+    ]
+    action: Annotated[
+        Literal["pierce", "cut"], Words("What the tool does; only a blade cuts.", '"pierce"', is_used=True)
+    ] = "pierce"
+    depth: Annotated[Length, Words("How far the tool is pushed in. F is proportional to it.", '"0.2 mm"', is_used=True)]
+    at: Annotated[
+        tuple[Coordinate, Coordinate], Words("Where its axis meets the top face: x and y.", '["0 mm", "0 mm"]')
+    ] = (0.0, 0.0)
+    contact: Annotated[
+        Contact, Words("Tissue sticks to the footprint (bonded), or slides along it (frictionless).", '"bonded"')
+    ] = "bonded"
+
+    # Keys that F is proportional to, if all of them change together.
+    PROPORTIONAL_TO: ClassVar[tuple[str, ...]]
+    # Error of F on a mesh that is graded to the footprint's edge, in units of that of a disc: docs/accuracy.md.
+    EXPECTED_ERROR: ClassVar[float]
+
+    # ---- place and movement ---------------------------------------------------------------------------
+
+    def frame_on(self, body: Body) -> Frame:
+        """Return its place on ``body``."""
+        return _frame_on(self, body)
+
+    @property
+    @abstractmethod
+    def lies_along(self) -> Vector:
+        """Direction of its length."""
+
+    @abstractmethod
+    def travel(self, frame: Frame) -> Vector:
+        """Return the prescribed displacement (m) of the footprint."""
+
+    # ---- size -----------------------------------------------------------------------------------------
+
+    @property
+    @abstractmethod
+    def circumradius(self) -> float:
+        """Radius of the smallest circle round the footprint (m)."""
+
+    @property
+    @abstractmethod
+    def half_width(self) -> float:
+        """Half of the footprint's smallest extent (m)."""
+
+    @property
+    @abstractmethod
+    def perimeter(self) -> float:
+        """Length of the footprint's edge (m)."""
+
+    @abstractmethod
+    def gap(self, body: Body, frame: Frame) -> float:
+        """Return the distance (m) between the footprint and the edge of the face it touches, negative outside."""
+
+    # ---- symmetry -------------------------------------------------------------------------------------
+
+    @property
+    @abstractmethod
+    def is_round(self) -> bool:
+        """Whether the footprint is the same all round its axis."""
+
+    @abstractmethod
+    def is_mirrored(self, along: float, across: float) -> bool:
+        """Tell whether the footprint is its own image in the line through its centre normal to (along, across)."""
+
+    # ---- geometry -------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def draw(self, kernel: Any, frame: Frame, units: Units) -> int:
+        """Add the footprint, at its place, to a CAD ``kernel`` (gmsh's ``occ``); return the tag of the face."""
+
+    @property
+    @abstractmethod
+    def is_curved(self) -> bool:
+        """Whether the footprint's edge is one smooth curve, which elements must be bent to follow."""
+
+    @abstractmethod
+    def inscribed(self, edges: int) -> Self:
+        """Return the probe, of the same form, in which the polygon of ``edges`` equal edges has this one's area."""
+
+    @abstractmethod
+    def edge_distance(self, along: str, across: str, height: str, unit: float) -> str:
+        """Write the distance to the footprint's edge, in units of 1/``unit`` m, from text of the own coordinates.
+
+        It is exact at the edge, where elements are smallest, and never off by much.
+        """
+
+    @abstractmethod
+    def to_edge(self, points: FloatArray) -> FloatArray:
+        """Return the nearest points (n, 2) of the footprint's curved edge to ``points`` (n, 2) near it, in m."""
+
+    @abstractmethod
+    def outline(self) -> FloatArray:
+        """Return the edge as a closed line of points (n, 2), in m, for pictures."""
+
+    # ---- sense ----------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def check(self, problems: Problems) -> None:
+        """Report what makes no sense in its keys."""
+
+
+class Straight(Probe):
+    """A probe that is only pushed in, along its axis."""
+
+    PROPORTIONAL_TO = ("depth",)
+
+    def travel(self, frame: Frame) -> Vector:
+        """Return the depth along the axis."""
+        x, y, z = (self.depth * c for c in frame.axis)
+        return x, y, z
+
+
+@lru_cache(_MANY)
+def _frame_on(probe: Probe, body: Body) -> Frame:
+    return body.frame(probe.at).turned(probe.lies_along)
+
+
+def check_direction(direction: Vector, problems: Problems) -> bool:
+    """Report a direction that is not horizontal, and tell whether it is."""
+    sane = direction[2] == 0 and hypot(*direction) > 0 and all(map(isfinite, direction))
+    if not sane:
+        problems.error("probe.direction", list(direction), "must be a horizontal vector: [x, y, 0], not all zero")
+    return sane

@@ -1,0 +1,111 @@
+"""A blade."""
+
+from math import hypot
+from typing import Annotated, Any, Literal, Self
+
+from pipeline.shapes.arrays import FloatArray, np
+from pipeline.shapes.body import Body
+from pipeline.shapes.frame import Frame, Units, Vector
+from pipeline.shapes.probe import Probe, check_direction
+from pipeline.shapes.section import Problems, Words, in_mm
+from pipeline.units import Length, Travel
+
+_ALIGNED = 1e-12
+_CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+
+
+class Blade(Probe):
+    """A flat rectangular punch; its length lies along ``direction``."""
+
+    PROPORTIONAL_TO = ("depth", "slice")
+    EXPECTED_ERROR = 0.75
+
+    shape: Literal["blade"]
+    length: Annotated[Length, Words("Length of the edge.", '"6 mm"')]
+    width: Annotated[Length, Words("Width of the edge.", '"1 mm"')]
+    direction: Annotated[
+        tuple[float, float, float], Words("Along which the edge lies: x, y and 0.", "[1.0, 0.0, 0.0]")
+    ] = (1.0, 0.0, 0.0)
+    slice: Annotated[Travel, Words("How far it is drawn along its edge as it cuts.", '"0.05 mm"')] = 0.0
+
+    @property
+    def lies_along(self) -> Vector:
+        """The direction of its edge."""
+        return self.direction
+
+    def travel(self, frame: Frame) -> Vector:
+        """Return depth along the axis and slice along the edge (m)."""
+        x, y, z = (self.slice * t + self.depth * a for t, a in zip(frame.along, frame.axis, strict=True))
+        return x, y, z
+
+    @property
+    def circumradius(self) -> float:
+        """Half of the diagonal (m)."""
+        return hypot(self.length, self.width) / 2
+
+    @property
+    def half_width(self) -> float:
+        """Half of the shorter side (m)."""
+        return min(self.length, self.width) / 2
+
+    @property
+    def perimeter(self) -> float:
+        """Length of the four sides (m)."""
+        return 2 * (self.length + self.width)
+
+    def gap(self, body: Body, frame: Frame) -> float:
+        """Return the distance (m) from the nearest corner to the edge of the face, which is convex."""
+        corners = [(i * self.length / 2, j * self.width / 2) for i, j in _CORNERS]
+        return min(body.gap(frame.at(*corner)) for corner in corners)
+
+    @property
+    def is_round(self) -> bool:
+        """It is not."""
+        return False
+
+    def is_mirrored(self, along: float, across: float) -> bool:
+        """Tell that it is in its two middle lines only."""
+        return min(abs(along), abs(across)) < _ALIGNED
+
+    def draw(self, kernel: Any, frame: Frame, units: Units) -> int:
+        """Add the rectangle."""
+        (x, y, z), a, b = map(units, frame.point), units(self.length), units(self.width)
+        tag = int(kernel.addRectangle(x - a / 2, y - b / 2, z, a, b))
+        frame.place(kernel, [(2, tag)], units)
+        return tag
+
+    @property
+    def is_curved(self) -> bool:
+        """It is not: it has four straight sides."""
+        return False
+
+    def inscribed(self, edges: int) -> Self:
+        """Return the blade itself: straight elements follow it."""
+        return self
+
+    def edge_distance(self, along: str, across: str, height: str, unit: float) -> str:
+        """Write the distance to the four sides."""
+        p = f"(Fabs({along})-{unit * self.length / 2:.12g})"
+        q = f"(Fabs({across})-{unit * self.width / 2:.12g})"
+        # Signed distance to a rectangle in its plane; its magnitude is the distance to the edge line.
+        in_plane = f"(Sqrt(Max({p},0)^2+Max({q},0)^2)+Min(Max({p},{q}),0))"
+        return f"Sqrt({in_plane}^2+{height}^2)"
+
+    def to_edge(self, points: FloatArray) -> FloatArray:
+        """Return the points: no edge of an element needs to be bent."""
+        return points
+
+    def outline(self) -> FloatArray:
+        """Return the rectangle."""
+        return np.array([(i * self.length / 2, j * self.width / 2) for i, j in (*_CORNERS, _CORNERS[0])])
+
+    def check(self, problems: Problems) -> None:
+        """Report a direction that is not horizontal, and a slice that makes no sense."""
+        check_direction(self.direction, problems)
+        if self.slice > 0 and self.action != "cut":
+            problems.error("probe.slice", in_mm(self.slice), 'only a cut slices: set action = "cut"')
+        if self.slice > 0 and self.contact == "frictionless":
+            problems.error(
+                "probe.slice", in_mm(self.slice), "a frictionless blade slides along without force: use "
+                "contact = 'bonded'",
+            )  # fmt: skip

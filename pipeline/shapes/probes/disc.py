@@ -1,0 +1,90 @@
+"""A disc."""
+
+from math import pi, sin, sqrt
+from typing import Annotated, Any, Literal, Self
+
+from pipeline.shapes.arrays import FloatArray, np
+from pipeline.shapes.body import Body
+from pipeline.shapes.frame import Frame, Units, Vector
+from pipeline.shapes.probe import Straight
+from pipeline.shapes.section import Problems, Words
+from pipeline.units import Length
+
+# Points of the edge in pictures.
+_ROUND = 200
+
+
+class Disc(Straight):
+    """A flat round punch, such as the tip of a blunt needle."""
+
+    EXPECTED_ERROR = 1.0
+
+    shape: Literal["disc"]
+    action: Literal["pierce"] = "pierce"
+    radius: Annotated[Length, Words("Radius of the footprint.", '"2 mm"', is_used=True)]
+
+    @property
+    def lies_along(self) -> Vector:
+        """Any direction is as good: that of x."""
+        return 1.0, 0.0, 0.0
+
+    @property
+    def circumradius(self) -> float:
+        """The radius (m)."""
+        return self.radius
+
+    @property
+    def half_width(self) -> float:
+        """The radius (m)."""
+        return self.radius
+
+    @property
+    def perimeter(self) -> float:
+        """Length of the circle (m)."""
+        return 2 * pi * self.radius
+
+    def gap(self, body: Body, frame: Frame) -> float:
+        """Return the distance (m) from the circle to the edge of the face."""
+        return body.gap(frame.point) - self.radius
+
+    @property
+    def is_round(self) -> bool:
+        """It is."""
+        return True
+
+    def is_mirrored(self, along: float, across: float) -> bool:
+        """Tell that it is, in any line."""
+        return True
+
+    def draw(self, kernel: Any, frame: Frame, units: Units) -> int:
+        """Add the disc."""
+        radius = units(self.radius)
+        tag = int(kernel.addDisk(*map(units, frame.point), radius, radius))
+        frame.place(kernel, [(2, tag)], units)
+        return tag
+
+    @property
+    def is_curved(self) -> bool:
+        """It is."""
+        return True
+
+    def inscribed(self, edges: int) -> Self:
+        """Return the larger disc whose regular polygon has this one's area."""
+        angle = 2 * pi / edges
+        return self.model_copy(update={"radius": self.radius * sqrt(angle / sin(angle))})
+
+    def edge_distance(self, along: str, across: str, height: str, unit: float) -> str:
+        """Write the distance to the circle."""
+        return f"Sqrt((Sqrt({along}^2+{across}^2)-{unit * self.radius:.12g})^2+{height}^2)"
+
+    def to_edge(self, points: FloatArray) -> FloatArray:
+        """Return the points moved along their radii onto the circle."""
+        return self.radius * points / np.linalg.norm(points, axis=1, keepdims=True)
+
+    def outline(self) -> FloatArray:
+        """Return the circle."""
+        angle = np.linspace(0.0, 2 * pi, _ROUND + 1)
+        return self.radius * np.column_stack([np.cos(angle), np.sin(angle)])
+
+    def check(self, problems: Problems) -> None:
+        """Find nothing: each key says what it takes."""

@@ -1,0 +1,19 @@
+"""The shapes that there are: one line each. What is not here is refused."""
+
+from pipeline.shapes.bodies.box import Box
+from pipeline.shapes.bodies.cylinder import Cylinder
+from pipeline.shapes.body import Body
+from pipeline.shapes.probe import Probe
+from pipeline.shapes.probes.blade import Blade
+from pipeline.shapes.probes.disc import Disc
+
+BODIES: dict[str, type[Body]] = {
+    "box": Box,
+    "cylinder": Cylinder,
+}
+PROBES: dict[str, type[Probe]] = {
+    "disc": Disc,
+    "blade": Blade,
+}
+# Shapes of the format that this version does not compute: named as such, not as typing errors.
+LATER = {"body": ("ellipsoid", "cad", "surface", "image"), "probe": ("sphere", "cone", "wedge")}

@@ -1,0 +1,55 @@
+"""What every section of a study file is, and the words that go with its keys."""
+
+from dataclasses import dataclass
+from typing import Annotated, Any, Protocol
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic_core import PydanticCustomError
+
+
+@dataclass(frozen=True)
+class Words:
+    """What a key means, an example in TOML, and what its default is where the model has no plain value for it.
+
+    Stands in the annotation of a field; the reference and the studies that ``epsmesh new`` begins are made of it.
+    """
+
+    text: str
+    example: str
+    default: str = ""
+    is_used: bool = False  # in the study that `epsmesh new` writes
+
+
+class Section(BaseModel):
+    """A section of a study file: strict, frozen; lengths in metres, pressures in pascal."""
+
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid")
+
+    name: Annotated[str, Field(exclude=True)] = ""
+
+
+class Problems(Protocol):
+    """Where a section reports what makes no sense in it: key, value found, what is allowed."""
+
+    def error(self, key: str, found: Any, allowed: str) -> None:
+        """Report what cannot work."""
+
+    def warn(self, key: str, found: Any, allowed: str) -> None:
+        """Report what is doubtful."""
+
+
+def refuse(kind: str, later: tuple[str, ...], supported: tuple[str, ...]) -> BeforeValidator:
+    """Refuse by name what the format describes and this version cannot compute."""
+
+    def check(value: Any) -> Any:
+        if value in later:
+            message = f'{kind} "{value}" is not supported; supported: {", ".join(supported)}'
+            raise PydanticCustomError("not_supported", message)
+        return value
+
+    return BeforeValidator(check)
+
+
+def in_mm(length: float) -> str:
+    """Write a length (m) for people."""
+    return f"{length * 1e3:.4g} mm"

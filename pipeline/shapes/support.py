@@ -1,0 +1,176 @@
+"""Where a body is held: on named faces, or everywhere below a height."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import hypot
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict
+from pydantic_core import PydanticCustomError
+
+from pipeline.shapes.arrays import FloatArray, np
+from pipeline.shapes.section import Problems, in_mm
+from pipeline.shapes.surface import Surface
+from pipeline.units import Coordinate
+
+if TYPE_CHECKING:
+    from pipeline.shapes.body import Body
+
+Surfaces = Mapping[str, tuple[Surface, ...]]
+FaceNames = Literal["bottom", "sides", "bottom+sides"]
+HeldOnHalfPlane = FaceNames | float
+
+# Elements may be this much longer than a strip is wide.
+_LONGEST_NEEDLE = 200
+
+
+class Support(ABC):
+    """What is held of a body's boundary."""
+
+    @abstractmethod
+    def holds(self, surfaces: Surfaces, points: FloatArray, tolerance: float) -> bool:
+        """Tell whether a face of the body, of which ``points`` (n, 3), in m, are a sample, is held."""
+
+    @abstractmethod
+    def mirror_planes(self) -> tuple[str, ...]:
+        """Return the planes, of x = 0 ("x") and y = 0 ("y"), in which it is its own image if the body is."""
+
+    @abstractmethod
+    def is_round(self) -> bool:
+        """Tell whether it is the same all round the z axis if the body is."""
+
+    @abstractmethod
+    def on_half_plane(self) -> HeldOnHalfPlane:
+        """Return what it is on the half plane of a round body: faces by name, or the height (m) below all is held."""
+
+    @abstractmethod
+    def gap(self, to_edge: float) -> float | None:
+        """Return the distance (m) to what is held beside a footprint ``to_edge`` from the edge of its face, if any."""
+
+    @abstractmethod
+    def holds_column(self) -> bool:
+        """Tell whether a column that is cut out of the middle of the body is still held."""
+
+    @abstractmethod
+    def edges(self) -> tuple[float, ...]:
+        """Return the heights z (m) at which what is held ends in the middle of a face."""
+
+    @abstractmethod
+    def check(self, body: "Body", fine: float, problems: Problems) -> None:
+        """Report what cannot work on ``body``, with elements of size ``fine`` (m)."""
+
+
+@dataclass(frozen=True)
+class Faces(Support):
+    """Held on whole faces, by the names that the body gives them."""
+
+    fixed: FaceNames
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The faces."""
+        return tuple(self.fixed.split("+"))
+
+    def holds(self, surfaces: Surfaces, points: FloatArray, tolerance: float) -> bool:
+        """Tell whether the face is one of those."""
+        return any(
+            bool(np.all(np.abs(surface.distance(points)) < tolerance))
+            for name in self.names for surface in surfaces[name]
+        )  # fmt: skip
+
+    def mirror_planes(self) -> tuple[str, ...]:
+        """Return both planes: a name stands for a face and for its image."""
+        return "x", "y"
+
+    def is_round(self) -> bool:
+        """Tell that it is: a name stands for the whole of a round side."""
+        return True
+
+    def on_half_plane(self) -> HeldOnHalfPlane:
+        """Return the names."""
+        return self.fixed
+
+    def gap(self, to_edge: float) -> float | None:
+        """Return the distance to the sides, if they are held."""
+        return to_edge if "sides" in self.names else None
+
+    def holds_column(self) -> bool:
+        """Tell whether the bottom is held."""
+        return "bottom" in self.names
+
+    def edges(self) -> tuple[float, ...]:
+        """Return none: it ends where faces do."""
+        return ()
+
+    def check(self, body: "Body", fine: float, problems: Problems) -> None:
+        """Find nothing: names are checked as they are read."""
+
+
+class Below(BaseModel, Support):
+    """Held everywhere below a height: ``fixed = {below = "-15 mm"}``."""
+
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid")
+    below: Coordinate
+
+    def holds(self, surfaces: Surfaces, points: FloatArray, tolerance: float) -> bool:
+        """Tell whether all of the face is below the height."""
+        return bool(np.all(points[:, 2] < self.below + tolerance))
+
+    def mirror_planes(self) -> tuple[str, ...]:
+        """Return both planes: the height is the same on either side."""
+        return "x", "y"
+
+    def is_round(self) -> bool:
+        """Tell that it is: the height is the same all round."""
+        return True
+
+    def on_half_plane(self) -> HeldOnHalfPlane:
+        """Return the height."""
+        return self.below
+
+    def gap(self, to_edge: float) -> float | None:
+        """Return the distance to where the side is held."""
+        return hypot(to_edge, self.below)
+
+    def holds_column(self) -> bool:
+        """Tell that the bottom is held."""
+        return True
+
+    def edges(self) -> tuple[float, ...]:
+        """Return the height."""
+        return (self.below,)
+
+    def check(self, body: "Body", fine: float, problems: Problems) -> None:
+        """Report a height outside the body, or one so near an end of it that elements would be needles."""
+        low, high = body.heights
+        found = f"below {in_mm(self.below)}"
+        if not low < self.below < high:
+            problems.error("body.fixed", found, f"must lie inside the body: between {in_mm(low)} and {high * 1e3:g} mm")
+            return
+        strip = min(high - self.below, self.below - low)
+        if strip < fine / _LONGEST_NEEDLE < float("inf"):
+            problems.error(
+                "body.fixed",
+                found,
+                f"leaves a strip of {in_mm(strip)} at the side, too thin for elements of {in_mm(fine)}: "
+                f"use fine = {in_mm(_LONGEST_NEEDLE * strip)} at most, or another level",
+            )
+
+
+def _fixed(value: Any) -> Any:
+    if isinstance(value, dict):
+        if set(value) != {"below"}:
+            raise PydanticCustomError("not_supported", 'a table here has the one key `below`: {below = "-15 mm"}')
+        return Below(below=value["below"])
+    if value not in ("bottom", "sides", "bottom+sides"):
+        raise PydanticCustomError("not_supported", "must be 'bottom', 'sides', 'bottom+sides' or {below = \"-15 mm\"}")
+    return value
+
+
+Fixed = Annotated[FaceNames | Below, BeforeValidator(_fixed)]
+
+
+def support_of(fixed: FaceNames | Below) -> Support:
+    """Return what the key ``fixed`` of a body says."""
+    return Faces(fixed) if isinstance(fixed, str) else fixed

@@ -1,0 +1,277 @@
+"""What every shape must get right, whatever it is: each is asked, and its answers are held against each other.
+
+A new shape is found in the registry, with the examples in its own words; nothing need be added here.
+"""
+
+import tomllib
+from itertools import pairwise, product
+from math import cos, inf, pi, sin
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from pipeline.mesh.generate import generate
+from pipeline.mesh.size import Sizes
+from pipeline.scene.model import Scene
+from pipeline.shapes.body import Body
+from pipeline.shapes.frame import Frame
+from pipeline.shapes.probe import PLANES, Probe
+from pipeline.shapes.registry import BODIES, PROBES
+from pipeline.study.keys import words_of
+
+SUPPORTS = ("bottom", "sides", "bottom+sides", {"below": "-6 mm"})
+SIZES = Sizes(epsilon=inf, fine=3e-3, coarse=6e-3, rim=0.4e-3, growth=0.6)
+
+
+def example(model, **changes):
+    """Return a shape of the examples in its own words."""
+    required = {name for name, field in model.model_fields.items() if field.is_required()} - {"shape"}
+    examples = tomllib.loads("\n".join(f"{name} = {words_of(model, name).example}" for name in sorted(required)))
+    (shape,) = model.model_fields["shape"].annotation.__args__
+    given = {name: tuple(value) if isinstance(value, list) else value for name, value in examples.items()}
+    return model.model_validate({"shape": shape} | given | changes)
+
+
+def body(shape: str, fixed="bottom") -> Body:
+    return example(BODIES[shape], fixed=fixed)
+
+
+def probe(shape: str, **changes) -> Probe:
+    """Return an example that lies across the axes, if it has a direction."""
+    turned = {"direction": (1.0, 2.0, 0.0)} if "direction" in PROBES[shape].model_fields else {}
+    return example(PROBES[shape], **turned, **changes)
+
+
+@pytest.fixture(params=BODIES)
+def a_body(request) -> Body:
+    return body(request.param)
+
+
+@pytest.fixture(params=PROBES)
+def a_probe(request) -> Probe:
+    return probe(request.param)
+
+
+@pytest.fixture(scope="module", params=list(product(BODIES, PROBES)), ids="-".join)
+def meshed(request):
+    """A scene off centre with straight elements, and its mesh."""
+    shapes = body(request.param[0]), probe(request.param[1], at=("3 mm", "-2 mm"))
+    scene = Scene(*shapes, rim_segments=SIZES.rim_segments(shapes[1]), straight=True)
+    return scene, generate(scene, SIZES)
+
+
+def on_outline(mesh, group):
+    return mesh.points[np.unique(mesh.facets[group])]
+
+
+# ---- bodies -----------------------------------------------------------------------------------------
+
+
+def test_volume_extent_and_heights_are_those_of_what_is_drawn(meshed):
+    scene, mesh = meshed
+    corners = mesh.points[mesh.cells]
+    volume = float(np.linalg.det(corners[:, 1:] - corners[:, :1]).sum() / 6)
+    assert volume == pytest.approx(scene.body.volume, rel=0.03)
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    assert (low[2], high[2]) == pytest.approx(scene.body.heights, abs=1e-9)
+    assert max(high - low) <= 1.0001 * scene.body.extent <= 2.5 * max(high - low)
+
+
+def test_every_point_of_the_boundary_is_on_a_surface_and_projects_to_itself(meshed):
+    scene, mesh = meshed
+    surfaces = [surface for group in scene.body.surfaces().values() for surface in group]
+    points = np.vstack([on_outline(mesh, group) for group in mesh.facets])
+    distance = np.abs([surface.distance(points) for surface in surfaces])
+    assert distance.min(axis=0).max() < 1e-9
+    for surface, off in zip(surfaces, distance, strict=True):
+        on = points[off < 1e-9]
+        assert len(on)
+        np.testing.assert_allclose(surface.project(on), on, atol=1e-12)
+        moved = on + 1e-4 * np.random.default_rng(1).normal(size=on.shape)
+        assert np.abs(surface.distance(surface.project(moved))).max() < 1e-12
+        assert np.linalg.norm(surface.project(moved) - moved, axis=1) == pytest.approx(np.abs(surface.distance(moved)))
+
+
+def test_reach_thickness_and_farthest_hold_all_of_the_body(meshed):
+    scene, mesh = meshed
+    local = scene.frame.local(mesh.points)
+    assert np.hypot(local[:, 0], local[:, 1]).max() == pytest.approx(scene.body.reach(scene.frame), rel=0.01)
+    assert -local[:, 2].min() == pytest.approx(scene.body.thickness(scene.frame), rel=1e-9)
+    assert 1 <= scene.body.farthest(scene.frame) / np.linalg.norm(local, axis=1).max() < 1.01
+
+
+def test_a_curved_surface_says_how_much(a_body):
+    curved = [surface for group in a_body.surfaces().values() for surface in group if surface.is_curved]
+    assert np.isfinite(a_body.bend) == bool(curved)
+
+
+def test_outline_lies_on_the_body(a_body):
+    points = np.vstack(a_body.outline())
+    surfaces = [surface for group in a_body.surfaces().values() for surface in group]
+    assert np.sort(np.abs([s.distance(points) for s in surfaces]), axis=0)[1].max() < 1e-9  # an edge joins two
+    extent = np.ptp(points, axis=0).max()
+    assert extent <= 1.0001 * a_body.extent <= 2.5 * extent
+
+
+@pytest.mark.parametrize("fixed", SUPPORTS, ids=str)
+@pytest.mark.parametrize("shape", BODIES)
+def test_mirror_planes_and_half_plane_are_true(shape, fixed):
+    """Images of points of the boundary are on it, too, and held where the points are."""
+    found, random = body(shape, fixed), np.random.default_rng(2)
+    surfaces = found.surfaces()
+    images = [np.diag(1 - 2 * np.array(PLANES[plane])) for plane in found.mirror_planes()]
+    if found.half_plane() is not None:
+        images += [np.array([[cos(t), -sin(t), 0], [sin(t), cos(t), 0], [0, 0, 1]]) for t in random.uniform(0, 7, 5)]
+        assert found.support.is_round()
+    for surface in (surface for group in surfaces.values() for surface in group):
+        points = surface.project(random.uniform(-1, 1, (40, 3)) * found.extent)
+        for image in images:
+            at = points @ image.T
+            off = np.min([np.abs(other.distance(at)) for group in surfaces.values() for other in group], axis=0)
+            assert off.max() < 1e-12
+            held = [found.support.holds(surfaces, point[None], 1e-9) for point in points]
+            assert held == [found.support.holds(surfaces, point[None], 1e-9) for point in at]
+
+
+def test_gap_is_the_distance_to_the_edge_of_the_top(a_body):
+    top = ConvexHull(np.vstack([line for line in a_body.outline() if np.ptp(line[:, 2]) == 0])[:, :2])
+    for x, y in ((0.0, 0.0), (3e-3, -2e-3), (-9e-3, 5e-3), (40e-3, 0.0)):
+        off = -np.max(top.equations @ [x, y, 1.0])  # for the nearest side, or its line where the point is outside
+        assert a_body.gap((x, y, 0.0)) == pytest.approx(off, rel=1e-3)
+
+
+# ---- probes -----------------------------------------------------------------------------------------
+
+
+def test_sizes_of_a_footprint_are_those_of_its_outline(a_probe):
+    outline = a_probe.outline()
+    assert np.array_equal(outline[0], outline[-1]) or np.allclose(outline[0], outline[-1], atol=1e-12)
+    length = float(np.linalg.norm(np.diff(outline, axis=0), axis=1).sum())
+    assert length == pytest.approx(a_probe.perimeter, rel=1e-3)
+    assert np.hypot(*outline.T).max() == pytest.approx(a_probe.circumradius)
+    assert np.abs(outline).max(axis=0).min() == pytest.approx(a_probe.half_width)
+    np.testing.assert_allclose(a_probe.to_edge(outline), outline, atol=1e-9)
+
+
+def test_mirror_lines_and_roundness_of_a_footprint_are_true(a_probe):
+    """In every line in which it says so, and in no other, the outline is its own image."""
+    outline, sizes = a_probe.outline(), a_probe.circumradius
+    dense = np.vstack([np.linspace(start, end, 30) for start, end in pairwise(outline)])
+
+    def is_image(matrix) -> bool:
+        images = outline @ matrix.T
+        return bool(
+            max(np.hypot(*(dense - image).T).min() for image in images[:: len(images) // 100 + 1]) < 5e-3 * sizes
+        )
+
+    for angle in (0.0, 0.3, pi / 4, pi / 2, 2.0):
+        normal = np.array([cos(angle), sin(angle)])
+        assert a_probe.is_mirrored(*normal) == is_image(np.eye(2) - 2 * np.outer(normal, normal)), angle
+    turn = np.array([[cos(0.7), -sin(0.7)], [sin(0.7), cos(0.7)]])
+    assert a_probe.is_round == is_image(turn)
+
+
+def test_edge_distance_is_nought_at_the_edge_and_near_the_truth_elsewhere(a_probe):
+    names = {"Sqrt": np.sqrt, "Max": np.maximum, "Min": np.minimum, "Fabs": np.abs}
+    code = a_probe.edge_distance("x", "y", "z", 1e3).replace("^", "**")
+    outline = a_probe.outline()
+    dense = np.vstack([np.linspace(start, end, 30) for start, end in pairwise(outline)])
+    for x, y, z in np.random.default_rng(3).uniform(-3, 3, (60, 3)) * a_probe.circumradius:
+        true = np.sqrt(np.min(np.sum((dense - [x, y]) ** 2, axis=1)) + z**2)
+        said = 1e-3 * eval(code, names, {"x": 1e3 * x, "y": 1e3 * y, "z": 1e3 * z})
+        assert 0.6 * true < said < 2 * true
+    x, y = outline.T
+    assert eval(code, names, {"x": 1e3 * x, "y": 1e3 * y, "z": 0.0}) == pytest.approx(0.0, abs=1e-3)
+
+
+def test_what_is_drawn_lies_within_the_outline_and_has_its_area(meshed):
+    scene, mesh = meshed
+    corners = scene.frame.local(mesh.points)[mesh.facets["probe"]]
+    assert np.abs(corners[..., 2]).max() < 1e-9
+    sides = corners[:, 1:, :2] - corners[:, :1, :2]
+    area = float(np.abs(np.linalg.det(sides)).sum() / 2)
+    x, y = scene.probe.outline().T
+    assert area == pytest.approx(float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])) / 2, rel=1e-3)
+    assert np.hypot(corners[..., 0], corners[..., 1]).max() < 1.02 * scene.probe.circumradius
+
+
+def test_curved_edges_lie_on_the_outline(meshed):
+    from pipeline.mesh.curve import curve
+
+    scene, _ = meshed
+    scene = Scene(scene.body, scene.probe, rim_segments=SIZES.rim_segments(scene.probe))
+    mesh = curve(generate(scene, SIZES), scene)
+    patch = np.isin(mesh.cells[:, :4], mesh.rim)
+    assert patch.sum(axis=1).max() >= 2
+    pairs = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
+    ends, middle = mesh.cells[:, :4][:, pairs], mesh.cells[:, 4:]
+    along = np.isin(ends, mesh.rim).all(axis=2) & (np.abs(mesh.points[middle][..., 2]) < 1e-12)
+    local = scene.frame.local(mesh.points[np.unique(middle[along])])[:, :2]
+    edge = local[np.linalg.norm(scene.probe.to_edge(local) - local, axis=1) < 0.02 * SIZES.rim]
+    assert len(edge) >= SIZES.rim_segments(scene.probe)
+    np.testing.assert_allclose(scene.probe.to_edge(edge), edge, atol=1e-12)
+
+
+@pytest.mark.parametrize("at", [(0.0, 0.0), (3e-3, -2e-3), (12e-3, 8e-3)])
+def test_gap_is_the_least_over_the_outline(a_body, a_probe, at):
+    frame = a_probe.model_copy(update={"at": at}).frame_on(a_body)
+    edge = [a_body.gap(frame.at(*point)) for point in a_probe.outline()]
+    assert a_probe.gap(a_body, frame) == pytest.approx(min(edge), rel=2e-3, abs=1e-6)
+
+
+# ---- frames -----------------------------------------------------------------------------------------
+
+
+def test_a_frame_turns_forth_and_back():
+    frame = Frame((1e-3, 2e-3, 3e-3), axis=(0.6, 0.0, -0.8)).turned((1.0, 1.0, 0.0))
+    points = np.random.default_rng(4).normal(size=(20, 3))
+    np.testing.assert_allclose(frame.world(frame.local(points)), points, atol=1e-12)
+    matrix = np.array([frame.along, frame.across, frame.outward])
+    np.testing.assert_allclose(matrix @ matrix.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(matrix) == pytest.approx(1)
+
+
+def test_a_frame_places_what_is_drawn_and_writes_its_coordinates():
+    """A rectangle drawn upright comes to lie in the frame's plane, along its direction, wherever that points."""
+    import gmsh
+
+    from pipeline.compat import gmsh_session
+
+    for axis in ((0.6, 0.0, -0.8), (0.0, 0.6, 0.8), (0.0, 0.0, -1.0), (0.0, 0.0, 1.0)):
+        frame = Frame((1e-3, 2e-3, 3e-3), axis=axis).turned((1.0, 2.0, 0.5))
+        blade = probe("blade")
+        with gmsh_session():
+            gmsh.option.setNumber("General.Terminal", 0)
+            blade.draw(gmsh.model.occ, frame, lambda length: 1e3 * length)
+            gmsh.model.occ.synchronize()
+            corners = 1e-3 * np.array([gmsh.model.getValue(0, tag, []) for _, tag in gmsh.model.getEntities(0)])
+        local = frame.local(corners)
+        np.testing.assert_allclose(np.abs(local), np.tile([blade.length / 2, blade.width / 2, 0], (4, 1)), atol=1e-9)
+        texts = frame.expressions(1e3)
+        for corner, own in zip(corners, local, strict=True):
+            x, y, z = 1e3 * corner
+            assert [eval(text, {}, {"x": x, "y": y, "z": z}) for text in texts] == pytest.approx(1e3 * own, abs=1e-9)
+
+
+# ---- nothing by default -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("model", "base"), [*((body, Body) for body in BODIES.values()), *((probe, Probe) for probe in PROBES.values())]
+)
+def test_a_shape_that_leaves_something_out_cannot_be_made(model, base):
+    """What may be wrong silently has no default: without any one answer there is no shape."""
+    for name in base.__abstractmethods__:
+        incomplete = type("Incomplete", (model,), {name: getattr(base, name), "__module__": __name__})
+        with pytest.raises(TypeError, match=name):
+            example(incomplete)
+
+
+def test_what_is_not_in_the_registry_is_refused():
+    from pipeline.study.problems import StudyError
+    from tests.cases import study
+
+    for section, shape in (("body", "torus"), ("probe", "star")):
+        with pytest.raises(StudyError, match="unknown shape"):
+            study(**{section: {"shape": shape}})
