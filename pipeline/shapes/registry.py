@@ -6,6 +6,7 @@ from pipeline.shapes.body import Body
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.probes.blade import Blade
 from pipeline.shapes.probes.disc import Disc
+from pipeline.shapes.probes.ellipse import Ellipse
 
 BODIES: dict[str, type[Body]] = {
     "box": Box,
@@ -14,6 +15,7 @@ BODIES: dict[str, type[Body]] = {
 PROBES: dict[str, type[Probe]] = {
     "disc": Disc,
     "blade": Blade,
+    "ellipse": Ellipse,
 }
 # Shapes of the format that this version does not compute: named as such, not as typing errors.
 LATER = {"body": ("ellipsoid", "cad", "surface", "image"), "probe": ("sphere", "cone", "wedge")}

@@ -1,10 +1,11 @@
 """Scenes whose force is known, solved by the program's own run in two dimensions and in three."""
 
 from collections.abc import Iterator
-from math import log
+from math import log, pi
 from typing import Any
 
 from mpi4py import MPI
+from scipy.special import ellipk
 
 from pipeline.plan.plan import make_plan
 from pipeline.run.execute import compute
@@ -21,7 +22,12 @@ _RECTANGLE = "boundary elements (A. E. H. Love 1929)"
 _HAYES = "W. C. Hayes et al., J. Biomech. 5, 541 (1972)"
 _CYLINDER = "axisymmetric, degree 4, converged to 1e-7"
 
+_GALIN = "L. A. Galin, Contact Problems (1961)"
+
 _RECTANGLES = (1, 2, 4, 8)  # length over width
+_ELLIPSES = (1.5, 3, 8)  # first semi-axis over second
+# Not along the axes: nothing is symmetric.
+_OBLIQUE = [2.0, 1.0, 0.0]
 # κ = F (1 - ν²) / (2 E a d) of a frictionless disc on a layer of thickness h, by a / h; ν = 0.3, three digits.
 _LAYERS = {0.2: 1.207, 0.4: 1.472, 0.6: 1.784, 0.8: 2.124, 1.0: 2.480}
 _LAYER_ERROR = 2e-3
@@ -35,7 +41,7 @@ _NEAR_HALF = (0.49, 0.499, 0.4999, 0.5)
 
 def scene_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
     """Yield the rows of all scenes, as they are solved; ``quick`` leaves a few of each kind; collective."""
-    for compare in (_half_space, _rectangles, _cylinders, _layers, _incompressible):
+    for compare in (_half_space, _rectangles, _ellipses, _cylinders, _layers, _incompressible):
         yield from compare(comm, quick)
 
 
@@ -66,6 +72,21 @@ def _rectangles(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
             comm, f"half-space, rectangle {ratio}:1, frictionless, ν = 0.3", "3D", force, _RECTANGLE, error + 1e-4,
             body=_cylinder(_FAR, _FAR), poisson=0.3, probe=blade,
         )  # fmt: skip
+
+
+def _ellipses(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
+    """F = π E* a d / K(e) with the longer semi-axis a and e² = 1 - b²/a²; along the axes, and across them."""
+    for ratio in (3,) if quick else _ELLIPSES:
+        force = pi * 10e3 / (1 - 0.3**2) * ratio * 1e-3 * 1e-5 / float(ellipk(1 - 1 / ratio**2))
+        for name, direction in (("", [1.0, 0.0, 0.0]), (", oblique", _OBLIQUE)):
+            ellipse = {
+                "shape": "ellipse", "axes": [f"{ratio} mm", "1 mm"], "depth": "0.01 mm", "contact": "frictionless",
+                "direction": direction,
+            }  # fmt: skip
+            yield _row(
+                comm, f"half-space, ellipse {ratio:g}:1{name}, frictionless, ν = 0.3", "3D", force, _GALIN, 1e-4,
+                body=_cylinder(_FAR, _FAR), poisson=0.3, probe=ellipse,
+            )  # fmt: skip
 
 
 def _cylinders(comm: MPI.Comm, quick: bool) -> Iterator[Row]:

@@ -3,6 +3,7 @@
 from math import log, pi
 
 import pytest
+from scipy.special import ellipk
 
 from tests.cases import BLADE, force, solve
 
@@ -71,6 +72,38 @@ def test_force_falls_with_refinement_and_degree():
     linear, cubic = (force(mesh={"rim": "2 mm", "fine": "8 mm", "degree": degree}) for degree in (1, 3))
     assert linear > coarse > fine
     assert coarse > cubic
+
+
+ELLIPSE = {"action": "pierce", "shape": "ellipse", "axes": ["3 mm", "1 mm"], "depth": "0.1 mm"}
+
+
+@pytest.mark.parametrize("axes", [(3, 1), (1, 3)])
+def test_ellipse_on_half_space(axes):
+    """Galin: π E* a d / K(e) with the longer semi-axis a. A body of 60 a is 1.5 % stiffer than a half-space."""
+    value = force(
+        body={"shape": "cylinder", "radius": "180 mm", "height": "180 mm"},
+        probe=ELLIPSE | {"axes": [f"{axis} mm" for axis in axes], "contact": "frictionless"},
+        mesh={"fine": "60 mm", "coarse": "60 mm", "rim": "0.1 mm", "growth": 0.5},
+    )
+    exact = pi * 10e3 / (1 - 0.3**2) * 3e-3 * 0.1e-3 / ellipk(1 - 1 / 9)
+    assert 1 <= value / exact <= 1.02
+
+
+def test_ellipse_of_equal_axes_is_a_disc():
+    round_one, mesh = ELLIPSE | {"axes": ["3 mm", "3 mm"], "depth": "0.2 mm"}, {"rim": "0.3 mm", "growth": 0.5}
+    assert force(probe=round_one, mesh=mesh) == pytest.approx(force(mesh=mesh), rel=2e-3)
+
+
+def test_ellipse_gives_the_same_force_wherever_it_points():
+    """On a round body; across the axes nothing is symmetric, and all of the body is solved."""
+    body = {"shape": "cylinder", "radius": "15 mm", "height": "10 mm"}
+    mesh = {"fine": "4 mm", "coarse": "4 mm", "rim": "0.3 mm", "growth": 0.6, "degree": 3}
+    forces = []
+    for direction in ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [2.0, 1.0, 0.0]):
+        (record,) = solve(body=body, probe=ELLIPSE | {"direction": direction}, mesh=mesh).values()
+        assert record.origin == ("solved" if all(direction[:2]) else "symmetric")
+        forces.append(record.force)
+    assert forces[1:] == pytest.approx([forces[0]] * 2, rel=3e-3)
 
 
 @pytest.mark.parametrize("contact", ["bonded", "frictionless"])

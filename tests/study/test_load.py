@@ -11,6 +11,8 @@ from tests.cases import BLADE, raw, study
 
 STUDIES = sorted(Path("studies").glob("*.toml"))
 
+ELLIPSE = {"shape": "ellipse", "axes": ["3 mm", "1 mm"], "depth": "0.1 mm"}
+
 # section changes -> what the message must hold: the key, what was found, what is allowed
 MISTAKES = {
     "bare number": ({"probe": {"radius": 2}}, ["probe.radius = 2", 'such as "10 mm"']),
@@ -59,6 +61,14 @@ MISTAKES = {
     "fine above coarse": ({"mesh": {"fine": "9 mm"}}, ['mesh.fine = "9 mm"', "at most coarse = 8 mm"]),
     "rim above fine": ({"mesh": {"rim": "6 mm"}}, ['mesh.rim = "6 mm"', "at most fine"]),
     "direction": ({"probe": BLADE | {"direction": [0.0, 0.0, 1.0]}}, ["probe.direction", "horizontal"]),
+    "direction of an ellipse": (
+        {"probe": ELLIPSE | {"direction": [0.0, 0.0, 0.0]}}, ["probe.direction", "horizontal"],
+    ),
+    "one axis": ({"probe": ELLIPSE | {"axes": ["3 mm"]}}, ["probe.axes", "2 values"]),
+    "ellipse outside": (
+        {"probe": ELLIPSE | {"at": ["17.5 mm", "0 mm"]}}, ["probe.at", "ellipse", "inside the body's top"],
+    ),
+    "ellipse that cuts": ({"probe": ELLIPSE | {"action": "cut"}}, ["probe.action", "'pierce'"]),
     "slice without cut": (
         {"probe": BLADE | {"action": "pierce", "slice": "1 mm"}}, ["probe.slice", 'action = "cut"'],
     ),

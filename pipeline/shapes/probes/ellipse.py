@@ -1,0 +1,128 @@
+"""An ellipse."""
+
+from math import pi, sqrt
+from typing import Annotated, Any, Literal, Self
+
+from pipeline.shapes.arrays import FloatArray, np
+from pipeline.shapes.body import Body
+from pipeline.shapes.frame import Frame, Units, Vector
+from pipeline.shapes.probe import Straight, check_direction
+from pipeline.shapes.section import Problems, Words
+from pipeline.units import Length
+
+_ALIGNED = 1e-12
+# Points of the edge in pictures, and for the distance to the edge of a face: to 1e-6 of the ellipse's size.
+_ROUND = 2000
+# Points along the edge by which its length is divided into equal parts.
+_FINE = 20_000
+# Newton's iterations to the nearest point; it starts within a few degrees and doubles its digits.
+_ITERATIONS = 12
+
+
+class Ellipse(Straight):
+    """A flat elliptical punch; its first semi-axis lies along ``direction``."""
+
+    EXPECTED_ERROR = 0.9
+
+    shape: Literal["ellipse"]
+    action: Literal["pierce"] = "pierce"
+    axes: Annotated[tuple[Length, Length], Words("Two semi-axes: along and across.", '["3 mm", "1.5 mm"]')]
+    direction: Annotated[
+        tuple[float, float, float], Words("Along which the first axis lies: x, y and 0.", "[1.0, 0.0, 0.0]")
+    ] = (1.0, 0.0, 0.0)
+
+    @property
+    def lies_along(self) -> Vector:
+        """The direction of the first axis."""
+        return self.direction
+
+    @property
+    def circumradius(self) -> float:
+        """The longer semi-axis (m)."""
+        return max(self.axes)
+
+    @property
+    def half_width(self) -> float:
+        """The shorter semi-axis (m)."""
+        return min(self.axes)
+
+    @property
+    def perimeter(self) -> float:
+        """Length of the edge (m), to 1e-4 up to axes of 10:1 (S. Ramanujan, Q. J. Math. 45, 350, 1914)."""
+        a, b = self.axes
+        h = 3 * ((a - b) / (a + b)) ** 2
+        return pi * (a + b) * (1 + h / (10 + sqrt(4 - h)))
+
+    def gap(self, body: Body, frame: Frame) -> float:
+        """Return the distance (m) from the nearest point of the ellipse to the edge of the face."""
+        return min(body.gap(frame.at(float(x), float(y))) for x, y in self.outline())
+
+    @property
+    def is_round(self) -> bool:
+        """It is if its axes are equal."""
+        return self.axes[0] == self.axes[1]
+
+    def is_mirrored(self, along: float, across: float) -> bool:
+        """Tell that it is in its two axes only."""
+        return self.is_round or min(abs(along), abs(across)) < _ALIGNED
+
+    def draw(self, kernel: Any, frame: Frame, units: Units) -> int:
+        """Add the ellipse."""
+        a, b = map(units, self.axes)
+        x, y, z = map(units, frame.point)
+        # The kernel wants the longer axis first.
+        tag = int(kernel.addDisk(x, y, z, max(a, b), min(a, b)))
+        if a < b:
+            kernel.rotate([(2, tag)], x, y, z, 0, 0, 1, pi / 2)
+        frame.place(kernel, [(2, tag)], units)
+        return tag
+
+    @property
+    def is_curved(self) -> bool:
+        """It is."""
+        return True
+
+    def inscribed(self, edges: int) -> Self:
+        """Return the larger ellipse whose polygon of equal edges, from the end of an axis on, has this one's area."""
+        angle = np.linspace(0.0, 2 * pi, _FINE + 1)
+        ellipse = self._at(angle)
+        length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ellipse, axis=0), axis=1))])
+        x, y = self._at(np.interp(np.linspace(0.0, length[-1], edges + 1), length, angle)).T
+        polygon = float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])) / 2
+        larger = sqrt(pi * self.axes[0] * self.axes[1] / polygon)
+        return self.model_copy(update={"axes": (larger * self.axes[0], larger * self.axes[1])})
+
+    def edge_distance(self, along: str, across: str, height: str, unit: float) -> str:
+        """Write the distance to the ellipse, to first order: exact at the edge and far away on the axes.
+
+        With ρ² = x²/a² + y²/b² that is ρ |ρ - 1| / (x²/a⁴ + y²/b⁴)^½ in the plane.
+        """
+        a, b = (unit * axis for axis in self.axes)
+        rho = f"Sqrt({along}^2*({1 / a**2:.12g})+{across}^2*({1 / b**2:.12g}))"
+        slope = f"Max(Sqrt({along}^2*({1 / a**4:.12g})+{across}^2*({1 / b**4:.12g})),{1e-6 / max(a, b):.12g})"
+        return f"Sqrt(({rho}*({rho}-1)/{slope})^2+{height}^2)"
+
+    def to_edge(self, points: FloatArray) -> FloatArray:
+        """Return the nearest points of the ellipse."""
+        a, b = self.axes
+        x, y = points[:, 0], points[:, 1]
+        angle = np.arctan2(y / b, x / a)
+        for _ in range(_ITERATIONS):
+            sine, cosine = np.sin(angle), np.cos(angle)
+            # The offset is normal to the ellipse where the derivative of half its square is nought.
+            slope = (x - a * cosine) * a * sine - (y - b * sine) * b * cosine
+            curvature = a * cosine * x + b * sine * y + (a**2 - b**2) * (sine**2 - cosine**2)
+            angle = angle - slope / curvature
+        return self._at(angle)
+
+    def outline(self) -> FloatArray:
+        """Return the ellipse."""
+        return self._at(np.linspace(0.0, 2 * pi, _ROUND + 1))
+
+    def check(self, problems: Problems) -> None:
+        """Report a direction that is not horizontal."""
+        check_direction(self.direction, problems)
+
+    def _at(self, angle: FloatArray) -> FloatArray:
+        """Return the points of the ellipse at eccentric angles."""
+        return np.column_stack([self.axes[0] * np.cos(angle), self.axes[1] * np.sin(angle)])
