@@ -92,7 +92,7 @@ class Case:
     @property
     def is_full(self) -> bool:
         """Whether the mesh is fine everywhere: asked for as such, or with an ε past the whole body."""
-        return self.mesh.epsilon >= self.body.farthest(self.frame)
+        return self.mesh.epsilon == inf or self.mesh.epsilon >= self.body.farthest(self.frame)
 
     @property
     def column(self) -> float:
