@@ -31,6 +31,8 @@ _FLOATS = {
     "time_total": ("s", "time that this case costs alone"),
     "memory": ("bytes", "peak memory of all ranks"),
 }
+# Of a failed case these are not known, whatever came out; how far its bar missed, and what it took, is.
+_RELIED_ON = ("force", "energy", "max_strain", "balance")
 # Taken from the records of F_exact.
 _EXACT = {
     "force_exact": ("N", "force converged well below every error in the study, whole body (F_exact)"),
@@ -83,16 +85,16 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     exact = [_scaled(records.get(key), case) for key, case in zip(keys, study.cases(), strict=True)]
     variables: dict[str, Any] = {}
     for name, (units, text) in _FLOATS.items():
-        values = [getattr(r, name) if r else nan for r in flat]
+        values = [getattr(r, name) if r and (r.is_ok or name not in _RELIED_ON) else nan for r in flat]
         variables[name] = (dims, array(values, float), {"units": units, "long_name": text})
     for name, (units, text) in _COUNTS.items():
         values = [getattr(r, name) if r and r.status == "ok" else _MISSING for r in flat]
         attributes = {"units": units, "long_name": text, "missing_value": _MISSING}
         variables[name] = (dims, array(values, np.int64), attributes)
     for name, (units, text) in _EXACT.items():
-        values = [getattr(r, name.replace("_exact", "")) if r else nan for r in exact]
+        values = [getattr(r, name.replace("_exact", "")) if r and r.is_ok else nan for r in exact]
         variables[name] = (dims, array(values, float), {"units": units, "long_name": text})
-    vectors = np.array([r.force_vector if r else (nan,) * 3 for r in flat]).reshape(*study.shape, 3)
+    vectors = np.array([r.force_vector if r and r.is_ok else (nan,) * 3 for r in flat]).reshape(*study.shape, 3)
     variables["force_vector"] = (
         (*dims, "component"), vectors, {"units": "N", "long_name": "force of the tissue on the probe"},
     )  # fmt: skip
