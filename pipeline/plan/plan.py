@@ -34,7 +34,8 @@ class Plan:
     """What a study needs done.
 
     ``keys`` holds, for each case in order, the key of its record, ``reference_keys`` that of its scene's F_exact.
-    ``stored`` are the keys that were on record; ``shared`` says that solves share meshes and assembly, ``reuse`` that
+    ``used`` are the reductions that had their turn, whether they found work to strike out or not. ``stored`` are the
+    keys that were on record; ``shared`` says that solves share meshes and assembly, ``reuse`` that
     they begin from their neighbours' solutions; ``cost`` estimates what steps take. Of a plan that is one shard's,
     ``part`` are the keys that are its own.
     """
@@ -44,6 +45,7 @@ class Plan:
     keys: tuple[str, ...]
     reference_keys: tuple[str, ...] = ()
     struck: tuple[Struck, ...] = ()
+    used: frozenset[str] = frozenset()
     stored: frozenset[str] = frozenset()
     shared: bool = False
     reuse: bool = False
@@ -93,6 +95,7 @@ def make_plan(
         for name, reduction in REDUCTIONS.items():
             if name not in left_out:
                 plan = reduction(plan)
+                plan = replace(plan, used=plan.used | {name})
     plan = ask_for_exact(plan)
     if shard is not None:
         plan = take(plan, shard)

@@ -12,7 +12,6 @@ from pipeline.mesh.curve import EDGES
 from pipeline.scene.model import FIXED, PROBE
 from pipeline.view.fields import Fields
 
-FORMATS = ("vtu", "xdmf")
 # Edges of the quadratic tetrahedron in the order of VTK's nodes 4 to 9.
 _VTK_EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
 
