@@ -4,13 +4,12 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import pipeline
-from pipeline.cli import app
 from pipeline.plan.cost import CostModel, Observation, fit
 from pipeline.run.record import Record
 from pipeline.run.store import Store
+from tests.commands import epsmesh
 
 KIND = "displacement 2"
 STUDY = """
@@ -81,5 +80,5 @@ def test_estimates_follow_what_the_store_knows(factor, tmp_path):
     assert told["factor"] < 2.0
     assert told["seconds"] == pytest.approx(factor * first, rel=0.2)
     assert pipeline.load(file).summary()["fitted_to"] == 0
-    shown = CliRunner().invoke(app, ["plan", str(file), "--store", str(known), "--json"])
+    shown = epsmesh("plan", file, "--store", known, "--json")
     assert json.loads(shown.stdout)["seconds"] == pytest.approx(told["seconds"])

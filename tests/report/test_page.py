@@ -8,9 +8,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from pipeline.cli import app
 from pipeline.report import page
 from pipeline.report.dataset import write
 from pipeline.report.guide import guide
@@ -18,6 +16,7 @@ from pipeline.report.page import render, write_page
 from pipeline.report.page.cases import case_table
 from pipeline.report.page.guideline import ACCURACY, Section, guide_section
 from pipeline.report.page.skipped import struck
+from tests.commands import epsmesh
 from tests.report import known
 from tests.report.synthetic import dataset
 
@@ -44,10 +43,6 @@ class Reader(HTMLParser):
 
     def handle_data(self, data):
         self.texts.append(data)
-
-
-def command(*arguments):
-    return CliRunner().invoke(app, [*map(str, arguments)])
 
 
 def small(**attributes):
@@ -156,7 +151,7 @@ def test_a_guide_stands_in_the_page_where_there_is_one(monkeypatch):
     assert 'id="guide"' not in render(small(), "small")
 
 
-def test_the_guide_of_the_page_is_that_of_the_command():
+def test_the_guide_of_the_page_is_that_of_the_epsmesh():
     assert guide_section(small()) is None  # F_exact is not known
     section, found = guide_section(known.dataset()), guide(known.dataset(), ACCURACY)
     assert section is not None
@@ -188,10 +183,10 @@ def test_commands_take_a_study_file(tmp_path):
     write(dataset().assign_attrs(study="title = 'x'"), tmp_path / "small.nc")
     study = tmp_path / "small.toml"
     study.write_text("title = 'y'")
-    done = command("report", study, "--output", tmp_path)
+    done = epsmesh("report", study, "--output", tmp_path)
     assert (done.exit_code, done.stdout.strip()) == (0, str(tmp_path / "small.html"))
     assert "has changed since" in done.stderr
-    done = command("plot", study, "--output", tmp_path)
+    done = epsmesh("plot", study, "--output", tmp_path)
     assert done.stdout.split() == [str(tmp_path / f"small.{suffix}") for suffix in ("png", "svg")]
 
 
@@ -211,6 +206,6 @@ def test_bad_input_is_told(arguments, words, tmp_path):
     files["bad"].write_text("not netCDF")
     write(small()[["energy"]], files["other"])
     write(small(), files["good"])
-    done = command(*(argument.format(**files) for argument in arguments))
+    done = epsmesh(*(argument.format(**files) for argument in arguments))
     assert done.exit_code == 2
     assert words in done.stderr
