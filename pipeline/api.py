@@ -11,7 +11,7 @@ from pipeline.plan.describe import summary
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.run.progress import Terminal
 from pipeline.study.load import load
-from pipeline.study.sweep import Study as Declared
+from pipeline.study.sweep import Study
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,19 +19,19 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Study:
+class RunnableStudy:
     """A study file that was found to make sense; ``declared`` holds its axes, cases and sections."""
 
-    declared: Declared
+    declared: Study
 
     @staticmethod
-    def load(path: str | Path) -> "Study":
+    def load(path: str | Path) -> "RunnableStudy":
         """Read the study file at ``path``.
 
         Raises:
             StudyError: with every problem of the file.
         """
-        return Study(load(path))
+        return RunnableStudy(load(path))
 
     @property
     def name(self) -> str:

@@ -4,7 +4,7 @@ import itertools
 from math import hypot, isfinite
 
 from pipeline.study.problems import Problems
-from pipeline.study.schema import AnyBody, AnyProbe, Below, Blade, Box, Material, Mesh, Section, Solve
+from pipeline.study.schema import AnyBody, AnyProbe, Below, Blade, Box, Material, Mesh, Section, Solving
 from pipeline.study.sweep import Axis
 
 # Linear elasticity: strain under the probe is of order depth / radius.
@@ -43,7 +43,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         _check_locking(material, mesh, problems)  # type: ignore[arg-type]
     _check_reference(meshes, axes, problems)
     (solve,) = sections["solve"]
-    assert isinstance(solve, Solve)
+    assert isinstance(solve, Solving)
     if "repeats" in solve.model_fields_set and not solve.timing:
         problems.error("solve.repeats", solve.repeats, "only a timing study repeats its cases: add `timing = true`")
 

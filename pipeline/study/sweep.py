@@ -7,7 +7,7 @@ from functools import cached_property
 from math import inf
 from typing import Any
 
-from pipeline.study.schema import AnyBody, AnyProbe, Material, Mesh, Planning, Section, Solve
+from pipeline.study.schema import AnyBody, AnyProbe, Material, Mesh, Planning, Section, Solving
 
 # Keys that both body and probe have, or a variable of the dataset: their dimension says whose it is.
 _AMBIGUOUS = ("radius", "shape", "accuracy")
@@ -50,7 +50,7 @@ class Case:
     material: Material
     probe: AnyProbe
     mesh: Mesh
-    solve: Solve
+    solve: Solving
 
     @property
     def labels(self) -> tuple[tuple[str, float | int | str], ...]:
@@ -95,10 +95,10 @@ class Study:
         return tuple(len(axis) for axis in self.axes)
 
     @cached_property
-    def solve(self) -> Solve:
+    def solve(self) -> Solving:
         """The solver section, which is not swept."""
         (solve,) = self.sections["solve"]
-        assert isinstance(solve, Solve)
+        assert isinstance(solve, Solving)
         return solve
 
     @cached_property

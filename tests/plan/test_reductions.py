@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from pipeline.plan.describe import story, summary
 from pipeline.plan.plan import make_plan
-from pipeline.plan.reduce import REDUCTIONS
+from pipeline.plan.reductions import REDUCTIONS
 from pipeline.report.dataset import build
 from pipeline.run.execute import compute
 from pipeline.study.load import parse
