@@ -1,8 +1,8 @@
 """The dataset of a study: every record in its place, with labels, units and provenance."""
 
 import json
-import os
 from collections.abc import Mapping
+from dataclasses import replace
 from math import isinf, nan
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline import __version__
+from pipeline.files import atomic
 from pipeline.plan.key import digest
 from pipeline.plan.plan import Plan
 from pipeline.run.record import Record
@@ -31,8 +32,6 @@ _FLOATS = {
     "time_total": ("s", "time that this case costs alone"),
     "memory": ("bytes", "peak memory of all ranks"),
 }
-# Of a failed case these are not known, whatever came out; how far its bar missed, and what it took, is.
-_RELIED_ON = ("force", "energy", "max_strain", "balance")
 # Taken from the records of F_exact.
 _EXACT = {
     "force_exact": ("N", "force converged well below every error in the study, whole body (F_exact)"),
@@ -85,16 +84,16 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     exact = [_scaled(records.get(key), case) for key, case in zip(keys, study.cases(), strict=True)]
     variables: dict[str, Any] = {}
     for name, (units, text) in _FLOATS.items():
-        values = [getattr(r, name) if r and (r.is_ok or name not in _RELIED_ON) else nan for r in flat]
+        values = [getattr(r, name) if r else nan for r in flat]
         variables[name] = (dims, array(values, float), {"units": units, "long_name": text})
     for name, (units, text) in _COUNTS.items():
         values = [getattr(r, name) if r and r.status == "ok" else _MISSING for r in flat]
         attributes = {"units": units, "long_name": text, "missing_value": _MISSING}
         variables[name] = (dims, array(values, np.int64), attributes)
     for name, (units, text) in _EXACT.items():
-        values = [getattr(r, name.replace("_exact", "")) if r and r.is_ok else nan for r in exact]
+        values = [getattr(r, name.replace("_exact", "")) if r else nan for r in exact]
         variables[name] = (dims, array(values, float), {"units": units, "long_name": text})
-    vectors = np.array([r.force_vector if r and r.is_ok else (nan,) * 3 for r in flat]).reshape(*study.shape, 3)
+    vectors = np.array([r.force_vector if r else (nan,) * 3 for r in flat]).reshape(*study.shape, 3)
     variables["force_vector"] = (
         (*dims, "component"), vectors, {"units": "N", "long_name": "force of the tissue on the probe"},
     )  # fmt: skip
@@ -113,13 +112,8 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
 
 def write(dataset: xr.Dataset, path: Path) -> None:
     """Write ``dataset`` to ``path`` as netCDF4: to a new file beside it, which then takes its place."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
+    with atomic(path) as temporary:
         dataset.to_netcdf(temporary, format="NETCDF4", engine="netcdf4")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _add_ratios(dataset: xr.Dataset) -> xr.Dataset:
@@ -147,8 +141,13 @@ def _add_ratios(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _scaled(record: Record | None, case: Case) -> Record | None:
-    """Return the record for the Young's modulus and the depth of ``case``."""
-    return record.scaled(case.material.young, case.probe.depth) if record else None
+    """Return the record for the Young's modulus and the depth of ``case``; of a failure, without what is not known.
+
+    How far its bar missed, and what it took, is.
+    """
+    if record is None or record.is_ok:
+        return record.scaled(case.material.young, case.probe.depth) if record else None
+    return replace(record, force=nan, force_vector=(nan, nan, nan), energy=nan, max_strain=nan, balance=nan)
 
 
 def _origin(plan: Plan, key: str, record: Record | None) -> str:

@@ -46,7 +46,7 @@ def _checked(solve: Solve, record: Record) -> Record:
     A force whose bar had no memory is one to rely on, and says so; where an accuracy is asked for, only the bar proves
     it.
     """
-    if not record.is_ok:
+    if record.status != "ok":
         return record
     bar = record.force_error
     if not isfinite(record.force):
