@@ -35,15 +35,15 @@ def warning(text: str) -> None:
 
 def print_json(value: Any) -> None:
     """Print ``value`` as JSON: an infinite ε is "full", as in a study file, and null is what JSON has no number for."""
-    print(json.dumps(_plain(value), indent=2, ensure_ascii=False, allow_nan=False), flush=True)
+    print(json.dumps(plain(value), indent=2, ensure_ascii=False, allow_nan=False), flush=True)
 
 
-def _plain(value: Any, key: str = "") -> Any:
+def plain(value: Any, key: str = "") -> Any:
     """Return ``value``, which stands under ``key``, as JSON takes it."""
     if isinstance(value, dict):
-        return {name: _plain(item, name) for name, item in value.items()}
+        return {name: plain(item, name) for name, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item, key) for item in value]
+        return [plain(item, key) for item in value]
     if isinstance(value, float) and not isfinite(value):
         return "full" if key == "epsilon" and value == inf else None
     return value

@@ -10,7 +10,7 @@ import xarray as xr
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from pipeline.files import atomic
-from pipeline.report.figures import FIGURES, choose, complete, figure
+from pipeline.report.figures import FIGURES, choose, figure
 from pipeline.report.page.cases import FIRST_ROWS, case_table
 from pipeline.report.page.facts import facts, failures, provenance, reproduce, without_exact
 from pipeline.report.page.guideline import guide_section
@@ -30,7 +30,6 @@ def write_page(dataset: xr.Dataset, path: Path) -> Path:
 
 def render(dataset: xr.Dataset, name: str) -> str:
     """Return the report of ``dataset`` as HTML; ``name`` is the study's, for files and commands."""
-    dataset = complete(dataset)
     script = (_TEMPLATES / "page.js").read_text(encoding="utf-8")
     study = str(dataset.attrs.get("study", ""))
     table = case_table(dataset)
