@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.api import Study
+    from pipeline.api import RunnableStudy
 
 __version__ = "0.1.0"
 __all__ = ["DatasetError", "StoreError", "StudyError", "__version__", "load", "open"]
@@ -22,15 +22,15 @@ _ERRORS = {
 }
 
 
-def load(path: str | Path) -> "Study":
+def load(path: str | Path) -> "RunnableStudy":
     """Return the study of the file at ``path``, which plans and runs itself.
 
     Raises:
         StudyError: with every problem of the file: key, value found, what is allowed.
     """
-    from pipeline.api import Study  # noqa: PLC0415
+    from pipeline.api import RunnableStudy  # noqa: PLC0415
 
-    return Study.load(path)
+    return RunnableStudy.load(path)
 
 
 def open(path: str | Path, output: str | Path = "results") -> "xr.Dataset":

@@ -2,15 +2,16 @@
 
 import warnings
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pipeline.plan.cost import CostModel
 from pipeline.plan.describe import summary
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.run.progress import Terminal
 from pipeline.study.load import load
-from pipeline.study.sweep import Study as Declared
+from pipeline.study.sweep import Study
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,19 +19,19 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Study:
+class RunnableStudy:
     """A study file that was found to make sense; ``declared`` holds its axes, cases and sections."""
 
-    declared: Declared
+    declared: Study
 
     @staticmethod
-    def load(path: str | Path) -> "Study":
+    def load(path: str | Path) -> "RunnableStudy":
         """Read the study file at ``path``.
 
         Raises:
             StudyError: with every problem of the file.
         """
-        return Study(load(path))
+        return RunnableStudy(load(path))
 
     @property
     def name(self) -> str:
@@ -64,7 +65,8 @@ class Study:
         bare = make_plan(self.declared, without=without)
         if store is None or not Path(store).is_file():
             return bare
-        return make_plan(self.declared, _keys_on_record(Path(store), bare), without)
+        keys, cost = _on_record(Path(store), bare)
+        return replace(make_plan(self.declared, keys, without), cost=cost)
 
     def summary(self, **options: Any) -> dict[str, Any]:
         """Return the plan as plain data with estimates of time and memory: what ``epsmesh plan --json`` prints."""
@@ -125,12 +127,10 @@ def open_dataset(path: str | Path, output: str | Path = "results") -> "xr.Datase
     return read(path, output)
 
 
-def _keys_on_record(path: Path, plan: Plan) -> list[str]:
-    from pipeline.run.store import Store  # noqa: PLC0415
+def _on_record(path: Path, plan: Plan) -> tuple[list[str], CostModel]:
+    """Return which of a plan's keys have a force on record, and what cases cost."""
+    from pipeline.run.reading import open_to_read  # noqa: PLC0415
 
-    opened = Store(path)
-    try:
+    with open_to_read(path) as opened:
         records = opened.get({*plan.keys, *plan.reference_keys})
-    finally:
-        opened.close()
-    return [key for key, record in records.items() if record.is_ok]
+        return [key for key, record in records.items() if record.is_ok], opened.cost_model()

@@ -16,9 +16,9 @@ from pipeline.plan.cost import CostModel
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.plan.shard import Shard
 from pipeline.report.publish import publish
-from pipeline.run.merge import read
 from pipeline.run.outcome import count_states, failures
 from pipeline.run.progress import Silent, Terminal
+from pipeline.run.reading import read_rows
 from pipeline.run.record import Record
 from pipeline.run.store import Store, StoreError
 from pipeline.study.sweep import Study
@@ -86,7 +86,7 @@ def prepare(
                 keys = () if study.solve.timing else declared.keys
                 wanted = {*keys, *declared.reference_keys}
                 found = opened.store.get(wanted)
-                opened.records = {key: record for key, record in found.items() if record.status == "ok"}
+                opened.records = {key: record for key, record in found.items() if record.is_ok}
                 if shard is not None:
                     opened.records = _known_beside(beside, wanted) | opened.records
         except StoreError as error:
@@ -186,7 +186,7 @@ def _interruptible() -> Iterator[list[int]]:
 def _known_beside(path: Path | None, keys: Collection[str]) -> dict[str, Record]:
     """Return the forces on record in another store; without a readable one the work is done again, no more."""
     try:
-        rows = read(path) if path and path.exists() else []
+        rows = read_rows(path) if path and path.exists() else []
         records = (Record.from_json(text) for key, text, _ in rows if key in keys)
         return {record.key: record for record in records if record.is_ok}
     except (StoreError, ValueError, TypeError, KeyError):

@@ -1,61 +1,22 @@
 """The command line as a person uses it: end to end, in a process of its own."""
 
 import json
-import os
 import signal
 import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 from mpi4py import MPI
 
+from tests.commands import ENVIRONMENT, ROOT, command
+from tests.conftest import SMALL
+
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts processes itself")
 
-SMALL = """
-title = "small"
-[body]
-shape = "box"
-size = ["20 mm", "20 mm", "10 mm"]
-[material]
-young = "10 kPa"
-poisson = [0.3, 0.4]
-[probe]
-shape = "disc"
-radius = "2 mm"
-depth = "0.1 mm"
-[mesh]
-epsilon = ["4 mm", "6 mm", "full"]
-fine = "2 mm"
-coarse = "4 mm"
-rim = "0.5 mm"
-outside = ["coarse", "free"]
-"""
-ROOT = Path(__file__).parents[1]
-# Under pytest, mpi4py may have marked this process's environment as a running MPI job.
-ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_"))} | {
-    "OMPI_ALLOW_RUN_AS_ROOT": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-}
 
-
-def epsmesh(*arguments: object, ranks: int = 1) -> subprocess.CompletedProcess[str]:
-    launcher = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
-    command = [*launcher, sys.executable, "-m", "pipeline", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, check=False, timeout=300, cwd=ROOT)
-
-
-@pytest.fixture
-def small(tmp_path):
-    file = tmp_path / "small.toml"
-    file.write_text(SMALL)
-    return file
-
-
-def test_quick_study_end_to_end(tmp_path):
-    done = epsmesh("run", "studies/quick.toml", "--output", tmp_path)
+def test_quick_study_end_to_end(spawn, tmp_path):
+    done = spawn("run", "studies/quick.toml", "--output", tmp_path)
     assert done.returncode == 0, done.stderr
     assert {"quick.nc", "quick.png", "quick.svg", "cases.sqlite"} <= {path.name for path in tmp_path.iterdir()}
     with xr.open_dataset(tmp_path / "quick.nc") as data:
@@ -80,9 +41,9 @@ def test_quick_study_end_to_end(tmp_path):
         } <= set(data.attrs)
 
 
-def test_second_run_reads_back_and_two_ranks_agree(small, tmp_path):
-    first, again = (epsmesh("run", small, "--output", tmp_path / "a") for _ in "ab")
-    parallel = epsmesh("run", small, "--output", tmp_path / "b", ranks=2)
+def test_second_run_reads_back_and_two_ranks_agree(spawn, small, tmp_path):
+    first, again = (spawn("run", small, "--output", tmp_path / "a") for _ in "ab")
+    parallel = spawn("run", small, "--output", tmp_path / "b", ranks=2)
     assert first.returncode == again.returncode == parallel.returncode == 0, parallel.stderr
     assert "A case whose record is stored is read back." in again.stdout
     one, two = (xr.load_dataset(tmp_path / folder / "small.nc") for folder in "ab")
@@ -92,9 +53,9 @@ def test_second_run_reads_back_and_two_ranks_agree(small, tmp_path):
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_bad_study_ends_with_2_and_writes_nothing(small, tmp_path, ranks):
+def test_bad_study_ends_with_2_and_writes_nothing(spawn, small, tmp_path, ranks):
     small.write_text(SMALL.replace('"2 mm"', "2").replace("0.4", "0.9"))
-    done = epsmesh("run", small, "--output", tmp_path / "out", ranks=ranks)
+    done = spawn("run", small, "--output", tmp_path / "out", ranks=ranks)
     assert done.returncode == 2
     assert "probe.radius = 2" in done.stderr
     assert "material.poisson = 0.9" in done.stderr
@@ -103,22 +64,24 @@ def test_bad_study_ends_with_2_and_writes_nothing(small, tmp_path, ranks):
     assert not (tmp_path / "out").exists()
 
 
-def test_failed_case_ends_with_1_and_is_told(small, tmp_path):
+def test_failed_case_ends_with_1_and_is_told(spawn, small, tmp_path):
     small.write_text(SMALL.replace('["coarse", "free"]', '"fixed"').replace('"4 mm", "6 mm"', '"2 mm", "6 mm"'))
-    done = epsmesh("run", small, "--output", tmp_path)
+    done = spawn("run", small, "--output", tmp_path)
     assert done.returncode == 1
     assert "touches the held face" in done.stderr
     data = xr.load_dataset(tmp_path / "small.nc")
     assert (data["status"].sel(epsilon=2e-3) == "failed").all()
     assert (data["status"].sel(epsilon=6e-3) == "ok").all()
-    status = json.loads(epsmesh("status", small, "--output", tmp_path, "--json").stdout)
+    status = json.loads(spawn("status", small, "--output", tmp_path, "--json").stdout)
     assert (status["ok"], status["failed"], status["pending"]) == (4, 2, 0)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_interrupted_run_leaves_what_is_done_and_goes_on(small, tmp_path, number):
-    command = [sys.executable, "-m", "pipeline", "run", str(small), "--output", str(tmp_path / "a")]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT)
+def test_interrupted_run_leaves_what_is_done_and_goes_on(spawn, small, tmp_path, number):
+    process = subprocess.Popen(
+        command("run", small, "--output", tmp_path / "a"),
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT,
+    )  # fmt: skip
     assert process.stderr is not None
     while "[2/" not in process.stderr.readline():
         assert process.poll() is None
@@ -128,17 +91,16 @@ def test_interrupted_run_leaves_what_is_done_and_goes_on(small, tmp_path, number
     assert "goes on from there" in errors
     partial = xr.load_dataset(tmp_path / "a" / "small.nc")
     assert 0 < int((partial["status"] == "ok").sum()) < partial["status"].size
-    assert epsmesh("run", small, "--output", tmp_path / "a").returncode == 0
-    assert epsmesh("run", small, "--output", tmp_path / "b").returncode == 0
+    assert spawn("run", small, "--output", tmp_path / "a").returncode == 0
+    assert spawn("run", small, "--output", tmp_path / "b").returncode == 0
     resumed, whole = (xr.load_dataset(tmp_path / folder / "small.nc") for folder in "ab")
     for name in ("force", "force_vector", "energy", "dofs", "cells", "force_ratio", "status"):
         xr.testing.assert_allclose(resumed[name], whole[name], rtol=1e-9)
 
 
-def test_interrupted_parallel_run_writes_what_is_done(small, tmp_path):
-    command = ["mpirun", "--oversubscribe", "-n", "2", sys.executable, "-m", "pipeline", "run", str(small)]
+def test_interrupted_parallel_run_writes_what_is_done(spawn, small, tmp_path):
     process = subprocess.Popen(
-        [*command, "--output", str(tmp_path)],
+        command("run", small, "--output", tmp_path, ranks=2),
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True, cwd=ROOT, env=ENVIRONMENT,
     )  # fmt: skip
     assert process.stderr is not None
@@ -147,34 +109,33 @@ def test_interrupted_parallel_run_writes_what_is_done(small, tmp_path):
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=60)
     assert process.returncode != 0
-    status = json.loads(epsmesh("status", small, "--output", tmp_path, "--json").stdout)
+    status = json.loads(spawn("status", small, "--output", tmp_path, "--json").stdout)
     assert status["ok"] >= 2
-    again = epsmesh("run", small, "--output", tmp_path, ranks=2)
+    again = spawn("run", small, "--output", tmp_path, ranks=2)
     assert again.returncode == 0, again.stderr
     assert (xr.load_dataset(tmp_path / "small.nc")["status"] == "ok").all()
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_run_killed_at_random_moments_yields_the_same_dataset(small, tmp_path, seed):
+def test_run_killed_at_random_moments_yields_the_same_dataset(spawn, small, tmp_path, seed):
     """SIGKILL, again and again, at any moment: nothing finished is lost, and in the end nothing tells it happened."""
     random = np.random.default_rng(seed)
-    command = [sys.executable, "-m", "pipeline", "run", str(small), "--output", str(tmp_path / "killed")]
-    command += ["--meshes", str(tmp_path / "meshes")]
+    words = command("run", small, "--output", tmp_path / "killed", "--meshes", tmp_path / "meshes")
     done = 0
     for _ in range(4):
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=ROOT)
+        process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=ROOT)
         try:
             process.wait(timeout=random.uniform(1.0, 5.0))
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
-        status = json.loads(epsmesh("status", small, "--output", tmp_path / "killed", "--json").stdout)
+        status = json.loads(spawn("status", small, "--output", tmp_path / "killed", "--json").stdout)
         assert status["failed"] == 0
         assert status["ok"] >= done
         done = status["ok"]
     for folder in ("killed", "whole"):
-        assert epsmesh("run", small, "--output", tmp_path / folder).returncode == 0
-    assert epsmesh("store", "verify", "--store", tmp_path / "killed" / "cases.sqlite").returncode == 0
+        assert spawn("run", small, "--output", tmp_path / folder).returncode == 0
+    assert spawn("store", "verify", "--store", tmp_path / "killed" / "cases.sqlite").returncode == 0
     killed, whole = (xr.load_dataset(tmp_path / folder / "small.nc") for folder in ("killed", "whole"))
     # Times, memory, iterations and round-off say how the work was done; where F came from says that it was stored.
     how = {"speedup", "memory", "iterations", "balance", "origin"}
@@ -189,37 +150,32 @@ def test_run_killed_at_random_moments_yields_the_same_dataset(small, tmp_path, s
             np.testing.assert_allclose(killed[name], whole[name], rtol=close, atol=close * scale, err_msg=name)
 
 
-def test_plan_explain_and_store(small, tmp_path):
-    planned = json.loads(epsmesh("plan", small, "--output", tmp_path, "--json").stdout)
+def test_plan_explain_and_store(spawn, small, tmp_path):
+    planned = json.loads(spawn("plan", small, "--output", tmp_path, "--json").stdout)
     assert planned["cases"] == 12
     assert {"full", "symmetry", "sharing"} <= {struck["name"] for struck in planned["struck"]}
-    assert "Body, support and probe" in epsmesh("plan", small, "--output", tmp_path).stdout
-    without = json.loads(epsmesh("plan", small, "--output", tmp_path, "--without", "all", "--json").stdout)
+    assert "Body, support and probe" in spawn("plan", small, "--output", tmp_path).stdout
+    without = json.loads(spawn("plan", small, "--output", tmp_path, "--without", "all", "--json").stdout)
     assert without["solves"] > planned["solves"]
-    assert epsmesh("plan", small, "--without", "everything").returncode == 2
-    assert epsmesh("run", small, "--output", tmp_path, "-q").returncode == 0
-    assert json.loads(epsmesh("plan", small, "--output", tmp_path, "--json").stdout)["solves"] == 0
-    told = epsmesh("explain", small, "poisson=0.3, epsilon=full", "--output", tmp_path).stdout
+    assert spawn("plan", small, "--without", "everything").returncode == 2
+    assert spawn("run", small, "--output", tmp_path, "-q").returncode == 0
+    assert json.loads(spawn("plan", small, "--output", tmp_path, "--json").stdout)["solves"] == 0
+    told = spawn("explain", small, "poisson=0.3, epsilon=full", "--output", tmp_path).stdout
     assert "epsilon = full" in told
     assert "origin: symmetric" in told
     assert "proportional" in told
-    assert epsmesh("explain", small, "poisson=0.31", "--output", tmp_path).returncode == 2
+    assert spawn("explain", small, "poisson=0.31", "--output", tmp_path).returncode == 2
     store = tmp_path / "cases.sqlite"
-    listed = json.loads(epsmesh("store", "list", "--store", store, "--json").stdout)
+    listed = json.loads(spawn("store", "list", "--store", store, "--json").stdout)
     assert listed["records"] == planned["solves"]
-    assert epsmesh("store", "verify", "--store", store).returncode == 0
-    assert "records removed" in epsmesh("store", "prune", "--days", "0", "--store", store).stdout
-    assert json.loads(epsmesh("store", "list", "--store", store, "--json").stdout)["records"] == 0
+    assert spawn("store", "verify", "--store", store).returncode == 0
+    assert "records removed" in spawn("store", "prune", "--days", "0", "--store", store).stdout
+    assert json.loads(spawn("store", "list", "--store", store, "--json").stdout)["records"] == 0
 
 
-def test_validate_status_and_plot(small, tmp_path):
-    assert "small.toml: fine; 12 cases (2 poisson × 3 epsilon × 2 outside)" in epsmesh("validate", small).stdout
-    assert "12 pending" in epsmesh("status", small, "--output", tmp_path).stdout
-    assert epsmesh("plot", small, "--output", tmp_path).returncode == 2
-    report = json.loads(epsmesh("validate", small, "--json").stdout)
+def test_validate_status_and_plot(spawn, small, tmp_path):
+    assert "small.toml: fine; 12 cases (2 poisson × 3 epsilon × 2 outside)" in spawn("validate", small).stdout
+    assert "12 pending" in spawn("status", small, "--output", tmp_path).stdout
+    assert spawn("plot", small, "--output", tmp_path).returncode == 2
+    report = json.loads(spawn("validate", small, "--json").stdout)
     assert report == [{"file": str(small), "errors": [], "warnings": [], "cases": 12}]
-
-
-def test_every_command_has_help_with_an_example():
-    for command in ("validate", "run", "status", "plot"):
-        assert "Example: epsmesh " + command in epsmesh(command, "--help").stdout

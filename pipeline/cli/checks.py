@@ -102,7 +102,7 @@ def stress(
 
     Example: epsmesh stress poisson layer
     """
-    from benchmarks.stress import line, run, summary, to_json
+    from benchmarks.stress import line, run, summary
     from benchmarks.stress.report import heading
     from pipeline.workflow import world
 
@@ -115,8 +115,10 @@ def stress(
         results = list(_told(run(comm, names, quick=quick), line, speaks and not as_json))
     except ValueError as wrong:
         fail(str(wrong))
-    if speaks:
-        print(to_json(results) if as_json else summary(results))
+    if speaks and as_json:
+        print_json([asdict(result) for result in results])
+    elif speaks:
+        print(summary(results))
     raise typer.Exit(DONE if all(result.is_good for result in results) else SOME_FAILED)
 
 

@@ -4,7 +4,7 @@ import json
 import os
 import signal
 import sys
-from math import isfinite
+from math import inf, isfinite
 from typing import Any, TextIO
 
 _COLOURS = {"red": "31", "yellow": "33"}
@@ -34,16 +34,19 @@ def warning(text: str) -> None:
 
 
 def print_json(value: Any) -> None:
-    """Print ``value`` as JSON, with null for what JSON has no number for."""
-    print(json.dumps(_plain(value), indent=2, ensure_ascii=False), flush=True)
+    """Print ``value`` as JSON: an infinite ε is "full", as in a study file, and null is what JSON has no number for."""
+    print(json.dumps(plain(value), indent=2, ensure_ascii=False, allow_nan=False), flush=True)
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any, key: str = "") -> Any:
+    """Return ``value``, which stands under ``key``, as JSON takes it."""
     if isinstance(value, dict):
-        return {key: _plain(v) for key, v in value.items()}
+        return {name: plain(item, name) for name, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(v) for v in value]
-    return None if isinstance(value, float) and not isfinite(value) else value
+        return [plain(item, key) for item in value]
+    if isinstance(value, float) and not isfinite(value):
+        return "full" if key == "epsilon" and value == inf else None
+    return value
 
 
 class Patient:

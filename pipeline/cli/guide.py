@@ -1,12 +1,11 @@
 """The command that answers from a dataset how large ε must be."""
 
-import json
-from math import isfinite
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
+from pipeline.cli.console import print_json
 from pipeline.cli.words import DEFAULT_OUTPUT, DONE, SOME_FAILED, Json, Output, fail
 
 
@@ -42,16 +41,8 @@ def guide(
         found = make_guide(read(file, output), accuracy, budget)
     except DatasetError as wrong:
         fail(str(wrong) if str(wrong).startswith(str(file)) else f"{file}: {wrong}")
-    print(json.dumps(plain(found.to_dict()), indent=2, ensure_ascii=False) if as_json else found)
+    if as_json:
+        print_json(found.to_dict())
+    else:
+        print(found)
     raise typer.Exit(DONE if found.answer else SOME_FAILED)
-
-
-def plain(value: Any) -> Any:
-    """Return ``value`` as JSON takes it: NaN is null, and an infinite ε is "full"."""
-    if isinstance(value, dict):
-        return {
-            key: "full" if key == "epsilon" and item == float("inf") else plain(item) for key, item in value.items()
-        }
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    return None if isinstance(value, float) and not isfinite(value) else value

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from pipeline.cli.words import fail
+from pipeline.files import write_new
 from pipeline.study.problems import nearest
 from pipeline.study.starter import examples, starter
 
@@ -42,9 +43,7 @@ def new(
         fail(f"NAME = {name!r}: must be letters, digits, - and _: results are called after it")
     text = starter(path.stem) if like is None else _copy_of(like)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
+        write_new(path, text)
     except FileExistsError:
         fail(f"{path}: exists already, and is left alone; give another name")
     except OSError as problem:

@@ -25,7 +25,7 @@ from pipeline.cli.words import (
     warn,
 )
 from pipeline.plan.describe import story, summary
-from pipeline.plan.plan import Plan, declare, make_plan
+from pipeline.plan.plan import Plan, make_plan
 from pipeline.run.remaining import format_seconds
 from pipeline.study.sweep import Case, Study, format_label
 
@@ -106,7 +106,7 @@ def explain(
     (study,) = load_all([file])
     chosen = find_case(study, case)
     made, records = _planned(study, output, store, check_names(without))
-    found = story(made, declare(study), chosen.index)
+    found = story(made, chosen.index)
     record = records.get(found["key"])
     if record:
         found["record"] = {"status": record.status, "origin": record.origin, "force": record.force,

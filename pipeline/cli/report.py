@@ -35,14 +35,14 @@ def plot(
     Example: epsmesh plot studies/figure3.toml --kind accuracy --kind exact
     """
     path, dataset = _read(file, output)
-    from pipeline.report.figures import KINDS, choose, complete, draw, lacks
+    from pipeline.report.figures import KINDS, choose, draw, lacks
 
     for name in kind or ():
         if name not in KINDS:
             fail(f"--kind {name}: no figure is called so; there are {', '.join(KINDS)}")
-        if lack := lacks(complete(dataset), name):
-            fail(f"{path}: --kind {name} {lack}; its figures are {', '.join(choose(complete(dataset)))}")
-    for picture in draw(dataset, path.with_suffix(""), kinds=kind or choose(complete(dataset))):
+        if lack := lacks(dataset, name):
+            fail(f"{path}: --kind {name} {lack}; its figures are {', '.join(choose(dataset))}")
+    for picture in draw(dataset, path.with_suffix(""), kinds=kind or choose(dataset)):
         print(picture)
 
 

@@ -1,16 +1,18 @@
 """The commands that look after the case store and the mesh cache."""
 
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipeline.cli.console import print_json
+from pipeline.cli.console import print_json, warning
 from pipeline.cli.words import DEFAULT_OUTPUT, SOME_FAILED, Json, check_store, fail
 
 if TYPE_CHECKING:
-    from pipeline.run.store import Store
+    from pipeline.run.store import Records
 
 app = typer.Typer(
     no_args_is_help=True, help="Look after the case store: list, prune, verify.\n\nExample: epsmesh store list"
@@ -26,9 +28,8 @@ def list_records(store: StoreFile = DEFAULT_STORE, as_json: Json = False) -> Non
 
     Example: epsmesh store list
     """
-    opened = _open(store)
-    rows = list(opened.records())
-    opened.close()
+    with _read(store) as opened:
+        rows = list(opened.records())
     content: dict[str, Any] = {
         "file": str(store), "records": len(rows), "bytes": store.stat().st_size,
         "status": dict(Counter(r.status for r in rows)), "origin": dict(Counter(r.origin for r in rows)),
@@ -54,9 +55,19 @@ def prune(
 ) -> None:
     """Remove records that are old or failed, and those that cannot be read.
 
+    A file that is damaged as a whole is moved aside, and a new store begun.
+
     Example: epsmesh store prune --days 90 --failed
     """
-    opened = _open(store)
+    from pipeline.run.store import Store, StoreError
+
+    _check(store)
+    try:
+        opened = Store(store)
+    except StoreError as wrong:
+        fail(str(wrong))
+    if opened.notice:
+        warning(opened.notice)
     count = opened.prune(older_than=None if days is None else 86400 * days, failed=failed)
     opened.close()
     print(f"{store}: {count} records removed")
@@ -70,28 +81,32 @@ def verify(store: StoreFile = DEFAULT_STORE) -> None:
 
     Example: epsmesh store verify
     """
-    opened = _open(store)
-    problems = list(opened.problems())
-    opened.close()
+    with _read(store) as opened:
+        problems = list(opened.problems())
     for problem in problems:
         print(problem)
     print(f"{store}: {f'{len(problems)} problems' if problems else 'sound'}")
     raise typer.Exit(SOME_FAILED if problems else 0)
 
 
-def _open(path: Path) -> "Store":
-    from pipeline.run.store import Store, StoreError
+@contextmanager
+def _read(path: Path) -> Iterator["Records"]:
+    """Open a store that is left as it is; exit if there is none, or if it cannot be read."""
+    from pipeline.run.reading import open_to_read
+    from pipeline.run.store import StoreError
 
+    _check(path)
+    try:
+        with open_to_read(path) as opened:
+            yield opened
+    except StoreError as wrong:
+        fail(str(wrong))
+
+
+def _check(path: Path) -> None:
     if not path.exists():
         fail(f"{path}: there is no such store")
     check_store(path)
-    try:
-        opened = Store(path)
-    except StoreError as wrong:
-        fail(str(wrong))
-    if opened.notice:
-        fail(opened.notice)
-    return opened
 
 
 def _versions(provenance: dict[str, str | int]) -> str:

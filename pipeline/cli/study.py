@@ -148,28 +148,31 @@ def run(
     raise typer.Exit(ended)
 
 
-def status(file: File, output: Output = DEFAULT_OUTPUT, store: StoreFile = None, as_json: Json = False) -> None:
-    """Say which cases are done, failed, or still to be run.
+def status(
+    file: File, output: Output = DEFAULT_OUTPUT, store: StoreFile = None, without: Without = None, as_json: Json = False
+) -> None:
+    """Say which cases are done, failed, skipped, or still to be run.
+
+    A run without some of its reductions is asked after with the same --without.
 
     Example: epsmesh status studies/figure3.toml
     """
+    from pipeline.run.outcome import count_states, failures
+    from pipeline.run.stop import skipped
+
     (study,) = load_all([file])
-    plan = make_plan(study)
-    path = store or output / "cases.sqlite"
-    records, _ = stored_records(path, plan)
-    counts = dict.fromkeys(("ok", "failed", "pending"), 0)
-    failed = []
-    for key, case in zip(plan.keys, study.cases(), strict=True):
-        record = records.get(key)
-        counts[record.status if record else "pending"] += 1
-        if record and record.status == "failed":
-            failed.append({"case": str(case), "message": record.message})
+    plan = make_plan(study, without=check_names(without))
+    records, _ = stored_records(store or output / "cases.sqlite", plan)
+    records |= skipped(plan, records)
+    counts, failed = count_states(plan, records), failures(plan, records)
     if as_json:
-        print_json({"file": str(file), **counts, "failures": failed})
+        print_json({"file": str(file), **counts, "failures": [{"case": c, "message": m} for c, m in failed]})
         return
-    print(f"{file}: {counts['ok']} done, {counts['failed']} failed, {counts['pending']} pending{axes_of(study)}")
-    for failure in failed:
-        print(f"  failed: {failure['case']}: {failure['message']}")
+    told = f"{counts['ok']} done, {counts['failed']} failed"
+    told += f", {counts['skipped']} skipped" if counts["skipped"] else ""
+    print(f"{file}: {told}, {counts['pending']} pending{axes_of(study)}")
+    for case, message in failed:
+        print(f"  failed: {case}: {message}")
 
 
 def version(as_json: Json = False) -> None:

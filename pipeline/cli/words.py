@@ -82,16 +82,15 @@ def stored_records(path: Path, plan: Plan) -> tuple[dict[str, "Record"], CostMod
     """Return what the store at ``path`` has of a plan's cases and of their F_exact, and what cases cost."""
     if not path.exists():
         return {}, CostModel()
-    from pipeline.run.store import Store, StoreError
+    from pipeline.run.reading import open_to_read
+    from pipeline.run.store import StoreError
 
     check_store(path)
     try:
-        store = Store(path)
+        with open_to_read(path) as store:
+            return store.get({*plan.keys, *plan.reference_keys}), store.cost_model()
     except StoreError as problem:
         fail(str(problem))
-    records, cost = store.get({*plan.keys, *plan.reference_keys}), store.cost_model()
-    store.close()
-    return records, cost
 
 
 def check_store(path: Path) -> None:

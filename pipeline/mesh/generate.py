@@ -31,6 +31,10 @@ class MeshError(Exception):
     """gmsh could not mesh the scene."""
 
 
+class GeometryError(MeshError):
+    """The scene itself could not be built: no other element sizes mend that."""
+
+
 @dataclass(frozen=True)
 class MeshArrays:
     """A tetrahedral mesh as arrays, whole, on one process.
@@ -53,12 +57,15 @@ def generate(scene: Scene, sizes: Sizes) -> MeshArrays:
     gmsh now and then fails on elements that are large for the body; it is then asked for smaller ones, far away.
 
     Raises:
-        MeshError: with gmsh's own words, if the geometry or the mesh fails.
+        GeometryError: at once, if there is nothing to mesh.
+        MeshError: with gmsh's own words, if the mesh fails.
     """
     start = time.perf_counter()
     for divisor in _RETRIES:
         try:
             return _generate(scene, sizes, start)
+        except GeometryError:
+            raise
         except MeshError:
             sizes = replace(sizes, column=min(sizes.column, scene.body.extent / divisor))
     return _generate(scene, sizes, start)
@@ -66,18 +73,26 @@ def generate(scene: Scene, sizes: Sizes) -> MeshArrays:
 
 def _generate(scene: Scene, sizes: Sizes, start: float) -> MeshArrays:
     with _model():
+        rim_curves = _built(scene)
         try:
-            rim_curves = build(scene)
             if scene.rim_segments and len(rim_curves) == 1:
                 edges = scene.rim_segments // 2 ** len(scene.mirrors)
                 gmsh.model.mesh.setTransfiniteCurve(rim_curves[0], edges + 1)
             set_size_field(sizes, scene.probe, scene.frame, scene.scale)
             gmsh.model.mesh.generate(3)
-        except SceneError as error:
-            raise MeshError(str(error)) from None
         except Exception as error:  # gmsh raises bare Exception
             raise MeshError(f"gmsh: {error or gmsh.logger.getLastError()}") from error
         return _collect(scene.scale, rim_curves, start)
+
+
+def _built(scene: Scene) -> list[int]:
+    """Build the scene in gmsh's current model and return the curves of the probe's rim."""
+    try:
+        return build(scene)
+    except SceneError as error:
+        raise GeometryError(str(error)) from None
+    except Exception as error:  # so does its geometry kernel
+        raise GeometryError(f"gmsh: {error or gmsh.logger.getLastError()}") from error
 
 
 @contextmanager

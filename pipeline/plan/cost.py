@@ -15,7 +15,6 @@ from pipeline.plan import estimate
 from pipeline.plan.steps import MeshStep, Solve
 from pipeline.study.sweep import Case
 
-STAGES = ("mesh", "solve", "bar")
 # What ranks are worth on one solve: n of them are as good as n^0.8.
 _PARALLEL = 0.8
 # Seconds on one core of 2020s hardware: for each tetrahedron; and of the mixed element, as a multiple.

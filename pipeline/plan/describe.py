@@ -8,6 +8,7 @@ from pipeline.plan.cost import speed_up
 from pipeline.plan.plan import Plan
 from pipeline.plan.schedule import schedule
 from pipeline.plan.steps import MeshStep, Solve
+from pipeline.study.sweep import Case
 
 
 def summary(plan: Plan, ranks: int = 1) -> dict[str, Any]:
@@ -44,7 +45,7 @@ def _makespan(costs: Iterable[float], groups: int) -> float:
     return max(busy)
 
 
-def story(plan: Plan, declared: Plan, index: tuple[int, ...]) -> dict[str, Any]:
+def story(plan: Plan, index: tuple[int, ...]) -> dict[str, Any]:
     """Return what is to be known of one case: its steps, with whom it shares them, and what a change would cost."""
     position = next(i for i, case in enumerate(plan.study.cases()) if case.index == index)
     case, key = plan.study.case(index), plan.keys[position]
@@ -61,17 +62,21 @@ def story(plan: Plan, declared: Plan, index: tuple[int, ...]) -> dict[str, Any]:
         "record_shared_with": [str(c) for c in same],
         "mesh_shared_with": [s.label for s in step.solves if s is not solve] if step else [],
         "reference_key": plan.reference_keys[position] if plan.reference_keys else "",
-        "changes": {
-            ", ".join(case.proportional_to): "nothing: F is proportional" if _has(plan, "scaling") else "one solve",
-            "poisson": "one solve, on the same mesh and assembly",
-            "contact": "one assembly and one solve, on the same mesh",
-            "body, probe, epsilon, fine, coarse, rim, growth, outside": "mesh, assembly and solve",
-        },
+        "changes": _changes(plan, case, solve),
     }
 
 
-def _has(plan: Plan, name: str) -> bool:
-    return name not in plan.study.planning.without and not plan.study.solve.timing
+def _changes(plan: Plan, case: Case, solve: Solve | None) -> dict[str, str]:
+    """Return what a change of each input would cost, with the reductions that this plan was made by."""
+    all_of_it = "mesh, assembly and solve"
+    shares = plan.shared and not (solve and solve.axisymmetric)
+    material = "one solve, on the same mesh and assembly" if shares else all_of_it
+    return {
+        ", ".join(case.proportional_to): "nothing: F is proportional" if "scaling" in plan.used else material,
+        "poisson": material,
+        "contact": "one assembly and one solve, on the same mesh" if shares else all_of_it,
+        "body, probe, epsilon, fine, coarse, rim, growth, outside": all_of_it,
+    }
 
 
 def _steps(solve: Solve, step: MeshStep | None) -> list[str]:

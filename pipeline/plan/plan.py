@@ -1,63 +1,22 @@
 """The plan of a study: which steps yield its cases, and what was struck out, by which reduction, and why."""
 
 from collections.abc import Collection
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
-from pipeline.plan.cost import CostModel
 from pipeline.plan.key import case_key, normalised, reference_key
 from pipeline.plan.recipe import meshes_for
-from pipeline.plan.steps import MeshStep, Solve, mesh_steps
+from pipeline.plan.reductions import REDUCTIONS, strike_stored
+from pipeline.plan.shard import Shard, take
+from pipeline.plan.steps import Solve
 from pipeline.plan.symmetry import is_round, model_planes
-from pipeline.study.schema import Mesh
-from pipeline.study.schema import Solve as Solving
+from pipeline.plan.work import Plan, Struck
+from pipeline.study.schema import Mesh, Solving
 from pipeline.study.sweep import Case, Study
 
-if TYPE_CHECKING:
-    from pipeline.plan.shard import Shard
+__all__ = ["EXACT", "Plan", "Struck", "ask_for_exact", "declare", "first_attempts", "make_plan"]
 
 # F_exact is to have errors well below the study's: this relative error, or this share of what a study asks for.
 EXACT, _EXACT_SHARE = 1e-3, 0.3
-
-
-@dataclass(frozen=True)
-class Struck:
-    """Work that a reduction took out or made smaller: how many solves, and why."""
-
-    name: str
-    count: int
-    reason: str
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What a study needs done.
-
-    ``keys`` holds, for each case in order, the key of its record, ``reference_keys`` that of its scene's F_exact.
-    ``stored`` are the keys that were on record; ``shared`` says that solves share meshes and assembly, ``reuse`` that
-    they begin from their neighbours' solutions; ``cost`` estimates what steps take. Of a plan that is one shard's,
-    ``part`` are the keys that are its own.
-    """
-
-    study: Study
-    solves: tuple[Solve, ...]
-    keys: tuple[str, ...]
-    reference_keys: tuple[str, ...] = ()
-    struck: tuple[Struck, ...] = ()
-    stored: frozenset[str] = frozenset()
-    shared: bool = False
-    reuse: bool = False
-    cost: CostModel = field(default_factory=CostModel)
-    part: frozenset[str] | None = None
-
-    @property
-    def meshes(self) -> tuple[MeshStep, ...]:
-        """The solves grouped by mesh and operator, in the study's order, or each by itself."""
-        return mesh_steps(self.solves, shared=self.shared)
-
-    def struck_by(self, name: str, count: int, reason: str) -> "Plan":
-        """Return the plan with a note of what a reduction did, if it did anything."""
-        return replace(self, struck=(*self.struck, Struck(name, count, reason))) if count else self
 
 
 def declare(study: Study) -> Plan:
@@ -71,7 +30,7 @@ def _declared(case: Case) -> Solve:
 
 
 def make_plan(
-    study: Study, stored: Collection[str] = (), without: Collection[str] = (), shard: "Shard | None" = None
+    study: Study, stored: Collection[str] = (), without: Collection[str] = (), shard: Shard | None = None
 ) -> Plan:
     """Return the plan of ``study`` with everything avoidable struck out; ``stored`` are the keys on record.
 
@@ -82,9 +41,6 @@ def make_plan(
     Raises:
         ValueError: if ``without`` holds an unknown name.
     """
-    from pipeline.plan.reduce import REDUCTIONS, strike_stored  # noqa: PLC0415 (they are functions of plans)
-    from pipeline.plan.shard import take  # noqa: PLC0415 (so is this)
-
     left_out = {*without, *study.planning.without}
     if unknown := left_out - {*REDUCTIONS, "stored", "all"}:
         raise ValueError(f"no reduction is called {', '.join(sorted(unknown))}; there are {', '.join(REDUCTIONS)}")
@@ -93,6 +49,7 @@ def make_plan(
         for name, reduction in REDUCTIONS.items():
             if name not in left_out:
                 plan = reduction(plan)
+                plan = replace(plan, used=plan.used | {name})
     plan = ask_for_exact(plan)
     if shard is not None:
         plan = take(plan, shard)

@@ -7,8 +7,8 @@ from heapq import heapify, heapreplace
 from pathlib import Path
 
 from pipeline.plan.cost import CostModel
-from pipeline.plan.plan import Plan
 from pipeline.plan.steps import MeshStep
+from pipeline.plan.work import Plan
 from pipeline.study.sweep import Study
 
 _NAME = re.compile(r"\.(\d+)-of-(\d+)\.sqlite$")

@@ -1,8 +1,8 @@
 """The dataset of a study: every record in its place, with labels, units and provenance."""
 
 import json
-import os
 from collections.abc import Mapping
+from dataclasses import replace
 from math import isinf, nan
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline import __version__
+from pipeline.files import atomic
 from pipeline.plan.key import digest
 from pipeline.plan.plan import Plan
 from pipeline.run.record import Record
@@ -111,13 +112,8 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
 
 def write(dataset: xr.Dataset, path: Path) -> None:
     """Write ``dataset`` to ``path`` as netCDF4: to a new file beside it, which then takes its place."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
+    with atomic(path) as temporary:
         dataset.to_netcdf(temporary, format="NETCDF4", engine="netcdf4")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _add_ratios(dataset: xr.Dataset) -> xr.Dataset:
@@ -145,8 +141,13 @@ def _add_ratios(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _scaled(record: Record | None, case: Case) -> Record | None:
-    """Return the record for the scale of ``case``."""
-    return record.scaled(case.scale) if record else None
+    """Return the record for the scale of ``case``; of a failure, without what is not known.
+
+    How far its bar missed, and what it took, is.
+    """
+    if record is None or record.is_ok:
+        return record.scaled(case.scale) if record else None
+    return replace(record, force=nan, force_vector=(nan, nan, nan), energy=nan, max_strain=nan, balance=nan)
 
 
 def _origin(plan: Plan, key: str, record: Record | None) -> str:

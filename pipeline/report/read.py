@@ -6,6 +6,12 @@ import xarray as xr
 
 from pipeline.report.settings import DatasetError
 
+# What every dataset of a study has, and figures and report are made from.
+_NEEDED = (
+    "force", "force_error", "force_ratio", "force_exact", "force_exact_error", "force_exact_message", "accuracy",
+    "status", "message", "origin", "time_total", "reductions", "study",
+)  # fmt: skip
+
 
 def dataset_path(file: str | Path, output: str | Path = "results") -> Path:
     """Return the dataset meant by ``file``: itself, or ``<study>.nc`` in ``output`` for a study file.
@@ -32,6 +38,6 @@ def read(file: str | Path, output: str | Path = "results") -> xr.Dataset:
         dataset = xr.load_dataset(path)
     except (OSError, ValueError) as error:
         raise DatasetError(f"{path}: cannot be read as netCDF: {str(error).splitlines()[0]}") from None
-    if missing := {"force", "status", "time_total", "force_ratio"} - set(dataset.data_vars):
-        raise DatasetError(f"{path}: not a study's dataset: it has no {', '.join(sorted(missing))}")
+    if missing := [name for name in _NEEDED if name not in {*dataset.data_vars, *dataset.attrs}]:
+        raise DatasetError(f"{path}: not a study's dataset: it has no {', '.join(missing)}")
     return dataset

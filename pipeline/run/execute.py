@@ -81,4 +81,5 @@ class _Desk:
     @property
     def failed(self) -> int:
         """How many cases of the study failed."""
-        return sum(len(s.serves) for k, s in self._solves.items() if self.records[k].status == "failed")
+        states = {key: record.status for key, record in self.records.items()}
+        return sum(len(solve.serves) for key, solve in self._solves.items() if states.get(key, "failed") == "failed")

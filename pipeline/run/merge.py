@@ -3,16 +3,13 @@
 Of two records of one case the one with a force is kept; of two such, or of two failures, the one stored last.
 """
 
-import shutil
-import sqlite3
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
+from pipeline.run.reading import read_rows
 from pipeline.run.record import Record
-from pipeline.run.store import PATIENCE, Row, Store, StoreError
+from pipeline.run.store import Row, Store, StoreError
 
 
 @dataclass(frozen=True)
@@ -39,7 +36,7 @@ def merge(paths: Sequence[Path], store: Store) -> tuple[Source, ...]:
         best = {row[0]: row for row in store.rows()}
         for path in paths:
             try:
-                rows = read(path)
+                rows = read_rows(path)
             except StoreError as error:
                 sources.append(Source(path, problems=(str(error),)))
                 continue
@@ -51,40 +48,6 @@ def merge(paths: Sequence[Path], store: Store) -> tuple[Source, ...]:
             problems = (f"{path}: {lost} of {len(rows)} records cannot be read",) if lost else ()
             sources.append(Source(path, len(rows), len(better), problems))
     return tuple(sources)
-
-
-def read(path: Path) -> list[Row]:
-    """Return the rows of the store at ``path``, whose file is not touched.
-
-    Raises:
-        StoreError: if it is no store, or a damaged one.
-    """
-    try:
-        try:
-            return _rows(f"{path.absolute().as_uri()}?mode=ro")
-        except sqlite3.OperationalError:
-            # A run that was killed while it wrote has left a journal: what was half done is undone in a copy.
-            with TemporaryDirectory() as folder:
-                shutil.copy(path, folder)
-                with suppress(FileNotFoundError):
-                    shutil.copy(path.with_name(f"{path.name}-journal"), folder)
-                return _rows((Path(folder) / path.name).as_uri())
-    except (sqlite3.Error, OSError) as error:
-        raise StoreError(f"{path}: damaged, left out: {error}") from error
-
-
-def _rows(uri: str) -> list[Row]:
-    database = sqlite3.connect(uri, uri=True, timeout=PATIENCE, isolation_level=None)
-    try:
-        (state,) = database.execute("PRAGMA integrity_check").fetchone()
-        if state != "ok":
-            raise sqlite3.DatabaseError(state)
-        # A job may end between making the file and its table.
-        if not database.execute("SELECT 1 FROM sqlite_master WHERE name = 'records'").fetchone():
-            return []
-        return database.execute("SELECT key, record, stored FROM records ORDER BY key").fetchall()
-    finally:
-        database.close()
 
 
 def _worth(row: Row) -> tuple[int, float, str]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.compat import versions
+from pipeline.files import atomic
 from pipeline.mesh.generate import MeshArrays
 from pipeline.plan.key import digest, mesh_key
 from pipeline.stages import stage
@@ -51,20 +52,15 @@ class MeshCache:
     @stage("mesh cache")
     def put(self, path: Path, mesh: MeshArrays) -> None:
         """Keep a mesh. A full disk is no reason to end a run: it is then not kept."""
-        temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp")
         facets = {f"facets_{name}": value for name, value in mesh.facets.items()}
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with temporary.open("wb") as file:
+        with suppress(OSError):
+            with atomic(path) as temporary:
                 np.savez(
-                    file, points=mesh.points, cells=mesh.cells, rim=mesh.rim, seconds=np.float64(mesh.seconds), **facets
-                )
-            _touch(temporary)
-            os.replace(temporary, path)
+                    temporary, points=mesh.points, cells=mesh.cells, rim=mesh.rim, seconds=np.float64(mesh.seconds),
+                    **facets,
+                )  # fmt: skip
+                _touch(temporary)
             self._shrink()
-        except OSError:
-            with suppress(OSError):
-                temporary.unlink()
 
     def _shrink(self) -> None:
         """Remove the least recently used files until the rest is within the limit."""

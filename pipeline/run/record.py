@@ -2,7 +2,7 @@
 
 import json
 from dataclasses import asdict, dataclass, field, replace
-from math import nan
+from math import isfinite, nan
 
 from pipeline.plan.cost import Observation, speed_up
 from pipeline.study.sweep import Scale
@@ -48,7 +48,7 @@ class Record:
     @property
     def is_ok(self) -> bool:
         """Whether there is a force to rely on."""
-        return self.status == "ok"
+        return self.status == "ok" and isfinite(self.force)
 
     @property
     def time_total(self) -> float:

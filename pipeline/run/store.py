@@ -1,5 +1,6 @@
 """The case store: every record on disk, in one SQLite file, the moment it exists."""
 
+import itertools
 import sqlite3
 import time
 from collections.abc import Iterable, Iterator
@@ -11,7 +12,7 @@ from pipeline.plan.cost import CostModel, fit
 from pipeline.run.record import Record
 from pipeline.stages import stage
 
-_SCHEMA = "CREATE TABLE IF NOT EXISTS records (key TEXT PRIMARY KEY, record TEXT NOT NULL, stored REAL NOT NULL)"
+SCHEMA = "CREATE TABLE IF NOT EXISTS records (key TEXT PRIMARY KEY, record TEXT NOT NULL, stored REAL NOT NULL)"
 # Two runs may share a store: each write takes milliseconds, so half a minute means that something hangs.
 PATIENCE = 30.0
 # Records that the cost model is fitted to: the newest.
@@ -24,7 +25,67 @@ class StoreError(Exception):
     """The case store cannot be used."""
 
 
-class Store:
+class Records:
+    """What a case store holds, to be read: see :func:`pipeline.run.reading.open_to_read`."""
+
+    def __init__(self, path: Path, database: sqlite3.Connection):
+        self.path, self._database = path, database
+
+    def rows(self) -> list[Row]:
+        """Return what is on disk as it is, in the order of the keys."""
+        return self._database.execute("SELECT key, record, stored FROM records ORDER BY key").fetchall()
+
+    def get(self, keys: Iterable[str]) -> dict[str, Record]:
+        """Return the records on disk among ``keys``.
+
+        Raises:
+            StoreError: if a record cannot be read, or is another one's.
+        """
+        found = {}
+        for key in keys:
+            try:
+                row = self._database.execute("SELECT record FROM records WHERE key = ?", (key,)).fetchone()
+            except sqlite3.Error as error:
+                raise StoreError(damaged(self.path, error)) from error
+            if row:
+                found[key] = record = _readable(row[0])
+                if record is None or record.key != key:
+                    what = "cannot be read" if record is None else f"is that of {record.key}"
+                    raise StoreError(f"the case store {self.path}: record {key} {what}; {_mend(self.path)} removes it")
+        return {key: record for key, record in found.items() if record is not None}
+
+    def records(self) -> Iterator[Record]:
+        """Yield every record that can be read."""
+        return (record for _, text, _ in self.rows() if (record := _readable(text)) is not None)
+
+    def cost_model(self) -> CostModel:
+        """Return the cost model that fits the latest records: those that can be read."""
+        latest, seen = "SELECT record FROM records ORDER BY stored DESC LIMIT ?", []
+        with suppress(sqlite3.Error):
+            for (text,) in self._database.execute(latest, (_RECENT,)):
+                seen.append(record.observation() if (record := _readable(text)) is not None else None)
+        return fit(observation for observation in seen if observation is not None)
+
+    def problems(self) -> Iterator[str]:
+        """Yield what is wrong with the file or with its records."""
+        (state,) = self._database.execute("PRAGMA integrity_check").fetchone()
+        if state != "ok":
+            yield f"the file: {state}"
+        for key, text, _ in self.rows():
+            record = _readable(text)
+            if record is None:
+                yield f"record {key}: cannot be read"
+            elif record.key != key:
+                yield f"record {key}: is that of {record.key}"
+            elif record.status == "ok" and not (isfinite(record.force) and record.force > 0):
+                yield f"record {key}: is ok, and its force {record.force}"
+
+    def close(self) -> None:
+        """Close the file."""
+        self._database.close()
+
+
+class Store(Records):
     """Records by key. One process of a run opens it; a record is on disk, whole, when ``put`` returns."""
 
     def __init__(self, path: Path):
@@ -33,31 +94,18 @@ class Store:
         Raises:
             StoreError: if the file cannot be made or opened.
         """
-        self.path = path
         self.notice = ""
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._database = self._open()
+            super().__init__(path, _open(path))
         except sqlite3.OperationalError as error:
             raise StoreError(f"the case store {path} cannot be opened: {error}") from error
         except sqlite3.DatabaseError as error:
-            aside = path.with_name(f"{path.name}.damaged-{time.strftime('%Y%m%d-%H%M%S')}")
-            path.rename(aside)
+            aside = _move_aside(path)
             self.notice = f"the case store {path} is damaged ({error}); it was moved to {aside} and a new one begun"
-            self._database = self._open()
+            super().__init__(path, _open(path))
         except OSError as error:
             raise StoreError(f"the case store {path} cannot be made: {error.strerror}") from error
-
-    def _open(self) -> sqlite3.Connection:
-        database = sqlite3.connect(self.path, timeout=PATIENCE, isolation_level=None)
-        try:
-            database.execute("PRAGMA synchronous = FULL")
-            database.execute(_SCHEMA)
-            database.execute("SELECT count(*) FROM records").fetchone()
-        except BaseException:
-            database.close()
-            raise
-        return database
 
     @stage("store")
     def put(self, record: Record) -> None:
@@ -94,75 +142,57 @@ class Store:
         """Write rows of another store, times and all, in place of earlier ones of the same keys."""
         self._database.executemany("INSERT OR REPLACE INTO records VALUES (?, ?, ?)", rows)
 
-    def rows(self) -> list[Row]:
-        """Return what is on disk as it is, in the order of the keys."""
-        return self._database.execute("SELECT key, record, stored FROM records ORDER BY key").fetchall()
-
-    def get(self, keys: Iterable[str]) -> dict[str, Record]:
-        """Return the records on disk among ``keys``.
-
-        Raises:
-            StoreError: if a record cannot be read.
-        """
-        found = {}
-        try:
-            for key in keys:
-                row = self._database.execute("SELECT record FROM records WHERE key = ?", (key,)).fetchone()
-                if row:
-                    found[key] = Record.from_json(row[0])
-        except (sqlite3.Error, ValueError, TypeError, KeyError) as error:
-            raise StoreError(f"the case store {self.path} cannot be read: {error}") from error
-        return found
-
-    def records(self) -> Iterator[Record]:
-        """Yield every record that can be read."""
-        for _, text, _ in self.rows():
-            with suppress(ValueError, TypeError, KeyError):
-                yield Record.from_json(text)
-
-    def cost_model(self) -> CostModel:
-        """Return the cost model that fits the latest records: those that can be read."""
-        latest, seen = "SELECT record FROM records ORDER BY stored DESC LIMIT ?", []
-        with suppress(sqlite3.Error):
-            for (text,) in self._database.execute(latest, (_RECENT,)):
-                with suppress(ValueError, TypeError, KeyError):
-                    seen.append(Record.from_json(text).observation())
-        return fit(observation for observation in seen if observation is not None)
-
-    def problems(self) -> Iterator[str]:
-        """Yield what is wrong with the file or with its records."""
-        (state,) = self._database.execute("PRAGMA integrity_check").fetchone()
-        if state != "ok":
-            yield f"the file: {state}"
-        for key, text, _ in self.rows():
-            try:
-                record = Record.from_json(text)
-            except (ValueError, TypeError, KeyError) as error:
-                yield f"record {key}: cannot be read: {error}"
-                continue
-            if record.key != key:
-                yield f"record {key}: is that of {record.key}"
-            elif record.is_ok and not (isfinite(record.force) and record.force > 0):
-                yield f"record {key}: is ok, and its force {record.force}"
-
     def prune(self, *, older_than: float | None = None, failed: bool = False) -> int:
-        """Remove records stored more than ``older_than`` seconds ago, failed ones, and those that cannot be read.
+        """Remove records stored more than ``older_than`` seconds ago, failed ones, and what is no record of its key.
 
         Returns their number.
         """
         gone = []
         for key, text, stored in self.rows():
-            try:
-                is_ok = Record.from_json(text).is_ok
-            except (ValueError, TypeError, KeyError):
-                gone.append(key)
-                continue
-            if (failed and not is_ok) or (older_than is not None and time.time() - stored > older_than):
+            record = _readable(text)
+            is_lost = record is None or record.key != key
+            is_old = older_than is not None and time.time() - stored > older_than
+            if is_lost or is_old or (failed and record is not None and not record.is_ok):
                 gone.append(key)
         self._database.executemany("DELETE FROM records WHERE key = ?", [(key,) for key in gone])
         self._database.execute("VACUUM")
         return len(gone)
 
-    def close(self) -> None:
-        """Close the file."""
-        self._database.close()
+
+def _open(path: Path) -> sqlite3.Connection:
+    database = sqlite3.connect(path, timeout=PATIENCE, isolation_level=None)
+    try:
+        database.execute("PRAGMA synchronous = FULL")
+        database.execute(SCHEMA)
+        database.execute("SELECT count(*) FROM records").fetchone()
+    except BaseException:
+        database.close()
+        raise
+    return database
+
+
+def _move_aside(path: Path) -> Path:
+    """Give a damaged store a name of its own."""
+    name, number = f"{path.name}.damaged-{time.strftime('%Y%m%d-%H%M%S')}", itertools.count(2)
+    aside = path.with_name(name)
+    while aside.exists():
+        aside = path.with_name(f"{name}-{next(number)}")
+    path.rename(aside)
+    return aside
+
+
+def damaged(path: Path, error: Exception) -> str:
+    """Return what to say of a store that cannot be read."""
+    return f"the case store {path} is damaged ({error}); {_mend(path)} moves it aside and begins a new one"
+
+
+def _mend(path: Path) -> str:
+    return f"`epsmesh store prune --store {path}`"
+
+
+def _readable(text: str) -> Record | None:
+    """Return the record that ``text`` is, None if it is none."""
+    try:
+        return Record.from_json(text)
+    except (ValueError, TypeError, KeyError):
+        return None

@@ -50,6 +50,8 @@ class ReducedBasis:
         self._solutions: list[PETSc.Vec] = []
         self._reactions: list[FloatArray] = []
         self._gram = np.zeros((0, 0))
+        self._products = np.zeros((0, 2))  # w_i · parts_j
+        self._result = self._vector()
         held = self._vector()
         held.array[:] = self._space.held[: self._space.owned]
         self._held = held
@@ -77,9 +79,16 @@ class ReducedBasis:
         ):
             return
         vector.scale(1 / norm)
+        known = len(self._parts)
         self._solutions.append(vector)
         for lame in (_LAMBDA, _MU):
             self._add(vector, lame, sign=1.0)
+        new = self._parts[known:]
+        products = np.zeros((len(self._solutions), len(self._parts)))
+        products[:-1, :known] = self._products
+        products[:-1, known:] = np.reshape([part.dot(w) for w in self._solutions[:-1] for part in new], (-1, len(new)))
+        products[-1] = [part.dot(vector) for part in self._parts]
+        self._products = products
 
     def evaluate(self, t: float) -> Reduced:
         """Return force, energy and bound for t = λ/μ; no work to speak of.
@@ -104,18 +113,11 @@ class ReducedBasis:
         return Reduced(reaction, twice_energy, bound, weights)
 
     def displacement(self, reduced: Reduced) -> PETSc.Vec:
-        """Return the displacement of an evaluation; the basis frees it."""
-        vector = self._vector()
-        self._held.copy(vector)
+        """Return the displacement of an evaluation; the basis owns it, and the next one takes its place."""
+        self._held.copy(self._result)
         for weight, solution in zip(reduced.weights, self._solutions, strict=True):
-            vector.axpy(float(weight), solution)
-        return vector
-
-    @property
-    def _products(self) -> FloatArray:
-        """w_i · parts_j, shape (solutions, parts); each is computed once."""
-        rows = [[part.dot(w) for part in self._parts] for w in self._solutions]
-        return np.array(rows).reshape(len(self._solutions), len(self._parts))
+            self._result.axpy(float(weight), solution)
+        return self._result
 
     def _add(self, vector: PETSc.Vec, lame: tuple[float, float], *, sign: float) -> float:
         """Take sign · A·``vector`` among the parts of the residual; return ``vector``·A·``vector``; collective."""

@@ -12,7 +12,7 @@ from pipeline.shapes.body import Body
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section, in_mm
 from pipeline.study.problems import Problems
-from pipeline.study.schema import Material, Mesh, Solve
+from pipeline.study.schema import Material, Mesh, Solving
 from pipeline.study.sweep import Axis
 
 # Linear elasticity: strain under the probe is of order depth / radius.
@@ -49,7 +49,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     for material, mesh in itertools.product(materials, meshes):
         _check_locking(material, mesh, problems)
     _check_reference(meshes, axes, problems)
-    for solve in cast(Sequence[Solve], sections["solve"]):
+    for solve in cast(Sequence[Solving], sections["solve"]):
         if "repeats" in solve.model_fields_set and not solve.timing:
             problems.error("solve.repeats", solve.repeats, "only a timing study repeats its cases: add `timing = true`")
 

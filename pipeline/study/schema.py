@@ -140,7 +140,7 @@ class Mesh(Section):
         return "mixed" if self.degree > 1 and poisson >= self.MIXED_FROM else "displacement"
 
 
-class Solve(Section):
+class Solving(Section):
     """How cases are solved and timed; ``exact`` asks for F_exact of every scene."""
 
     method: Annotated[
@@ -199,7 +199,7 @@ SECTIONS: dict[str, type[Section] | Mapping[str, type[Section]]] = {
     "material": Material,
     "probe": PROBES,
     "mesh": Mesh,
-    "solve": Solve,
+    "solve": Solving,
     "plan": Planning,
 }
 # Sections that say how, not what: their lists are no sweeps.

@@ -11,7 +11,7 @@ from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
-from pipeline.study.schema import Material, Mesh, Planning, Solve
+from pipeline.study.schema import Material, Mesh, Planning, Solving
 
 # Keys that both body and probe have, or a variable of the dataset: their dimension says whose it is.
 _AMBIGUOUS = ("radius", "shape", "accuracy")
@@ -62,7 +62,7 @@ class Case:
     material: Material
     probe: Probe
     mesh: Mesh
-    solve: Solve
+    solve: Solving
 
     @property
     def labels(self) -> tuple[tuple[str, float | int | str], ...]:
@@ -131,10 +131,10 @@ class Study:
         return tuple(len(axis) for axis in self.axes)
 
     @cached_property
-    def solve(self) -> Solve:
+    def solve(self) -> Solving:
         """The solver section, which is not swept."""
         (solve,) = self.sections["solve"]
-        assert isinstance(solve, Solve)
+        assert isinstance(solve, Solving)
         return solve
 
     @cached_property

@@ -1,18 +1,17 @@
 """Fields as files that ParaView reads: VTU, or XDMF that holds its own numbers."""
 
 import io
-import os
 from pathlib import Path
 from xml.etree import ElementTree as Xml
 
 import meshio
 import numpy as np
 
+from pipeline.files import atomic
 from pipeline.mesh.curve import EDGES
 from pipeline.scene.model import FIXED, PROBE
 from pipeline.view.fields import Fields
 
-FORMATS = ("vtu", "xdmf")
 # Edges of the quadratic tetrahedron in the order of VTK's nodes 4 to 9.
 _VTK_EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
 
@@ -23,17 +22,12 @@ def write_fields(fields: Fields, path: Path) -> Path:
     At points: ``displacement`` (m), ``on_probe`` and ``on_support`` (1 or 0). In cells: ``element_size`` (m),
     ``max_strain`` (largest principal strain by magnitude), ``within_epsilon`` (1 or 0).
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
-    try:
-        mesh = _mesh(fields)
+    mesh = _mesh(fields)
+    with atomic(path) as temporary:
         if path.suffix == ".xdmf":
             _xdmf(mesh).write(temporary)
         else:
             meshio.vtu.write(temporary, mesh)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
     return path
 
 

@@ -5,13 +5,22 @@ import os
 import pty
 import subprocess
 import sys
+from math import inf, nan
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from pipeline.cli import app
-from tests.test_cli import ENVIRONMENT, ROOT, SMALL, epsmesh
+from pipeline.cli.console import print_json
+from tests.commands import ENVIRONMENT, ROOT
+from tests.conftest import SMALL
+
+
+def strict(text: str):
+    """Read JSON as other languages do, who know no NaN."""
+    return json.loads(text, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
+
 
 COMMANDS = sorted(command.name or command.callback.__name__ for command in app.registered_commands)
 
@@ -37,8 +46,8 @@ def on_terminal(*arguments: str, **environment: str) -> str:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_has_help_with_an_example(command):
-    shown = CliRunner().invoke(app, [command, "--help"])
+def test_every_command_has_help_with_an_example(epsmesh, command):
+    shown = epsmesh(command, "--help")
     assert shown.exit_code == 0
     assert "Example: " in shown.stdout
     assert f"epsmesh {command}" in shown.stdout
@@ -51,26 +60,23 @@ def test_help_imports_neither_solvers_nor_what_is_slow():
     assert not slow & set(modules.split())
 
 
-def test_misspelt_commands_options_and_reductions_get_the_nearest(tmp_path):
-    invoke = CliRunner().invoke
-    assert "'plan'" in invoke(app, ["pln"]).stderr
-    assert "--json" in invoke(app, ["plan", "x.toml", "--jsn"]).stderr
-    file = tmp_path / "small.toml"
-    file.write_text(SMALL)
+def test_misspelt_commands_options_and_reductions_get_the_nearest(epsmesh, small, tmp_path):
+    assert "'plan'" in epsmesh("pln").stderr
+    assert "--json" in epsmesh("plan", "x.toml", "--jsn").stderr
     for command in ("validate", "plan", "run", "status"):
-        absent = invoke(app, [command, str(tmp_path / "smal.toml")])
-        assert (absent.exit_code, f"did you mean {file}?" in absent.stderr) == (2, True)
-    refused = invoke(app, ["plan", str(file), "--without", "symetry"])
+        absent = epsmesh(command, tmp_path / "smal.toml")
+        assert (absent.exit_code, f"did you mean {small}?" in absent.stderr) == (2, True)
+    refused = epsmesh("plan", small, "--without", "symetry")
     assert (refused.exit_code, "did you mean `symmetry`?" in refused.stderr) == (2, True)
 
 
-def test_colour_on_terminals_only_and_not_where_it_is_unwanted(tmp_path):
+def test_colour_on_terminals_only_and_not_where_it_is_unwanted(spawn, tmp_path):
     file = tmp_path / "bad.toml"
     file.write_text("[body]\n")
     assert "\033[31m" in on_terminal("validate", str(file))
     assert "\033[" not in on_terminal("validate", str(file), NO_COLOR="1")
     assert "\033[" not in on_terminal("validate", str(file), TERM="dumb")
-    assert "\033[" not in epsmesh("validate", file).stderr
+    assert "\033[" not in spawn("validate", file).stderr
 
 
 @pytest.mark.parametrize("lines", [0, 1])
@@ -86,11 +92,11 @@ def test_a_reader_that_goes_away_is_no_error(lines):
     assert process.wait(timeout=60) == 0
 
 
-def test_json_of_a_run_is_one_object_with_what_failed_and_why(tmp_path):
+def test_json_of_a_run_is_one_object_with_what_failed_and_why(spawn, tmp_path):
     file = tmp_path / "small.toml"
     small = SMALL.replace('["coarse", "free"]', '"fixed"').replace('"4 mm", "6 mm"', '"2 mm", "6 mm"')
     file.write_text(f"{small.replace('[0.3, 0.4]', '0.3')}[solve]\nexact = false\n")
-    done = epsmesh("run", file, "--output", tmp_path, "--meshes", tmp_path / "meshes", "--json")
+    done = spawn("run", file, "--output", tmp_path, "--meshes", tmp_path / "meshes", "--json")
     found = json.loads(done.stdout)
     assert found["status"] == done.returncode == 1
     (study,) = found["studies"]
@@ -98,16 +104,41 @@ def test_json_of_a_run_is_one_object_with_what_failed_and_why(tmp_path):
     assert {"touches the held face" in failure["message"] for failure in study["failures"]} == {True}
     assert all(Path(name).exists() for name in study["files"])
     assert study["seconds"] > 0
-    again = epsmesh("run", file, "--output", tmp_path, "--meshes", tmp_path / "meshes")
+    again = spawn("run", file, "--output", tmp_path, "--meshes", tmp_path / "meshes")
     line = again.stdout.splitlines()[-1]
     assert "2 ok, 1 failed (" in line
     assert "(2 read back); wrote" in line
     assert "touches the held face" in line
 
 
-def test_quiet_and_verbose_plans():
-    shown = [CliRunner().invoke(app, ["plan", str(ROOT / "studies" / "figure3.toml"), *more]).stdout
-             for more in (["-q"], [], ["-v"])]  # fmt: skip
+@pytest.mark.parametrize(
+    ("value", "written"),
+    [
+        ({"epsilon": inf, "seconds": inf}, {"epsilon": "full", "seconds": None}),
+        ({"epsilon": [4e-3, inf]}, {"epsilon": [4e-3, "full"]}),
+        (
+            [{"mesh": {"epsilon": inf, "fine": 1e-3}}, nan, -inf],
+            [{"mesh": {"epsilon": "full", "fine": 1e-3}}, None, None],
+        ),
+    ],
+)
+def test_json_has_no_numbers_that_are_none(value, written, capsys):
+    print_json(value)
+    assert strict(capsys.readouterr().out) == written
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("validate", "FILE"), ("plan", "FILE"), ("status", "FILE"), ("explain", "FILE", "epsilon=full"), ("version",)],
+)
+def test_json_of_commands_is_valid(epsmesh, small, words):
+    done = epsmesh(*(small if word == "FILE" else word for word in words), "--json")
+    assert done.exit_code == 0
+    assert strict(done.stdout)
+
+
+def test_quiet_and_verbose_plans(epsmesh):
+    shown = [epsmesh("plan", ROOT / "studies" / "figure3.toml", *more).stdout for more in (["-q"], [], ["-v"])]
     quiet, usual, verbose = (len(text.splitlines()) for text in shown)
     assert quiet == 1
     assert usual < verbose
@@ -127,12 +158,13 @@ def test_shell_completes_commands_and_names_and_leaves_files_to_the_shell():
     assert completed("run", "stud") == []
 
 
-def test_what_is_no_store_is_left_alone(tmp_path):
+def test_what_is_no_store_is_left_alone(epsmesh, tmp_path, monkeypatch):
+    monkeypatch.chdir(ROOT)
     letter = tmp_path / "letter.txt"
     letter.write_text("Dear reader")
     for command in (["store", "list"], ["store", "prune"], ["status", "studies/quick.toml"]):
         refused = epsmesh(*command, "--store", letter)
-        assert refused.returncode == 2
+        assert refused.exit_code == 2
         assert "is not a case store" in refused.stderr
     assert letter.read_text() == "Dear reader"
-    assert epsmesh("plot", letter.rename(tmp_path / "letter.nc")).returncode == 2
+    assert epsmesh("plot", letter.rename(tmp_path / "letter.nc")).exit_code == 2

@@ -3,15 +3,14 @@
 import json
 
 import pytest
-from typer.testing import CliRunner
 
-from pipeline.cli import app
 from pipeline.report.dataset import write
+from tests.commands import epsmesh
 from tests.report.known import dataset
 
 
 def call(*arguments: object):
-    return CliRunner().invoke(app, ["guide", *map(str, arguments)], catch_exceptions=False)
+    return epsmesh("guide", *arguments)
 
 
 @pytest.fixture
@@ -33,6 +32,7 @@ def test_json_is_for_scripts(results):
     assert content["accuracy"] == pytest.approx(0.05)
     assert content["answer"]["error"] + 0.0249 == pytest.approx(content["accuracy"], abs=1e-4)
     assert len(content["settings"]) == 7
+    assert [setting["epsilon"] for setting in content["settings"]].count("full") == 1
 
 
 def test_what_no_setting_reaches_ends_with_1(results):

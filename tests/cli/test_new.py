@@ -4,14 +4,13 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from pipeline.cli import app
 from pipeline.plan.plan import make_plan
 from pipeline.study.keys import SECTION_TEXTS, keys_of
 from pipeline.study.load import load, parse
 from pipeline.study.schema import SECTIONS
 from pipeline.study.starter import examples, starter
+from tests.commands import epsmesh
 
 STUDIES = Path(__file__).parents[2] / "studies"
 
@@ -24,7 +23,7 @@ def elsewhere(tmp_path, monkeypatch):
 
 
 def new(*arguments):
-    return CliRunner().invoke(app, ["new", *arguments])
+    return epsmesh("new", *arguments)
 
 
 def test_every_key_of_the_schema_has_words_and_an_example():

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import xarray as xr
 from mpi4py import MPI
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
-from pipeline.cli import app
 from tests.cluster.compare import all_done, assert_same
+from tests.commands import epsmesh
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="runs studies by itself")
 
@@ -37,10 +37,6 @@ outside = ["coarse", "free"]
 [solve]
 exact = false
 """
-
-
-def epsmesh(*arguments: object) -> Result:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from pipeline.run.merge import read
+from pipeline.run.reading import read_rows
 from pipeline.run.store import StoreError
 from tests.cluster.compare import all_done, assert_same
 
@@ -103,7 +103,7 @@ def wait(condition: Callable[[], bool]) -> None:
 
 def records(store: Path) -> int:
     try:
-        return len(read(store)) if store.exists() else 0
+        return len(read_rows(store)) if store.exists() else 0
     except (StoreError, sqlite3.Error):
         return 0
 

@@ -5,6 +5,7 @@ import sys
 from dataclasses import replace
 from math import inf, pi
 
+import gmsh
 import numpy as np
 import pytest
 
@@ -147,3 +148,27 @@ def test_reflection_joins_without_a_seam(straight):
     _, counts = np.unique(faces, axis=0, return_counts=True)
     assert counts.max() == 2
     assert (counts == 1).sum() == sum(map(len, whole.facets.values()))
+
+
+def test_a_scene_that_cannot_be_built_is_refused_at_once(monkeypatch):
+    """No other element sizes hold what floats."""
+    begun = []
+    session = gmsh.initialize
+    monkeypatch.setattr("gmsh.initialize", lambda *args, **more: (begun.append(1), session(*args, **more)))
+    with pytest.raises(MeshError, match="the tissue would float"):
+        generate(scene(column=8e-3, body={"fixed": "sides"}), SIZES)
+    assert len(begun) == 1
+
+
+def test_a_mesh_that_fails_is_made_with_other_sizes(monkeypatch):
+    made, attempts = gmsh.model.mesh.generate, []
+
+    def fails_once(dim):
+        attempts.append(dim)
+        if len(attempts) == 1:
+            raise Exception("overlapping facets")
+        made(dim)
+
+    monkeypatch.setattr("gmsh.model.mesh.generate", fails_once)
+    assert len(generate(scene(), SIZES).cells) > 0
+    assert len(attempts) == 2

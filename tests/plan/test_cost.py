@@ -1,16 +1,25 @@
 """The cost model: follows what is on record, and says how wrong it is."""
 
+import json
+
 import numpy as np
 import pytest
 
+import pipeline
 from pipeline.plan.cost import CostModel, Observation, fit
-from pipeline.plan.describe import summary
-from pipeline.plan.plan import make_plan
 from pipeline.run.record import Record
 from pipeline.run.store import Store
-from tests.cases import solve, study
+from tests.commands import epsmesh
 
 KIND = "displacement 2"
+STUDY = """
+title = "next"
+body = {shape = "box", size = ["40 mm", "40 mm", "20 mm"]}
+material = {young = "10 kPa", poisson = [0.25, 0.35]}
+probe = {shape = "disc", radius = "3 mm", depth = "0.2 mm"}
+mesh = {epsilon = "full", fine = "3 mm", coarse = "8 mm", rim = "1 mm"}
+solve = {exact = false}
+"""
 
 
 def law(cells: float, poisson: float) -> float:
@@ -46,14 +55,30 @@ def test_few_observations_move_the_factor_and_hardly_the_exponents():
     assert model.seconds("bar", KIND, 1e4, 0.3) == CostModel().seconds("bar", KIND, 1e4, 0.3)
 
 
-def test_plan_uses_what_the_store_knows(tmp_path):
-    store = Store(tmp_path / "cases.sqlite")
-    for record in solve(material={"poisson": [0.2, 0.3, 0.4]}).values():
-        store.put(record)
+@pytest.mark.parametrize("factor", [20.0, 0.05])
+def test_estimates_follow_what_the_store_knows(factor, tmp_path):
+    """On a machine as much slower, or faster, than the law without records says."""
+    file = tmp_path / "next.toml"
+    file.write_text(STUDY)
+    known = tmp_path / "cases.sqlite"
+    first = pipeline.load(file).summary()["seconds"]
+    store = Store(known)
+    model = CostModel()
+    for number in range(20):
+        cells, ratio = 10 ** (3 + 0.1 * number), 0.02 * number
+        seconds = {stage: factor * model.seconds(stage, KIND, cells, ratio) for stage in ("mesh", "solve", "bar")}
+        store.put(
+            Record(
+                f"k{number}", "ok", force=1.0, kind=KIND, planned_cells=cells, poisson=ratio, time_mesh=seconds["mesh"],
+                time_assemble=0.0, time_setup=0.0, time_solve=seconds["solve"], time_error=seconds["bar"],
+            )
+        )  # fmt: skip
     store.put(Record("other", "failed", "no force"))
-    model = store.cost_model()
-    assert model.count == 3
-    plan = make_plan(study(material={"poisson": [0.25, 0.35]}))
-    told = summary(plan)
-    assert told["fitted_to"] == 0
-    assert told["seconds"] == pytest.approx(sum(step["seconds"] for step in told["steps"]))
+    store.close()
+    told = pipeline.load(file).summary(store=known)
+    assert told["fitted_to"] == 20
+    assert told["factor"] < 2.0
+    assert told["seconds"] == pytest.approx(factor * first, rel=0.2)
+    assert pipeline.load(file).summary()["fitted_to"] == 0
+    shown = epsmesh("plan", file, "--store", known, "--json")
+    assert json.loads(shown.stdout)["seconds"] == pytest.approx(told["seconds"])

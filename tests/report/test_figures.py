@@ -75,12 +75,6 @@ def test_where_nothing_has_a_force_the_figure_says_why(tmp_path):
     assert "it went wrong" in text
 
 
-def test_figures_of_a_dataset_without_the_later_variables(tmp_path):
-    later = ["force_error", "force_exact", "force_exact_error", "accuracy", "force_exact_message"]
-    data = dataset(mesh={"epsilon": EPSILONS}).drop_vars(later)
-    assert len(draw(data, tmp_path / "a", ["svg"], ["epsilon", "convergence", "accuracy", "force"])) == 4
-
-
 @pytest.mark.parametrize("kind", sorted({*KINDS} - {"force"}))
 def test_a_figure_that_does_not_suit_says_what_it_lacks(kind):
     assert lacks(dataset(), kind).startswith("needs ")

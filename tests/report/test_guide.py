@@ -6,7 +6,7 @@ from math import inf, isnan, nan
 import numpy as np
 import pytest
 
-from pipeline.cli.guide import plain
+from pipeline.cli.console import plain
 from pipeline.report.correction import fit, r_without
 from pipeline.report.guide import guide, quantity
 from pipeline.report.settings import DatasetError, arrange

@@ -6,7 +6,8 @@ import sqlite3
 
 import pytest
 
-from pipeline.run.merge import merge, read
+from pipeline.run.merge import merge
+from pipeline.run.reading import read_rows
 from pipeline.run.record import Record
 from pipeline.run.store import Store, StoreError
 
@@ -100,7 +101,7 @@ def test_records_that_cannot_be_read_are_left_out(tmp_path, sources):
 
 def test_store_of_a_run_killed_while_it_wrote(tmp_path, sources):
     """The file holds half of a change, the journal what was there before."""
-    before = read(sources[0])
+    before = read_rows(sources[0])
     database = sqlite3.connect(sources[0], isolation_level=None)
     database.execute("PRAGMA cache_size = 1")
     database.execute("BEGIN")
@@ -110,14 +111,14 @@ def test_store_of_a_run_killed_while_it_wrote(tmp_path, sources):
         shutil.copy(f"{sources[0]}{suffix}", f"{killed}{suffix}")
     database.close()
     assert killed.read_bytes() != sources[0].read_bytes()
-    assert read(killed) == before
+    assert read_rows(killed) == before
 
 
 def test_store_that_is_begun_only(tmp_path):
     (tmp_path / "empty.sqlite").touch()
-    assert read(tmp_path / "empty.sqlite") == []
+    assert read_rows(tmp_path / "empty.sqlite") == []
     with pytest.raises(StoreError):
-        read(tmp_path / "absent.sqlite")
+        read_rows(tmp_path / "absent.sqlite")
 
 
 def test_all_or_nothing(tmp_path, sources, monkeypatch):

@@ -1,9 +1,11 @@
 """The case store: what is put is there, whole, and damage loses nothing silently."""
 
 import sqlite3
+from math import nan
 
 import pytest
 
+from pipeline.run.reading import open_to_read
 from pipeline.run.record import Record
 from pipeline.run.store import Store, StoreError
 
@@ -30,6 +32,43 @@ def test_damaged_store_is_moved_aside(tmp_path):
     assert aside.read_bytes().startswith(b"this is no database")
 
 
+def test_damaged_stores_of_one_moment_do_not_replace_each_other(tmp_path):
+    path = tmp_path / "cases.sqlite"
+    for number in range(3):
+        path.write_bytes(b"no database %d" % number * 100)
+        Store(path).close()
+    found = {name.read_bytes()[:13] for name in tmp_path.glob("*damaged*")}
+    assert found == {b"no database %d" % number for number in range(3)}
+
+
+def test_a_store_that_is_read_is_left_alone(tmp_path):
+    path = tmp_path / "cases.sqlite"
+    store = Store(path)
+    store.put(Record("k", "ok", force=1.5))
+    before = {file.name: (file.stat().st_mtime_ns, file.read_bytes()) for file in tmp_path.iterdir()}
+    with open_to_read(path) as opened:
+        assert opened.get(["k", "unknown"])["k"].force == 1.5
+        store.put(Record("later", "ok", force=2.5))  # a run goes on meanwhile
+        assert set(opened.get(["later"])) == {"later"}
+    store.prune(older_than=0.0)
+    store.close()
+    assert set(before) == {file.name for file in tmp_path.iterdir()}
+    path.write_bytes(b"this is no database" * 100)
+    with pytest.raises(StoreError, match=r"is damaged \(.*\); `epsmesh store prune --store .*` moves it aside"):
+        open_to_read(path).__enter__()
+    with pytest.raises(StoreError, match="cannot be read"):
+        open_to_read(tmp_path / "absent.sqlite").__enter__()
+    assert {file.name for file in tmp_path.iterdir()} == {"cases.sqlite"}
+
+
+def test_a_stored_force_that_is_no_number_is_not_relied_on(tmp_path):
+    store = Store(tmp_path / "cases.sqlite")
+    store.put(Record("k", "ok", force=nan))
+    assert not store.get(["k"])["k"].is_ok
+    assert len(list(store.problems())) == 1
+    assert store.prune(failed=True) == 1
+
+
 def test_locked_store_is_not_taken_for_damaged(tmp_path, monkeypatch):
     path = tmp_path / "cases.sqlite"
     Store(path).close()
@@ -53,6 +92,10 @@ def test_prune_and_problems(tmp_path):
     assert len(problems.splitlines()) == 3
     assert all(word in problems for word in ("nonsense", "torn", "moved"))
     assert {record.key for record in store.records()} == {"good", "bad", "nonsense"}
-    assert store.prune(failed=True) == 2
+    with pytest.raises(StoreError, match=r"record torn cannot be read; `epsmesh store prune --store .*` removes it"):
+        store.get(["good", "torn"])
+    with pytest.raises(StoreError, match="record moved is that of good"):
+        store.get(["moved"])
+    assert store.prune(failed=True) == 3
     assert {record.key for record in store.records()} == {"good", "nonsense"}
-    assert store.prune(older_than=0.0) == 3
+    assert store.prune(older_than=0.0) == 2

@@ -1,9 +1,11 @@
 """Conjugate gradients with multigrid: exact enough for F, balanced near locking, indifferent to the mesh's size."""
 
+import numpy as np
 import pytest
+from petsc4py import PETSc
 
 from pipeline.solve.elasticity import ElasticBody
-from pipeline.solve.linear import SolveError
+from pipeline.solve.linear import Level, LinearSolver, SolveError
 from pipeline.solve.solution import BALANCE_LIMIT
 from pipeline.solve.space import Contact
 from pipeline.solve.spaces import Spaces
@@ -32,6 +34,20 @@ def test_force_of_a_probe_that_slices_is_as_exact():
 def test_forces_that_do_not_balance_are_a_failure():
     with ElasticBody(Spaces(make_mesh()), 2, contact()) as body, pytest.raises(SolveError, match="do not balance"):
         body.solve(lame(0.3), method="iterative", tolerance=1e-3)
+
+
+def test_what_does_not_converge_is_a_failure():
+    """An operator that is not positive definite: no energy is smallest, and conjugate gradients give up."""
+    matrix = PETSc.Mat().createAIJ(2, nnz=2, comm=PETSc.COMM_SELF)
+    matrix.setValues([0, 1], [0, 1], [1.0, 3.0, 3.0, 1.0])
+    matrix.assemble()
+    solver = LinearSolver([Level(None, matrix, np.empty(0, np.int32))], direct=False, tolerance=1e-6)
+    rhs, unknown = matrix.createVecs()
+    rhs.setValues([0, 1], [1.0, -1.0])
+    rhs.assemble()
+    with pytest.raises(SolveError, match="did not converge: diverged_"):
+        solver.solve(rhs, unknown)
+    solver.close()
 
 
 @pytest.mark.parametrize("degree", [1, 2])

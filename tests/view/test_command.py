@@ -4,9 +4,8 @@ import importlib.util
 
 import pytest
 from mpi4py import MPI
-from typer.testing import CliRunner
 
-from pipeline.cli import app
+from tests.commands import epsmesh
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="one process")
 
@@ -42,7 +41,7 @@ def view(tmp_path):
     file = tmp_path / "small.toml"
     file.write_text(STUDY)
     folders = ["--output", str(tmp_path / "out"), "--meshes", str(tmp_path / "meshes")]
-    return lambda *arguments: CliRunner().invoke(app, ["view", str(file), *arguments, *folders])
+    return lambda *arguments: epsmesh("view", file, *arguments, *folders)
 
 
 @pytest.mark.parametrize("kind", ["vtu", "xdmf"])

@@ -9,6 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from tests.cases import study
+from tests.commands import epsmesh
 
 pytest.importorskip("pyvista", reason="an optional extra: make setup EXTRAS=view")
 if not os.environ.get("DISPLAY"):
@@ -70,13 +71,9 @@ def test_epsilon_is_drawn_where_there_is_one(tmp_path):
 
 
 def test_command_writes_both_pictures_and_says_the_factor(tmp_path):
-    from typer.testing import CliRunner
-
-    from pipeline.cli import app
-
     file = Path(__file__).parents[2] / "studies/quick.toml"
     folders = ["--output", str(tmp_path / "out"), "--meshes", str(tmp_path / "meshes")]
-    done = CliRunner().invoke(app, ["view", str(file), "3", *folders])
+    done = epsmesh("view", file, "3", *folders)
     assert done.exit_code == 0, done.output
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"quick_3_mesh.png", "quick_3_deformed.png"}
     assert "quick_3_deformed.png (displacement 10 × as large)" in done.output

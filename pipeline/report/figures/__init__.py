@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import matplotlib as mpl
-import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
@@ -22,8 +21,6 @@ FIGURES: dict[str, Callable[[xr.Dataset, str, str], Figure]] = {
     "epsilon": epsilon, "exact": exact, "convergence": convergence, "accuracy": accuracy, "force": force,
     "nothing": nothing, "ratio": ratio, "speedup": speedup,
 }  # fmt: skip
-# Variables that datasets of earlier versions lack.
-_LATER = ("force_error", "force_exact", "force_exact_error", "accuracy")
 
 
 def draw(
@@ -33,7 +30,7 @@ def draw(
 
     The main figure goes to ``<stem>.png`` and ``.svg``, those of other ``kinds`` to ``<stem>_<kind>.png`` and ``.svg``.
     """
-    main = choose(complete(dataset))[0]
+    main = choose(dataset)[0]
     paths = []
     for kind in [main] if kinds is None else kinds:
         name = stem.name if kind == main else f"{stem.name}_{kind}"
@@ -48,12 +45,7 @@ def figure(dataset: xr.Dataset, kind: str, *, titled: bool = True) -> Figure:
     # A title is no formula, whatever stands in it.
     title = str(dataset.attrs.get("title", "")).replace("$", r"\$") if titled else ""
     with mpl.rc_context(STYLE):
-        return FIGURES[kind](complete(dataset), title, _missing(dataset))
-
-
-def complete(dataset: xr.Dataset) -> xr.Dataset:
-    """Return ``dataset`` with the variables that an earlier version did not write, empty."""
-    return dataset.assign({name: dataset["force"] * np.nan for name in _LATER if name not in dataset})
+        return FIGURES[kind](dataset, title, _missing(dataset))
 
 
 def _missing(dataset: xr.Dataset) -> str:

@@ -1,12 +1,13 @@
 """What all figures share: colours, sizes, files."""
 
-import os
 import textwrap
 from pathlib import Path
 from typing import Any
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+
+from pipeline.files import atomic
 
 WIDTH, PANEL_HEIGHT = 7.1, 1.75  # inches: the width of a page's text
 # From dark to light, told apart by the colour-blind and in grey; markers tell them apart as well.
@@ -59,14 +60,9 @@ def finish(figure: Figure, title: str, note: str = "", warning: str = "", *, leg
 
 def save(figure: Figure, path: Path) -> Path:
     """Write ``figure`` to ``path``, in place of an earlier one only once it is whole."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
-    try:
+    with atomic(path) as temporary:
         # Without a date, the same dataset gives the same file.
         figure.savefig(temporary, dpi=200, metadata={"Date": None} if path.suffix == ".svg" else None)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
     return path
 
 

@@ -1,6 +1,5 @@
 """The report of a study: one HTML page that holds all it needs, made from the dataset alone."""
 
-import os
 from base64 import b64encode
 from hashlib import sha256
 from pathlib import Path
@@ -10,7 +9,8 @@ from urllib.parse import quote
 import xarray as xr
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from pipeline.report.figures import FIGURES, choose, complete, figure
+from pipeline.files import atomic
+from pipeline.report.figures import FIGURES, choose, figure
 from pipeline.report.page.cases import FIRST_ROWS, case_table
 from pipeline.report.page.facts import facts, failures, provenance, reproduce, without_exact
 from pipeline.report.page.guideline import guide_section
@@ -23,19 +23,13 @@ _TEMPLATES = Path(__file__).parent / "templates"
 def write_page(dataset: xr.Dataset, path: Path) -> Path:
     """Write the report of ``dataset`` to ``path``, in place of an earlier one only once it is whole."""
     text = render(dataset, path.stem)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
+    with atomic(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
     return path
 
 
 def render(dataset: xr.Dataset, name: str) -> str:
     """Return the report of ``dataset`` as HTML; ``name`` is the study's, for files and commands."""
-    dataset = complete(dataset)
     script = (_TEMPLATES / "page.js").read_text(encoding="utf-8")
     study = str(dataset.attrs.get("study", ""))
     table = case_table(dataset)

@@ -40,7 +40,7 @@ def failures(dataset: xr.Dataset) -> list[dict[str, Any]]:
 
 def without_exact(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return why scenes have no F_exact, with some of their cases."""
-    return _by_message(dataset, "", "force_exact_message") if "force_exact_message" in dataset else []
+    return _by_message(dataset, "", "force_exact_message")
 
 
 def by_status(dataset: xr.Dataset, status: str) -> list[dict[str, Any]]:

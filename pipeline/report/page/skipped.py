@@ -1,16 +1,12 @@
 """What was not done, and why: the plan's reductions, where forces came from, cases that were not run."""
 
 import json
-import tomllib
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from pipeline.plan.plan import make_plan
 from pipeline.report.page.facts import by_status
-from pipeline.study.load import parse
-from pipeline.study.problems import StudyError
 
 _ORIGINS = {
     "solved": "solved for themselves, on the whole body",
@@ -23,19 +19,8 @@ _ORIGINS = {
 
 
 def struck(dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return what the run's plan struck out: name, how many solves, reason.
-
-    Datasets of earlier versions do not say; for them the study is planned again, as if nothing were stored.
-    """
-    try:
-        return list(json.loads(dataset.attrs["reductions"]))
-    except (KeyError, ValueError):
-        pass
-    try:
-        study = parse(tomllib.loads(str(dataset.attrs.get("study", ""))))
-    except (StudyError, tomllib.TOMLDecodeError):
-        return []
-    return [vars(found) for found in make_plan(study).struck]
+    """Return what the run's plan struck out: name, how many solves, reason."""
+    return list(json.loads(dataset.attrs["reductions"]))
 
 
 def origins(dataset: xr.Dataset) -> list[tuple[int, str, str]]:

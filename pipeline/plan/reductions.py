@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from pipeline.plan.key import case_key, digest
-from pipeline.plan.plan import Plan
 from pipeline.plan.steps import OperatorStep, Solve, mesh_steps
 from pipeline.plan.symmetry import is_round, model_planes
+from pipeline.plan.work import Plan
 
 # Fewer Poisson's ratios than this are solved one by one: a basis needs about five solutions itself.
 _FEWEST_RATIOS = 8

@@ -5,8 +5,8 @@ import pytest
 from mpi4py import MPI
 
 from pipeline.plan.describe import story, summary
-from pipeline.plan.plan import declare, make_plan
-from pipeline.plan.reduce import REDUCTIONS
+from pipeline.plan.plan import make_plan
+from pipeline.plan.reductions import REDUCTIONS
 from pipeline.report.dataset import build
 from pipeline.run.execute import compute
 from pipeline.study.load import parse
@@ -126,10 +126,30 @@ def test_summary_and_story():
     assert (many["meshes"], many["solves"]) == (8, 8)
     assert 0 < few["seconds"] < many["seconds"]
     assert few["memory"] <= many["memory"]
-    told = story(made, declare(made.study), (0, 1, 0))
+    told = story(made, (0, 1, 0))
     assert told["record_shared_with"] == ["poisson = 0.3, epsilon = full, outside = free"]
     assert any("poisson = 0.4" in label for label in told["mesh_shared_with"])
     assert "proportional" in told["changes"]["young, depth"]
+
+
+@pytest.mark.parametrize(
+    ("without", "young", "poisson"),
+    [
+        ((), "nothing: F is proportional", "same mesh"),
+        (("scaling",), "one solve, on the same mesh", "same mesh"),
+        (("sharing",), "nothing: F is proportional", "mesh, assembly and solve"),
+        (("all",), "mesh, assembly and solve", "mesh, assembly and solve"),
+    ],
+)
+def test_story_tells_what_a_change_costs_with_the_reductions_that_are_used(without, young, poisson):
+    changes = {"material": {"poisson": [0.3, 0.4]}}
+    told = story(make_plan(study(**changes), without=without), (0,))["changes"]
+    assert young in told["young, depth"]
+    assert poisson in told["poisson"]
+    in_file = parse(raw(**changes, plan={"without": list(without)}))
+    assert story(make_plan(in_file), (0,))["changes"] == told
+    timed = story(make_plan(study(**changes, solve={"timing": True})), (0,))["changes"]
+    assert timed["young, depth"] == "mesh, assembly and solve"
 
 
 def test_plan_of_a_hundred_thousand_cases_is_made_of_few_steps():

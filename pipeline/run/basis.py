@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import inf
+from math import inf, isnan, nan
 
 from pipeline.plan.steps import Solve
 from pipeline.run.record import Record
@@ -43,12 +43,14 @@ def reduced_records(
 
 
 def _source(solve: Solve, solved: dict[float, Record]) -> Record:
-    """Return the solved record next above in ν, or below, with the larger error bar of both."""
+    """Return the solved record next above in ν, or below, with the larger error bar of both, unknown if one is."""
     t = _ratio(solve)
     above = [solved[min(other for other in solved if other >= t)]] if max(solved) >= t else []
     below = [solved[max(other for other in solved if other <= t)]] if min(solved) <= t else []
     neighbours = above + below
-    return replace(neighbours[0], force_error=max(record.force_error for record in neighbours))
+    bars = [record.force_error for record in neighbours]
+    message = next((record.message for record in neighbours if record.message), "")
+    return replace(neighbours[0], force_error=nan if any(map(isnan, bars)) else max(bars), message=message)
 
 
 def _ratio(solve: Solve) -> float:
@@ -60,8 +62,9 @@ def _record(solve: Solve, reduced: Reduced, source: Record, body: ElasticBody, b
     """Return the record of an evaluation, which is for μ = 1."""
     scale, (_, mu) = solve.case.scale, solve.case.material.lame
     x, y, z = (mu * float(component) for component in reduced.reaction)
+    force = -sum(f * a for f, a in zip((x, y, z), solve.case.frame.axis, strict=True))
     return replace(
-        source, key=solve.key, origin="reduced", young=scale.stress, depth=scale.length, force=z,
+        source, key=solve.key, origin="reduced", young=scale.stress, depth=scale.length, force=force,
         force_vector=(x, y, z), force_error=source.force_error + reduced.bound, energy=mu * reduced.twice_energy / 2,
         max_strain=body.largest_strain(basis.displacement(reduced)), balance=reduced.bound, iterations=0,
     )  # fmt: skip

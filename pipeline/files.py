@@ -1,0 +1,56 @@
+"""Files that appear whole or not at all, whatever ends the program, or the machine, meanwhile."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+@contextmanager
+def atomic(path: Path) -> Iterator[Path]:
+    """Yield a file beside ``path`` to be written: once it is on disk, it takes the place of an earlier one.
+
+    It ends as ``path`` does, for those who tell formats by endings. After an exception, ``path`` is as it was.
+
+    Raises:
+        OSError: if the folder cannot be made, or the file not be written.
+    """
+    with _beside(path) as temporary:
+        yield temporary
+        _to_disk(temporary)
+        os.replace(temporary, path)
+
+
+def write_new(path: Path, text: str) -> None:
+    """Write a file that was not there before.
+
+    Raises:
+        FileExistsError: if it was; it is left alone.
+        OSError: if it cannot be written.
+    """
+    with _beside(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+        _to_disk(temporary)
+        try:
+            os.link(temporary, path)
+        except FileExistsError:
+            raise
+        except OSError as error:  # a file system without links
+            if path.exists():
+                raise FileExistsError(path) from error
+            os.replace(temporary, path)
+
+
+@contextmanager
+def _beside(path: Path) -> Iterator[Path]:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{os.getpid()}-{path.name}")
+    try:
+        yield temporary
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _to_disk(path: Path) -> None:
+    with path.open("rb") as file:
+        os.fsync(file.fileno())

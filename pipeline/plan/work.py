@@ -1,0 +1,49 @@
+"""The work that a study needs, as a value that reductions make smaller, each with its reason."""
+
+from dataclasses import dataclass, field, replace
+
+from pipeline.plan.cost import CostModel
+from pipeline.plan.steps import MeshStep, Solve, mesh_steps
+from pipeline.study.sweep import Study
+
+
+@dataclass(frozen=True)
+class Struck:
+    """Work that a reduction took out or made smaller: how many solves, and why."""
+
+    name: str
+    count: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a study needs done.
+
+    ``keys`` holds, for each case in order, the key of its record, ``reference_keys`` that of its scene's F_exact.
+    ``used`` are the reductions that had their turn, whether they found work to strike out or not. ``stored`` are the
+    keys that were on record; ``shared`` says that solves share meshes and assembly, ``reuse`` that
+    they begin from their neighbours' solutions; ``cost`` estimates what steps take. Of a plan that is one shard's,
+    ``part`` are the keys that are its own.
+    """
+
+    study: Study
+    solves: tuple[Solve, ...]
+    keys: tuple[str, ...]
+    reference_keys: tuple[str, ...] = ()
+    struck: tuple[Struck, ...] = ()
+    used: frozenset[str] = frozenset()
+    stored: frozenset[str] = frozenset()
+    shared: bool = False
+    reuse: bool = False
+    cost: CostModel = field(default_factory=CostModel)
+    part: frozenset[str] | None = None
+
+    @property
+    def meshes(self) -> tuple[MeshStep, ...]:
+        """The solves grouped by mesh and operator, in the study's order, or each by itself."""
+        return mesh_steps(self.solves, shared=self.shared)
+
+    def struck_by(self, name: str, count: int, reason: str) -> "Plan":
+        """Return the plan with a note of what a reduction did, if it did anything."""
+        return replace(self, struck=(*self.struck, Struck(name, count, reason))) if count else self

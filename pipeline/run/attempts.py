@@ -1,0 +1,75 @@
+"""What becomes of a computed record: kept, failed, or the next mesh tried, where an accuracy is asked for."""
+
+from dataclasses import replace
+from math import isfinite
+
+from pipeline.plan.steps import Solve
+from pipeline.run.measure import add_times
+from pipeline.run.record import Record
+
+# An error bar above this says that the force is not known.
+_WORST_BAR = 0.5
+
+
+class Attempts:
+    """The records of solves, judged; remembers those with a goal that are on their way to it."""
+
+    def __init__(self) -> None:
+        self._earlier: dict[str, list[Record]] = {}
+        self._again: list[Solve] = []
+
+    def judge(self, solve: Solve, record: Record) -> Record | None:
+        """Return the record to keep of a solve, or None if its next mesh is to be tried: see :meth:`take_again`."""
+        record = _checked(solve, record)
+        if solve.goal is None:
+            return record
+        if record.is_ok and record.force_error > solve.goal and solve.later:
+            self._earlier.setdefault(solve.key, []).append(record)
+            self._again.append(solve.again())
+            return None
+        return _concluded(solve, record, self._earlier.pop(solve.key, []))
+
+    def take_again(self) -> tuple[Solve, ...]:
+        """Return the solves whose next mesh is to be tried, each once."""
+        again, self._again = tuple(self._again), []
+        return again
+
+
+def failed(record: Record, message: str) -> Record:
+    """Return ``record`` as that of a failure."""
+    return replace(record, status="failed", message=message)
+
+
+def _checked(solve: Solve, record: Record) -> Record:
+    """Return ``record``, as a failure if its force is not known.
+
+    A force whose bar had no memory is one to rely on, and says so; where an accuracy is asked for, only the bar proves
+    it.
+    """
+    if record.status != "ok":
+        return record
+    bar = record.force_error
+    if not isfinite(record.force):
+        return failed(record, f"the force came out as {record.force}")
+    if not isfinite(bar) and (solve.goal is not None or not record.message):
+        return failed(record, f"the error bar came out as {bar}")
+    if solve.goal is None and bar > _WORST_BAR:
+        return failed(record, f"error bar {100 * bar:.0f} %: the mesh is too coarse for this scene; use a smaller rim")
+    return failed(record, f"the error bar came out as {bar:.2g}") if bar < 0 else record
+
+
+def _concluded(solve: Solve, last: Record, earlier: list[Record]) -> Record:
+    """Return the record of a goal after its ``last`` attempt: F_exact has the best there is, with its own bar."""
+    assert solve.goal is not None
+    known = [record for record in (*earlier, last) if record.is_ok]
+    if not known:
+        return last
+    best = min(known, key=lambda record: record.force_error)
+    # What several meshes took together says nothing of what one takes.
+    record = replace(add_times(best, [r for r in known if r is not best]), kind="")
+    if best.force_error <= solve.goal:
+        return record
+    if solve.is_reference and best.force_error <= _WORST_BAR:
+        return record
+    why = last.message or "this is the finest mesh tried"
+    return failed(record, f"error bar {best.force_error:.2g}, accuracy {solve.goal:g} missed: {why}")

@@ -1,0 +1,82 @@
+"""Case stores that are read and left as they are: no file is made, moved or changed."""
+
+import shutil
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from pipeline.run.store import PATIENCE, SCHEMA, Records, Row, StoreError, damaged
+
+
+@contextmanager
+def open_to_read(path: Path) -> Iterator[Records]:
+    """Open the store at ``path``.
+
+    Raises:
+        StoreError: if there is none, or a damaged one: what mends it is named.
+    """
+    try:
+        with _connection(path) as database:
+            yield Records(path, database)
+    except sqlite3.OperationalError as error:
+        raise StoreError(f"the case store {path} cannot be read: {error}") from error
+    except sqlite3.DatabaseError as error:
+        raise StoreError(damaged(path, error)) from error
+    except OSError as error:
+        raise StoreError(f"the case store {path} cannot be read: {error.strerror}") from error
+
+
+def read_rows(path: Path) -> list[Row]:
+    """Return the rows of the store at ``path``, all of whose file is sound.
+
+    Raises:
+        StoreError: if it is no store, or a damaged one.
+    """
+    try:
+        with _connection(path) as database:
+            (state,) = database.execute("PRAGMA integrity_check").fetchone()
+            if state != "ok":
+                raise sqlite3.DatabaseError(state)
+            return Records(path, database).rows()
+    except (sqlite3.Error, OSError) as error:
+        raise StoreError(f"{path}: damaged, left out: {error}") from error
+
+
+@contextmanager
+def _connection(path: Path) -> Iterator[sqlite3.Connection]:
+    """Connect to the store at ``path``, to a copy of it, or, where it has no records, to nothing."""
+    with TemporaryDirectory() as folder:
+        try:
+            database = _connect(path)
+        except sqlite3.OperationalError:
+            # A run that was killed while it wrote has left a journal: what was half done is undone in a copy.
+            if not _journal(path).exists():
+                raise
+            shutil.copy(path, folder)
+            with suppress(FileNotFoundError):
+                shutil.copy(_journal(path), folder)
+            database = sqlite3.connect(Path(folder) / path.name, isolation_level=None)
+        with closing(database):
+            # A job may end between making the file and its table.
+            if database.execute("SELECT 1 FROM sqlite_master WHERE name = 'records'").fetchone():
+                yield database
+                return
+        with closing(sqlite3.connect(":memory:")) as nothing:
+            nothing.execute(SCHEMA)
+            yield nothing
+
+
+def _connect(path: Path) -> sqlite3.Connection:
+    database = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=PATIENCE, isolation_level=None)
+    try:
+        database.execute("SELECT 1 FROM sqlite_master").fetchone()
+    except BaseException:
+        database.close()
+        raise
+    return database
+
+
+def _journal(path: Path) -> Path:
+    return path.with_name(f"{path.name}-journal")

@@ -1,0 +1,112 @@
+"""Commands that only look: they answer from what is on record, and leave every file as it is."""
+
+import json
+import sqlite3
+from dataclasses import replace
+
+import pytest
+
+from pipeline.plan.plan import make_plan
+from pipeline.run.record import Record
+from pipeline.run.store import Store
+from pipeline.study.load import load
+
+LOOKING = ("plan", "status", "explain")
+
+
+def contents(folder):
+    return {path: path.read_bytes() if path.is_file() else None for path in folder.rglob("*")}
+
+
+def fill(path, plan, **states):
+    """Put records of a plan's solves into a store: F_exact, and each case by the state of its ε in mm."""
+    store = Store(path)
+    for solve in plan.solves:
+        case = solve.case
+        record = Record(solve.key, "ok", force=1.0, force_error=0.01, young=case.material.young, depth=case.probe.depth)
+        state = "ok" if solve.is_reference else states.get(f"at_{1e3 * case.mesh.epsilon:.0f}", "pending")
+        if state == "failed":
+            record = Record(solve.key, "failed", "it went wrong")
+        if state != "pending":
+            store.put(record)
+    store.close()
+
+
+@pytest.mark.parametrize("words", [*((name, "FILE") for name in LOOKING), ("store", "list"), ("store", "verify")])
+def test_a_damaged_store_is_named_and_left_where_it_is(epsmesh, small, tmp_path, words):
+    store = tmp_path / "kept" / "cases.sqlite"
+    store.parent.mkdir()
+    store.write_bytes(b"this was a store, and may be one again" * 100)
+    before = contents(tmp_path)
+    done = epsmesh(*(small if word == "FILE" else word for word in words), "--store", store)
+    assert done.exit_code == 2
+    assert f"the case store {store} is damaged" in done.stderr
+    assert f"`epsmesh store prune --store {store}` moves it aside" in done.stderr
+    assert contents(tmp_path) == before
+    mended = epsmesh("store", "prune", "--store", store)
+    assert mended.exit_code == 0
+    assert "it was moved to" in mended.stderr
+    assert epsmesh(*(small if word == "FILE" else word for word in words), "--store", store).exit_code == 0
+
+
+@pytest.mark.parametrize("command", LOOKING)
+@pytest.mark.parametrize("text", ["{", "[1, 2]", '{"key": "k", "status": "ok"}', '{"force_vector": [1], "colour": 1}'])
+def test_an_unreadable_record_is_told_with_what_removes_it(epsmesh, small, tmp_path, command, text):
+    store = tmp_path / "cases.sqlite"
+    plan = make_plan(load(small))
+    fill(store, plan, at_4="ok", at_6="ok", at_inf="ok")
+    with sqlite3.connect(store) as database:
+        database.execute("UPDATE records SET record = ? WHERE key = ?", (text, plan.keys[0]))
+    database.close()
+    before = contents(tmp_path)
+    done = epsmesh(command, small, "--store", store)
+    assert (done.exit_code, done.exception is None or isinstance(done.exception, SystemExit)) == (2, True)
+    assert f"record {plan.keys[0]} cannot be read" in done.stderr
+    assert f"`epsmesh store prune --store {store}` removes it" in done.stderr
+    assert contents(tmp_path) == before
+    assert epsmesh("store", "prune", "--store", store).exit_code == 0
+    assert epsmesh(command, small, "--store", store).exit_code == 0
+
+
+@pytest.mark.parametrize("command", [*LOOKING, "validate"])
+def test_looking_makes_no_files(epsmesh, small, tmp_path, monkeypatch, command):
+    monkeypatch.chdir(tmp_path)
+    assert epsmesh(command, small).exit_code == 0
+    assert contents(tmp_path) == {small: small.read_bytes()}
+
+
+def test_status_counts_what_is_not_to_be_run_as_skipped(epsmesh, small, tmp_path):
+    """F is at F_exact at 4 and 6 mm: the full order need not be run, and never will be."""
+    store = tmp_path / "cases.sqlite"
+    small.write_text(small.read_text() + '[plan]\nstop_when = "5 %"\n')
+    fill(store, make_plan(load(small)), at_4="ok", at_6="ok")
+    told = json.loads(epsmesh("status", small, "--store", store, "--json").stdout)
+    assert [told[state] for state in ("ok", "skipped", "failed", "pending")] == [8, 4, 0, 0]
+    assert "8 done, 0 failed, 4 skipped, 0 pending" in epsmesh("status", small, "--store", store).stdout
+
+
+def test_status_asks_after_a_run_without_reductions(epsmesh, small, tmp_path):
+    """Such a run keeps other records: 12 of its own where the full order is shared no more."""
+    store, plan = tmp_path / "cases.sqlite", make_plan(load(small), without=["all"])
+    fill(store, plan, at_4="failed", at_6="ok", at_inf="ok")
+    assert len(plan.solves) > len(make_plan(load(small)).solves)
+    told = json.loads(epsmesh("status", small, "--store", store, "--without", "all", "--json").stdout)
+    assert [told[state] for state in ("ok", "failed", "pending")] == [8, 4, 0]
+    assert {failure["message"] for failure in told["failures"]} == {"it went wrong"}
+    assert json.loads(epsmesh("status", small, "--store", store, "--json").stdout)["pending"] > 0
+    assert epsmesh("status", small, "--without", "everything").exit_code == 2
+
+
+def test_explain_tells_what_the_plan_used(epsmesh, small):
+    for without, words in (([], "F is proportional"), (["--without", "scaling"], "one solve, on the same mesh")):
+        told = json.loads(epsmesh("explain", small, *without, "--json").stdout)
+        assert words in told["changes"]["young, depth"]
+
+
+def test_a_force_on_record_that_is_no_number_is_computed_again(epsmesh, small, tmp_path):
+    store, plan = tmp_path / "cases.sqlite", make_plan(load(small))
+    fill(store, plan, at_4="ok", at_6="ok", at_inf="ok")
+    opened = Store(store)
+    opened.put(replace(opened.get(plan.keys[:1])[plan.keys[0]], force=float("nan")))
+    opened.close()
+    assert json.loads(epsmesh("plan", small, "--store", store, "--json").stdout)["solves"] == 1

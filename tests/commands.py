@@ -1,0 +1,37 @@
+"""The command line for the tests: where it runs, and in which environment."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from typer.testing import CliRunner, Result
+
+from pipeline.cli import app
+
+ROOT = Path(__file__).parents[1]
+# Under pytest, mpi4py may have marked this process's environment as a running MPI job.
+ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_"))} | {
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "OMP_NUM_THREADS": "1",
+}
+
+
+def epsmesh(*arguments: object) -> Result:
+    """Run ``epsmesh`` in this process."""
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def command(*arguments: object, ranks: int = 1) -> list[str]:
+    """Return what starts ``epsmesh`` in a process of its own, on one rank or on several."""
+    launcher = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
+    return [*launcher, sys.executable, "-m", "pipeline", *map(str, arguments)]
+
+
+def spawn(*arguments: object, ranks: int = 1) -> subprocess.CompletedProcess[str]:
+    """Run ``epsmesh`` in a process of its own, to its end."""
+    return subprocess.run(
+        command(*arguments, ranks=ranks),
+        capture_output=True, text=True, env=ENVIRONMENT, check=False, timeout=300, cwd=ROOT,
+    )  # fmt: skip

@@ -1,0 +1,156 @@
+"""What becomes of a computed force: kept with its bar, failed with a reason, or tried on the next mesh."""
+
+from dataclasses import replace
+from math import inf, nan
+
+import pytest
+from mpi4py import MPI
+
+from pipeline.plan import estimate
+from pipeline.plan.plan import make_plan
+from pipeline.report.dataset import build
+from pipeline.run.attempts import Attempts
+from pipeline.run.execute import compute, execute
+from pipeline.run.progress import Silent
+from pipeline.run.record import Record
+from pipeline.study.load import parse
+from tests.cases import raw, study
+
+WORLD = MPI.COMM_WORLD
+GOAL = "0.3 %"
+
+
+def record(bar: float, **content) -> Record:
+    return replace(Record("", "ok", force=2.0, force_error=bar, time_solve=1.0, time_error=0.5), **content)
+
+
+def asked(exact: bool = False):
+    """Return the solve of a case with a goal, or of its F_exact."""
+    plan = make_plan(parse({**raw(), "mesh": {"accuracy": GOAL}, "solve": {"exact": True}, "plan": {}}))
+    return next(solve for solve in plan.solves if solve.is_reference == exact)
+
+
+def plain():
+    (solve,) = make_plan(study()).solves
+    return solve
+
+
+def judged(solve, *records: Record) -> Record:
+    """Judge the records of one attempt after the other, as far as more are asked for."""
+    attempts, found = Attempts(), None
+    for tried in records:
+        assert found is None
+        found = attempts.judge(solve, tried)
+        (solve,) = attempts.take_again() or (solve,)
+    assert found is not None
+    assert not attempts.take_again()
+    return found
+
+
+@pytest.mark.parametrize("force", [nan, inf, -inf])
+@pytest.mark.parametrize("solve", [plain(), asked(), asked(exact=True)])
+def test_a_force_that_is_no_number_is_a_failure(solve, force):
+    found = judged(solve, record(1e-4, force=force))
+    assert (found.status, found.message) == ("failed", f"the force came out as {force}")
+
+
+@pytest.mark.parametrize("bar", [nan, inf, -0.2])
+@pytest.mark.parametrize("solve", [plain(), asked(), asked(exact=True)])
+def test_a_bar_that_is_no_number_is_a_failure_and_no_reason_for_a_finer_mesh(solve, bar):
+    found = judged(solve, record(bar))
+    assert found.status == "failed"
+    assert "the error bar came out as" in found.message
+
+
+def test_a_force_whose_bar_had_no_memory_says_so():
+    found = judged(plain(), record(nan, message="the error bar needs about 9 GB"))
+    assert (found.status, found.force) == ("ok", 2.0)
+
+
+@pytest.mark.parametrize("solve", [plain(), replace(asked(), later=()), replace(asked(exact=True), later=())])
+def test_no_force_is_relied_on_whose_bar_is_as_large_as_itself(solve):
+    assert judged(solve, record(0.9)).status == "failed"
+
+
+def test_attempts_go_on_until_the_bar_is_small_and_all_their_time_counts():
+    found = judged(asked(), record(0.02), record(0.01), record(0.002))
+    assert (found.status, found.force_error, found.time_error) == ("ok", 0.002, 0.0)
+    assert found.time_solve == 3 * 1.5
+    assert found.observation() is None
+
+
+def test_an_accuracy_that_is_missed_for_another_reason_says_both():
+    lost = Record("", "failed", "no memory left")
+    found = judged(asked(), record(0.02), lost)
+    assert found.status == "failed"
+    assert "error bar 0.02, accuracy 0.003 missed" in found.message
+    assert "no memory left" in found.message
+    assert judged(asked(), lost).message == "no memory left"
+
+
+def test_exact_force_is_the_best_that_was_found():
+    """Its own bar says how good it is: a finer mesh that fails, or is worse, takes nothing away."""
+    solve = asked(exact=True)
+    assert judged(solve, record(0.002, force=3.0), Record("", "failed", "no memory")).force == 3.0
+    solve = replace(solve, later=solve.later[:1])
+    found = judged(solve, record(0.002, force=3.0), record(0.004))
+    assert (found.status, found.force, found.force_error) == ("ok", 3.0, 0.002)
+
+
+class Notes(Silent):
+    """Remembers what was worked on."""
+
+    def __init__(self):
+        self.texts = []
+
+    def note(self, text):
+        self.texts.append(text)
+
+
+@pytest.mark.mpi
+def test_accuracy_without_memory_for_its_proof_is_refused_and_no_finer_mesh_is_tried(monkeypatch):
+    """The force would be worth nothing: neither the case nor F_exact has one."""
+    changes = {"mesh": {"accuracy": GOAL, "degree": 2}, "solve": {"exact": True, "method": "iterative"}, "plan": {}}
+    plan = make_plan(parse({**raw(), **changes}), without=("axisymmetric",))
+    first = plan.solves[0].case
+    enough = estimate.case_memory(first, share=0.25) + 1e6
+    assert enough < estimate.enriched_memory(estimate.dofs(0.25 * estimate.cells(first), 2), 2)
+    monkeypatch.setattr("pipeline.run.memory.FreeMemory.available", lambda self: enough / 0.9)
+    found, notes = [], Notes()
+    execute(plan, WORLD, found.append, notes)
+    if WORLD.rank == 0:
+        assert [record.status for record in found] == ["failed", "failed"]
+        assert "the error bar that proves the accuracy needs about" in found[0].message
+        assert "GB of memory" in found[1].message
+    assert sum(text == "meshing: the one case" for text in notes.texts) == 1
+
+
+@pytest.mark.mpi
+def test_timed_case_of_an_accuracy_has_the_force_of_an_untimed_one():
+    def force(**solve):
+        plan = make_plan(parse({**raw(), "mesh": {"accuracy": "3 %"}, "solve": {"exact": False, **solve}, "plan": {}}))
+        (found,) = compute(plan, WORLD).values()
+        assert found.status == "ok", found.message
+        return found
+
+    timed, untimed = force(timing=True, repeats=2), force()
+    assert timed.force == pytest.approx(untimed.force, rel=1e-6)
+    assert timed.force_error == pytest.approx(untimed.force_error, rel=0.05)
+    assert (timed.time_error, timed.time_total > 0) == (0.0, True)
+
+
+def test_a_force_that_failed_is_no_yardstick():
+    """Of a full order that failed there is no F/F_max, whatever number came out; nor is there F/F_exact."""
+    plan = make_plan(study(mesh={"epsilon": ["6 mm", "full"]}, solve={"exact": True}))
+    records = {}
+    for solve in plan.solves:
+        content = {"young": solve.case.material.young, "depth": solve.case.probe.depth}
+        bad = solve.is_reference or solve.case.is_full
+        records[solve.key] = replace(
+            record(0.01, force=1.0, force_vector=(0.0, 0.0, 1.0), energy=1.0, **content), key=solve.key,
+            status="failed" if bad else "ok", message="no" if bad else "",
+        )  # fmt: skip
+    data = build(plan, records)
+    assert data["force"].notnull().values.tolist() == [True, False]
+    for name in ("force_max", "force_ratio", "force_exact", "accuracy"):
+        assert data[name].isnull().all(), name
