@@ -11,7 +11,7 @@ from mpi4py import MPI
 from typer.testing import CliRunner, Result
 
 from pipeline.cli import app
-from tests.cluster.compare import all_done, assert_same
+from tests.compare import all_done, assert_same
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="runs studies by itself")
 
