@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from benchmarks.peers.results import TARGETS, Run
-from benchmarks.peers.scenes import SCENES
+from benchmarks.peers.tasks import TASKS
 from pipeline.report.figures import STYLE, save
 
 _LOOKS = {
@@ -29,7 +29,7 @@ def draw(runs: Sequence[Run], path: Path) -> Path:
         panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
         for axes, name in zip(panels, names, strict=True):
             _panel(axes, [run for run in runs if run.scene == name and run.threads == 1])
-            axes.set_title(f"{SCENES[name].title}, ν = {SCENES[name].poisson:g}", fontsize=8)
+            axes.set_title(f"{TASKS[name].title}, ν = {TASKS[name].poisson:g}", fontsize=8)
             axes.set_xlabel("time from geometry to F (s)")
         panels[0].set_ylabel("|true error of F| (%)")
         known = {label: h for axes in panels for h, label in zip(*axes.get_legend_handles_labels(), strict=True)}

@@ -7,6 +7,7 @@ from mpi4py import MPI
 from typer.testing import CliRunner
 
 from pipeline import cli, verify
+from pipeline.verify import known
 from pipeline.verify.boundary import rectangle_stiffness
 from pipeline.verify.coverage import Coverage, Trial, trials
 from pipeline.verify.row import Row
@@ -31,7 +32,7 @@ def test_a_force_two_bars_off_is_out(rows):
             assert not replace(row, value=float("nan")).is_right
 
 
-@pytest.mark.parametrize(("ratio", "published"), [(1, 1.1523), (2, 1.671), (4, 2.543), (8, 4.036)])
+@pytest.mark.parametrize(("ratio", "published"), known.RECTANGLE.items())
 def test_boundary_elements_agree_with_published_rectangles(ratio, published):
     value, error = rectangle_stiffness(ratio)
     assert value == pytest.approx(published, rel=error + 5e-4)
