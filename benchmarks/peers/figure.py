@@ -12,6 +12,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from benchmarks.peers.results import TARGETS, Run
 from benchmarks.peers.tasks import TASKS
 from pipeline.report.figures import STYLE, save
+from pipeline.report.pareto import front
 
 _LOOKS = {
     "this program": ("#d81b60", "-", "*"), "this program, meridian": ("#2a9d8f", "-", "D"),
@@ -45,7 +46,8 @@ def _panel(axes: Axes, runs: Sequence[Run]) -> None:
         mine = [run for run in runs if _label(run) == label]
         if mine:
             axes.plot(*_points(mine), marker, color=colour, markersize=3, alpha=0.45)
-            axes.plot(*_points(_front(mine)), line, color=colour, marker=marker, label=label)
+            best = front(*_points(mine))
+            axes.plot(*_points([mine[i] for i in best]), line, color=colour, marker=marker, label=label)
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
@@ -62,12 +64,3 @@ def _label(run: Run) -> str:
     if run.program != "program":
         return run.program
     return "this program, meridian" if run.setting.get("model") == "auto" else "this program"
-
-
-def _front(runs: Sequence[Run]) -> list[Run]:
-    """Return the runs that no faster one beats."""
-    front: list[Run] = []
-    for run in sorted(runs, key=lambda r: r.seconds):
-        if not front or abs(run.error) < abs(front[-1].error):
-            front.append(run)
-    return front

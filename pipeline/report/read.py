@@ -4,7 +4,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from pipeline.report.settings import DatasetError
+from pipeline.report.table import DatasetError
 
 
 def dataset_path(file: str | Path, output: str | Path = "results") -> Path:

@@ -4,9 +4,9 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf
 from typing import Any
 
+from pipeline.quantities import write
 from pipeline.study.schema import AnyBody, AnyProbe, Material, Mesh, Planning, Section, Solve
 
 # Keys that both body and probe have, or a variable of the dataset: their dimension says whose it is.
@@ -74,7 +74,7 @@ class Case:
         return self.mesh.element_for(self.material.poisson)
 
     def __str__(self) -> str:
-        return ", ".join(f"{name} = {format_label(name, value)}" for name, value in self.labels) or "the one case"
+        return ", ".join(f"{name} = {write(name, value)}" for name, value in self.labels) or "the one case"
 
 
 @dataclass(frozen=True)
@@ -130,16 +130,3 @@ class Study:
             (self.sections[name], tuple((i, len(axis)) for i, axis in enumerate(self.axes) if axis.section == name))
             for name in _PARTS
         )
-
-
-def format_label(name: str, value: float | int | str) -> str:
-    """Write an axis label as people read it: lengths in mm, pressures in kPa."""
-    if isinstance(value, str):
-        return value
-    if value == inf:
-        return "full"
-    if name in ("accuracy", "mesh_accuracy"):
-        return f"{100 * value:.3g} %"
-    if name == "young":
-        return f"{value / 1e3:g} kPa"
-    return f"{value:g}" if name in ("poisson", "growth", "degree") else f"{value * 1e3:g} mm"
