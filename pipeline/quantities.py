@@ -5,7 +5,7 @@ them are from here. Values are SI; people read mm, kPa, mN and per cent.
 """
 
 from dataclasses import dataclass
-from math import inf, isnan
+from math import inf, isnan, pi
 from typing import Literal
 
 Value = float | int | str
@@ -53,6 +53,13 @@ _SCENE = (
     Quantity("body", "", "body"),
     Quantity("depth", "m", "depth to which the probe is pushed", "d", "depth d"),
     Quantity("contact", "", "contact between probe and tissue"),
+    Quantity("slice", "m", "travel along the blade"),
+    Quantity("incision", "m", "depth of the slit that is open below the blade"),
+    Quantity("height", "m", "height of the body"),
+    Quantity("length", "m", "length of the probe"),
+    Quantity("width", "m", "width of the probe"),
+    Quantity("tip", "m", "radius of the rounding at the tip"),
+    Quantity("angle", "rad", "half angle of the probe to its axis"),
     Quantity("body_radius", "m", "radius of the body"),
     Quantity("probe_radius", "m", "radius of the probe"),
     Quantity("body_shape", "", "shape of the body"),
@@ -95,7 +102,10 @@ QUANTITIES = {quantity.name: quantity for quantity in (*_MESH, *_SCENE, *_RESULT
 MESH_DIMENSIONS = tuple(quantity.name for quantity in _MESH)
 
 # Factor and unit of what people do not read in SI.
-_READ = {"m": (1e3, "mm"), "Pa": (1e-3, "kPa"), "N": (1e3, "mN"), "J": (1e6, "µJ"), "bytes": (1e-6, "MB"), "1": (1, "")}
+_READ = {
+    "m": (1e3, "mm"), "Pa": (1e-3, "kPa"), "N": (1e3, "mN"), "J": (1e6, "µJ"), "bytes": (1e-6, "MB"),
+    "rad": (180 / pi, "°"), "1": (1.0, ""),
+}  # fmt: skip
 
 
 def attributes(name: str) -> dict[str, str]:
@@ -108,12 +118,13 @@ def attributes(name: str) -> dict[str, str]:
 def readable(name: str, unit: str | None = None) -> tuple[float, str]:
     """Return the factor from a quantity's unit to the one that people read, and that one's name ("": none).
 
-    ``unit`` is for a quantity that the table does not hold: a length, if it is not given, as most sizes of shapes are.
+    ``unit`` is for a quantity that the table may not hold; without either, a value is written as it is.
     """
     quantity = QUANTITIES.get(name)
     if quantity and quantity.in_per_cent:
         return 100.0, "%"
-    unit = unit if unit is not None else quantity.unit if quantity else "m"
+    if unit is None:
+        unit = quantity.unit if quantity else ""
     return _READ.get(unit, (1.0, unit))
 
 

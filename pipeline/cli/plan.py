@@ -26,7 +26,6 @@ from pipeline.cli.words import (
 )
 from pipeline.plan.describe import story, summary
 from pipeline.plan.plan import Plan, declare, make_plan
-from pipeline.quantities import write
 from pipeline.run.remaining import format_seconds
 from pipeline.study.sweep import Case, Study
 
@@ -161,14 +160,14 @@ def find_case(study: Study, text: str) -> Case:
         wanted[name] = _squeezed(value)
     found = [case for case in cases if _matches(case, wanted)]
     if not found:
-        choices = {axis.name: [write(axis.name, label) for label in axis.labels] for axis in study.axes}
+        choices = {axis.name: [axis.write(label) for label in axis.labels] for axis in study.axes}
         listed = "; ".join(f"{name} = {', '.join(choices[name])}" for name in wanted)
         fail(f"case {text!r}: there is none; there are {listed}")
     return found[0]
 
 
 def _matches(case: Case, wanted: dict[str, str]) -> bool:
-    labels = {name: _squeezed(write(name, value)) for name, value in case.labels}
+    labels = {name: _squeezed(text) for name, text in case.words.items()}
     return all(labels[name] == value for name, value in wanted.items())
 
 

@@ -36,6 +36,10 @@ class Axis:
         """Where it stands in the study file."""
         return f"{self.section}.{self.key}" if self.key else self.section
 
+    def write(self, label: float | int | str) -> str:
+        """Write one of its labels as people read it."""
+        return write(self.name, label, self.unit)
+
     def __len__(self) -> int:
         return len(self.labels)
 
@@ -58,6 +62,11 @@ class Case:
         return tuple((axis.name, axis.labels[i]) for axis, i in zip(self.axes, self.index, strict=True))
 
     @property
+    def words(self) -> dict[str, str]:
+        """Names of what is swept, and values as people read them."""
+        return {axis.name: axis.write(axis.labels[i]) for axis, i in zip(self.axes, self.index, strict=True)}
+
+    @property
     def is_full(self) -> bool:
         """Whether the mesh is fine everywhere: asked for as such, or with an ε past the whole body."""
         reach = self.body.reach(self.probe.at)
@@ -74,7 +83,7 @@ class Case:
         return self.mesh.element_for(self.material.poisson)
 
     def __str__(self) -> str:
-        return ", ".join(f"{name} = {write(name, value)}" for name, value in self.labels) or "the one case"
+        return ", ".join(f"{name} = {text}" for name, text in self.words.items()) or "the one case"
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,9 @@ What compares forces with the truth asks here: ``epsmesh verify``, the benchmark
 says otherwise.
 """
 
-from math import log
+from math import log, pi
+
+from scipy.special import ellipk
 
 # F / (E d) in mm, by contact and Poisson's ratio, of the cylinder R = H = 50 mm that is held at its bottom, under a
 # disc of 3 mm: axisymmetric, Taylor–Hood elements of degree 4 graded to 1e-5 of the radius at the rim.
@@ -38,6 +40,7 @@ BOX_BLADE = (4.02343, 5e-5)
 
 SNEDDON = "I. N. Sneddon, Int. J. Eng. Sci. 3, 47 (1965)"
 SPENCE = "D. A. Spence, Proc. R. Soc. A 305, 55 (1968)"
+GALIN = "L. A. Galin, Contact Problems (1961)"
 
 
 def half_space_disc(young: float, poisson: float, radius: float, depth: float, contact: str) -> tuple[float, str]:
@@ -49,6 +52,15 @@ def half_space_disc(young: float, poisson: float, radius: float, depth: float, c
         return 2 * young * radius * depth / (1 - poisson**2), SNEDDON
     mu, x = young / (2 * (1 + poisson)), 1 - 2 * poisson
     return 4 * mu * radius * depth * (log(1 + 2 * x) / x if x else 2.0), SPENCE
+
+
+def half_space_ellipse(young: float, poisson: float, axes: tuple[float, float], depth: float) -> tuple[float, str]:
+    """Return F of a frictionless flat ellipse with these semi-axes on a half-space, and who found it.
+
+    π E* a d / K(e) with the longer semi-axis a and e² = 1 - b²/a²; a circle's K = π/2 gives 2 E* a d.
+    """
+    short, long = sorted(axes)
+    return pi * young / (1 - poisson**2) * long * depth / float(ellipk(1 - (short / long) ** 2)), GALIN
 
 
 def rectangle(stiffness: float, young: float, poisson: float, width: float, depth: float) -> float:

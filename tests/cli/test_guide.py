@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from pipeline.cli import app
 from pipeline.report.dataset import write
-from tests.report.known import dataset
+from tests.report.chosen import dataset
 
 
 def call(*arguments: object):

@@ -10,7 +10,7 @@ from pipeline.cli.guide import plain
 from pipeline.report.correction import fit, r_without
 from pipeline.report.guide import guide, quantity
 from pipeline.report.table import DatasetError, arrange
-from tests.report.known import BAR, EXACT_BAR, TEXT, dataset
+from tests.report.chosen import BAR, EXACT_BAR, TEXT, dataset
 from tests.report.synthetic import FIGURE
 from tests.report.synthetic import dataset as synthetic
 

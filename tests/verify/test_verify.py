@@ -38,6 +38,16 @@ def test_boundary_elements_agree_with_published_rectangles(ratio, published):
     assert value == pytest.approx(published, rel=error + 5e-4)
 
 
+def test_closed_forms_meet_in_their_limits():
+    """A round ellipse is a disc, a long one a line; incompressible tissue does not feel whether a disc is bonded."""
+    disc, _ = known.half_space_disc(1e4, 0.3, 1e-3, 1e-5, "frictionless")
+    assert known.half_space_ellipse(1e4, 0.3, (1e-3, 1e-3), 1e-5)[0] == pytest.approx(disc)
+    wide = [known.half_space_ellipse(1e4, 0.3, axes, 1e-5)[0] for axes in ((1e-3, 2e-3), (2e-3, 1e-3), (1e-3, 1e-3))]
+    assert wide[0] == wide[1] > wide[2]
+    bonded, free = (known.half_space_disc(1e4, 0.5, 1e-3, 1e-5, contact)[0] for contact in ("bonded", "frictionless"))
+    assert bonded == pytest.approx(free)
+
+
 def test_error_bars_of_random_scenes_hold():
     found = Coverage(tuple(trials(MPI.COMM_SELF, count=4, seed=3)))
     assert len(found.trials) == 4
