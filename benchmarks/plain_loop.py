@@ -25,11 +25,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from benchmarks.machine import machine
 from benchmarks.plain_case import MOST_DIRECT, SOLVERS, Solved, solve
 from pipeline.plan import estimate
 from pipeline.study.load import load
 from pipeline.study.sweep import Case, Study
+from pipeline.verify.machine import machine
 
 ROOT = Path(__file__).parents[1]
 # Compiles what a run of the program needs, in seconds.

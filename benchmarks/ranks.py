@@ -18,10 +18,10 @@ from typing import Any
 from mpi4py import MPI
 
 from benchmarks import soak
-from benchmarks.machine import MPI_ENVIRONMENT
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.run.execute import compute
 from pipeline.study.load import parse
+from pipeline.verify.machine import MPI_ENVIRONMENT
 
 _REPEATS, _CASES = 3, 60
 _LARGE = {

@@ -17,7 +17,7 @@ from math import inf, log
 from pathlib import Path
 from typing import Any
 
-from benchmarks.machine import MPI_ENVIRONMENT
+from pipeline.verify.machine import MPI_ENVIRONMENT
 
 # Element size far from the probe (mm), for about 100,000, 500,000 and 2,000,000 dofs.
 SIZES = {"small": 2.5, "middle": 1.35, "large": 0.82}

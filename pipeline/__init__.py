@@ -16,7 +16,7 @@ __version__ = "0.1.0"
 __all__ = ["DatasetError", "StoreError", "StudyError", "__version__", "load", "open"]
 
 _ERRORS = {
-    "DatasetError": "pipeline.report.settings",
+    "DatasetError": "pipeline.report.table",
     "StoreError": "pipeline.run.store",
     "StudyError": "pipeline.study.problems",
 }

@@ -1,12 +1,18 @@
 #!/bin/bash
 # Run `make test` on Debian 13, in a root made by mmdebstrap and kept in .cache/ for the next time.
+#   PYTEST_ARGS=…      only these tests
+#   DEBIAN13_ROOT=DIR  the root's folder, for checkouts that share one
+# A run of the whole suite is written down in .ci/debian13, which .ci/run quotes.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 ((EUID == 0)) || { echo "test-debian13: needs root: a Debian 13 root is made, mounted and entered" >&2; exit 1; }
 # In a mount namespace of its own, what is mounted below goes with the last process, however that ends.
 [[ ${1:-} == --inside ]] || exec unshare --mount --propagation private "$PWD/scripts/test-debian13.sh" --inside
 
-root=$PWD/.cache/debian13
+root=${DEBIAN13_ROOT:-$PWD/.cache/debian13}
+mkdir -p "$(dirname "$root")"
+exec 9>"$root.lock"
+flock -n 9 || { echo "test-debian13: another run is using $root" >&2; exit 1; }
 if [[ ! -f $root/.complete ]]; then
     command -v mmdebstrap >/dev/null || { apt-get update -q && apt-get install -y -q --no-install-recommends mmdebstrap; }
     rm -rf "$root"
@@ -31,8 +37,27 @@ mount -t proc proc "$root/proc"
 mount -t sysfs -o ro sysfs "$root/sys" # where Open MPI counts the cores
 mount --bind /dev "$root/dev"
 mount -t tmpfs tmpfs "$root/dev/shm"
+mount -t devpts -o ptmxmode=0666,mode=0620,gid=5 devpts "$root/dev/pts" # terminals, for the tests of what a person sees
 environment=(PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/src LANG=C.UTF-8)
 for name in http_proxy https_proxy no_proxy HTTP_PROXY HTTPS_PROXY NO_PROXY PIP_INDEX_URL PIP_CERT PIP_FIND_LINKS PIP_EXTRA_INDEX_URL PYTEST_ADDOPTS; do
     [[ -n ${!name:-} ]] && environment+=("$name=${!name}")
 done
-chroot "$root" env -i "${environment[@]}" make -C /src/epsmesh test PYTEST_ARGS="${PYTEST_ARGS:-}" </dev/null
+# The commit, before anybody goes on to the next one.
+commit=$(git rev-parse HEAD)
+[[ -z $(git status --porcelain --untracked-files=no) ]] || commit+=" with changes"
+log=$root.log
+status=0
+chroot "$root" env -i "${environment[@]}" make -C /src/epsmesh test PYTEST_ARGS="${PYTEST_ARGS:-}" </dev/null 2>&1 | tee "$log" || status=$?
+[[ -z ${PYTEST_ARGS:-}${PYTEST_ADDOPTS:-} ]] || exit "$status"
+
+# pytest's last line of each run: first the serial one, then the one on 2 ranks.
+mapfile -t counts < <(sed -nE 's/\x1b\[[0-9;]*m//g; s/^=* *(([0-9]+ [a-z]+(, )?)+) in [0-9.]+s.*/\1/p' "$log")
+{
+    echo "commit: $commit"
+    echo "date: $(date -u +%F)"
+    echo "libraries: $(chroot "$root" dpkg-query -W -f '${Package} ${Version}  ' python3-dolfinx-real python3-numpy openmpi-bin | sed 's/ *$//')"
+    echo "serial: ${counts[0]:-not finished}"
+    echo "2 ranks: ${counts[1]:-not run}"
+    echo "result: $( ((status)) && echo failed || echo passed)"
+} >.ci/debian13
+exit "$status"

@@ -10,19 +10,19 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from benchmarks.machine import machine
 from benchmarks.peers.figure import draw
 from benchmarks.peers.processes import MODULES, PEERS, ask
 from benchmarks.peers.results import TARGETS, Run, breakdown, standings, table, to_json, truths_table
-from benchmarks.peers.scenes import SCENES
 from benchmarks.peers.settings import GRIDS, LADDERS, MERIDIAN, PROGRAM, Settings
+from benchmarks.peers.tasks import TASKS
 from benchmarks.peers.truth import Truth, converge, known
+from pipeline.verify.machine import machine
 
 
 def main() -> int:
     """Run everything that is asked for; return 1 if a setting failed or two truths differ."""
     options = _options()
-    truths = {name: converge(name) if options.truth else known(SCENES[name]) for name in options.scenes}
+    truths = {name: converge(name) if options.truth else known(TASKS[name]) for name in options.scenes}
     print(truths_table(truths), flush=True)
     if options.scan:
         _scan(options, truths)
@@ -51,7 +51,7 @@ def main() -> int:
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scenes", nargs="+", choices=SCENES, default=list(SCENES))
+    parser.add_argument("--scenes", nargs="+", choices=TASKS, default=list(TASKS))
     parser.add_argument("--programs", nargs="+", choices=MODULES, default=list(MODULES))
     parser.add_argument("--repeats", type=int, default=3, help="runs of each setting; the median counts")
     parser.add_argument("--output", type=Path, default=Path("results"))
@@ -74,7 +74,7 @@ def _jobs(options: argparse.Namespace) -> Iterator[tuple[str, dict[str, Any]]]:
 def _settings(program: str, scene: str, threads: int) -> Settings:
     if program != "program":
         return LADDERS[program][scene]
-    return PROGRAM + (MERIDIAN if SCENES[scene].body[0] == "cylinder" and threads == 1 else ())
+    return PROGRAM + (MERIDIAN if TASKS[scene].body[0] == "cylinder" and threads == 1 else ())
 
 
 def _answers(program: str, job: dict[str, Any]) -> Iterator[dict[str, Any]]:

@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from benchmarks.peers.results import TARGETS, Run
-from benchmarks.peers.scenes import SCENES
+from benchmarks.peers.tasks import TASKS
 from pipeline.report.figures import STYLE, save
+from pipeline.report.pareto import front
 
 _LOOKS = {
     "this program": ("#d81b60", "-", "*"), "this program, meridian": ("#2a9d8f", "-", "D"),
@@ -29,7 +30,7 @@ def draw(runs: Sequence[Run], path: Path) -> Path:
         panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
         for axes, name in zip(panels, names, strict=True):
             _panel(axes, [run for run in runs if run.scene == name and run.threads == 1])
-            axes.set_title(f"{SCENES[name].title}, ν = {SCENES[name].poisson:g}", fontsize=8)
+            axes.set_title(f"{TASKS[name].title}, ν = {TASKS[name].poisson:g}", fontsize=8)
             axes.set_xlabel("time from geometry to F (s)")
         panels[0].set_ylabel("|true error of F| (%)")
         known = {label: h for axes in panels for h, label in zip(*axes.get_legend_handles_labels(), strict=True)}
@@ -45,7 +46,8 @@ def _panel(axes: Axes, runs: Sequence[Run]) -> None:
         mine = [run for run in runs if _label(run) == label]
         if mine:
             axes.plot(*_points(mine), marker, color=colour, markersize=3, alpha=0.45)
-            axes.plot(*_points(_front(mine)), line, color=colour, marker=marker, label=label)
+            best = front(*_points(mine))
+            axes.plot(*_points([mine[i] for i in best]), line, color=colour, marker=marker, label=label)
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
@@ -62,12 +64,3 @@ def _label(run: Run) -> str:
     if run.program != "program":
         return run.program
     return "this program, meridian" if run.setting.get("model") == "auto" else "this program"
-
-
-def _front(runs: Sequence[Run]) -> list[Run]:
-    """Return the runs that no faster one beats."""
-    front: list[Run] = []
-    for run in sorted(runs, key=lambda r: r.seconds):
-        if not front or abs(run.error) < abs(front[-1].error):
-            front.append(run)
-    return front

@@ -9,14 +9,14 @@ from typing import Any
 import ngsolve as ng
 from netgen.occ import Axes, Box, Cylinder, Glue, OCCGeometry, Pnt, WorkPlane, X, Z
 
-from benchmarks.peers.scenes import Scene
+from benchmarks.peers.tasks import Task
 from benchmarks.peers.worker import Answer, Parts, serve
 
 _CLOSE = 1e-6
 
 
 def solve(
-    scene: Scene, threads: int, *, order: int, rim: float, maxh: float, grading: float, levels: int,
+    scene: Task, threads: int, *, order: int, rim: float, maxh: float, grading: float, levels: int,
     factor: float = 0.15, safety: float = 2.0, corners: bool = True,
     solver: str = "sparsecholesky",
 ) -> Answer:  # fmt: skip
@@ -39,14 +39,14 @@ def solve(
         return _force(scene, mesh, order, solver, parts)
 
 
-def _mesh(scene: Scene, rim: float, maxh: float, grading: float, safety: float = 2.0, corners: bool = True) -> Any:
+def _mesh(scene: Task, rim: float, maxh: float, grading: float, safety: float = 2.0, corners: bool = True) -> Any:
     geometry = OCCGeometry(_shape(scene, rim, corners))
     # Netgen's own threads wait by spinning, which costs more than all of such a mesh.
     sizes = {"maxh": maxh, "grading": grading, "curvaturesafety": safety}
     return ng.Mesh(geometry.GenerateMesh(**sizes, parallel_meshing=False, nthreads=1))
 
 
-def _shape(scene: Scene, rim: float, corners: bool) -> Any:
+def _shape(scene: Task, rim: float, corners: bool) -> Any:
     """Return the part of the body that symmetry leaves, with the footprint in its surface and all faces named."""
     if scene.body[0] == "box":
         _, length, width, height = scene.body
@@ -76,7 +76,7 @@ def _shape(scene: Scene, rim: float, corners: bool) -> Any:
     return shape
 
 
-def _footprint(scene: Scene) -> Any:
+def _footprint(scene: Task) -> Any:
     x, y = scene.at
     plane = WorkPlane(Axes((x, y, 0), Z, X))
     if scene.probe[0] == "disc":
@@ -94,7 +94,7 @@ def _name(face: Any, height: float, planes: tuple[str, ...]) -> str:
     return "free"
 
 
-def _force(scene: Scene, mesh: Any, order: int, solver: str, parts: Parts) -> Answer:
+def _force(scene: Task, mesh: Any, order: int, solver: str, parts: Parts) -> Answer:
     mu = 1 / (2 * (1 + scene.poisson))
     lam = 2 * mu * scene.poisson / (1 - 2 * scene.poisson)
     mirrors = {f"dirichlet{axis}": f"mirror_{axis}" for axis in scene.planes}
@@ -121,7 +121,7 @@ def _force(scene: Scene, mesh: Any, order: int, solver: str, parts: Parts) -> An
     return Answer(2 ** len(scene.planes) * work, space.ndof, parts.seconds)
 
 
-def area(scene: Scene, **sizes: float) -> float:
+def area(scene: Task, **sizes: float) -> float:
     """Return the area (mm²) of the meshed footprint over the true one: that geometry and names are right."""
     mesh = _mesh(scene, sizes["rim"] * scene.half_width, sizes["maxh"], sizes["grading"])
     mesh.Curve(3)

@@ -7,7 +7,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from benchmarks.peers.scenes import Scene
+from benchmarks.peers.tasks import Task
 from benchmarks.peers.worker import Answer, serve
 from pipeline.plan.plan import make_plan
 from pipeline.run.execute import compute
@@ -20,7 +20,7 @@ YOUNG, DEPTH = 1e4, 1e-4  # Pa, m: F is proportional to both
 _MM = 1e-3
 
 
-def solve(scene: Scene, threads: int, *, accuracy: str, model: str = "3d", **mesh: Any) -> Answer:
+def solve(scene: Task, threads: int, *, accuracy: str, model: str = "3d", **mesh: Any) -> Answer:
     """Return F, asked for to ``accuracy``: ``model`` "3d" uses mirror symmetry, "auto" axisymmetry, too.
 
     ``threads`` are ranks here, those of the world.
@@ -31,7 +31,7 @@ def solve(scene: Scene, threads: int, *, accuracy: str, model: str = "3d", **mes
     return Answer(force, record.dofs, {name.removeprefix("time_"): getattr(record, name) for name in TIMES})
 
 
-def record_of(scene: Scene, model: str, mesh: dict[str, Any]) -> Record:
+def record_of(scene: Task, model: str, mesh: dict[str, Any]) -> Record:
     """Return the record of a scene with a ``mesh`` section; collective on the world.
 
     Raises:
@@ -44,7 +44,7 @@ def record_of(scene: Scene, model: str, mesh: dict[str, Any]) -> Record:
     return record
 
 
-def study(scene: Scene, mesh: dict[str, Any]) -> Study:
+def study(scene: Task, mesh: dict[str, Any]) -> Study:
     """Return the study of a scene, whose one case is solved, and nothing else."""
     body: dict[str, Any] = {"shape": scene.body[0]}
     probe: dict[str, Any] = {"shape": scene.probe[0], "depth": f"{DEPTH * 1e3} mm", "at": _mm(*scene.at)}

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from benchmarks.peers.processes import PEERS
-from benchmarks.peers.scenes import SCENES
+from benchmarks.peers.tasks import TASKS
 from benchmarks.peers.truth import Truth
 
 TARGETS = (1e-2, 3e-3, 1e-3)
@@ -91,7 +91,7 @@ def table(found: Sequence[Standing]) -> str:
     names = ("scene", "threads", "true error", "program, asked", "program, hindsight", "meridian", *PEERS)
     lines = [f"| {' | '.join(names)} | asked / best peer |", "|---" * (len(names) + 1) + "|"]
     for s in found:
-        cells = [SCENES[s.scene].title, str(s.threads), f"{100 * s.target:g} %"]
+        cells = [TASKS[s.scene].title, str(s.threads), f"{100 * s.target:g} %"]
         cells += [_cell(run, s.clock) for run in (s.asked, s.hindsight, s.meridian, *s.peers.values())]
         ratio = s.ratio
         verdict = "" if ratio is None else f"{ratio:.2f}{'' if ratio <= GOAL else ' (missed)'}"
@@ -130,7 +130,7 @@ def truths_table(truths: dict[str, Truth]) -> str:
     for name, truth in truths.items():
         sources = ", ".join(f"{who} {force:.6f} ± {100 * bar:.2g} %" for who, (force, bar) in truth.sources.items())
         verdict = "agree" if truth.agree else "DO NOT AGREE"
-        lines.append(f"| {SCENES[name].title} | {truth.force:.6f} | {100 * truth.bar:.2g} % | {sources} | {verdict} |")
+        lines.append(f"| {TASKS[name].title} | {truth.force:.6f} | {100 * truth.bar:.2g} % | {sources} | {verdict} |")
     return "\n".join(lines)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from skfem import Basis, BilinearForm, ElementTetP2, MeshTet2
 
-from benchmarks.peers.scenes import Scene
+from benchmarks.peers.tasks import Task
 from benchmarks.peers.worker import Answer, Parts, serve
 
 _CLOSE = 1e-6
@@ -25,7 +25,7 @@ _PAIRS = [(i, j) for i in range(3) for j in range(i, 3)]
 
 
 def solve(
-    scene: Scene, threads: int, *, rim: float, growth: float, quarter: bool = False, solver: str = "pardiso"
+    scene: Task, threads: int, *, rim: float, growth: float, quarter: bool = False, solver: str = "pardiso"
 ) -> Answer:
     """Return F: sizes are ``rim`` half widths at the probe's edge and grow by ``growth`` with the distance from it.
 
@@ -53,7 +53,7 @@ def solve(
     return Answer(2 ** len(scene.planes) * float(work), len(displacement), parts.seconds)
 
 
-def _mesh(scene: Scene, rim: float, growth: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _mesh(scene: Task, rim: float, growth: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return points (n, 3), cells (m, 10), and which points are on the probe's edge."""
     if not gmsh.isInitialized():
         gmsh.initialize([""], readConfigFiles=False)
@@ -83,7 +83,7 @@ def _mesh(scene: Scene, rim: float, growth: float) -> tuple[np.ndarray, np.ndarr
     return points, cells.reshape(-1, 10)[:, _ORDER], _on_rim(scene, points)
 
 
-def _geometry(scene: Scene) -> list[int]:
+def _geometry(scene: Task) -> list[int]:
     """Build the part of the body that symmetry leaves; return the curves of the probe's edge."""
     occ, height = gmsh.model.occ, scene.height
     if scene.body[0] == "box":
@@ -114,7 +114,7 @@ def _middle(curve: int) -> np.ndarray:
     return np.array(gmsh.model.getValue(1, curve, [(start + end) / 2]))
 
 
-def _rim_distance(scene: Scene) -> str:
+def _rim_distance(scene: Task) -> str:
     x, y = (f"({c}-({a}))" for c, a in zip("xy", scene.at, strict=True))
     if scene.probe[0] == "disc":
         return f"Sqrt((Sqrt({x}^2+{y}^2)-{scene.probe[1]})^2+z^2)"
@@ -122,7 +122,7 @@ def _rim_distance(scene: Scene) -> str:
     return f"Sqrt((Sqrt(Max({p},0)^2+Max({q},0)^2)+Min(Max({p},{q}),0))^2+z^2)"
 
 
-def _on_rim(scene: Scene, points: np.ndarray) -> np.ndarray:
+def _on_rim(scene: Task, points: np.ndarray) -> np.ndarray:
     p = np.abs(points[:, :2] - scene.at)
     if scene.probe[0] == "disc":
         distance = np.hypot(*p.T) - scene.probe[1]
@@ -167,7 +167,7 @@ def _stiffness(basis: Basis, nu: float) -> sp.csr_matrix:
     return sp.coo_matrix((local.reshape(-1), (rows.reshape(-1), columns.reshape(-1)))).tocsr()
 
 
-def _prescribed(scene: Scene, basis: Basis) -> tuple[np.ndarray, np.ndarray]:
+def _prescribed(scene: Task, basis: Basis) -> tuple[np.ndarray, np.ndarray]:
     """Return the prescribed displacement and which unknowns it holds."""
     x, y, z = basis.doflocs
     offset = np.abs(np.array([x - scene.at[0], y - scene.at[1]]))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from benchmarks.peers.processes import ask
-from benchmarks.peers.scenes import SCENES, Scene
+from benchmarks.peers.tasks import TASKS, Task
 
 # NGSolve: one mesh, refined to a two-thousandth of its size at the rim, ever higher orders.
 _MESH = {"rim": 0.7, "maxh": 20, "grading": 0.4, "levels": 4, "factor": 0.15}
@@ -27,7 +27,7 @@ class Truth:
         return all(abs(a / b - 1) <= bar_a + bar_b for a, bar_a in found for b, bar_b in found)
 
 
-def known(scene: Scene) -> Truth:
+def known(scene: Task) -> Truth:
     """Return what was found before."""
     return Truth(*scene.truth, {"stored": scene.truth})
 
@@ -38,7 +38,7 @@ def converge(name: str) -> Truth:
     Raises:
         RuntimeError: if a program breaks down.
     """
-    sources = {"stored": SCENES[name].truth, "NGSolve": _ngsolve(name), "program": _program(name)}
+    sources = {"stored": TASKS[name].truth, "NGSolve": _ngsolve(name), "program": _program(name)}
     best = min(sources.values(), key=lambda found: found[1])
     return Truth(*best, sources)
 

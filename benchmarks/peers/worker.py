@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from benchmarks.peers.scenes import SCENES, Scene
+from benchmarks.peers.tasks import TASKS, Task
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ def answers(solve: Solve, job: dict[str, Any]) -> Iterator[dict[str, Any]]:
     ``seconds`` and ``cpu`` are medians of ``repeats`` runs; with ``warm`` each setting runs once before, otherwise
     the first setting alone does.
     """
-    scene, threads = SCENES[job["scene"]], job.get("threads", 1)
+    scene, threads = TASKS[job["scene"]], job.get("threads", 1)
     for number, setting in enumerate(job["settings"]):
         try:
             if job.get("warm", True) or number == 0:
@@ -48,7 +48,7 @@ def answers(solve: Solve, job: dict[str, Any]) -> Iterator[dict[str, Any]]:
         yield {"setting": setting, **middle, "cpu": cpu, "all_seconds": [run["seconds"] for run in runs]}
 
 
-def _timed(solve: Solve, scene: Scene, threads: int, setting: dict[str, Any]) -> dict[str, Any]:
+def _timed(solve: Solve, scene: Task, threads: int, setting: dict[str, Any]) -> dict[str, Any]:
     gc.collect()
     start, cpu = time.perf_counter(), time.process_time()
     answer = solve(scene, threads, **setting)

@@ -79,7 +79,7 @@ def benchmark(
 
     Example: epsmesh benchmark
     """
-    from benchmarks.work_precision import main
+    from pipeline.verify.work_precision import main
 
     load_solvers()
     for path in main(output, repeats, quick=quick):
@@ -102,8 +102,8 @@ def stress(
 
     Example: epsmesh stress poisson layer
     """
-    from benchmarks.stress import line, run, summary
-    from benchmarks.stress.report import heading
+    from pipeline.verify.stress import line, run, summary
+    from pipeline.verify.stress.report import heading
     from pipeline.workflow import world
 
     load_solvers()

@@ -29,7 +29,7 @@ def guide(
     from pipeline.report.guide import guide as make_guide
     from pipeline.report.guide import quantity
     from pipeline.report.read import read
-    from pipeline.report.settings import DatasetError
+    from pipeline.report.table import DatasetError
 
     for name, value, unit in (("--accuracy", accuracy, ""), ("--budget", budget, "s")):
         try:

@@ -27,7 +27,7 @@ from pipeline.cli.words import (
 from pipeline.plan.describe import story, summary
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.run.remaining import format_seconds
-from pipeline.study.sweep import Case, Study, format_label
+from pipeline.study.sweep import Case, Study
 
 if TYPE_CHECKING:
     from pipeline.run.record import Record
@@ -160,14 +160,14 @@ def find_case(study: Study, text: str) -> Case:
         wanted[name] = _squeezed(value)
     found = [case for case in cases if _matches(case, wanted)]
     if not found:
-        choices = {axis.name: [format_label(axis.name, label) for label in axis.labels] for axis in study.axes}
+        choices = {axis.name: [axis.write(label) for label in axis.labels] for axis in study.axes}
         listed = "; ".join(f"{name} = {', '.join(choices[name])}" for name in wanted)
         fail(f"case {text!r}: there is none; there are {listed}")
     return found[0]
 
 
 def _matches(case: Case, wanted: dict[str, str]) -> bool:
-    labels = {name: _squeezed(format_label(name, value)) for name, value in case.labels}
+    labels = {name: _squeezed(text) for name, text in case.words.items()}
     return all(labels[name] == value for name, value in wanted.items())
 
 

@@ -65,7 +65,7 @@ def report(file: Dataset, output: Output = DEFAULT_OUTPUT) -> None:
 def _read(file: Path, output: Path) -> "tuple[Path, xr.Dataset]":
     """Return the dataset that ``file`` names, in memory, and where it is; exit if there is none."""
     from pipeline.report.read import dataset_path, read
-    from pipeline.report.settings import DatasetError
+    from pipeline.report.table import DatasetError
 
     try:
         return dataset_path(file, output), read(file, output)

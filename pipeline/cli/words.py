@@ -2,6 +2,7 @@
 
 import difflib
 import os
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from pipeline.run.record import Record
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+_PATIENCE = 5.0  # seconds
 _SQLITE = b"SQLite format 3\0"
 DEFAULT_OUTPUT, DEFAULT_MESHES = Path("results"), Path("meshes/cache")
 
@@ -117,9 +119,12 @@ def warn(study: Study) -> None:
 
 
 def fail(text: str) -> NoReturn:
-    """Exit for bad input, with one voice if there are several ranks."""
-    if is_first_rank():
-        error(text)
+    """Exit for bad input, with one voice if there are several ranks: the first one's, if it came to the same."""
+    if not is_first_rank():
+        # All ranks are ended as soon as one leaves with a bad status: the first one must have spoken by then. Who is
+        # still here after that is alone in what it found.
+        time.sleep(_PATIENCE)
+    error(text)
     raise typer.Exit(BAD_INPUT)
 
 

@@ -10,7 +10,8 @@ from itertools import combinations
 
 import numpy as np
 
-from pipeline.mesh.generate import FloatArray, IntArray, MeshArrays
+from pipeline.arrays import FloatArray, IntArray
+from pipeline.mesh.generate import MeshArrays
 from pipeline.scene.model import Scene
 from pipeline.stages import stage
 

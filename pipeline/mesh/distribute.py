@@ -5,15 +5,13 @@ from typing import Any
 
 import dolfinx
 import numpy as np
-import numpy.typing as npt
 from mpi4py import MPI
 
 from pipeline import compat
+from pipeline.arrays import Int32Array, IntArray
 from pipeline.mesh.generate import MeshArrays
 from pipeline.scene.model import MIRROR
 from pipeline.stages import stage
-
-Int32Array = npt.NDArray[np.int32]
 
 
 @dataclass(frozen=True)
@@ -53,7 +51,7 @@ def distribute(comm: MPI.Comm, arrays: MeshArrays | None) -> BodyMesh:
     return BodyMesh(mesh, _find_facets(mesh, surface), count)
 
 
-def _find_facets(mesh: Any, surface: dict[str, npt.NDArray[np.int64]]) -> dict[str, Int32Array]:
+def _find_facets(mesh: Any, surface: dict[str, IntArray]) -> dict[str, Int32Array]:
     """Find the local facets of each group of triangles, given by the input numbers of their corners."""
     topology = mesh.topology
     tdim = topology.dim
@@ -77,5 +75,5 @@ def _find_facets(mesh: Any, surface: dict[str, npt.NDArray[np.int64]]) -> dict[s
     }
 
 
-def _keys(triples: npt.NDArray[np.int64], base: int) -> npt.NDArray[np.int64]:
+def _keys(triples: IntArray, base: int) -> IntArray:
     return (triples[:, 0] * base + triples[:, 1]) * base + triples[:, 2]

@@ -7,15 +7,12 @@ from dataclasses import dataclass, replace
 
 import gmsh
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.arrays import FloatArray, IntArray
 from pipeline.compat import gmsh_session
 from pipeline.mesh.size import Sizes, set_size_field
 from pipeline.scene.model import CUT, FIXED, FREE, MIRROR, PROBE, Scene, SceneError, build
 from pipeline.stages import stage
-
-IntArray = npt.NDArray[np.int64]
-FloatArray = npt.NDArray[np.float64]
 
 # gmsh's HXT is 3 to 6 times faster, but numbers its points by memory address: no two runs give the same mesh,
 # on one thread either (gmsh 4.8.4). The sequential Delaunay algorithm repeats to the last bit.

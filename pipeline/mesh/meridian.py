@@ -15,11 +15,10 @@ from typing import Any, Literal
 
 import dolfinx
 import numpy as np
-import numpy.typing as npt
 from mpi4py import MPI
 
 from pipeline import compat
-from pipeline.mesh.generate import FloatArray, IntArray
+from pipeline.arrays import FloatArray, Int32Array, IntArray
 from pipeline.scene.model import CUT, FIXED, FREE, PROBE
 
 AXIS = "axis"
@@ -115,7 +114,7 @@ def generate_meridian(meridian: Meridian, grading: Grading) -> MeridianArrays:
     return MeridianArrays(points, cells, facets, places, meridian.unit, time.perf_counter() - start)
 
 
-def meridian_mesh(arrays: MeridianArrays) -> tuple[Any, dict[str, npt.NDArray[np.int32]]]:
+def meridian_mesh(arrays: MeridianArrays) -> tuple[Any, dict[str, Int32Array]]:
     """Return the dolfinx mesh of ``arrays`` on this process alone, and the facets of each group."""
     mesh = compat.create_mesh(MPI.COMM_SELF, arrays.cells, arrays.points, order=1)
     topology = mesh.topology

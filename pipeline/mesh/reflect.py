@@ -8,8 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.curve import EDGES
-from pipeline.mesh.generate import FloatArray, IntArray, MeshArrays
+from pipeline.mesh.generate import MeshArrays
 from pipeline.scene.model import MIRROR
 
 # Reflection turns tetrahedra inside out: corners 2 and 3 change places, and with them their edges' mid nodes.

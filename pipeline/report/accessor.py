@@ -6,8 +6,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from pipeline.quantities import MESH_DIMENSIONS
 from pipeline.report.guide import Guide, guide
-from pipeline.report.settings import MESH_AXES, words
+from pipeline.report.pareto import front
+from pipeline.report.table import words
+from pipeline.report.words import formula
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,12 +61,11 @@ class Accessor:
         """
         frame = self.to_frame()
         frame["error"] = (frame["accuracy"] - 1).abs()
-        frame = frame[(frame["status"] == "ok") & frame["error"].notna() & frame["time_total"].notna()]
-        scene = [str(d) for d in self._dataset["force"].dims if d not in MESH_AXES]
-        frame = frame.sort_values([*scene, "time_total", "error"], kind="stable")
-        best = frame.groupby(scene, sort=False)["error"].cummin() if scene else frame["error"].cummin()
-        previous = best.groupby([frame[d] for d in scene], sort=False).shift() if scene else best.shift()
-        return frame[~(frame["error"] >= previous)].reset_index(drop=True)
+        frame = frame[frame["status"] == "ok"]
+        scene = [str(d) for d in self._dataset["force"].dims if d not in MESH_DIMENSIONS]
+        scenes = [rows for _, rows in frame.groupby(scene)] if scene else [frame]
+        best = [label for rows in scenes for label in rows.index[front(rows["time_total"], rows["error"])]]
+        return frame.loc[best].reset_index(drop=True)
 
     def plot_ratio(
         self, ax: "Axes | None" = None, variable: str = "force_ratio", by: str | None = None, **labels: Any
@@ -88,14 +90,14 @@ class Accessor:
             ax = plt.figure(figsize=(5, 3.4), layout="constrained").subplots()
         data = data.isel(epsilon=np.isfinite(data["epsilon"].values)).sortby("epsilon")
         others = [str(d) for d in data.dims if d != "epsilon"]
-        if np.prod([data.sizes[d] for d in others]) <= _MOST_CURVES or {*others} <= {*MESH_AXES, by}:
+        if np.prod([data.sizes[d] for d in others]) <= _MOST_CURVES or {*others} <= {*MESH_DIMENSIONS, by}:
             _draw_curves(ax, data, others)
         else:
             _draw_bands(ax, data, others, by)
         if variable == "force_ratio":
             ax.axhline(1.0, color="black", linewidth=0.7)
         ax.set_xlabel("ε (mm)")
-        ax.set_ylabel({"force_ratio": "$F/F_{max}$", "accuracy": "$F/F_{exact}$"}.get(variable, variable))
+        ax.set_ylabel(formula(variable) if variable in ("force_ratio", "accuracy") else variable)
         if ax.get_legend_handles_labels()[1]:
             ax.legend(fontsize=8)
         return ax
@@ -114,7 +116,7 @@ def _draw_bands(ax: "Axes", data: xr.DataArray, dims: list[str], by: str | None)
     from pipeline.report.figures.style import COLOURS, MARKERS  # noqa: PLC0415 (matplotlib is slow to load)
 
     x = 1e3 * data["epsilon"].values
-    scene = [d for d in dims if d not in (*MESH_AXES, by)]
+    scene = [d for d in dims if d not in (*MESH_DIMENSIONS, by)]
     for number, labels in enumerate(_combinations(data, [d for d in dims if d not in scene])):
         chosen = data.sel(labels)
         colour = COLOURS[number % len(COLOURS)]

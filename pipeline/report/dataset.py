@@ -14,60 +14,17 @@ from pipeline import __version__
 from pipeline.files import atomic
 from pipeline.plan.key import digest
 from pipeline.plan.plan import Plan
+from pipeline.quantities import QUANTITIES, attributes
 from pipeline.run.record import Record
 from pipeline.study.sweep import Axis, Case
 
-# name: (units, long_name) of the variables taken as they are from the records
-_FLOATS = {
-    "force": ("N", "reaction force along the probe's axis, positive against its advance"),
-    "force_error": ("1", "relative error bar (95 %) on force, against the exact solution of the case's scene"),
-    "energy": ("J", "strain energy"),
-    "max_strain": ("1", "largest principal strain of a cell's mean strain; grows as the rim is refined"),
-    "balance": ("1", "relative error of F d = 2 U and of the balance of forces"),
-    "time_mesh": ("s", "time to generate and distribute the mesh"),
-    "time_assemble": ("s", "time to assemble operator and load"),
-    "time_setup": ("s", "time to factorise, or to set up the preconditioner"),
-    "time_solve": ("s", "time to solve and to evaluate the force"),
-    "time_error": ("s", "time spent on the error bar, not in time_total"),
-    "time_total": ("s", "time that this case costs alone"),
-    "memory": ("bytes", "peak memory of all ranks"),
-}
-# Taken from the records of F_exact.
-_EXACT = {
-    "force_exact": ("N", "force converged well below every error in the study, whole body (F_exact)"),
-    "force_exact_error": ("1", "relative error bar (95 %) on force_exact"),
-}
-_COUNTS = {
-    "dofs": ("1", "unknowns of the whole body"),
-    "cells": ("1", "elements of the whole body"),
-    "iterations": ("1", "iterations of the linear solver"),
-}
-_TEXTS = {
-    "status": "ok, failed, skipped, or pending where not yet run",
-    "message": "why a case failed or was skipped",
-    "origin": "how the force was obtained",
-    "force_exact_message": "why there is no force_exact",
-}
-_AXES = {
-    "epsilon": "radius of the fine mesh round the contact (infinite: full order)",
-    "fine": "element size within epsilon of the contact",
-    "coarse": "element size far from the contact",
-    "rim": "element size at the probe's edge",
-    "growth": "growth of the element size with distance",
-    "outside": "what becomes of the body beyond epsilon",
-    "degree": "polynomial degree of the displacement",
-    "young": "Young's modulus",
-    "poisson": "Poisson's ratio",
-    "probe": "probe",
-    "body": "body",
-    "depth": "depth to which the probe is pushed",
-    "contact": "contact between probe and tissue",
-    "mesh_accuracy": "accuracy asked for",
-    "body_radius": "radius of the body",
-    "probe_radius": "radius of the probe",
-    "body_shape": "shape of the body",
-    "probe_shape": "shape of the probe",
-}
+# The variables that are taken as they are from the records of the cases, and from those of F_exact.
+_FLOATS = (
+    "force", "force_error", "energy", "max_strain", "balance", "time_mesh", "time_assemble", "time_setup", "time_solve",
+    "time_error", "time_total", "memory",
+)  # fmt: skip
+_COUNTS = ("dofs", "cells", "iterations")
+_EXACT = ("force_exact", "force_exact_error")
 _MISSING = -1  # of counts, which have no NaN
 
 
@@ -83,20 +40,17 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     keys = plan.reference_keys or [""] * len(flat)
     exact = [_scaled(records.get(key), case) for key, case in zip(keys, study.cases(), strict=True)]
     variables: dict[str, Any] = {}
-    for name, (units, text) in _FLOATS.items():
+    for name in _FLOATS:
         values = [getattr(r, name) if r else nan for r in flat]
-        variables[name] = (dims, array(values, float), {"units": units, "long_name": text})
-    for name, (units, text) in _COUNTS.items():
+        variables[name] = (dims, array(values, float), attributes(name))
+    for name in _COUNTS:
         values = [getattr(r, name) if r and r.status == "ok" else _MISSING for r in flat]
-        attributes = {"units": units, "long_name": text, "missing_value": _MISSING}
-        variables[name] = (dims, array(values, np.int64), attributes)
-    for name, (units, text) in _EXACT.items():
+        variables[name] = (dims, array(values, np.int64), {**attributes(name), "missing_value": _MISSING})
+    for name in _EXACT:
         values = [getattr(r, name.replace("_exact", "")) if r else nan for r in exact]
-        variables[name] = (dims, array(values, float), {"units": units, "long_name": text})
+        variables[name] = (dims, array(values, float), attributes(name))
     vectors = np.array([r.force_vector if r else (nan,) * 3 for r in flat]).reshape(*study.shape, 3)
-    variables["force_vector"] = (
-        (*dims, "component"), vectors, {"units": "N", "long_name": "force of the tissue on the probe"},
-    )  # fmt: skip
+    variables["force_vector"] = ((*dims, "component"), vectors, attributes("force_vector"))
     texts = {
         "status": [r.status if r else "pending" for r in flat],
         "message": [r.message if r else "" for r in flat],
@@ -104,7 +58,7 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
         "force_exact_message": [r.message if r else "" for r in exact],
     }
     for name, words in texts.items():
-        variables[name] = (dims, array(words, object), {"long_name": _TEXTS[name]})
+        variables[name] = (dims, array(words, object), attributes(name))
     coordinates = {axis.name: _coordinate(axis) for axis in study.axes} | {"component": ["x", "y", "z"]}
     dataset = xr.Dataset(variables, coordinates, _attributes(plan, flat, run or {}))
     return _add_ratios(dataset)
@@ -127,17 +81,13 @@ def _add_ratios(dataset: xr.Dataset) -> xr.Dataset:
     elif "epsilon" not in dataset.dims and dataset.attrs["epsilon_is_full"]:
         full_force, full_seconds = force, seconds
     order = force.dims
-    dataset["accuracy"] = (force / dataset["force_exact"]).assign_attrs(units="1", long_name="F / F_exact")
-    dataset["force_max"] = full_force.transpose(*order).assign_attrs(
-        units="N", long_name="force of the full-order mesh of the same study (F_max)"
+    ratios = {
+        "accuracy": force / dataset["force_exact"], "force_max": full_force, "force_ratio": force / full_force,
+        "speedup": full_seconds / seconds,
+    }  # fmt: skip
+    return dataset.assign(
+        {name: values.transpose(*order).assign_attrs(attributes(name)) for name, values in ratios.items()}
     )
-    dataset["force_ratio"] = (force / full_force).transpose(*order).assign_attrs(units="1", long_name="F / F_max")
-    dataset["speedup"] = (
-        (full_seconds / seconds)
-        .transpose(*order)
-        .assign_attrs(units="1", long_name="time of the full-order case over time of this case")
-    )
-    return dataset
 
 
 def _scaled(record: Record | None, case: Case) -> Record | None:
@@ -157,11 +107,12 @@ def _origin(plan: Plan, key: str, record: Record | None) -> str:
 
 
 def _coordinate(axis: Axis) -> Any:
-    attributes = {"long_name": _AXES.get(axis.name, f"{axis.path} of the study file")}
+    known = QUANTITIES.get(axis.name)
+    texts = {"long_name": known.meaning if known else f"{axis.path} of the study file"}
     if axis.unit:
-        attributes["units"] = axis.unit
+        texts["units"] = axis.unit
     values = np.array(axis.labels, dtype=object if isinstance(axis.labels[0], str) else None)
-    return (axis.name, values, attributes)
+    return (axis.name, values, texts)
 
 
 def _attributes(plan: Plan, records: list[Record | None], run: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline.report.settings import DatasetError, Labels, arrange
+from pipeline.report.table import DatasetError, Labels, arrange
 from pipeline.report.verdict import Verdict, choose, judge, keeps, most_accurate
 from pipeline.units import parse_quantity
 

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from math import inf, isfinite
 
+from pipeline.quantities import symbol, write
 from pipeline.report.correction import Correction
 from pipeline.report.guide import Guide
-from pipeline.report.settings import SYMBOLS, Labels, words
+from pipeline.report.table import Labels, words
 from pipeline.report.verdict import Verdict
-from pipeline.study.sweep import format_label
 
 
 def text(guide: Guide) -> str:
@@ -113,9 +113,7 @@ def _constancy(guide: Guide) -> list[str]:
         return []
     ratio = "F/F_max" if guide.has_full else "F/F_exact"
     names_of = heads(guide)
-    rows = [
-        [*names_of, "least", "most", "most - least", "relative", *(f"by {SYMBOLS.get(name, name)}" for name in names)]
-    ]
+    rows = [[*names_of, "least", "most", "most - least", "relative", *(f"by {symbol(name)}" for name in names)]]
     for v in in_order(guide):
         if v.is_judged and isfinite(v.spread.most):
             over = dict(v.spread.over)
@@ -128,7 +126,7 @@ def _constancy(guide: Guide) -> list[str]:
 def heads(guide: Guide) -> list[str]:
     """Return the names of what the settings differ in, ε last."""
     labels = guide.verdicts[0].labels
-    return sorted((SYMBOLS.get(name, name) for name in labels), key="ε".__eq__) or ["setting"]
+    return sorted((symbol(name) for name in labels), key="ε".__eq__) or ["setting"]
 
 
 def cells_of(verdict: Verdict) -> list[str]:
@@ -136,7 +134,7 @@ def cells_of(verdict: Verdict) -> list[str]:
     labels = verdict.labels
     full = {"outside": "any"} if labels.get("epsilon") == inf and "outside" in labels else {}
     names = sorted(labels, key="epsilon".__eq__)
-    return [full.get(name) or format_label(name, labels[name]) for name in names] or ["the only one"]
+    return [full.get(name) or write(name, labels[name]) for name in names] or ["the only one"]
 
 
 def in_order(guide: Guide) -> list[Verdict]:
@@ -170,8 +168,8 @@ def elements(mesh: Labels) -> str:
     parts = []
     if "fine" in mesh:
         full = mesh.get("epsilon", inf) == inf
-        parts.append(f"{format_label('fine', mesh['fine'])} {'everywhere' if full else 'within ε'}")
-        parts += [] if full else [f"{format_label('coarse', mesh['coarse'])} far away"]
+        parts.append(f"{write('fine', mesh['fine'])} {'everywhere' if full else 'within ε'}")
+        parts += [] if full else [f"{write('coarse', mesh['coarse'])} far away"]
         rim = mesh["rim"]
         edge = "a tenth of its half width" if rim is None else f"{1e3 * rim:g} mm"
         parts.append(f"{edge} at the probe's edge")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from pipeline.report.settings import DatasetError
+from pipeline.report.table import DatasetError
 
 # What every dataset of a study has, and figures and report are made from.
 _NEEDED = (

@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline.report import correction
 from pipeline.report.correction import Correction
-from pipeline.report.settings import Labels, Table
+from pipeline.report.table import Labels, Table
 
 
 @dataclass(frozen=True)

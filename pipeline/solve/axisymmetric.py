@@ -17,7 +17,7 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from pipeline.mesh.generate import FloatArray
+from pipeline.arrays import FloatArray
 from pipeline.mesh.meridian import AXIS, Grading, Meridian, MeridianArrays, generate_meridian, meridian_mesh
 from pipeline.scene.model import FIXED, PROBE
 from pipeline.solve.elasticity import BALANCE_LIMIT

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
+from pipeline.arrays import FloatArray
 from pipeline.solve.enrich import energy_decrement
 from pipeline.solve.error import error_bar
 from pipeline.solve.forms import mean_strain_form
@@ -23,7 +24,6 @@ from pipeline.solve.linear import Level, LinearSolver, SolveError, is_direct
 from pipeline.solve.solution import (
     BALANCE_LIMIT,
     TOLERANCE,
-    FloatArray,
     Solution,
     global_sum,
     largest_strain,

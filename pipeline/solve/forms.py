@@ -9,12 +9,12 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
-import numpy.typing as npt
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
 from pipeline import compat
+from pipeline.arrays import BoolArray
 from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import distribute
 from pipeline.mesh.generate import MeshArrays
@@ -25,7 +25,7 @@ from pipeline.solve.straight.stiffness import cell_kernel
 # Marks of cells, and the bulge of an edge, in units of its length, that rounding may leave.
 _ALL, _NEITHER, _STRAIGHT, _CURVED = -1, 0, 1, 2
 _FLAT = 1e-9
-_curved: WeakKeyDictionary[Any, npt.NDArray[np.bool_] | None] = WeakKeyDictionary()
+_curved: WeakKeyDictionary[Any, BoolArray | None] = WeakKeyDictionary()
 
 
 class ElasticForms:
@@ -94,14 +94,14 @@ def form_name(name: str, *spaces: Any) -> str:
     return " ".join([name, *(repr(s.ufl_element()) for s in spaces), f"{compat.geometry_dofs(mesh).shape[1]} nodes"])
 
 
-def curved_cells(mesh: Any) -> npt.NDArray[np.bool_] | None:
+def curved_cells(mesh: Any) -> BoolArray | None:
     """Tell which local cells have a mid node away from the middle of its edge, None if cells have no mid nodes."""
     if mesh not in _curved:
         _curved[mesh] = _find_curved(mesh)
     return _curved[mesh]
 
 
-def _find_curved(mesh: Any) -> npt.NDArray[np.bool_] | None:
+def _find_curved(mesh: Any) -> BoolArray | None:
     nodes = compat.geometry_dofs(mesh)
     if nodes.shape[1] == 4:
         return None

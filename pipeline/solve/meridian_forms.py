@@ -17,7 +17,7 @@ import ufl
 from dolfinx import fem
 
 from pipeline import compat
-from pipeline.mesh.generate import FloatArray, IntArray
+from pipeline.arrays import FloatArray, IntArray
 from pipeline.solve.cache import form_cache
 
 

@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.arrays import FloatArray
 from pipeline.solve.error import error_bar
 from pipeline.solve.forms import mean_strain_form
 from pipeline.solve.linear import Level, SolveError
@@ -33,7 +34,6 @@ from pipeline.solve.saddle import Pair, Saddle, SaddleSolver
 from pipeline.solve.solution import (
     BALANCE_LIMIT,
     TOLERANCE,
-    FloatArray,
     Solution,
     global_sum,
     largest_strain,

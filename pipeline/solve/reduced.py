@@ -16,9 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
+from pipeline.arrays import FloatArray
 from pipeline.solve.elasticity import ElasticBody
 from pipeline.solve.enrich import smallest_eigenvalue
-from pipeline.solve.solution import FloatArray, global_sum
+from pipeline.solve.solution import global_sum
 
 # λ_min is estimated from above, by Lanczos: its share that is relied on.
 _TRUST = 0.5

@@ -5,14 +5,12 @@ from math import isfinite, nan
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem
 from mpi4py import MPI
 
+from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.stages import stage
-
-FloatArray = npt.NDArray[np.float64]
 
 # F·d = 2U and F_probe + F_support = 0 hold for the exact solution of the discrete system, and are linear in the
 # solver's error: what misses them by this much has not been solved.

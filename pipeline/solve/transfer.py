@@ -10,12 +10,11 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from pipeline import compat
+from pipeline.arrays import FloatArray, Int32Array, IntArray
 from pipeline.stages import stage
 
 # What interpolates to less than this does so by rounding.
 _NOTHING = 1e-12
-
-_IntArray = npt.NDArray[np.int32]
 
 
 class Side(Protocol):
@@ -57,7 +56,7 @@ def transfer(coarse: Side, fine: Side) -> PETSc.Mat:
     return matrix
 
 
-def _rows(coarse: Any, fine: Any) -> tuple[npt.NDArray[np.int64], _IntArray, npt.NDArray[np.float64]]:
+def _rows(coarse: Any, fine: Any) -> tuple[IntArray, Int32Array, FloatArray]:
     """Return the interpolation of scalars as sparse rows, one for each point of ``fine`` that this rank owns.
 
     A point's row is that of any cell it belongs to.
@@ -80,13 +79,13 @@ def _rows(coarse: Any, fine: Any) -> tuple[npt.NDArray[np.int64], _IntArray, npt
     return offsets, coarse_cells[np.repeat(cell, count), columns], weights
 
 
-def _on_one_cell(coarse: int, fine: int) -> npt.NDArray[np.float64]:
+def _on_one_cell(coarse: int, fine: int) -> FloatArray:
     """Return the values of the functions of degree ``coarse`` at the points of ``fine`` on the reference cell."""
     low, high = (compat.reference_element(degree) for degree in (coarse, fine))
     return np.asarray(low.tabulate(0, high.points)[0, :, :, 0])
 
 
-def _free(side: Side) -> npt.NDArray[np.float64]:
+def _free(side: Side) -> FloatArray:
     dofmap = side.space.dofmap
     free = np.ones(dofmap.index_map_bs * (dofmap.index_map.size_local + dofmap.index_map.num_ghosts))
     free[side.prescribed] = 0.0

@@ -7,6 +7,7 @@ from functools import cached_property
 from math import inf
 from typing import Any
 
+from pipeline.quantities import write
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.probe import Probe
@@ -40,6 +41,10 @@ class Axis:
         """Where it stands in the study file."""
         return f"{self.section}.{self.key}" if self.key else self.section
 
+    def write(self, label: float | int | str) -> str:
+        """Write one of its labels as people read it."""
+        return write(self.name, label, self.unit)
+
     def __len__(self) -> int:
         return len(self.labels)
 
@@ -68,6 +73,11 @@ class Case:
     def labels(self) -> tuple[tuple[str, float | int | str], ...]:
         """Names and values of what is swept."""
         return tuple((axis.name, axis.labels[i]) for axis, i in zip(self.axes, self.index, strict=True))
+
+    @property
+    def words(self) -> dict[str, str]:
+        """Names of what is swept, and values as people read them."""
+        return {axis.name: axis.write(axis.labels[i]) for axis, i in zip(self.axes, self.index, strict=True)}
 
     @property
     def frame(self) -> Frame:
@@ -110,7 +120,7 @@ class Case:
         return self.mesh.element_for(self.material.poisson)
 
     def __str__(self) -> str:
-        return ", ".join(f"{name} = {format_label(name, value)}" for name, value in self.labels) or "the one case"
+        return ", ".join(f"{name} = {text}" for name, text in self.words.items()) or "the one case"
 
 
 @dataclass(frozen=True)
@@ -166,16 +176,3 @@ class Study:
             (self.sections[name], tuple((i, len(axis)) for i, axis in enumerate(self.axes) if axis.section == name))
             for name in _PARTS
         )
-
-
-def format_label(name: str, value: float | int | str) -> str:
-    """Write an axis label as people read it: lengths in mm, pressures in kPa."""
-    if isinstance(value, str):
-        return value
-    if value == inf:
-        return "full"
-    if name in ("accuracy", "mesh_accuracy"):
-        return f"{100 * value:.3g} %"
-    if name == "young":
-        return f"{value / 1e3:g} kPa"
-    return f"{value:g}" if name in ("poisson", "growth", "degree") else f"{value * 1e3:g} mm"

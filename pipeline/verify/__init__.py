@@ -13,7 +13,7 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     """Yield every comparison as it is made, the same on every rank; ``quick`` leaves a few of each kind; collective."""
     from pipeline.solve.cache import compiling  # noqa: PLC0415 (the folder's face loads no solver)
     from pipeline.verify.elements import element_rows  # noqa: PLC0415
-    from pipeline.verify.scenes import scene_rows  # noqa: PLC0415
+    from pipeline.verify.forces import scene_rows  # noqa: PLC0415
 
     found: list[Row] = []
     if comm.rank == 0:

@@ -5,9 +5,8 @@ surface sinks under each as A. E. H. Love has it (Phil. Trans. R. Soc. A 228, 37
 """
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from pipeline.arrays import FloatArray
 
 
 def rectangle_stiffness(ratio: float, divisions: tuple[int, int] = (16, 32)) -> tuple[float, float]:

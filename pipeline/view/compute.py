@@ -10,6 +10,7 @@ from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
 from pipeline import compat
+from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.mesh.generate import MeshArrays
 from pipeline.mesh.reflect import reflect, reflect_vectors
@@ -25,7 +26,7 @@ from pipeline.run.meshing import cached_arrays, on_first_rank
 from pipeline.solve.linear import is_direct
 from pipeline.solve.spaces import Spaces
 from pipeline.study.sweep import Case, Study
-from pipeline.view.fields import Fields, FloatArray, IntArray
+from pipeline.view.fields import Fields
 
 Note = Callable[[str], None]
 

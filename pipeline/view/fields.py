@@ -4,12 +4,9 @@ from dataclasses import dataclass
 from math import inf
 
 import numpy as np
-import numpy.typing as npt
 
+from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.study.sweep import Case
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -54,6 +51,6 @@ class Fields:
         return np.asarray((6 * np.sqrt(2) * volume) ** (1 / 3))
 
     @property
-    def within_epsilon(self) -> npt.NDArray[np.bool_]:
+    def within_epsilon(self) -> BoolArray:
         """Whether the middle of each cell is nearer to the contact than ε."""
         return np.asarray(np.linalg.norm(self.centres - self.contact, axis=1) <= self.epsilon)

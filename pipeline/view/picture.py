@@ -14,8 +14,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from pipeline.report.figures import save
+from pipeline.view.drawing import FOOTPRINT, INK, MM, Colouring, Drawing
 from pipeline.view.fields import Fields
-from pipeline.view.scene import FOOTPRINT, INK, MM, Colouring, OpenedBody
 
 # Inches, at 200 dots each: 1200 × 720 pixels.
 _WIDTH, _HEIGHT = 6.0, 3.6
@@ -37,7 +37,7 @@ def draw_mesh(fields: Fields, path: Path, title: str) -> Path:
     sizes = MM * fields.sizes
     colouring = Colouring(sizes, "viridis", (float(sizes.min()), float(sizes.max())), logarithmic=True)
     words = f"{len(fields.cells):,} elements" + (", fine everywhere" if fields.epsilon == inf else "")
-    return _compose(fields, OpenedBody(fields, colouring), colouring, "element size (mm)", (title, words), path)
+    return _compose(fields, Drawing(fields, colouring), colouring, "element size (mm)", (title, words), path)
 
 
 def draw_deformed(fields: Fields, path: Path, title: str) -> tuple[Path, float]:
@@ -54,12 +54,12 @@ def draw_deformed(fields: Fields, path: Path, title: str) -> tuple[Path, float]:
     unit, scale = ("µm", 1e6) if largest < _SMALL else ("mm", MM)
     colouring = Colouring(scale * moved, "YlGnBu", (0.0, scale * largest))
     words = "true to scale" if factor == 1 else f"displacement drawn {factor:,.0f} × as large"
-    body = OpenedBody(fields, colouring, factor)
+    body = Drawing(fields, colouring, factor)
     return _compose(fields, body, colouring, f"displacement ({unit})", (title, words), path), factor
 
 
 def _compose(
-    fields: Fields, body: OpenedBody, colouring: Colouring, quantity: str, words: tuple[str, str], path: Path
+    fields: Fields, body: Drawing, colouring: Colouring, quantity: str, words: tuple[str, str], path: Path
 ) -> Path:
     """Put the two views, the scale of colours and the words together."""
     with mpl.rc_context(_STYLE):

@@ -8,8 +8,8 @@ from mpi4py import MPI
 from benchmarks.peers import figure, program, results
 from benchmarks.peers.processes import PEERS_PYTHON, ask
 from benchmarks.peers.results import Run, standings
-from benchmarks.peers.scenes import SCENES
 from benchmarks.peers.settings import GRIDS, LADDERS
+from benchmarks.peers.tasks import TASKS
 from benchmarks.peers.truth import Truth
 from benchmarks.peers.worker import Answer, answers
 
@@ -81,20 +81,20 @@ def test_a_setting_that_fails_does_not_end_the_job():
     assert len(first["all_seconds"]) == 3
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", TASKS)
 def test_this_program_gets_the_truth(name):
-    answer = program.solve(SCENES[name], 1, accuracy="2 %")
-    assert answer.force == pytest.approx(SCENES[name].truth[0], rel=0.02)
+    answer = program.solve(TASKS[name], 1, accuracy="2 %")
+    assert answer.force == pytest.approx(TASKS[name].truth[0], rel=0.02)
     assert {"mesh", "assemble", "setup", "solve"} == set(answer.parts)
 
 
 def test_the_meridian_is_used_where_it_may_be():
-    answer = program.solve(SCENES["cylinder"], 1, accuracy="0.1 %", model="auto")
-    assert answer.force == pytest.approx(SCENES["cylinder"].truth[0], rel=1e-5)
+    answer = program.solve(TASKS["cylinder"], 1, accuracy="0.1 %", model="auto")
+    assert answer.force == pytest.approx(TASKS["cylinder"].truth[0], rel=1e-5)
 
 
 @NEEDS_PEERS
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", TASKS)
 @pytest.mark.parametrize(
     ("peer", "setting", "error"),
     [
@@ -105,12 +105,12 @@ def test_the_meridian_is_used_where_it_may_be():
 )
 def test_peers_get_the_truth_from_above(name, peer, setting, error):
     (answer,) = ask(peer, {"scene": name, "settings": [setting], "warm": False})
-    relative = answer["force"] / SCENES[name].truth[0] - 1
+    relative = answer["force"] / TASKS[name].truth[0] - 1
     assert 0 < relative < error
 
 
 def test_every_ladder_is_of_settings_that_exist():
     for peer, ladders in LADDERS.items():
         known = {key for setting in GRIDS[peer] for key in setting}
-        assert set(ladders) == set(SCENES)
+        assert set(ladders) == set(TASKS)
         assert all(set(setting) <= known for ladder in ladders.values() for setting in ladder)

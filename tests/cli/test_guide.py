@@ -6,7 +6,7 @@ import pytest
 
 from pipeline.report.dataset import write
 from tests.commands import epsmesh
-from tests.report.known import dataset
+from tests.report.chosen import dataset
 
 
 def call(*arguments: object):

@@ -10,8 +10,8 @@ import xarray as xr
 from mpi4py import MPI
 from typer.testing import Result
 
-from tests.cluster.compare import all_done, assert_same
 from tests.commands import epsmesh
+from tests.compare import all_done, assert_same
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="runs studies by itself")
 

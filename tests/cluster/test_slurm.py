@@ -16,7 +16,7 @@ import pytest
 
 from pipeline.run.reading import read_rows
 from pipeline.run.store import StoreError
-from tests.cluster.compare import all_done, assert_same
+from tests.compare import all_done, assert_same
 
 pytestmark = pytest.mark.slurm
 

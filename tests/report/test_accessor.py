@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from pipeline.report import accessor  # noqa: F401 (registers dataset.epsmesh)
-from tests.report.known import TEXT, dataset
+from tests.report.chosen import TEXT, dataset
 from tests.report.synthetic import EPSILONS, FIGURE
 from tests.report.synthetic import dataset as synthetic
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from pipeline.report.figures import KINDS, choose, draw, lacks
-from pipeline.report.figures.accuracy import front
 from pipeline.report.figures.axis import horizontal
 from pipeline.report.figures.layout import arrange
 from pipeline.report.figures.style import COLOURS
+from pipeline.report.pareto import front
 from tests.report.synthetic import EPSILONS, FIGURE, dataset
 
 EXACT = {"exact": True}

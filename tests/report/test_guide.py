@@ -9,8 +9,8 @@ import pytest
 from pipeline.cli.console import plain
 from pipeline.report.correction import fit, r_without
 from pipeline.report.guide import guide, quantity
-from pipeline.report.settings import DatasetError, arrange
-from tests.report.known import BAR, EXACT_BAR, TEXT, dataset
+from pipeline.report.table import DatasetError, arrange
+from tests.report.chosen import BAR, EXACT_BAR, TEXT, dataset
 from tests.report.synthetic import FIGURE
 from tests.report.synthetic import dataset as synthetic
 

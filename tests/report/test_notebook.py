@@ -10,7 +10,7 @@ from jupyter_client.kernelspec import KernelSpecManager
 from nbclient import NotebookClient
 
 from pipeline.report.dataset import write
-from tests.report.known import TEXT, dataset
+from tests.report.chosen import TEXT, dataset
 
 ROOT = Path(__file__).parents[2]
 NOTEBOOK = ROOT / "notebooks" / "analysis.ipynb"

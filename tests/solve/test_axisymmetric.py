@@ -1,6 +1,6 @@
 """The solver for round scenes obeys mechanics: closed forms, published tables, limits, invariances, its error bar."""
 
-from math import inf, log, pi
+from math import inf, pi
 
 import numpy as np
 import pytest
@@ -9,14 +9,7 @@ from pipeline.mesh.meridian import Grading, Meridian, generate_meridian
 from pipeline.solve.axisymmetric import compile_axisymmetric, solve_axisymmetric
 from pipeline.solve.cache import compiling
 from pipeline.solve.linear import SolveError
-
-# F / (E d · 1 mm) of the cylinder R = H = 50 mm under a disc of 3 mm, by another program, converged to 1e-7.
-REFERENCE = {
-    (True, 0.3): 7.126315, (True, 0.45): 7.943726, (True, 0.49): 8.325817,
-    (False, 0.3): 6.921313, (False, 0.45): 7.922109, (False, 0.49): 8.325029,
-}  # fmt: skip
-# Hayes et al., J. Biomech. 5, 1972, ν = 0.3: a layer of thickness h bonded to a rigid base, F = κ·2E a d/(1-ν²).
-HAYES = {0.2: 1.207, 0.4: 1.472, 0.6: 1.784, 0.8: 2.124, 1.0: 2.480}
+from pipeline.verify import known
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -26,11 +19,11 @@ def _forms():
             compile_axisymmetric(degree)
 
 
-@pytest.mark.parametrize(("bonded", "poisson"), REFERENCE)
-def test_reference_cylinder(bonded, poisson):
-    solution = solve_axisymmetric(Meridian(50e-3, 50e-3, 3e-3), poisson, bonded)
-    error = solution.force / 1e-3 / REFERENCE[bonded, poisson] - 1
-    assert abs(error) < 2e-7
+@pytest.mark.parametrize(("contact", "poisson"), known.CYLINDER)
+def test_reference_cylinder(contact, poisson):
+    solution = solve_axisymmetric(Meridian(50e-3, 50e-3, 3e-3), poisson, contact == "bonded")
+    error = solution.force / 1e-3 / known.CYLINDER[contact, poisson] - 1
+    assert abs(error) < known.CYLINDER_ERROR
     assert solution.force_error < 1e-5
     assert solution.balance < 1e-9
 
@@ -39,18 +32,14 @@ def test_reference_cylinder(bonded, poisson):
 @pytest.mark.parametrize("bonded", [True, False])
 def test_half_space(bonded, poisson):
     """In a body a million times as wide as the disc F is that of a half-space (closed forms), to 1e-6."""
-    if not bonded:
-        exact = 2 / (1 - poisson**2)
-    else:
-        x = 1 - 2 * poisson  # ln(3 - 4ν)/(1 - 2ν) = ln(1 + 2x)/x, which is 2 for ν = 1/2
-        exact = 4 / (2 * (1 + poisson)) * (log(1 + 2 * x) / x if x else 2)
+    exact, _ = known.half_space_disc(1.0, poisson, 1.0, 1.0, "bonded" if bonded else "frictionless")
     assert solve_axisymmetric(Meridian(1e6, 1e6, 1), poisson, bonded).force == pytest.approx(exact, rel=3e-6)
 
 
-@pytest.mark.parametrize("ratio", HAYES)
+@pytest.mark.parametrize("ratio", known.LAYER)
 def test_layer_on_rigid_base(ratio):
     force = solve_axisymmetric(Meridian(100, 1 / ratio, 1), 0.3, False).force
-    assert force / (2 / (1 - 0.3**2)) == pytest.approx(HAYES[ratio], rel=3e-3)
+    assert force == pytest.approx(known.layer(ratio, 1.0, 1.0, 1.0), rel=3e-3)
 
 
 @pytest.mark.parametrize("column", [inf, 1.0])

@@ -7,6 +7,7 @@ from mpi4py import MPI
 from typer.testing import CliRunner
 
 from pipeline import cli, verify
+from pipeline.verify import known
 from pipeline.verify.boundary import rectangle_stiffness
 from pipeline.verify.coverage import Coverage, Trial, trials
 from pipeline.verify.row import Row
@@ -31,10 +32,20 @@ def test_a_force_two_bars_off_is_out(rows):
             assert not replace(row, value=float("nan")).is_right
 
 
-@pytest.mark.parametrize(("ratio", "published"), [(1, 1.1523), (2, 1.671), (4, 2.543), (8, 4.036)])
+@pytest.mark.parametrize(("ratio", "published"), known.RECTANGLE.items())
 def test_boundary_elements_agree_with_published_rectangles(ratio, published):
     value, error = rectangle_stiffness(ratio)
     assert value == pytest.approx(published, rel=error + 5e-4)
+
+
+def test_closed_forms_meet_in_their_limits():
+    """A round ellipse is a disc, a long one a line; incompressible tissue does not feel whether a disc is bonded."""
+    disc, _ = known.half_space_disc(1e4, 0.3, 1e-3, 1e-5, "frictionless")
+    assert known.half_space_ellipse(1e4, 0.3, (1e-3, 1e-3), 1e-5)[0] == pytest.approx(disc)
+    wide = [known.half_space_ellipse(1e4, 0.3, axes, 1e-5)[0] for axes in ((1e-3, 2e-3), (2e-3, 1e-3), (1e-3, 1e-3))]
+    assert wide[0] == wide[1] > wide[2]
+    bonded, free = (known.half_space_disc(1e4, 0.5, 1e-3, 1e-5, contact)[0] for contact in ("bonded", "frictionless"))
+    assert bonded == pytest.approx(free)
 
 
 def test_error_bars_of_random_scenes_hold():

@@ -11,7 +11,8 @@ from pipeline.report.figures.dimensions import mesh_dimensions, with_error
 from pipeline.report.figures.layout import Selection, arrange
 from pipeline.report.figures.panels import grid, panels
 from pipeline.report.figures.style import PAPER, finish, look
-from pipeline.report.words import choices, number, symbol
+from pipeline.report.pareto import front
+from pipeline.report.words import choices, heading, number, symbol
 
 _MOST_NAMED = 6
 # Share of a panel's height that two names keep apart.
@@ -35,7 +36,7 @@ def accuracy(dataset: xr.Dataset, title: str, warning: str) -> Figure:
         panel.ax.set_title(panel.title)
         mark_floor(panel.ax, panel.data)
         if panel.is_last:
-            panel.ax.set_xlabel("run time of the case (s)")
+            panel.ax.set_xlabel(heading(dataset["time_total"]))
         if panel.is_first:
             panel.ax.set_ylabel(f"$|F/F_{{{reference}}}-1|$ (%)")
     log_axis(figure.axes[0], *bounds(100 * data["error"].values, 1.6))
@@ -76,11 +77,3 @@ def _some(best: np.ndarray, error: np.ndarray) -> list[int]:
         if all(abs(height[i] - height[j]) > _APART * span for j in chosen):
             chosen.append(int(i))
     return chosen[:_MOST_NAMED]
-
-
-def front(seconds: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Return the indices of the cases that no other one beats in both time and error, the fastest first."""
-    order = np.lexsort((error, seconds))
-    order = order[np.isfinite(seconds[order]) & np.isfinite(error[order])]
-    best = np.minimum.accumulate(error[order])
-    return order[error[order] < np.concatenate([[np.inf], best[:-1]])]

@@ -12,6 +12,7 @@ from pipeline.report.figures.dimensions import main_dimension, refinements, with
 from pipeline.report.figures.layout import Layout, arrange
 from pipeline.report.figures.panels import Panel, draw_curves, grid, panels
 from pipeline.report.figures.style import QUIET, finish, look
+from pipeline.report.words import heading
 
 _QUANTITIES = ("error", "dofs")
 
@@ -55,7 +56,7 @@ def _over_unknowns(panel: Panel, layout: Layout) -> None:
         known = known[np.argsort(x[known], kind="stable")]
         panel.ax.plot(x[known], y[known], **look(position))
     log_axis(panel.ax, *bounds(panel.data["dofs"].values), which="x")
-    panel.ax.set_xlabel("unknowns of the whole body")
+    panel.ax.set_xlabel(heading(panel.data["dofs"]))
 
 
 def _shown(data: xr.Dataset, layout: Layout) -> np.ndarray:

@@ -3,16 +3,16 @@
 import numpy as np
 import xarray as xr
 
+from pipeline.quantities import MESH_DIMENSIONS
 from pipeline.report.words import is_numeric
 
 # What refines a mesh, the most telling first: the rim rules the error.
 _REFINEMENTS = ("epsilon", "rim", "fine", "coarse", "growth", "mesh_accuracy")
-_MESH = (*_REFINEMENTS, "degree", "outside", "element", "model", "mesh")
 
 
 def mesh_dimensions(dataset: xr.Dataset) -> list[str]:
     """Return the dimensions that change the mesh and not the scene."""
-    return [str(dim) for dim in dataset["force"].dims if dim in _MESH]
+    return [str(dim) for dim in dataset["force"].dims if dim in MESH_DIMENSIONS]
 
 
 def refinements(dataset: xr.Dataset) -> list[str]:

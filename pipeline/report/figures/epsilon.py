@@ -11,6 +11,7 @@ from pipeline.report.figures.axis import log_axis
 from pipeline.report.figures.layout import arrange
 from pipeline.report.figures.panels import draw_curves, grid, panels
 from pipeline.report.figures.style import CLAIM, LINE, finish
+from pipeline.report.words import formula, heading
 
 # The paper's claims: 80 % of F_max at ε = 10 mm, 50 times faster.
 CLAIM_EPSILON, CLAIM_RATIO, CLAIM_SPEEDUP = 10e-3, 0.8, 50.0
@@ -41,7 +42,8 @@ def _against_epsilon(dataset: xr.Dataset, quantities: Sequence[str], title: str,
         else:
             _mark_speedup(panel.ax, first=panel.is_first)
         if panel.is_first:
-            panel.ax.set_ylabel("$F/F_{max}$" if panel.quantity == "force_ratio" else "speed-up $t_{full}/t$")
+            is_ratio = panel.quantity == "force_ratio"
+            panel.ax.set_ylabel(formula("force_ratio") if is_ratio else heading(dataset["speedup"]))
     finish(figure, title, layout.note, warning)
     return figure
 

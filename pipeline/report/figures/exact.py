@@ -9,6 +9,7 @@ from pipeline.report.figures.dimensions import main_dimension
 from pipeline.report.figures.layout import arrange
 from pipeline.report.figures.panels import draw_curves, grid, panels
 from pipeline.report.figures.style import LINE, QUIET, finish
+from pipeline.report.words import formula
 
 # From such a ratio on, the axis is logarithmic.
 _FAR = 3.0
@@ -28,7 +29,7 @@ def exact(dataset: xr.Dataset, title: str, warning: str) -> Figure:
         if high > _FAR:
             log_axis(panel.ax, min(0.7, max(low, 0.1)), high)
         if panel.is_first:
-            panel.ax.set_ylabel("$F/F_{exact}$")
+            panel.ax.set_ylabel(formula("accuracy"))
     note = "bars: 95 % error bars of F; grey band: that of F_exact"
     finish(figure, title, "; ".join(filter(None, (note, layout.note))), warning)
     return figure

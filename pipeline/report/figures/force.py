@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from pipeline.report.figures.layout import arrange
 from pipeline.report.figures.panels import Panel, draw_curves
 from pipeline.report.figures.style import FAILED, QUIET, finish, look, new_figure
-from pipeline.report.words import choices
+from pipeline.report.words import choices, heading
 
 _COLUMNS, _MOST_PANELS, _MOST_CURVES = 3, 6, 4
 _LEGEND_ROOM = 0.25  # of a panel's height, above the points
@@ -33,7 +33,7 @@ def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     if not dims:
         _draw_one(axes[0, 0], dataset)
     for ax in axes[:, 0]:
-        ax.set_ylabel("reaction force F (mN)")
+        ax.set_ylabel(heading(dataset["force"]))
     left_out = f"; not shown: against {', '.join(swept[_MOST_PANELS:])}" if swept[_MOST_PANELS:] else ""
     finish(figure, title, f"bars: 95 % error bars{left_out}", warning, legend=False)
     return figure

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from pipeline.quantities import QUANTITIES
 from pipeline.report.words import choice, choices, is_numeric, symbol
 
 Selection = dict[str, Any]
@@ -15,9 +16,6 @@ Selection = dict[str, Any]
 MOST_CURVES, MOST_COLUMNS, MOST_ROWS = 7, 3, 3
 # Quantities that differ by less than this along a dimension do not depend on it: E scales F and leaves F/F_max.
 _IDLE = 1e-7
-# Where a dimension finds no place, its finest mesh is shown.
-_FINEST = {"epsilon": np.argmax, "degree": np.argmax, "fine": np.argmin, "rim": np.argmin, "coarse": np.argmin,
-           "growth": np.argmin, "mesh_accuracy": np.argmin}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -120,7 +118,10 @@ def _representative(dataset: xr.Dataset, dim: str, x: str | None) -> Any:
     if dim == "epsilon" and x == "outside" and np.isfinite(values).any():
         finite = np.sort(values[np.isfinite(values)])
         return finite[len(finite) // 2]
-    return values[int(_FINEST[dim](values))] if dim in _FINEST else values[0]
+    finest = QUANTITIES[dim].finest if dim in QUANTITIES else ""
+    if not finest:
+        return values[0]
+    return values.max() if finest == "largest" else values.min()
 
 
 def title_of(dataset: xr.Dataset, *parts: Selection) -> str:

@@ -8,21 +8,19 @@ import numpy as np
 import xarray as xr
 from markupsafe import Markup
 
+from pipeline.quantities import QUANTITIES
 from pipeline.report.words import is_numeric, number, scale, symbol
 
 # Rows in the page before anybody asks for more; the script's number, too.
 FIRST_ROWS = 200
 _STATES = ("failed", "pending", "skipped", "ok")  # the order of the rows
-# name: heading, whether it is shown at first
-_QUANTITIES = {
-    "force": ("F", True), "force_error": ("± F", True), "force_ratio": ("F/F_max", True),
-    "accuracy": ("F/F_exact", True), "force_exact_error": ("± F_exact", False), "speedup": ("speed-up", True),
-    "time_total": ("time", True), "dofs": ("unknowns", False), "cells": ("cells", False),
-    "iterations": ("iterations", False), "time_mesh": ("mesh", False), "time_assemble": ("assembly", False),
-    "time_setup": ("set-up", False), "time_solve": ("solve", False), "time_error": ("error bar", False),
-    "memory": ("memory", False), "max_strain": ("largest strain", False), "energy": ("energy", False),
-    "balance": ("imbalance", False),
-}  # fmt: skip
+# The columns of numbers; some are shown only when asked for.
+_QUANTITIES = (
+    "force", "force_error", "force_ratio", "accuracy", "force_exact_error", "speedup", "time_total", "dofs", "cells",
+    "iterations", "time_mesh", "time_assemble", "time_setup", "time_solve", "time_error", "memory", "max_strain",
+    "energy", "balance",
+)  # fmt: skip
+_SHOWN = {"force", "force_error", "force_ratio", "accuracy", "speedup", "time_total"}
 _DIGITS = 4
 
 
@@ -80,10 +78,10 @@ def case_table(dataset: xr.Dataset) -> Table:
     numbers = Column("case", "case", list(range(size)), "the number by which `epsmesh explain` knows it")
     axes = [_axis(dataset, dim, position, dims) for position, dim in enumerate(dims)]
     quantities = [_quantity(dataset[name].transpose(*dims), name) for name in _QUANTITIES if name in dataset]
-    status = _texts("status", "status", states, "ok, failed, skipped, or pending where not yet run", is_filter=True)
-    origin = _texts("origin", "origin", dataset["origin"].transpose(*dims).values.ravel(), "how F was obtained",
+    status = _texts("status", states, QUANTITIES["status"].meaning, is_filter=True)
+    origin = _texts("origin", dataset["origin"].transpose(*dims).values.ravel(), QUANTITIES["origin"].meaning,
                     is_filter=True, is_first=False)  # fmt: skip
-    message = _texts("message", "message", dataset["message"].transpose(*dims).values.ravel(), "why there is no force")
+    message = _texts("message", dataset["message"].transpose(*dims).values.ravel(), "why there is no force")
     known = [column for column in quantities if any(value is not None for value in column.values)]
     told = [column for column in (origin, message) if any(column.words or ())]
     rank = {state: position for position, state in enumerate(_STATES)}
@@ -102,7 +100,7 @@ def _axis(dataset: xr.Dataset, dim: str, position: int, dims: list[str]) -> Colu
 
 
 def _quantity(array: xr.DataArray, name: str) -> Column:
-    heading, is_first = _QUANTITIES[name]
+    heading = symbol(array)
     factor, unit = scale(array)
     hint = str(array.attrs.get("long_name", name))
     if np.issubdtype(array.dtype, np.integer):
@@ -110,7 +108,7 @@ def _quantity(array: xr.DataArray, name: str) -> Column:
     else:
         flat = array.values.ravel()
         values = [_rounded(value, name, factor) if np.isfinite(value) else None for value in flat]
-    return Column(name, f"{heading} ({unit})" if unit else heading, values, hint, is_first=is_first)
+    return Column(name, f"{heading} ({unit})" if unit else heading, values, hint, is_first=name in _SHOWN)
 
 
 def _rounded(value: float, name: str, factor: float) -> float | int:
@@ -120,10 +118,8 @@ def _rounded(value: float, name: str, factor: float) -> float | int:
     return float(f"{value * factor:.{_DIGITS + 2 if name in ('force_ratio', 'accuracy') else _DIGITS}g}")
 
 
-def _texts(
-    name: str, heading: str, values: Any, hint: str, *, is_filter: bool = False, is_first: bool = True
-) -> Column:
+def _texts(name: str, values: Any, hint: str, *, is_filter: bool = False, is_first: bool = True) -> Column:
     texts = [str(value) for value in values]
     words = list(dict.fromkeys(texts))
     codes = {word: code for code, word in enumerate(words)}
-    return Column(name, heading, [codes[text] for text in texts], hint, words, is_filter=is_filter, is_first=is_first)
+    return Column(name, name, [codes[text] for text in texts], hint, words, is_filter=is_filter, is_first=is_first)

@@ -6,7 +6,7 @@ import xarray as xr
 
 from pipeline.report.guide import guide
 from pipeline.report.guide_text import answer, cells_of, heads, in_order, number, percent, time
-from pipeline.report.settings import DatasetError
+from pipeline.report.table import DatasetError
 from pipeline.report.verdict import Verdict
 
 # The accuracy that the report asks for; `epsmesh guide` answers for any.

@@ -11,16 +11,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline import compat
-from pipeline.solve.straight.pattern import (
-    BoolArray,
-    FloatArray,
-    Pattern,
-    corners,
-    library,
-    pattern,
-    reference,
-    straight_cells,
-)
+from pipeline.arrays import BoolArray, FloatArray
+from pipeline.solve.straight.pattern import Pattern, corners, library, pattern, reference, straight_cells
 
 
 def mass(pressures: Any, curved: BoolArray | None) -> PETSc.Mat:

@@ -6,15 +6,11 @@ from typing import Any
 
 import basix
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 
 from pipeline import compat
+from pipeline.arrays import BoolArray, FloatArray, Int32Array
 from pipeline.solve.straight.native import Library
-
-IntArray = npt.NDArray[np.int32]
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 _DECLARATIONS = """
 void find_entries(int rows, int height, int width, const int* dofs, const int* offsets, const int* columns,
@@ -44,9 +40,9 @@ class Pattern:
     ``places`` has the shape (cells, points of the rows' space, points of the columns' space).
     """
 
-    offsets: IntArray
-    columns: IntArray
-    places: IntArray
+    offsets: Int32Array
+    columns: Int32Array
+    places: Int32Array
 
 
 def pattern(rows: Any, columns: Any) -> Pattern:
@@ -65,7 +61,7 @@ def pattern(rows: Any, columns: Any) -> Pattern:
     return Pattern(graph.indptr, graph.indices, places)
 
 
-def straight_cells(curved: BoolArray | None, count: int) -> IntArray:
+def straight_cells(curved: BoolArray | None, count: int) -> Int32Array:
     """Return the numbers of those of ``count`` cells that are not ``curved``, None if none is."""
     every = np.arange(count, dtype=np.int32)
     return every if curved is None else every[~curved]
@@ -86,7 +82,7 @@ def reference(degree: int, quadrature: int) -> tuple[FloatArray, FloatArray, Flo
     return weights, table[0], table[1:4]
 
 
-def _cells_and_points(space: Any) -> tuple[IntArray, Any]:
+def _cells_and_points(space: Any) -> tuple[Int32Array, Any]:
     """Return the points of each cell, as an array and as a sparse matrix of cells × points."""
     dofs = np.ascontiguousarray(compat.cell_dofs(space))
     count, width = dofs.shape

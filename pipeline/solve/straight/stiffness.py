@@ -7,16 +7,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline import compat
-from pipeline.solve.straight.pattern import (
-    BoolArray,
-    FloatArray,
-    IntArray,
-    corners,
-    library,
-    pattern,
-    reference,
-    straight_cells,
-)
+from pipeline.arrays import BoolArray, FloatArray, Int32Array
+from pipeline.solve.straight.pattern import corners, library, pattern, reference, straight_cells
 
 
 class StraightStiffness:
@@ -26,7 +18,7 @@ class StraightStiffness:
     (unrolled) whose rows and columns the operator does not have.
     """
 
-    def __init__(self, space: Any, curved: BoolArray | None, prescribed: IntArray):
+    def __init__(self, space: Any, curved: BoolArray | None, prescribed: Int32Array):
         self._dofs = np.ascontiguousarray(compat.cell_dofs(space))
         self._which = straight_cells(curved, len(self._dofs))
         self._corners = corners(space.mesh)
@@ -68,7 +60,7 @@ class StraightStiffness:
         blocks[self._diagonal] = diagonal
 
     @cached_property
-    def _unblocked(self) -> IntArray:
+    def _unblocked(self) -> Int32Array:
         """Where the entries of each block are in sparse rows without blocks, shape (blocks, 9), by columns."""
         offsets = self._pattern.offsets
         width = np.diff(offsets)

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from math import isfinite
 
-from benchmarks.stress.cell import Result
+from pipeline.verify.stress.cell import Result
 
 _LINE = "{:8} {:30} {:56} {:>12} {:>12} {:>5} {:>8} {:>6}  {}"
 _LONGEST = 110  # characters of a message in the table; the JSON has all of it

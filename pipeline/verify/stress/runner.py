@@ -8,14 +8,14 @@ from typing import Any
 
 from mpi4py import MPI
 
-from benchmarks.stress.cell import Cell, Result, judge, refused
-from benchmarks.stress.ranks import PATH, compute_on, why_not
-from benchmarks.stress.rows import cells
 from pipeline.plan.plan import make_plan
 from pipeline.run.execute import compute
 from pipeline.run.record import Record
 from pipeline.study.load import parse
 from pipeline.study.problems import StudyError
+from pipeline.verify.stress.cell import Cell, Result, judge, refused
+from pipeline.verify.stress.ranks import PATH, compute_on, why_not
+from pipeline.verify.stress.rows import cells
 
 
 def run(comm: MPI.Comm, names: Collection[str] | None = None, *, quick: bool = False) -> Iterator[Result]:

@@ -10,15 +10,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from pipeline.quantities import MESH_DIMENSIONS, symbol, write
 from pipeline.study.load import parse
 from pipeline.study.problems import StudyError
-from pipeline.study.schema import Mesh
-from pipeline.study.sweep import Case, Study, format_label
+from pipeline.study.sweep import Case, Study
 
-# The dimensions that say how a scene is meshed ("mesh": an array of tables); every other one belongs to the scene.
-MESH_AXES = ("mesh", "mesh_accuracy", *(key for key in Mesh.model_fields if key not in ("name", "accuracy")))
-# What people call them.
-SYMBOLS = {"epsilon": "ε", "poisson": "ν", "young": "E", "mesh_accuracy": "accuracy"}
 Labels = dict[str, Any]
 
 
@@ -76,7 +72,7 @@ def arrange(dataset: xr.Dataset) -> Table:
             "run its study with `exact = true` in [solve]"
         )
     dims = [str(dim) for dim in dataset["force"].dims]
-    rows, columns = [d for d in dims if d in MESH_AXES], [d for d in dims if d not in MESH_AXES]
+    rows, columns = [d for d in dims if d in MESH_DIMENSIONS], [d for d in dims if d not in MESH_DIMENSIONS]
     settings, scenes = _labels(dataset, rows), _labels(dataset, columns)
     keep = _distinct(settings)
 
@@ -111,8 +107,8 @@ def words(labels: Labels) -> str:
     """Write labels as people read them."""
     parts = []
     for name, value in labels.items():
-        text = format_label(name, value)
-        parts.append(f"outside {text}" if name == "outside" else f"{SYMBOLS.get(name, name)} = {text}")
+        text = write(name, value)
+        parts.append(f"outside {text}" if name == "outside" else f"{symbol(name)} = {text}")
     return ", ".join(parts) or "the one setting"
 
 

@@ -17,8 +17,6 @@ import xarray as xr
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
-from benchmarks.machine import machine
-from benchmarks.work_precision_figure import draw
 from pipeline.mesh.meridian import Meridian
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import write
@@ -26,12 +24,13 @@ from pipeline.run.execute import compute
 from pipeline.run.record import Record
 from pipeline.solve.axisymmetric import solve_axisymmetric
 from pipeline.study.load import parse
+from pipeline.verify import known
+from pipeline.verify.machine import machine
+from pipeline.verify.work_precision_figure import draw
 
 NAME = "work_precision"
 POISSON = (0.3, 0.49)
 YOUNG, DEPTH = 10e3, 1e-4
-# F / (E d) in m, converged to 1e-7 (docs/accuracy.md).
-EXACT = {0.3: 7.126315e-3, 0.49: 8.325817e-3}
 
 
 @dataclass(frozen=True)
@@ -109,7 +108,7 @@ def _point(
     name: str, nu: float, level: int, mesh: dict[str, Any], without: tuple[str, ...], repeats: int
 ) -> Point:  # fmt: skip
     study = parse({
-        "body": {"shape": "cylinder", "radius": "50 mm", "height": "50 mm"},
+        "body": known.CYLINDER_BODY,
         "material": {"young": "10 kPa", "poisson": nu},
         "probe": {"shape": "disc", "radius": "3 mm", "depth": "0.1 mm"},
         "mesh": mesh,
@@ -123,11 +122,15 @@ def _point(
             raise RuntimeError(f"{name}, ν = {nu:g}: {record.message}")
         runs.append(record)
     median = {n: statistics.median(getattr(r, n) for r in runs[1:]) for n in ("time_total", "time_error")}
-    error = record.force / (EXACT[nu] * YOUNG * DEPTH) - 1
+    error = record.force / _exact(nu) - 1
     return Point(
         name, nu, level, error, record.force_error, median["time_total"], median["time_error"], record.dofs,
         record.iterations,
     )  # fmt: skip
+
+
+def _exact(nu: float) -> float:
+    return known.CYLINDER["bonded", nu] * 1e-3 * YOUNG * DEPTH
 
 
 def _meridians(nu: float, repeats: int) -> Iterator[Point]:
@@ -141,7 +144,7 @@ def _meridians(nu: float, repeats: int) -> Iterator[Point]:
         ]
         seconds = statistics.median(r.time_mesh + r.time_assemble + r.time_setup + r.time_solve for r in runs[1:])
         last = runs[-1]
-        error = last.force / (EXACT[nu] * YOUNG * DEPTH) - 1
+        error = last.force / _exact(nu) - 1
         yield Point("axisymmetric, by degree", nu, level, error, last.force_error, seconds, 0.0, last.dofs, 1)
 
 

@@ -10,15 +10,15 @@ from typing import Any
 
 from mpi4py import MPI
 
-from benchmarks.machine import MPI_ENVIRONMENT
 from pipeline.plan.plan import make_plan
 from pipeline.run.execute import compute
 from pipeline.run.record import Record
 from pipeline.study.load import parse
+from pipeline.verify.machine import MPI_ENVIRONMENT
 
 # Cells are solved in three dimensions, with the mesh that they give; the references of round scenes are not.
 PATH = ("axisymmetric",)
-_ROOT = Path(__file__).parents[2]
+_ROOT = Path(__file__).parents[3]
 _MARK = "record "
 _LAUNCHER = ("OMPI_", "PMIX_", "PRTE_")
 _LONGEST = 300  # seconds

@@ -1,4 +1,4 @@
-"""The three-dimensional scene of a picture: the body cut open, ε and footprint upon it, seen from two distances."""
+"""The drawing in three dimensions: the body cut open, ε and footprint upon it, seen from two distances."""
 
 import os
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.arrays import FloatArray
 from pipeline.scene.model import PROBE
 from pipeline.view.fields import Fields
 
@@ -31,13 +32,13 @@ _FROM = (1.0, 0.45, 0.6)
 class Colouring:
     """What colours the body: a value for each point or each cell, and the map from values to colours."""
 
-    values: npt.NDArray[np.float64]
+    values: FloatArray
     cmap: str
     limits: tuple[float, float]
     logarithmic: bool = False
 
 
-class OpenedBody:
+class Drawing:
     """The part of a case's body behind the plane through the contact, deformed by ``factor`` times its displacement.
 
     Lengths are in mm, as people read them.
@@ -127,7 +128,7 @@ class OpenedBody:
             lines = lines.translate(2e-3 * self._surface.length * self._towards_eye())
             plotter.add_mesh(lines, color=colour, line_width=width, lighting=False)
 
-    def _towards_eye(self) -> npt.NDArray[np.float64]:
+    def _towards_eye(self) -> FloatArray:
         front, up = -self._sign * np.eye(3)[self._axis], np.eye(3)[2]
         direction = sum(share * vector for share, vector in zip(_FROM, (front, np.cross(up, front), up), strict=True))
         return np.asarray(direction / np.linalg.norm(direction))

@@ -7,9 +7,9 @@ from math import inf, isnan, nan
 import pytest
 from mpi4py import MPI
 
-from benchmarks.stress import Cell, Result, cells, judge, run, summary, table, to_json
-from benchmarks.stress import runner as stress_runner
 from pipeline.run.record import Record
+from pipeline.verify.stress import Cell, Result, cells, judge, run, summary, table, to_json
+from pipeline.verify.stress import runner as stress_runner
 
 WORLD = MPI.COMM_WORLD
 CELL = Cell("row", "value", {})

@@ -1,0 +1,144 @@
+"""What is swept, measured and reported: unit, meaning and symbol of each quantity, in one table.
+
+The long names and units of a dataset, the labels of the command line, the words of guide, figures and pages: all of
+them are from here. Values are SI; people read mm, kPa, mN and per cent.
+"""
+
+from dataclasses import dataclass
+from math import inf, isnan, pi
+from typing import Literal
+
+Value = float | int | str
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A dimension or a variable of a dataset.
+
+    ``unit`` is SI's, "1" for plain numbers and "" for words; ``meaning`` is the long name in a dataset. ``symbol``
+    stands for it where room is short (without one, its name does), ``axis`` at the axis of a figure (without one, its
+    meaning). ``finest`` says at which end of its values the mesh is the finest.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    symbol: str = ""
+    axis: str = ""
+    in_per_cent: bool = False
+    finest: Literal["smallest", "largest", ""] = ""
+
+
+# The dimensions that say how a scene is meshed ("mesh": an array of tables); every other one belongs to the scene.
+_MESH = (
+    Quantity("epsilon", "m", "radius of the fine mesh round the contact (infinite: full order)", "ε",
+             "ε-mesh radius ε", finest="largest"),
+    Quantity("rim", "m", "element size at the probe's edge", axis="element size at the rim", finest="smallest"),
+    Quantity("fine", "m", "element size within epsilon of the contact", axis="element size within ε",
+             finest="smallest"),
+    Quantity("coarse", "m", "element size far from the contact", axis="element size far away", finest="smallest"),
+    Quantity("growth", "1", "growth of the element size with distance", axis="growth of the element size",
+             finest="smallest"),
+    Quantity("mesh_accuracy", "1", "accuracy asked for", "accuracy", in_per_cent=True, finest="smallest"),
+    Quantity("degree", "1", "polynomial degree of the displacement", axis="degree of the elements", finest="largest"),
+    Quantity("outside", "", "what becomes of the body beyond epsilon", axis="outside of ε"),
+    Quantity("element", "", "kind of element"),
+    Quantity("model", "", "whether symmetry may be used"),
+    Quantity("mesh", "", "mesh"),
+)  # fmt: skip
+_SCENE = (
+    Quantity("young", "Pa", "Young's modulus", "E", "Young's modulus E"),
+    Quantity("poisson", "1", "Poisson's ratio", "ν", "Poisson's ratio ν"),
+    Quantity("probe", "", "probe"),
+    Quantity("body", "", "body"),
+    Quantity("depth", "m", "depth to which the probe is pushed", "d", "depth d"),
+    Quantity("contact", "", "contact between probe and tissue"),
+    Quantity("slice", "m", "travel along the blade"),
+    Quantity("incision", "m", "depth of the slit that is open below the blade"),
+    Quantity("height", "m", "height of the body"),
+    Quantity("length", "m", "length of the probe"),
+    Quantity("width", "m", "width of the probe"),
+    Quantity("tip", "m", "radius of the rounding at the tip"),
+    Quantity("angle", "rad", "half angle of the probe to its axis"),
+    Quantity("body_radius", "m", "radius of the body"),
+    Quantity("probe_radius", "m", "radius of the probe"),
+    Quantity("body_shape", "", "shape of the body"),
+    Quantity("probe_shape", "", "shape of the probe"),
+)
+_RESULTS = (
+    Quantity("force", "N", "reaction force along the probe's axis, positive against its advance", "F",
+             "reaction force F"),
+    Quantity("force_vector", "N", "force of the tissue on the probe"),
+    Quantity("force_error", "1", "relative error bar (95 %) on force, against the exact solution of the case's scene",
+             "± F", in_per_cent=True),
+    Quantity("force_max", "N", "force of the full-order mesh of the same study (F_max)", "F_max"),
+    Quantity("force_ratio", "1", "F / F_max", "F/F_max"),
+    Quantity("force_exact", "N", "force converged well below every error in the study, whole body (F_exact)",
+             "F_exact"),
+    Quantity("force_exact_error", "1", "relative error bar (95 %) on force_exact", "± F_exact", in_per_cent=True),
+    Quantity("accuracy", "1", "F / F_exact", "F/F_exact"),
+    Quantity("speedup", "1", "time of the full-order case over time of this case", "speed-up",
+             "speed-up $t_{full}/t$"),
+    Quantity("energy", "J", "strain energy", "energy"),
+    Quantity("max_strain", "1", "largest principal strain of a cell's mean strain; grows as the rim is refined",
+             "largest strain", in_per_cent=True),
+    Quantity("balance", "1", "relative error of F d = 2 U and of the balance of forces", "imbalance"),
+    Quantity("time_mesh", "s", "time to generate and distribute the mesh", "mesh"),
+    Quantity("time_assemble", "s", "time to assemble operator and load", "assembly"),
+    Quantity("time_setup", "s", "time to factorise, or to set up the preconditioner", "set-up"),
+    Quantity("time_solve", "s", "time to solve and to evaluate the force", "solve"),
+    Quantity("time_error", "s", "time spent on the error bar, not in time_total", "error bar"),
+    Quantity("time_total", "s", "time that this case costs alone", "time", "run time of the case"),
+    Quantity("memory", "bytes", "peak memory of all ranks", "memory"),
+    Quantity("dofs", "1", "unknowns of the whole body", "unknowns"),
+    Quantity("cells", "1", "elements of the whole body", "cells"),
+    Quantity("iterations", "1", "iterations of the linear solver", "iterations"),
+    Quantity("status", "", "ok, failed, skipped, or pending where not yet run", "status"),
+    Quantity("message", "", "why a case failed or was skipped", "message"),
+    Quantity("origin", "", "how the force was obtained", "origin"),
+    Quantity("force_exact_message", "", "why there is no force_exact"),
+)  # fmt: skip
+QUANTITIES = {quantity.name: quantity for quantity in (*_MESH, *_SCENE, *_RESULTS)}
+MESH_DIMENSIONS = tuple(quantity.name for quantity in _MESH)
+
+# Factor and unit of what people do not read in SI.
+_READ = {
+    "m": (1e3, "mm"), "Pa": (1e-3, "kPa"), "N": (1e3, "mN"), "J": (1e6, "µJ"), "bytes": (1e-6, "MB"),
+    "rad": (180 / pi, "°"), "1": (1.0, ""),
+}  # fmt: skip
+
+
+def attributes(name: str) -> dict[str, str]:
+    """Return the attributes of a variable in a dataset: long name and, of numbers, units."""
+    quantity = QUANTITIES[name]
+    units = {"units": quantity.unit} if quantity.unit else {}
+    return {**units, "long_name": quantity.meaning}
+
+
+def readable(name: str, unit: str | None = None) -> tuple[float, str]:
+    """Return the factor from a quantity's unit to the one that people read, and that one's name ("": none).
+
+    ``unit`` is for a quantity that the table may not hold; without either, a value is written as it is.
+    """
+    quantity = QUANTITIES.get(name)
+    if quantity and quantity.in_per_cent:
+        return 100.0, "%"
+    if unit is None:
+        unit = quantity.unit if quantity else ""
+    return _READ.get(unit, (1.0, unit))
+
+
+def write(name: str, value: Value, unit: str | None = None) -> str:
+    """Write a value as people read it: ``10 mm``, ``12 kPa``, ``5 %``, ``full``, ``coarse``; "" for what is unknown."""
+    if isinstance(value, str):
+        return value
+    if value == inf:
+        return "full"
+    factor, word = readable(name, unit)
+    return "" if isnan(value) else f"{value * factor:.6g} {word}".rstrip()
+
+
+def symbol(name: str) -> str:
+    """Return the letter or the word for a quantity."""
+    quantity = QUANTITIES.get(name)
+    return (quantity.symbol if quantity else "") or name.replace("_", " ")

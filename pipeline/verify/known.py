@@ -1,0 +1,73 @@
+"""Forces that are known, each with its source: closed forms, published tables, and values converged beforehand.
+
+What compares forces with the truth asks here: ``epsmesh verify``, the benchmarks, the tests. SI units, unless a name
+says otherwise.
+"""
+
+from math import log, pi
+
+from scipy.special import ellipk
+
+# F / (E d) in mm, by contact and Poisson's ratio, of the cylinder R = H = 50 mm that is held at its bottom, under a
+# disc of 3 mm: axisymmetric, Taylor–Hood elements of degree 4 graded to 1e-5 of the radius at the rim.
+CYLINDER = {
+    ("bonded", 0.3): 7.126315, ("bonded", 0.45): 7.943726, ("bonded", 0.49): 8.325817,
+    ("bonded", 0.4999): 8.437103, ("bonded", 0.5): 8.438265,
+    ("frictionless", 0.3): 6.921313, ("frictionless", 0.45): 7.922109, ("frictionless", 0.49): 8.325029,
+    ("frictionless", 0.4999): 8.437071, ("frictionless", 0.5): 8.438229,
+}  # fmt: skip
+CYLINDER_ERROR = 2e-7
+CYLINDER_BODY = {"shape": "cylinder", "radius": "50 mm", "height": "50 mm"}
+CYLINDER_SOURCE = "axisymmetric, degree 4, converged to 1e-7"
+
+# κ = F (1 - ν²) / (2 E a d) of a frictionless disc on a layer of thickness h on a rigid base, by a / h, for ν = 0.3.
+LAYER = {0.2: 1.207, 0.4: 1.472, 0.6: 1.784, 0.8: 2.124, 1.0: 2.480}
+LAYER_ERROR = 2e-3  # of three digits
+LAYER_SOURCE = "W. C. Hayes et al., J. Biomech. 5, 541 (1972)"
+
+# c = F / (E* W d) of a frictionless rectangle of length L and width W on a half-space, by L / W: published.
+RECTANGLE = {1: 1.1523, 2: 1.671, 4: 2.543, 8: 4.036}
+
+# F / F_max, by Poisson's ratio, of a disc of 2 mm bonded to tissue of 20 mm (radius 34 mm, base held), of which only
+# the column r < 10 mm is kept, its cut face free: axisymmetric, converged.
+FREE_COLUMN = {0.30: 0.900, 0.40: 0.882, 0.45: 0.870, 0.49: 0.857}
+
+# F / (E d) in mm, with its relative error, on a box of 60 × 60 × 20 mm, bonded: a disc of 2 mm at (10, 5) mm, ν = 0.45,
+# and a blade of 6 × 1 mm on the centre, ν = 0.3. NGSolve's orders 3 to 5 extrapolated; this program's agree:
+# ``python -m benchmarks.peers --truth``.
+BOX_DISC = (5.5635, 1.5e-4)
+BOX_BLADE = (4.02343, 5e-5)
+
+SNEDDON = "I. N. Sneddon, Int. J. Eng. Sci. 3, 47 (1965)"
+SPENCE = "D. A. Spence, Proc. R. Soc. A 305, 55 (1968)"
+GALIN = "L. A. Galin, Contact Problems (1961)"
+
+
+def half_space_disc(young: float, poisson: float, radius: float, depth: float, contact: str) -> tuple[float, str]:
+    """Return F of a disc on a half-space, and who found it.
+
+    Frictionless 2 E a d / (1 - ν²); bonded 4 μ a d ln(3 - 4ν) / (1 - 2ν), whose limit for ν = ½ is 8 μ a d.
+    """
+    if contact == "frictionless":
+        return 2 * young * radius * depth / (1 - poisson**2), SNEDDON
+    mu, x = young / (2 * (1 + poisson)), 1 - 2 * poisson
+    return 4 * mu * radius * depth * (log(1 + 2 * x) / x if x else 2.0), SPENCE
+
+
+def half_space_ellipse(young: float, poisson: float, axes: tuple[float, float], depth: float) -> tuple[float, str]:
+    """Return F of a frictionless flat ellipse with these semi-axes on a half-space, and who found it.
+
+    π E* a d / K(e) with the longer semi-axis a and e² = 1 - b²/a²; a circle's K = π/2 gives 2 E* a d.
+    """
+    short, long = sorted(axes)
+    return pi * young / (1 - poisson**2) * long * depth / float(ellipk(1 - (short / long) ** 2)), GALIN
+
+
+def rectangle(stiffness: float, young: float, poisson: float, width: float, depth: float) -> float:
+    """Return F = c E* W d of a frictionless rectangle on a half-space, c its ``stiffness``."""
+    return stiffness * young / (1 - poisson**2) * width * depth
+
+
+def layer(ratio: float, young: float, radius: float, depth: float) -> float:
+    """Return F of a frictionless disc on a layer ``radius / ratio`` thick, for ν = 0.3."""
+    return LAYER[ratio] * half_space_disc(young, 0.3, radius, depth, "frictionless")[0]

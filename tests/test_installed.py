@@ -1,0 +1,64 @@
+"""The program installed, without the checkout: what is in the wheel is all that its commands need."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from mpi4py import MPI
+
+pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts processes itself")
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    """Build and install into a folder; return what runs ``epsmesh`` from there, away from the checkout."""
+    pytest.importorskip("setuptools", reason="nothing here to build a wheel with")
+    folder = tmp_path_factory.mktemp("installed")
+    # Building leaves files beside the sources.
+    shutil.copytree(ROOT / "pipeline", folder / "src" / "pipeline", ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, folder / "src")
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation"]
+    subprocess.run([*pip, "--target", folder / "site", folder / "src"], check=True, capture_output=True, timeout=300)
+    (folder / "away").mkdir()
+
+    def run(*arguments):
+        environment = os.environ | {"PYTHONPATH": str(folder / "site")}
+        command = [sys.executable, *arguments]
+        return subprocess.run(
+            command, cwd=folder / "away", env=environment, capture_output=True, text=True, check=False, timeout=300
+        )
+
+    where = run("-c", "import pipeline; print(pipeline.__file__)").stdout
+    assert str(folder / "site") in where
+    return run
+
+
+@pytest.mark.parametrize("command", ["verify", "stress", "benchmark", "new", "view", "store", "run"])
+def test_every_command_loads(installed, command):
+    done = installed("-m", "pipeline", command, "--help")
+    assert done.returncode == 0, done.stderr
+    assert "Example" in done.stdout
+
+
+def test_what_measures_the_program_is_part_of_it(installed):
+    script = "import pipeline.verify.work_precision, pipeline.verify.stress, sys; print('benchmarks' in sys.modules)"
+    done = installed("-c", script)
+    assert done.stdout.strip() == "False", done.stderr
+
+
+def test_stress_runs(installed):
+    done = installed("-m", "pipeline", "stress", "gap to the body's edge / a", "--quick")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "no wrong numbers" in done.stdout
+
+
+def test_examples_and_templates_come_along(installed):
+    done = installed("-m", "pipeline", "new", "mine", "--like", "quick")
+    assert done.returncode == 0, done.stderr
+    script = "from pathlib import Path; import pipeline.report.page as p; print(*Path(p.__file__).parent.rglob('*.j2'))"
+    assert "page.html.j2" in installed("-c", script).stdout
