@@ -16,7 +16,7 @@ from pipeline.report.page import render, write_page
 from pipeline.report.page.cases import case_table
 from pipeline.report.page.guideline import ACCURACY, Section, guide_section
 from tests.commands import epsmesh
-from tests.report import known
+from tests.report import chosen
 from tests.report.synthetic import dataset
 
 NASTY = """</script><script>alert(1)</script><b onclick="x">&amp; "quoted" 'text' \u2028"""
@@ -136,7 +136,7 @@ def test_a_guide_stands_in_the_page_where_there_is_one(monkeypatch):
 
 def test_the_guide_of_the_page_is_that_of_the_epsmesh():
     assert guide_section(small()) is None  # F_exact is not known
-    section, found = guide_section(known.dataset()), guide(known.dataset(), ACCURACY)
+    section, found = guide_section(chosen.dataset()), guide(chosen.dataset(), ACCURACY)
     assert section is not None
     assert len(section.rows) == len(found.verdicts)
     assert section.lines[0] in str(found)
