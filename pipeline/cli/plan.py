@@ -145,7 +145,7 @@ def _planned(
 def find_case(study: Study, text: str) -> Case:
     """Return the case of a number, or of labels; fail with what there is to choose from."""
     cases = list(study.cases())
-    if text.strip().isdigit():
+    if text.strip().isdecimal():
         number = int(text)
         if number >= len(cases):
             fail(f"case {number}: there are {len(cases)} cases, counted from 0")

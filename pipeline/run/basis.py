@@ -27,7 +27,7 @@ def reduced_records(
     with ReducedBasis(body, case.travel, _ratio(todo[0]), case.solve.method) as basis:
         ends = [todo[0], todo[-1]]
         while todo:
-            following = ends.pop() if ends else max(todo, key=lambda s: found[s.key].bound if s.key in found else inf)
+            following = ends.pop() if ends else max(todo, key=lambda s: abs(found[s.key].bound) if found else inf)
             todo.remove(following)
             record = compute(following)
             if record is not None and body.correction is not None:
@@ -36,7 +36,8 @@ def reduced_records(
             if ends or not solved:
                 continue
             found = {solve.key: basis.evaluate(_ratio(solve)) for solve in todo}
-            if all(reduced.bound <= tolerance for reduced in found.values()):
+            # A bound below zero comes of round-off, or of a preconditioner that is not definite: it is none.
+            if all(0 <= reduced.bound <= tolerance for reduced in found.values()):
                 break
         for solve in todo:
             finish(solve, _record(solve, found[solve.key], _source(solve, solved), body, basis))

@@ -34,7 +34,8 @@ def reason_to_skip(plan: Plan, solve: Solve, find: Callable[[str], Record | None
         if record is None or exact is None or not (record.is_ok and exact.is_ok):
             return ""
         ratio = record.scaled(case.scale).force / exact.scaled(case.scale).force
-        near.append((abs(ratio - 1) <= limit, other))
+        # What F_exact itself may be wrong by counts: near to a doubtful one is not near.
+        near.append((abs(ratio - 1) + exact.force_error <= limit, other))
     near.sort(key=lambda pair: pair[1])
     last = [is_near for is_near, _ in near[-_IN_A_ROW:]]
     if len(last) < _IN_A_ROW or not all(last):

@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from math import isnan
 
 import psutil
@@ -13,6 +14,7 @@ from mpi4py import MPI
 
 from pipeline.plan.plan import make_plan
 from pipeline.run import body, meshing
+from pipeline.run.basis import ReducedBasis
 from pipeline.run.execute import execute
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.progress import Silent
@@ -125,6 +127,17 @@ def test_cases_whose_reduced_basis_fails_are_solved(monkeypatch):
     for index, record in found.items():
         assert record.status == "ok", record.message
         assert record.force == pytest.approx(solved[index].force, rel=1e-8)
+
+
+@pytest.mark.mpi
+def test_a_bound_that_is_none_is_not_relied_on(monkeypatch):
+    class Doubtful(ReducedBasis):
+        def evaluate(self, t):
+            return replace(super().evaluate(t), bound=-1e-9)
+
+    monkeypatch.setattr("pipeline.run.basis.ReducedBasis", Doubtful)
+    records = solve(WORLD, material={"poisson": [0.05 * i for i in range(8)]})
+    assert {record.origin for record in records.values()} == {"symmetric"}
 
 
 @pytest.mark.mpi

@@ -1,12 +1,17 @@
 """An early stop along ε: what is run is what an unstopped study gives, what is not says why."""
 
+from math import nan
+
 import numpy as np
+import pytest
 from mpi4py import MPI
 
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build
 from pipeline.run.execute import compute, execute
 from pipeline.run.progress import Silent
+from pipeline.run.record import Record
+from pipeline.run.stop import skipped
 from tests.cases import study
 
 SWEEP = {
@@ -46,3 +51,18 @@ def test_stop_is_decided_alike_from_stored_records():
     execute(again, MPI.COMM_SELF, lambda record: found.__setitem__(record.key, record), Silent(), known=stored)
     assert {record.status for record in found.values()} == {"skipped"}
     assert set(found) == set(records) - set(stored)
+
+
+@pytest.mark.parametrize(("bar", "stops"), [(1e-3, True), (0.04, True), (0.06, False), (nan, False)])
+def test_near_to_a_doubtful_exact_force_is_not_near(bar, stops):
+    plan = make_plan(
+        study(mesh={"epsilon": ["5 mm", "7 mm", "10 mm"]}, plan={"stop_when": "5 %"}, solve={"exact": True})
+    )
+    known = {
+        solve.key: Record(
+            solve.key, "ok", young=solve.case.material.young, depth=solve.case.probe.depth, force_error=bar,
+            force=solve.case.material.young * solve.case.probe.depth,
+        )
+        for solve in plan.solves if solve.is_reference or solve.case.mesh.epsilon < 9e-3
+    }  # fmt: skip
+    assert [record.status for record in skipped(plan, known).values()] == ["skipped"] * stops
