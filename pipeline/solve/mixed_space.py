@@ -10,6 +10,7 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.mesh.distribute import BodyMesh
+from pipeline.solve.compiled import scalar_space
 from pipeline.solve.forms import curved_cells
 from pipeline.solve.mixed_forms import MixedForms
 from pipeline.solve.saddle import Pair
@@ -29,7 +30,7 @@ class MixedSpace:
         """Add the pressures to the ``displacements`` on a mesh; collective."""
         self.comm, self.degree = body.comm, displacements.degree
         self.displacements = displacements
-        self.pressures = compat.scalar_space(body.mesh, displacements.degree - 1)
+        self.pressures = scalar_space(body.mesh, displacements.degree - 1)
         self.forms = MixedForms(displacements.forms.displacement, self.pressures)
         index_map = self.pressures.dofmap.index_map
         self._owned, self._size = index_map.size_local, index_map.size_global

@@ -14,6 +14,7 @@ from petsc4py import PETSc
 from pipeline import compat
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.scene.model import FIXED, MIRROR, PROBE
+from pipeline.solve.compiled import vector_space
 from pipeline.solve.forms import ElasticForms, curved_cells
 from pipeline.solve.linear import SolveError
 from pipeline.solve.straight import suits
@@ -46,7 +47,7 @@ class ConstrainedSpace:
             SolveError: if the footprint and the support share a point.
         """
         self._body, self.comm, self.degree = body, body.comm, degree
-        self.space = space = compat.vector_space(body.mesh, degree)
+        self.space = space = vector_space(body.mesh, degree)
         index_map = space.dofmap.index_map
         self.owned, self.dofs = 3 * index_map.size_local, 3 * index_map.size_global
         self._ghosts = np.asarray(index_map.ghosts, dtype=PETSc.IntType)

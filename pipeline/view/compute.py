@@ -22,6 +22,7 @@ from pipeline.run.compile import prepare
 from pipeline.run.memory import FreeMemory
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import cached_arrays, on_first_rank
+from pipeline.solve.compiled import vector_space
 from pipeline.solve.linear import is_direct
 from pipeline.solve.spaces import Spaces
 from pipeline.study.sweep import Case, Study
@@ -94,7 +95,7 @@ def _gathered(mesh: BodyMesh, body: Body, points: int) -> tuple[FloatArray, Floa
     displacement, principal = body.fields()
     owned = mesh.owned_cells
     order = 1 if compat.geometry_dofs(mesh.mesh).shape[1] == 4 else 2
-    nodal = fem.Function(compat.vector_space(mesh.mesh, order))
+    nodal = fem.Function(vector_space(mesh.mesh, order))
     nodal.interpolate(displacement)
     # Nodes of the geometry and dofs of that order come in the same order within a cell.
     nodes = compat.geometry_dofs(mesh.mesh)[:owned].reshape(-1)

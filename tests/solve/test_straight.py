@@ -8,6 +8,7 @@ from petsc4py import PETSc
 from pipeline import compat
 from pipeline.mesh.distribute import distribute
 from pipeline.mesh.generate import MeshArrays
+from pipeline.solve.compiled import vector_space
 from pipeline.solve.elasticity import ElasticBody
 from pipeline.solve.forms import curved_cells
 from pipeline.solve.mixed import MixedBody
@@ -75,7 +76,7 @@ def test_a_point_of_very_many_cells():
     around = np.arange(count)
     cells = np.stack([np.zeros(count), np.ones(count), 2 + around, 2 + (around + 1) % count], axis=1).astype(np.int64)
     body = distribute(MPI.COMM_SELF, MeshArrays(points, cells, {"fixed": cells[:1, 1:]}, np.array([0]), 0.0))
-    space = compat.vector_space(body.mesh, 2)
+    space = vector_space(body.mesh, 2)
     found = pattern(space, space)
     dofs = compat.cell_dofs(space)
     assert np.array_equal(found.columns[found.places], np.broadcast_to(dofs[:, None, :], found.places.shape))
