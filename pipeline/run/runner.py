@@ -14,19 +14,20 @@ from pipeline.plan import estimate
 from pipeline.plan.plan import Plan
 from pipeline.plan.steps import MeshStep, OperatorStep, Solve, mesh_steps
 from pipeline.plan.symmetry import model_planes
-from pipeline.run.body import Body, CaseFailure, body_of, check_memory, lacks_memory, solve_body
 from pipeline.run.compile import prepare
-from pipeline.run.measure import TIMES, add_times, record_of, record_of_meridian
+from pipeline.run.measure import TIMES, add_times, record_of
 from pipeline.run.memory import FreeMemory, PeakMemory, give_back
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import meridian_of, mesh_case, on_first_rank
+from pipeline.run.problem import CaseFailure, check_memory, conditions_of, lacks_memory, problem_of, solve_problem
 from pipeline.run.progress import Progress
 from pipeline.run.provenance import provenance
 from pipeline.run.record import Record
 from pipeline.run.reduce import reduced_records
-from pipeline.solve.axisymmetric import solve_axisymmetric
-from pipeline.solve.elasticity import ElasticBody
+from pipeline.solve.axisymmetric import MeridianProblem
+from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.linear import SolveError, is_direct
+from pipeline.solve.solution import FieldProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.study.sweep import Case
 
@@ -83,56 +84,52 @@ class StepRunner:
                 self._run_operator(operator, spaces, seconds, memory)
 
     def _run_operator(self, step: OperatorStep, spaces: Spaces, mesh_seconds: float, memory: PeakMemory) -> None:
-        bodies, mesh = list[Body](), spaces.body
+        problems, mesh = list[FieldProblem](), spaces.body
         # Assembling both parts of the operator costs as much as assembling it twice, and memory for three; on one rank
         # assembly is so fast that they are never worth it.
         degree = step.case.mesh.degree
         needed = estimate.enriched_memory(estimate.dofs(mesh.cells, degree), degree, parts=True)
         shared = self.comm.size > 1 and len(step.solves) > 2 and not lacks_memory(self._free, needed, "")
         if not self._guard(
-            step.solves, lambda: bodies.append(body_of(spaces, step.case, shared=shared, reuse=self._plan.reuse))
+            step.solves, lambda: problems.append(problem_of(spaces, step.case, shared=shared, reuse=self._plan.reuse))
         ):
             return
-        with bodies[0] as body:
-            if step.solves[0].reduced and isinstance(body, ElasticBody):
-                self._run_reduced(step, body, mesh, mesh_seconds, memory)
+        with problems[0] as problem:
+            if step.solves[0].reduced and isinstance(problem, DisplacementProblem):
+                self._run_reduced(step, problem, mesh, mesh_seconds, memory)
                 return
             for solve in step.solves:
                 self._progress.note(solve.label)
-                self._record_one(solve, partial(self._solve, solve, body, mesh, mesh_seconds, memory))
+                self._record_one(solve, partial(self._solve, solve, problem, mesh, mesh_seconds, memory))
 
     def _run_reduced(
-        self, step: OperatorStep, body: ElasticBody, mesh: BodyMesh, mesh_seconds: float, memory: PeakMemory
+        self, step: OperatorStep, problem: DisplacementProblem, mesh: BodyMesh, mesh_seconds: float, memory: PeakMemory
     ) -> None:
         def compute(solve: Solve) -> Record | None:
             self._progress.note(solve.label)
-            self._record_one(solve, partial(self._solve, solve, body, mesh, mesh_seconds, memory))
+            self._record_one(solve, partial(self._solve, solve, problem, mesh, mesh_seconds, memory))
             record = self._records[solve.key]
             return record if record.is_ok else None
 
         tolerance = self._plan.study.planning.tolerance
-        self._guard((), lambda: reduced_records(step.solves, body, tolerance, compute, self._finish))
+        self._guard((), lambda: reduced_records(step.solves, problem, tolerance, compute, self._finish))
 
-    def _solve(self, solve: Solve, body: Body, mesh: BodyMesh, seconds: float, memory: PeakMemory) -> Record:
+    def _solve(self, solve: Solve, problem: FieldProblem, mesh: BodyMesh, seconds: float, memory: PeakMemory) -> Record:
         case, degree = solve.case, solve.case.mesh.degree
-        direct = is_direct(case.solve.method, body.dofs, degree)
-        check_memory(self._free, estimate.solving_memory(body.dofs, degree, direct=direct), "solving")
+        direct = is_direct(case.solve.method, problem.dofs, degree)
+        check_memory(self._free, estimate.solving_memory(problem.dofs, degree, direct=direct), "solving")
         missing = ""
         untimed = solve.is_reference or not self._timed
         if untimed:
-            missing = lacks_memory(self._free, estimate.enriched_memory(body.dofs, degree), "the error bar")
+            missing = lacks_memory(self._free, estimate.enriched_memory(problem.dofs, degree), "the error bar")
         wanted = untimed and not missing
-        solution = solve_body(case, body, estimate=wanted)
-        return replace(self._stamp(record_of(solve, solution, mesh.cells, seconds), memory), message=missing)
+        solution = solve_problem(case, problem, estimate=wanted)
+        return replace(self._stamp(record_of(solve, solution, seconds), memory), message=missing)
 
     def _solve_meridian(self, solve: Solve, memory: PeakMemory) -> Record:
         """Solve a round scene in two dimensions, on the first rank; collective."""
-        case = solve.case
-        compute = partial(
-            solve_axisymmetric, meridian_of(case), case.material.poisson, case.probe.contact == "bonded",
-            young=case.material.young, depth=case.probe.depth,
-        )  # fmt: skip
-        record = on_first_rank(self.comm, lambda: record_of_meridian(solve, compute()))
+        problem = MeridianProblem(meridian_of(solve.case), conditions_of(solve.case))
+        record = on_first_rank(self.comm, lambda: record_of(solve, solve_problem(solve.case, problem, estimate=True)))
         return self._stamp(self.comm.bcast(record), memory)
 
     def _stamp(self, record: Record, memory: PeakMemory) -> Record:
@@ -156,9 +153,9 @@ class StepRunner:
     def _compute(self, solve: Solve, memory: PeakMemory) -> Record:
         """Compute one case afresh, mesh and all; collective."""
         mesh, seconds = self._mesh(solve.case, solve.mirrors)
-        with Spaces(mesh) as spaces, body_of(spaces, solve.case, shared=False) as body:
-            record = self._solve(solve, body, mesh, seconds, memory)
-        del mesh, spaces, body
+        with Spaces(mesh) as spaces, problem_of(spaces, solve.case, shared=False) as problem:
+            record = self._solve(solve, problem, mesh, seconds, memory)
+        del mesh, spaces, problem
         give_back()
         return record
 

@@ -51,10 +51,9 @@ class MeridianForms:
         cellwise = ufl.TestFunction(cellwise_space(mesh, (4,)))
         self._strains = form(ufl.inner(ufl.as_vector(_strain(displacement, r)), cellwise) * dx)
 
-    def set_poisson(self, poisson: float) -> None:
-        """Set λ/μ = 2ν/(1 - 2ν), or its inverse if mixed."""
-        above, below = 2 * poisson, 1 - 2 * poisson
-        self._compressibility.value = below / above if self._mixed else above / below
+    def set_ratio(self, ratio: float) -> None:
+        """Set λ/μ, which may be infinite if mixed, or there its inverse."""
+        self._compressibility.value = 1 / ratio if self._mixed else ratio
 
     def locate(self, facets: dict[str, Any], name: str, component: int) -> IntArray:
         """Return the dofs of u_r (0) or u_z (1) on a group of facets."""
