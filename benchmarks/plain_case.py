@@ -20,7 +20,7 @@ from petsc4py import PETSc
 from pipeline import compat
 from pipeline.mesh.size import Sizes, set_size_field
 from pipeline.scene.model import FIXED, PROBE, Scene, build
-from pipeline.solve.cache import form_cache
+from pipeline.solve.compiled import form, vector_space
 from pipeline.study.sweep import Case
 
 _CG = {"ksp_type": "cg", "ksp_rtol": 1e-8}
@@ -59,9 +59,8 @@ def solve(case: Case, solver: str, most_direct: int) -> Solved:
     times, cpu = [time.perf_counter()], time.process_time()
     mesh, facets = make_mesh(case)
     times.append(time.perf_counter())
-    space = compat.vector_space(mesh, case.mesh.degree)
+    space = vector_space(mesh, case.mesh.degree)
     u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
-    cache = str(form_cache())
     lam, mu = (fem.Constant(mesh, PETSc.ScalarType(value)) for value in case.material.lame)
 
     def virtual_work(w: Any) -> Any:
@@ -69,12 +68,12 @@ def solve(case: Case, solver: str, most_direct: int) -> Solved:
         return ufl.inner(stress, ufl.sym(ufl.grad(v))) * ufl.dx
 
     conditions, probe = _conditions(space, facets, case)
-    form = compat.form(virtual_work(u), cache)
-    matrix = fem_petsc.assemble_matrix(form, bcs=conditions)
+    stiffness = form(virtual_work(u))
+    matrix = fem_petsc.assemble_matrix(stiffness, bcs=conditions)
     matrix.assemble()
     no_load = ufl.inner(fem.Constant(mesh, np.zeros(3)), v) * ufl.dx
-    rhs = fem_petsc.assemble_vector(compat.form(no_load, cache))
-    fem_petsc.apply_lifting(rhs, [form], [conditions])
+    rhs = fem_petsc.assemble_vector(form(no_load))
+    fem_petsc.apply_lifting(rhs, [stiffness], [conditions])
     rhs.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
     fem_petsc.set_bc(rhs, conditions)
     times.append(time.perf_counter())
@@ -84,7 +83,7 @@ def solve(case: Case, solver: str, most_direct: int) -> Solved:
     iterations = _linear_solve(matrix, rhs, displacement, SOLVERS[method])
     times.append(time.perf_counter())
     # The reaction: the residual of the operator without conditions, summed over the probe's dofs.
-    residual = fem_petsc.assemble_vector(compat.form(virtual_work(displacement), cache))
+    residual = fem_petsc.assemble_vector(form(virtual_work(displacement)))
     force = -float(residual.array.reshape(-1, 3)[probe, 2].sum())
     times.append(time.perf_counter())
     for item in (residual, rhs, matrix):

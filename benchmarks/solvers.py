@@ -22,11 +22,14 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.solve.loads import Motion
+
 # Element size far from the probe and at its edge, mm.
 SMALL = {1: ((4, 2), (3, 1), (2, 0.8)), 2: ((10, 3), (8, 1), (5, 0.8)), 3: ((20, 4), (15, 3), (10, 2))}
 LARGE = {1: ((1, 0.2), (0.6, 0.2)), 2: ((1.7, 0.2), (1.0, 0.2), (0.63, 0.2)), 3: ((2.6, 0.3), (1.7, 0.2))}
 RATIOS = {"displacement": (0.3, 0.45, 0.49), "mixed": (0.45, 0.49, 0.4999)}
-YOUNG, DEPTH = 10e3, 0.2e-3
+YOUNG = 10e3
+PRESS = Motion((0.0, 0.0, -1.0))
 COLUMNS = {
     "element": "", "degree": "d", "poisson": "g", "dofs": "d", "method": "", "iterations": "d", "assemble": ".0f",
     "setup": ".0f", "solve": ".0f", "total": ".0f", "application": ".2f", "bandwidth": ".2f", "bytes": ".0f",
@@ -40,21 +43,20 @@ def measure(element: str, degree: int, poisson: float, size: tuple[float, float]
 
     from pipeline.run.memory import PeakMemory
     from pipeline.run.meshing import mesh_case
-    from pipeline.solve.elasticity import ElasticBody
-    from pipeline.solve.mixed import MixedBody
-    from pipeline.solve.space import Contact
+    from pipeline.solve.conditions import Conditions
+    from pipeline.solve.displacement import DisplacementProblem
+    from pipeline.solve.material import MaterialLaw
+    from pipeline.solve.mixed import MixedProblem
     from pipeline.solve.spaces import Spaces
 
     with threadpool_limits(limits=1), ExitStack() as stack:
         mesh, _ = mesh_case(_case(degree, size), ("x", "y"), MPI.COMM_SELF)
         base = PeakMemory(MPI.COMM_SELF)
         held = base.peak()
-        make = MixedBody if element == "mixed" else ElasticBody
-        body = stack.enter_context(make(stack.enter_context(Spaces(mesh)), degree, Contact((0.0, 0.0, -DEPTH), True)))
-        mu = YOUNG / (2 * (1 + poisson))
-        lame = 2 * mu * poisson / (1 - 2 * poisson), mu
-        run = _mixed_run if isinstance(body, MixedBody) else _elastic_run
-        matrix, once = run(body, lame, method, stack)
+        make = MixedProblem if element == "mixed" else DisplacementProblem
+        problem = stack.enter_context(make(stack.enter_context(Spaces(mesh)), degree, Conditions()))
+        run = _mixed_run if isinstance(problem, MixedProblem) else _elastic_run
+        matrix, once = run(problem, MaterialLaw.of_moduli(YOUNG, poisson), method, stack)
         runs = []
         for _ in range(repeats):
             before = _application(matrix)
@@ -64,9 +66,10 @@ def measure(element: str, degree: int, poisson: float, size: tuple[float, float]
         assemble, setup, solve, unit = (statistics.median(values) for values in zip(*runs, strict=True))
         moved = matrix.getInfo()["nz_used"] * (8 + 4 / 9) + 16 * matrix.getSize()[0]
         row = {
-            "element": element, "degree": degree, "poisson": poisson, "dofs": body.dofs, "method": method,
+            "element": element, "degree": degree, "poisson": poisson, "dofs": problem.dofs, "method": method,
             "iterations": iterations, "assemble": assemble, "setup": setup, "solve": solve, "total": setup + solve,
-            "application": 1e3 * unit, "bandwidth": moved / unit / _stream(), "bytes": (base.peak() - held) / body.dofs,
+            "application": 1e3 * unit, "bandwidth": moved / unit / _stream(),
+            "bytes": (base.peak() - held) / problem.dofs,
         }  # fmt: skip
     print(json.dumps(row), flush=True)
 
@@ -86,19 +89,20 @@ def _case(degree: int, size: tuple[float, float]) -> Any:
     return parse(content).case(())
 
 
-def _elastic_run(body: Any, lame: tuple[float, float], method: str, stack: ExitStack) -> tuple[Any, Callable[[], Any]]:
+def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[Any, Callable[[], Any]]:
     """Return the blocked operator, and what assembles, sets up and solves once."""
     from pipeline.solve.linear import LinearSolver
     from pipeline.solve.solution import TOLERANCE
+    from pipeline.solve.vectors import vector
 
-    unit, _ = body.space.operator(lame, shared=False, blocked=body.space.degree > 1)
-    body.space.disown(unit)
-    stack.callback(unit.destroy)
+    space = problem.space
+    unit, _ = stack.enter_context(space.operators.lend(law.lame, blocked=space.degree > 1))
+    held = space.dofs.held(PRESS)
 
     def once() -> tuple[float, float, float, int]:
         start = time.process_time()
-        with body.solver(lame, method) as lent, body.space.vector() as rhs, body.space.vector() as unknown:
-            body.space.lift(rhs, lame)
+        with problem.solver(law, method) as lent, vector(space.dofs.space) as rhs, vector(space.dofs.space) as unknown:
+            space.lift(rhs, held, law.lame)
             made = time.process_time()
             solver = LinearSolver(lent.levels, direct=method == "direct", tolerance=TOLERANCE)
             ready = time.process_time()
@@ -110,25 +114,26 @@ def _elastic_run(body: Any, lame: tuple[float, float], method: str, stack: ExitS
     return unit, once
 
 
-def _mixed_run(body: Any, lame: tuple[float, float], method: str, stack: ExitStack) -> tuple[Any, Callable[[], Any]]:
+def _mixed_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[Any, Callable[[], Any]]:
     """The same for mixed elements; a set-up that serves all ratios counts for one."""
     from pipeline.solve.mixed import LAME, STRICTER
     from pipeline.solve.saddle import SaddleSolver
     from pipeline.solve.solution import TOLERANCE
 
-    direct, space, c = method == "direct", body.space, 1 / (lame[0] / lame[1] - LAME[0])
+    direct, space, c = method == "direct", problem.space, 1 / (law.ratio - LAME[0])
     start = time.process_time()
-    saddle, _ = body.saddle(direct=direct)
+    saddle, _ = problem.saddle(direct=direct)
     assemble = time.process_time() - start
-    unit, _ = space.displacements.operator(LAME, shared=False, blocked=True)
+    unit, _ = stack.enter_context(space.displacements.operators.lend(LAME, blocked=True))
+    held = space.displacements.dofs.held(PRESS)
 
     def once() -> tuple[float, float, float, int]:
         with space.pair() as rhs, space.pair() as unknown:
-            space.lift(rhs, LAME)
+            space.lift(rhs, held, LAME)
             start = time.process_time()
             with SaddleSolver(saddle, direct=direct) as solver:
                 ready = time.process_time()
-                iterations = solver.solve(c, rhs, unknown, STRICTER * TOLERANCE)
+                iterations = solver.solve(c, [rhs], [unknown], STRICTER * TOLERANCE)
                 return assemble, ready - start, time.process_time() - ready, iterations
 
     return unit, once

@@ -3,16 +3,13 @@
 Everything is decided by what a library offers, never by its version number.
 """
 
-import ctypes
 import inspect
-import logging
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import basix
-import cffi
 import dolfinx
 import gmsh
 import numpy as np
@@ -22,14 +19,6 @@ from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 
-_JIT = {
-    new if new in inspect.signature(fem.form).parameters else old: key
-    for key, new, old in (
-        ("jit", "jit_options", "jit_params"),
-        ("ffcx", "form_compiler_options", "form_compiler_params"),
-    )
-}
-_PETSC = ctypes.CDLL(PETSc.__file__)  # petsc4py has no way to the blocks of a matrix
 _DIAGONAL = "diag" if "diag" in inspect.signature(fem_petsc.assemble_matrix).parameters else "diagonal"
 
 
@@ -49,18 +38,12 @@ def gmsh_session() -> Iterator[None]:
         signal.signal(signal.SIGINT, handler)
 
 
-def _vector_element(cell: str, degree: int, dim: int) -> Any:
-    if hasattr(ufl, "VectorElement"):
-        return ufl.VectorElement("Lagrange", cell, degree, dim=dim)
-    return basix.ufl.element("Lagrange", cell, degree, shape=(dim,))
-
-
 def _coordinate_element(cell: str, order: int, dim: int) -> Any:
     if hasattr(ufl, "VectorElement"):
         # ffcx 0.5 writes this variant into the element when it first compiles a form on the mesh, which changes the
         # name under which every later form on it is looked up in the cache.
         return ufl.VectorElement("Lagrange", cell, order, dim=dim, variant="equispaced")
-    return _vector_element(cell, order, dim)
+    return basix.ufl.element("Lagrange", cell, order, shape=(dim,))
 
 
 def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray, order: int) -> Any:
@@ -100,36 +83,20 @@ def cell_tags(mesh: Any, values: np.ndarray) -> Any:
     )
 
 
-def vector_space(mesh: Any, degree: int) -> Any:
-    """Return the continuous vector Lagrange space of ``degree`` on ``mesh``."""
-    if hasattr(fem, "functionspace"):
-        return fem.functionspace(mesh, ("Lagrange", degree, (mesh.geometry.dim,)))
-    return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
+def element(mesh: Any, family: str, degree: int, shape: tuple[int, ...] = ()) -> Any:
+    """Return an element of scalars, vectors or tensors on the cells of ``mesh``."""
+    cell = mesh.ufl_cell()
+    if not hasattr(ufl, "VectorElement"):
+        name = cell.cellname() if callable(cell.cellname) else cell.cellname
+        return basix.ufl.element(family, name, degree, shape=shape)
+    if len(shape) == 2:
+        return ufl.TensorElement(family, cell, degree, shape)
+    return ufl.VectorElement(family, cell, degree, dim=shape[0]) if shape else ufl.FiniteElement(family, cell, degree)
 
 
-def scalar_space(mesh: Any, degree: int) -> Any:
-    """Return the continuous scalar Lagrange space of ``degree`` on ``mesh``."""
-    if hasattr(fem, "functionspace"):
-        return fem.functionspace(mesh, ("Lagrange", degree))
-    return fem.FunctionSpace(mesh, ("Lagrange", degree))
-
-
-def taylor_hood_space(mesh: Any, degree: int) -> Any:
-    """Return the mixed space of vectors of ``degree`` and of scalars one degree lower, both continuous."""
-    cell = mesh.ufl_cell().cellname() if callable(mesh.ufl_cell().cellname) else mesh.ufl_cell().cellname
-    vector = _vector_element(cell, degree, mesh.geometry.dim)
-    if hasattr(ufl, "MixedElement"):
-        scalar = ufl.FiniteElement("Lagrange", cell, degree - 1)
-        return fem.FunctionSpace(mesh, ufl.MixedElement([vector, scalar]))
-    scalar = basix.ufl.element("Lagrange", cell, degree - 1)
-    return fem.functionspace(mesh, basix.ufl.mixed_element([vector, scalar]))
-
-
-def cellwise_vector_space(mesh: Any, size: int) -> Any:
-    """Return the space of vectors of ``size`` components constant on each cell."""
-    if hasattr(fem, "functionspace"):
-        return fem.functionspace(mesh, ("DG", 0, (size,)))
-    return fem.VectorFunctionSpace(mesh, ("DG", 0), dim=size)
+def mixed_element(parts: list[Any]) -> Any:
+    """Return the element that has ``parts`` side by side."""
+    return ufl.MixedElement(parts) if hasattr(ufl, "MixedElement") else basix.ufl.mixed_element(parts)
 
 
 def reference_element(degree: int) -> Any:
@@ -143,87 +110,6 @@ def degree(space: Any) -> int:
     """Return the polynomial degree of a Lagrange space."""
     value = space.ufl_element().degree
     return int(value() if callable(value) else value)
-
-
-def cellwise_tensor_space(mesh: Any) -> Any:
-    """Return the space of 3 × 3 tensors constant on each cell."""
-    if hasattr(fem, "functionspace"):
-        return fem.functionspace(mesh, ("DG", 0, (3, 3)))
-    return fem.TensorFunctionSpace(mesh, ("DG", 0))
-
-
-_jit = dolfinx.jit.ffcx_jit
-_compiled: dict[str, Any] = {}
-_kernels: dict[int, int] = {}
-_name = [""]
-_FFI = cffi.FFI()
-
-
-def _remember(comm: MPI.Comm, expression: Any, *args: Any, **options: Any) -> Any:
-    """Compile as dolfinx does, and look only once a process into the folder of what is compiled: it takes 5 ms.
-
-    Ranks that compile together must all look, or none of them: their memories may differ.
-    """
-    if comm.size > 1:
-        return _jit(comm, expression, *args, **options)
-    known = (_name[-1] or expression.signature()) if isinstance(expression, ufl.Form) else repr(expression)
-    key = f"{type(expression).__name__} {known} {args} {options}"
-    if key not in _compiled:
-        _compiled[key] = _jit(comm, expression, *args, **options)
-    return _compiled[key]
-
-
-def _compile(comm: MPI.Comm, expression: Any, *args: Any, **options: Any) -> Any:
-    """Compile, and put the kernels that are asked for in the place of the generated ones."""
-    found = _remember(comm, expression, *args, **options)
-    if _kernels and isinstance(expression, ufl.Form):
-        of = found[0]
-        if hasattr(of, "form_integrals"):  # since 0.7; integrals over cells come first
-            count, marks, integrals = of.form_integral_offsets[1], of.form_integral_ids, of.form_integrals
-        else:
-            count, marks, integrals = of.num_integrals(0), of.integral_ids(0), of.integrals(0)
-        for i in range(count):
-            if marks[i] in _kernels:
-                integrals[i].tabulate_tensor_float64 = _FFI.cast("void*", _kernels[marks[i]])
-    return found
-
-
-dolfinx.jit.ffcx_jit = _compile
-
-
-def form(expression: Any, cache: str, name: str = "", kernels: dict[int, int] | None = None) -> Any:
-    """Compile ``expression``, with the generated code in the folder ``cache``; collective.
-
-    ``name`` tells it from all others with other code in this process; without one, UFL finds out in a millisecond.
-    ``kernels`` are addresses of kernels for integrals over cells, by the mark of the cells (-1: all): they are used
-    in place of the generated ones, now and whenever this process compiles the same expression again.
-    """
-    jit = {"cache_dir": cache, "cffi_extra_compile_args": ["-O2", "-march=native"], "timeout": 120}
-    options = {"jit": jit, "ffcx": {}}
-    with quiet_compiler(), _using(kernels or {}, name):
-        return fem.form(expression, **{name: options[key] for name, key in _JIT.items()})
-
-
-@contextmanager
-def _using(kernels: dict[int, int], name: str) -> Iterator[None]:
-    _kernels.update(kernels)
-    _name.append(name)
-    try:
-        yield
-    finally:
-        _kernels.clear()
-        _name.pop()
-
-
-@contextmanager
-def quiet_compiler() -> Iterator[None]:
-    """Keep the compiler's own words, which go to the root logger, from those who wait for a force."""
-    before = logging.root.manager.disable
-    logging.disable(logging.INFO)
-    try:
-        yield
-    finally:
-        logging.disable(before)
 
 
 def dirichletbc(value: Any, dofs: np.ndarray, space: Any) -> Any:
@@ -255,36 +141,6 @@ def add_matrix(matrix: PETSc.Mat, form: Any, bcs: list[Any], diagonal: float) ->
     """Add ``form`` to a matrix, but for the rows and columns of ``bcs``, whose diagonal is set; collective."""
     fem_petsc.assemble_matrix(matrix, form, bcs=bcs, **{_DIAGONAL: diagonal})
     matrix.assemble()
-
-
-def sparse_matrix(offsets: np.ndarray, columns: np.ndarray, block: int) -> PETSc.Mat:
-    """Return a square matrix of zeros, of this process alone, in sparse rows whose columns ascend.
-
-    Of type seqbaij if rows and columns are of blocks of ``block``, else (1) seqaij, for vectors of three components.
-    """
-    count, size, indices = np.diff(offsets), block * (len(offsets) - 1), columns.astype(PETSc.IntType, copy=False)
-    create, kind = (PETSc.Mat().createBAIJ, "SeqBAIJ") if block > 1 else (PETSc.Mat().createAIJ, "SeqAIJ")
-    matrix = create(((size, None), (size, None)), 3, nnz=count.astype(PETSc.IntType), comm=MPI.COMM_SELF)
-    fill = getattr(_PETSC, f"Mat{kind}SetColumnIndices")
-    if fill(ctypes.c_void_p(matrix.handle), ctypes.c_void_p(indices.ctypes.data)):
-        raise RuntimeError("PETSc does not take the pattern of a matrix")
-    matrix.assemble()
-    matrix.zeroEntries()
-    return matrix
-
-
-@contextmanager
-def entries(matrix: PETSc.Mat, count: int) -> Iterator[np.ndarray]:
-    """Lend the ``count`` entries of a matrix, seqaij or seqbaij, there block by block by columns, to write to."""
-    kind = {"seqaij": "SeqAIJ", "seqbaij": "SeqBAIJ"}[matrix.getType()]
-    handle, values = ctypes.c_void_p(matrix.handle), ctypes.POINTER(ctypes.c_double)()
-    if getattr(_PETSC, f"Mat{kind}GetArray")(handle, ctypes.byref(values)):
-        raise RuntimeError("PETSc does not lend the entries of its matrix")
-    try:
-        yield np.ctypeslib.as_array(values, (count,))
-    finally:
-        getattr(_PETSC, f"Mat{kind}RestoreArray")(handle, ctypes.byref(values))
-        matrix.assemble()  # what was made of the values before is void
 
 
 def versions() -> dict[str, str]:

@@ -53,8 +53,8 @@ def view(
 def _fields(study: Study, case: Case, comm: "MPI.Comm", mesh_only: bool, meshes: Path) -> "Fields | None":
     """Return the case's fields, on the first rank; if it cannot be computed, exit on all of them."""
     from pipeline.mesh.generate import MeshError
-    from pipeline.run.body import CaseFailure
     from pipeline.run.mesh_cache import MeshCache
+    from pipeline.run.problem import CaseFailure
     from pipeline.solve.linear import SolveError
     from pipeline.view.compute import compute_fields, solve_to_view
 

@@ -5,16 +5,17 @@ from dataclasses import replace
 from math import inf, isnan, nan
 
 from pipeline.plan.steps import Solve
+from pipeline.run.problem import loads_of
 from pipeline.run.record import Record
-from pipeline.solve.elasticity import ElasticBody
-from pipeline.solve.reduced import Reduced, ReducedBasis
+from pipeline.solve.displacement import DisplacementProblem
+from pipeline.solve.reduced_basis import Reduced, ReducedBasis
 
 Compute = Callable[[Solve], Record | None]
 Finish = Callable[[Solve, Record], None]
 
 
 def reduced_records(
-    solves: tuple[Solve, ...], body: ElasticBody, tolerance: float, compute: Compute, finish: Finish
+    solves: tuple[Solve, ...], problem: DisplacementProblem, tolerance: float, compute: Compute, finish: Finish
 ) -> None:
     """Solve a few of ``solves`` by ``compute``, which returns None where it fails, and ``finish`` the rest; collective.
 
@@ -24,14 +25,15 @@ def reduced_records(
     solved: dict[float, Record] = {}
     found: dict[str, Reduced] = {}
     case = todo[0].case
-    with ReducedBasis(body, case.travel, _ratio(todo[0]), case.solve.method) as basis:
+    with ReducedBasis(problem, loads_of(case), _ratio(todo[0]), case.solve.method) as basis:
         ends = [todo[0], todo[-1]]
         while todo:
             following = ends.pop() if ends else max(todo, key=lambda s: abs(found[s.key].bound) if found else inf)
             todo.remove(following)
             record = compute(following)
-            if record is not None and body.correction is not None:
-                basis.add(body.correction)
+            if record is not None and problem.corrections:
+                (correction,) = problem.corrections.values()
+                basis.add(correction)
                 solved[_ratio(following)] = record
             if ends or not solved:
                 continue
@@ -40,7 +42,7 @@ def reduced_records(
             if all(0 <= reduced.bound <= tolerance for reduced in found.values()):
                 break
         for solve in todo:
-            finish(solve, _record(solve, found[solve.key], _source(solve, solved), body, basis))
+            finish(solve, _record(solve, found[solve.key], _source(solve, solved), problem, basis))
 
 
 def _source(solve: Solve, solved: dict[float, Record]) -> Record:
@@ -59,13 +61,15 @@ def _ratio(solve: Solve) -> float:
     return lame_lambda / mu
 
 
-def _record(solve: Solve, reduced: Reduced, source: Record, body: ElasticBody, basis: ReducedBasis) -> Record:
+def _record(
+    solve: Solve, reduced: Reduced, source: Record, problem: DisplacementProblem, basis: ReducedBasis
+) -> Record:
     """Return the record of an evaluation, which is for μ = 1."""
     scale, (_, mu) = solve.case.scale, solve.case.material.lame
-    x, y, z = (mu * float(component) for component in reduced.reaction)
+    x, y, z = (mu * component for component in reduced.response.force)
     force = -sum(f * a for f, a in zip((x, y, z), solve.case.frame.axis, strict=True))
     return replace(
         source, key=solve.key, origin="reduced", young=scale.stress, depth=scale.length, force=force,
-        force_vector=(x, y, z), force_error=source.force_error + reduced.bound, energy=mu * reduced.twice_energy / 2,
-        max_strain=body.largest_strain(basis.displacement(reduced)), balance=reduced.bound, iterations=0,
+        force_vector=(x, y, z), force_error=source.force_error + reduced.bound, energy=mu * reduced.response.energy,
+        max_strain=problem.largest_strain(basis.displacement(reduced)), balance=reduced.bound, iterations=0,
     )  # fmt: skip

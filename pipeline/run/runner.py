@@ -20,18 +20,19 @@ from pipeline.plan.steps import MeshStep, OperatorStep, Solve, mesh_steps
 from pipeline.plan.symmetry import model_planes
 from pipeline.run.attempts import Attempts
 from pipeline.run.basis import reduced_records
-from pipeline.run.body import Body, CaseFailure, body_of, check_memory, lacks_memory, solve_body
 from pipeline.run.compile import prepare
-from pipeline.run.measure import TIMES, record_of, record_of_meridian
+from pipeline.run.measure import TIMES, record_of
 from pipeline.run.memory import FreeMemory, PeakMemory, give_back
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import mesh_case, on_first_rank
+from pipeline.run.problem import CaseFailure, check_memory, conditions_of, lacks_memory, problem_of, solve_problem
 from pipeline.run.progress import Progress
 from pipeline.run.provenance import provenance
 from pipeline.run.record import Record
-from pipeline.solve.axisymmetric import solve_axisymmetric
-from pipeline.solve.elasticity import ElasticBody
+from pipeline.solve.axisymmetric import MeridianProblem
+from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.linear import SolveError, is_direct
+from pipeline.solve.solution import FieldProblem
 from pipeline.solve.spaces import Spaces
 
 T = TypeVar("T")
@@ -113,27 +114,27 @@ class StepRunner:
     def _operate(self, step: OperatorStep, ground: Ground) -> None:
         """Solve every material of an operator, or a few of them and the rest from these."""
         shared = self._assembles_parts(step, ground.mesh)
-        body = self._caught(lambda: body_of(ground.spaces, step.case, shared=shared, reuse=self._plan.reuse))
-        if isinstance(body, Failure):
-            self._fail(step.solves, body)
+        problem = self._caught(lambda: problem_of(ground.spaces, step.case, shared=shared, reuse=self._plan.reuse))
+        if isinstance(problem, Failure):
+            self._fail(step.solves, problem)
             return
-        with body:
-            if step.solves[0].reduced and isinstance(body, ElasticBody):
-                self._reduce(step, body, ground)
+        with problem:
+            if step.solves[0].reduced and isinstance(problem, DisplacementProblem):
+                self._reduce(step, problem, ground)
             for solve in step.solves:
                 if solve.key not in self._records:
-                    self._record(solve, partial(self._solve, solve, body, ground, _bar_of(solve)))
+                    self._record(solve, partial(self._solve, solve, problem, ground, _bar_of(solve)))
 
-    def _reduce(self, step: OperatorStep, body: ElasticBody, ground: Ground) -> None:
+    def _reduce(self, step: OperatorStep, problem: DisplacementProblem, ground: Ground) -> None:
         """Solve a few and finish the rest from their basis; without a basis those are left to be solved, too."""
 
         def compute(solve: Solve) -> Record | None:
-            self._record(solve, partial(self._solve, solve, body, ground, _bar_of(solve)))
+            self._record(solve, partial(self._solve, solve, problem, ground, _bar_of(solve)))
             record = self._records[solve.key]
             return record if record.is_ok else None
 
         tolerance = self._plan.study.planning.tolerance
-        found = self._caught(lambda: reduced_records(step.solves, body, tolerance, compute, self._finish))
+        found = self._caught(lambda: reduced_records(step.solves, problem, tolerance, compute, self._finish))
         if isinstance(found, Failure):
             self._progress.note(f"no reduced basis, every case is solved: {found.message}")
 
@@ -164,19 +165,19 @@ class StepRunner:
     def _afresh(self, solve: Solve, memory: PeakMemory, bar: Bar) -> Record:
         """Compute one case, mesh and all; collective."""
         mesh, seconds = self._mesh(solve)
-        with Spaces(mesh) as spaces, body_of(spaces, solve.case, shared=False) as body:
-            record = self._solve(solve, body, Ground(spaces, seconds, memory), bar)
-        del mesh, spaces, body
+        with Spaces(mesh) as spaces, problem_of(spaces, solve.case, shared=False) as problem:
+            record = self._solve(solve, problem, Ground(spaces, seconds, memory), bar)
+        del mesh, spaces, problem
         give_back()
         return record
 
-    def _solve(self, solve: Solve, body: Body, ground: Ground, bar: Bar) -> Record:
+    def _solve(self, solve: Solve, problem: FieldProblem, ground: Ground, bar: Bar) -> Record:
         case, degree = solve.case, solve.case.mesh.degree
-        direct = is_direct(case.solve.method, body.dofs, degree)
-        check_memory(self._free, estimate.solving_memory(body.dofs, degree, direct=direct), "solving")
-        missing = self._lacks_room(bar, body.dofs, degree)
-        solution = solve_body(case, body, estimate=bar is not Bar.NONE and not missing)
-        record = record_of(solve, solution, ground.mesh.cells, ground.seconds)
+        direct = is_direct(case.solve.method, problem.dofs, degree)
+        check_memory(self._free, estimate.solving_memory(problem.dofs, degree, direct=direct), "solving")
+        missing = self._lacks_room(bar, problem.dofs, degree)
+        solution = solve_problem(case, problem, estimate=bar is not Bar.NONE and not missing)
+        record = record_of(solve, solution, ground.seconds)
         return replace(self._stamp(record, ground.memory), message=missing)
 
     def _lacks_room(self, bar: Bar, dofs: int, degree: int) -> str:
@@ -193,12 +194,8 @@ class StepRunner:
         return lacks_memory(self._free, needed, "the error bar")
 
     def _solve_meridian(self, solve: Solve, memory: PeakMemory) -> Record:
-        case = solve.case
-        compute = partial(
-            solve_axisymmetric, meridian_of(case), case.material.poisson, case.probe.contact == "bonded",
-            young=case.scale.stress, depth=case.scale.length,
-        )  # fmt: skip
-        record = on_first_rank(self._comm, lambda: record_of_meridian(solve, compute()))
+        problem = MeridianProblem(meridian_of(solve.case), conditions_of(solve.case))
+        record = on_first_rank(self._comm, lambda: record_of(solve, solve_problem(solve.case, problem, estimate=True)))
         return self._stamp(self._comm.bcast(record), memory)
 
     def _mesh(self, solve: Solve) -> tuple[BodyMesh, float]:

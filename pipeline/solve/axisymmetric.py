@@ -20,9 +20,13 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray
 from pipeline.mesh.meridian import AXIS, Grading, Meridian, MeridianArrays, generate_meridian, meridian_mesh
 from pipeline.scene.model import FIXED, PROBE
-from pipeline.solve.elasticity import BALANCE_LIMIT
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.linear import SolveError
+from pipeline.solve.loads import Loads
+from pipeline.solve.material import MaterialLaw
 from pipeline.solve.meridian_forms import MeridianForms
+from pipeline.solve.reaction import reaction
+from pipeline.solve.solution import BALANCE_LIMIT, Solution
 from pipeline.stages import stage
 
 DEGREE = 5
@@ -40,86 +44,79 @@ _MOST_REFINEMENTS, _BALANCED = 20, 1e-9
 _STRAIN_DISTANCE = 0.1
 
 
-@dataclass(frozen=True)
-class AxisymmetricSolution:
-    """What one round scene gives.
+class MeridianProblem:
+    """The meridian of a round scene, which a probe presses along its axis; on this process alone.
 
-    ``force`` (N) is positive against the probe's advance; ``force_error`` its relative error bar (95 %); ``energy``
-    (J) the strain energy; ``balance`` the larger of the relative errors of F·d = 2U and of F_probe + F_support = 0;
-    ``max_strain`` the largest principal strain, by magnitude, of the mean strains of cells at least a/10 away from
-    every singular point. ``dofs``, ``cells`` and ``iterations`` belong to the solve that gave F, the seconds are of
-    all; an iteration beyond the first refines what a slender body loses to round-off.
+    A context manager, like other problems; it holds nothing between solves, each of which makes meshes of its own.
     """
 
-    force: float
-    force_error: float
-    energy: float
-    balance: float
-    max_strain: float
-    dofs: int
-    cells: int
-    iterations: int
-    time_mesh: float
-    time_assemble: float
-    time_setup: float
-    time_solve: float
+    def __init__(self, meridian: Meridian, conditions: Conditions, *, accuracy: float = 1e-5, degree: int = DEGREE):
+        """Prepare to refine until the error bar is at most ``accuracy``; ``degree`` is 3 at least."""
+        self._meridian, self._bonded = meridian, conditions.bonded
+        self._accuracy, self._degree = accuracy, degree
 
+    def __enter__(self) -> "MeridianProblem":
+        return self
 
-@stage("axisymmetric")
-def solve_axisymmetric(
-    meridian: Meridian,
-    poisson: float,
-    bonded: bool,
-    *,
-    young: float = 1.0,
-    depth: float = 1.0,
-    accuracy: float = 1e-5,
-    degree: int = DEGREE,
-) -> AxisymmetricSolution:
-    """Solve a round scene for 0 <= ν <= 0.5 on this process alone; ``young`` in Pa, ``depth`` in m.
+    def __exit__(self, *_: object) -> None:
+        pass
 
-    Refines until the error bar is at most ``accuracy``, or there is no finer mesh; then takes the best. ``degree``
-    is 3 at least.
+    @property
+    def dofs(self) -> int:
+        """Unknowns of the first mesh are some 10,000; none is made before it is solved on."""
+        return 0
 
-    Raises:
-        SolveError: if the conditions contradict each other or nothing is held, if a solve fails a check, or if the
-            error bar stays above 1e-3.
-    """
-    if not 0 <= poisson <= 0.5:
-        raise SolveError(f"Poisson's ratio is {poisson:g}, must be between 0 and 0.5")
-    clock, best, failure = _Clock(), None, SolveError("no mesh was tried")
-    for grading in _GRADINGS:
-        try:
-            arrays = generate_meridian(meridian, grading)
-            solution = _solve_on(arrays, poisson, bonded, degree, clock)
-        except _Unbalanced as error:
-            # Round-off grows with refinement: a finer mesh would do no better.
-            failure = error
-            break
-        if best is None or solution.error < best.error:
-            best, cells = solution, len(arrays.cells)
-        if best.error <= accuracy:
-            break
-    if best is None:
-        raise failure
-    if best.error > _WORST_ERROR:
-        raise SolveError(f"the force is known to {best.error:.0e} only, allowed {_WORST_ERROR:.0e}")
-    a, mu = meridian.unit, young / (2 * (1 + poisson))
-    return AxisymmetricSolution(
-        force=mu * a * depth * best.force,
-        force_error=best.error,
-        energy=mu * a * depth**2 * best.energy,
-        balance=best.balance,
-        max_strain=depth / a * best.max_strain,
-        dofs=best.forms.dofs,
-        cells=cells,
-        iterations=best.iterations,
-        **{f"time_{name}": seconds for name, seconds in clock.seconds.items()},
-    )
+    @stage("axisymmetric")
+    def solve(
+        self, law: MaterialLaw, loads: Loads, *, method: str = "auto", tolerance: float = 0.0, estimate: bool = True
+    ) -> Solution:
+        """Solve for 0 <= ν <= 0.5 and a movement along the axis; directly, refined until round-off stops it.
+
+        Takes the next mesh until the error bar is small enough, or there is no finer one; then takes the best. The
+        bars are there whether ``estimate`` asks for them or not; ``max_strain`` is that of cells at least a/10 away
+        from every singular point. ``dofs``, ``cells`` and ``iterations`` belong to the solve that gave F, the seconds
+        are of all; an iteration beyond the first refines what a slender body loses to round-off.
+
+        Raises:
+            SolveError: if the conditions contradict each other or nothing is held, if a solve fails a check, or if the
+                error bar stays above 1e-3.
+        """
+        if len(loads.motions) > 1 or loads.motions[0].is_rotation or any(loads.motions[0].direction[:2]):
+            raise SolveError("the meridian serves movements along its axis only")
+        if not 0 <= law.poisson <= 0.5:
+            raise SolveError(f"Poisson's ratio is {law.poisson:g}, must be between 0 and 0.5")
+        clock, best, failure = _Clock(), None, SolveError("no mesh was tried")
+        for grading in _GRADINGS:
+            try:
+                arrays = generate_meridian(self._meridian, grading)
+                found = _solve_on(arrays, law, self._bonded, self._degree, clock)
+            except _Unbalanced as error:
+                # Round-off grows with refinement: a finer mesh would do no better.
+                failure = error
+                break
+            if best is None or found.error < best.error:
+                best, cells = found, len(arrays.cells)
+            if best.error <= self._accuracy:
+                break
+        if best is None:
+            raise failure
+        if best.error > _WORST_ERROR:
+            raise SolveError(f"the force is known to {best.error:.0e} only, allowed {_WORST_ERROR:.0e}")
+        a, (_, mu), (amount,) = self._meridian.unit, law.lame, loads.amounts
+        response = reaction(
+            loads, np.array([[mu * a * best.stationary]]), np.array([[0.0, 0.0, mu * a * best.on_probe]]),
+            balance=best.balance,
+        )  # fmt: skip
+        return Solution(
+            response, abs(amount) / a * best.max_strain, best.forms.dofs, cells, best.iterations,
+            bars=best.error * response.stiffness,
+            time_mesh=clock.seconds["mesh"], time_assemble=clock.seconds["assemble"],
+            time_setup=clock.seconds["setup"], time_solve=clock.seconds["solve"],
+        )  # fmt: skip
 
 
 def compile_axisymmetric(degree: int = DEGREE) -> None:
-    """Compile every form that ``solve_axisymmetric`` needs, on this process alone; call it within ``compiling()``."""
+    """Compile every form that a :class:`MeridianProblem` needs, on this process; call it within ``compiling()``."""
     mesh, _ = meridian_mesh(generate_meridian(Meridian(2.0, 1.0, 1.0), Grading(1.0)))
     for mixed in (False, True):
         for p in (degree - 1, degree):
@@ -147,10 +144,10 @@ class _Clock:
 
 @dataclass(frozen=True)
 class _Scaled:
-    """A solution for a = μ = d = 1; ``error`` is relative."""
+    """A solution for a = μ = d = 1: the residual on the probe, and twice the energy; ``error`` is relative."""
 
-    force: float
-    energy: float
+    on_probe: float
+    stationary: float
     balance: float
     forms: MeridianForms
     iterations: int
@@ -158,7 +155,7 @@ class _Scaled:
     max_strain: float = 0.0
 
 
-def _solve_on(arrays: MeridianArrays, poisson: float, bonded: bool, degree: int, clock: _Clock) -> _Scaled:
+def _solve_on(arrays: MeridianArrays, law: MaterialLaw, bonded: bool, degree: int, clock: _Clock) -> _Scaled:
     """Solve with degrees p - 1 and p on one mesh: the answer is that of p, its error bar comes from the difference.
 
     At an edge where the displacement goes like r^½, the error falls like p⁻² if nothing else is left (the mesh's
@@ -172,11 +169,11 @@ def _solve_on(arrays: MeridianArrays, poisson: float, bonded: bool, degree: int,
         raise SolveError("the probe covers the top right to the held side: no displacement satisfies both conditions")
     with clock("mesh"):
         mesh, facets = meridian_mesh(arrays)
-    mixed = poisson >= MIXED_FROM
-    coarse = _solve_degree(mesh, facets, degree - 1, mixed, poisson, bonded, clock)
-    fine = _solve_degree(mesh, facets, degree, mixed, poisson, bonded, clock)
+    mixed = law.poisson >= MIXED_FROM
+    coarse = _solve_degree(mesh, facets, degree - 1, mixed, law, bonded, clock)
+    fine = _solve_degree(mesh, facets, degree, mixed, law, bonded, clock)
     theta = (degree - 1) ** 2 / (2 * degree - 1)
-    step = abs(coarse.force / fine.force - 1)
+    step = abs(coarse.on_probe / fine.on_probe - 1)
     error = 1.25 * theta * step + 3 * max(coarse.balance, fine.balance)
     with clock("solve"):
         strain, corners = fine.forms.mean_strains()
@@ -186,12 +183,12 @@ def _solve_on(arrays: MeridianArrays, poisson: float, bonded: bool, degree: int,
 
 
 def _solve_degree(
-    mesh: Any, facets: dict[str, Any], degree: int, mixed: bool, poisson: float, bonded: bool, clock: _Clock
+    mesh: Any, facets: dict[str, Any], degree: int, mixed: bool, law: MaterialLaw, bonded: bool, clock: _Clock
 ) -> _Scaled:
     """Solve with one degree; refine the solution until round-off stops it."""
     with clock("assemble"):
         forms = MeridianForms(mesh, degree, mixed)
-        forms.set_poisson(poisson)
+        forms.set_ratio(law.ratio)
         stiffness = forms.stiffness()
         probe, support = forms.locate(facets, PROBE, 1), forms.locate(facets, FIXED, 1)
         zero = [support, forms.locate(facets, FIXED, 0), forms.locate(facets, AXIS, 0)]
@@ -219,7 +216,7 @@ def _solve_degree(
             f"forces do not balance: relative error {balance:.1e}, allowed {BALANCE_LIMIT:.0e}; "
             "the body is so slender that its stiffness drowns in round-off"
         )
-    return _Scaled(-on_probe, twice_energy / 2, balance, forms, iteration)
+    return _Scaled(on_probe, twice_energy, balance, forms, iteration)
 
 
 @contextmanager

@@ -9,42 +9,69 @@ is summed by conjugate gradients that start from u_p: each iteration adds α (r,
 of them give s to a few per cent, always from below.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 
 import numpy as np
 from petsc4py import PETSc
 
 from pipeline.solve.linear import LinearSolver, SolveError
+from pipeline.solve.loads import FloatArray
+from pipeline.solve.vectors import global_sum
 
 # Iterations end when one adds less than this share of the sum; the first few may be short by chance.
 _SMALL = 0.02
 _FEWEST, _MOST = 3, 60
 
 
-def energy_decrement(solver: LinearSolver, residual: PETSc.Vec) -> tuple[float, int]:
-    """Return ``residual``·A⁻¹·``residual`` (J), from below, and the iterations; collective.
+def energy_decrements(solver: LinearSolver, residuals: Sequence[PETSc.Vec]) -> tuple[FloatArray, int]:
+    """Return r_i·A⁻¹·r_j (J) of n ``residuals``, (n, n), and the iterations; collective.
 
-    ``residual`` is overwritten.
+    On the diagonal it is from below; the error of any entry is at most the root of the two on the diagonal. The
+    residuals are overwritten.
 
     Raises:
         SolveError: if the increments do not get small.
     """
+    first = [np.array(residual.array) for residual in residuals]
+    corrections, totals, iterations = [], [], 0
+    for residual in residuals:
+        total, correction, count = _correct(solver, residual, keep=len(residuals) > 1)
+        totals.append(total)
+        corrections.append(correction)
+        iterations += count
+    if len(totals) == 1:
+        return np.array([totals]), iterations
+    # With x_i for A⁻¹ r_i and ρ_i for what is left of r_i: x_i·r_j + x_j·r_i - x_i·A·x_j, and A x_j = r_j - ρ_j.
+    left = [np.array(residual.array) for residual in residuals]
+    local = np.array([[x @ rho + y @ r for y, rho in zip(corrections, left, strict=True)]
+                      for x, r in zip(corrections, first, strict=True)])  # fmt: skip
+    found = global_sum(residuals[0].comm.tompi4py(), local)
+    found = (found + found.T) / 2
+    np.fill_diagonal(found, totals)
+    return found, iterations
+
+
+def _correct(solver: LinearSolver, residual: PETSc.Vec, *, keep: bool) -> tuple[float, FloatArray, int]:
+    """Return ``residual``·A⁻¹·``residual``, the solution if it is to be kept (owned dofs), and the iterations."""
     total, previous = 0.0, 0.0
+    solution = np.zeros(residual.getLocalSize() if keep else 0)
     with ExitStack() as stack:
         direction, preconditioned, product = (stack.enter_context(_like(residual)) for _ in range(3))
         for iteration in range(1, _MOST + 1):
             solver.precondition(residual, preconditioned)
             rz = residual.dot(preconditioned)
             if rz <= 0.0:  # nothing is left to gain
-                return total, iteration
+                return total, solution, iteration
             direction.aypx(rz / previous if previous else 0.0, preconditioned)
             solver.matrix.mult(direction, product)
             step = rz / direction.dot(product)
             residual.axpy(-step, product)
+            if keep:
+                solution += step * direction.array
             total, previous = total + step * rz, rz
             if iteration >= _FEWEST and step * rz <= _SMALL * total:
-                return total, iteration
+                return total, solution, iteration
     raise SolveError(f"the error estimate did not settle in {_MOST} iterations")
 
 

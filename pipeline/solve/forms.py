@@ -18,12 +18,12 @@ from pipeline.arrays import BoolArray
 from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import distribute
 from pipeline.mesh.generate import MeshArrays
-from pipeline.solve.cache import form_cache
-from pipeline.solve.straight import has_kernel
+from pipeline.solve.compiled import EVERYWHERE, cellwise_space, form, vector_space
+from pipeline.solve.straight import has_kernel, suits
 from pipeline.solve.straight.stiffness import cell_kernel
 
 # Marks of cells, and the bulge of an edge, in units of its length, that rounding may leave.
-_ALL, _NEITHER, _STRAIGHT, _CURVED = -1, 0, 1, 2
+_NEITHER, _STRAIGHT, _CURVED = 0, 1, 2
 _FLAT = 1e-9
 _curved: WeakKeyDictionary[Any, BoolArray | None] = WeakKeyDictionary()
 
@@ -62,14 +62,14 @@ class ElasticForms:
     def _kernels(self) -> dict[int, int]:
         """Return a kernel for the straight cells, which takes a twelfth of the time of the generated one."""
         degree, mesh = compat.degree(self._space), self._space.mesh
-        if mesh.comm.size == 1 or not has_kernel(degree):
+        if suits(self._space) or not has_kernel(degree):
             return {}
-        return {_ALL if curved_cells(mesh) is None else _STRAIGHT: cell_kernel(degree)}
+        return {EVERYWHERE if curved_cells(mesh) is None else _STRAIGHT: cell_kernel(degree)}
 
     def _form(self, name: str, u: Any, measure: Any, kernels: dict[int, int] | None = None) -> Any:
         v, (lame_lambda, lame_mu) = ufl.TestFunction(self._space), self.lame
         energy = lame_lambda * ufl.div(u) * ufl.div(v) + 2 * lame_mu * ufl.inner(strain(u), strain(v))
-        return compat.form(energy * measure, str(form_cache()), form_name(name, self._space), kernels)
+        return form(energy * measure, form_name(name, self._space), kernels)
 
 
 def dx(space: Any, *, curved_only: bool = False) -> Any:
@@ -118,13 +118,13 @@ def strain(u: Any) -> Any:
 
 def mean_strain_form(space: Any, displacement: Any) -> tuple[Any, Any]:
     """Return forms of the integral of the strain, and of the volume, of each cell; collective."""
-    tensors = compat.cellwise_tensor_space(space.mesh)
+    tensors = cellwise_space(space.mesh, (3, 3))
     test = ufl.TestFunction(tensors)
-    measure, cache = dx(space), str(form_cache())
+    measure = dx(space)
     one = ufl.as_tensor(np.ones((3, 3)).tolist())
     integrands = (ufl.inner(strain(displacement), test), ufl.inner(one, test))
     integral, volume = (
-        compat.form(integrand * measure, cache, form_name(name, space, tensors))
+        form(integrand * measure, form_name(name, space, tensors))
         for name, integrand in zip(("mean strain", "volume"), integrands, strict=True)
     )
     return integral, volume
@@ -134,7 +134,7 @@ def compile_elastic(degree: int, *, straight: bool) -> None:
     """Compile the forms of displacements of ``degree`` and of those below, and of one degree more for the error bar."""
     mesh = distribute(MPI.COMM_SELF, one_cell(straight=straight)).mesh
     for level in range(1, degree + 2):
-        space = compat.vector_space(mesh, level)
+        space = vector_space(mesh, level)
         forms = ElasticForms(space)
         _ = forms.stiffness, forms.action
         if level == degree:

@@ -18,7 +18,7 @@ from dolfinx import fem
 
 from pipeline import compat
 from pipeline.arrays import FloatArray, IntArray
-from pipeline.solve.cache import form_cache
+from pipeline.solve.compiled import cellwise_space, form, taylor_hood_space, vector_space
 
 
 class MeridianForms:
@@ -26,7 +26,7 @@ class MeridianForms:
 
     def __init__(self, mesh: Any, degree: int, mixed: bool):
         self._mesh, self._mixed = mesh, mixed
-        self._space = compat.taylor_hood_space(mesh, degree) if mixed else compat.vector_space(mesh, degree)
+        self._space = taylor_hood_space(mesh, degree) if mixed else vector_space(mesh, degree)
         self._solution = fem.Function(self._space)
         self._compressibility = fem.Constant(mesh, 1.0)  # λ/μ, or μ/λ if mixed
         self.dofs = len(self._solution.x.array)
@@ -45,17 +45,15 @@ class MeridianForms:
                 density += self._compressibility * _div(u, r) * _div(v, r)
             return density * r * dx
 
-        cache = str(form_cache())
-        self._stiffness = compat.form(virtual_work(trial), cache)
-        self._action = compat.form(virtual_work(self._solution), cache)
+        self._stiffness = form(virtual_work(trial))
+        self._action = form(virtual_work(self._solution))
         displacement = ufl.split(self._solution)[0] if mixed else self._solution
-        cellwise = ufl.TestFunction(compat.cellwise_vector_space(mesh, 4))
-        self._strains = compat.form(ufl.inner(ufl.as_vector(_strain(displacement, r)), cellwise) * dx, cache)
+        cellwise = ufl.TestFunction(cellwise_space(mesh, (4,)))
+        self._strains = form(ufl.inner(ufl.as_vector(_strain(displacement, r)), cellwise) * dx)
 
-    def set_poisson(self, poisson: float) -> None:
-        """Set λ/μ = 2ν/(1 - 2ν), or its inverse if mixed."""
-        above, below = 2 * poisson, 1 - 2 * poisson
-        self._compressibility.value = below / above if self._mixed else above / below
+    def set_ratio(self, ratio: float) -> None:
+        """Set λ/μ, which may be infinite if mixed, or there its inverse."""
+        self._compressibility.value = 1 / ratio if self._mixed else ratio
 
     def locate(self, facets: dict[str, Any], name: str, component: int) -> IntArray:
         """Return the dofs of u_r (0) or u_z (1) on a group of facets."""

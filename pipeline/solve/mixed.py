@@ -7,8 +7,8 @@ With λ split into λ₀ = μ, which stays with the displacement, and λ₁ = λ
 
 holds for ν = ½, where 1/λ₁ = 0. Divided by μ, all but 1/λ₁ is the same for every material: it is assembled once.
 
-The force is the reaction K₀ u + Bᵀ p on the probe; along the probe's travel it is the value of the functional
-a₀(u, u) + 2 b(u, p) − (p, p)/λ₁, which is stationary: its error is the square of the solver's.
+The force is the reaction K₀ u + Bᵀ p on the probe; the probe's stiffness is, for each pair of motions,
+a₀(u, v) + b(u, q) + b(v, p) − (p, q)/λ₁, which is stationary: its error is the product of the solver's.
 
 F_h is no upper bound, since the constraint is relaxed; s = F_k − F_{k+1} may have either sign, and vanish by chance.
 The bar is therefore the larger of what :mod:`pipeline.solve.error` makes of |s|, with the same constants, and of a
@@ -18,31 +18,28 @@ were within the bar, the worst off by 1.02 of it, and the median bar is 1.6 time
 """
 
 import time
+from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 from typing import Any
 
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.error import error_bar
+from pipeline.solve.conditions import Conditions
+from pipeline.solve.error import error_bar, stiffness_bars
 from pipeline.solve.forms import mean_strain_form
 from pipeline.solve.linear import Level, SolveError
+from pipeline.solve.loads import Loads
+from pipeline.solve.material import MaterialLaw
 from pipeline.solve.mixed_space import MixedSpace
+from pipeline.solve.reaction import Response, reaction, sums
 from pipeline.solve.saddle import Pair, Saddle, SaddleSolver
-from pipeline.solve.solution import (
-    BALANCE_LIMIT,
-    TOLERANCE,
-    Solution,
-    global_sum,
-    largest_strain,
-    needed_tolerance,
-    principal_strains,
-    rest,
-)
-from pipeline.solve.space import Contact
+from pipeline.solve.solution import BALANCE_LIMIT, TOLERANCE, Solution, rest
 from pipeline.solve.spaces import Spaces
+from pipeline.solve.strain import largest_strain, principal_strains
+from pipeline.solve.vectors import global_sum
 from pipeline.stages import stage
 
 # λ₀/μ = 1 (ν = ¼): small enough for the multigrid, large enough for the pressure's mass to be a good preconditioner.
@@ -57,28 +54,19 @@ STRICTER = 0.1
 _UNSEEN = 0.3
 
 
-@dataclass(frozen=True)
-class _Forces:
-    """What a pair of fields gives, for μ = 1 and the whole body; ``work`` is F·d as a stationary value."""
-
-    reaction: FloatArray
-    work: float
-    balance: float
-
-
-class MixedBody:
-    """The spaces of a mesh, a degree k and a contact: solves for any λ > μ, infinity too, sharing all assembly.
+class MixedProblem:
+    """The spaces of a mesh, a degree k and conditions: solves for any λ > μ, infinity too, sharing all assembly.
 
     A context manager, which frees what it made.
     """
 
-    def __init__(self, spaces: Spaces, degree: int, contact: Contact):
-        """Prepare; collective. Until its end, nobody else may ask the spaces for an operator.
+    def __init__(self, spaces: Spaces, degree: int, conditions: Conditions):
+        """Prepare; collective.
 
         Raises:
             SolveError: if footprint and support share a point: no displacement satisfies both.
         """
-        self._spaces, self._body, self._contact = spaces, spaces.body, contact
+        self._spaces, self._body, self._conditions = spaces, spaces.body, conditions
         self._stack = ExitStack()
         self._mixed: dict[int, MixedSpace] = {}
         self._levels: dict[tuple[int, bool], tuple[Level, float]] = {}
@@ -86,122 +74,152 @@ class MixedBody:
         self._degree = degree
         self._fine = self._space(degree)
         fine = self._fine.displacements
-        self._strain = mean_strain_form(fine.space, fine.forms.displacement)
-        self.dofs = self._fine.dofs
+        self._strain = mean_strain_form(fine.dofs.space, fine.forms.displacement)
 
-    def __enter__(self) -> "MixedBody":
+    def __enter__(self) -> "MixedProblem":
         return self
 
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
+    @property
+    def dofs(self) -> int:
+        """Unknowns of the modelled part."""
+        return self._fine.dofs
+
     def solve(
-        self, lame: tuple[float, float], *, method: str = "auto", tolerance: float = TOLERANCE, estimate: bool = False
-    ) -> Solution:
-        """Solve for Lamé's λ, which may be infinite, and μ (Pa); return force, energy and checks; collective.
+        self, law: MaterialLaw, loads: Loads, *, method: str = "auto", tolerance: float = TOLERANCE,
+        estimate: bool = False,
+    ) -> Solution:  # fmt: skip
+        """Solve for each motion of ``loads``, with one set-up, and return forces and checks; collective.
 
         ``tolerance`` is that of the energy norm of the solver's error. ``estimate`` goes on with elements of one
-        degree more, for ``decrement``, which may be negative, and ``bar``.
+        degree more, for the solution's ``decrements``, which may be negative, and ``bars``.
 
         Raises:
             SolveError: if λ <= μ, the solver did not converge, or the solution fails a check.
         """
-        lame_lambda, mu = lame
+        lame_lambda, mu = law.lame
         if not lame_lambda > mu:
             raise SolveError("mixed elements are for Poisson's ratios above 0.25; use displacement elements")
-        tolerance = STRICTER * needed_tolerance(self._contact.travel, tolerance)
+        tolerance = STRICTER * tolerance
         c = 0.0 if lame_lambda == inf else 1 / (lame_lambda / mu - LAME[0])
         direct = method == "direct" or (method == "auto" and self.dofs <= DIRECT_LIMIT)
         solver, assemble = self._solver(self._degree, direct=direct)
+        fine = self._fine
         start = time.perf_counter()
-        with self._fine.pair() as unknown:
-            iterations = self._correct(self._fine, solver, c, unknown, tolerance)
-            forces = self._forces(self._fine, c, unknown)
-            if (share := rest(forces.balance, tolerance)) < 1:
-                self._fine.release(unknown)
-                iterations += self._correct(self._fine, solver, c, unknown, share)
-                forces = self._forces(self._fine, c, unknown)
-        seconds = time.perf_counter() - start - (solver.setup_seconds if direct else 0.0)
-        if forces.balance > BALANCE_LIMIT:
-            raise SolveError(f"forces do not balance: relative error {forces.balance:.1e}, allowed {BALANCE_LIMIT:.0e}")
-        x, y, z = (mu * float(component) for component in forces.reaction)
-        solution = Solution(
-            (x, y, z), mu * forces.work / 2, largest_strain(self._strain, self._body), forces.balance,
-            self._fine.whole_dofs, iterations,
-            assemble, solver.setup_seconds, seconds,
-        )  # fmt: skip
-        return self._estimate(solution, forces.work, c) if estimate else solution
+        held = [fine.displacements.dofs.held(motion) for motion in loads.motions]
+        with ExitStack() as stack:
+            unknowns = [stack.enter_context(fine.pair()) for _ in held]
+            iterations = self._correct(fine, solver, c, unknowns, held, tolerance)
+            response = self._response(fine, c, unknowns, held, loads)
+            if (share := rest(response.balance, tolerance)) < 1:
+                iterations += self._correct(fine, solver, c, unknowns, held, share)
+                response = self._response(fine, c, unknowns, held, loads)
+            seconds = time.perf_counter() - start - (solver.setup_seconds if direct else 0.0)
+            if response.balance > BALANCE_LIMIT:
+                raise SolveError(
+                    f"forces do not balance: relative error {response.balance:.1e}, allowed {BALANCE_LIMIT:.0e}"
+                )
+            self._move(unknowns, held, loads.amounts)
+            strain = largest_strain(self._strain, self._body)
+            solution = Solution(
+                _times(response, mu), strain, fine.whole_dofs, self._body.cells, iterations,
+                assemble, solver.setup_seconds, seconds,
+            )  # fmt: skip
+            if not estimate:
+                return solution
+            solution = self._estimate(solution, response, unknowns, held, c, mu)
+            self._move(unknowns, held, loads.amounts)
+        return solution
 
     def fields(self) -> tuple[Any, FloatArray]:
         """Return the last solution's displacement (m) and the principal strains of each owned cell; collective."""
         return self._fine.displacements.forms.displacement, principal_strains(self._strain, self._body)
 
+    def _move(self, unknowns: list[Pair], held: list[FloatArray], amounts: Sequence[float]) -> None:
+        """Make the sum of the motions the displacement and the pressure of the forms; collective."""
+        owned = self._fine.displacements.dofs.owned
+        with self._fine.pair() as (displacement, pressure):
+            for (u, p), values, amount in zip(unknowns, held, amounts, strict=True):
+                displacement.array[:] += amount * (u.array + values[:owned])
+                pressure.axpy(amount, p)
+            self._fine.set_fields((displacement, pressure))
+
     @stage("error bar")
-    def _estimate(self, solution: Solution, work: float, c: float) -> Solution:
-        """Return ``solution``, whose F·d is ``work`` for μ = 1, with its error bar; collective."""
-        start = time.perf_counter()
+    def _estimate(
+        self, solution: Solution, coarse: Response, unknowns: list[Pair], held: list[FloatArray], c: float, mu: float
+    ) -> Solution:
+        """Return ``solution``, whose response for μ = 1 is ``coarse``, with its error bars; collective."""
+        start, loads = time.perf_counter(), coarse.loads
         solver, _ = self._solver(self._degree + 1, direct=False)
         finer = self._space(self._degree + 1)
-        with finer.pair() as unknown:
-            finer.start_from(self._fine, unknown)
-            iterations = self._correct(finer, solver, c, unknown, _ESTIMATE_TOLERANCE)
-            forces = self._forces(finer, c, unknown)
-        decrement = (work - forces.work) / work
-        unseen = _UNSEEN * self._multiplicity * solver.first_energy / work
+        finer_held = [finer.displacements.dofs.held(motion) for motion in loads.motions]
+        with ExitStack() as stack:
+            found = [stack.enter_context(finer.pair()) for _ in held]
+            for pair, unknown, values, fine_values in zip(found, unknowns, held, finer_held, strict=True):
+                self._move([unknown], [values], [1.0])
+                finer.start_from(self._fine, pair, fine_values)
+            iterations = self._correct(finer, solver, c, found, finer_held, _ESTIMATE_TOLERANCE)
+            fine = self._response(finer, c, found, finer_held, loads)
+        decrements, energies = coarse.stiffness - fine.stiffness, np.diag(coarse.stiffness)
+        unseen = _UNSEEN * 2.0 ** len(self._body.mirrored) * np.array(solver.first_energies) / energies
+        bars = [error_bar(abs(d), self._degree) for d in np.diag(decrements) / energies]
+        relative = np.maximum(bars, unseen)
         return replace(
-            solution, decrement=decrement, bar=max(error_bar(abs(decrement), self._degree), unseen),
+            solution, decrements=mu * decrements,
+            bars=stiffness_bars(solution.stiffness, relative, apart=loads.apart),
             estimate_iterations=iterations, time_estimate=time.perf_counter() - start,
         )  # fmt: skip
 
     @stage("iterations")
-    def _correct(self, space: MixedSpace, solver: SaddleSolver, c: float, unknown: Pair, tolerance: float) -> int:
-        """Solve for what is zero where displacements are prescribed, then add those; return the iterations."""
-        with space.pair() as rhs:
-            space.lift(rhs, LAME)
-            iterations = solver.solve(c, rhs, unknown, tolerance)
-        unknown[0].array[:] += space.displacements.held[: space.displacements.owned]
-        space.set_fields(unknown)
-        return iterations
+    def _correct(
+        self, space: MixedSpace, solver: SaddleSolver, c: float, unknowns: list[Pair], held: list[FloatArray],
+        tolerance: float,
+    ) -> int:  # fmt: skip
+        """Improve ``unknowns``, each less the prescribed displacements ``held``; return the iterations."""
+        with ExitStack() as stack:
+            loads = [stack.enter_context(space.pair()) for _ in held]
+            for load, values in zip(loads, held, strict=True):
+                space.lift(load, values, LAME)
+            return solver.solve(c, loads, unknowns, tolerance)
 
-    def _forces(self, space: MixedSpace, c: float, unknown: Pair) -> _Forces:
-        """Return the force on the probe, for μ = 1, and how well it balances."""
-        fine = space.displacements
-        u, p = unknown
-        with space.pair() as (residual, dilation), space.pair() as (pull, mass_p):
-            space.apply(residual, pull, dilation, LAME)
-            space.mass.mult(p, mass_p)
-            elastic, coupled, compressed = residual.dot(u), dilation.dot(p), c * mass_p.dot(p)
-            residual.axpy(1.0, pull)
-            r = residual.array
-            on_probe, on_support = (
-                global_sum(fine.comm, r.reshape(-1, 3)[dofs].sum(axis=0))
-                for dofs in (fine.probe_owned, fine.fixed_owned)
-            )
-            held = fine.held[: fine.owned]
-            work = float(global_sum(fine.comm, np.array([r[fine.prescribed_owned] @ held[fine.prescribed_owned]]))[0])
-        # Of a half or quarter model: its images double what lies in the plane and cancel what is across it.
-        whole = np.full(3, self._multiplicity)
-        whole[list(self._body.mirrored)] = 0.0
-        on_probe, on_support = whole * on_probe, whole * on_support
-        stationary, energy = elastic + 2 * coupled - compressed, elastic + compressed
-        size = float(np.linalg.norm(on_probe))
-        if not (np.isfinite(stationary) and np.isfinite(size) and stationary > 0 and size > 0):
-            raise SolveError(f"the solution is not a number or has no energy (2U/μ = {stationary:g} m³)")
-        balance = max(abs(work - energy) / energy, float(np.linalg.norm(on_probe + on_support)) / size)
-        travel = np.array(self._contact.travel) if self._contact.bonded else self._contact.travel[2] * np.eye(3)[2]
-        on_probe += self._multiplicity * (stationary - work) * travel / (travel @ travel)
-        return _Forces(-on_probe, self._multiplicity * stationary, balance)
-
-    @property
-    def _multiplicity(self) -> float:
-        """How many times the modelled part makes up the whole body."""
-        return 2.0 ** len(self._body.mirrored)
+    def _response(
+        self, space: MixedSpace, c: float, unknowns: list[Pair], held: list[FloatArray], loads: Loads
+    ) -> Response:
+        """Return the response, for μ = 1, to the motions whose solutions less ``held`` are ``unknowns``; collective."""
+        dofs, elastic, residuals, dilations, masses, moved = space.displacements.dofs, [], [], [], [], []
+        for unknown, values in zip(unknowns, held, strict=True):
+            with space.pair() as (residual, dilation), space.pair() as (pull, mass_p), space.pair() as total:
+                total[0].array[:] = unknown[0].array + values[: dofs.owned]
+                unknown[1].copy(total[1])
+                space.set_fields(total)
+                space.apply(residual, pull, dilation, LAME)
+                space.mass.mult(total[1], mass_p)
+                elastic.append(residual.array.copy())
+                residuals.append(residual.array + pull.array)
+                dilations.append(dilation.array.copy())
+                masses.append(c * mass_p.array)
+                moved.append((total[0].array.copy(), total[1].array.copy()))
+        # a₀(u_i, u_j), b(u_j, p_i), (p_i, p_j)/λ₁.
+        products = global_sum(
+            dofs.comm,
+            np.array([[[u @ k, p @ d, p @ m] for k, d, m in zip(elastic, dilations, masses, strict=True)]
+                      for u, p in moved]),
+        )  # fmt: skip
+        elastic_energy, coupled, compressed = np.moveaxis(products, -1, 0)
+        found = sums(dofs, residuals, held)
+        response = reaction(
+            loads, elastic_energy + coupled + coupled.T - compressed, found.on_probe, self._body.mirrored
+        )
+        energies = np.diag(elastic_energy + compressed)
+        return replace(response, balance=found.imbalance(energies, loads, self._body.mirrored))
 
     @stage("spaces, forms")
     def _space(self, degree: int) -> MixedSpace:
         """Return the spaces of elements of ``degree``, made when first asked for; collective."""
         if degree not in self._mixed:
-            self._mixed[degree] = MixedSpace(self._body, self._spaces.get(degree, self._contact))
+            self._mixed[degree] = MixedSpace(self._body, self._spaces.get(degree, self._conditions))
             self._stack.callback(self._mixed[degree].close)
         return self._mixed[degree]
 
@@ -213,7 +231,7 @@ class MixedBody:
     def saddle(self, *, direct: bool, degree: int | None = None) -> tuple[Saddle, float]:
         """Return the blocks for elements of ``degree``, None for its own, and the seconds of assembly; collective.
 
-        The body owns the matrices.
+        The problem owns the matrices.
         """
         degree = degree or self._degree
         space = self._space(degree)
@@ -233,7 +251,12 @@ class MixedBody:
     def _level(self, degree: int, *, blocked: bool) -> tuple[Level, float]:
         """Return K₀ for μ = 1 in displacements of ``degree``, and the seconds that its assembly took; collective."""
         if (degree, blocked) not in self._levels:
-            space = self._spaces.get(degree, self._contact)
-            matrix, seconds = space.operator(LAME, shared=False, blocked=blocked)
-            self._levels[degree, blocked] = Level(space.space, matrix, space.prescribed), seconds
+            space = self._spaces.get(degree, self._conditions)
+            matrix, seconds = self._stack.enter_context(space.operators.lend(LAME, blocked=blocked))
+            self._levels[degree, blocked] = Level(space.dofs.space, matrix, space.dofs.prescribed), seconds
         return self._levels[degree, blocked]
+
+
+def _times(response: Response, mu: float) -> Response:
+    """Return the response for ``mu`` (Pa), given that for 1."""
+    return replace(response, stiffness=mu * response.stiffness, forces=mu * response.forces)

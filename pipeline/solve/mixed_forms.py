@@ -10,9 +10,8 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from pipeline import compat
 from pipeline.mesh.distribute import distribute
-from pipeline.solve.cache import form_cache
+from pipeline.solve.compiled import form, scalar_space, vector_space
 from pipeline.solve.forms import dx, form_name, one_cell
 
 
@@ -67,12 +66,12 @@ class MixedForms:
     def _form(self, name: str, integrand: Any, *, curved_only: bool = False) -> Any:
         space = self._displacement.function_space
         name = form_name(name, space, self._pressures)
-        return compat.form(integrand * dx(space, curved_only=curved_only), str(form_cache()), name)
+        return form(integrand * dx(space, curved_only=curved_only), name)
 
 
 def compile_mixed(degree: int) -> None:
     """Compile what mixed elements of ``degree``, and of one degree more for the error bar, add to the elastic forms."""
     mesh = distribute(MPI.COMM_SELF, one_cell(straight=False)).mesh
     for level in (degree, degree + 1):
-        forms = MixedForms(fem.Function(compat.vector_space(mesh, level)), compat.scalar_space(mesh, level - 1))
+        forms = MixedForms(fem.Function(vector_space(mesh, level)), scalar_space(mesh, level - 1))
         _ = forms.mass, forms.coupling, forms.dilation, forms.pull

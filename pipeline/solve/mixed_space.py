@@ -4,18 +4,21 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
-import numpy as np
 from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.mesh.distribute import BodyMesh
+from pipeline.solve.compiled import scalar_space
+from pipeline.solve.conditions import whole_points
 from pipeline.solve.forms import curved_cells
+from pipeline.solve.loads import FloatArray
 from pipeline.solve.mixed_forms import MixedForms
 from pipeline.solve.saddle import Pair
-from pipeline.solve.space import ConstrainedSpace, whole_points
+from pipeline.solve.spaces import ElasticSpace
 from pipeline.solve.straight import mixed as straight
 from pipeline.solve.straight import suits
+from pipeline.solve.vectors import add_from_ghosts, fill, vector
 
 
 class MixedSpace:
@@ -25,17 +28,16 @@ class MixedSpace:
     of the saddle point are then of like magnitude in any unit of length.
     """
 
-    def __init__(self, body: BodyMesh, displacements: ConstrainedSpace):
+    def __init__(self, body: BodyMesh, displacements: ElasticSpace):
         """Add the pressures to the ``displacements`` on a mesh; collective."""
         self.comm, self.degree = body.comm, displacements.degree
         self.displacements = displacements
-        self.pressures = compat.scalar_space(body.mesh, displacements.degree - 1)
+        self.pressures = scalar_space(body.mesh, displacements.degree - 1)
         self.forms = MixedForms(displacements.forms.displacement, self.pressures)
         index_map = self.pressures.dofmap.index_map
         self._owned, self._size = index_map.size_local, index_map.size_global
-        self._ghosts = np.asarray(index_map.ghosts, dtype=PETSc.IntType)
-        self.dofs = self.displacements.dofs + index_map.size_global
-        self.whole_dofs = self.displacements.whole_dofs + whole_points(self.pressures, body)
+        self.dofs = displacements.dofs.dofs + index_map.size_global
+        self.whole_dofs = displacements.dofs.whole_dofs + whole_points(self.pressures, body)
         with ExitStack() as stack:
             start = time.perf_counter()
             self.mass, self.coupling = self._matrices(body)
@@ -57,56 +59,44 @@ class MixedSpace:
     @contextmanager
     def pair(self) -> Iterator[Pair]:
         """Lend ghosted vectors of zeros for displacement and pressure."""
-        with self.displacements.vector() as u:
-            p = PETSc.Vec().createGhost(self._ghosts, (self._owned, None), comm=self.comm)
-            p.set(0.0)
-            try:
-                yield u, p
-            finally:
-                p.destroy()
+        with vector(self.displacements.dofs.space) as u, vector(self.pressures) as p:
+            yield u, p
 
-    def lift(self, rhs: Pair, lame: tuple[float, float]) -> None:
-        """Put the loads of the prescribed displacements into ``rhs``, λ and μ being those of K₀; collective."""
-        self.displacements.lift(rhs[0], lame)
+    def lift(self, rhs: Pair, held: FloatArray, lame: tuple[float, float]) -> None:
+        """Put the loads of the prescribed displacements ``held`` into ``rhs``, λ and μ being K₀'s; collective."""
+        self.displacements.lift(rhs[0], held, lame)
         self._dilate(rhs[1])
         rhs[1].scale(-1.0)
 
     def set_fields(self, unknown: Pair) -> None:
         """Make ``unknown`` the displacement and the pressure that ``apply`` acts on; collective."""
         self.displacements.set_displacement(unknown[0])
-        pressure = unknown[1]
-        pressure.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
-        with pressure.localForm() as local:
-            self.forms.pressure.x.array[:] = self.unit * local.array
+        fill(self.forms.pressure, unknown[1], self.unit)
 
     def apply(self, elastic: PETSc.Vec, pull: PETSc.Vec, dilation: PETSc.Vec, lame: tuple[float, float]) -> None:
         """Add K₀ u, Bᵀ p and B u, all with the unmodified operator, to the three vectors; collective."""
         self.displacements.apply(elastic, lame)
         fem_petsc.assemble_vector(pull, self.forms.pull)
-        pull.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        add_from_ghosts(pull)
         self._dilate(dilation)
 
-    def start_from(self, coarse: "MixedSpace", unknown: Pair) -> None:
-        """Put the fields of ``coarse``, less the prescribed displacements, into ``unknown``; collective."""
+    def start_from(self, coarse: "MixedSpace", unknown: Pair, held: FloatArray) -> None:
+        """Put the fields of ``coarse``, less the displacements ``held``, into ``unknown``; collective."""
         displacement, pressure = self.displacements.forms.displacement, self.forms.pressure
         displacement.interpolate(coarse.displacements.forms.displacement)
         pressure.interpolate(coarse.forms.pressure)
-        owned = self.displacements.owned
-        unknown[0].array[:] = displacement.x.array[:owned] - self.displacements.held[:owned]
-        unknown[0].array[self.displacements.prescribed_owned] = 0.0
+        dofs = self.displacements.dofs
+        unknown[0].array[:] = displacement.x.array[: dofs.owned] - held[: dofs.owned]
+        unknown[0].array[dofs.prescribed_owned] = 0.0
         unknown[1].array[:] = pressure.x.array[: self._owned] / self.unit
-
-    def release(self, unknown: Pair) -> None:
-        """Take the prescribed displacements out of ``unknown`` again."""
-        unknown[0].array[:] -= self.displacements.held[: self.displacements.owned]
 
     def _matrices(self, body: BodyMesh) -> tuple[PETSc.Mat, PETSc.Mat]:
         """Return M and B, without conditions; collective."""
-        if not suits(self.displacements.space):
+        if not suits(self.displacements.dofs.space):
             return _assemble(self.forms.mass), _assemble(self.forms.coupling)
         curved = curved_cells(body.mesh)
         mass = straight.mass(self.pressures, curved)
-        coupling = straight.coupling(self.pressures, self.displacements.space, curved)
+        coupling = straight.coupling(self.pressures, self.displacements.dofs.space, curved)
         if curved is not None and curved.any():
             compat.add_matrix(mass, self.forms.curved_mass, [], 1.0)
             compat.add_matrix(coupling, self.forms.curved_coupling, [], 1.0)
@@ -114,13 +104,13 @@ class MixedSpace:
 
     def _dilate(self, result: PETSc.Vec) -> None:
         fem_petsc.assemble_vector(result, self.forms.dilation)
-        result.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        add_from_ghosts(result)
         result.scale(self.unit)
 
     def _mask_coupling(self) -> None:
         free = self.coupling.createVecRight()
         free.set(1.0)
-        free.array[self.displacements.prescribed_owned] = 0.0
+        free.array[self.displacements.dofs.prescribed_owned] = 0.0
         self.coupling.diagonalScale(None, free)
         free.destroy()
 

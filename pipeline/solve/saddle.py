@@ -11,7 +11,7 @@ mesh changes the iterations much.
 
 import itertools
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -54,13 +54,14 @@ class SaddleSolver:
     """Solves a saddle point for any c; a context manager, which frees what it made.
 
     What does not depend on c is set up once. ``setup_seconds`` is the time of all set-up that the last solve relied
-    on, whether it was done for it or before; ``first_energy`` is the energy norm, squared, of the error that an
-    iterative solve began with, as its preconditioner sees it.
+    on, whether it was done for it or before; ``first_energies`` are the energy norms, squared, of the errors that an
+    iterative solve began with, as its preconditioner sees them, one for each right-hand side.
     """
 
     def __init__(self, saddle: Saddle, *, direct: bool):
         self._saddle, self._direct = saddle, direct
-        self.setup_seconds, self.first_energy = 0.0, 0.0
+        self.setup_seconds = 0.0
+        self.first_energies: list[float] = []
         start = time.perf_counter()
         with ExitStack() as stack:
             if not direct:
@@ -76,33 +77,35 @@ class SaddleSolver:
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
-    def solve(self, c: float, rhs: Pair, unknown: Pair, tolerance: float) -> int:
-        """Improve ``unknown``, (u, p), until the energy norm of its error has fallen by ``tolerance``; collective.
+    def solve(self, c: float, rhs: Sequence[Pair], unknowns: Sequence[Pair], tolerance: float) -> int:
+        """Improve each of ``unknowns``, (u, p), until the energy norm of its error has fallen by ``tolerance``.
 
-        Returns the iterations. A direct solve is exact and does not look at what ``unknown`` holds.
+        Returns the iterations of all; collective. A direct solve is exact and does not look at what they hold.
 
         Raises:
             SolveError: if PETSc reports anything but convergence.
         """
+        iterations, self.first_energies = 0, []
         with ExitStack() as stack:
             try:
                 matrix = self._matrix(c, stack)
                 b, x = (_keep(stack, vector) for vector in matrix.createVecs())
-                split = unknown[0].getLocalSize()
-                for whole, (first, second) in ((b, rhs), (x, unknown)):
-                    whole.array[:split], whole.array[split:] = first.array, second.array
                 block = None if self._direct else self._preconditioner(c, stack)
                 solver = self._factors(matrix, stack) if block is None else _iteration(matrix, block, tolerance, stack)
-                solver.solve(b, x)
+                for load, unknown in zip(rhs, unknowns, strict=True):
+                    split = load[0].getLocalSize()
+                    for whole, (first, second) in ((b, load), (x, unknown)):
+                        whole.array[:split], whole.array[split:] = first.array, second.array
+                    solver.solve(b, x)
+                    reason, iterations = solver.getConvergedReason(), iterations + int(solver.its)
+                    if reason <= 0:
+                        raise SolveError(
+                            f"the linear solver did not converge: {reason_name(reason)} after {solver.its} iterations"
+                        )
+                    unknown[0].array[:], unknown[1].array[:] = x.array[:split], x.array[split:]
+                    self.first_energies.append(0.0 if block is None else block.first_energy)
             except PETSc.Error as error:
                 raise SolveError(explain(error)) from error
-            reason, iterations = solver.getConvergedReason(), int(solver.its)
-            if reason <= 0:
-                raise SolveError(
-                    f"the linear solver did not converge: {reason_name(reason)} after {iterations} iterations"
-                )
-            unknown[0].array[:], unknown[1].array[:] = x.array[:split], x.array[split:]
-            self.first_energy = 0.0 if block is None else block.first_energy
         return iterations
 
     def _matrix(self, c: float, stack: ExitStack) -> PETSc.Mat:

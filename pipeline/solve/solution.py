@@ -1,16 +1,16 @@
-"""What one solve gives, and what every kind of element needs to say it."""
+"""What one solve gives, whatever the elements, and how well it must have been solved."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, nan
-from typing import Any
+from typing import Any, Protocol, Self
 
 import numpy as np
-from dolfinx import fem
-from mpi4py import MPI
 
 from pipeline.arrays import FloatArray
-from pipeline.mesh.distribute import BodyMesh
-from pipeline.stages import stage
+from pipeline.solve.error import extrapolate_stiffness
+from pipeline.solve.loads import Loads, Vector
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.reaction import Response
 
 # F·d = 2U and F_probe + F_support = 0 hold for the exact solution of the discrete system, and are linear in the
 # solver's error: what misses them by this much has not been solved.
@@ -32,55 +32,110 @@ def rest(balance: float, tolerance: float) -> float:
     return max(_AIM * BALANCE_LIMIT / balance, _MOST)
 
 
-def needed_tolerance(travel: tuple[float, float, float], tolerance: float) -> float:
-    """Return the tolerance to solve to: of a probe that slices, too, only the work is quadratic in the error."""
-    return 1e-2 * tolerance if np.count_nonzero(travel) > 1 else tolerance
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Solution:
-    """What one solve gives; all values global and equal on every rank.
+    """What one solve gives; all values global and equal on every rank, times in seconds.
 
-    ``reaction`` (N, xyz) is the force of the tissue on the probe, ``energy`` (J) the strain energy,
-    ``balance`` the larger of the relative errors of F·d = 2U and of F_probe + F_support = 0. ``decrement`` is the
-    share of the energy that one degree more takes away, s / F_p, and ``bar`` the relative 95 % error bar on F·d that
-    comes of it (see :mod:`pipeline.solve.error`).
+    ``max_strain`` is the largest principal strain of a cell's mean strain; ``dofs`` and ``cells`` are those of the
+    whole body, ``iterations`` the sum over the motions. ``decrements`` (n, n) is what one degree more takes away from
+    the probe's stiffness, and ``bars`` (n, n) the 95 % error bars on its entries (see :mod:`pipeline.solve.error`).
     """
 
-    reaction: tuple[float, float, float]
-    energy: float
+    response: Response
     max_strain: float
-    balance: float
     dofs: int
+    cells: int
     iterations: int
     time_assemble: float
     time_setup: float
     time_solve: float
-    decrement: float = nan
-    bar: float = nan
+    time_mesh: float = 0.0
+    decrements: FloatArray | None = None
+    bars: FloatArray | None = None
     estimate_iterations: int = 0
     time_estimate: float = 0.0
 
+    @property
+    def reaction(self) -> Vector:
+        """Force of the tissue on the probe (N)."""
+        return self.response.force
 
-def global_sum(comm: MPI.Comm, values: FloatArray) -> FloatArray:
-    """Return the sum of ``values`` over all ranks, entry by entry; collective."""
-    total = np.empty_like(values)
-    comm.Allreduce(np.ascontiguousarray(values), total)
-    return total
+    @property
+    def energy(self) -> float:
+        """Strain energy (J)."""
+        return self.response.energy
+
+    @property
+    def balance(self) -> float:
+        """Largest relative error of F·d = 2U and of F_probe + F_support = 0."""
+        return self.response.balance
+
+    @property
+    def stiffness(self) -> FloatArray:
+        """The probe's stiffness (n, n), in the order of the loads' motions; units: see ``Response``."""
+        return self.response.stiffness
+
+    @property
+    def decrement(self) -> float:
+        """Share of the energy that one degree more takes away; not a number if that was not asked for."""
+        if self.decrements is None:
+            return nan
+        amounts = self.response.amounts
+        return float(amounts @ self.decrements @ amounts) / (2 * self.energy)
+
+    @property
+    def bar(self) -> float:
+        """Relative 95 % error bar on the energy, hence on F along the travel; not a number if not asked for."""
+        if self.bars is None:
+            return nan
+        amounts = np.abs(self.response.amounts)
+        return float(amounts @ self.bars @ amounts) / (2 * self.energy)
+
+    @property
+    def reaction_bars(self) -> Vector:
+        """95 % error bars (N) on the components of the reaction, not a number where no motion was solved for."""
+        spanned, bars = np.zeros(3), np.zeros(3)
+        if self.bars is not None:
+            conjugate = self.bars @ np.abs(self.response.amounts)
+            for motion, bar in zip(self.response.loads.motions, conjugate, strict=True):
+                if not motion.is_rotation:
+                    spanned += np.square(motion.direction)
+                    bars += bar * np.abs(motion.direction)
+        x, y, z = map(float, np.where(spanned > 1 - 1e-9, bars, nan))
+        return x, y, z
+
+    def extrapolated(self, degree: int, element: str) -> "Solution":
+        """Return what the sequence of degrees tends to, on a mesh graded to the edge; itself if it has no bars."""
+        if self.decrements is None or self.bars is None:
+            return self
+        stiffness, bars = extrapolate_stiffness(self.stiffness, self.decrements, self.bars, degree, element)
+        return replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
 
 
-@stage("strain")
-def principal_strains(mean_strain: tuple[Any, Any], body: BodyMesh) -> FloatArray:
-    """Return the principal strains, ascending, of the strain averaged over each owned cell, shape (cells, 3).
+class Problem(Protocol):
+    """A body, conditions and elements, ready to be solved for any material and loads; a context manager."""
 
-    ``mean_strain`` are the forms of :func:`pipeline.solve.forms.mean_strain_form`. Collective.
-    """
-    integral, volume = (fem.assemble_vector(form) for form in mean_strain)
-    tensors = [np.asarray(v.array).reshape(-1, 3, 3)[: body.owned_cells] for v in (integral, volume)]
-    return np.asarray(np.linalg.eigvalsh(tensors[0] / tensors[1]))
+    @property
+    def dofs(self) -> int:
+        """Unknowns of the modelled part."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def solve(
+        self, law: MaterialLaw, loads: Loads, *, method: str = "auto", tolerance: float = TOLERANCE,
+        estimate: bool = False,
+    ) -> Solution:  # fmt: skip
+        """Solve; ``estimate`` adds error bars. Collective.
+
+        Raises:
+            SolveError: if the solver did not converge, or the solution fails a check.
+        """
 
 
-def largest_strain(mean_strain: tuple[Any, Any], body: BodyMesh) -> float:
-    """Return the largest of :func:`principal_strains`, by magnitude; collective."""
-    local = float(np.abs(principal_strains(mean_strain, body)).max(initial=0.0))
-    return float(body.comm.allreduce(local, op=MPI.MAX))
+class FieldProblem(Problem, Protocol):
+    """A problem whose last solution can be looked at."""
+
+    def fields(self) -> tuple[Any, FloatArray]:
+        """Return the last displacement (m), a function, and the principal strains of each owned cell; collective."""

@@ -1,19 +1,65 @@
 """The displacement spaces of one mesh, shared by all that solve on it."""
 
+from dolfinx.fem import petsc as fem_petsc
+from petsc4py import PETSc
+
 from pipeline.mesh.distribute import BodyMesh
-from pipeline.solve.space import ConstrainedSpace, Contact
+from pipeline.solve.conditions import Conditions, ConstrainedSpace
+from pipeline.solve.forms import ElasticForms
+from pipeline.solve.loads import FloatArray
+from pipeline.solve.operator import Operators
+from pipeline.solve.vectors import add_from_ghosts, fill
+from pipeline.stages import stage
+
+
+class ElasticSpace:
+    """Displacements of one degree: their dofs with conditions, their forms, and the operators made of both."""
+
+    def __init__(self, body: BodyMesh, degree: int, conditions: Conditions):
+        """Collective.
+
+        Raises:
+            SolveError: if footprint and support share a point: no displacement satisfies both.
+        """
+        self.dofs = ConstrainedSpace(body, degree, conditions)
+        self.forms = ElasticForms(self.dofs.space)
+        self.operators = Operators(self.dofs, self.forms)
+
+    @property
+    def degree(self) -> int:
+        """Polynomial degree."""
+        return self.dofs.degree
+
+    @stage("residuals")
+    def apply(self, result: PETSc.Vec, lame: tuple[float, float]) -> None:
+        """Add K u (N), with the unmodified operator and the forms' displacement, to ``result``; collective."""
+        self.forms.set_lame(*lame)
+        fem_petsc.assemble_vector(result, self.forms.action)
+        add_from_ghosts(result)
+
+    def lift(self, rhs: PETSc.Vec, held: FloatArray, lame: tuple[float, float]) -> None:
+        """Put the loads of the prescribed displacements ``held`` into ``rhs``; collective.
+
+        What is left to find is zero on the prescribed dofs, and so is its load: the solver's norms then measure the
+        energy of the error and nothing else, in any unit of length.
+        """
+        self.forms.displacement.x.array[:] = held
+        self.apply(rhs, lame)
+        rhs.scale(-1.0)
+        rhs.array[self.dofs.prescribed_owned] = 0.0
+
+    def set_displacement(self, values: PETSc.Vec, factor: float = 1.0) -> None:
+        """Make ``factor`` times ``values`` the displacement of the forms; collective."""
+        fill(self.forms.displacement, values, factor)
 
 
 class Spaces:
-    """Displacement spaces of a mesh, one a degree, each made when first asked for; a context manager.
-
-    A space has one operator: who asks for another one takes it from those before.
-    """
+    """Displacement spaces of a mesh, one a degree, each made when first asked for; a context manager."""
 
     def __init__(self, body: BodyMesh):
         self.body = body
-        self._contact: Contact | None = None
-        self._made: dict[int, ConstrainedSpace] = {}
+        self._conditions: Conditions | None = None
+        self._made: dict[int, ElasticSpace] = {}
 
     def __enter__(self) -> "Spaces":
         return self
@@ -21,22 +67,20 @@ class Spaces:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def get(self, degree: int, contact: Contact) -> ConstrainedSpace:
-        """Return the space of ``degree`` with the conditions of ``contact``; collective.
-
-        Those of another contact are closed.
+    def get(self, degree: int, conditions: Conditions) -> ElasticSpace:
+        """Return the space of ``degree`` with ``conditions``; collective. Those of other conditions are closed.
 
         Raises:
             SolveError: if footprint and support share a point: no displacement satisfies both.
         """
-        if contact != self._contact:
+        if conditions != self._conditions:
             self.close()
-            self._contact = contact
+            self._conditions = conditions
         if degree not in self._made:
-            self._made[degree] = ConstrainedSpace(self.body, degree, contact)
+            self._made[degree] = ElasticSpace(self.body, degree, conditions)
         return self._made[degree]
 
     def close(self) -> None:
-        """Free the operators of all spaces."""
+        """Free the operators that all spaces keep."""
         while self._made:
-            self._made.popitem()[1].close()
+            self._made.popitem()[1].operators.close()

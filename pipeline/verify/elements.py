@@ -15,11 +15,10 @@ from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from pipeline import compat
 from pipeline.mesh.distribute import distribute
 from pipeline.mesh.of_case import mesh_arrays
 from pipeline.plan.plan import make_plan
-from pipeline.solve.cache import form_cache
+from pipeline.solve.compiled import form, scalar_space, vector_space
 from pipeline.solve.forms import ElasticForms
 from pipeline.solve.mixed_forms import MixedForms
 from pipeline.study.load import parse
@@ -67,14 +66,14 @@ def _patch(degree: int, *, mixed: bool) -> float:
     })  # fmt: skip
     (solve,) = [s for s in make_plan(study).solves if not s.is_reference]
     body = distribute(MPI.COMM_SELF, mesh_arrays(solve.case, ("x", "y")))
-    space = compat.vector_space(body.mesh, degree)
+    space = vector_space(body.mesh, degree)
     forms = ElasticForms(space)
     forms.set_lame(1.0, 1.0)
     gradient = np.array([[0.2, 0.5, -0.3], [0.1, -0.4, 0.7], [0.6, 0.3, 0.9]])
     forms.displacement.interpolate(lambda x: gradient @ x)
     parts = [forms.action]
     if mixed:
-        coupled = MixedForms(forms.displacement, compat.scalar_space(body.mesh, degree - 1))
+        coupled = MixedForms(forms.displacement, scalar_space(body.mesh, degree - 1))
         coupled.pressure.x.array[:] = np.trace(gradient)
         parts.append(coupled.pull)
     vectors = [fem.assemble_vector(part) for part in parts]
@@ -109,17 +108,16 @@ def _manufactured(degree: int, cubes: int, *, poisson: float, mixed: bool) -> fl
     """
     mesh = dolfinx.mesh.create_unit_cube(MPI.COMM_SELF, cubes, cubes, cubes)
     lame_lambda = 1.0 if mixed else 2 * poisson / (1 - 2 * poisson)
-    space = compat.vector_space(mesh, degree)
+    space = vector_space(mesh, degree)
     forms = ElasticForms(space)
     forms.set_lame(lame_lambda, 1.0)
     exact = _exact(mesh, 0.0 if mixed else lame_lambda)
-    cache = str(form_cache())
     dx = ufl.dx(metadata={"quadrature_degree": 2 * degree + 2})
-    load = compat.form(ufl.inner(exact.load, ufl.TestFunction(space)) * dx, cache)
+    load = form(ufl.inner(exact.load, ufl.TestFunction(space)) * dx)
     blocks = [[_sparse(forms.stiffness)]]
     rhs = np.array(fem.assemble_vector(load).array)
     if mixed:
-        coupling = _sparse(MixedForms(forms.displacement, compat.scalar_space(mesh, degree - 1)).coupling)
+        coupling = _sparse(MixedForms(forms.displacement, scalar_space(mesh, degree - 1)).coupling)
         blocks = [[blocks[0][0], coupling.T], [coupling, None]]
         rhs = np.concatenate([rhs, np.zeros(coupling.shape[0])])
     matrix = sp.bmat(blocks, format="csc")
@@ -137,7 +135,7 @@ def _manufactured(degree: int, cubes: int, *, poisson: float, mixed: bool) -> fl
     values[free] = spl.spsolve(matrix[free][:, free], (rhs - matrix @ values)[free])
     forms.displacement.x.array[:] = values[: len(forms.displacement.x.array)]
     error = ufl.sym(ufl.grad(forms.displacement - exact.displacement))
-    return float(fem.assemble_scalar(compat.form(ufl.inner(error, error) * dx, cache)) ** 0.5)
+    return float(fem.assemble_scalar(form(ufl.inner(error, error) * dx)) ** 0.5)
 
 
 def _evaluate(mixed: bool) -> Any:

@@ -18,12 +18,14 @@ from pipeline.plan import estimate
 from pipeline.plan.plan import declare, first_attempts
 from pipeline.plan.steps import Solve
 from pipeline.plan.symmetry import mirror_planes, model_planes
-from pipeline.run.body import Body, body_of, check_memory, solve_body
 from pipeline.run.compile import prepare
 from pipeline.run.memory import FreeMemory
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import cached_arrays, on_first_rank
+from pipeline.run.problem import check_memory, problem_of, solve_problem
+from pipeline.solve.compiled import vector_space
 from pipeline.solve.linear import is_direct
+from pipeline.solve.solution import FieldProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.study.sweep import Case, Study
 from pipeline.view.fields import Fields
@@ -68,13 +70,15 @@ def _attempt(solve: Solve, comm: MPI.Comm, cache: MeshCache | None, note: Note) 
     arrays = _arrays(solve, comm, cache, note)
     prepare(comm, [solve])
     mesh = distribute(comm, arrays)
-    with Spaces(mesh) as spaces, body_of(spaces, case, shared=False) as body:
-        direct = is_direct(case.solve.method, body.dofs, case.mesh.degree)
-        check_memory(FreeMemory(comm), estimate.solving_memory(body.dofs, case.mesh.degree, direct=direct), "solving")
-        note(f"solving for {body.dofs} unknowns")
-        solution = solve_body(case, body, estimate=solve.goal is not None)
+    with Spaces(mesh) as spaces, problem_of(spaces, case, shared=False) as problem:
+        direct = is_direct(case.solve.method, problem.dofs, case.mesh.degree)
+        check_memory(
+            FreeMemory(comm), estimate.solving_memory(problem.dofs, case.mesh.degree, direct=direct), "solving"
+        )
+        note(f"solving for {problem.dofs} unknowns")
+        solution = solve_problem(case, problem, estimate=solve.goal is not None)
         points = comm.bcast(len(arrays.points) if arrays is not None else 0)
-        displacement, strain = _gathered(mesh, body, points)
+        displacement, strain = _gathered(mesh, problem, points)
     if arrays is None:
         return None, solution.bar
     return replace(_whole(solve, arrays, displacement, strain), dofs=solution.dofs), solution.bar
@@ -87,15 +91,15 @@ def _arrays(solve: Solve, comm: MPI.Comm, cache: MeshCache | None, note: Note) -
     return on_first_rank(comm, lambda: cached_arrays(solve.case, solve.mirrors, cache))
 
 
-def _gathered(mesh: BodyMesh, body: Body, points: int) -> tuple[FloatArray, FloatArray]:
+def _gathered(mesh: BodyMesh, problem: FieldProblem, points: int) -> tuple[FloatArray, FloatArray]:
     """Return, on rank 0, the displacement of every point of the mesh as it was made, and the strain of every cell.
 
     A displacement of higher degree is interpolated to the order of the mesh: exact at its nodes.
     """
-    displacement, principal = body.fields()
+    displacement, principal = problem.fields()
     owned = mesh.owned_cells
     order = 1 if compat.geometry_dofs(mesh.mesh).shape[1] == 4 else 2
-    nodal = fem.Function(compat.vector_space(mesh.mesh, order))
+    nodal = fem.Function(vector_space(mesh.mesh, order))
     nodal.interpolate(displacement)
     # Nodes of the geometry and dofs of that order come in the same order within a cell.
     nodes = compat.geometry_dofs(mesh.mesh)[:owned].reshape(-1)

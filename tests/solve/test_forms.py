@@ -13,7 +13,7 @@ from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.mesh.generate import generate
 from pipeline.mesh.size import Sizes
 from pipeline.scene.model import Scene
-from pipeline.solve.cache import form_cache
+from pipeline.solve.compiled import form, vector_space
 from pipeline.solve.forms import ElasticForms, strain
 from tests.cases import study
 
@@ -36,7 +36,7 @@ def boundary_dofs(space) -> np.ndarray:
 @pytest.mark.parametrize("degree", [1, 2, 3])
 def test_patch(degree):
     """A linear displacement leaves no force on any inner dof, on a graded mesh with curved elements."""
-    space = compat.vector_space(make_mesh(degree, 5e-3, 0.5e-3).mesh, degree)
+    space = vector_space(make_mesh(degree, 5e-3, 0.5e-3).mesh, degree)
     forms = ElasticForms(space)
     forms.set_lame(*LAME)
     gradient = np.array([[0.3, -0.2, 0.1], [0.4, 0.1, -0.5], [0.2, 0.6, -0.3]])
@@ -51,7 +51,7 @@ def test_patch(degree):
 def manufactured_error(degree: int, size: float) -> tuple[float, int]:
     """Return the energy-norm error of a smooth displacement, held on the whole boundary, and the number of cells."""
     body = make_mesh(degree, size, size)
-    space = compat.vector_space(body.mesh, degree)
+    space = vector_space(body.mesh, degree)
     forms = ElasticForms(space)
     forms.set_lame(*LAME)
     k = 2 * np.pi / 40e-3
@@ -63,8 +63,7 @@ def manufactured_error(degree: int, size: float) -> tuple[float, int]:
     u = ufl.as_vector(exact(x, ufl.sin, ufl.cos))
     stress = LAME[0] * ufl.div(u) * ufl.Identity(3) + 2 * LAME[1] * strain(u)
     dx = ufl.dx(metadata={"quadrature_degree": 6})
-    cache = str(form_cache())
-    load = compat.form(-ufl.inner(ufl.div(stress), ufl.TestFunction(space)) * dx, cache)
+    load = form(-ufl.inner(ufl.div(stress), ufl.TestFunction(space)) * dx)
     held = fem.Function(space)
     held.interpolate(lambda p: np.array(exact(p, np.sin, np.cos)))
     condition = fem.dirichletbc(held, boundary_dofs(space))
@@ -85,7 +84,7 @@ def manufactured_error(degree: int, size: float) -> tuple[float, int]:
     forms.displacement.x.array[:] = solution.array
     e = forms.displacement - u
     density = LAME[0] * ufl.div(e) ** 2 + 2 * LAME[1] * ufl.inner(strain(e), strain(e))
-    return fem.assemble_scalar(compat.form(density * dx, cache)) ** 0.5, body.cells
+    return fem.assemble_scalar(form(density * dx)) ** 0.5, body.cells
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3])

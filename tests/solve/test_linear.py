@@ -4,36 +4,40 @@ import numpy as np
 import pytest
 from petsc4py import PETSc
 
-from pipeline.solve.elasticity import ElasticBody
+from pipeline.solve.conditions import Conditions
+from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.linear import Level, LinearSolver, SolveError
+from pipeline.solve.loads import Loads
 from pipeline.solve.solution import BALANCE_LIMIT
-from pipeline.solve.space import Contact
 from pipeline.solve.spaces import Spaces
-from tests.solve.test_mixed import DEPTH, contact, lame, make_mesh
+from tests.solve.test_mixed import DEPTH, PRESS, law, make_mesh
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3])
 @pytest.mark.parametrize("poisson", [0.0, 0.3, 0.49])
 def test_default_tolerance_is_enough_for_f(degree, poisson):
-    with ElasticBody(Spaces(make_mesh(mesh={"degree": min(degree, 2)})), degree, contact()) as body:
-        usual = body.solve(lame(poisson), method="iterative")
-        direct = body.solve(lame(poisson), method="direct")
+    with DisplacementProblem(Spaces(make_mesh(mesh={"degree": min(degree, 2)})), degree, Conditions()) as problem:
+        usual = problem.solve(law(poisson), PRESS, method="iterative")
+        direct = problem.solve(law(poisson), PRESS, method="direct")
     assert usual.reaction[2] == pytest.approx(direct.reaction[2], rel=1e-8)
     assert usual.balance <= BALANCE_LIMIT
     assert direct.iterations == 1 < usual.iterations
 
 
 def test_force_of_a_probe_that_slices_is_as_exact():
-    """Its force along the axis is not the work alone, and linear in the solver's error."""
-    slicing = Contact((DEPTH / 2, 0.0, -DEPTH), True)
-    with ElasticBody(Spaces(make_mesh(mirrors=("y",))), 2, slicing) as body:
-        usual, direct = (body.solve(lame(0.45), method=method) for method in ("iterative", "direct"))
+    """Its force along the axis is not the work alone: both movements are solved for."""
+    slicing = Loads.along((DEPTH / 2, 0.0, -DEPTH))
+    with DisplacementProblem(Spaces(make_mesh(mirrors=("y",))), 2, Conditions()) as problem:
+        usual, direct = (problem.solve(law(0.45), slicing, method=method) for method in ("iterative", "direct"))
     assert usual.reaction == pytest.approx(direct.reaction, rel=1e-7, abs=1e-7 * direct.reaction[2])
 
 
 def test_forces_that_do_not_balance_are_a_failure():
-    with ElasticBody(Spaces(make_mesh()), 2, contact()) as body, pytest.raises(SolveError, match="do not balance"):
-        body.solve(lame(0.3), method="iterative", tolerance=1e-3)
+    with (
+        DisplacementProblem(Spaces(make_mesh()), 2, Conditions()) as problem,
+        pytest.raises(SolveError, match="do not balance"),
+    ):
+        problem.solve(law(0.3), PRESS, method="iterative", tolerance=1e-3)
 
 
 def test_what_does_not_converge_is_a_failure():
@@ -55,8 +59,8 @@ def test_iterations_do_not_grow_with_the_mesh(degree):
     counts, dofs = [], []
     for rim, fine in (("1 mm", "5 mm"), ("0.25 mm", "2.5 mm")):
         mesh = make_mesh(mesh={"rim": rim, "fine": fine, "growth": 0.5, "degree": degree})
-        with ElasticBody(Spaces(mesh), degree, contact()) as body:
-            counts.append(body.solve(lame(0.3), method="iterative").iterations)
-            dofs.append(body.dofs)
+        with DisplacementProblem(Spaces(mesh), degree, Conditions()) as problem:
+            counts.append(problem.solve(law(0.3), PRESS, method="iterative").iterations)
+            dofs.append(problem.dofs)
     assert dofs[1] > 4 * dofs[0]
     assert counts[1] <= 1.3 * counts[0]

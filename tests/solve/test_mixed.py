@@ -1,7 +1,6 @@
 """Mixed elements obey mechanics up to and including ν = ½, and their bars hold."""
 
 from dataclasses import replace
-from math import inf
 from typing import Any
 
 import numpy as np
@@ -12,12 +11,15 @@ from petsc4py import PETSc
 
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.run.meshing import mesh_arrays, mesh_case
-from pipeline.solve.elasticity import ElasticBody
+from pipeline.solve.conditions import Conditions
+from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.error import error_bar
 from pipeline.solve.linear import SolveError
-from pipeline.solve.mixed import MixedBody, Solution
+from pipeline.solve.loads import Loads
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.mixed import MixedProblem
 from pipeline.solve.mixed_space import MixedSpace
-from pipeline.solve.space import Contact
+from pipeline.solve.solution import Solution
 from pipeline.solve.spaces import Spaces
 from pipeline.verify import known
 from tests.cases import study
@@ -29,9 +31,11 @@ QUARTER = ("x", "y")
 EXACT = {(name, nu): value for (name, nu), value in known.CYLINDER.items() if nu >= 0.45}
 
 
-def lame(poisson: float, young: float = YOUNG) -> tuple[float, float]:
-    mu = young / (2 * (1 + poisson))
-    return (2 * mu * poisson / (1 - 2 * poisson) if poisson < 0.5 else inf), mu
+PRESS = Loads.along((0.0, 0.0, -DEPTH))
+
+
+def law(poisson: float, young: float = YOUNG) -> MaterialLaw:
+    return MaterialLaw.of_moduli(young, poisson)
 
 
 def make_mesh(comm: MPI.Comm = MPI.COMM_SELF, mirrors: tuple[str, ...] = QUARTER, **changes: Any) -> BodyMesh:
@@ -39,20 +43,16 @@ def make_mesh(comm: MPI.Comm = MPI.COMM_SELF, mirrors: tuple[str, ...] = QUARTER
     return body
 
 
-def contact(bonded: bool = True, depth: float = DEPTH) -> Contact:
-    return Contact((0.0, 0.0, -depth), bonded)
-
-
 def solve(body: BodyMesh, poisson: float, degree: int = 2, *, bonded: bool = True, **options: Any) -> Solution:
-    with MixedBody(Spaces(body), degree, contact(bonded)) as mixed:
-        return mixed.solve(lame(poisson), **options)
+    with MixedProblem(Spaces(body), degree, Conditions(bonded)) as mixed:
+        return mixed.solve(law(poisson), PRESS, **options)
 
 
 @pytest.mark.parametrize("degree", [2, 3])
 def test_patch(degree):
     """A linear displacement with its constant pressure is in equilibrium, on curved, quarter-point elements."""
     body = make_mesh()
-    space = MixedSpace(body, Spaces(body).get(degree, contact()))
+    space = MixedSpace(body, Spaces(body).get(degree, Conditions()))
     gradient = np.array([[0.3, -0.2, 0.1], [0.4, 0.1, -0.5], [0.2, 0.6, -0.1]])
     u = space.displacements.forms.displacement
     u.interpolate(lambda x: gradient @ x)
@@ -65,7 +65,7 @@ def test_patch(degree):
         space.mass.mult(unknown[1], compression)
         assert np.abs(dilation.array - c * compression.array).max() < 1e-12 * np.abs(dilation.array).max()
         surface = mesh.exterior_facet_indices(body.mesh.topology)
-        outer = fem.locate_dofs_topological(space.displacements.space, 2, surface)
+        outer = fem.locate_dofs_topological(space.displacements.dofs.space, 2, surface)
         forces = (force.array + pull.array).reshape(-1, 3)
         inner = np.setdiff1d(np.arange(len(forces)), outer)
         assert len(inner)
@@ -88,8 +88,8 @@ def test_cylinder_is_within_the_bar(name, poisson):
 def test_agrees_with_displacement_elements(degree):
     body = make_mesh(mesh={"rim": "0.5 mm"})
     mixed = solve(body, 0.4, degree, estimate=True)
-    with ElasticBody(Spaces(body), degree, contact()) as elastic:
-        other = elastic.solve(lame(0.4), estimate=True)
+    with DisplacementProblem(Spaces(body), degree, Conditions()) as elastic:
+        other = elastic.solve(law(0.4), PRESS, estimate=True)
     bars = mixed.bar * mixed.reaction[2] + error_bar(other.decrement, degree) * other.reaction[2]
     assert mixed.reaction[2] == pytest.approx(other.reaction[2], abs=bars)
     assert mixed.reaction[2] != pytest.approx(other.reaction[2], rel=1e-6)
@@ -127,8 +127,8 @@ def test_force_is_quadratic_in_the_tolerance():
 
 def test_incompressible_is_the_limit():
     """F is linear in 1 - 2ν towards ½, on one mesh and with one assembly."""
-    with MixedBody(Spaces(make_mesh()), 2, contact()) as body:
-        near, nearer, limit = (body.solve(lame(0.5 - x)).reaction[2] for x in (2e-5, 1e-5, 0.0))
+    with MixedProblem(Spaces(make_mesh()), 2, Conditions()) as body:
+        near, nearer, limit = (body.solve(law(0.5 - x), PRESS).reaction[2] for x in (2e-5, 1e-5, 0.0))
     assert limit == pytest.approx(2 * nearer - near, rel=1e-8)
     assert limit == pytest.approx(near, rel=1e-4)
 
@@ -139,8 +139,10 @@ def test_iterations_are_bounded(bonded):
     counts, dofs = [], []
     for rim, fine in (("1 mm", "5 mm"), ("0.25 mm", "3 mm")):
         body = make_mesh(mesh={"rim": rim, "fine": fine, "growth": 0.5})
-        with MixedBody(Spaces(body), 2, contact(bonded)) as mixed:
-            counts.append([mixed.solve(lame(nu), method="iterative").iterations for nu in (0.4, 0.45, 0.4999, 0.5)])
+        with MixedProblem(Spaces(body), 2, Conditions(bonded)) as mixed:
+            counts.append(
+                [mixed.solve(law(nu), PRESS, method="iterative").iterations for nu in (0.4, 0.45, 0.4999, 0.5)]
+            )
             dofs.append(mixed.dofs)
     assert dofs[1] > 3 * dofs[0]
     assert max(map(max, counts)) <= 30
@@ -154,8 +156,8 @@ def test_units_do_not_matter(method):
     numbers = []
     for young, size in ((1e-3, 1.0), (YOUNG, 1.0), (1e12, 1.0), (YOUNG, 0.025), (YOUNG, 250.0)):
         body = distribute(MPI.COMM_SELF, replace(arrays, points=size * arrays.points))
-        with MixedBody(Spaces(body), 2, contact(depth=DEPTH * size)) as mixed:
-            s = mixed.solve(lame(0.4999, young), method=method, estimate=True)
+        with MixedProblem(Spaces(body), 2, Conditions()) as mixed:
+            s = mixed.solve(law(0.4999, young), PRESS.times(size), method=method, estimate=True)
         unit = young * (DEPTH * size) * size
         numbers.append((s.reaction[2] / unit, s.energy / unit / (DEPTH * size), s.max_strain, s.decrement, s.bar))
     for other in numbers[1:]:

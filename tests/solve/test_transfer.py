@@ -8,7 +8,7 @@ import pytest
 from dolfinx import fem
 from mpi4py import MPI
 
-from pipeline import compat
+from pipeline.solve.compiled import vector_space
 from pipeline.solve.transfer import transfer
 from tests.solve.test_mixed import make_mesh
 
@@ -47,14 +47,14 @@ def carried(coarse, fine, degree):
 def test_polynomials_are_carried_over(low, high):
     """On a mesh of straight cells a polynomial of the lower degree belongs to both spaces."""
     mesh = make_mesh(MPI.COMM_WORLD, mesh={"degree": 1, "fine": "8 mm", "rim": "3 mm"}).mesh
-    coarse, fine = (Side(compat.vector_space(mesh, d), np.zeros(0, dtype=np.int32)) for d in (low, high))
+    coarse, fine = (Side(vector_space(mesh, d), np.zeros(0, dtype=np.int32)) for d in (low, high))
     found, expected = carried(coarse, fine, low)
     assert np.abs(found - expected).max(initial=0.0) < 1e-11 * np.abs(expected).max(initial=1.0)
 
 
 def test_prescribed_dofs_are_neither_read_nor_written():
     mesh = make_mesh(mesh={"degree": 1, "fine": "8 mm", "rim": "3 mm"}).mesh
-    spaces = [compat.vector_space(mesh, d) for d in (1, 2)]
+    spaces = [vector_space(mesh, d) for d in (1, 2)]
     coarse, fine = Side(spaces[0], np.array([4, 30])), Side(spaces[1], np.array([0, 7, 100]))
     matrix = transfer(coarse, fine)
     offsets, columns, values = matrix.getValuesCSR()

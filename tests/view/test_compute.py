@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.run.body import CaseFailure
+from pipeline.run.problem import CaseFailure
 from pipeline.scene.model import FIXED, PROBE
 from pipeline.view.compute import compute_fields, solve_to_view
 from tests.cases import BLADE, solve, study

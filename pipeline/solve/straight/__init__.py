@@ -1,7 +1,8 @@
 """Operators on cells without curved edges, which are most: no quadrature, and every entry knows its place.
 
 ``kernels.c`` has the formulas. On one process they take a sixth of the time of dolfinx's general kernels and PETSc's
-insertion, entry by entry (docs/solvers.md); dolfinx assembles the curved cells, and everything on several processes.
+insertion, entry by entry (docs/solvers.md). dolfinx assembles the curved cells, and everything on several processes,
+or where this PETSc does not lend the arrays of its matrices.
 """
 
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline import compat
+from pipeline.solve.straight import arrays
 
 DEGREES = (1, 2, 3, 4)
 
@@ -21,4 +23,4 @@ def has_kernel(degree: int) -> bool:
 
 def suits(displacements: Any) -> bool:
     """Tell whether operators on a space of displacements can be put together here: on one process."""
-    return displacements.mesh.comm.size == 1 and has_kernel(compat.degree(displacements))
+    return displacements.mesh.comm.size == 1 and has_kernel(compat.degree(displacements)) and arrays.available()

@@ -14,8 +14,8 @@ from typing import Any
 import cffi
 import numpy as np
 
-from pipeline import compat
 from pipeline.solve.cache import form_cache
+from pipeline.solve.compiled import quiet_compiler
 
 _FLAGS = ("-O3", "-march=native")
 
@@ -59,7 +59,7 @@ def _load(code: str, declarations: str) -> Any:
             builder = cffi.FFI()
             builder.cdef(declarations)
             builder.set_source(name, code, extra_compile_args=list(_FLAGS))
-            with compat.quiet_compiler():
+            with quiet_compiler():
                 Path(builder.compile(tmpdir=folder)).replace(path)
     specification = importlib.util.spec_from_file_location(name, path)
     assert specification is not None and specification.loader is not None

@@ -8,6 +8,7 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
+from pipeline.solve.straight.arrays import entries, sparse_matrix
 from pipeline.solve.straight.pattern import corners, library, pattern, reference, straight_cells
 
 
@@ -35,22 +36,22 @@ class StraightStiffness:
         """Return a matrix of zeros, "baij" or "aij", for the operator on all cells; the caller destroys it."""
         offsets, columns = self._pattern.offsets, self._pattern.columns
         if mat_type == "baij":
-            return compat.sparse_matrix(offsets, columns, 3)
+            return sparse_matrix(offsets, columns, 3)
         rows = np.repeat(3 * np.diff(offsets), 3)
         unrolled = np.empty(9 * len(columns), dtype=np.int32)
         unrolled[self._unblocked] = np.repeat(3 * columns[:, None] + np.arange(3, dtype=np.int32), 3, axis=1)
-        return compat.sparse_matrix(np.concatenate([[0], np.cumsum(rows)]), unrolled, 1)
+        return sparse_matrix(np.concatenate([[0], np.cumsum(rows)]), unrolled, 1)
 
     def add(self, matrix: PETSc.Mat, lame: tuple[float, float], diagonal: float) -> None:
         """Add the straight cells to ``matrix``, which has this pattern; set the diagonal of prescribed dofs."""
         count = 9 * len(self._pattern.columns)
-        with compat.entries(matrix, count) as entries:
+        with entries(matrix, count) as values:
             if matrix.getType() == "seqbaij":
-                self._add(entries.reshape(-1, 9), lame, diagonal)
+                self._add(values.reshape(-1, 9), lame, diagonal)
                 return
-            blocks = entries[self._unblocked]
+            blocks = values[self._unblocked]
             self._add(blocks, lame, diagonal)
-            entries[self._unblocked] = blocks
+            values[self._unblocked] = blocks
 
     def _add(self, blocks: FloatArray, lame: tuple[float, float], diagonal: float) -> None:
         library()(

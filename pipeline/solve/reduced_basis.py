@@ -17,9 +17,12 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.elasticity import ElasticBody
+from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.enrich import smallest_eigenvalue
-from pipeline.solve.solution import global_sum
+from pipeline.solve.loads import Loads
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.reaction import Response, reaction
+from pipeline.solve.vectors import global_sum, vector
 
 # λ_min is estimated from above, by Lanczos: its share that is relied on.
 _TRUST = 0.5
@@ -28,23 +31,23 @@ _LAMBDA, _MU = (1.0, 0.0), (0.0, 1.0)
 
 @dataclass(frozen=True)
 class Reduced:
-    """What the basis gives for one t and μ = 1 Pa: reaction (N), twice the energy (J), and the relative bound."""
+    """What the basis gives for one t and μ = 1 Pa: response, relative bound on F, share of each solution."""
 
-    reaction: FloatArray
-    twice_energy: float
+    response: Response
     bound: float
     weights: FloatArray
 
 
 class ReducedBasis:
-    """Solutions of an :class:`ElasticBody` for a few t, and what follows from them for others; a context manager."""
+    """Solutions of a problem for a few t, and what follows from them for others; a context manager."""
 
-    def __init__(self, body: ElasticBody, travel: tuple[float, float, float], smallest: float, method: str):
-        """Begin with no solutions; ``smallest`` is the least t that will be asked for. Collective."""
-        self._body, self._space = body, body.space
-        self._travel = np.array(travel)
+    def __init__(self, problem: DisplacementProblem, loads: Loads, smallest: float, method: str):
+        """Begin with no solutions, for ``loads`` of one motion; ``smallest`` is the least t asked for. Collective."""
+        self._problem, self._space = problem, problem.space
+        (motion,) = loads.motions
+        self._loads, self._mirrored = loads, self._space.dofs.body.mirrored
         self._stack = ExitStack()
-        self._solver = self._stack.enter_context(body.solver((smallest, 1.0), method))
+        self._solver = self._stack.enter_context(problem.solver(MaterialLaw.of(smallest, 1.0), method))
         # What the residual is made of, and what each of it becomes under P: first the loads, then two for each w.
         self._parts: list[PETSc.Vec] = []
         self._under_p: list[PETSc.Vec] = []
@@ -54,7 +57,7 @@ class ReducedBasis:
         self._products = np.zeros((0, 2))  # w_i · parts_j
         self._result = self._vector()
         held = self._vector()
-        held.array[:] = self._space.held[: self._space.owned]
+        held.array[:] = self._space.dofs.held(motion)[: self._space.dofs.owned]
         self._held = held
         self._held_energy = [self._add(held, lame, sign=-1.0) for lame in (_LAMBDA, _MU)]
         load = self._vector()
@@ -69,26 +72,26 @@ class ReducedBasis:
 
     def add(self, correction: FloatArray) -> None:
         """Take a solution, less the prescribed displacements, into the basis; owned dofs, collective."""
-        vector = self._vector()
-        vector.array[:] = correction
+        added = self._vector()
+        added.array[:] = correction
         # Made orthogonal to the others: the small systems stay well conditioned.
         for other in self._solutions:
-            vector.axpy(-vector.dot(other), other)
-        norm = vector.norm()
+            added.axpy(-added.dot(other), other)
+        norm = added.norm()
         if norm <= 1e-10 * float(
-            np.linalg.norm(global_sum(self._space.comm, np.array([correction @ correction]))) ** 0.5
+            np.linalg.norm(global_sum(self._space.dofs.comm, np.array([correction @ correction]))) ** 0.5
         ):
             return
-        vector.scale(1 / norm)
+        added.scale(1 / norm)
         known = len(self._parts)
-        self._solutions.append(vector)
+        self._solutions.append(added)
         for lame in (_LAMBDA, _MU):
-            self._add(vector, lame, sign=1.0)
+            self._add(added, lame, sign=1.0)
         new = self._parts[known:]
         products = np.zeros((len(self._solutions), len(self._parts)))
         products[:-1, :known] = self._products
         products[:-1, known:] = np.reshape([part.dot(w) for w in self._solutions[:-1] for part in new], (-1, len(new)))
-        products[-1] = [part.dot(vector) for part in self._parts]
+        products[-1] = [part.dot(added) for part in self._parts]
         self._products = products
 
     def evaluate(self, t: float) -> Reduced:
@@ -104,32 +107,32 @@ class ReducedBasis:
         residual = float(mixture @ self._gram @ mixture)
         twice_energy = float(np.dot(self._held_energy, theta) - weights @ (loads @ theta))
         reactions = np.array(self._reactions)  # for each part, of the unmodified operator
-        reaction = reactions.T @ np.concatenate([theta, np.outer(weights, theta).reshape(-1)])
-        whole = np.full(3, self._body.multiplicity)
-        whole[list(self._space.mirrored)] = 0.0
-        reaction, twice_energy = -whole * reaction, self._body.multiplicity * twice_energy
-        # Along the travel the energy tells the force: to the square of the error.
-        reaction -= (reaction @ self._travel + twice_energy) * self._travel / (self._travel @ self._travel)
-        bound = self._body.multiplicity * max(residual, 0.0) / self._least / twice_energy
-        return Reduced(reaction, twice_energy, bound, weights)
+        on_probe = reactions.T @ np.concatenate([theta, np.outer(weights, theta).reshape(-1)])
+        response = reaction(self._loads, np.array([[twice_energy]]), on_probe[None, :], self._mirrored)
+        bound = max(residual, 0.0) / self._least / twice_energy
+        return Reduced(response, bound, weights)
 
     def displacement(self, reduced: Reduced) -> PETSc.Vec:
-        """Return the displacement of an evaluation; the basis owns it, and the next one takes its place."""
+        """Return the displacement of an evaluation, with the loads' amount.
+
+        The basis owns it, and the next one takes its place.
+        """
         self._held.copy(self._result)
         for weight, solution in zip(reduced.weights, self._solutions, strict=True):
             self._result.axpy(float(weight), solution)
+        self._result.scale(self._loads.amounts[0])
         return self._result
 
-    def _add(self, vector: PETSc.Vec, lame: tuple[float, float], *, sign: float) -> float:
-        """Take sign · A·``vector`` among the parts of the residual; return ``vector``·A·``vector``; collective."""
+    def _add(self, values: PETSc.Vec, lame: tuple[float, float], *, sign: float) -> float:
+        """Take sign · A·``values`` among the parts of the residual; return ``values``·A·``values``; collective."""
         space, part, under_p = self._space, self._vector(), self._vector()
-        space.set_displacement(vector)
+        space.set_displacement(values)
         space.apply(part, lame)
-        energy = float(part.dot(vector))
-        on_probe = part.array.reshape(-1, 3)[space.probe_owned].sum(axis=0)
-        self._reactions.append(global_sum(space.comm, on_probe))
+        energy = float(part.dot(values))
+        on_probe = part.array.reshape(-1, 3)[space.dofs.probe_owned].sum(axis=0)
+        self._reactions.append(global_sum(space.dofs.comm, on_probe))
         part.scale(sign)
-        part.array[space.prescribed_owned] = 0.0
+        part.array[space.dofs.prescribed_owned] = 0.0
         self._solver.precondition(part, under_p)
         self._parts.append(part)
         self._under_p.append(under_p)
@@ -141,4 +144,4 @@ class ReducedBasis:
         return energy
 
     def _vector(self) -> PETSc.Vec:
-        return self._stack.enter_context(self._space.vector())
+        return self._stack.enter_context(vector(self._space.dofs.space))

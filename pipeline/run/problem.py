@@ -1,0 +1,70 @@
+"""What solves a case on its mesh, if the memory is there for it."""
+
+from pipeline.plan.symmetry import mirror_planes, model_planes
+from pipeline.run.memory import FreeMemory
+from pipeline.solve.conditions import Conditions
+from pipeline.solve.displacement import DisplacementProblem
+from pipeline.solve.linear import SolveError
+from pipeline.solve.loads import Loads
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.mixed import MixedProblem
+from pipeline.solve.solution import FieldProblem, Problem, Solution
+from pipeline.solve.spaces import Spaces
+from pipeline.study.sweep import Case
+
+# Unknowns up to which a direct solve is a way out where iterations do not converge.
+_MOST_DIRECT = 60_000
+# A case may take this share of the memory that is free when it begins.
+_MEMORY_SHARE = 0.9
+
+
+class CaseFailure(Exception):
+    """A case cannot be computed, for a reason that all ranks have agreed on."""
+
+
+def problem_of(spaces: Spaces, case: Case, *, shared: bool, reuse: bool = False) -> FieldProblem:
+    """Return what solves ``case`` in the spaces of its mesh, by the elements that suit it; collective."""
+    if case.element == "mixed":
+        return MixedProblem(spaces, case.mesh.degree, conditions_of(case))
+    return DisplacementProblem(spaces, case.mesh.degree, conditions_of(case), shared=shared, reuse=reuse)
+
+
+def conditions_of(case: Case) -> Conditions:
+    """Return what the probe of ``case`` prescribes."""
+    return Conditions(bonded=case.probe.contact == "bonded")
+
+
+def loads_of(case: Case) -> Loads:
+    """Return how the probe of ``case`` moves."""
+    # Across a plane of symmetry a probe slides without force along its axis, and presses without force along itself.
+    return Loads.along(case.travel, apart=mirror_planes(case) != model_planes(case))
+
+
+def solve_problem(case: Case, problem: Problem, *, estimate: bool) -> Solution:
+    """Solve a case; where iterations do not converge and the system is small, directly. Collective."""
+    law, loads = MaterialLaw.of(*case.material.lame), loads_of(case)
+    method, tolerance = case.solve.method, case.solve.tolerance
+    try:
+        return problem.solve(law, loads, method=method, tolerance=tolerance, estimate=estimate)
+    except SolveError:
+        if method != "auto" or problem.dofs > _MOST_DIRECT:
+            raise
+        return problem.solve(law, loads, method="direct", tolerance=tolerance, estimate=estimate)
+
+
+def check_memory(free: FreeMemory, needed: float, what: str) -> None:
+    """Refuse what needs more bytes of memory than there are; collective.
+
+    Raises:
+        CaseFailure: on every rank.
+    """
+    if message := lacks_memory(free, needed, what):
+        raise CaseFailure(f"{message}: use larger elements, or a smaller epsilon")
+
+
+def lacks_memory(free: FreeMemory, needed: float, what: str) -> str:
+    """Return what to say if ``needed`` bytes are too much, the same on every rank; collective."""
+    available = free.available()
+    if needed <= _MEMORY_SHARE * available:
+        return ""
+    return f"{what} needs about {needed / 1e9:.1f} GB of memory, {available / 1e9:.1f} GB are available"

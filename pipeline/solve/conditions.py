@@ -1,0 +1,110 @@
+"""Where displacements are prescribed: the dofs of one space on the probe's footprint, on the support, in mirrors."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from pipeline import compat
+from pipeline.mesh.distribute import BodyMesh
+from pipeline.scene.model import FIXED, MIRROR, PROBE
+from pipeline.solve.compiled import vector_space
+from pipeline.solve.linear import SolveError
+from pipeline.solve.loads import FloatArray, Motion
+from pipeline.stages import stage
+
+IntArray = npt.NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What is prescribed, whatever its value: on the footprint all components (``bonded``) or that along z alone.
+
+    The support is held, and on planes of symmetry that bound the mesh so is the displacement across them.
+    """
+
+    bonded: bool = True
+
+    @property
+    def components(self) -> tuple[int, ...]:
+        """Components of the displacement that the probe prescribes."""
+        return (0, 1, 2) if self.bonded else (2,)
+
+
+class ConstrainedSpace:
+    """Displacements of one degree on a mesh, and which of their dofs are prescribed. Holds no operator.
+
+    ``prescribed`` are local dofs (unrolled, owned and ghosts); arrays named ``…_owned`` index the dofs, or for
+    ``probe_owned`` and ``fixed_owned`` the blocks of three dofs, that this rank owns. ``owned`` and ``dofs`` count dofs
+    of this rank, and of all.
+    """
+
+    @stage("spaces, forms")
+    def __init__(self, body: BodyMesh, degree: int, conditions: Conditions):
+        """Collective.
+
+        Raises:
+            SolveError: if the footprint and the support share a point.
+        """
+        self._body, self.comm, self.degree, self.conditions = body, body.comm, degree, conditions
+        self.space = space = vector_space(body.mesh, degree)
+        index_map = space.dofmap.index_map
+        self.owned, self.dofs = 3 * index_map.size_local, 3 * index_map.size_global
+        probe, fixed = (_points(space, body, name) for name in (PROBE, FIXED))
+        if self.comm.allreduce(len(np.intersect1d(probe, fixed))):
+            raise SolveError("the probe's footprint touches the held face: no displacement satisfies both conditions")
+        mirrors = list(zip(body.mirrored, _planes(space, body), strict=True))
+        single = [(3 * probe + axis, axis) for axis in conditions.components]
+        single += [(3 * plane + axis, axis) for axis, plane in mirrors]
+        zero = np.zeros((), dtype=PETSc.ScalarType)
+        self.dirichlet = [compat.dirichletbc(np.zeros(3, dtype=PETSc.ScalarType), fixed, space)]
+        self.dirichlet += [compat.dirichletbc(zero, dofs, space.sub(axis)) for dofs, axis in single]
+        self._probe = probe
+        self.prescribed = np.unique(np.concatenate([*(d for d, _ in single), *(3 * fixed + c for c in range(3))]))
+        self.prescribed_owned = self.prescribed[self.prescribed < self.owned]
+        self.probe_owned, self.fixed_owned = (dofs[dofs < index_map.size_local] for dofs in (probe, fixed))
+
+    @property
+    def body(self) -> BodyMesh:
+        """The mesh."""
+        return self._body
+
+    @property
+    def whole_dofs(self) -> int:
+        """Unknowns of the whole body, of which a half or a quarter may be modelled; collective."""
+        return 3 * whole_points(self.space, self._body)
+
+    def held(self, motion: Motion) -> FloatArray:
+        """Return the displacement (m) that a unit of ``motion`` prescribes, zero elsewhere; local, with ghosts."""
+        index_map = self.space.dofmap.index_map
+        values = np.zeros(3 * (index_map.size_local + index_map.num_ghosts))
+        points = np.asarray(self.space.tabulate_dof_coordinates())[self._probe] if motion.is_rotation else _ORIGIN
+        displacement = np.broadcast_to(motion.at(points), (len(self._probe), 3))
+        for component in self.conditions.components:
+            values[3 * self._probe + component] = displacement[:, component]
+        return values
+
+
+_ORIGIN = np.zeros((1, 3))
+
+
+def whole_points(space: Any, body: BodyMesh) -> int:
+    """Return the points of ``space`` on the whole body, of which those in a plane have one image; collective."""
+    images = np.full(space.dofmap.index_map.size_local, 2.0 ** len(body.mirrored))
+    for plane in _planes(space, body):
+        images[plane[plane < len(images)]] /= 2
+    return round(body.comm.allreduce(float(images.sum()), op=MPI.SUM))
+
+
+def _planes(space: Any, body: BodyMesh) -> list[IntArray]:
+    """Local points of ``space`` in each of the planes of symmetry that bound the mesh."""
+    names = [MIRROR["xy"[axis]] for axis in body.mirrored]
+    return [_points(space, body, name) for name in names]
+
+
+def _points(space: Any, body: BodyMesh, group: str) -> IntArray:
+    return np.asarray(fem.locate_dofs_topological(space, body.mesh.topology.dim - 1, body.facets[group]))

@@ -1,0 +1,219 @@
+"""A body, a probe that displaces part of its surface, and the force that this takes, by displacement elements.
+
+    find u with K u = 0 inside, u = the probe's motion on its footprint (bonded) or its normal part only
+    (frictionless), u = 0 on the support; K = λ A_λ + μ A_μ.
+
+The force is the reaction (:mod:`pipeline.solve.reaction`). Stress integrated under the probe is wrong by tens of per
+cent on the same solution.
+"""
+
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from pipeline.solve.conditions import Conditions
+from pipeline.solve.enrich import energy_decrements
+from pipeline.solve.error import error_bar, stiffness_bars
+from pipeline.solve.forms import mean_strain_form
+from pipeline.solve.linear import Level, LinearSolver, SolveError, is_direct
+from pipeline.solve.loads import FloatArray, Loads, Motion
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.reaction import Response, reaction, sums
+from pipeline.solve.solution import BALANCE_LIMIT, TOLERANCE, Solution, rest
+from pipeline.solve.spaces import ElasticSpace, Spaces
+from pipeline.solve.strain import largest_strain, principal_strains
+from pipeline.solve.vectors import global_sum, vector
+from pipeline.stages import stage
+
+Lame = tuple[float, float]
+
+
+class DisplacementProblem:
+    """The spaces of a mesh, a degree and conditions: solves for any material and loads. A context manager."""
+
+    def __init__(
+        self, spaces: Spaces, degree: int, conditions: Conditions, *, shared: bool = False, reuse: bool = False
+    ):
+        """Prepare; ``shared`` assembles A_λ and A_μ apart, once, for many pairs of λ and μ. Collective.
+
+        ``reuse`` begins each solve from the solution of the one before. What the spaces hold is freed with them.
+
+        Raises:
+            SolveError: if footprint and support share a point: no displacement satisfies both.
+        """
+        self._shared, self._reuse = shared, reuse
+        # By motion, the last solution for a unit of it less the prescribed displacements, owned dofs.
+        self.corrections: dict[Motion, FloatArray] = {}
+        self._spaces, self._body, self._conditions = spaces, spaces.body, conditions
+        self._fine = spaces.get(degree, conditions)
+        self._strain = mean_strain_form(self._fine.dofs.space, self._fine.forms.displacement)
+
+    def __enter__(self) -> "DisplacementProblem":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.corrections.clear()
+
+    @property
+    def dofs(self) -> int:
+        """Unknowns of the modelled part."""
+        return self._fine.dofs.dofs
+
+    @property
+    def space(self) -> ElasticSpace:
+        """The space of displacements."""
+        return self._fine
+
+    def solve(
+        self, law: MaterialLaw, loads: Loads, *, method: str = "auto", tolerance: float = TOLERANCE,
+        estimate: bool = False,
+    ) -> Solution:  # fmt: skip
+        """Solve for each motion of ``loads``, with one set-up, and return forces and checks; collective.
+
+        ``tolerance`` is that of the energy norm of the solver's error. ``estimate`` goes on in the space of one degree
+        more, for the solution's ``decrements`` and ``bars``.
+
+        Raises:
+            SolveError: if the solver did not converge, or the solution fails a check.
+        """
+        fine, lame = self._fine, law.lame
+        direct = is_direct(method, self.dofs, fine.degree)
+        held = [fine.dofs.held(motion) for motion in loads.motions]
+        with ExitStack() as stack:
+            start = time.perf_counter()
+            rhs, unknowns = ([stack.enter_context(vector(fine.dofs.space)) for _ in held] for _ in range(2))
+            for motion, values, load, unknown in zip(loads.motions, held, rhs, unknowns, strict=True):
+                fine.lift(load, values, lame)
+                if self._reuse and motion in self.corrections:
+                    unknown.array[:] = self.corrections[motion]
+            assemble = time.perf_counter() - start
+            levels, seconds = self._hierarchy(lame, stack, direct=direct)
+            assemble += seconds
+            solver = LinearSolver(levels, direct=direct, tolerance=tolerance)
+            stack.callback(solver.close)
+            start = time.perf_counter()
+            iterations = sum(map(solver.solve, rhs, unknowns))
+            response = self._response(unknowns, held, lame, loads)
+            if not direct and (share := rest(response.balance, tolerance)) < 1:
+                iterations += sum(solver.solve(*pair, share * tolerance) for pair in zip(rhs, unknowns, strict=True))
+                response = self._response(unknowns, held, lame, loads)
+            if response.balance > BALANCE_LIMIT:
+                raise SolveError(
+                    f"forces do not balance: relative error {response.balance:.1e}, allowed {BALANCE_LIMIT:.0e}"
+                )
+            self.corrections = {m: u.array.copy() for m, u in zip(loads.motions, unknowns, strict=True)}
+            self._move(held, loads)
+            seconds = time.perf_counter() - start
+            solution = Solution(
+                response, largest_strain(self._strain, self._body), fine.dofs.whole_dofs, self._body.cells,
+                iterations, assemble, solver.setup_seconds, seconds,
+            )  # fmt: skip
+            if not estimate:
+                return solution
+            solver.close()  # what the next degree takes is the most memory of all
+            start = time.perf_counter()
+            found, more = self._decrements(lame, levels, held, loads, stack)
+        relative = np.array([error_bar(d, fine.degree) for d in np.diag(found) / np.diag(response.stiffness)])
+        return replace(
+            solution, decrements=found, bars=stiffness_bars(response.stiffness, relative, apart=loads.apart),
+            estimate_iterations=more, time_estimate=time.perf_counter() - start,
+        )  # fmt: skip
+
+    @contextmanager
+    def solver(self, law: MaterialLaw, method: str = "auto") -> Iterator[LinearSolver]:
+        """Lend the solver for a material; collective.
+
+        Raises:
+            SolveError: if it cannot be set up.
+        """
+        direct = is_direct(method, self.dofs, self._fine.degree)
+        with ExitStack() as stack:
+            levels, _ = self._hierarchy(law.lame, stack, direct=direct)
+            solver = LinearSolver(levels, direct=direct, tolerance=0.5)
+            stack.callback(solver.close)
+            yield solver
+
+    def fields(self) -> tuple[Any, FloatArray]:
+        """Return the last solution's displacement (m) and the principal strains of each owned cell; collective."""
+        return self._fine.forms.displacement, principal_strains(self._strain, self._body)
+
+    def largest_strain(self, displacement: PETSc.Vec) -> float:
+        """Return the largest principal strain of ``displacement``; collective."""
+        self._fine.set_displacement(displacement)
+        return largest_strain(self._strain, self._body)
+
+    def _hierarchy(self, lame: Lame, stack: ExitStack, *, direct: bool) -> tuple[list[Level], float]:
+        """Return the levels of multigrid, or the one of a direct solve, and the seconds that one assembly takes.
+
+        Their operators are given back with the ``stack``.
+        """
+        spaces = [self._fine] if direct else [*self._coarser(), self._fine]
+        found = [self._level(space, lame, stack, blocked=not direct) for space in spaces]
+        return [level for level, _ in found], sum(seconds for _, seconds in found)
+
+    def _coarser(self) -> list[ElasticSpace]:
+        """Return the spaces of lower degree; collective."""
+        return [self._spaces.get(degree, self._conditions) for degree in range(1, self._fine.degree)]
+
+    def _level(self, space: ElasticSpace, lame: Lame, stack: ExitStack, *, blocked: bool) -> tuple[Level, float]:
+        blocked = blocked and space.degree > 1
+        matrix, seconds = stack.enter_context(space.operators.lend(lame, blocked=blocked, shared=self._shared))
+        return Level(space.dofs.space, matrix, space.dofs.prescribed), seconds
+
+    def _unit(self, motion: Motion, held: FloatArray) -> FloatArray:
+        """Return the last solution for a unit of ``motion``, owned dofs."""
+        return np.asarray(self.corrections[motion] + held[: self._fine.dofs.owned])
+
+    def _move(self, held: list[FloatArray], loads: Loads) -> None:
+        """Make the sum of the motions the displacement of the forms; collective."""
+        with vector(self._fine.dofs.space) as displacement:
+            for motion, values, amount in zip(loads.motions, held, loads.amounts, strict=True):
+                displacement.array[:] += amount * self._unit(motion, values)
+            self._fine.set_displacement(displacement)
+
+    @stage("error bar")
+    def _decrements(
+        self, lame: Lame, levels: list[Level], held: list[FloatArray], loads: Loads, stack: ExitStack
+    ) -> tuple[FloatArray, int]:
+        """Return what one degree more takes away from the last stiffness of the whole body, and the iterations."""
+        fine = self._fine
+        finer = self._spaces.get(fine.degree + 1, self._conditions)
+        if len(levels) == 1:
+            levels = [*(self._level(space, lame, stack, blocked=True)[0] for space in self._coarser()), *levels]
+        level, _ = self._level(finer, lame, stack, blocked=True)
+        solver = LinearSolver([*levels, level], direct=False, tolerance=0.5)
+        stack.callback(solver.close)
+        residuals = [stack.enter_context(vector(finer.dofs.space)) for _ in held]
+        moved = fine.forms.displacement.x.array.copy()
+        for motion, values, residual in zip(loads.motions, held, residuals, strict=True):
+            self._move([values], Loads((motion,), (1.0,)))
+            finer.forms.displacement.interpolate(fine.forms.displacement)
+            finer.apply(residual, lame)
+            residual.scale(-1.0)
+            residual.array[finer.dofs.prescribed_owned] = 0.0
+        fine.forms.displacement.x.array[:] = moved
+        decrements, iterations = energy_decrements(solver, residuals)
+        if loads.apart:
+            decrements = np.diag(np.diag(decrements))
+        return 2.0 ** len(self._body.mirrored) * decrements, iterations
+
+    def _response(self, unknowns: list[PETSc.Vec], held: list[FloatArray], lame: Lame, loads: Loads) -> Response:
+        """Return the response to the motions whose solutions, less the prescribed displacements, are ``unknowns``."""
+        fine, owned = self._fine, self._fine.dofs.owned
+        units = [unknown.array + values[:owned] for unknown, values in zip(unknowns, held, strict=True)]
+        residuals = []
+        for unit in units:
+            with vector(fine.dofs.space) as residual, vector(fine.dofs.space) as displacement:
+                displacement.array[:] = unit
+                fine.set_displacement(displacement)
+                fine.apply(residual, lame)
+                residuals.append(residual.array.copy())
+        stationary = global_sum(fine.dofs.comm, np.array([[u @ r for r in residuals] for u in units]))
+        found = sums(fine.dofs, residuals, held)
+        response = reaction(loads, stationary, found.on_probe, self._body.mirrored)
+        return replace(response, balance=found.imbalance(np.diag(stationary), loads, self._body.mirrored))

@@ -1,0 +1,67 @@
+"""What the probe does: a rigid movement, put together of a few that are each solved for once."""
+
+from dataclasses import dataclass
+from math import hypot
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+Vector = tuple[float, float, float]
+
+_ZERO: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A unit of one rigid movement: along the unit vector ``direction``, or about the axis ``rotation`` of a point.
+
+    A unit is a metre, or, for the small rotation ω × (x − ``centre``), a radian.
+    """
+
+    direction: Vector = _ZERO
+    rotation: Vector = _ZERO
+    centre: Vector = _ZERO
+
+    @property
+    def is_rotation(self) -> bool:
+        """Whether it turns the probe."""
+        return any(self.rotation)
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return the displacement of a unit (m), at ``points`` (m), shape (points, 3)."""
+        turned = np.cross(np.array(self.rotation), points - np.array(self.centre))
+        return np.asarray(np.array(self.direction) + turned)
+
+
+@dataclass(frozen=True)
+class Loads:
+    """What moves: the sum of ``motions``, each by its amount (m, or rad); translations are along orthogonal directions.
+
+    ``apart`` says that symmetry keeps the motions apart: none takes any work in the movement of another.
+    """
+
+    motions: tuple[Motion, ...]
+    amounts: tuple[float, ...]
+    apart: bool = False
+
+    @staticmethod
+    def along(travel: Vector, *, apart: bool = False) -> "Loads":
+        """Return the loads of a probe that presses by −z of ``travel`` (m) and slides by the rest of it."""
+        x, y, z = travel
+        slide = hypot(x, y)
+        press = Motion((0.0, 0.0, -1.0))
+        if not slide:
+            return Loads((press,), (-z,))
+        return Loads((press, Motion((x / slide, y / slide, 0.0))), (-z, slide), apart)
+
+    @staticmethod
+    def all(travel: Vector, centre: Vector) -> "Loads":
+        """Return ``travel`` (m) as an amount of all six rigid motions: along x, y, z, and about those axes."""
+        axes: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+        motions = [Motion(axis) for axis in axes] + [Motion(rotation=axis, centre=centre) for axis in axes]
+        return Loads(tuple(motions), (*travel, 0.0, 0.0, 0.0))
+
+    def times(self, factor: float) -> "Loads":
+        """Return ``factor`` times the movement."""
+        return Loads(self.motions, tuple(factor * amount for amount in self.amounts), self.apart)

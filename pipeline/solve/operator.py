@@ -1,0 +1,116 @@
+"""The operator K = λ A_λ + μ A_μ of one constrained space, with prescribed dofs eliminated symmetrically."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from petsc4py import PETSc
+
+from pipeline import compat
+from pipeline.solve.conditions import ConstrainedSpace
+from pipeline.solve.forms import ElasticForms, curved_cells
+from pipeline.solve.straight import suits
+from pipeline.solve.straight.stiffness import StraightStiffness
+from pipeline.stages import stage
+
+_SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
+
+
+class Operators:
+    """Makes operators of one space, and lends them: a matrix is its borrower's until it is given back.
+
+    What is given back is kept for the next, since finding out where its entries are takes longer than an assembly.
+    ``close`` frees what is kept.
+    """
+
+    def __init__(self, space: ConstrainedSpace, forms: ElasticForms):
+        self._space, self._forms = space, forms
+        self._idle: dict[str, list[PETSc.Mat]] = {}
+        self._parts: dict[str, tuple[PETSc.Mat, PETSc.Mat]] = {}
+        self._part_seconds = 0.0
+        self._straight: StraightStiffness | None = None
+        self._closed = False
+
+    def close(self) -> None:
+        """Free what is kept; what is lent is freed when it is given back."""
+        self._closed = True
+        self._drop_parts()
+        for matrices in self._idle.values():
+            while matrices:
+                matrices.pop().destroy()
+
+    @contextmanager
+    def lend(
+        self, lame: tuple[float, float], *, blocked: bool, shared: bool = False
+    ) -> Iterator[tuple[PETSc.Mat, float]]:
+        """Lend K for λ and μ (Pa), and the seconds that one assembly takes; collective.
+
+        The diagonal of prescribed dofs is μ. ``shared`` keeps A_λ and A_μ for the next pair of λ and μ.
+        """
+        mat_type = "baij" if blocked else "aij"
+        idle = self._idle.setdefault(mat_type, [])
+        matrix, seconds = self._make(lame, mat_type, idle.pop() if idle else None, shared=shared)
+        try:
+            yield matrix, seconds
+        finally:
+            if idle or self._closed:  # one of a kind serves those who borrow in turn
+                matrix.destroy()
+            else:
+                idle.append(matrix)
+
+    @stage("assembly")
+    def _make(
+        self, lame: tuple[float, float], mat_type: str, into: PETSc.Mat | None, *, shared: bool
+    ) -> tuple[PETSc.Mat, float]:
+        start = time.perf_counter()
+        if not shared:
+            return self._assemble(lame, lame[1], mat_type, into), time.perf_counter() - start
+        # The parts are the copies: PETSc multiplies with a copy of a blocked matrix at less than half the speed.
+        if mat_type not in self._parts:
+            self._drop_parts()
+            whole = self._assemble((1.0, 0.0), 0.0, mat_type, into)
+            first = whole.copy()
+            into = self._assemble((0.0, 1.0), 1.0, mat_type, whole)
+            self._parts[mat_type] = first, into.copy()
+            self._part_seconds = (time.perf_counter() - start) / 2
+        matrix = into if into is not None else self._assemble((0.0, 1.0), 1.0, mat_type, None)
+        of_lambda, of_mu = self._parts[mat_type]
+        of_lambda.copy(matrix, structure=_SAME)
+        matrix.scale(lame[0])
+        matrix.axpy(lame[1], of_mu, structure=_SAME)
+        _mark(matrix)
+        return matrix, self._part_seconds
+
+    def _drop_parts(self) -> None:
+        while self._parts:
+            for part in self._parts.popitem()[1]:
+                part.destroy()
+
+    def _assemble(self, lame: tuple[float, float], diagonal: float, mat_type: str, into: PETSc.Mat | None) -> PETSc.Mat:
+        self._forms.set_lame(*lame)
+        if suits(self._space.space):
+            matrix = self._assemble_alone(lame, diagonal, mat_type, into)
+        else:
+            matrix = compat.assemble_matrix(self._forms.stiffness, self._space.dirichlet, diagonal, mat_type, into)
+        _mark(matrix)
+        return matrix
+
+    def _assemble_alone(
+        self, lame: tuple[float, float], diagonal: float, mat_type: str, into: PETSc.Mat | None
+    ) -> PETSc.Mat:
+        """Assemble on one process: the straight cells, which are most, the fast way, and dolfinx the others."""
+        curved = curved_cells(self._space.body.mesh)
+        if self._straight is None:
+            self._straight = StraightStiffness(self._space.space, curved, self._space.prescribed)
+        matrix = self._straight.matrix(mat_type) if into is None else into
+        matrix.zeroEntries()
+        if curved is not None and curved.any():
+            compat.add_matrix(matrix, self._forms.curved_stiffness, self._space.dirichlet, diagonal)
+        self._straight.add(matrix, lame, diagonal)
+        return matrix
+
+
+def _mark(matrix: PETSc.Mat) -> None:
+    matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    if not matrix.getType().endswith("baij"):  # PETSc 3.18 does not take the second one for blocked matrices
+        matrix.setOption(PETSc.Mat.Option.SPD, True)

@@ -1,0 +1,129 @@
+"""dolfinx stays as it is: forms with kernels of our own are objects of our own, and what we lack it does."""
+
+import inspect
+import subprocess
+import sys
+
+import cffi
+import pytest
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from pipeline import compat
+from pipeline.solve.cache import compiling, form_cache
+from pipeline.solve.compiled import EVERYWHERE, form, scalar_space, vector_space
+from pipeline.solve.straight import arrays
+from pipeline.solve.straight.stiffness import cell_kernel
+from tests.cases import force
+from tests.solve.test_mixed import make_mesh
+
+_EVERY_MODULE = """
+import importlib, pkgutil, sys
+import dolfinx, dolfinx.fem.petsc, dolfinx.io, dolfinx.jit, dolfinx.mesh, dolfinx.nls
+
+modules = {name: module for name, module in sys.modules.items() if name.split(".")[0] in ("dolfinx", "ffcx")}
+before = {name: dict(vars(module)) for name, module in modules.items()}
+import pipeline
+for found in pkgutil.walk_packages(pipeline.__path__, "pipeline."):
+    try:
+        importlib.import_module(found.name)
+    except ModuleNotFoundError as error:
+        assert error.name.split(".")[0] in ("pyvista", "vtkmodules"), error
+from tests.cases import force
+assert force() > 0
+assert force(material={"poisson": 0.49}) > 0
+for name, module in modules.items():
+    for key, value in before[name].items():
+        assert vars(module)[key] is value, f"{name}.{key} is another one"
+"""
+
+
+def test_importing_and_solving_leave_dolfinx_as_it_is():
+    done = subprocess.run([sys.executable, "-c", _EVERY_MODULE], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def stiffness(space):
+    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
+    strain = ufl.sym(ufl.grad(u))
+    lame = fem.Constant(space.mesh, 1.7), fem.Constant(space.mesh, 0.6)
+    return (lame[0] * ufl.div(u) * ufl.div(v) + 2 * lame[1] * ufl.inner(strain, ufl.sym(ufl.grad(v)))) * ufl.dx
+
+
+def first_kernel(made) -> int:
+    compiled = made.ufcx_form
+    integrals = compiled.form_integrals if hasattr(compiled, "form_integrals") else compiled.integrals(0)
+    return int(cffi.FFI().cast("uintptr_t", cffi.FFI().cast("void*", integrals[0].tabulate_tensor_float64)))
+
+
+@pytest.fixture()
+def _alone():
+    """Others, too, compile into the folder."""
+    with compiling():
+        yield
+
+
+@pytest.mark.usefixtures("_alone")
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_plain_form_has_the_generated_kernel(degree):
+    """Even of the very expression, in the very folder, of which a form with another kernel was made before."""
+    space = vector_space(make_mesh(mesh={"degree": 1, "fine": "8 mm", "rim": "3 mm"}).mesh, degree)
+    expression = stiffness(space)
+    address = cell_kernel(degree)
+    own = form(expression, kernels={EVERYWHERE: address})
+    jit = {"cache_dir": str(form_cache()), "cffi_extra_compile_args": ["-O2", "-march=native"]}
+    key = "jit_options" if "jit_options" in inspect.signature(fem.form).parameters else "jit_params"
+    plain = fem.form(expression, **{key: jit})
+    assert first_kernel(plain) != address
+    matrices = [compat.assemble_matrix(f, [], 1.0, "aij") for f in (own, plain, form(expression))]
+    size = matrices[0].norm()
+    for other in matrices[1:]:
+        other.axpy(-1.0, matrices[0])
+        assert other.norm() < 1e-13 * size
+
+
+@pytest.mark.usefixtures("_alone")
+def test_a_kernel_of_ones_own_is_used():
+    """The kernel of the stiffness, put into the form of a mass with the same constants, gives the stiffness."""
+    space = vector_space(make_mesh(mesh={"degree": 1, "fine": "8 mm", "rim": "3 mm"}).mesh, 2)
+    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
+    lame = fem.Constant(space.mesh, 1.7), fem.Constant(space.mesh, 0.6)
+    other = (lame[0] + lame[1]) * ufl.inner(u, v) * ufl.dx
+    mass, replaced, wanted = (
+        compat.assemble_matrix(f, [], 1.0, "aij")
+        for f in (form(other), form(other, kernels={EVERYWHERE: cell_kernel(2)}), form(stiffness(space)))
+    )
+    assert abs(mass.norm() / wanted.norm() - 1) > 0.5
+    replaced.axpy(-1.0, wanted)
+    assert replaced.norm() < 1e-13 * wanted.norm()
+
+
+@pytest.mark.usefixtures("_alone")
+def test_code_is_looked_up_once(monkeypatch):
+    space = scalar_space(make_mesh(mesh={"degree": 1, "fine": "8 mm", "rim": "3 mm"}).mesh, 1)
+    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
+    made = [form(u * v * ufl.dx)]
+    monkeypatch.setattr("dolfinx.jit.ffcx_jit", None)
+    made.append(form(u * v * ufl.dx))
+    norms = [compat.assemble_matrix(f, [], 1.0, "aij").norm() for f in made]
+    assert norms[0] == norms[1]
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("changes", [{}, {"mesh": {"degree": 1}}, {"material": {"poisson": 0.49}}])
+def test_without_the_arrays_of_petsc_dolfinx_assembles(changes, monkeypatch):
+    wanted = force(MPI.COMM_WORLD, **changes)
+    monkeypatch.setattr(arrays, "available", lambda: False)
+    assert force(MPI.COMM_WORLD, **changes) == pytest.approx(wanted, rel=1e-9)
+
+
+def test_the_arrays_of_petsc_are_tried_before_they_are_relied_on(monkeypatch):
+    assert arrays.available()
+    for broken in (object, lambda: (_ for _ in ()).throw(OSError)):
+        monkeypatch.setattr(arrays, "_petsc", broken)
+        arrays.available.cache_clear()
+        assert not arrays.available()
+    monkeypatch.undo()
+    arrays.available.cache_clear()
+    assert arrays.available()
