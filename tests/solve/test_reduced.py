@@ -5,12 +5,13 @@ import psutil
 import pytest
 from mpi4py import MPI
 
-from pipeline.run.basis import ReducedBasis
-from pipeline.solve.elasticity import ElasticBody
+from pipeline.solve.conditions import Conditions
+from pipeline.solve.displacement import DisplacementProblem
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.reduced_basis import ReducedBasis
 from pipeline.solve.spaces import Spaces
-from tests.solve.test_mixed import DEPTH, contact, make_mesh
+from tests.solve.test_mixed import DEPTH, PRESS, make_mesh
 
-TRAVEL = (0.0, 0.0, -DEPTH)
 RATIOS = (0.1, 0.3, 0.45)
 
 
@@ -19,21 +20,27 @@ def t_of(poisson: float) -> float:
     return 2 * poisson / (1 - 2 * poisson)
 
 
+def law_of(poisson: float) -> MaterialLaw:
+    """μ = 1 Pa."""
+    return MaterialLaw.of(t_of(poisson), 1.0)
+
+
 @pytest.mark.mpi
 def test_energy_falls_towards_that_of_a_solve_with_each_solution():
     """A combination of more solutions has less energy, never less than the solution itself."""
-    with ElasticBody(Spaces(make_mesh(MPI.COMM_WORLD)), 2, contact()) as body:
-        wanted = 2 * body.solve((t_of(0.4), 1.0)).energy
+    with DisplacementProblem(Spaces(make_mesh(MPI.COMM_WORLD)), 2, Conditions()) as problem:
+        wanted = problem.solve(law_of(0.4), PRESS).energy
         found = []
-        with ReducedBasis(body, TRAVEL, t_of(0.0), "auto") as basis:
+        with ReducedBasis(problem, PRESS, t_of(0.0), "auto") as basis:
             for poisson in RATIOS:
-                body.solve((t_of(poisson), 1.0))
-                basis.add(body.correction)
+                problem.solve(law_of(poisson), PRESS)
+                (correction,) = problem.corrections.values()
+                basis.add(correction)
                 reduced = basis.evaluate(t_of(0.4))
-                found.append(reduced.twice_energy / wanted - 1)
+                found.append(reduced.response.energy / wanted - 1)
                 assert -1e-9 < found[-1] <= 1.001 * reduced.bound
-                assert -reduced.reaction @ np.array(TRAVEL) == pytest.approx(reduced.twice_energy)
-                np.testing.assert_allclose(basis.evaluate(t_of(0.4)).reaction, reduced.reaction)
+                assert reduced.response.force[2] * DEPTH == pytest.approx(2 * reduced.response.energy)
+                np.testing.assert_allclose(basis.evaluate(t_of(0.4)).response.force, reduced.response.force)
     assert found[0] > 10 * found[1] > 100 * found[2]
     assert found[2] < 1e-3
 
@@ -42,13 +49,15 @@ def test_energy_falls_towards_that_of_a_solve_with_each_solution():
 def test_many_evaluations_keep_no_memory():
     mesh = make_mesh(mesh={"fine": "2 mm", "rim": "0.5 mm"})
     with (
-        ElasticBody(Spaces(mesh), 2, contact()) as body, ReducedBasis(body, TRAVEL, t_of(0.0), "auto") as basis,
-    ):  # fmt: skip
-        body.solve((t_of(0.3), 1.0))
-        basis.add(body.correction)
+        DisplacementProblem(Spaces(mesh), 2, Conditions()) as problem,
+        ReducedBasis(problem, PRESS, t_of(0.0), "auto") as basis,
+    ):
+        problem.solve(law_of(0.3), PRESS)
+        (correction,) = problem.corrections.values()
+        basis.add(correction)
         basis.displacement(basis.evaluate(0.5))
         before = psutil.Process().memory_info().rss
         for number in range(300):
             basis.displacement(basis.evaluate(0.01 * number))
         # A vector each would be this many bytes.
-        assert psutil.Process().memory_info().rss - before < 0.2 * 300 * 8 * body.dofs
+        assert psutil.Process().memory_info().rss - before < 0.2 * 300 * 8 * problem.dofs
