@@ -71,10 +71,11 @@ def test_the_reason_is_told_once_whichever_rank_is_the_first_to_know(small, tmp_
     """A rank that leaves with a bad status takes the others with it: none may do so before somebody has spoken."""
     bad = tmp_path / "bad.toml"
     bad.write_text(SMALL.replace('"2 mm"', "2"))
+    script = 'file=$1; shift; if [ "$OMPI_COMM_WORLD_RANK" = 0 ]; then file=$1; sleep 2; fi; shift; exec "$@" "$file"'
+    files = map(str, (bad, small if first == "good" else bad))
     run = [sys.executable, "-m", "pipeline", "run", "--output", str(tmp_path / "out")]
-    late = ["sh", "-c", 'sleep 2; exec "$@"', "sh", *run, str(small if first == "good" else bad)]
-    command = ["mpirun", "--oversubscribe", "-n", "1", *late, ":", "-n", "1", *run, str(bad)]
-    done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, check=False, timeout=100, cwd=ROOT)
+    ranks = ["mpirun", "--oversubscribe", "-n", "2", "sh", "-c", script, "sh", *files, *run]
+    done = subprocess.run(ranks, capture_output=True, text=True, env=ENVIRONMENT, check=False, timeout=100, cwd=ROOT)
     assert done.returncode == 2
     assert done.stderr.count("probe.radius = 2") == 1
 
