@@ -5,12 +5,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import numpy as np
-    import numpy.typing as npt
 
-    FloatArray = npt.NDArray[np.float64]
-    BoolArray = npt.NDArray[np.bool_]
+    from pipeline.arrays import FloatArray
 else:
-    FloatArray = BoolArray = Any
+    FloatArray = Any
 
     class _Numpy:
         """Stands for the module until one of its names is asked for."""
@@ -22,4 +20,4 @@ else:
 
     np = _Numpy()
 
-__all__ = ["BoolArray", "FloatArray", "np"]
+__all__ = ["FloatArray", "np"]
