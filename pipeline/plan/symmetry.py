@@ -19,10 +19,14 @@ def mirror_planes(probe: AnyProbe) -> tuple[str, ...]:
 
 def model_planes(probe: AnyProbe) -> tuple[str, ...]:
     """Return the mirror planes that the probe's movement respects, too: half or quarter of the body tells all."""
+    if probe.motion == "all":
+        return ()
     planes = mirror_planes(probe)
     return tuple(plane for plane, travel in zip(PLANES, probe.travel, strict=False) if plane in planes and travel == 0)
 
 
 def is_round(case: Case) -> bool:
     """Tell whether body, support and probe are the same all round one axis, and the movement along it."""
+    if case.probe.motion == "all":
+        return False
     return isinstance(case.body, Cylinder) and isinstance(case.probe, Disc) and case.probe.at == (0.0, 0.0)

@@ -67,6 +67,15 @@ _AXES = {
     "body_shape": "shape of the body",
     "probe_shape": "shape of the probe",
 }
+_BARS = "error bar (95 %) on force_vector; not a number across the movements that were solved for"
+# Translations, and rotations about the axes of the point of contact.
+_MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
+_NO_STIFFNESS = ((nan,) * 6,) * 6
+_STIFFNESS = {
+    "stiffness": "force (x, y, z: N) and torque about the point of contact (rx, ry, rz: N m) on the tissue for a unit"
+    " of each rigid motion of the probe (m, rad): N/m, N/rad = N m/m, N m/rad",
+    "stiffness_error": "error bar (95 %) on stiffness, in its units",
+}
 _MISSING = -1  # of counts, which have no NaN
 
 
@@ -96,6 +105,17 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     variables["force_vector"] = (
         (*dims, "component"), vectors, {"units": "N", "long_name": "force of the tissue on the probe"},
     )  # fmt: skip
+    vector_bars = np.array([r.force_vector_error if r else (nan,) * 3 for r in flat]).reshape(*study.shape, 3)
+    variables["force_vector_error"] = (
+        (*dims, "component"), vector_bars, {"units": "N", "long_name": _BARS},
+    )  # fmt: skip
+    has_stiffness = any(r and r.stiffness for r in flat)
+    if has_stiffness:
+        for name, text in _STIFFNESS.items():
+            matrices = np.array([getattr(r, name) if r and getattr(r, name) else _NO_STIFFNESS for r in flat])
+            variables[name] = (
+                (*dims, "motion", "conjugate"), matrices.reshape(*study.shape, 6, 6), {"units": "1", "long_name": text},
+            )  # fmt: skip
     texts = {
         "status": [r.status if r else "pending" for r in flat],
         "message": [r.message if r else "" for r in flat],
@@ -105,6 +125,8 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     for name, words in texts.items():
         variables[name] = (dims, array(words, object), {"long_name": _TEXTS[name]})
     coordinates = {axis.name: _coordinate(axis) for axis in study.axes} | {"component": ["x", "y", "z"]}
+    if has_stiffness:
+        coordinates |= {"motion": list(_MOTIONS), "conjugate": list(_MOTIONS)}
     dataset = xr.Dataset(variables, coordinates, _attributes(plan, flat, run or {}))
     return _add_ratios(dataset)
 

@@ -36,8 +36,11 @@ def conditions_of(case: Case) -> Conditions:
 
 def loads_of(case: Case) -> Loads:
     """Return how the probe of ``case`` moves."""
+    probe = case.probe
+    if probe.motion == "all":
+        return Loads.all(probe.travel, (*probe.at, 0.0))
     # Across a plane of symmetry a probe slides without force along its axis, and presses without force along itself.
-    return Loads.along(case.probe.travel, apart=mirror_planes(case.probe) != model_planes(case.probe))
+    return Loads.along(probe.travel, apart=mirror_planes(probe) != model_planes(probe))
 
 
 def solve_problem(case: Case, problem: Problem, *, estimate: bool) -> Solution:

@@ -28,6 +28,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         _check_body(body, problems)  # type: ignore[arg-type]
     for probe in probes:
         _check_probe(probe, problems)  # type: ignore[arg-type]
+        _check_motion(probe, problems)  # type: ignore[arg-type]
     for mesh in meshes:
         _check_mesh(mesh, problems)  # type: ignore[arg-type]
     for body, probe in itertools.product(bodies, probes):
@@ -79,6 +80,14 @@ def _check_probe(probe: AnyProbe, problems: Problems) -> None:
         problems.error(
             "probe.slice", _mm(probe.slice), "a frictionless blade slides along without force: use contact = 'bonded'"
         )
+
+
+def _check_motion(probe: AnyProbe, problems: Problems) -> None:
+    if probe.motion == "all" and probe.contact != "bonded":
+        problems.error(
+            "probe.motion", probe.motion,
+            f'a {probe.contact} probe holds the tissue in one direction only: use contact = "bonded"',
+        )  # fmt: skip
 
 
 def _check_mesh(mesh: Mesh, problems: Problems) -> None:

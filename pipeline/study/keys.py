@@ -70,6 +70,10 @@ TEXTS: dict[str, Words] = {
     "probe.length": Words("Length of the edge.", '"6 mm"'),
     "probe.width": Words("Width of the edge.", '"1 mm"'),
     "probe.direction": Words("Along which the edge lies: x, y and 0.", "[1.0, 0.0, 0.0]"),
+    "probe.motion": Words(
+        "Which movements are solved for: those of the study (`press`), or all six rigid motions (`all`), for the 6 × 6 "
+        "stiffness of the bonded tool: forces and torques about the point of contact.", '"all"',
+    ),
     "probe.slice": Words("How far it is drawn along its edge as it cuts.", '"0.05 mm"'),
     "mesh.accuracy": Words(
         "Largest relative error that F may have. Elements and sizes that are not given are then chosen, and a case "

@@ -132,6 +132,12 @@ class Probe(Section):
     depth: Length
     at: tuple[Coordinate, Coordinate] = (0.0, 0.0)
     contact: Contact = "bonded"
+    motion: Literal["press", "all"] = "press"
+
+    @property
+    def movements(self) -> int:
+        """How many rigid motions are solved for: the press, the slide if there is one, or all six."""
+        return 6 if self.motion == "all" else 1 + any(self.travel[:2])
 
     @property
     def axis(self) -> tuple[float, float, float]:

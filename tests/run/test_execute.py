@@ -12,6 +12,7 @@ from mpi4py import MPI
 from pipeline.plan.plan import make_plan
 from pipeline.run.execute import execute
 from pipeline.run.progress import Silent
+from pipeline.solve.solution import BALANCE_LIMIT
 from tests.cases import BLADE, solve, study
 
 WORLD = MPI.COMM_WORLD
@@ -62,7 +63,7 @@ def test_forces_balance(degree):
     mesh = {"degree": degree, "rim": "0.4 mm" if degree == 1 else "1 mm"}
     (record,) = solve(WORLD, probe=BLADE | {"slice": "0.1 mm"}, mesh=mesh).values()
     assert record.status == "ok"
-    assert record.balance < 2e-7
+    assert record.balance < BALANCE_LIMIT
     assert record.force > 0
     work = record.force * 0.1e-3 - record.force_vector[0] * 0.1e-3
     assert work == pytest.approx(2 * record.energy, rel=1e-7)
