@@ -109,7 +109,7 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     variables["force_vector_error"] = (
         (*dims, "component"), vector_bars, {"units": "N", "long_name": _BARS},
     )  # fmt: skip
-    has_stiffness = any(r and r.stiffness for r in flat)
+    has_stiffness = any(probe.motion == "all" for probe in study.sections["probe"])  # type: ignore[attr-defined]
     if has_stiffness:
         for name, text in _STIFFNESS.items():
             matrices = np.array([getattr(r, name) if r and getattr(r, name) else _NO_STIFFNESS for r in flat])
