@@ -53,7 +53,9 @@ def study_page() -> str:
 
 def dataset_page() -> str:
     """Return the page of every variable of a dataset."""
-    dataset = build(make_plan(parse(tomllib.loads(starter("study")))), {})
+    study = tomllib.loads(starter("study"))
+    study["probe"]["motion"] = "all"
+    dataset = build(make_plan(parse(study)), {})
     lines = [
         "# Dataset", "",
         "`results/<study>.nc`: netCDF4, SI units, CF attributes. Its dimensions are what the study sweeps, in the "

@@ -69,6 +69,12 @@ _RESULTS = (
     Quantity("force", "N", "reaction force along the probe's axis, positive against its advance", "F",
              "reaction force F"),
     Quantity("force_vector", "N", "force of the tissue on the probe"),
+    Quantity("force_vector_error", "N",
+             "error bar (95 %) on force_vector; not a number across the movements that were solved for"),
+    Quantity("stiffness", "1",
+             "force (x, y, z: N) and torque about the point of contact (rx, ry, rz: N m) on the tissue for a unit of "
+             "each rigid motion of the probe (m, rad): N/m, N/rad = N m/m, N m/rad"),
+    Quantity("stiffness_error", "1", "error bar (95 %) on stiffness, in its units"),
     Quantity("force_error", "1", "relative error bar (95 %) on force, against the exact solution of the case's scene",
              "± F", in_per_cent=True),
     Quantity("force_max", "N", "force of the full-order mesh of the same study (F_max)", "F_max"),

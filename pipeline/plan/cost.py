@@ -23,6 +23,8 @@ _SOLVE = {1: 5e-6, 2: 2e-5, 3: 5e-5, 4: 1.6e-4}
 _MERIDIAN = 0.5
 # How fast iterations grow on the way to incompressible.
 _LOCKING = -0.35
+# What another movement of the probe adds, on the same set-up: a right-hand side.
+_MOVEMENT = 0.5
 # Observations that weigh as much as the law above, for its factor and for its exponents.
 _WEIGHT = (0.5, 5.0, 5.0)
 
@@ -83,11 +85,18 @@ class CostModel:
 
 
 def features(solve: Solve) -> tuple[str, float, float]:
-    """Return what a solve's cost depends on: kind of element, tetrahedra (estimated) of the part modelled, ν."""
+    """Return what a solve's cost depends on: kind of element with the number of movements if there are several,
+    tetrahedra (estimated) of the part modelled, ν.
+    """
     case = solve.case
     if solve.axisymmetric:
         return "meridian", 1.0, 0.0
-    return f"{case.element} {case.mesh.degree}", estimate.cells(case) * 0.5 ** len(solve.mirrors), _poisson(case)
+    movements = "" if case.movements == 1 else f" {case.movements}"
+    return (
+        f"{case.element} {case.mesh.degree}{movements}",
+        estimate.cells(case) * 0.5 ** len(solve.mirrors),
+        _poisson(case),
+    )
 
 
 def speed_up(ranks: int) -> float:
@@ -137,6 +146,7 @@ def _prior(stage: str, kind: str) -> _Numbers:
         return log(_MERIDIAN), 0.0, 0.0
     if stage == "mesh":
         return log(1e4 * _MESH), 1.0, 0.0
-    element, degree = kind.split()
-    per_cell = _SOLVE[int(degree) + (stage == "bar")] * (_MIXED if element == "mixed" else 1.0)
+    element, degree, *movements = kind.split()
+    more = 1 + _MOVEMENT * (int(movements[0]) - 1) if movements else 1.0
+    per_cell = more * _SOLVE[int(degree) + (stage == "bar")] * (_MIXED if element == "mixed" else 1.0)
     return log(1e4 * per_cell), 1.0, 0.0 if element == "mixed" else _LOCKING

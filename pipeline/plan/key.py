@@ -18,6 +18,8 @@ from pipeline.units import canonical
 PHYSICS_VERSION = 5
 
 _MANY = 200_000  # sections of a large study
+# Keys that came later, with the value that stands for what was before: records of then stay valid.
+_LATER = {"motion": "press"}
 
 
 def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
@@ -42,7 +44,7 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
 
 def reference_key(case: Case, accuracy: float) -> str:
     """Key of F_exact of the case's scene, for E = 1 and depth = 1: of what F / (E d) depends on, no mesh."""
-    probe = case.probe
+    probe = case.probe.model_copy(update={"motion": "press"})
     ratio = 0.0 if _slides_across_a_mirror(case) else slice_ratio(probe)
     parts = [
         f"{PHYSICS_VERSION} exact {accuracy!r}", text_of(case.body),
@@ -54,7 +56,7 @@ def reference_key(case: Case, accuracy: float) -> str:
 def mesh_key(case: Case) -> str:
     """Key of the case's mesh: body, footprint, sizes, and whether elements are straight or curved."""
     sizes = _mesh_text(case.mesh, case.is_full, case.probe.half_width, "")
-    footprint = text_of(case.probe, ("action", "depth", "contact", "slice"))
+    footprint = text_of(case.probe, ("action", "depth", "contact", "slice", "motion"))
     return digest("\n".join([text_of(case.body), footprint, sizes, str(case.mesh.degree > 1)]))
 
 
@@ -65,7 +67,7 @@ def operator_key(case: Case) -> str:
 
 def normalised(case: Case) -> Case:
     """Return the case with a Young's modulus of 1 Pa and a depth of 1 m: its force is F / (E d)."""
-    travel = {"depth": 1.0}
+    travel: dict[str, Any] = {"depth": 1.0, "motion": "press"}
     if getattr(case.probe, "slice", 0.0):
         travel["slice"] = 0.0 if _slides_across_a_mirror(case) else slice_ratio(case.probe)
     material = case.material.model_copy(update={"young": 1.0})
@@ -85,8 +87,9 @@ def digest(text: str) -> str:
 
 @lru_cache(_MANY)
 def text_of(section: Section, without: tuple[str, ...] = ()) -> str:
-    """Write a section in canonical form, ``without`` some of its keys."""
-    return _text({key: value for key, value in section.model_dump().items() if key not in without})
+    """Write a section in canonical form, ``without`` some of its keys, and what was not there in earlier versions."""
+    content = {key: value for key, value in section.model_dump().items() if key not in without}
+    return _text({key: value for key, value in content.items() if _LATER.get(key) != value})
 
 
 @lru_cache(_MANY)

@@ -125,11 +125,13 @@ def _mirrored(solve: Solve) -> Solve:
 
 
 def _suits_a_basis(operator: OperatorStep) -> bool:
-    """Displacement elements depend on one parameter; of a probe that slices, energy tells the work, not the forces."""
+    """Displacement elements depend on one parameter; and the bound is on the work of one movement, not on forces that
+    several take.
+    """
     first = operator.solves[0]
     ratios = {solve.case.material.poisson for solve in operator.solves}
     plain = first.goal is None and not first.axisymmetric and first.case.element == "displacement"
-    return plain and len(ratios) >= _FEWEST_RATIOS and not getattr(first.case.probe, "slice", 0.0)
+    return plain and len(ratios) >= _FEWEST_RATIOS and first.case.movements == 1
 
 
 def _asks_for_accuracy_or_truncation(plan: Plan) -> bool:

@@ -26,6 +26,8 @@ def model_planes(case: Case) -> tuple[str, ...]:
 def is_round(case: Case) -> bool:
     """Tell whether body, support and probe are the same all round one axis, and the movement along it."""
     body, probe, frame = case.body, case.probe, case.frame
+    if probe.motion == "all":
+        return False
     upright = frame.point[:2] == _ON_AXIS and frame.axis[:2] == _ON_AXIS and case.travel[:2] == _ON_AXIS
     return upright and probe.is_round and body.half_plane() is not None and body.support.is_round()
 
@@ -45,5 +47,7 @@ def _geometry(body: Body, probe: Probe) -> tuple[str, ...]:
 
 @lru_cache(_MANY)
 def _movement(body: Body, probe: Probe) -> tuple[str, ...]:
+    if probe.motion == "all":
+        return ()
     travel = dict(zip(PLANES, probe.travel(probe.frame_on(body)), strict=False))
     return tuple(plane for plane in _geometry(body, probe) if travel[plane] == 0)

@@ -25,6 +25,9 @@ _FLOATS = (
 )  # fmt: skip
 _COUNTS = ("dofs", "cells", "iterations")
 _EXACT = ("force_exact", "force_exact_error")
+# Translations, and rotations about the axes of the point of contact.
+_MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
+_NO_STIFFNESS = ((nan,) * 6,) * 6
 _MISSING = -1  # of counts, which have no NaN
 
 
@@ -51,6 +54,14 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
         variables[name] = (dims, array(values, float), attributes(name))
     vectors = np.array([r.force_vector if r else (nan,) * 3 for r in flat]).reshape(*study.shape, 3)
     variables["force_vector"] = ((*dims, "component"), vectors, attributes("force_vector"))
+    bars = np.array([r.force_vector_error if r else (nan,) * 3 for r in flat]).reshape(*study.shape, 3)
+    variables["force_vector_error"] = ((*dims, "component"), bars, attributes("force_vector_error"))
+    has_stiffness = any(case.probe.motion == "all" for case in study.cases())
+    if has_stiffness:
+        for name in ("stiffness", "stiffness_error"):
+            matrices = np.array([getattr(r, name) if r and getattr(r, name) else _NO_STIFFNESS for r in flat])
+            dimensions = (*dims, "motion", "conjugate")
+            variables[name] = (dimensions, matrices.reshape(*study.shape, 6, 6), attributes(name))
     texts = {
         "status": [r.status if r else "pending" for r in flat],
         "message": [r.message if r else "" for r in flat],
@@ -60,6 +71,8 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     for name, words in texts.items():
         variables[name] = (dims, array(words, object), attributes(name))
     coordinates = {axis.name: _coordinate(axis) for axis in study.axes} | {"component": ["x", "y", "z"]}
+    if has_stiffness:
+        coordinates |= {"motion": list(_MOTIONS), "conjugate": list(_MOTIONS)}
     dataset = xr.Dataset(variables, coordinates, _attributes(plan, flat, run or {}))
     return _add_ratios(dataset)
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pipeline.plan.cost import features
 from pipeline.plan.steps import Solve
 from pipeline.run.record import Record
+from pipeline.solve.loads import FloatArray
 from pipeline.solve.solution import Solution
 
 TIMES = ("time_mesh", "time_assemble", "time_setup", "time_solve")
@@ -33,6 +34,9 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         force=force,
         force_error=bar / abs(force),
         force_vector=solution.reaction,
+        force_vector_error=_vector_bars(solution),
+        stiffness=_rows(solution.stiffness) if case.probe.motion == "all" else (),
+        stiffness_error=_rows(solution.bars) if case.probe.motion == "all" else (),
         energy=solution.energy,
         max_strain=solution.max_strain,
         balance=solution.balance,
@@ -48,6 +52,16 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         planned_cells=planned_cells,
         poisson=poisson,
     )
+
+
+def _vector_bars(solution: Solution) -> tuple[float, float, float]:
+    """Return the bars (N) on the components of the force; what symmetry makes zero is known to be."""
+    x, y, z = (0.0 if f == 0 else bar for f, bar in zip(solution.reaction, solution.reaction_bars, strict=True))
+    return x, y, z
+
+
+def _rows(matrix: FloatArray | None) -> tuple[tuple[float, ...], ...]:
+    return () if matrix is None else tuple(tuple(map(float, row)) for row in matrix)
 
 
 def add_times(record: Record, earlier: list[Record]) -> Record:

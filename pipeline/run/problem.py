@@ -36,6 +36,8 @@ def conditions_of(case: Case) -> Conditions:
 
 def loads_of(case: Case) -> Loads:
     """Return how the probe of ``case`` moves."""
+    if case.probe.motion == "all":
+        return Loads.all(case.travel, case.frame.point)
     # Across a plane of symmetry a probe slides without force along its axis, and presses without force along itself.
     return Loads.along(case.travel, apart=mirror_planes(case) != model_planes(case))
 

@@ -14,8 +14,10 @@ class Record:
 
     ``young`` (Pa) and ``depth`` (m) are the :class:`Scale` of the case it was computed for. ``force_vector`` is the
     force of the tissue on the probe; ``force`` its part against the probe's advance, and ``force_error`` the relative
-    95 % error bar on that, on which ``time_error`` seconds were spent. ``kind``, ``planned_cells`` and ``poisson`` are
-    what its cost was estimated from (:mod:`pipeline.plan.cost`), ``group`` the ranks that computed it.
+    95 % error bar on that, on which ``time_error`` seconds were spent. ``force_vector_error`` (N) are the bars on the
+    vector's components, where they are known; ``stiffness`` is that of all six rigid motions, if it was asked for, and
+    ``stiffness_error`` has the bars on its entries. ``kind``, ``planned_cells`` and ``poisson`` are what its cost was
+    estimated from (:mod:`pipeline.plan.cost`), ``group`` the ranks that computed it.
     """
 
     key: str
@@ -27,6 +29,9 @@ class Record:
     force: float = nan
     force_error: float = nan
     force_vector: tuple[float, float, float] = (nan, nan, nan)
+    force_vector_error: tuple[float, float, float] = (nan, nan, nan)
+    stiffness: tuple[tuple[float, ...], ...] = ()
+    stiffness_error: tuple[tuple[float, ...], ...] = ()
     energy: float = nan
     max_strain: float = nan
     balance: float = nan
@@ -75,10 +80,18 @@ class Record:
         if (young, depth) == (self.young, self.depth) or not self.is_ok:
             return self
         stiffer, deeper = young / self.young, depth / self.depth
-        x, y, z = (stiffer * deeper * component for component in self.force_vector)
+        (x, y, z), (bx, by, bz) = (
+            (stiffer * deeper * component for component in vector)
+            for vector in (self.force_vector, self.force_vector_error)
+        )
+        stiffness, bars = (
+            tuple(tuple(stiffer * entry for entry in row) for row in rows)
+            for rows in (self.stiffness, self.stiffness_error)
+        )
         return replace(
             self, origin="scaled", young=young, depth=depth, force=stiffer * deeper * self.force,
-            force_vector=(x, y, z), energy=stiffer * deeper**2 * self.energy, max_strain=deeper * self.max_strain,
+            force_vector=(x, y, z), force_vector_error=(bx, by, bz), stiffness=stiffness, stiffness_error=bars,
+            energy=stiffer * deeper**2 * self.energy, max_strain=deeper * self.max_strain,
         )  # fmt: skip
 
     def to_json(self) -> str:
@@ -89,5 +102,8 @@ class Record:
     def from_json(text: str) -> "Record":
         """Read what :meth:`to_json` wrote."""
         content = json.loads(text)
-        content["force_vector"] = tuple(content["force_vector"])
+        for name in ("force_vector", "force_vector_error"):
+            content[name] = tuple(content.get(name, (nan, nan, nan)))
+        for name in ("stiffness", "stiffness_error"):
+            content[name] = tuple(tuple(row) for row in content.get(name, ()))
         return Record(**content)

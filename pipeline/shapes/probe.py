@@ -38,6 +38,14 @@ class Probe(Section, ABC):
     contact: Annotated[
         Contact, Words("Tissue sticks to the footprint (bonded), or slides along it (frictionless).", '"bonded"')
     ] = "bonded"
+    motion: Annotated[
+        Literal["press", "all"],
+        Words(
+            "Which movements are solved for: those of the study (`press`), or all six rigid motions (`all`), for the "
+            "6 × 6 stiffness of the bonded tool: forces and torques about the point of contact.",
+            '"all"',
+        ),
+    ] = "press"
 
     # Keys that F is proportional to, if all of them change together.
     PROPORTIONAL_TO: ClassVar[tuple[str, ...]]

@@ -114,7 +114,8 @@ def _code(comm: MPI.Comm, expression: Any, name: str) -> _Code:
 def _form_of_code(expression: Any, mesh: Any, tags: Any, code: _Code, _: dict[int, int]) -> Any:
     """Make the C++ form as ``fem.form`` does after it has compiled."""
     compiled, module, _ = code
-    positions = getattr(compiled, "original_coefficient_positions", None) or compiled.original_coefficient_position
+    name = "original_coefficient_position"
+    positions = getattr(compiled, name if _IS_OLD else name + "s")
     functions = expression.coefficients()
     coefficients = [functions[positions[i]]._cpp_object for i in range(compiled.num_coefficients)]
     address, spaces, constants = _address(module, compiled), _spaces(expression), _constants(expression)

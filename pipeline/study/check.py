@@ -33,6 +33,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     materials, meshes = cast(Sequence[Material], sections["material"]), cast(Sequence[Mesh], sections["mesh"])
     for probe in probes:
         _check_depth(probe, problems)
+        _check_motion(probe, problems)
         probe.check(problems)
     for mesh in meshes:
         _check_mesh(mesh, problems)
@@ -62,6 +63,14 @@ def _check_depth(probe: Probe, problems: Problems) -> None:
             f"is more than {_LINEAR:.0%} of the probe's half width {in_mm(probe.half_width)}: linear elasticity is "
             "then an extrapolation (F stays proportional to depth)",
         )
+
+
+def _check_motion(probe: Probe, problems: Problems) -> None:
+    if probe.motion == "all" and probe.contact != "bonded":
+        problems.error(
+            "probe.motion", probe.motion,
+            f'a {probe.contact} probe holds the tissue in one direction only: use contact = "bonded"',
+        )  # fmt: skip
 
 
 def _check_mesh(mesh: Mesh, problems: Problems) -> None:

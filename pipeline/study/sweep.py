@@ -90,6 +90,12 @@ class Case:
         return self.probe.travel(self.frame)
 
     @property
+    def movements(self) -> int:
+        """How many rigid motions of the probe are solved for: the press, the slide if there is one, or all six."""
+        slides = self.travel != tuple(self.probe.depth * a for a in self.frame.axis)
+        return 6 if self.probe.motion == "all" else 1 + slides
+
+    @property
     def proportional_to(self) -> tuple[str, ...]:
         """The keys that F is proportional to, those of one section changing together."""
         return *self.material.PROPORTIONAL_TO, *self.probe.PROPORTIONAL_TO

@@ -13,12 +13,13 @@ import pytest
 from mpi4py import MPI
 
 from pipeline.plan.plan import make_plan
-from pipeline.run import body, meshing
+from pipeline.run import meshing, problem
 from pipeline.run.basis import ReducedBasis
 from pipeline.run.execute import execute
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.progress import Silent
 from pipeline.solve.linear import SolveError
+from pipeline.solve.solution import BALANCE_LIMIT
 from tests.cases import BLADE, solve, study
 
 WORLD = MPI.COMM_WORLD
@@ -70,7 +71,7 @@ def test_forces_balance(degree):
     mesh = {"degree": degree, "rim": "0.2 mm" if degree == 1 else "1 mm"}
     (record,) = solve(WORLD, probe=BLADE | {"slice": "0.1 mm"}, mesh=mesh).values()
     assert record.status == "ok"
-    assert record.balance < 2e-7
+    assert record.balance < BALANCE_LIMIT
     assert record.force > 0
     work = record.force * 0.1e-3 - record.force_vector[0] * 0.1e-3
     assert work == pytest.approx(2 * record.energy, rel=1e-7)
@@ -97,12 +98,12 @@ def test_solver_that_fails_is_a_failed_case_and_the_others_are_as_without_it(mon
     ratios = {"material": {"poisson": [0.2, 0.3, 0.4]}, "solve": {"method": "iterative", "exact": False}}
     whole = solve(WORLD, **ratios)
 
-    def solve_body(case, *arguments, **options):
+    def solve_problem(case, *arguments, **options):
         if case.material.poisson == 0.3:
             raise SolveError("the linear solver did not converge: diverged_dtol after 7 iterations")
-        return body.solve_body(case, *arguments, **options)
+        return problem.solve_problem(case, *arguments, **options)
 
-    monkeypatch.setattr("pipeline.run.runner.solve_body", solve_body)
+    monkeypatch.setattr("pipeline.run.runner.solve_problem", solve_problem)
     records = solve(WORLD, **ratios)
     assert [records[i,].status for i in range(3)] == ["ok", "failed", "ok"]
     assert "did not converge: diverged_dtol" in records[1,].message

@@ -95,7 +95,7 @@ def test_nothing_is_solved_where_the_mesh_alone_is_asked_for(monkeypatch):
     def refuse(*_, **__):
         raise AssertionError("solved")
 
-    monkeypatch.setattr("pipeline.view.compute.solve_body", refuse)
+    monkeypatch.setattr("pipeline.view.compute.solve_problem", refuse)
     found = fields(mesh_only=True)
     assert found.displacement is None
     assert found.strain is None

@@ -1,0 +1,192 @@
+"""A probe that moves in several ways: its stiffness obeys mechanics, and forces superpose."""
+
+from functools import cache
+from math import log
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from pipeline.solve.conditions import Conditions
+from pipeline.solve.displacement import DisplacementProblem
+from pipeline.solve.loads import Loads, Motion
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.mixed import MixedProblem
+from pipeline.solve.spaces import Spaces
+from tests.cases import BLADE, solve
+from tests.solve.test_mixed import law, make_mesh
+
+TRAVEL = (0.1e-3, 0.05e-3, -0.2e-3)
+OFF = {"probe": {"at": ["4 mm", "2 mm"]}}
+KINDS = pytest.mark.parametrize(("kind", "poisson"), [(DisplacementProblem, 0.3), (MixedProblem, 0.49)])
+
+
+def run(kind, loads, poisson=0.3, comm=MPI.COMM_SELF, mesh=None, **options):
+    with Spaces(mesh or make_mesh(comm, (), **OFF)) as spaces, kind(spaces, 2, Conditions()) as problem:
+        return problem.solve(law(poisson), loads, **options)
+
+
+def all_six(centre=(4e-3, 2e-3, 0.0), travel=TRAVEL):
+    return Loads.all(travel, centre)
+
+
+@pytest.mark.mpi
+@KINDS
+@pytest.mark.parametrize("method", ["direct", "iterative"])
+def test_movements_superpose(kind, poisson, method):
+    """Press and slide, each solved for, give the force and the energy of both at once."""
+    norm = float(np.linalg.norm(TRAVEL))
+    together = Loads((Motion(tuple(t / norm for t in TRAVEL)),), (norm,))
+    options = {"method": method, "tolerance": 1e-10, "comm": MPI.COMM_WORLD}
+    whole, parts = (run(kind, loads, poisson, **options) for loads in (together, Loads.along(TRAVEL)))
+    assert parts.energy == pytest.approx(whole.energy, rel=1e-9)
+    assert parts.reaction == pytest.approx(whole.reaction, rel=1e-8, abs=1e-8 * whole.reaction[2])
+    assert parts.max_strain == pytest.approx(whole.max_strain, rel=1e-7)
+
+
+@KINDS
+def test_stiffness_of_all_motions(kind, poisson):
+    """Symmetric and positive; forces are its rows; another point of reference is another description of the same."""
+    here = run(kind, all_six(), poisson, tolerance=1e-9)
+    stiffness = here.stiffness
+    assert stiffness.shape == (6, 6)
+    assert np.array_equal(stiffness, stiffness.T)
+    assert np.linalg.eigvalsh(stiffness).min() > 0
+    assert here.reaction == pytest.approx(-stiffness[:3] @ here.response.amounts, rel=1e-12)
+    for j, force in enumerate(here.response.forces):  # Newton's: what the residuals sum up to, linear in their error
+        assert force == pytest.approx(-stiffness[:3, j], abs=1e-6 * np.abs(stiffness[:3, j]).max())
+    arm = np.array([1e-3, -2e-3, 3e-3])
+    there = run(kind, all_six(tuple(np.array([4e-3, 2e-3, 0.0]) + arm)), poisson, tolerance=1e-9).stiffness
+    # Turning about a point at c + arm is turning about c and moving by arm × ω.
+    shift = np.eye(6)
+    shift[:3, 3:] = np.cross(np.eye(3), -arm).T
+    assert there == pytest.approx(shift.T @ stiffness @ shift, rel=1e-7, abs=1e-7 * np.abs(there).max())
+
+
+def test_rotations_are_those_of_the_residuals():
+    """Reciprocity: the torque of the pressed probe's residual is what turning it takes along the axis."""
+    found = run(DisplacementProblem, all_six(), tolerance=1e-10)
+    with Spaces(make_mesh(mirrors=(), **OFF)) as spaces, DisplacementProblem(spaces, 2, Conditions()) as problem:
+        turned = problem.solve(law(0.3), Loads((all_six().motions[3],), (1.0,)), tolerance=1e-10)
+        assert turned.response.forces[0] == pytest.approx(-found.stiffness[:3, 3], rel=1e-6)
+        assert 2 * turned.energy == pytest.approx(found.stiffness[3, 3], rel=1e-9)
+
+
+@cache
+def on_half_space(poisson):
+    """The stiffness of a disc of 1 mm bonded to a body of 60 radii, extrapolated, and its bars, for μ = 1 and a = 1."""
+    changes = {
+        "body": {"shape": "cylinder", "radius": "60 mm", "height": "60 mm"},
+        "probe": {"radius": "1 mm", "depth": "0.05 mm"},
+        "mesh": {"fine": "20 mm", "coarse": "20 mm", "rim": "0.2 mm", "growth": 0.5},
+    }
+    spaces = Spaces(make_mesh(mirrors=(), **changes))
+    material = MaterialLaw.of_moduli(2 * (1 + poisson), poisson)
+    with spaces, DisplacementProblem(spaces, 2, Conditions()) as problem:
+        loads = Loads.all((0.0, 0.0, -1.0), (0.0, 0.0, 0.0))
+        solution = problem.solve(material, loads, estimate=True).extrapolated(2, "displacement")
+    unit = 1e-3 * np.outer([1, 1, 1, 1e-3, 1e-3, 1e-3], [1, 1, 1, 1e-3, 1e-3, 1e-3])
+    return solution.stiffness / unit, solution.bars / unit
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.3])
+def test_bonded_disc_on_half_space(poisson):
+    """In closed form: torsion 16/3, whatever the material (E. Reissner and H. F. Sagoci 1944); the press
+    4 ln(3 - 4ν)/(1 - 2ν) (D. A. Spence 1968). What is far adds the stiffness of a body of 60 a to the latter: 1 %.
+    """
+    stiffness, bars = on_half_space(poisson)
+    assert stiffness[5, 5] == pytest.approx(16 / 3, abs=bars[5, 5] + 1e-4)
+    assert bars[5, 5] < 0.01 * stiffness[5, 5]
+    press = 4 * log(3 - 4 * poisson) / (1 - 2 * poisson)
+    assert 0 < stiffness[2, 2] / press - 1 < 0.02
+    # Round: both slides alike, both tilts alike, and no press or torsion in either.
+    assert stiffness[0, 0] == pytest.approx(stiffness[1, 1], abs=2 * bars[0, 0])
+    assert stiffness[3, 3] == pytest.approx(stiffness[4, 4], abs=2 * bars[3, 3])
+    assert stiffness[0, 4] == pytest.approx(-stiffness[1, 3], abs=2 * bars[0, 4])
+    apart = [(0, 1), (0, 2), (0, 3), (0, 5), (2, 3), (2, 5), (3, 4), (3, 5)]
+    assert all(abs(stiffness[i, j]) <= bars[i, j] for i, j in apart)
+
+
+def test_slide_and_tilt_of_a_bonded_disc():
+    """At ν = ½ the slide takes no pressure, and the press and the tilt no shear: the closed forms of frictionless
+    discs and of Mindlin's slide hold, 8 μ a, 16/3 μ a³ and 16/3 μ a. A body held all round is stiffer.
+    """
+    changes = {
+        "body": {"shape": "cylinder", "radius": "60 mm", "height": "60 mm", "fixed": "bottom+sides"},
+        "probe": {"radius": "1 mm", "depth": "0.05 mm"},
+        "mesh": {"fine": "20 mm", "coarse": "20 mm", "rim": "0.3 mm", "growth": 0.6},
+    }
+    spaces = Spaces(make_mesh(mirrors=(), **changes))
+    with spaces, MixedProblem(spaces, 2, Conditions()) as problem:
+        loads = Loads.all((0.0, 0.0, -1.0), (0.0, 0.0, 0.0))
+        solution = problem.solve(MaterialLaw.of_moduli(3.0, 0.5), loads, estimate=True).extrapolated(2, "mixed")
+    unit = 1e-3 * np.outer([1, 1, 1, 1e-3, 1e-3, 1e-3], [1, 1, 1, 1e-3, 1e-3, 1e-3])
+    stiffness, bars = solution.stiffness / unit, solution.bars / unit
+    assert stiffness[3, 3] == pytest.approx(16 / 3, abs=bars[3, 3] + 1e-4)
+    assert stiffness[5, 5] == pytest.approx(16 / 3, abs=bars[5, 5] + 1e-4)
+    for j, exact in ((0, 16 / 3), (1, 16 / 3), (2, 8.0)):
+        assert -bars[j, j] < stiffness[j, j] - exact < 0.03 * exact
+    assert abs(stiffness[0, 4]) <= bars[0, 4] + 0.02
+
+
+@KINDS
+def test_bars_of_movements_hold_those_of_finer_meshes(kind, poisson):
+    """The entries of the stiffness, and the forces, of a coarse mesh against those of a finer one of higher degree."""
+    coarse, fine = (make_mesh(mirrors=(), mesh={"rim": rim}, **OFF) for rim in ("1.5 mm", "0.5 mm"))
+    rough = run(kind, all_six(), poisson, mesh=coarse, estimate=True)
+    with Spaces(fine) as spaces, kind(spaces, 3, Conditions()) as problem:
+        exact = problem.solve(law(poisson), all_six(), estimate=True).extrapolated(
+            3, "mixed" if kind is MixedProblem else "displacement"
+        )
+    assert np.all(np.abs(rough.stiffness - exact.stiffness) <= rough.bars + exact.bars)
+    gaps, bars = np.subtract(rough.reaction, exact.reaction), np.add(rough.reaction_bars, exact.reaction_bars)
+    assert np.all(np.abs(gaps) <= bars)
+
+
+def test_one_movement_is_a_matrix_of_one():
+    """What one degree more takes away, and the bars, are the same whether a movement is solved for alone or not."""
+    press = Loads.along((0.0, 0.0, -1.0))
+    alone, among = (run(DisplacementProblem, loads, estimate=True) for loads in (press, Loads.along((1.0, 0.0, -1.0))))
+    assert among.stiffness[0, 0] == pytest.approx(alone.stiffness[0, 0], rel=1e-9)
+    assert among.decrements[0, 0] == pytest.approx(alone.decrements[0, 0], rel=1e-6)
+    assert among.bars[0, 0] == pytest.approx(alone.bars[0, 0], rel=1e-6)
+
+
+def test_decrements_are_those_of_the_higher_degree():
+    """K_p - K_{p+1}, entry by entry, to what the few iterations leave of it."""
+    mesh = make_mesh(mirrors=(), **OFF)
+    found = run(DisplacementProblem, all_six(), mesh=mesh, estimate=True)
+    with Spaces(mesh) as spaces, DisplacementProblem(spaces, 3, Conditions()) as problem:
+        wanted = found.stiffness - problem.solve(law(0.3), all_six()).stiffness
+    root = np.sqrt(np.diag(wanted))
+    assert np.all(np.abs(found.decrements - wanted) <= 0.05 * np.outer(root, root))
+    assert np.all(np.abs(wanted) <= 1.0000001 * np.outer(root, root))
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.49])
+def test_study_asks_for_the_stiffness(poisson):
+    """By a study: the force is that of the press alone, and scales; symmetry of the scene shows in the stiffness."""
+    material = {"poisson": poisson}
+    alone, found = (next(iter(solve(material=material, probe={"motion": m}).values())) for m in ("press", "all"))
+    assert alone.stiffness == ()
+    assert found.status == "ok", found.message
+    assert found.force == pytest.approx(alone.force, rel=1e-8)
+    stiffness, bars = np.array(found.stiffness), np.array(found.stiffness_error)
+    assert found.force == pytest.approx(stiffness[2, 2] * 0.2e-3, rel=1e-12)
+    assert found.force_error == pytest.approx(bars[2, 2] / stiffness[2, 2], rel=1e-12)
+    assert found.force_error == pytest.approx(alone.force_error, rel=0.05)
+    double = found.scaled(20e3, 0.4e-3)
+    assert np.array(double.stiffness) == pytest.approx(2 * stiffness)
+    assert double.force == pytest.approx(4 * found.force)
+    assert type(found).from_json(found.to_json()).stiffness == found.stiffness
+
+
+def test_blade_that_slices_has_bars_on_each_component():
+    records = solve(probe=BLADE | {"slice": "0.1 mm", "at": ["3 mm", "0 mm"]}, mesh={"degree": [2, 3], "rim": "0.5 mm"})
+    coarse, fine = records[0,], records[1,]
+    for i in (0, 2):
+        assert 0 < coarse.force_vector_error[i] < 0.2 * abs(coarse.force_vector[i])
+        gap = abs(coarse.force_vector[i] - fine.force_vector[i])
+        assert gap <= coarse.force_vector_error[i] + fine.force_vector_error[i]
+    assert coarse.force_vector_error[1] == coarse.force_vector[1] == 0.0
+    assert coarse.force_error == pytest.approx(coarse.force_vector_error[2] / coarse.force)
