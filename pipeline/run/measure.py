@@ -8,7 +8,7 @@ from pipeline.plan.symmetry import mirror_planes, model_planes
 from pipeline.run.record import Record
 from pipeline.solve.axisymmetric import AxisymmetricSolution
 from pipeline.solve.elasticity import Solution
-from pipeline.solve.error import extrapolate
+from pipeline.solve.error import extrapolate, is_graded
 from pipeline.study.sweep import Case
 
 # The relative errors of two movements on one mesh differ by less than this factor.
@@ -111,7 +111,11 @@ def _extrapolated(record: Record, case: Case, solution: Solution) -> Record:
     It is work that is extrapolated. Of a probe that slices, too, half of the correction is doubtful: the forces need
     not share it evenly.
     """
-    factor, bar = extrapolate(solution.decrement, solution.bar, case.mesh.degree, case.element)
+    mesh, half_width = case.mesh, case.probe.half_width
+    graded = is_graded(mesh.rim_size(half_width) / half_width, mesh.growth)
+    factor, bar = extrapolate(
+        solution.decrement, solution.bar, mesh.degree, case.element, plain=solution.plain, graded=graded
+    )
     if getattr(case.probe, "slice", 0.0):
         bar = (bar + abs(1 - factor) / 2) * _share_of_work(case, solution, record.force)
     x, y, z = record.force_vector

@@ -20,6 +20,7 @@ from pipeline.solve.enrich import energy_decrement
 from pipeline.solve.error import error_bar
 from pipeline.solve.forms import mean_strain_form
 from pipeline.solve.linear import Level, LinearSolver, SolveError, is_direct
+from pipeline.solve.rim import plain_share
 from pipeline.solve.solution import (
     BALANCE_LIMIT,
     TOLERANCE,
@@ -103,10 +104,11 @@ class ElasticBody:
             solver.close()  # what the next degree takes is the most memory of all
             start = time.perf_counter()
             found, more = self._decrement(lame, levels, stack)
+            plain = plain_share(self._body)
         decrement = found / (2 * energy)
         return replace(
-            solution, decrement=decrement, bar=error_bar(decrement, fine.degree), estimate_iterations=more,
-            time_estimate=time.perf_counter() - start,
+            solution, decrement=decrement, bar=error_bar(decrement, fine.degree, plain=plain), plain=plain,
+            estimate_iterations=more, time_estimate=time.perf_counter() - start,
         )  # fmt: skip
 
     @contextmanager

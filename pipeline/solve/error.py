@@ -1,31 +1,68 @@
 """From what one degree more changes to an error bar, and to the value that the degrees tend to.
 
-With s = F_p - F_{p+1} (:mod:`pipeline.solve.enrich`), and an error that falls like p⁻², as it does at an edge where
-u ~ r^½ (I. Babuška and M. Suri, SIAM J. Numer. Anal. 24, 750, 1987), what degree p + 1 leaves is θ s with
-θ = p² / (2 p + 1). On meshes with quarter-point elements at the edge it is less, on naive ones sometimes more: the
-multiples of θ s below are measured, with the coverage that they reach, in docs/accuracy.md.
+With s = (F_p - F_{p+1}) / F_p (:mod:`pipeline.solve.enrich`), and an error that falls like p⁻², as it does at an edge
+where u ~ r^½ (I. Babuška and M. Suri, SIAM J. Numer. Anal. 24, 750, 1987), what degree p + 1 leaves is θ s with
+θ = p² / (2 p + 1). How much of θ s it is depends on the elements at the probe's edge: less with quarter points, more
+without (:mod:`pipeline.solve.rim`). The multiples below are measured, with the coverage that they reach, in
+docs/accuracy.md.
+
+Shares are of F_p, bars relative to the exact force, too: where F_p is a third too high, F_exact is within 25 % of it,
+but F_p errs by 33 %.
 """
 
-# F_p is too high by between s and s (1 + _BAR θ) in more than 95 % of all cases.
-_BAR = 1.25
-# On meshes graded to the edge F is at F_{p+1} - (centre ± spread) θ s.
+# What degree p + 1 leaves, at most, in units of θ s: with quarter points, without, and for straight elements.
+_LEFT = {"displacement": 1.0, "mixed": 1.25}
+_LEFT_PLAIN, _LEFT_STRAIGHT = 1.75, 1.5
+# What N, the energy norm squared of the first correction, leaves to a mixed element whose s may vanish by chance.
+_UNSEEN, _UNSEEN_PLAIN = 0.3, 0.8
+# From this share of edges without quarter points on, a mesh is as good as without any.
+_PLAIN = 0.2
+# A larger share of F_p than this makes no larger bar: the force is not known.
+_MOST = 0.9
+# F is at F_{p+1} - (centre ± spread) θ s on meshes graded to the edge, on others, and without quarter points.
 _LIMITS = {"displacement": (0.4, 0.25), "mixed": (0.5, 0.35)}
+_LIMITS_COARSE, _LIMITS_PLAIN = (0.4, 1.0), (0.85, 0.85)
+# Graded to the edge: the coarsest that was measured, relative to the probe's half width, and the growth from there.
+_GRADED = (0.4, 0.7)
+
+
+def is_graded(rim: float, growth: float) -> bool:
+    """Tell whether a mesh is graded to the probe's edge; ``rim`` in units of the probe's half width."""
+    return rim <= _GRADED[0] and growth <= _GRADED[1]
+
+
+def error_bar(
+    decrement: float, degree: int, element: str = "displacement", *, plain: float = 0.0, unseen: float = 0.0
+) -> float:
+    """Return the 95 % bar on F_p, relative to F_p and to F_exact alike.
+
+    ``decrement`` is s, ``plain`` the share of edges at the rim without quarter points, ``unseen`` is N / (F_p d) of a
+    mixed element.
+    """
+    seen = abs(decrement) * (1 + _left(degree, element, plain) * _theta(degree))
+    share = max(seen, _between(_UNSEEN, _UNSEEN_PLAIN, plain) * unseen)
+    return share / (1 - min(share, _MOST))
+
+
+def extrapolate(
+    decrement: float, bar: float, degree: int, element: str, *, plain: float = 0.0, graded: bool = True
+) -> tuple[float, float]:
+    """Return what to multiply F_p with, given s and ``bar``, that of :func:`error_bar`, and the bar on the product."""
+    theta = _theta(degree)
+    centre, spread = _LIMITS[element] if graded else _LIMITS_COARSE
+    if plain >= _PLAIN:
+        centre, spread = _LIMITS_PLAIN
+    factor = 1 - decrement * (1 + centre * theta)
+    return factor, bar / (1 + bar) * spread * theta / (1 + _left(degree, element, plain) * theta) / factor
 
 
 def _theta(degree: int) -> float:
     return degree**2 / (2 * degree + 1)
 
 
-def error_bar(decrement: float, degree: int) -> float:
-    """Return the relative 95 % bar on F_p, given s / F_p."""
-    return abs(decrement) * (1 + _BAR * _theta(degree))
+def _left(degree: int, element: str, plain: float) -> float:
+    return _LEFT_STRAIGHT if degree == 1 else _between(_LEFT[element], _LEFT_PLAIN, plain)
 
 
-def extrapolate(decrement: float, bar: float, degree: int, element: str) -> tuple[float, float]:
-    """Return what to multiply F_p with, given s / F_p on a mesh graded to the edge, and the bar on the product.
-
-    The new bar is the same share of ``bar``, that on F_p, whatever that was made of.
-    """
-    (centre, spread), theta = _LIMITS[element], _theta(degree)
-    factor = 1 - decrement * (1 + centre * theta)
-    return factor, bar * spread * theta / (1 + _BAR * theta) / factor
+def _between(best: float, worst: float, plain: float) -> float:
+    return best + (worst - best) * min(1.0, plain / _PLAIN)

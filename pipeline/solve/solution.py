@@ -46,7 +46,7 @@ class Solution:
     ``reaction`` (N, xyz) is the force of the tissue on the probe, ``energy`` (J) the strain energy,
     ``balance`` the larger of the relative errors of F·d = 2U and of F_probe + F_support = 0. ``decrement`` is the
     share of the energy that one degree more takes away, s / F_p, and ``bar`` the relative 95 % error bar on F·d that
-    comes of it (see :mod:`pipeline.solve.error`).
+    comes of it, with ``plain``, the share of edges at the rim without quarter points (see :mod:`pipeline.solve.error`).
     """
 
     reaction: tuple[float, float, float]
@@ -60,6 +60,7 @@ class Solution:
     time_solve: float
     decrement: float = nan
     bar: float = nan
+    plain: float = nan
     estimate_iterations: int = 0
     time_estimate: float = 0.0
 
