@@ -30,8 +30,8 @@ from pipeline.solve.linear import SolveError, is_direct
 from pipeline.solve.spaces import Spaces
 from pipeline.study.sweep import Case
 
-# An error bar above this says that the force is not known.
-_WORST_BAR = 0.5
+# An error bar above this says that the force is not known: it may be more than twice the true one.
+_WORST_BAR = 1.0
 Keep = Callable[[Record], None]
 
 
