@@ -20,6 +20,10 @@ def verify(
     coverage: Annotated[bool, typer.Option("--coverage", help="Random scenes: do the error bars hold?")] = False,
     count: Annotated[int, typer.Option(metavar="N", help="Number of random scenes.", min=1)] = 160,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the random scenes.")] = 2026,
+    family: Annotated[
+        str,
+        typer.Option(metavar="NAME", help="Random scenes: design (any body and tool) or proportions (cylinders)."),
+    ] = "design",
     quick: Quick = False,
     as_json: Json = False,
 ) -> None:
@@ -30,27 +34,32 @@ def verify(
     Example: epsmesh verify
 
     Example: epsmesh verify --coverage
+
+    Example: epsmesh verify --coverage --family proportions --count 400 --seed 7
     """
     from pipeline.workflow import world
 
     comm = world()
     speaks = comm.rank == 0
     if coverage:
-        from pipeline.verify.coverage import Coverage, trials
+        from pipeline.verify.coverage import FAMILIES, Coverage, trials
 
+        if family not in FAMILIES:
+            fail(f"there is no family of scenes {family}; there are {', '.join(FAMILIES)}")
         load_solvers()
-        found = Coverage(tuple(_told(trials(comm, count, seed), _trial, speaks and not as_json)))
+        found = Coverage(tuple(_told(trials(comm, count, seed, family), _trial, speaks and not as_json)))
         right = found.is_met
-        summary = {
-            "cases": len(found.trials), "held": found.held, "median_bar_over_error": found.ratio, "met": right,
-        }  # fmt: skip
         if speaks and as_json:
-            print_json({**summary, "trials": [asdict(trial) for trial in found.trials]})
+            groups = [
+                {
+                    "name": g.name, "cases": len(g.trials), "served": len(g.served), "held": g.held,
+                    "median_bar_over_error": g.ratio, "worst": g.worst,
+                }
+                for g in found.groups
+            ]  # fmt: skip
+            print_json({"met": right, "groups": groups, "trials": [asdict(trial) for trial in found.trials]})
         elif speaks:
-            print(
-                f"{found.held:.1%} of {len(found.trials)} error bars hold the truth (95 % asked for); median of "
-                f"bar / |error| {found.ratio:.2f} (at most 3 asked for): {'met' if right else 'NOT MET'}"
-            )
+            print(found)
     else:
         from pipeline.verify import rows
 
@@ -136,8 +145,8 @@ def _row(row: "Row") -> str:
 
 
 def _trial(trial: "Trial") -> str:
-    verdict = "ok" if trial.is_held else "OUT"
-    return f"{verdict:4} error {100 * trial.error:8.4f} %  bar {100 * trial.bar:8.4f} %  {trial.name} {trial.message}"
+    verdict = "refused" if trial.refused else "ok" if trial.is_held else "OUT"
+    return f"{verdict:7} error {100 * trial.error:8.4f} %  bar {100 * trial.bar:8.4f} %  {trial.name} {trial.message}"
 
 
 def _told(items: Iterable[Any], words: Any, speaks: bool) -> Iterable[Any]:

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pipeline.plan.cost import features
 from pipeline.plan.steps import Solve
 from pipeline.run.record import Record
+from pipeline.solve.error import is_graded
 from pipeline.solve.loads import FloatArray
 from pipeline.solve.solution import Solution
 
@@ -20,7 +21,9 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
     case = solve.case
     kind, planned_cells, poisson = features(solve)
     if solve.goal is not None and not solve.axisymmetric:
-        solution = solution.extrapolated(case.mesh.degree, case.element)
+        half_width = case.probe.half_width
+        graded = is_graded(case.mesh.rim_size(half_width) / half_width, case.mesh.growth)
+        solution = solution.extrapolated(case.mesh.degree, case.element, graded=graded)
     axis = case.frame.axis
     force = -sum(f * a for f, a in zip(solution.reaction, axis, strict=True))
     # The axis of a flat probe is z: other components of the force, whose bars may be unknown, are across it.

@@ -24,6 +24,7 @@ from pipeline.solve.linear import Level, LinearSolver, SolveError, is_direct
 from pipeline.solve.loads import FloatArray, Loads, Motion
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.reaction import Response, reaction, sums
+from pipeline.solve.rim import plain_share
 from pipeline.solve.solution import BALANCE_LIMIT, TOLERANCE, Solution, rest
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.strain import largest_strain, principal_strains
@@ -118,10 +119,13 @@ class DisplacementProblem:
             solver.close()  # what the next degree takes is the most memory of all
             start = time.perf_counter()
             found, more = self._decrements(lame, levels, held, loads, stack)
-        relative = np.array([error_bar(d, fine.degree) for d in np.diag(found) / np.diag(response.stiffness)])
+            plain = plain_share(self._body)
+        shares = np.diag(found) / np.diag(response.stiffness)
+        relative = np.array([error_bar(share, fine.degree, plain=plain) for share in shares])
+        bars = stiffness_bars(response.stiffness, relative, apart=loads.apart)
         return replace(
-            solution, decrements=found, bars=stiffness_bars(response.stiffness, relative, apart=loads.apart),
-            estimate_iterations=more, time_estimate=time.perf_counter() - start,
+            solution, decrements=found, plain=plain, bars=bars, estimate_iterations=more,
+            time_estimate=time.perf_counter() - start,
         )  # fmt: skip
 
     @contextmanager

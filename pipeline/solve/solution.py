@@ -7,7 +7,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.error import extrapolate_stiffness
+from pipeline.solve.error import extrapolate
 from pipeline.solve.loads import Loads, Vector
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.reaction import Response
@@ -38,7 +38,8 @@ class Solution:
 
     ``max_strain`` is the largest principal strain of a cell's mean strain; ``dofs`` and ``cells`` are those of the
     whole body, ``iterations`` the sum over the motions. ``decrements`` (n, n) is what one degree more takes away from
-    the probe's stiffness, and ``bars`` (n, n) the 95 % error bars on its entries (see :mod:`pipeline.solve.error`).
+    the probe's stiffness, and ``bars`` (n, n) the 95 % error bars on its entries, made with ``plain``, the share of
+    edges at the rim without quarter points (see :mod:`pipeline.solve.error`).
     """
 
     response: Response
@@ -52,6 +53,7 @@ class Solution:
     time_mesh: float = 0.0
     decrements: FloatArray | None = None
     bars: FloatArray | None = None
+    plain: float = nan
     estimate_iterations: int = 0
     time_estimate: float = 0.0
 
@@ -104,11 +106,13 @@ class Solution:
         x, y, z = map(float, np.where(spanned > 1 - 1e-9, bars, nan))
         return x, y, z
 
-    def extrapolated(self, degree: int, element: str) -> "Solution":
-        """Return what the sequence of degrees tends to, on a mesh graded to the edge; itself if it has no bars."""
+    def extrapolated(self, degree: int, element: str, *, graded: bool = True) -> "Solution":
+        """Return what the sequence of degrees tends to, ``graded`` to the edge or not; itself if it has no bars."""
         if self.decrements is None or self.bars is None:
             return self
-        stiffness, bars = extrapolate_stiffness(self.stiffness, self.decrements, self.bars, degree, element)
+        stiffness, bars = extrapolate(
+            self.stiffness, self.decrements, self.bars, degree, element, plain=self.plain, graded=graded
+        )
         return replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
 
 

@@ -1,8 +1,13 @@
-"""Do the error bars hold the truth: random scenes and meshes, good and naive, against converged forces."""
+"""Do the error bars hold the truth: random scenes and meshes, good and naive, against converged forces.
 
-from collections.abc import Iterator
+There are two families. "design" are the scenes that the bars are made for: cylinders, layers, boxes, discs off the
+axis and blades. "proportions" are cylinders under a disc on the axis, of any proportions, whose truth costs nothing:
+hundreds of them tell of each kind of element and mesh for itself.
+"""
+
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, nan
 from statistics import median
 from typing import Any
 
@@ -16,6 +21,8 @@ from pipeline.study.load import parse
 from pipeline.study.problems import StudyError
 
 SEED, COUNT = 2026, 160
+# What is asked of the bars of every group of trials that is large enough to tell.
+HELD, IDLE, ENOUGH = 0.95, 2.0, 40
 # The truth is to be known ten times better than the best of the cases' errors.
 _TRUTH = "0.03 %"
 # Kinds of scenes, with their share of the cases.
@@ -23,11 +30,17 @@ _KINDS = {"cylinder": 0.32, "layer": 0.15, "box": 0.18, "off centre": 0.12, "bla
 _POISSON = (0.0, 0.2, 0.3, 0.4, 0.45, 0.47, 0.49, 0.495, 0.499, 0.4999, 0.5)
 # Displacement elements of degree 1 are for less than this.
 _MOST_STRAIGHT = 0.45
+# A mesh is naive if its elements at the probe's edge are larger than this, in units of the probe's half width.
+_NAIVE = 0.35
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One random case: its force and error bar, and the truth with its own; or the message of what failed."""
+    """One random case: its force and error bar, and the truth with its own; or the message of what failed.
+
+    ``kind`` is the degree and the element, ``mesh`` "graded" or "naive"; a case is ``refused`` if its bar says that the
+    force is not known.
+    """
 
     name: str
     force: float
@@ -35,11 +48,14 @@ class Trial:
     truth: float
     truth_bar: float
     message: str = ""
+    kind: tuple[int, str] = (0, "")
+    mesh: str = ""
+    refused: bool = False
 
     @property
     def error(self) -> float:
-        """Relative to the force, as the bar is."""
-        return abs(self.truth / self.force - 1)
+        """The larger of those relative to the force and to the truth."""
+        return max(abs(self.truth / self.force - 1), abs(self.force / self.truth - 1))
 
     @property
     def is_held(self) -> bool:
@@ -53,42 +69,115 @@ class Trial:
 
 
 @dataclass(frozen=True)
+class Group:
+    """Trials of one kind, of which those that were refused say nothing of the bars."""
+
+    name: str
+    trials: tuple[Trial, ...]
+
+    @property
+    def served(self) -> tuple[Trial, ...]:
+        """Those with a force."""
+        return tuple(trial for trial in self.trials if not trial.refused)
+
+    @property
+    def held(self) -> int:
+        """How many bars hold the truth."""
+        return sum(trial.is_held for trial in self.served)
+
+    @property
+    def share(self) -> float:
+        """Share of the bars that hold the truth."""
+        return self.held / len(self.served) if self.served else nan
+
+    @property
+    def ratio(self) -> float:
+        """Median of bar over error."""
+        ratios = [trial.ratio for trial in self.served if not trial.message]
+        return median(ratios) if ratios else nan
+
+    @property
+    def worst(self) -> float:
+        """The largest error, in bars."""
+        return max((1 / trial.ratio for trial in self.served if not trial.message), default=nan)
+
+    @property
+    def is_met(self) -> bool:
+        """Whether the bars are 95 % bars, and not idle ones."""
+        return self.share >= HELD and self.ratio <= IDLE
+
+
+@dataclass(frozen=True)
 class Coverage:
     """What all trials say of the bars."""
 
     trials: tuple[Trial, ...]
 
     @property
-    def held(self) -> float:
-        """Share of the bars that hold the truth."""
-        return sum(trial.is_held for trial in self.trials) / len(self.trials)
+    def groups(self) -> tuple[Group, ...]:
+        """The trials by degree and element, by mesh, by both, and all of them."""
+        kinds = sorted({trial.kind for trial in self.trials}, key=lambda kind: (kind[1], kind[0]))
+        found = []
+        for degree, element in kinds:
+            of_kind = tuple(trial for trial in self.trials if trial.kind == (degree, element))
+            name = f"degree {degree} {element}"
+            found.append(Group(name, of_kind))
+            found += [Group(f"{name}, {mesh}", tuple(t for t in of_kind if t.mesh == mesh)) for mesh in self.meshes]
+        found += [Group(f"{mesh} meshes", tuple(t for t in self.trials if t.mesh == mesh)) for mesh in self.meshes]
+        return (*(group for group in found if group.trials), Group("all", self.trials))
 
     @property
-    def ratio(self) -> float:
-        """Median of bar over error."""
-        return median(trial.ratio for trial in self.trials if not trial.message)
+    def meshes(self) -> tuple[str, ...]:
+        """The kinds of meshes."""
+        return tuple(sorted({trial.mesh for trial in self.trials}))
 
     @property
     def is_met(self) -> bool:
-        """Whether the bars are 95 % bars, and not idle ones."""
-        return self.held >= 0.95 and self.ratio <= 3.0
+        """Whether all bars together, and those of every group that is large enough, are what they should be."""
+        return all(group.is_met for group in self.groups if len(group.served) >= ENOUGH or group.name == "all")
+
+    def __str__(self) -> str:
+        """The table, a line for each group."""
+        lines = [_LINE.format("", "held", "", "bar / |error|", "worst", "refused")]
+        lines += [
+            _LINE.format(
+                group.name, f"{group.held} of {len(group.served)}", f"{group.share:.1%}", f"{group.ratio:.2f}",
+                f"{group.worst:.2f}", len(group.trials) - len(group.served),
+            )
+            for group in self.groups
+        ]  # fmt: skip
+        asked = f"asked for, of groups of {ENOUGH} and more: {HELD:.0%} held, median of bar / |error| at most {IDLE:g}"
+        return "\n".join([*lines, f"{asked}: {'met' if self.is_met else 'NOT MET'}"])
 
 
-def trials(comm: MPI.Comm, count: int = COUNT, seed: int = SEED) -> Iterator[Trial]:
-    """Yield ``count`` random trials; the same seed gives the same ones; collective."""
+_LINE = "{:32} {:>12} {:>7} {:>14} {:>6} {:>8}"
+
+
+def trials(comm: MPI.Comm, count: int = COUNT, seed: int = SEED, family: str = "design") -> Iterator[Trial]:
+    """Yield ``count`` random trials of a family; the same seed gives the same ones; collective."""
     random = np.random.default_rng(seed)
+    throw = FAMILIES[family]
     done = 0
     while done < count:
-        scene = _scene(random)
-        mesh = _mesh(random, scene)
+        scene, mesh = throw(random)
         truth_mesh = {"accuracy": _TRUTH} | {k: mesh[k] for k in ("epsilon", "outside") if mesh["outside"] != "coarse"}
         try:
             case, truth = _solve(comm, scene, mesh, ("axisymmetric",)), _solve(comm, scene, truth_mesh)
         except StudyError:  # the dice made no sense: a footprint over the edge, a ratio that locks
             continue
         done += 1
-        message = "; ".join(r.message for r in (case, truth) if not isfinite(r.force))
-        yield Trial(_name(scene, mesh), case.force, case.force_error, truth.force, truth.force_error, message)
+        yield _trial(scene, mesh, case, truth)
+
+
+def _trial(scene: dict[str, Any], mesh: dict[str, Any], case: Record, truth: Record) -> Trial:
+    message = "; ".join(r.message for r in (case, truth) if not isfinite(r.force))
+    (declared,) = parse({**scene, "mesh": mesh}).cases()
+    rim = declared.mesh.rim_size(declared.probe.half_width) / declared.probe.half_width
+    return Trial(
+        _name(scene, mesh), case.force, case.force_error, truth.force, truth.force_error, message,
+        (declared.mesh.degree, declared.element), "naive" if rim > _NAIVE else "graded",
+        refused=not case.is_ok and not message,
+    )  # fmt: skip
 
 
 def _solve(comm: MPI.Comm, scene: dict[str, Any], mesh: dict[str, Any], without: tuple[str, ...] = ()) -> Record:
@@ -97,11 +186,54 @@ def _solve(comm: MPI.Comm, scene: dict[str, Any], mesh: dict[str, Any], without:
     return record
 
 
+def _design(random: np.random.Generator) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Throw a scene that the bars are made for, and a mesh for it."""
+    scene = _scene(random)
+    return scene, _mesh(random, scene)
+
+
+def _log_uniform(random: np.random.Generator, low: float, high: float) -> float:
+    return float(np.round(np.exp(random.uniform(np.log(low), np.log(high))), 3))
+
+
+def _proportions(random: np.random.Generator) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Throw a cylinder under a disc on its axis and a mesh, fine within 2.5 a; half of them nearly incompressible."""
+    a = _log_uniform(random, 0.7, 5.0)
+    poisson = round(random.uniform(0, 0.45) if random.random() < 0.5 else random.uniform(0.45, 0.497), 3)
+    scene = {
+        "body": {
+            "shape": "cylinder", "radius": f"{a * _log_uniform(random, 3.5, 16):.4g} mm",
+            "height": f"{a * _log_uniform(random, 1, 16):.4g} mm",
+            "fixed": str(random.choice(["bottom", "bottom", "sides", "bottom+sides"])),
+        },
+        "material": {"young": "10 kPa", "poisson": poisson},
+        "probe": {
+            "shape": "disc", "radius": f"{a:.4g} mm", "depth": f"{a / 100:.4g} mm",
+            "contact": str(random.choice(["bonded", "frictionless"])),
+        },
+    }  # fmt: skip
+    degree = int(random.choice([1, 2, 3] if poisson < _MOST_STRAIGHT else [2, 3]))
+    rim = random.uniform(0.4, 1.0) if random.random() < 0.5 else random.uniform(0.06, 0.3)
+    fine = max(rim, _log_uniform(random, 0.4, 3.0))
+    mesh = {
+        "epsilon": f"{2.5 * a:.4g} mm", "outside": "coarse", "fine": f"{fine * a:.4g} mm",
+        "coarse": f"{max(fine, _log_uniform(random, 2, 8)) * a:.4g} mm", "rim": f"{rim * a:.4g} mm", "growth": 0.5,
+        "degree": degree,
+    }  # fmt: skip
+    return scene, mesh
+
+
+# Families of trials by name.
+FAMILIES: dict[str, Callable[[np.random.Generator], tuple[dict[str, Any], dict[str, Any]]]] = {
+    "design": _design, "proportions": _proportions,
+}  # fmt: skip
+
+
 def _scene(random: np.random.Generator) -> dict[str, Any]:
     """Throw a scene; lengths in units of the probe's half width, 1 mm."""
 
     def log_uniform(low: float, high: float) -> float:
-        return float(np.round(np.exp(random.uniform(np.log(low), np.log(high))), 3))
+        return _log_uniform(random, low, high)
 
     kind = random.choice(list(_KINDS), p=list(_KINDS.values()))
     contact = str(random.choice(["bonded", "frictionless"]))

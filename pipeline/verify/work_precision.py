@@ -121,7 +121,7 @@ def _point(
     runs: list[Record] = []
     for _ in range(repeats + 1):  # the first one warms up
         (record,) = compute(plan, MPI.COMM_SELF).values()
-        if not isfinite(record.force):  # an error bar above 50 % is no obstacle here
+        if not isfinite(record.force):  # an error bar above 100 % is no obstacle here
             raise RuntimeError(f"{name}, ν = {nu:g}: {record.message}")
         runs.append(record)
     median = {n: statistics.median(getattr(r, n) for r in runs[1:]) for n in ("time_total", "time_error")}

@@ -67,7 +67,7 @@ def test_world_agrees_with_each_rank_alone():
 @pytest.mark.mpi
 @pytest.mark.parametrize("degree", [1, 2, 3])
 def test_forces_balance(degree):
-    # Linear elements need a fine rim: on a coarser one the error bar is near 50 %, from where a case is refused.
+    # Linear elements need a fine rim: on a coarser one the error bar is near that from where a case is refused.
     mesh = {"degree": degree, "rim": "0.2 mm" if degree == 1 else "1 mm"}
     (record,) = solve(WORLD, probe=BLADE | {"slice": "0.1 mm"}, mesh=mesh).values()
     assert record.status == "ok"

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from pipeline import cli, verify
 from pipeline.verify import known
 from pipeline.verify.boundary import rectangle_stiffness
-from pipeline.verify.coverage import Coverage, Trial, trials
+from pipeline.verify.coverage import FAMILIES, Coverage, Trial, trials
 from pipeline.verify.row import Row
 
 
@@ -55,8 +55,17 @@ def test_error_bars_of_random_scenes_hold():
     assert found.is_met
 
 
-def test_same_seed_same_scenes():
-    first, again, other = (next(trials(MPI.COMM_SELF, 1, seed)).name for seed in (7, 7, 8))
+def test_error_bars_of_other_proportions_hold():
+    found = Coverage(tuple(trials(MPI.COMM_SELF, 12, 3, "proportions")))
+    assert len(found.trials) == 12
+    assert all(trial.truth_bar < 1e-4 for trial in found.trials)
+    assert len(found.groups) >= 6
+    assert found.is_met
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_same_seed_same_scenes(family):
+    first, again, other = (next(trials(MPI.COMM_SELF, 1, seed, family)).name for seed in (7, 7, 8))
     assert first == again != other
 
 
@@ -67,6 +76,36 @@ def test_coverage_asks_for_bars_that_hold_and_are_not_idle():
     assert coverage(0.02).is_met
     assert not coverage(0.005).is_met
     assert not coverage(0.2).is_met
+
+
+def test_every_large_group_must_hold():
+    """A kind of element whose bars miss is not outvoted by the others; one that is refused misses nothing."""
+
+    def trial(kind, bar, count, refused=False):
+        return (Trial("", 1.0, bar, 0.99, 0.0, "", kind, "naive", refused),) * count
+
+    good = trial((2, "displacement"), 0.015, 900)
+    assert Coverage(good + trial((1, "displacement"), 0.015, 40)).is_met
+    assert not Coverage(good + trial((1, "displacement"), 0.005, 40)).is_met
+    assert not Coverage(good + trial((1, "displacement"), 0.05, 40)).is_met
+    assert Coverage(good + trial((1, "displacement"), 0.005, 39)).is_met
+    assert Coverage(good + trial((1, "displacement"), 0.005, 40, refused=True)).is_met
+    table = str(Coverage(good + trial((1, "displacement"), 0.005, 40)))
+    assert "degree 1 displacement" in table
+    assert "0 of 40" in table
+    assert "NOT MET" in table
+
+
+def test_error_is_the_larger_of_both_readings():
+    """Relative to the truth where F is too large, to F where it is too small."""
+    for force, truth in ((1.5, 1.0), (1.0, 1.5)):
+        assert Trial("", force, 0.5, truth, 0.0).error == pytest.approx(0.5)
+
+
+def test_unknown_family_is_named():
+    result = CliRunner().invoke(cli.app, ["verify", "--coverage", "--family", "square"])
+    assert result.exit_code == 2
+    assert "proportions" in result.output
 
 
 def test_command_fails_if_a_row_is_out(monkeypatch):

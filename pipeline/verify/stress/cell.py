@@ -12,7 +12,7 @@ Expect = Literal["right", "refused", "either"]
 # What should not change must not change by more than this.
 INVARIANT = 1e-8
 # An error bar above this is no answer: the case should have been refused.
-IDLE = 0.5
+IDLE = 1.0
 
 
 @dataclass(frozen=True)
