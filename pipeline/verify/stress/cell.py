@@ -82,7 +82,7 @@ def judge(cell: Cell, record: Record, reference: Record | None, seconds: float =
     if cell.against == "truth" and record.origin == reference.origin == "axisymmetric":
         return _changed(found, message="case and reference were computed in the same way: nothing is compared")
     ratio = record.force / cell.scale / reference.force
-    bar = INVARIANT if cell.against == "base" else abs(ratio) * record.force_error + reference.force_error
+    bar = INVARIANT if cell.against == "base" else min(1.0, abs(ratio)) * record.force_error + reference.force_error
     found = _changed(found, error=ratio - 1, bar=bar)
     if not abs(ratio - 1) <= bar:
         return _changed(found, wrong=True, message=f"WRONG by {abs(ratio - 1) / bar:.3g} bars {record.message}".strip())
