@@ -113,9 +113,8 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     if has_stiffness:
         for name, text in _STIFFNESS.items():
             matrices = np.array([getattr(r, name) if r and getattr(r, name) else _NO_STIFFNESS for r in flat])
-            variables[name] = (
-                (*dims, "motion", "conjugate"), matrices.reshape(*study.shape, 6, 6), {"units": "1", "long_name": text},
-            )  # fmt: skip
+            values = matrices.reshape(*study.shape, 6, 6)
+            variables[name] = ((*dims, "movement", "conjugate"), values, {"units": "1", "long_name": text})
     texts = {
         "status": [r.status if r else "pending" for r in flat],
         "message": [r.message if r else "" for r in flat],
@@ -126,7 +125,7 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
         variables[name] = (dims, array(words, object), {"long_name": _TEXTS[name]})
     coordinates = {axis.name: _coordinate(axis) for axis in study.axes} | {"component": ["x", "y", "z"]}
     if has_stiffness:
-        coordinates |= {"motion": list(_MOTIONS), "conjugate": list(_MOTIONS)}
+        coordinates |= {"movement": list(_MOTIONS), "conjugate": list(_MOTIONS)}
     dataset = xr.Dataset(variables, coordinates, _attributes(plan, flat, run or {}))
     return _add_ratios(dataset)
 
