@@ -113,8 +113,8 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     if has_stiffness:
         for name, text in _STIFFNESS.items():
             matrices = np.array([getattr(r, name) if r and getattr(r, name) else _NO_STIFFNESS for r in flat])
-            values = matrices.reshape(*study.shape, 6, 6)
-            variables[name] = ((*dims, "movement", "conjugate"), values, {"units": "1", "long_name": text})
+            placed = matrices.reshape(*study.shape, 6, 6)
+            variables[name] = ((*dims, "movement", "conjugate"), placed, {"units": "1", "long_name": text})
     texts = {
         "status": [r.status if r else "pending" for r in flat],
         "message": [r.message if r else "" for r in flat],
