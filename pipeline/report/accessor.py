@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 # More curves than this are drawn as bands, from the least to the most over the scenes.
 _MOST_CURVES = 7
+# Dimensions of what a case has several of.
+_INNER = ("component", "movement", "conjugate")
 
 
 @xr.register_dataset_accessor("epsmesh")
@@ -30,20 +32,25 @@ class Accessor:
     def to_frame(self) -> "pd.DataFrame":
         """Return a pandas frame with a row for each case and a column for each variable, SI units.
 
-        Labels are columns as well; the components of the force are ``force_x``, ``force_y`` and ``force_z``. The
-        frame's ``attrs["units"]`` holds the unit of each column that has one.
+        Labels are columns as well; the components of the force are ``force_x``, ``force_y`` and ``force_z``, their
+        error bars ``force_error_x`` …, the entries of a stiffness ``stiffness_x_rx`` … and ``stiffness_error_x_rx`` ….
+        The frame's ``attrs["units"]`` holds the unit of each column that has one.
         """
-        data = self._dataset.drop_vars(["component", "force_vector"], errors="ignore")
-        if "force_vector" in self._dataset:
-            for i, name in enumerate("xyz"):
-                data[f"force_{name}"] = self._dataset["force_vector"].isel(component=i, drop=True)
+        inner = [name for name in _INNER if name in self._dataset.dims]
+        parts = [name for name, values in self._dataset.data_vars.items() if set(values.dims) & set(inner)]
+        data = self._dataset.drop_vars([*inner, *parts])
+        for name in parts:
+            values = self._dataset[name]
+            own = [dim for dim in inner if dim in values.dims]
+            for labels in itertools.product(*(values[dim].values for dim in own)):
+                column = "_".join([str(name).replace("_vector", ""), *map(str, labels)])
+                data[column] = values.sel(dict(zip(own, labels, strict=True)), drop=True)
         dims = list(self._dataset["force"].dims)
         if dims:
             frame = data.to_dataframe(dim_order=dims).reset_index()
         else:
             frame = data.expand_dims("case").to_dataframe().reset_index(drop=True)
-        units = {str(n): v.attrs["units"] for n, v in self._dataset.variables.items() if "units" in v.attrs}
-        units |= {f"force_{name}": units["force"] for name in "xyz"}
+        units = {str(n): v.attrs["units"] for n, v in data.variables.items() if "units" in v.attrs}
         frame.attrs["units"] = {name: units[name] for name in frame.columns if name in units}
         return frame
 

@@ -60,7 +60,7 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     if has_stiffness:
         for name in ("stiffness", "stiffness_error"):
             matrices = np.array([getattr(r, name) if r and getattr(r, name) else _NO_STIFFNESS for r in flat])
-            dimensions = (*dims, "motion", "conjugate")
+            dimensions = (*dims, "movement", "conjugate")
             variables[name] = (dimensions, matrices.reshape(*study.shape, 6, 6), attributes(name))
     texts = {
         "status": [r.status if r else "pending" for r in flat],
@@ -72,7 +72,7 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
         variables[name] = (dims, array(words, object), attributes(name))
     coordinates = {axis.name: _coordinate(axis) for axis in study.axes} | {"component": ["x", "y", "z"]}
     if has_stiffness:
-        coordinates |= {"motion": list(_MOTIONS), "conjugate": list(_MOTIONS)}
+        coordinates |= {"movement": list(_MOTIONS), "conjugate": list(_MOTIONS)}
     dataset = xr.Dataset(variables, coordinates, _attributes(plan, flat, run or {}))
     return _add_ratios(dataset)
 

@@ -49,7 +49,7 @@ def solve_problem(case: Case, problem: Problem, *, estimate: bool) -> Solution:
     try:
         return problem.solve(law, loads, method=method, tolerance=tolerance, estimate=estimate)
     except SolveError:
-        if method != "auto" or problem.dofs > _MOST_DIRECT:
+        if method != "auto" or not 0 < problem.dofs <= _MOST_DIRECT:
             raise
         return problem.solve(law, loads, method="direct", tolerance=tolerance, estimate=estimate)
 

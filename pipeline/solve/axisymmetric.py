@@ -65,7 +65,7 @@ class MeridianProblem:
 
     @property
     def dofs(self) -> int:
-        """Unknowns of the first mesh are some 10,000; none is made before it is solved on."""
+        """None: meshes are made, and their unknowns counted, in each solve, which is direct."""
         return 0
 
     @stage("axisymmetric")

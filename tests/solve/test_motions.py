@@ -7,13 +7,18 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from pipeline.plan.key import case_key
+from pipeline.plan.plan import make_plan
+from pipeline.report.dataset import build
+from pipeline.run.execute import compute
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.mixed import MixedProblem
 from pipeline.solve.spaces import Spaces
-from tests.cases import BLADE, solve
+from pipeline.study.problems import StudyError
+from tests.cases import BLADE, solve, study
 from tests.solve.test_mixed import law, make_mesh
 
 TRAVEL = (0.1e-3, 0.05e-3, -0.2e-3)
@@ -190,3 +195,69 @@ def test_blade_that_slices_has_bars_on_each_component():
         assert gap <= coarse.force_vector_error[i] + fine.force_vector_error[i]
     assert coarse.force_vector_error[1] == coarse.force_vector[1] == 0.0
     assert coarse.force_error == pytest.approx(coarse.force_vector_error[2] / coarse.force)
+
+
+def test_dataset_has_the_stiffness():
+    found = solved_dataset(probe={"motion": ["press", "all"]}, mesh={"degree": 1})
+    stiffness = found["stiffness"]
+    assert stiffness.dims == ("motion", "movement", "conjugate")
+    assert np.isnan(stiffness.sel(motion="press")).all()
+    matrix = stiffness.sel(motion="all").values
+    assert np.array_equal(matrix, matrix.T)
+    depth = 0.2e-3
+    assert float(found["force"][1]) == pytest.approx(depth * matrix[2, 2])
+    frame = found.epsmesh.to_frame()
+    assert len(frame) == 2
+    assert frame["stiffness_z_z"][1] == matrix[2, 2]
+    assert frame["stiffness_error_rz_rz"][1] > 0
+    assert frame["force_error_z"][1] == pytest.approx(found["force_error"].values[1] * frame["force_z"][1])
+
+
+def solved_dataset(**changes):
+    plan = make_plan(study(**changes))
+    return build(plan, compute(plan, MPI.COMM_SELF))
+
+
+def test_all_motions_are_for_bonded_probes():
+    with pytest.raises(StudyError, match="one direction only"):
+        study(probe={"motion": "all", "contact": "frictionless"})
+
+
+def test_what_several_movements_change_in_a_plan():
+    """No symmetry, no meridian and no reduced basis for all motions; F_exact is of the press; old keys stay."""
+    round_body = {"shape": "cylinder", "radius": "20 mm", "height": "20 mm"}
+    ratios = [0.0, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4]
+    press, every = (
+        make_plan(study(
+            body=round_body, material={"poisson": ratios}, probe={"motion": motion}, solve={"exact": True},
+            plan={"without": []}, mesh={"epsilon": ["8 mm", "full"], "outside": "coarse"},
+        ))
+        for motion in ("press", "all")
+    )  # fmt: skip
+    assert any(solve.reduced for solve in press.solves)
+    assert not any(solve.reduced or solve.mirrors for solve in every.solves if not solve.is_reference)
+    assert press.reference_keys == every.reference_keys
+    assert all(solve.axisymmetric for solve in every.solves if solve.is_reference)
+    blade = study(probe=BLADE).case(())
+    assert case_key(blade) == "4acdeea403dea87a58d3ff4f"
+
+
+def test_estimates_count_the_movements():
+    seconds = []
+    for changes in ({}, {"slice": "0.1 mm"}, {"motion": "all"}):
+        plan = make_plan(study(probe=BLADE | {"at": ["3 mm", "1 mm"]} | changes))
+        seconds.append(sum(plan.cost.step(step).seconds for step in plan.meshes))
+    assert seconds[0] < seconds[1] < seconds[2]
+    assert seconds[1] < 2 * seconds[0]
+    assert seconds[2] < 6 * seconds[0]
+
+
+def test_a_slide_takes_a_finer_mesh():
+    """The bar on the force along the axis holds what the slide adds to it, unless symmetry keeps them apart."""
+    finest = []
+    for changes in ({"at": ["3 mm", "0 mm"]}, {"at": ["3 mm", "0 mm"], "slice": "0.3 mm"}, {"slice": "0.3 mm"}):
+        plan = make_plan(study(probe=BLADE | changes, mesh={"accuracy": "0.3 %", "epsilon": None, "fine": None,
+                               "coarse": None, "rim": None, "growth": None, "degree": None}))  # fmt: skip
+        (solve,) = plan.solves
+        finest.append((solve.case.mesh.degree, -solve.case.mesh.rim))
+    assert finest[1] > finest[0] == finest[2]
