@@ -24,7 +24,7 @@ _LEFT = {"displacement": 1.0, "mixed": 1.25}
 _LEFT_PLAIN, _LEFT_STRAIGHT = 1.75, 1.5
 # What N, the energy norm squared of the first correction, leaves to a mixed element whose s may vanish by chance.
 _UNSEEN, _UNSEEN_PLAIN = 0.3, 0.8
-# From this share of edges without quarter points on, a mesh is as good as without any.
+# From this share of edges without quarter points on, a mesh counts as one that has none.
 _PLAIN = 0.2
 # A larger share of F_p than this makes no larger bar: the force is not known.
 _MOST = 0.9
