@@ -220,6 +220,21 @@ def test_gap_is_the_least_over_the_outline(a_body, a_probe, at):
     assert a_probe.gap(a_body, frame) == pytest.approx(min(edge), rel=2e-3, abs=1e-6)
 
 
+@pytest.mark.parametrize("slender", [2.0, 8.0])
+def test_nothing_under_a_slender_ellipse_is_taken_to_be_far_from_its_edge(slender):
+    """Elements grow with that distance: one taken for larger than it is leaves the footprint to a few of them."""
+    for axes in ((f"{slender} mm", "1 mm"), ("1 mm", f"{slender} mm")):
+        ellipse = probe("ellipse", axes=axes)
+        names = {"Sqrt": np.sqrt, "Max": np.maximum}
+        code = ellipse.edge_distance("x", "y", "0", 1e3).replace("^", "**")
+        x, y = np.random.default_rng(5).uniform(-1.5, 1.5, (2, 2000)) * np.array(ellipse.axes)[:, None]
+        true = np.linalg.norm(ellipse.outline()[None] - np.stack([x, y], axis=1)[:, None], axis=2).min(axis=1)
+        said = 1e-3 * eval(code, names, {"x": 1e3 * x, "y": 1e3 * y})
+        apart = true > 0.02e-3  # the outline is a polygon
+        assert np.all(said[apart] < 1.02 * true[apart])
+        assert np.all(said[apart] > 0.58 * true[apart])
+
+
 # ---- frames -----------------------------------------------------------------------------------------
 
 
