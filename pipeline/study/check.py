@@ -39,7 +39,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     for mesh, probe in itertools.product(meshes, probes):
         _check_epsilon(mesh, probe, problems)
     for body, mesh in itertools.product(bodies, meshes):
-        body.support.check(body, mesh.fine, problems)
+        body.support.check(body.heights, mesh.fine, problems)
         _check_outside(body, mesh, problems)
     if not any(problem.key.startswith("probe.") for problem in problems.errors):  # they have a place
         for body, probe in itertools.product(bodies, probes):
