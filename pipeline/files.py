@@ -4,6 +4,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from secrets import token_hex
 
 
 @contextmanager
@@ -44,7 +45,8 @@ def write_new(path: Path, text: str) -> None:
 @contextmanager
 def _beside(path: Path) -> Iterator[Path]:
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{os.getpid()}-{path.name}")
+    # Not by the number of the process: those of two machines, or of two containers, may well be one.
+    temporary = path.with_name(f".{token_hex(4)}-{path.name}")
     try:
         yield temporary
     finally:

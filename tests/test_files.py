@@ -24,6 +24,15 @@ def test_a_file_is_whole_or_as_it_was(tmp_path, name):
     assert [file.name for file in path.parent.iterdir()] == [name]
 
 
+def test_two_who_write_at_once_write_two_files(tmp_path):
+    """On two machines, too, where both may be the process of one number."""
+    with atomic(tmp_path / "a") as mine, atomic(tmp_path / "a") as yours:
+        mine.write_text("mine")
+        yours.write_text("yours")
+    assert (tmp_path / "a").read_text() == "mine"
+    assert [file.name for file in tmp_path.iterdir()] == ["a"]
+
+
 def test_it_is_on_disk_before_it_takes_the_place_of_another(tmp_path, monkeypatch):
     done = []
     for name in ("fsync", "replace"):

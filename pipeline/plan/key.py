@@ -33,7 +33,7 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
         text_of(case.body),
         text_of(case.material, case.material.PROPORTIONAL_TO if scaled else ()),
         text_of(case.probe, case.probe.PROPORTIONAL_TO if scaled else ()),
-        str(slice_ratio(case.probe)) if scaled else "",
+        _ratios_text(case.probe) if scaled else "",
         _mesh_text(case.mesh, folded and case.is_full, case.probe.half_width, case.element),
         text_of(case.solve, ("timing", "repeats", "exact")),
     ]
@@ -45,10 +45,10 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
 def reference_key(case: Case, accuracy: float) -> str:
     """Key of F_exact of the case's scene, for E = 1 and depth = 1: of what F / (E d) depends on, no mesh."""
     probe = case.probe.model_copy(update={"motion": "press"})
-    ratio = 0.0 if _slides_across_a_mirror(case) else slice_ratio(probe)
+    ratios = "0.0" if _slides_across_a_mirror(case) else _ratios_text(probe)
     parts = [
         f"{PHYSICS_VERSION} exact {accuracy!r}", text_of(case.body),
-        text_of(case.material, case.material.PROPORTIONAL_TO), text_of(probe, probe.PROPORTIONAL_TO), str(ratio),
+        text_of(case.material, case.material.PROPORTIONAL_TO), text_of(probe, probe.PROPORTIONAL_TO), ratios,
     ]  # fmt: skip
     return digest("\n".join(parts))
 
@@ -66,18 +66,25 @@ def operator_key(case: Case) -> str:
 
 
 def normalised(case: Case) -> Case:
-    """Return the case with a Young's modulus of 1 Pa and a depth of 1 m: its force is F / (E d)."""
-    travel: dict[str, Any] = {"depth": 1.0, "motion": "press"}
-    if getattr(case.probe, "slice", 0.0):
-        travel["slice"] = 0.0 if _slides_across_a_mirror(case) else slice_ratio(case.probe)
+    """Return the case in the units of its scale, 1 Pa and 1 m, and pressed only: its force is F / (E d)."""
+    travel = _ratios(case.probe)
+    if _slides_across_a_mirror(case):
+        travel = {key: float(number == 0) for number, key in enumerate(travel)}
+    pressed: dict[str, Any] = {**travel, "motion": "press"}
     material = case.material.model_copy(update={"young": 1.0})
-    return replace(case, material=material, probe=case.probe.model_copy(update=travel))
+    return replace(case, material=material, probe=case.probe.model_copy(update=pressed))
 
 
 @lru_cache(_MANY)
-def slice_ratio(probe: Probe) -> float:
-    """Return how far the probe slices for each unit of depth."""
-    return canonical(getattr(probe, "slice", 0.0) / probe.depth)
+def _ratios(probe: Probe) -> dict[str, float]:
+    """Return all that F is proportional to, for a unit of the first of them: how far a blade slices for each depth."""
+    values = {key: getattr(probe, key) for key in probe.PROPORTIONAL_TO}
+    return {key: canonical(value / values[probe.PROPORTIONAL_TO[0]]) for key, value in values.items()}
+
+
+def _ratios_text(probe: Probe) -> str:
+    _, *others = _ratios(probe).values() or (1.0,)
+    return " ".join(map(str, others)) or "0.0"
 
 
 def digest(text: str) -> str:

@@ -6,9 +6,9 @@ case itself decides whether its mesh was good enough, or the next one is tried.
 """
 
 from dataclasses import dataclass
+from math import hypot
 from typing import Any
 
-from pipeline.plan.key import slice_ratio
 from pipeline.plan.symmetry import mirror_planes, model_planes
 from pipeline.study.check import held_gaps
 from pipeline.study.schema import Mesh
@@ -71,12 +71,18 @@ def _expected(case: Case, recipe: Recipe) -> float:
     """Return the error bar to expect of a recipe."""
     shape = case.probe.EXPECTED_ERROR
     if mirror_planes(case) == model_planes(case):
-        shape *= 1 + _SLIDE * slice_ratio(case.probe)
+        shape *= 1 + _SLIDE * _slide(case)
     thickness = 1 + _THICKNESS * min(case.probe.half_width / case.body.thickness(case.frame), _THINNEST)
     if case.element == "mixed":
         return recipe.bar * shape * thickness * _MIXED[recipe.degree]
     locking = ((1 - 2 * case.material.poisson) / 0.4) ** -_LOCKING
     return float(recipe.bar * shape * thickness * locking)
+
+
+def _slide(case: Case) -> float:
+    """Return how far the probe moves across its axis for each unit of depth."""
+    across = [t - case.probe.depth * a for t, a in zip(case.travel, case.frame.axis, strict=True)]
+    return hypot(*across) / case.probe.depth
 
 
 def _mesh(case: Case, recipe: Recipe) -> Mesh:

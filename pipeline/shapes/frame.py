@@ -76,7 +76,8 @@ class Frame:
         x, y, z = map(units, self.point)
         tilt, level = self._tilt, self._level_along
         if level != (1.0, 0.0, 0.0):
-            kernel.rotate(shapes, x, y, z, 0, 0, 1, atan2(level[1], level[0]))
+            # numpy's arctan2 and math's differ in the last digit, by which gmsh makes another mesh.
+            kernel.rotate(shapes, x, y, z, 0, 0, 1, float(np.arctan2(level[1], level[0])))
         if tilt:
             kernel.rotate(shapes, x, y, z, *tilt[0], tilt[1])
 

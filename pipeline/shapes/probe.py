@@ -47,7 +47,7 @@ class Probe(Section, ABC):
         ),
     ] = "press"
 
-    # Keys that F is proportional to, if all of them change together.
+    # Keys that F is proportional to, if all of them change together; the first one is the unit of the others.
     PROPORTIONAL_TO: ClassVar[tuple[str, ...]]
     # Error of F on a mesh that is graded to the footprint's edge, in units of that of a disc: docs/accuracy.md.
     EXPECTED_ERROR: ClassVar[float]
@@ -66,6 +66,11 @@ class Probe(Section, ABC):
     @abstractmethod
     def travel(self, frame: Frame) -> Vector:
         """Return the prescribed displacement (m) of the footprint."""
+
+    @property
+    def scale(self) -> float:
+        """The length (m) that F is proportional to; 1 if there is none."""
+        return float(getattr(self, self.PROPORTIONAL_TO[0])) if self.PROPORTIONAL_TO else 1.0
 
     # ---- size -----------------------------------------------------------------------------------------
 

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import hypot
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict
 from pydantic_core import PydanticCustomError
@@ -13,9 +13,6 @@ from pipeline.shapes.arrays import FloatArray, np
 from pipeline.shapes.section import Problems, in_mm
 from pipeline.shapes.surface import Surface
 from pipeline.units import Coordinate
-
-if TYPE_CHECKING:
-    from pipeline.shapes.body import Body
 
 Surfaces = Mapping[str, tuple[Surface, ...]]
 FaceNames = Literal["bottom", "sides", "bottom+sides"]
@@ -57,8 +54,8 @@ class Support(ABC):
         """Return the heights z (m) at which what is held ends in the middle of a face."""
 
     @abstractmethod
-    def check(self, body: "Body", fine: float, problems: Problems) -> None:
-        """Report what cannot work on ``body``, with elements of size ``fine`` (m)."""
+    def check(self, heights: tuple[float, float], fine: float, problems: Problems) -> None:
+        """Report what cannot work on a body between two ``heights`` (m), with elements of size ``fine`` (m)."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +100,7 @@ class Faces(Support):
         """Return none: it ends where faces do."""
         return ()
 
-    def check(self, body: "Body", fine: float, problems: Problems) -> None:
+    def check(self, heights: tuple[float, float], fine: float, problems: Problems) -> None:
         """Find nothing: names are checked as they are read."""
 
 
@@ -141,9 +138,9 @@ class Below(BaseModel, Support):
         """Return the height."""
         return (self.below,)
 
-    def check(self, body: "Body", fine: float, problems: Problems) -> None:
+    def check(self, heights: tuple[float, float], fine: float, problems: Problems) -> None:
         """Report a height outside the body, or one so near an end of it that elements would be needles."""
-        low, high = body.heights
+        low, high = heights
         found = f"below {in_mm(self.below)}"
         if not low < self.below < high:
             problems.error("body.fixed", found, f"must lie inside the body: between {in_mm(low)} and {high * 1e3:g} mm")

@@ -5,7 +5,7 @@ What makes no sense in a shape by itself, the shape reports; here is what must f
 
 import itertools
 from collections.abc import Sequence
-from math import isfinite
+from math import hypot, inf, isfinite
 from typing import cast
 
 from pipeline.shapes.body import Body
@@ -40,13 +40,13 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     for mesh, probe in itertools.product(meshes, probes):
         _check_epsilon(mesh, probe, problems)
     for body, mesh in itertools.product(bodies, meshes):
-        body.support.check(body, mesh.fine, problems)
+        body.support.check(body.heights, mesh.fine, problems)
         _check_outside(body, mesh, problems)
-    if not any(problem.key.startswith("probe.") for problem in problems.errors):  # they have a place
-        for body, probe in itertools.product(bodies, probes):
-            _check_fit(body, probe, problems)
-        for body, probe, mesh in itertools.product(bodies, probes, meshes):
-            _check_gap(body, probe, mesh, problems)
+    placed = [probe for probe in probes if _has_place(probe)]
+    for body, probe in itertools.product(bodies, placed):
+        _check_fit(body, probe, problems)
+    for body, probe, mesh in itertools.product(bodies, placed, meshes):
+        _check_gap(body, probe, mesh, problems)
     for material, mesh in itertools.product(materials, meshes):
         _check_locking(material, mesh, problems)
     _check_reference(meshes, axes, problems)
@@ -71,6 +71,12 @@ def _check_motion(probe: Probe, problems: Problems) -> None:
             "probe.motion", probe.motion,
             f'a {probe.contact} probe holds the tissue in one direction only: use contact = "bonded"',
         )  # fmt: skip
+
+
+def _has_place(probe: Probe) -> bool:
+    """Tell whether the probe lies along something: what does not has no frame, and an error of its own."""
+    x, y, _ = probe.lies_along
+    return 0 < hypot(x, y) < inf
 
 
 def _check_mesh(mesh: Mesh, problems: Problems) -> None:

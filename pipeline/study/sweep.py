@@ -103,7 +103,7 @@ class Case:
     @property
     def scale(self) -> Scale:
         """The units in which its results do not depend on what they are proportional to."""
-        return Scale(self.material.young, self.probe.depth)
+        return Scale(self.material.young, self.probe.scale)
 
     @property
     def is_full(self) -> bool:

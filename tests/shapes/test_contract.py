@@ -4,6 +4,7 @@ A new shape is found in the registry, with the examples in its own words; nothin
 """
 
 import tomllib
+from dataclasses import replace
 from itertools import pairwise, product
 from math import cos, inf, pi, sin
 
@@ -13,12 +14,14 @@ from scipy.spatial import ConvexHull
 
 from pipeline.mesh.generate import generate
 from pipeline.mesh.size import Sizes
+from pipeline.plan.key import case_key, normalised, reference_key
 from pipeline.scene.model import Scene
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame
 from pipeline.shapes.probe import PLANES, Probe
 from pipeline.shapes.registry import BODIES, PROBES
 from pipeline.study.keys import words_of
+from tests.cases import study
 
 SUPPORTS = ("bottom", "sides", "bottom+sides", {"below": "-6 mm"})
 SIZES = Sizes(epsilon=inf, fine=3e-3, coarse=6e-3, rim=0.4e-3, growth=0.6)
@@ -220,6 +223,50 @@ def test_gap_is_the_least_over_the_outline(a_body, a_probe, at):
     assert a_probe.gap(a_body, frame) == pytest.approx(min(edge), rel=2e-3, abs=1e-6)
 
 
+@pytest.mark.parametrize("slender", [2.0, 8.0])
+def test_nothing_under_a_slender_ellipse_is_taken_to_be_far_from_its_edge(slender):
+    """Elements grow with that distance: one taken for larger than it is leaves the footprint to a few of them."""
+    for axes in ((f"{slender} mm", "1 mm"), ("1 mm", f"{slender} mm")):
+        ellipse = probe("ellipse", axes=axes)
+        names = {"Sqrt": np.sqrt, "Max": np.maximum}
+        code = ellipse.edge_distance("x", "y", "0", 1e3).replace("^", "**")
+        x, y = np.random.default_rng(5).uniform(-1.5, 1.5, (2, 2000)) * np.array(ellipse.axes)[:, None]
+        true = np.linalg.norm(ellipse.outline()[None] - np.stack([x, y], axis=1)[:, None], axis=2).min(axis=1)
+        said = 1e-3 * eval(code, names, {"x": 1e3 * x, "y": 1e3 * y})
+        apart = true > 0.02e-3  # the outline is a polygon
+        assert np.all(said[apart] < 1.02 * true[apart])
+        assert np.all(said[apart] > 0.58 * true[apart])
+
+
+def test_cases_share_a_record_only_if_all_that_force_is_proportional_to_changes_together(a_probe):
+    """Whatever a shape is proportional to: with one of several changed alone it is another force."""
+    keys = a_probe.PROPORTIONAL_TO
+    (case,) = study().cases()
+    moved = a_probe.model_copy(update={key: 0.1e-3 * (2 + n) for n, key in enumerate(keys)})
+
+    def known(**changes):
+        changed = replace(case, probe=moved.model_copy(update=changes))
+        return case_key(changed, scaled=True), reference_key(changed, 1e-3), normalised(changed)
+
+    assert known() == known(**{key: 3 * getattr(moved, key) for key in keys})
+    for key in keys if len(keys) > 1 else ():
+        assert not {*known()} & {*known(**{key: 3 * getattr(moved, key)})}
+
+
+def test_a_force_that_is_proportional_to_nothing_is_of_its_own_depth():
+    class Settled(PROBES["disc"]):
+        PROPORTIONAL_TO = ()
+
+    (case,) = study().cases()
+    shallow, deep = (
+        replace(case, probe=example(Settled, depth=f"{depth} mm")) for depth in (0.1, 0.2)
+    )  # fmt: skip
+    assert normalised(deep).probe.depth == 0.2e-3
+    assert deep.scale.length == shallow.scale.length
+    assert case_key(deep, scaled=True) != case_key(shallow, scaled=True)
+    assert reference_key(deep, 1e-3) != reference_key(shallow, 1e-3)
+
+
 # ---- frames -----------------------------------------------------------------------------------------
 
 
@@ -270,7 +317,6 @@ def test_a_shape_that_leaves_something_out_cannot_be_made(model, base):
 
 def test_what_is_not_in_the_registry_is_refused():
     from pipeline.study.problems import StudyError
-    from tests.cases import study
 
     for section, shape in (("body", "torus"), ("probe", "star")):
         with pytest.raises(StudyError, match="unknown shape"):

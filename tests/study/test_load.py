@@ -98,6 +98,22 @@ MISTAKES = {
 }  # fmt: skip
 
 
+def test_a_mistake_of_one_probe_hides_none_of_another():
+    probes = [
+        {"name": "sideways", **BLADE, "direction": [0.0, 0.0, 1.0]},
+        {"name": "slicing", **BLADE, "action": "pierce", "slice": "1 mm", "length": "41 mm"},
+        {"name": "outside", **ELLIPSE, "at": ["19 mm", "0 mm"]},
+    ]
+    with pytest.raises(StudyError) as caught:
+        parse(raw() | {"probe": probes})
+    assert [problem.key for problem in caught.value.problems] == [
+        "probe.direction",
+        "probe.slice",
+        "probe.at",
+        "probe.at",
+    ]
+
+
 @pytest.mark.parametrize("name", MISTAKES)
 def test_each_mistake_gets_its_message(name):
     changes, words = MISTAKES[name]
