@@ -9,6 +9,7 @@ from pipeline.solve.axisymmetric import compile_axisymmetric
 from pipeline.solve.cache import compiling
 from pipeline.solve.forms import compile_elastic
 from pipeline.solve.mixed_forms import compile_mixed
+from pipeline.solve.single.cycle import compiles
 from pipeline.solve.straight.pattern import library
 from pipeline.stages import stage
 
@@ -34,6 +35,7 @@ def _compile(element: str, degree: int) -> None:
         compile_axisymmetric()
         return
     library()
+    compiles()
     compile_elastic(degree, straight=degree == 1)
     if element == "mixed":
         compile_mixed(degree)

@@ -13,6 +13,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline import compat
+from pipeline.solve.single.cycle import SingleCycle, SmoothedLevel, interpolation, suits
 from pipeline.solve.transfer import transfer
 from pipeline.stages import stage
 
@@ -88,6 +89,9 @@ class LinearSolver:
         except PETSc.Error as error:
             self.close()
             raise SolveError(explain(error)) from error
+        except ArithmeticError as error:
+            self.close()
+            raise SolveError(str(error)) from error
         finally:
             self._clear_options()
         self.setup_seconds = time.perf_counter() - start
@@ -161,7 +165,25 @@ class LinearSolver:
         levels = self._levels
         if len(levels) == 1:
             self._algebraic(pc, self._prefix)
-            return
+        elif suits([level.matrix for level in levels]):
+            self._single_precision(pc)
+        else:
+            self._double_precision(pc)
+
+    def _single_precision(self, pc: PETSc.PC) -> None:
+        prefix = self._prefix + "mg_coarse_"
+        coarse = self._own(PETSc.PC().create(pc.comm))
+        coarse.setOptionsPrefix(prefix)
+        coarse.setOperators(self._levels[0].matrix)
+        self._algebraic(coarse, prefix)
+        coarse.setFromOptions()
+        coarse.setUp()
+        smoothed = [SmoothedLevel(level.matrix) for level in self._levels[1:]]
+        pc.setType("python")
+        pc.setPythonContext(SingleCycle(smoothed, list(map(interpolation, self._levels, self._levels[1:])), coarse))
+
+    def _double_precision(self, pc: PETSc.PC) -> None:
+        levels = self._levels
         pc.setType("mg")
         pc.setMGLevels(len(levels))
         pc.setMGType(PETSc.PC.MGType.MULTIPLICATIVE)

@@ -34,12 +34,12 @@ def transfer(coarse: Side, fine: Side) -> PETSc.Mat:
     The caller destroys the matrix.
     """
     width = fine.space.dofmap.index_map_bs
-    offsets, points, weights = _rows(coarse.space, fine.space)
+    offsets, points, weights = point_weights(coarse.space, fine.space)
     count = np.diff(offsets)
     row = np.repeat(np.arange(len(count), dtype=np.int32), count)
     first = width * coarse.space.dofmap.index_map.local_to_global(points)
     columns, values = np.empty(width * len(row), dtype=PETSc.IntType), np.empty(width * len(row))
-    free_row, free_column = (_free(side) for side in (fine, coarse))
+    free_row, free_column = (free(side) for side in (fine, coarse))
     # A point has ``width`` rows with the same weights, each for its own component.
     place = np.arange(len(row)) + (width - 1) * offsets[row]
     for component in range(width):
@@ -56,7 +56,7 @@ def transfer(coarse: Side, fine: Side) -> PETSc.Mat:
     return matrix
 
 
-def _rows(coarse: Any, fine: Any) -> tuple[IntArray, Int32Array, FloatArray]:
+def point_weights(coarse: Any, fine: Any) -> tuple[IntArray, Int32Array, FloatArray]:
     """Return the interpolation of scalars as sparse rows, one for each point of ``fine`` that this rank owns.
 
     A point's row is that of any cell it belongs to.
@@ -85,8 +85,9 @@ def _on_one_cell(coarse: int, fine: int) -> FloatArray:
     return np.asarray(low.tabulate(0, high.points)[0, :, :, 0])
 
 
-def _free(side: Side) -> FloatArray:
+def free(side: Side) -> FloatArray:
+    """Return 0 for each number of a side that is prescribed, else 1; owned ones and ghosts."""
     dofmap = side.space.dofmap
-    free = np.ones(dofmap.index_map_bs * (dofmap.index_map.size_local + dofmap.index_map.num_ghosts))
-    free[side.prescribed] = 0.0
-    return free
+    mask = np.ones(dofmap.index_map_bs * (dofmap.index_map.size_local + dofmap.index_map.num_ghosts))
+    mask[side.prescribed] = 0.0
+    return mask

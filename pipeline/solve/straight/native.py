@@ -21,13 +21,13 @@ _FLAGS = ("-O3", "-march=native")
 
 
 class Library:
-    """The functions that ``declarations`` declare, of a C file in this folder; compiled if they are not yet."""
+    """The functions that ``declarations`` declare, of a C file; compiled if they are not yet."""
 
-    def __init__(self, source: str, declarations: str):
-        self._functions = _load(Path(__file__).with_name(source).read_text(), declarations)
+    def __init__(self, source: Path, declarations: str):
+        self._functions = _load(source.read_text(), declarations)
         self._kept: list[np.ndarray] = []
 
-    def __call__(self, name: str, *arguments: Any) -> None:
+    def __call__(self, name: str, *arguments: Any) -> Any:
         """Call a function; arrays are passed as they are, and must be contiguous and of the declared type."""
         ffi = self._functions.ffi
         types = ffi.typeof(getattr(self._functions.lib, name)).args
@@ -35,7 +35,7 @@ class Library:
             ffi.from_buffer(f"{kind.item.cname}[]", value) if isinstance(value, np.ndarray) else value
             for kind, value in zip(types, arguments, strict=True)
         ]
-        getattr(self._functions.lib, name)(*passed)
+        return getattr(self._functions.lib, name)(*passed)
 
     def address(self, name: str) -> int:
         """Return where a function begins."""

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import basix
@@ -30,7 +31,7 @@ void kernel_4(double* A, const double* w, const double* c, const double* x, cons
 @cache
 def library() -> Library:
     """Return the functions of ``kernels.c``, compiled if they are not yet."""
-    return Library("kernels.c", _DECLARATIONS)
+    return Library(Path(__file__).with_name("kernels.c"), _DECLARATIONS)
 
 
 @dataclass(frozen=True)

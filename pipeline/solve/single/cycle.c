@@ -1,0 +1,175 @@
+/* A multigrid cycle's loops in single precision. Matrices are symmetric, of 3 x 3 blocks by rows; of each row, the
+ * diagonal block and those right of it, in that order. Vectors hold three numbers a point. */
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+/* The upper blocks of a matrix of all blocks, by columns, whose columns ascend. */
+void take_upper(int rows, const int* offsets, const int* columns, const double* blocks, const int* upper_offsets,
+                int* upper_columns, float* upper)
+{
+  for (int i = 0; i < rows; ++i)
+  {
+    int to = upper_offsets[i];
+    for (int k = offsets[i]; k < offsets[i + 1]; ++k)
+      if (columns[k] >= i)
+      {
+        const double* block = blocks + 9 * (size_t)k;
+        float* target = upper + 9 * (size_t)to;
+        for (int r = 0; r < 3; ++r)
+          for (int c = 0; c < 3; ++c)
+            target[3 * r + c] = (float)block[3 * c + r];
+        upper_columns[to++] = columns[k];
+      }
+  }
+}
+
+/* The inverses of the diagonal blocks; the number of those that have none. */
+int invert_diagonal(int rows, const int* offsets, const float* values, float* inverse)
+{
+  int singular = 0;
+  for (int i = 0; i < rows; ++i)
+  {
+    const float* b = values + 9 * (size_t)offsets[i];
+    const double a = b[0], c = b[1], d = b[2], e = b[4], f = b[5], g = b[8];
+    const double A = e * g - f * f, B = d * f - c * g, C = c * f - d * e;
+    const double determinant = a * A + c * B + d * C;
+    if (!(determinant > 0.0))
+      ++singular;
+    const double s = 1.0 / determinant;
+    float* m = inverse + 9 * (size_t)i;
+    m[0] = (float)(s * A);
+    m[1] = m[3] = (float)(s * B);
+    m[2] = m[6] = (float)(s * C);
+    m[4] = (float)(s * (a * g - d * d));
+    m[5] = m[7] = (float)(s * (c * d - a * f));
+    m[8] = (float)(s * (a * e - c * c));
+  }
+  return singular;
+}
+
+/* y = A x */
+void multiply(int rows, const int* restrict offsets, const int* restrict columns, const float* restrict values,
+              const float* restrict x, float* restrict y)
+{
+  memset(y, 0, 3 * (size_t)rows * sizeof(float));
+  for (int i = 0; i < rows; ++i)
+  {
+    const float x0 = x[3 * i], x1 = x[3 * i + 1], x2 = x[3 * i + 2];
+    const float* b = values + 9 * (size_t)offsets[i];
+    float s0 = b[0] * x0 + b[1] * x1 + b[2] * x2;
+    float s1 = b[3] * x0 + b[4] * x1 + b[5] * x2;
+    float s2 = b[6] * x0 + b[7] * x1 + b[8] * x2;
+    b += 9;
+    for (int k = offsets[i] + 1; k < offsets[i + 1]; ++k, b += 9)
+    {
+      const int j = 3 * columns[k];
+      const float z0 = x[j], z1 = x[j + 1], z2 = x[j + 2];
+      s0 += b[0] * z0 + b[1] * z1 + b[2] * z2;
+      s1 += b[3] * z0 + b[4] * z1 + b[5] * z2;
+      s2 += b[6] * z0 + b[7] * z1 + b[8] * z2;
+      y[j] += b[0] * x0 + b[3] * x1 + b[6] * x2;
+      y[j + 1] += b[1] * x0 + b[4] * x1 + b[7] * x2;
+      y[j + 2] += b[2] * x0 + b[5] * x1 + b[8] * x2;
+    }
+    y[3 * i] += s0;
+    y[3 * i + 1] += s1;
+    y[3 * i + 2] += s2;
+  }
+}
+
+/* d = a d + b D^-1 r, and x += d: a step of Chebyshev's iteration. */
+void advance(int rows, const float* restrict inverse, float a, float b, const float* restrict r, float* restrict d,
+             float* restrict x)
+{
+  for (int i = 0; i < rows; ++i)
+  {
+    const float* m = inverse + 9 * (size_t)i;
+    const float r0 = r[3 * i], r1 = r[3 * i + 1], r2 = r[3 * i + 2];
+    const float d0 = a * d[3 * i] + b * (m[0] * r0 + m[1] * r1 + m[2] * r2);
+    const float d1 = a * d[3 * i + 1] + b * (m[3] * r0 + m[4] * r1 + m[5] * r2);
+    const float d2 = a * d[3 * i + 2] + b * (m[6] * r0 + m[7] * r1 + m[8] * r2);
+    d[3 * i] = d0;
+    d[3 * i + 1] = d1;
+    d[3 * i + 2] = d2;
+    x[3 * i] += d0;
+    x[3 * i + 1] += d1;
+    x[3 * i + 2] += d2;
+  }
+}
+
+/* r -= q */
+void subtract(int count, const float* restrict q, float* restrict r)
+{
+  for (int i = 0; i < count; ++i)
+    r[i] -= q[i];
+}
+
+double dot(int count, const float* x, const float* y)
+{
+  double sum = 0.0;
+  for (int i = 0; i < count; ++i)
+    sum += (double)x[i] * (double)y[i];
+  return sum;
+}
+
+/* x += P e of points: prescribed numbers neither read nor written. */
+void prolong(int rows, const int* offsets, const int* points, const float* weights, const float* coarse_free,
+             const float* fine_free, const float* e, float* x)
+{
+  for (int i = 0; i < rows; ++i)
+  {
+    float s0 = 0, s1 = 0, s2 = 0;
+    for (int k = offsets[i]; k < offsets[i + 1]; ++k)
+    {
+      const int j = 3 * points[k];
+      s0 += weights[k] * coarse_free[j] * e[j];
+      s1 += weights[k] * coarse_free[j + 1] * e[j + 1];
+      s2 += weights[k] * coarse_free[j + 2] * e[j + 2];
+    }
+    x[3 * i] += fine_free[3 * i] * s0;
+    x[3 * i + 1] += fine_free[3 * i + 1] * s1;
+    x[3 * i + 2] += fine_free[3 * i + 2] * s2;
+  }
+}
+
+/* g = P^T r */
+void restrict_to(int rows, const int* offsets, const int* points, const float* weights, int coarse_count,
+                 const float* coarse_free, const float* fine_free, const float* r, float* g)
+{
+  memset(g, 0, (size_t)coarse_count * sizeof(float));
+  for (int i = 0; i < rows; ++i)
+  {
+    const float r0 = fine_free[3 * i] * r[3 * i];
+    const float r1 = fine_free[3 * i + 1] * r[3 * i + 1];
+    const float r2 = fine_free[3 * i + 2] * r[3 * i + 2];
+    for (int k = offsets[i]; k < offsets[i + 1]; ++k)
+    {
+      const int j = 3 * points[k];
+      g[j] += weights[k] * r0;
+      g[j + 1] += weights[k] * r1;
+      g[j + 2] += weights[k] * r2;
+    }
+  }
+  for (int j = 0; j < coarse_count; ++j)
+    g[j] *= coarse_free[j];
+}
+
+/* y = x / s with the largest magnitude s of x, which is returned; nought if x is. */
+double to_single(int count, const double* x, float* y)
+{
+  double most = 0.0;
+  for (int i = 0; i < count; ++i)
+    most = fabs(x[i]) > most ? fabs(x[i]) : most;
+  const double scale = most > 0.0 ? 1.0 / most : 0.0;
+  for (int i = 0; i < count; ++i)
+    y[i] = (float)(scale * x[i]);
+  return most;
+}
+
+/* y = s x */
+void to_double(int count, double scale, const float* x, double* y)
+{
+  for (int i = 0; i < count; ++i)
+    y[i] = scale * (double)x[i];
+}

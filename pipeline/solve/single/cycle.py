@@ -1,0 +1,210 @@
+"""A multigrid cycle over degrees p, …, 2 in single precision, above a solver of degree 1 in double.
+
+The smoother is Chebyshev's iteration with the blocks of the diagonal, the same as PETSc's. What an iteration takes is
+the time to read its matrices: in single precision, and of a symmetric matrix the upper blocks alone, they are a
+quarter as long. The residual is brought to magnitude 1 first, so that nothing runs out of the exponents of a float.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from pipeline.arrays import Int32Array
+from pipeline.solve.straight.arrays import available, entries
+from pipeline.solve.straight.native import Library
+from pipeline.solve.transfer import Side, free, point_weights
+
+Single = npt.NDArray[np.float32]
+
+_DECLARATIONS = """
+void take_upper(int rows, const int* offsets, const int* columns, const double* blocks, const int* upper_offsets,
+                int* upper_columns, float* upper);
+int invert_diagonal(int rows, const int* offsets, const float* values, float* inverse);
+void multiply(int rows, const int* offsets, const int* columns, const float* values, const float* x, float* y);
+void advance(int rows, const float* inverse, float a, float b, const float* r, float* d, float* x);
+void subtract(int count, const float* q, float* r);
+double dot(int count, const float* x, const float* y);
+void prolong(int rows, const int* offsets, const int* points, const float* weights, const float* coarse_free,
+             const float* fine_free, const float* e, float* x);
+void restrict_to(int rows, const int* offsets, const int* points, const float* weights, int coarse_count,
+                 const float* coarse_free, const float* fine_free, const float* r, float* g);
+double to_single(int count, const double* x, float* y);
+void to_double(int count, double scale, const float* x, double* y);
+"""
+
+
+# Chebyshev's iteration: steps, the share of the spectrum that is left to the coarser level, and by how much the
+# largest eigenvalue that so many of Lanczos' steps find is raised. Measured: docs/solvers.md.
+_STEPS, _LEFT, _RAISED, _LANCZOS = 2, 0.1, 1.15, 5
+
+
+def suits(matrices: list[PETSc.Mat]) -> bool:
+    """Tell whether a cycle over operators of degrees 1, 2, … can be made: of one process, where C can be compiled."""
+    if len(matrices) < 2 or any(matrix.getType() != "seqbaij" for matrix in matrices[1:]):
+        return False
+    return available() and compiles()
+
+
+@cache
+def compiles() -> bool:
+    """Tell whether C can be compiled here."""
+    try:
+        library()
+    except Exception:  # distutils raises many kinds
+        return False
+    return True
+
+
+@cache
+def library() -> Library:
+    """Return the functions of ``cycle.c``, compiled if they are not yet."""
+    return Library(Path(__file__).with_name("cycle.c"), _DECLARATIONS)
+
+
+@dataclass(frozen=True)
+class Interpolation:
+    """From the points of a coarse space to those of a fine one: sparse rows with the same weight for all components.
+
+    ``coarse_free`` and ``fine_free`` are 0 for numbers that are prescribed, else 1.
+    """
+
+    offsets: Int32Array
+    points: Int32Array
+    weights: Single
+    coarse_free: Single
+    fine_free: Single
+
+    def prolong(self, coarse: Single, fine: Single) -> None:
+        """Add the interpolation of ``coarse`` to ``fine``."""
+        library()("prolong", len(self.offsets) - 1, self.offsets, self.points, self.weights, self.coarse_free,
+                  self.fine_free, coarse, fine)  # fmt: skip
+
+    def restrict(self, fine: Single, coarse: Single) -> None:
+        """Write the transposed interpolation of ``fine`` into ``coarse``."""
+        library()("restrict_to", len(self.offsets) - 1, self.offsets, self.points, self.weights, len(coarse),
+                  self.coarse_free, self.fine_free, fine, coarse)  # fmt: skip
+
+
+def interpolation(coarse: Side, fine: Side) -> Interpolation:
+    """Return the interpolation between two spaces of one process."""
+    offsets, points, weights = point_weights(coarse.space, fine.space)
+    masks = (free(side).astype(np.float32) for side in (coarse, fine))
+    return Interpolation(offsets.astype(np.int32), points, weights.astype(np.float32), *masks)
+
+
+class SmoothedLevel:
+    """An operator in single precision, upper blocks only, and its smoother."""
+
+    def __init__(self, matrix: PETSc.Mat):
+        """Take the entries of a matrix, of type seqbaij and symmetric.
+
+        Raises:
+            ArithmeticError: if a block of the diagonal is not positive.
+        """
+        offsets, columns = (index.astype(np.int32, copy=False) for index in matrix.getRowIJ(compressed=True)[:2])
+        rows = self._rows = len(offsets) - 1
+        upper = np.add.reduceat(columns >= np.repeat(np.arange(rows, dtype=np.int32), np.diff(offsets)), offsets[:-1])
+        self._offsets = np.concatenate([[0], np.cumsum(upper)]).astype(np.int32)
+        self._columns = np.empty(self._offsets[-1], dtype=np.int32)
+        self._values = np.empty((self._offsets[-1], 9), dtype=np.float32)
+        with entries(matrix, 9 * len(columns)) as values:
+            library()("take_upper", rows, offsets, columns, values, self._offsets, self._columns, self._values)
+        self._inverse = np.empty((rows, 9), dtype=np.float32)
+        if library()("invert_diagonal", rows, self._offsets, self._values, self._inverse):
+            raise ArithmeticError("the operator is not positive definite")
+        self.size = 3 * rows
+        self._product, self._direction, self.scratch = (np.zeros(self.size, dtype=np.float32) for _ in range(3))
+        self._most = _RAISED * self._largest_eigenvalue()
+
+    def subtract_product(self, x: Single, r: Single) -> None:
+        """Take A x away from ``r``."""
+        library()("multiply", self._rows, self._offsets, self._columns, self._values, x, self._product)
+        library()("subtract", self.size, self._product, r)
+
+    def smooth(self, x: Single, r: Single) -> Single:
+        """Improve ``x``, of which ``r`` is the residual, by Chebyshev's iteration.
+
+        Returns its last step, by which ``r`` still differs from the residual; the next call overwrites it.
+        """
+        theta, delta = (1 + _LEFT) * self._most / 2, (1 - _LEFT) * self._most / 2
+        d, rho = self._direction, delta / theta
+        d[:] = 0.0
+        library()("advance", self._rows, self._inverse, 0.0, 1 / theta, r, d, x)
+        for _ in range(_STEPS - 1):
+            self.subtract_product(d, r)
+            previous, rho = rho, 1 / (2 * theta / delta - rho)
+            library()("advance", self._rows, self._inverse, rho * previous, 2 * rho / delta, r, d, x)
+        return d
+
+    def _largest_eigenvalue(self) -> float:
+        """Return the largest eigenvalue of D⁻¹ A, from below, by Lanczos' method from noise."""
+        r = np.random.default_rng(0).standard_normal(self.size, dtype=np.float32)
+        z, p, diagonal, beside = np.empty_like(r), np.zeros_like(r), [], []
+        previous = step = 0.0
+        for _ in range(_LANCZOS):
+            z[:] = 0.0
+            library()("advance", self._rows, self._inverse, 0.0, 1.0, r, self._direction, z)
+            rz = library()("dot", self.size, r, z)
+            ratio = rz / previous if previous else 0.0
+            p *= ratio
+            p += z
+            library()("multiply", self._rows, self._offsets, self._columns, self._values, p, self._product)
+            before, step = step, rz / library()("dot", self.size, p, self._product)
+            diagonal.append(1 / step + (ratio / before if before else 0.0))
+            beside.append(ratio**0.5 / before if before else 0.0)
+            self._product *= step
+            library()("subtract", self.size, self._product, r)
+            previous = rz
+        return float(np.linalg.eigvalsh(np.diag(diagonal) + np.diag(beside[1:], 1) + np.diag(beside[1:], -1))[-1])
+
+
+class SingleCycle:
+    """The preconditioner: a context for PETSc's type "python"."""
+
+    def __init__(self, levels: list[SmoothedLevel], interpolations: list[Interpolation], coarse: PETSc.PC):
+        """``levels`` go up from degree 2, ``interpolations`` lead to each; ``coarse`` is the solver of degree 1."""
+        self._levels, self._interpolations, self._coarse = levels, interpolations, coarse
+        bottom, _ = coarse.getOperators()
+        sizes = [bottom.getLocalSize()[0], *(level.size for level in levels)]
+        self._x, self._r = ([np.zeros(size, dtype=np.float32) for size in sizes] for _ in range(2))
+        self._bottom = bottom.createVecs()
+
+    def apply(self, _: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
+        """Write one cycle's correction for ``residual`` into ``result``."""
+        top = len(self._levels)
+        scale = library()("to_single", len(self._r[top]), residual.array_r, self._r[top])
+        self._cycle(top)
+        library()("to_double", len(self._x[top]), scale, self._x[top], result.array_w)
+
+    def destroy(self, _: PETSc.PC) -> None:
+        """Free the vectors of the coarsest level."""
+        for vector in self._bottom:
+            vector.destroy()
+
+    def _cycle(self, number: int) -> None:
+        """Solve roughly for the residual of a level, which is overwritten."""
+        x, r = self._x[number], self._r[number]
+        if number == 0:
+            self._solve_coarsest(x, r)
+            return
+        level, interpolation = self._levels[number - 1], self._interpolations[number - 1]
+        x[:] = 0.0
+        level.subtract_product(level.smooth(x, r), r)
+        interpolation.restrict(r, self._r[number - 1])
+        self._cycle(number - 1)
+        correction = level.scratch
+        correction[:] = 0.0
+        interpolation.prolong(self._x[number - 1], correction)
+        x += correction
+        level.subtract_product(correction, r)
+        level.smooth(x, r)
+
+    def _solve_coarsest(self, x: Single, r: Single) -> None:
+        solution, rhs = self._bottom
+        library()("to_double", len(r), 1.0, r, rhs.array_w)
+        self._coarse.apply(rhs, solution)
+        x[:] = solution.array_r

@@ -1,0 +1,105 @@
+"""The cycle in single precision: a preconditioner as good as the one in double, in any units, or none at all."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from pipeline.solve import linear
+from pipeline.solve.conditions import Conditions
+from pipeline.solve.displacement import DisplacementProblem
+from pipeline.solve.linear import Level, LinearSolver, SolveError
+from pipeline.solve.loads import Loads
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.mixed import MixedProblem
+from pipeline.solve.single import cycle
+from pipeline.solve.spaces import Spaces
+from tests.solve.test_mixed import PRESS, law, make_mesh
+
+pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="for one process")
+FINE = {"mesh": {"rim": "0.5 mm", "fine": "3 mm"}}
+
+
+def solved(kind, degree, material, loads=PRESS, **options):
+    with Spaces(make_mesh(**FINE)) as spaces, kind(spaces, degree, Conditions()) as problem:
+        return problem.solve(material, loads, method="iterative", estimate=True, **options)
+
+
+@pytest.mark.parametrize(
+    ("kind", "degree", "poisson"),
+    [
+        (DisplacementProblem, 2, 0.3),
+        (DisplacementProblem, 2, 0.49),
+        (DisplacementProblem, 3, 0.3),
+        (MixedProblem, 2, 0.5),
+        (MixedProblem, 3, 0.47),
+    ],
+)
+def test_force_and_iterations_are_those_of_double_precision(kind, degree, poisson, monkeypatch):
+    single = solved(kind, degree, law(poisson))
+    monkeypatch.setattr(linear, "suits", lambda matrices: False)
+    double = solved(kind, degree, law(poisson))
+    assert single.reaction[2] == pytest.approx(double.reaction[2], rel=1e-9)
+    assert single.bar == pytest.approx(double.bar, rel=0.02)
+    assert single.iterations <= 1.1 * double.iterations + 1
+
+
+def test_a_tolerance_below_that_of_a_float_is_met():
+    exact, found = (solved(DisplacementProblem, 2, law(0.3), tolerance=tolerance) for tolerance in (1e-12, 1e-6))
+    assert exact.balance < 1e-9
+    assert exact.reaction[2] == pytest.approx(found.reaction[2], rel=1e-9)
+
+
+@pytest.mark.parametrize("stiffer", [1e-20, 1e25])
+@pytest.mark.parametrize("deeper", [1e-15, 1e10])
+def test_no_unit_runs_out_of_numbers(stiffer, deeper):
+    (lame_lambda, mu), depth = law(0.3).lame, PRESS.amounts[0]
+    known = solved(DisplacementProblem, 2, law(0.3))
+    material = MaterialLaw.of(stiffer * lame_lambda, stiffer * mu)
+    found = solved(DisplacementProblem, 2, material, Loads(PRESS.motions, (deeper * depth,)))
+    assert found.reaction[2] == pytest.approx(stiffer * deeper * known.reaction[2], rel=1e-8)
+
+
+def test_it_is_symmetric_and_positive():
+    with (
+        Spaces(make_mesh(**FINE)) as spaces,
+        DisplacementProblem(spaces, 3, Conditions()) as problem,
+        problem.solver(law(0.4), "iterative") as solver,
+    ):
+        assert solver.ksp.pc.getType() == "python"
+        random = np.random.default_rng(5)
+        pairs = []
+        for _ in range(2):
+            vector, result = solver.matrix.createVecs()
+            vector.array[:] = random.standard_normal(vector.getSize())
+            solver.precondition(vector, result)
+            pairs.append((vector, result))
+        (x, mx), (y, my) = pairs
+        size = (x.dot(mx) * y.dot(my)) ** 0.5
+        assert abs(x.dot(my) - y.dot(mx)) < 1e-5 * size
+        assert x.dot(mx) > 0
+        for item in (x, mx, y, my):
+            item.destroy()
+
+
+def test_without_a_compiler_petsc_s_own_cycle_serves(monkeypatch):
+    wanted = solved(DisplacementProblem, 2, law(0.3))
+    monkeypatch.setattr(cycle, "library", lambda: (_ for _ in ()).throw(RuntimeError("no compiler")))
+    cycle.compiles.cache_clear()
+    try:
+        assert solved(DisplacementProblem, 2, law(0.3)).reaction[2] == pytest.approx(wanted.reaction[2], rel=1e-9)
+    finally:
+        cycle.compiles.cache_clear()
+
+
+def test_an_operator_that_is_not_positive_is_refused():
+    with (
+        Spaces(make_mesh()) as spaces,
+        DisplacementProblem(spaces, 2, Conditions()) as problem,
+        problem.solver(law(0.3), "iterative") as solver,
+    ):
+        coarse, fine = solver.levels
+        turned = fine.matrix.copy()
+        turned.scale(-1.0)
+        with pytest.raises(SolveError, match="not positive definite"):
+            LinearSolver([coarse, Level(fine.space, turned, fine.prescribed)], direct=False, tolerance=1e-6)
+        turned.destroy()
