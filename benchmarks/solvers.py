@@ -124,7 +124,9 @@ def _mixed_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[A
     start = time.process_time()
     saddle, _ = problem.saddle(direct=direct)
     assemble = time.process_time() - start
-    unit, _ = stack.enter_context(space.displacements.operators.lend(LAME, blocked=True))
+    unit = saddle.levels[-1].matrix
+    if direct:  # whose matrix is not blocked
+        unit, _ = stack.enter_context(space.displacements.operators.lend(LAME, blocked=True))
     held = space.displacements.dofs.held(PRESS)
 
     def once() -> tuple[float, float, float, int]:
