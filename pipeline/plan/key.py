@@ -118,7 +118,8 @@ def _mesh_text(mesh: Mesh, is_full: bool, half_width: float, element: str) -> st
 
 def _slides_across_a_mirror(case: Case) -> bool:
     """Where a blade moves across a plane of symmetry, that movement takes no force along the axis."""
-    return mirror_planes(case) != model_planes(case)
+    pressed = replace(case, probe=case.probe.model_copy(update={"motion": "press"}))
+    return mirror_planes(case) != model_planes(pressed)
 
 
 def _text(content: dict[str, Any]) -> str:
