@@ -133,6 +133,8 @@ class Straight(Probe):
 
     PROPORTIONAL_TO = ("depth",)
 
+    action: Literal["pierce"] = "pierce"
+
     def travel(self, frame: Frame) -> Vector:
         """Return the depth along the axis."""
         x, y, z = (self.depth * c for c in frame.axis)

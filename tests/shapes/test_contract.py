@@ -9,6 +9,7 @@ from math import cos, inf, pi, sin
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 from scipy.spatial import ConvexHull
 
 from pipeline.mesh.generate import generate
@@ -16,7 +17,7 @@ from pipeline.mesh.size import Sizes
 from pipeline.scene.model import Scene
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame
-from pipeline.shapes.probe import PLANES, Probe
+from pipeline.shapes.probe import PLANES, Probe, Straight
 from pipeline.shapes.registry import BODIES, PROBES
 from pipeline.study.keys import words_of
 
@@ -218,6 +219,12 @@ def test_gap_is_the_least_over_the_outline(a_body, a_probe, at):
     frame = a_probe.model_copy(update={"at": at}).frame_on(a_body)
     edge = [a_body.gap(frame.at(*point)) for point in a_probe.outline()]
     assert a_probe.gap(a_body, frame) == pytest.approx(min(edge), rel=2e-3, abs=1e-6)
+
+
+@pytest.mark.parametrize("shape", [name for name, model in PROBES.items() if issubclass(model, Straight)])
+def test_what_is_only_pushed_in_does_not_cut(shape):
+    with pytest.raises(ValidationError, match="pierce"):
+        probe(shape, action="cut")
 
 
 # ---- frames -----------------------------------------------------------------------------------------
