@@ -284,6 +284,19 @@ def test_gap_is_the_least_over_the_outline(a_body, a_probe, at):
     assert a_probe.gap(a_body, frame) == pytest.approx(min(edge), rel=2e-3, abs=1e-6)
 
 
+def test_what_f_is_proportional_to_moves_the_footprint_and_leaves_its_shape(a_probe, a_body):
+    frame, keys = a_probe.frame_on(a_body), a_probe.PROPORTIONAL_TO
+    once, twice = (a_probe.model_copy(update=dict.fromkeys(keys, much)) for much in (1e-4, 2e-4))
+    assert np.linalg.norm(once.travel(frame)) > 0
+    assert twice.travel(frame) == pytest.approx(2 * np.array(once.travel(frame)))
+    assert np.array_equal(once.outline(), twice.outline())
+    assert once.frame_on(a_body) == twice.frame_on(a_body)
+
+
+def test_the_error_to_expect_is_that_of_a_few_discs(a_probe):
+    assert 0.1 < a_probe.EXPECTED_ERROR < 10
+
+
 @pytest.mark.parametrize("shape", [name for name, model in PROBES.items() if issubclass(model, Straight)])
 def test_what_is_only_pushed_in_does_not_cut(shape):
     with pytest.raises(ValidationError, match="pierce"):
