@@ -113,7 +113,7 @@ class Probe(Section, ABC):
     @property
     @abstractmethod
     def is_curved(self) -> bool:
-        """Whether the footprint's edge is one smooth curve, which elements must be bent to follow."""
+        """Whether a part of the footprint's edge is curved, which elements must be bent to follow."""
 
     @abstractmethod
     def inscribed(self, edges: int) -> Self:
@@ -128,11 +128,14 @@ class Probe(Section, ABC):
 
     @abstractmethod
     def to_edge(self, points: FloatArray) -> FloatArray:
-        """Return the nearest points (n, 2) of the footprint's curved edge to ``points`` (n, 2) near it, in m."""
+        """Return the nearest points (n, 2) of the footprint's edge to ``points`` (n, 2) near it, in m.
+
+        Where no part of the edge is curved, return ``points``: nothing is to be bent.
+        """
 
     @abstractmethod
     def outline(self) -> FloatArray:
-        """Return the edge as a closed line of points (n, 2), in m, for pictures."""
+        """Return the edge as a closed line of points (n, 2), in m, counterclockwise: what the rest is held against."""
 
     # ---- sense ----------------------------------------------------------------------------------------
 
@@ -145,6 +148,8 @@ class Straight(Probe):
     """A probe that is only pushed in, along its axis."""
 
     PROPORTIONAL_TO = ("depth",)
+
+    action: Literal["pierce"] = "pierce"
 
     def travel(self, frame: Frame) -> Vector:
         """Return the depth along the axis."""

@@ -44,15 +44,15 @@ _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 
 
 def keys_of(section: str) -> tuple[Key, ...]:
-    """Return every key that a section may hold, those of all its shapes."""
+    """Return every key that a section may hold, those of all its shapes: one for each meaning that it has."""
     models = shapes_of(section)
-    found: dict[str, list[str]] = {}
+    found: dict[str, dict[str, list[str]]] = {}
     for shape, model in models.items():
         for name in model.model_fields:
             if name != "name":
-                found.setdefault(name, []).append(shape)
+                found.setdefault(name, {}).setdefault(words_of(model, name).text, []).append(shape)
     keys = []
-    for name, shapes in found.items():
+    for name, shapes in ((name, shapes) for name, meanings in found.items() for shapes in meanings.values()):
         own = () if len(shapes) == len(models) else tuple(shapes)
         kinds = [_takes(models[shape], name) for shape in shapes]
         takes = " | ".join(dict.fromkeys(part for kind in kinds for part in kind.split(" | ")))

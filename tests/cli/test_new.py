@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.plan.plan import make_plan
-from pipeline.study.keys import SECTION_TEXTS, keys_of
+from pipeline.study.keys import SECTION_TEXTS, keys_of, shapes_of, words_of
 from pipeline.study.load import load, parse
 from pipeline.study.schema import SECTIONS
 from pipeline.study.starter import examples, starter
@@ -32,6 +32,14 @@ def test_every_key_of_the_schema_has_words_and_an_example():
         for key in keys_of(section):
             assert key.words.text, f"nothing is said of {section}.{key.name}"
             assert key.words.example, f"there is no example of {section}.{key.name}"
+
+
+def test_a_key_of_several_shapes_says_what_it_means_for_each():
+    for section in SECTIONS:
+        said = {(key.name, shape): key.words.text for key in keys_of(section) for shape in key.shapes}
+        for shape, model in shapes_of(section).items():
+            for name in {*model.model_fields} & {name for name, _ in said}:
+                assert said[name, shape] == words_of(model, name).text
 
 
 def test_starter_is_a_study_with_every_key():

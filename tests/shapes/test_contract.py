@@ -10,6 +10,7 @@ from math import cos, inf, pi, sin
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 from scipy.spatial import ConvexHull
 
 from pipeline.mesh.generate import generate
@@ -18,7 +19,7 @@ from pipeline.plan.key import case_key, normalised, reference_key
 from pipeline.scene.model import Scene
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame
-from pipeline.shapes.probe import PLANES, Probe
+from pipeline.shapes.probe import PLANES, Probe, Straight
 from pipeline.shapes.registry import BODIES, PROBES
 from pipeline.study.keys import words_of
 from tests.cases import study
@@ -175,17 +176,80 @@ def test_mirror_lines_and_roundness_of_a_footprint_are_true(a_probe):
     assert a_probe.is_round == is_image(turn)
 
 
-def test_edge_distance_is_nought_at_the_edge_and_near_the_truth_elsewhere(a_probe):
+def distance_to_outline(probe, points):
+    """Return the distance of points (n, 2) to the straight pieces of the outline."""
+    outline = probe.outline()
+    start, side = outline[:-1], np.diff(outline, axis=0)
+    offset = points[:, None] - start
+    share = np.clip(np.sum(offset * side, axis=2) / np.maximum(np.sum(side**2, axis=1), 1e-30), 0, 1)
+    return np.linalg.norm(offset - share[..., None] * side, axis=2).min(axis=1)
+
+
+def edge_distance(probe, points):
+    """Return what the probe's own text says of the distance of points (n, 3), in its own coordinates, to its edge."""
     names = {"Sqrt": np.sqrt, "Max": np.maximum, "Min": np.minimum, "Fabs": np.abs}
-    code = a_probe.edge_distance("x", "y", "z", 1e3).replace("^", "**")
+    x, y, z = 1e3 * points.T
+    return 1e-3 * eval(probe.edge_distance("x", "y", "z", 1e3).replace("^", "**"), names, {"x": x, "y": y, "z": z})
+
+
+def flat(points):
+    return np.column_stack([points, np.zeros(len(points))])
+
+
+def test_edge_distance_is_nought_at_the_edge_and_near_the_truth_elsewhere(a_probe):
+    points = np.random.default_rng(3).uniform(-3, 3, (60, 3)) * a_probe.circumradius
+    true = np.hypot(distance_to_outline(a_probe, points[:, :2]), points[:, 2])
+    said = edge_distance(a_probe, points)
+    assert np.all((0.6 * true < said) & (said < 2 * true))
+    assert edge_distance(a_probe, flat(a_probe.outline())).max() < 1e-9
+
+
+def drawn_edge(probe, body):
+    """Return points of every curve of the footprint as it is drawn, in its own coordinates, and their kinds."""
+    import gmsh
+
+    from pipeline.compat import gmsh_session
+
+    frame, curves, kinds = probe.frame_on(body), [], set()
+    with gmsh_session():
+        gmsh.option.setNumber("General.Terminal", 0)
+        face = probe.draw(gmsh.model.occ, frame, lambda size: 1e3 * size)
+        gmsh.model.occ.synchronize()
+        for _, curve in gmsh.model.getBoundary([(2, face)], oriented=False):
+            (start,), (end,) = gmsh.model.getParametrizationBounds(1, curve)
+            points = np.array(gmsh.model.getValue(1, curve, list(np.linspace(start, end, 9)))).reshape(-1, 3)
+            curves.append(frame.local(1e-3 * points))
+            kinds.add(gmsh.model.getType(1, curve))
+    return np.vstack(curves), kinds
+
+
+def test_the_edge_that_is_drawn_is_the_one_that_is_told_of(a_probe, a_body):
+    """Every curve of it; and where one of them is not straight, elements are bent to follow."""
+    points, kinds = drawn_edge(a_probe, a_body)
+    assert np.abs(points[:, 2]).max() < 1e-12
+    assert edge_distance(a_probe, points).max() < 1e-9 * a_probe.circumradius
+    assert a_probe.is_curved == (kinds != {"Line"})
+
+
+def test_to_edge_returns_the_nearest_points_of_a_curved_edge(a_probe):
+    """From beside it, where the middles of straight edges are."""
     outline = a_probe.outline()
-    dense = np.vstack([np.linspace(start, end, 30) for start, end in pairwise(outline)])
-    for x, y, z in np.random.default_rng(3).uniform(-3, 3, (60, 3)) * a_probe.circumradius:
-        true = np.sqrt(np.min(np.sum((dense - [x, y]) ** 2, axis=1)) + z**2)
-        said = 1e-3 * eval(code, names, {"x": 1e3 * x, "y": 1e3 * y, "z": 1e3 * z})
-        assert 0.6 * true < said < 2 * true
-    x, y = outline.T
-    assert eval(code, names, {"x": 1e3 * x, "y": 1e3 * y, "z": 0.0}) == pytest.approx(0.0, abs=1e-3)
+    points = outline[:: len(outline) // 50 + 1]
+    points = points + 0.05 * a_probe.half_width * np.random.default_rng(5).normal(size=points.shape)
+    nearest = a_probe.to_edge(points)
+    if not a_probe.is_curved:
+        assert np.array_equal(nearest, points)
+        return
+    assert edge_distance(a_probe, flat(nearest)).max() < 1e-9 * a_probe.circumradius
+    least = distance_to_outline(a_probe, points)
+    np.testing.assert_allclose(np.linalg.norm(nearest - points, axis=1), least, atol=1e-3 * a_probe.half_width)
+
+
+@pytest.mark.parametrize("shape", [name for name, model in PROBES.items() if "direction" in model.model_fields])
+def test_length_lies_along_the_direction(shape, a_body):
+    for direction in ((1.0, 2.0, 0.0), (0.0, 3.0, 0.0), (-1.0, 0.0, 0.0)):
+        along = example(PROBES[shape], direction=direction).frame_on(a_body).along
+        assert along == pytest.approx(np.array(direction) / np.linalg.norm(direction))
 
 
 def test_what_is_drawn_lies_within_the_outline_and_has_its_area(meshed):
@@ -265,6 +329,25 @@ def test_a_force_that_is_proportional_to_nothing_is_of_its_own_depth():
     assert deep.scale.length == shallow.scale.length
     assert case_key(deep, scaled=True) != case_key(shallow, scaled=True)
     assert reference_key(deep, 1e-3) != reference_key(shallow, 1e-3)
+
+
+def test_what_f_is_proportional_to_moves_the_footprint_and_leaves_its_shape(a_probe, a_body):
+    frame, keys = a_probe.frame_on(a_body), a_probe.PROPORTIONAL_TO
+    once, twice = (a_probe.model_copy(update=dict.fromkeys(keys, much)) for much in (1e-4, 2e-4))
+    assert np.linalg.norm(once.travel(frame)) > 0
+    assert twice.travel(frame) == pytest.approx(2 * np.array(once.travel(frame)))
+    assert np.array_equal(once.outline(), twice.outline())
+    assert once.frame_on(a_body) == twice.frame_on(a_body)
+
+
+def test_the_error_to_expect_is_that_of_a_few_discs(a_probe):
+    assert 0.1 < a_probe.EXPECTED_ERROR < 10
+
+
+@pytest.mark.parametrize("shape", [name for name, model in PROBES.items() if issubclass(model, Straight)])
+def test_what_is_only_pushed_in_does_not_cut(shape):
+    with pytest.raises(ValidationError, match="pierce"):
+        probe(shape, action="cut")
 
 
 # ---- frames -----------------------------------------------------------------------------------------

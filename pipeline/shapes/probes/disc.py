@@ -20,7 +20,6 @@ class Disc(Straight):
     EXPECTED_ERROR = 1.0
 
     shape: Literal["disc"]
-    action: Literal["pierce"] = "pierce"
     radius: Annotated[Length, Words("Radius of the footprint.", '"2 mm"', is_used=True)]
 
     @property

@@ -25,7 +25,6 @@ class Ellipse(Straight):
     EXPECTED_ERROR = 0.9
 
     shape: Literal["ellipse"]
-    action: Literal["pierce"] = "pierce"
     axes: Annotated[tuple[Length, Length], Words("Two semi-axes: along and across.", '["3 mm", "1.5 mm"]')]
     direction: Annotated[
         tuple[float, float, float], Words("Along which the first axis lies: x, y and 0.", "[1.0, 0.0, 0.0]")
