@@ -2,11 +2,11 @@
 
 from dataclasses import replace
 
+from pipeline.arrays import FloatArray
 from pipeline.plan.cost import features
 from pipeline.plan.steps import Solve
 from pipeline.run.record import Record
 from pipeline.solve.error import is_graded
-from pipeline.solve.loads import FloatArray
 from pipeline.solve.solution import Solution
 
 TIMES = ("time_mesh", "time_assemble", "time_setup", "time_solve")

@@ -13,12 +13,12 @@ from typing import Any
 
 import dolfinx
 import numpy as np
-import numpy.typing as npt
 from dolfinx import cpp, fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline import compat
+from pipeline.arrays import Int32Array
 from pipeline.solve.cache import form_cache
 
 # The mark of integrals over all cells.
@@ -162,7 +162,7 @@ def _kernels(code: _Code) -> dict[int, int]:
     return {marks[i]: int(module.ffi.cast("uintptr_t", kernel)) for i, kernel in enumerate(kernels)}
 
 
-def _cells(mesh: Any, tags: Any, mark: int) -> npt.NDArray[np.int32]:
+def _cells(mesh: Any, tags: Any, mark: int) -> Int32Array:
     """Return the cells of a mark that this rank owns, ascending."""
     owned = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local, dtype=np.int32)
     return owned if mark == EVERYWHERE else np.intersect1d(owned, tags.find(mark)).astype(np.int32)

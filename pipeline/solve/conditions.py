@@ -4,20 +4,18 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline import compat
+from pipeline.arrays import FloatArray, Int32Array
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.scene.model import FIXED, MIRROR, PROBE
 from pipeline.solve.compiled import vector_space
 from pipeline.solve.linear import SolveError
-from pipeline.solve.loads import FloatArray, Motion
+from pipeline.solve.loads import Motion
 from pipeline.stages import stage
-
-IntArray = npt.NDArray[np.int32]
 
 
 @dataclass(frozen=True)
@@ -100,11 +98,11 @@ def whole_points(space: Any, body: BodyMesh) -> int:
     return round(body.comm.allreduce(float(images.sum()), op=MPI.SUM))
 
 
-def _planes(space: Any, body: BodyMesh) -> list[IntArray]:
+def _planes(space: Any, body: BodyMesh) -> list[Int32Array]:
     """Local points of ``space`` in each of the planes of symmetry that bound the mesh."""
     names = [MIRROR["xy"[axis]] for axis in body.mirrored]
     return [_points(space, body, name) for name in names]
 
 
-def _points(space: Any, body: BodyMesh, group: str) -> IntArray:
+def _points(space: Any, body: BodyMesh, group: str) -> Int32Array:
     return np.asarray(fem.locate_dofs_topological(space, body.mesh.topology.dim - 1, body.facets[group]))

@@ -16,12 +16,13 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
+from pipeline.arrays import FloatArray
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.enrich import energy_decrements
 from pipeline.solve.error import error_bar, stiffness_bars
 from pipeline.solve.forms import mean_strain_form
 from pipeline.solve.linear import Level, LinearSolver, SolveError, is_direct
-from pipeline.solve.loads import FloatArray, Loads, Motion
+from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.reaction import Response, reaction, sums
 from pipeline.solve.rim import plain_share

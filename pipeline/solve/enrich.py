@@ -15,8 +15,8 @@ from contextlib import ExitStack, contextmanager
 import numpy as np
 from petsc4py import PETSc
 
+from pipeline.arrays import FloatArray
 from pipeline.solve.linear import LinearSolver, SolveError
-from pipeline.solve.loads import FloatArray
 from pipeline.solve.vectors import global_sum
 
 # Iterations end when one adds less than this share of the sum; the first few may be short by chance.

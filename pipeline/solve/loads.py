@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from math import hypot
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from pipeline.arrays import FloatArray
+
 Vector = tuple[float, float, float]
 
 _ZERO: Vector = (0.0, 0.0, 0.0)

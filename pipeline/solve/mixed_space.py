@@ -8,11 +8,11 @@ from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 
 from pipeline import compat
+from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.compiled import scalar_space
 from pipeline.solve.conditions import whole_points
 from pipeline.solve.forms import curved_cells
-from pipeline.solve.loads import FloatArray
 from pipeline.solve.mixed_forms import MixedForms
 from pipeline.solve.saddle import Pair
 from pipeline.solve.spaces import ElasticSpace

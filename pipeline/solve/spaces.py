@@ -3,10 +3,10 @@
 from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 
+from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.conditions import Conditions, ConstrainedSpace
 from pipeline.solve.forms import ElasticForms
-from pipeline.solve.loads import FloatArray
 from pipeline.solve.operator import Operators
 from pipeline.solve.vectors import add_from_ghosts, fill
 from pipeline.stages import stage

@@ -6,8 +6,8 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
+from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
-from pipeline.solve.loads import FloatArray
 from pipeline.stages import stage
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from pipeline.solve.loads import FloatArray
+from pipeline.arrays import FloatArray
 
 
 @contextmanager
