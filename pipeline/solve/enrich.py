@@ -64,7 +64,7 @@ def _correct(solver: LinearSolver, residual: PETSc.Vec, *, keep: bool) -> tuple[
             if rz <= 0.0:  # nothing is left to gain
                 return total, solution, iteration
             direction.aypx(rz / previous if previous else 0.0, preconditioned)
-            solver.matrix.mult(direction, product)
+            solver.multiply(direction, product)
             step = rz / direction.dot(product)
             residual.axpy(-step, product)
             if keep:
@@ -92,7 +92,7 @@ def smallest_eigenvalue(solver: LinearSolver, start: PETSc.Vec, steps: int = 30)
                 break
             ratio = rz / previous if previous else 0.0
             direction.aypx(ratio, preconditioned)
-            solver.matrix.mult(direction, product)
+            solver.multiply(direction, product)
             before, step = step, rz / direction.dot(product)
             diagonal.append(1 / step + (ratio / before if before else 0.0))
             beside.append(ratio**0.5 / before if before else 0.0)

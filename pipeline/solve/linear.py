@@ -13,7 +13,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline import compat
-from pipeline.solve.single.cycle import SingleCycle, SmoothedLevel, interpolation, suits
+from pipeline.solve.single.cycle import SingleCycle, SmoothedLevel, SymmetricProduct, interpolation, suits
 from pipeline.solve.transfer import transfer
 from pipeline.stages import stage
 
@@ -72,7 +72,8 @@ class LinearSolver:
         self._options: set[str] = set()
         self.ksp = self._own(PETSc.KSP().create(matrix.comm))
         self.ksp.setOptionsPrefix(self._prefix)
-        self.ksp.setOperators(matrix)
+        self._operator = self._symmetric_product(matrix) if not direct and suits(self._matrices) else matrix
+        self.ksp.setOperators(self._operator, matrix)
         if direct:
             self.ksp.setType("preonly")
             self.ksp.pc.setType("cholesky")
@@ -126,8 +127,16 @@ class LinearSolver:
 
     @property
     def matrix(self) -> PETSc.Mat:
-        """The operator."""
+        """The operator, as a matrix with entries."""
         return self._levels[-1].matrix
+
+    @property
+    def _matrices(self) -> list[PETSc.Mat]:
+        return [level.matrix for level in self._levels]
+
+    def multiply(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write the operator's product with ``x`` into ``y``; collective."""
+        self._operator.mult(x, y)
 
     def precondition(self, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Apply the preconditioner alone; collective.
@@ -165,10 +174,15 @@ class LinearSolver:
         levels = self._levels
         if len(levels) == 1:
             self._algebraic(pc, self._prefix)
-        elif suits([level.matrix for level in levels]):
+        elif suits(self._matrices):
             self._single_precision(pc)
         else:
             self._double_precision(pc)
+
+    def _symmetric_product(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        product = PETSc.Mat().createPython(matrix.getSizes(), SymmetricProduct(matrix), comm=matrix.comm)
+        product.setUp()
+        return self._own(product)
 
     def _single_precision(self, pc: PETSc.PC) -> None:
         prefix = self._prefix + "mg_coarse_"

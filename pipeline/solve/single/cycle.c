@@ -78,6 +78,36 @@ void multiply(int rows, const int* restrict offsets, const int* restrict columns
   }
 }
 
+/* y = A x in double, for a symmetric matrix with all its blocks, by columns, of which those from `diagonal` on are read. */
+void multiply_double(int rows, const int* restrict diagonal, const int* restrict offsets, const int* restrict columns,
+                     const double* restrict blocks, const double* restrict x, double* restrict y)
+{
+  memset(y, 0, 3 * (size_t)rows * sizeof(double));
+  for (int i = 0; i < rows; ++i)
+  {
+    const double x0 = x[3 * i], x1 = x[3 * i + 1], x2 = x[3 * i + 2];
+    const double* b = blocks + 9 * (size_t)diagonal[i];
+    double s0 = b[0] * x0 + b[3] * x1 + b[6] * x2;
+    double s1 = b[1] * x0 + b[4] * x1 + b[7] * x2;
+    double s2 = b[2] * x0 + b[5] * x1 + b[8] * x2;
+    b += 9;
+    for (int k = diagonal[i] + 1; k < offsets[i + 1]; ++k, b += 9)
+    {
+      const int j = 3 * columns[k];
+      const double z0 = x[j], z1 = x[j + 1], z2 = x[j + 2];
+      s0 += b[0] * z0 + b[3] * z1 + b[6] * z2;
+      s1 += b[1] * z0 + b[4] * z1 + b[7] * z2;
+      s2 += b[2] * z0 + b[5] * z1 + b[8] * z2;
+      y[j] += b[0] * x0 + b[1] * x1 + b[2] * x2;
+      y[j + 1] += b[3] * x0 + b[4] * x1 + b[5] * x2;
+      y[j + 2] += b[6] * x0 + b[7] * x1 + b[8] * x2;
+    }
+    y[3 * i] += s0;
+    y[3 * i + 1] += s1;
+    y[3 * i + 2] += s2;
+  }
+}
+
 /* d = a d + b D^-1 r, and x += d: a step of Chebyshev's iteration. */
 void advance(int rows, const float* restrict inverse, float a, float b, const float* restrict r, float* restrict d,
              float* restrict x)

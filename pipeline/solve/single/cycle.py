@@ -14,7 +14,7 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from pipeline.arrays import Int32Array
-from pipeline.solve.straight.arrays import available, entries
+from pipeline.solve.straight.arrays import available, entries, entries_to_read
 from pipeline.solve.straight.native import Library
 from pipeline.solve.transfer import Side, free, point_weights
 
@@ -25,6 +25,8 @@ void take_upper(int rows, const int* offsets, const int* columns, const double* 
                 int* upper_columns, float* upper);
 int invert_diagonal(int rows, const int* offsets, const float* values, float* inverse);
 void multiply(int rows, const int* offsets, const int* columns, const float* values, const float* x, float* y);
+void multiply_double(int rows, const int* diagonal, const int* offsets, const int* columns, const double* blocks,
+                     const double* x, double* y);
 void advance(int rows, const float* inverse, float a, float b, const float* r, float* d, float* x);
 void subtract(int count, const float* q, float* r);
 double dot(int count, const float* x, const float* y);
@@ -160,6 +162,25 @@ class SmoothedLevel:
             library()("subtract", self.size, self._product, r)
             previous = rz
         return float(np.linalg.eigvalsh(np.diag(diagonal) + np.diag(beside[1:], 1) + np.diag(beside[1:], -1))[-1])
+
+
+class SymmetricProduct:
+    """A symmetric operator in double, of which the blocks from the diagonal on are read: a context for PETSc.
+
+    Its own product reads all of them, and no faster.
+    """
+
+    def __init__(self, matrix: PETSc.Mat):
+        """Refer to the entries of a matrix, of type seqbaij, which must live as long."""
+        self._offsets, self._columns = (i.astype(np.int32, copy=False) for i in matrix.getRowIJ(compressed=True)[:2])
+        rows = np.repeat(np.arange(len(self._offsets) - 1, dtype=np.int32), np.diff(self._offsets))
+        self._diagonal = np.flatnonzero(self._columns == rows).astype(np.int32)
+        self._blocks = entries_to_read(matrix, 9 * len(self._columns))
+
+    def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write A x into ``y``."""
+        library()("multiply_double", len(self._diagonal), self._diagonal, self._offsets, self._columns, self._blocks,
+                  x.array_r, y.array_w)  # fmt: skip
 
 
 class SingleCycle:

@@ -7,6 +7,7 @@ import ctypes
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -39,13 +40,29 @@ def entries(matrix: PETSc.Mat, count: int) -> Iterator[np.ndarray]:
     Raises:
         RuntimeError: if PETSc does not lend them.
     """
+    with _array(matrix) as values:
+        yield np.ctypeslib.as_array(values, (count,))
+    matrix.assemble()  # what was made of the values before is void
+
+
+def entries_to_read(matrix: PETSc.Mat, count: int) -> np.ndarray:
+    """Return the ``count`` entries of a matrix, as :func:`entries` does, to read for as long as the matrix lives.
+
+    Raises:
+        RuntimeError: if PETSc does not lend them.
+    """
+    with _array(matrix) as values:
+        return np.ctypeslib.as_array(values, (count,))
+
+
+@contextmanager
+def _array(matrix: PETSc.Mat) -> Iterator[Any]:
     kind, values = _KINDS[matrix.getType()], ctypes.POINTER(ctypes.c_double)()
     _call(f"Mat{kind}GetArray", matrix, ctypes.byref(values))
     try:
-        yield np.ctypeslib.as_array(values, (count,))
+        yield values
     finally:
         _call(f"Mat{kind}RestoreArray", matrix, ctypes.byref(values))
-        matrix.assemble()  # what was made of the values before is void
 
 
 @cache
