@@ -100,10 +100,15 @@ class Record:
 
     @staticmethod
     def from_json(text: str) -> "Record":
-        """Read what :meth:`to_json` wrote."""
-        content = json.loads(text)
-        for name in ("force_vector", "force_vector_error"):
-            content[name] = tuple(content.get(name, (nan, nan, nan)))
+        """Read what :meth:`to_json` wrote, now or in an earlier version.
+
+        Raises:
+            ValueError, TypeError, KeyError: if it is no record.
+        """
+        content = dict(json.loads(text))
+        x, y, z = content["force_vector"]
+        bx, by, bz = content.get("force_vector_error", (nan, nan, nan))
+        content |= {"force_vector": (x, y, z), "force_vector_error": (bx, by, bz)}
         for name in ("stiffness", "stiffness_error"):
             content[name] = tuple(tuple(row) for row in content.get(name, ()))
         return Record(**content)

@@ -63,8 +63,14 @@ class LinearSolver:
     """A KSP for one operator, with everything that it needs; ``close`` frees it."""
 
     @stage("set-up")
-    def __init__(self, levels: list[Level], *, direct: bool, tolerance: float):
+    def __init__(self, levels: list[Level], *, direct: bool, tolerance: float, linear: bool = False):
+        """Set up; collective. ``linear``: the preconditioner is a linear map to the last digit, in double throughout.
+
+        Raises:
+            SolveError: if that fails.
+        """
         self._levels = levels
+        self._is_single = not direct and not linear and suits(self._matrices)
         self._owned: list[Any] = []
         matrix = levels[-1].matrix
         start = time.perf_counter()
@@ -72,7 +78,7 @@ class LinearSolver:
         self._options: set[str] = set()
         self.ksp = self._own(PETSc.KSP().create(matrix.comm))
         self.ksp.setOptionsPrefix(self._prefix)
-        self._operator = self._symmetric_product(matrix) if not direct and suits(self._matrices) else matrix
+        self._operator = self._symmetric_product(matrix) if self._is_single else matrix
         self.ksp.setOperators(self._operator, matrix)
         if direct:
             self.ksp.setType("preonly")
@@ -174,7 +180,7 @@ class LinearSolver:
         levels = self._levels
         if len(levels) == 1:
             self._algebraic(pc, self._prefix)
-        elif suits(self._matrices):
+        elif self._is_single:
             self._single_precision(pc)
         else:
             self._double_precision(pc)

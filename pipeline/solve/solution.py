@@ -18,7 +18,9 @@ BALANCE_LIMIT = 1e-6
 # The energy norm of the solver's error, relative: F, which is quadratic in it, then has no error above 1e-9 up to
 # ν = 0.49, and 1e-11 as a rule (docs/solvers.md).
 TOLERANCE = 1e-6
-# What a second round of iterations aims at, as a share of the limit, and the most by which it lowers the error.
+# Rounds of further iterations where forces do not balance, what each aims at as a share of the limit, and the most by
+# which it lowers the error.
+MOST_ROUNDS = 3
 _AIM, _MOST = 0.3, 1e-2
 
 

@@ -95,7 +95,7 @@ def test_extrapolation_from_a_graded_mesh(element, centre, spread):
 
     def extrapolated(bar, **options):
         stiffness, left = extrapolate(*(np.full((1, 1), value) for value in (1.0, s, bar)), 2, element, **options)
-        return float(stiffness), float(left / stiffness)
+        return stiffness.item(), (left / stiffness).item()
 
     factor, left = extrapolated(error_bar(s, 2, element))
     assert factor == pytest.approx(1 - s * (1 + centre * theta))

@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 from pipeline.plan.key import case_key
 from pipeline.plan.plan import make_plan
+from pipeline.report import accessor  # noqa: F401 (registers dataset.epsmesh)
 from pipeline.report.dataset import build
 from pipeline.run.execute import compute
 from pipeline.solve.conditions import Conditions
@@ -18,6 +19,7 @@ from pipeline.solve.material import MaterialLaw
 from pipeline.solve.mixed import MixedProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.study.problems import StudyError
+from pipeline.study.sweep import Scale
 from tests.cases import BLADE, solve, study
 from tests.solve.test_mixed import law, make_mesh
 
@@ -180,7 +182,7 @@ def test_study_asks_for_the_stiffness(poisson):
     assert found.force == pytest.approx(stiffness[2, 2] * 0.2e-3, rel=1e-12)
     assert found.force_error == pytest.approx(bars[2, 2] / stiffness[2, 2], rel=1e-12)
     assert found.force_error == pytest.approx(alone.force_error, rel=0.05)
-    double = found.scaled(20e3, 0.4e-3)
+    double = found.scaled(Scale(20e3, 0.4e-3))
     assert np.array(double.stiffness) == pytest.approx(2 * stiffness)
     assert double.force == pytest.approx(4 * found.force)
     assert type(found).from_json(found.to_json()).stiffness == found.stiffness

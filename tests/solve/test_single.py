@@ -40,7 +40,7 @@ def test_force_and_iterations_are_those_of_double_precision(kind, degree, poisso
     double = solved(kind, degree, law(poisson))
     assert single.reaction[2] == pytest.approx(double.reaction[2], rel=1e-9)
     assert single.bar == pytest.approx(double.bar, rel=0.02)
-    assert single.iterations <= 1.1 * double.iterations + 1
+    assert single.iterations <= 1.2 * double.iterations + 1
 
 
 def test_a_tolerance_below_that_of_a_float_is_met():
@@ -63,8 +63,9 @@ def test_it_is_symmetric_and_positive():
     with (
         Spaces(make_mesh(**FINE)) as spaces,
         DisplacementProblem(spaces, 3, Conditions()) as problem,
-        problem.solver(law(0.4), "iterative") as solver,
+        problem.solver(law(0.4), "iterative") as lent,
     ):
+        solver = LinearSolver(lent.levels, direct=False, tolerance=0.5)
         assert solver.ksp.pc.getType() == "python"
         random = np.random.default_rng(5)
         pairs = []
@@ -79,6 +80,26 @@ def test_it_is_symmetric_and_positive():
         assert x.dot(mx) > 0
         for item in (x, mx, y, my):
             item.destroy()
+        solver.close()
+
+
+def test_what_a_bound_is_made_of_is_linear_to_the_last_digit():
+    """The bound of a reduced basis is what is left of large terms that cancel."""
+    with (
+        Spaces(make_mesh(**FINE)) as spaces,
+        DisplacementProblem(spaces, 2, Conditions()) as problem,
+        problem.solver(law(0.4), "iterative") as solver,
+    ):
+        x, y, total, result = (solver.matrix.createVecRight() for _ in range(4))
+        for vector, seed in ((x, 1), (y, 2)):
+            vector.array[:] = np.random.default_rng(seed).standard_normal(vector.getSize())
+        (x + 1e6 * y).copy(total)
+        solver.precondition(total, result)
+        for vector, factor in ((x, -1.0), (y, -1e6)):
+            solver.precondition(vector, total)
+            result.axpy(factor, total)
+        solver.precondition(y, total)
+        assert result.norm() < 1e-13 * 1e6 * total.norm()
 
 
 def test_without_a_compiler_petsc_s_own_cycle_serves(monkeypatch):
