@@ -1,14 +1,18 @@
 """The cost model: follows what is on record, and says how wrong it is."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import pipeline
 from pipeline.plan.cost import CostModel, Observation, fit
+from pipeline.plan.plan import declare, first_attempts
+from pipeline.plan.steps import OperatorStep
 from pipeline.run.record import Record
 from pipeline.run.store import Store
+from tests.cases import study
 from tests.commands import epsmesh
 
 KIND = "displacement 2"
@@ -82,3 +86,13 @@ def test_estimates_follow_what_the_store_knows(factor, tmp_path):
     assert pipeline.load(file).summary()["fitted_to"] == 0
     shown = epsmesh("plan", file, "--store", known, "--json")
     assert json.loads(shown.stdout)["seconds"] == pytest.approx(told["seconds"])
+
+
+def test_meshes_that_may_have_to_follow_are_counted():
+    """Of an accuracy asked for, the later meshes count with the share of the cases that come to them."""
+    chosen = dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))
+    (step,) = first_attempts(declare(study(mesh={"accuracy": "1 %", **chosen}))).meshes
+    (solve,) = step.solves
+    alone = replace(step, operators=(OperatorStep((replace(solve, later=()),)),))
+    all_of_them, first = CostModel().step(step).seconds, CostModel().step(alone).seconds
+    assert first < all_of_them < 2 * first
