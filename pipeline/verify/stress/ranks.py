@@ -15,6 +15,7 @@ from pipeline.run.execute import compute
 from pipeline.run.record import Record
 from pipeline.study.load import parse
 from pipeline.verify.machine import MPI_ENVIRONMENT
+from pipeline.workflow import world
 
 # Cells are solved in three dimensions, with the mesh that they give; the references of round scenes are not.
 PATH = ("axisymmetric",)
@@ -50,7 +51,7 @@ def compute_on(ranks: int, scene: dict[str, Any]) -> Record:
 
 def main() -> None:
     """Compute the study that is the argument on all ranks; the first prints its record."""
-    comm = MPI.COMM_WORLD
+    comm = world()
     (record,) = compute(make_plan(parse(json.loads(sys.argv[1])), without=PATH), comm).values()
     if comm.rank == 0:
         print(_MARK + record.to_json(), flush=True)
