@@ -16,11 +16,15 @@ from pipeline.stages import stage
 
 @dataclass(frozen=True)
 class BodyMesh:
-    """A distributed mesh and the facets, local to this rank, of each boundary group."""
+    """A distributed mesh and the facets, local to this rank, of each boundary group.
+
+    ``regions`` numbers the material of each local cell, ghosts too; None where there is one only.
+    """
 
     mesh: Any
     facets: dict[str, Int32Array]
     cells: int  # global
+    regions: Int32Array | None = None
 
     @property
     def owned_cells(self) -> int:

@@ -38,6 +38,7 @@ class MeshArrays:
 
     ``points`` (n, 3) in metres; ``cells`` (m, 4), or (m, 10) once curved; ``facets`` maps the name of a group
     to its boundary triangles (k, 3); ``rim`` holds the points on the probe's edge; ``seconds`` is what it took.
+    ``regions`` (m) numbers the material of each cell, None where there is one only.
     """
 
     points: FloatArray
@@ -45,6 +46,7 @@ class MeshArrays:
     facets: dict[str, IntArray]
     rim: IntArray
     seconds: float
+    regions: IntArray | None = None
 
 
 @stage("gmsh")

@@ -13,7 +13,7 @@ from typing import Any
 import gmsh
 import numpy as np
 
-from pipeline.shapes.body import Body
+from pipeline.shapes.body import Body, Drawn
 from pipeline.shapes.frame import Frame
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.surface import Surface, Tube
@@ -84,6 +84,8 @@ def build(scene: Scene) -> list[int]:
         SceneError: if the kernel fails, or no footprint or no support is left.
     """
     occ = gmsh.model.occ
+    if not isinstance(scene.body, Drawn):
+        raise SceneError(f"a {scene.body.shape} is not drawn")
     volumes = [(3, scene.body.draw(occ, scene.units))]
     if scene.is_cut:
         volumes, _ = occ.intersect(volumes, [(3, _add_column(scene))])

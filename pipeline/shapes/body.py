@@ -57,8 +57,21 @@ class Body(Section, ABC):
     # ---- under a probe --------------------------------------------------------------------------------
 
     @abstractmethod
-    def frame(self, at: tuple[float, ...]) -> Frame:
-        """Return the place that the coordinates ``at`` (m) name."""
+    def frame(self, at: tuple[float, ...], axis: Vector | None = None) -> Frame:
+        """Return the place that two or three coordinates ``at`` (m) name; ``axis`` defaults to the inward normal there.
+
+        Two are x and y of the highest point of the surface over them; three are projected to the nearest.
+
+        Raises:
+            PlaceError: if a probe cannot touch the body there.
+        """
+
+    @abstractmethod
+    def lift(self, frame: Frame, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return where lines along a probe's axis through ``points`` (n, 2), in its own plane, enter the body nearby.
+
+        That is (n, 3), in m, not a number where they miss; and the outward unit normals there.
+        """
 
     @abstractmethod
     def thickness(self, frame: Frame) -> float:
@@ -94,10 +107,6 @@ class Body(Section, ABC):
     # ---- geometry -------------------------------------------------------------------------------------
 
     @abstractmethod
-    def draw(self, kernel: Any, units: Units) -> int:
-        """Add it to a CAD ``kernel`` (gmsh's ``occ``), in the model's ``units``; return the tag of the volume."""
-
-    @abstractmethod
     def surfaces(self) -> dict[str, tuple[Surface, ...]]:
         """Return all the surfaces that bound it, by the names under which they can be held."""
 
@@ -109,3 +118,11 @@ class Body(Section, ABC):
     @abstractmethod
     def outline(self) -> list[FloatArray]:
         """Return its edges as lines of points (n, 3), in m, for pictures."""
+
+
+class Drawn(Body):
+    """A body that a CAD kernel draws."""
+
+    @abstractmethod
+    def draw(self, kernel: Any, units: Units) -> int:
+        """Add it to a CAD ``kernel`` (gmsh's ``occ``), in the model's ``units``; return the tag of the volume."""

@@ -12,6 +12,11 @@ Vector = tuple[float, float, float]
 # Turns a length (m) into the units of a model.
 Units = Callable[[float], float]
 
+
+class PlaceError(ValueError):
+    """A probe cannot touch a body where it was told to; says why, and what is allowed."""
+
+
 # A unit vector nearer to another than this is the same.
 _SAME = 1e-12
 

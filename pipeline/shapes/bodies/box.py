@@ -5,14 +5,14 @@ from math import hypot, inf
 from typing import Annotated, Any, Literal
 
 from pipeline.shapes.arrays import FloatArray, np
-from pipeline.shapes.body import Body
-from pipeline.shapes.frame import Frame, Units, Vector
+from pipeline.shapes.body import Drawn
+from pipeline.shapes.frame import Frame, PlaceError, Units, Vector
 from pipeline.shapes.section import Words, in_mm
 from pipeline.shapes.surface import Plane, Surface
 from pipeline.units import Length
 
 
-class Box(Body):
+class Box(Drawn):
     """A box with its top face centred on the origin, tissue at z <= 0."""
 
     shape: Literal["box"]
@@ -40,9 +40,16 @@ class Box(Body):
         """Volume (m³)."""
         return self.size[0] * self.size[1] * self.size[2]
 
-    def frame(self, at: tuple[float, ...]) -> Frame:
+    def frame(self, at: tuple[float, ...], axis: Vector | None = None) -> Frame:
         """Return the place at x and y on the top."""
+        if len(at) != 2 or axis is not None:
+            raise PlaceError("give two coordinates: the top is what a probe touches, upright")
         return Frame((at[0], at[1], 0.0))
+
+    def lift(self, frame: Frame, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the points themselves: the top is flat."""
+        flat = np.column_stack([points, np.zeros(len(points))])
+        return frame.world(flat), np.tile(np.array(frame.outward), (len(points), 1))
 
     def thickness(self, frame: Frame) -> float:
         """Return the height (m)."""

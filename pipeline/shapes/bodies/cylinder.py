@@ -4,8 +4,8 @@ from math import hypot, pi
 from typing import Annotated, Any, Literal
 
 from pipeline.shapes.arrays import FloatArray, np
-from pipeline.shapes.body import Body, Rectangle
-from pipeline.shapes.frame import Frame, Units, Vector
+from pipeline.shapes.body import Drawn, Rectangle
+from pipeline.shapes.frame import Frame, PlaceError, Units, Vector
 from pipeline.shapes.section import Words, in_mm
 from pipeline.shapes.surface import Plane, Surface, Tube
 from pipeline.units import Length
@@ -14,7 +14,7 @@ from pipeline.units import Length
 _ROUND = 200
 
 
-class Cylinder(Body):
+class Cylinder(Drawn):
     """A cylinder about the z axis with its top face in z = 0."""
 
     shape: Literal["cylinder"]
@@ -36,9 +36,16 @@ class Cylinder(Body):
         """Volume (m³)."""
         return pi * self.radius**2 * self.height
 
-    def frame(self, at: tuple[float, ...]) -> Frame:
+    def frame(self, at: tuple[float, ...], axis: Vector | None = None) -> Frame:
         """Return the place at x and y on the top."""
+        if len(at) != 2 or axis is not None:
+            raise PlaceError("give two coordinates: the top is what a probe touches, upright")
         return Frame((at[0], at[1], 0.0))
+
+    def lift(self, frame: Frame, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the points themselves: the top is flat."""
+        flat = np.column_stack([points, np.zeros(len(points))])
+        return frame.world(flat), np.tile(np.array(frame.outward), (len(points), 1))
 
     def thickness(self, frame: Frame) -> float:
         """Return the height (m)."""
