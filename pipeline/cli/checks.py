@@ -22,7 +22,9 @@ def verify(
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the random scenes.")] = 2026,
     family: Annotated[
         str,
-        typer.Option(metavar="NAME", help="Random scenes: design (any body and tool) or proportions (cylinders)."),
+        typer.Option(
+            metavar="NAME", help="Random scenes: design (any body and tool), proportions (cylinders) or ellipses."
+        ),
     ] = "design",
     quick: Quick = False,
     as_json: Json = False,

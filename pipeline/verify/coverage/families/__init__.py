@@ -1,0 +1,28 @@
+"""Families of random scenes: a module each, with `throw` and `TRUTH` as :class:`Family` has them, and a line here."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.verify.coverage.families import design, ellipses, proportions
+from pipeline.verify.coverage.families.dice import Section
+
+
+@dataclass(frozen=True)
+class Family:
+    """``throw`` returns the sections of a scene and the section of its mesh, the same for the same state of the dice.
+
+    ``truth`` is the accuracy of what is held to be true. It is to be known better than the best of the cases' errors:
+    ten times, where that does not take minutes.
+    """
+
+    throw: Callable[[np.random.Generator], tuple[Section, Section]]
+    truth: str
+
+
+FAMILIES: dict[str, Family] = {
+    "design": Family(design.throw, design.TRUTH),
+    "proportions": Family(proportions.throw, proportions.TRUTH),
+    "ellipses": Family(ellipses.throw, ellipses.TRUTH),
+}

@@ -1,0 +1,69 @@
+"""Random scenes solved twice: on a mesh of chance, and to the accuracy of the truth."""
+
+from collections.abc import Iterator
+from math import isfinite
+
+import numpy as np
+from mpi4py import MPI
+
+from pipeline.plan.plan import make_plan
+from pipeline.run.execute import compute
+from pipeline.run.record import Record
+from pipeline.study.load import parse
+from pipeline.study.problems import StudyError
+from pipeline.verify.coverage.bars import Trial
+from pipeline.verify.coverage.families import FAMILIES
+from pipeline.verify.coverage.families.dice import Section
+
+SEED, COUNT = 2026, 160
+# A mesh is naive if its elements at the probe's edge are larger than this, in units of the probe's half width.
+_NAIVE = 0.35
+
+
+def trials(comm: MPI.Comm, count: int = COUNT, seed: int = SEED, family: str = "design") -> Iterator[Trial]:
+    """Yield ``count`` random trials of a family; the same seed gives the same ones; collective."""
+    random = np.random.default_rng(seed)
+    thrown = FAMILIES[family]
+    done = 0
+    while done < count:
+        scene, mesh = thrown.throw(random)
+        truth_mesh = {"accuracy": thrown.truth} | {
+            k: mesh[k] for k in ("epsilon", "outside") if mesh["outside"] != "coarse"
+        }
+        try:
+            case, truth = _solve(comm, scene, mesh, ("axisymmetric",)), _solve(comm, scene, truth_mesh)
+        except StudyError:  # the dice made no sense: a footprint over the edge, a ratio that locks
+            continue
+        done += 1
+        yield _trial(scene, mesh, case, truth)
+
+
+def _trial(scene: Section, mesh: Section, case: Record, truth: Record) -> Trial:
+    message = "; ".join(r.message for r in (case, truth) if not isfinite(r.force))
+    (declared,) = parse({**scene, "mesh": mesh}).cases()
+    rim = declared.mesh.rim_size(declared.probe.half_width) / declared.probe.half_width
+    return Trial(
+        _name(scene, mesh), case.force, case.force_error, truth.force, truth.force_error, message,
+        (declared.mesh.degree, declared.element), "naive" if rim > _NAIVE else "graded",
+        refused=not case.is_ok and not message,
+    )  # fmt: skip
+
+
+def _solve(comm: MPI.Comm, scene: Section, mesh: Section, without: tuple[str, ...] = ()) -> Record:
+    study = parse({**scene, "mesh": mesh, "solve": {"exact": False}})
+    (record,) = compute(make_plan(study, without=without), comm).values()
+    return record
+
+
+def _name(scene: Section, mesh: Section) -> str:
+    body, probe = scene["body"], scene["probe"]
+    size = f"{body['radius']} × {body['height']}" if body["shape"] == "cylinder" else " × ".join(body["size"])
+    at = f" at {probe['at'][0]}" if "at" in probe else ""
+    tool = {"disc": f"disc{at}", "blade": f"blade {probe.get('length')}"}.get(probe["shape"]) or (
+        f"ellipse {probe['axes'][0]} along {probe['direction'][0]:.2f} {probe['direction'][1]:.2f}"
+    )
+    sizes = f"rim {mesh['rim']} growth {mesh['growth']} fine {mesh['fine']}" if "rim" in mesh else "truth"
+    return (
+        f"{body['shape']} {size} on its {body['fixed']}, {tool} {probe['contact']}, ν {scene['material']['poisson']:g},"
+        f" degree {mesh.get('degree', '-')} {sizes} ε {mesh.get('epsilon', '-')} {mesh.get('outside', '')}"
+    )
