@@ -7,6 +7,7 @@ from pipeline.shapes.arrays import FloatArray, np
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.probe import Straight
+from pipeline.shapes.round import closed_ellipse, draw_ellipse
 from pipeline.shapes.section import Problems, Words
 from pipeline.units import Length
 
@@ -57,10 +58,7 @@ class Disc(Straight):
 
     def draw(self, kernel: Any, frame: Frame, units: Units) -> int:
         """Add the disc."""
-        radius = units(self.radius)
-        tag = int(kernel.addDisk(*map(units, frame.point), radius, radius))
-        frame.place(kernel, [(2, tag)], units)
-        return tag
+        return draw_ellipse(kernel, (self.radius, self.radius), frame, units)
 
     @property
     def is_curved(self) -> bool:
@@ -82,8 +80,7 @@ class Disc(Straight):
 
     def outline(self) -> FloatArray:
         """Return the circle."""
-        angle = np.linspace(0.0, 2 * pi, _ROUND + 1)
-        return self.radius * np.column_stack([np.cos(angle), np.sin(angle)])
+        return closed_ellipse((self.radius, self.radius), _ROUND)
 
     def check(self, problems: Problems) -> None:
         """Find nothing: each key says what it takes."""

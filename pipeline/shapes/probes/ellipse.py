@@ -7,6 +7,7 @@ from pipeline.shapes.arrays import FloatArray, np
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.probe import Straight, check_direction
+from pipeline.shapes.round import closed_ellipse, draw_ellipse, points_of_ellipse
 from pipeline.shapes.section import Problems, Words
 from pipeline.units import Length
 
@@ -67,14 +68,7 @@ class Ellipse(Straight):
 
     def draw(self, kernel: Any, frame: Frame, units: Units) -> int:
         """Add the ellipse."""
-        a, b = map(units, self.axes)
-        x, y, z = map(units, frame.point)
-        # The kernel wants the longer axis first.
-        tag = int(kernel.addDisk(x, y, z, max(a, b), min(a, b)))
-        if a < b:
-            kernel.rotate([(2, tag)], x, y, z, 0, 0, 1, pi / 2)
-        frame.place(kernel, [(2, tag)], units)
-        return tag
+        return draw_ellipse(kernel, self.axes, frame, units)
 
     @property
     def is_curved(self) -> bool:
@@ -84,9 +78,9 @@ class Ellipse(Straight):
     def inscribed(self, edges: int) -> Self:
         """Return the larger ellipse whose polygon of equal edges, from the end of an axis on, has this one's area."""
         angle = np.linspace(0.0, 2 * pi, _FINE + 1)
-        ellipse = self._at(angle)
+        ellipse = points_of_ellipse(self.axes, angle)
         length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ellipse, axis=0), axis=1))])
-        x, y = self._at(np.interp(np.linspace(0.0, length[-1], edges + 1), length, angle)).T
+        x, y = points_of_ellipse(self.axes, np.interp(np.linspace(0.0, length[-1], edges + 1), length, angle)).T
         polygon = float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])) / 2
         larger = sqrt(pi * self.axes[0] * self.axes[1] / polygon)
         return self.model_copy(update={"axes": (larger * self.axes[0], larger * self.axes[1])})
@@ -119,16 +113,12 @@ class Ellipse(Straight):
             slope = (x - a * cosine) * a * sine - (y - b * sine) * b * cosine
             curvature = a * cosine * x + b * sine * y + (a**2 - b**2) * (sine**2 - cosine**2)
             angle = angle - slope / curvature
-        return self._at(angle)
+        return points_of_ellipse(self.axes, angle)
 
     def outline(self) -> FloatArray:
         """Return the ellipse."""
-        return self._at(np.linspace(0.0, 2 * pi, _ROUND + 1))
+        return closed_ellipse(self.axes, _ROUND)
 
     def check(self, problems: Problems) -> None:
         """Report a direction that is not horizontal."""
         check_direction(self.direction, problems)
-
-    def _at(self, angle: FloatArray) -> FloatArray:
-        """Return the points of the ellipse at eccentric angles."""
-        return np.column_stack([self.axes[0] * np.cos(angle), self.axes[1] * np.sin(angle)])
