@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import numpy as np
 
-    from pipeline.arrays import FloatArray
+    from pipeline.arrays import BoolArray, FloatArray, IntArray
 else:
-    FloatArray = Any
+    BoolArray = FloatArray = IntArray = Any
 
     class _Numpy:
         """Stands for the module until one of its names is asked for."""
@@ -20,4 +20,4 @@ else:
 
     np = _Numpy()
 
-__all__ = ["FloatArray", "np"]
+__all__ = ["BoolArray", "FloatArray", "IntArray", "np"]

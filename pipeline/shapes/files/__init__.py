@@ -1,0 +1,1 @@
+"""Surfaces that organs are given as: STL, PLY and OBJ files, read strictly."""

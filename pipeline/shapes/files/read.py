@@ -1,0 +1,88 @@
+"""From a file to a closed surface in metres, or to what is wrong with it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from pipeline.shapes.files import obj, ply, stl
+from pipeline.shapes.files.check import made_whole
+from pipeline.shapes.files.raw import Raw
+from pipeline.shapes.triangles import SurfaceError, Triangles
+
+_PARSERS: dict[str, Callable[[bytes], Raw]] = {".stl": stl.parse, ".ply": ply.parse, ".obj": obj.parse}
+# That of 2,000,000 facets of an STL file as text.
+LARGEST_FILE = 600_000_000  # bytes
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A surface, and what was done to it that its author should know."""
+
+    triangles: Triangles
+    notices: tuple[str, ...]
+
+
+def load_surface(path: Path, unit: float, repair: bool = False, smooth: float | None = None) -> Loaded:
+    """Return the surface in an STL, PLY or OBJ file whose numbers are in a ``unit`` (m).
+
+    The file is read again only when it has changed.
+
+    Raises:
+        SurfaceError: if it does not bound one piece of tissue; says what was found, and what mends it.
+    """
+    try:
+        state = path.stat()
+    except OSError as error:
+        raise SurfaceError(f"cannot be read: {error.strerror or error}") from None
+    return _load(path, state.st_mtime_ns, state.st_size, unit, repair, smooth)
+
+
+def read_surface(path: Path, unit: float) -> Triangles:
+    """Return the surface in a file, as :func:`load_surface` does."""
+    return load_surface(path, unit).triangles
+
+
+@lru_cache(maxsize=8)
+def _load(path: Path, _changed: int, size: int, unit: float, repair: bool, smooth: float | None) -> Loaded:
+    if repair or smooth:
+        raise SurfaceError("`repair` and `smooth` are not supported")
+    if path.suffix.lower() not in _PARSERS:
+        raise SurfaceError(f"its name ends in `{path.suffix}`; read are {', '.join(_PARSERS)}")
+    if size == 0:
+        raise SurfaceError("is empty: copy or export it again")
+    if size > LARGEST_FILE:
+        raise SurfaceError(
+            f"has {size / 1e9:.2g} GB, more than {LARGEST_FILE / 1e9:.2g}: simplify it, or write it as binary"
+        )
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise SurfaceError(f"cannot be read: {error.strerror or error}") from None
+    raw = _parsed(data, path.suffix.lower())
+    triangles, notices = made_whole(raw, unit)
+    return Loaded(triangles, (*raw.notices, *notices))
+
+
+def _parsed(data: bytes, ending: str) -> Raw:
+    """Read the content as what the ending says; where that fails, say what it looks like instead."""
+    try:
+        return _PARSERS[ending](data)
+    except SurfaceError as error:
+        for other in _looks_like(data) - {ending}:
+            raise SurfaceError(
+                f"its name ends in `{ending}`, and its content is that of `{other}`: rename it"
+            ) from error
+        raise
+
+
+def _looks_like(data: bytes) -> set[str]:
+    if data.startswith(b"ply") and b"end_header" in data[:20000]:
+        return {".ply"}
+    if data.lstrip()[:5].lower() == b"solid" and b"facet normal" in data[:2000].lower():
+        return {".stl"}
+    if len(data) > 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little"):
+        return {".stl"}
+    if b"\0" not in data and b"\nv " in data[:20000] and b"\nf " in data:
+        return {".obj"}
+    return set()

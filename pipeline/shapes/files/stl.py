@@ -1,0 +1,100 @@
+"""STL, binary and text: triangles one by one, each with its own three corners."""
+
+from pipeline.shapes.arrays import FloatArray, np
+from pipeline.shapes.files.raw import Raw, is_number, limit, numbers
+from pipeline.shapes.files.weld import weld
+from pipeline.shapes.triangles import SurfaceError
+
+_HEADER, _FACET = 84, 50
+_WORDS = (b"facet normal", b"outer loop", b"endloop", b"endfacet", b"vertex")
+
+
+def parse(data: bytes) -> Raw:
+    """Read the content of an STL file.
+
+    Raises:
+        SurfaceError: if it is no STL file, or not a whole one.
+    """
+    # Many a binary file begins with the word of those in text: their length tells them apart.
+    notices: tuple[str, ...] = ()
+    promised = int.from_bytes(data[80:_HEADER], "little") if len(data) >= _HEADER else -1
+    if promised >= 0 and len(data) == _HEADER + _FACET * promised:
+        corners = _binary(data, promised)
+    elif data.lstrip()[:5].lower() == b"solid" and b"\0" not in data[:1000]:
+        corners = _text(data)
+    else:
+        corners, notices = _binary_of_another_length(data, promised)
+    points, number = weld(corners)
+    return Raw(points, number.reshape(-1, 3), notices)
+
+
+def _binary(data: bytes, count: int) -> FloatArray:
+    limit(count)
+    facet = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    facets = np.frombuffer(data, facet, count, _HEADER)
+    return facets["corners"].reshape(-1, 3).astype(np.float64)
+
+
+def _binary_of_another_length(data: bytes, promised: int) -> tuple[FloatArray, tuple[str, ...]]:
+    if promised < 0 or _is_text(data):
+        raise SurfaceError(
+            f"not an STL file: it has neither `solid` and facets as text, nor {_HEADER} bytes of header and "
+            f"{_FACET} bytes a facet; it begins with {data[:30]!r}"
+        )
+    there = (len(data) - _HEADER) // _FACET
+    if there < promised:
+        raise SurfaceError(
+            f"truncated: its header says {promised:,} facets, {there:,} are there: copy or export it again"
+        )
+    extra = len(data) - _HEADER - _FACET * promised
+    return _binary(data, promised), (f"{extra:,} bytes after the last facet are not read",)
+
+
+def _is_text(data: bytes) -> bool:
+    return all(32 <= byte < 127 or byte in b"\t\r\n" for byte in data[:_HEADER])
+
+
+def _text(data: bytes) -> FloatArray:
+    """Return the corners (3m, 3) of facets written as text, one ``solid`` after another."""
+    content = data.lower()
+    count = content.count(b"endfacet")
+    limit(count)
+    bare = _without_names(content)
+    if content.rfind(b"endsolid") < content.rfind(b"facet"):
+        raise SurfaceError(
+            f"truncated: it ends without `endsolid`, after {count:,} whole facets: copy or export it again"
+        )
+    for word in _WORDS:
+        if bare.count(word) != count * (3 if word == b"vertex" else 1):
+            raise SurfaceError(
+                f"{bare.count(word):,} times `{word.decode()}` in {count:,} facets: not a whole STL file, or facets "
+                "that are no triangles; export it again"
+            )
+    for word in _WORDS:
+        bare = bare.replace(word, b"")
+    values = numbers(bare)
+    if values is None or len(values) != 12 * count:
+        raise SurfaceError(_fault(content))
+    return values.reshape(count, 12)[:, 3:].reshape(-1, 3)
+
+
+def _without_names(content: bytes) -> bytes:
+    """Return the text without the lines of ``solid`` and ``endsolid``, whose names may be anything."""
+    parts, start = [], 0
+    while (found := content.find(b"solid", start)) >= 0:
+        begin = content.rfind(b"\n", 0, found) + 1
+        parts.append(content[start : max(begin, start)])
+        end = content.find(b"\n", found)
+        start = len(content) if end < 0 else end
+    return b"".join([*parts, content[start:]])
+
+
+def _fault(content: bytes) -> str:
+    """Say which line is not as it should be."""
+    for number, line in enumerate(content.splitlines(), 1):
+        words = line.split()
+        values = {b"vertex": words[1:], b"facet": words[2:]}.get(words[0]) if words else None
+        if values is not None and (len(values) != 3 or not all(map(is_number, values))):
+            found = line.strip().decode(errors="replace")[:60]
+            return f"line {number:,}, `{found}`, has not three numbers: export it again"
+    return "numbers that belong to no facet: export it again"

@@ -1,0 +1,71 @@
+"""A closed surface of triangles, as segmentation gives an organ, and what is wrong with one that is not."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
+
+from pipeline.shapes.arrays import FloatArray, IntArray, np
+from pipeline.shapes.frame import Vector
+
+
+class SurfaceError(ValueError):
+    """A file that does not bound a piece of tissue: says what was found in it, and what mends it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """The boundary of one piece of tissue.
+
+    ``points`` (n, 3) in m, none of them twice and none without facets; ``facets`` (m, 3) numbers of points, each seen
+    counter-clockwise from outside. Every edge belongs to two facets. Neither array may be written to.
+    """
+
+    points: FloatArray
+    facets: IntArray
+
+    def __post_init__(self) -> None:
+        for array in (self.points, self.facets):
+            array.setflags(write=False)
+
+    @cached_property
+    def volume(self) -> float:
+        """Volume (m³) within."""
+        return enclosed(self.points, self.facets)
+
+    @cached_property
+    def area(self) -> float:
+        """Area (m²)."""
+        return float(np.linalg.norm(doubled_normals(self.points, self.facets), axis=1).sum()) / 2
+
+    @cached_property
+    def bounds(self) -> tuple[Vector, Vector]:
+        """Lowest and highest coordinates (m)."""
+        low, high = self.points.min(axis=0).tolist(), self.points.max(axis=0).tolist()
+        return (low[0], low[1], low[2]), (high[0], high[1], high[2])
+
+    @cached_property
+    def extent(self) -> float:
+        """Largest extent (m) along an axis of coordinates."""
+        low, high = self.bounds
+        return max(top - bottom for bottom, top in zip(low, high, strict=True))
+
+    @cached_property
+    def hash(self) -> str:
+        """Hash of its points and facets: what meshes of it are known by."""
+        content = sha256(f"{self.points.shape}{self.facets.shape}".encode())
+        content.update(np.ascontiguousarray(self.points, dtype="<f8").data)
+        content.update(np.ascontiguousarray(self.facets, dtype="<i8").data)
+        return content.hexdigest()
+
+
+def doubled_normals(points: FloatArray, facets: IntArray) -> FloatArray:
+    """Return the normals (m, 3) of facets, twice as long as the facets are large."""
+    a, b, c = (points[facets[:, k]] for k in range(3))
+    return np.cross(b - a, c - a)
+
+
+def enclosed(points: FloatArray, facets: IntArray) -> float:
+    """Return the volume within closed facets, negative where they are seen clockwise from outside."""
+    # From the middle of the points: from a far origin, what cancels would take the digits with it.
+    a, b, c = (points[facets[:, k]] - points.mean(axis=0) for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
