@@ -18,7 +18,7 @@ from pipeline.arrays import BoolArray
 from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import distribute
 from pipeline.mesh.generate import MeshArrays
-from pipeline.solve.compiled import EVERYWHERE, cellwise_space, form, vector_space
+from pipeline.solve.compiled import cellwise_space, form, vector_space
 from pipeline.solve.straight import has_kernel, suits
 from pipeline.solve.straight.stiffness import cell_kernel
 
@@ -64,7 +64,7 @@ class ElasticForms:
         degree, mesh = compat.degree(self._space), self._space.mesh
         if suits(self._space) or not has_kernel(degree):
             return {}
-        return {EVERYWHERE if curved_cells(mesh) is None else _STRAIGHT: cell_kernel(degree)}
+        return {compat.EVERYWHERE if curved_cells(mesh) is None else _STRAIGHT: cell_kernel(degree)}
 
     def _form(self, name: str, u: Any, measure: Any, kernels: dict[int, int] | None = None) -> Any:
         v, (lame_lambda, lame_mu) = ufl.TestFunction(self._space), self.lame

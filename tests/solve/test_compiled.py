@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from pipeline import compat
 from pipeline.solve.cache import compiling, form_cache
-from pipeline.solve.compiled import EVERYWHERE, form, scalar_space, vector_space
+from pipeline.solve.compiled import form, scalar_space, vector_space
 from pipeline.solve.straight import arrays
 from pipeline.solve.straight.stiffness import cell_kernel
 from tests.cases import force
@@ -71,7 +71,7 @@ def test_a_plain_form_has_the_generated_kernel(degree):
     space = vector_space(make_mesh(mesh={"degree": 1, "fine": "8 mm", "rim": "3 mm"}).mesh, degree)
     expression = stiffness(space)
     address = cell_kernel(degree)
-    own = form(expression, kernels={EVERYWHERE: address})
+    own = form(expression, kernels={compat.EVERYWHERE: address})
     jit = {"cache_dir": str(form_cache()), "cffi_extra_compile_args": ["-O2", "-march=native"]}
     key = "jit_options" if "jit_options" in inspect.signature(fem.form).parameters else "jit_params"
     plain = fem.form(expression, **{key: jit})
@@ -92,7 +92,7 @@ def test_a_kernel_of_ones_own_is_used():
     other = (lame[0] + lame[1]) * ufl.inner(u, v) * ufl.dx
     mass, replaced, wanted = (
         compat.assemble_matrix(f, [], 1.0, "aij")
-        for f in (form(other), form(other, kernels={EVERYWHERE: cell_kernel(2)}), form(stiffness(space)))
+        for f in (form(other), form(other, kernels={compat.EVERYWHERE: cell_kernel(2)}), form(stiffness(space)))
     )
     assert abs(mass.norm() / wanted.norm() - 1) > 0.5
     replaced.axpy(-1.0, wanted)

@@ -1,0 +1,25 @@
+"""The one place that knows that versions of dolfinx and gmsh differ (0.5.2 to 0.10; 4.8 to 4.13).
+
+Everything is decided by what a library offers, never by its version number.
+"""
+
+import dolfinx
+import gmsh
+from petsc4py import PETSc
+
+from pipeline.compat.code import EVERYWHERE, Code, compile_code, function_space, make_form
+from pipeline.compat.elements import cell_dofs, degree, element, mixed_element, reference_element
+from pipeline.compat.matrices import add_matrix, assemble_matrix, dirichletbc
+from pipeline.compat.meshes import cell_tags, create_mesh, geometry_dofs, gmsh_session, original_cells
+
+__all__ = [
+    "EVERYWHERE", "Code", "add_matrix", "assemble_matrix", "cell_dofs", "cell_tags", "compile_code", "create_mesh",
+    "degree", "dirichletbc", "element", "function_space", "geometry_dofs", "gmsh_session", "make_form",
+    "mixed_element", "original_cells", "reference_element", "versions",
+]  # fmt: skip
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of the libraries that a force depends on."""
+    petsc = ".".join(map(str, PETSc.Sys.getVersion()))
+    return {"dolfinx": str(dolfinx.__version__), "petsc": petsc, "gmsh": str(gmsh.__version__)}

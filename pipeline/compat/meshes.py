@@ -1,0 +1,67 @@
+"""Meshes: gmsh, and how dolfinx takes and numbers them."""
+
+import inspect
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import basix
+import dolfinx
+import gmsh
+import numpy as np
+import ufl
+from mpi4py import MPI
+
+
+@contextmanager
+def gmsh_session() -> Iterator[None]:
+    """Start and end gmsh, leaving Python's handling of Ctrl-C as it was.
+
+    gmsh 4.8 changes it when imported and when finalized, later versions when initialized.
+    """
+    handler = signal.getsignal(signal.SIGINT)
+    gmsh.initialize([""], readConfigFiles=False)
+    signal.signal(signal.SIGINT, handler)
+    try:
+        yield
+    finally:
+        gmsh.finalize()
+        signal.signal(signal.SIGINT, handler)
+
+
+def _coordinate_element(cell: str, order: int, dim: int) -> Any:
+    if hasattr(ufl, "VectorElement"):
+        # ffcx 0.5 writes this variant into the element when it first compiles a form on the mesh, which changes the
+        # name under which every later form on it is looked up in the cache.
+        return ufl.VectorElement("Lagrange", cell, order, dim=dim, variant="equispaced")
+    return basix.ufl.element("Lagrange", cell, order, shape=(dim,))
+
+
+def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray, order: int) -> Any:
+    """Create a distributed mesh of tetrahedra, or in the plane of triangles; collective, arrays only on rank 0."""
+    dim = comm.bcast(points.shape[1] if comm.rank == 0 else 0)
+    domain = ufl.Mesh(_coordinate_element("tetrahedron" if dim == 3 else "triangle", order, dim))
+    names = inspect.signature(dolfinx.mesh.create_mesh).parameters
+    keyword = "domain" if "domain" in names else "e"
+    return dolfinx.mesh.create_mesh(comm, cells=cells, x=points, **{keyword: domain})
+
+
+def geometry_dofs(mesh: Any) -> np.ndarray:
+    """Return the geometry nodes of each local cell (owned and ghosts), shape (cells, nodes per cell)."""
+    dofmap = mesh.geometry.dofmap if hasattr(mesh.geometry, "dofmap") else mesh.geometry.dofmaps[0]
+    array = dofmap.array if hasattr(dofmap, "array") else np.asarray(dofmap)
+    topology = mesh.topology.index_map(mesh.topology.dim)
+    return array.reshape(topology.size_local + topology.num_ghosts, -1)
+
+
+def original_cells(mesh: Any) -> np.ndarray:
+    """Return, for each local cell, its number in the arrays that the mesh was made of."""
+    return np.asarray(mesh.topology.original_cell_index, dtype=np.int64)
+
+
+def cell_tags(mesh: Any, values: np.ndarray) -> Any:
+    """Return tags of all local cells (owned and ghosts)."""
+    return dolfinx.mesh.meshtags(
+        mesh, mesh.topology.dim, np.arange(len(values), dtype=np.int32), values.astype(np.int32)
+    )
