@@ -5,19 +5,19 @@ from math import inf, isfinite
 
 from pipeline.quantities import symbol, write
 from pipeline.report.correction import Correction
-from pipeline.report.guide import Guide
+from pipeline.report.guideline import Guideline
 from pipeline.report.table import Labels, words
 from pipeline.report.verdict import Verdict
 
 
-def text(guide: Guide) -> str:
+def text(guide: Guideline) -> str:
     """Return the answer, the settings, the law of correction and what is left out, as lines."""
     parts = [[guide.title], _question(guide), answer(guide), _per_outside(guide), _settings(guide)]
     parts += [_constancy(guide), _left_out(guide)]
     return "\n\n".join("\n".join(part) for part in parts if part and part[0])
 
 
-def _question(guide: Guide) -> list[str]:
+def _question(guide: Guideline) -> list[str]:
     axes = " × ".join(f"{length} {name}" for name, length in guide.axes)
     wanted = [f"F within {percent(guide.accuracy)} of F_exact, error bars included"] if isfinite(guide.accuracy) else []
     wanted += [f"at most {time(guide.budget)} a case"] if isfinite(guide.budget) else []
@@ -25,7 +25,7 @@ def _question(guide: Guide) -> list[str]:
     return [f"Asked for: {', '.join(wanted)}, over {scenes}."]
 
 
-def answer(guide: Guide) -> list[str]:
+def answer(guide: Guideline) -> list[str]:
     """Return the chosen setting, what it costs and what limits it, and the one with the law of correction."""
     if guide.answer is None:
         lines = [f"No setting of this study does that{_nearest(guide)}"]
@@ -53,7 +53,7 @@ def answer(guide: Guide) -> list[str]:
     return lines
 
 
-def _nearest(guide: Guide) -> str:
+def _nearest(guide: Guideline) -> str:
     if guide.best:
         return f"; best reached: {words(guide.best.labels)}"
     if not any(v.is_judged for v in guide.verdicts):
@@ -62,7 +62,7 @@ def _nearest(guide: Guide) -> str:
     return f"; the quickest takes {time(quickest.seconds)}: {words(quickest.labels)}"
 
 
-def _details(verdict: Verdict, guide: Guide) -> list[str]:
+def _details(verdict: Verdict, guide: Guideline) -> list[str]:
     margin = guide.accuracy - verdict.error
     spare = f" (margin {percent(margin)})" if isfinite(margin) and margin >= 0 else ""
     limit = f" at {words(verdict.limit)}" if verdict.limit else ""
@@ -74,7 +74,7 @@ def _details(verdict: Verdict, guide: Guide) -> list[str]:
     ]
 
 
-def _per_outside(guide: Guide) -> list[str]:
+def _per_outside(guide: Guideline) -> list[str]:
     """Return the answer for each value of outside, where there is more than one and an accuracy to keep."""
     answers = guide.of_each_outside()
     if len(answers) < 2 or not isfinite(guide.accuracy):
@@ -87,7 +87,7 @@ def _per_outside(guide: Guide) -> list[str]:
     return table(rows)
 
 
-def _settings(guide: Guide) -> list[str]:
+def _settings(guide: Guideline) -> list[str]:
     """Return the table of all settings: error, cost, and the law of correction."""
     rows = [[*heads(guide), "worst error", "usual", "time", "unknowns", "r", "residual", "left out", "unseen"]]
     for v in in_order(guide):
@@ -106,7 +106,7 @@ def _settings(guide: Guide) -> list[str]:
     return [*table(rows, len(heads(guide))), *legend]
 
 
-def _constancy(guide: Guide) -> list[str]:
+def _constancy(guide: Guideline) -> list[str]:
     """Return the table that tells how constant F/F_max is over the scenes, and what changes it."""
     names = [name for name, length in guide.axes if length > 1]
     if not names:
@@ -123,7 +123,7 @@ def _constancy(guide: Guide) -> list[str]:
     return [title, *table(rows, len(names_of))] if len(rows) > 1 else []
 
 
-def heads(guide: Guide) -> list[str]:
+def heads(guide: Guideline) -> list[str]:
     """Return the names of what the settings differ in, ε last."""
     labels = guide.verdicts[0].labels
     return sorted((symbol(name) for name in labels), key="ε".__eq__) or ["setting"]
@@ -137,7 +137,7 @@ def cells_of(verdict: Verdict) -> list[str]:
     return [full.get(name) or write(name, labels[name]) for name in names] or ["the only one"]
 
 
-def in_order(guide: Guide) -> list[Verdict]:
+def in_order(guide: Guideline) -> list[Verdict]:
     """Return the verdicts with ε running fastest, full order last."""
 
     def place(verdict: Verdict) -> tuple[bool, str, float]:
@@ -149,7 +149,7 @@ def in_order(guide: Guide) -> list[Verdict]:
     return sorted(guide.verdicts, key=place)
 
 
-def _left_out(guide: Guide) -> list[str]:
+def _left_out(guide: Guideline) -> list[str]:
     lines = []
     if guide.lost:
         few = "; ".join(words(scene) for scene in guide.lost[:4]) + ("; …" if len(guide.lost) > 4 else "")

@@ -1,0 +1,79 @@
+"""What the cases of a study say of its mesh settings, for an accuracy and a budget."""
+
+from dataclasses import asdict, dataclass
+from math import inf
+from typing import Any
+
+from pipeline.report.table import Labels
+from pipeline.report.verdict import Verdict, choose
+
+
+@dataclass(frozen=True)
+class Guideline:
+    """The answer for ``accuracy`` (relative) and ``budget`` (s a case); infinite where not asked for.
+
+    ``answer`` is the chosen setting, ``corrected`` the one with F_exact ≈ F / r, ``best`` and ``best_corrected`` the
+    most accurate there are within the budget; None if there is none. ``lean`` has the fewest unknowns of those
+    that keep the accuracy. ``left_out`` counts the scenes lost to every setting, by reason, and ``unjudged`` the cases
+    that keep settings from being judged.
+    """
+
+    title: str
+    accuracy: float
+    budget: float
+    scenes: int
+    axes: tuple[tuple[str, int], ...]
+    verdicts: tuple[Verdict, ...]
+    answer: Verdict | None
+    corrected: Verdict | None
+    best: Verdict | None
+    best_corrected: Verdict | None
+    lean: Verdict | None
+    left_out: tuple[tuple[str, int], ...]
+    unjudged: tuple[tuple[str, int], ...]
+    lost: tuple[Labels, ...]
+    has_full: bool
+    timing: str
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the table behind the answer, a row for each setting, in SI units; full order is ε = infinity."""
+        return [_row(verdict, self) for verdict in self.verdicts]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain data, in SI units: dictionaries, lists, texts and numbers."""
+        chosen = ("answer", "corrected", "best", "best_corrected", "lean")
+        rows = dict(zip(map(id, self.verdicts), self.rows(), strict=True))
+        return {
+            "title": self.title, "accuracy": self.accuracy, "budget": self.budget, "scenes": self.scenes,
+            "axes": dict(self.axes), **{name: rows.get(id(getattr(self, name))) for name in chosen},
+            "outside": {
+                name: {"answer": rows.get(id(plain)), "corrected": rows.get(id(law))}
+                for name, (plain, law) in self.of_each_outside().items()
+            },
+            "settings": list(rows.values()), "left_out": dict(self.left_out), "lost": list(self.lost),
+            "unjudged": dict(self.unjudged), "timing": self.timing,
+        }  # fmt: skip
+
+    def of_each_outside(self) -> dict[str, tuple[Verdict | None, Verdict | None]]:
+        """Return, for each swept value of outside, the answer as F stands and the corrected one."""
+        names = dict.fromkeys(v.labels["outside"] for v in self.verdicts if "outside" in v.labels)
+        groups = {
+            name: tuple(v for v in self.verdicts if v.labels["outside"] == name or v.labels.get("epsilon") == inf)
+            for name in names
+        }
+        return {
+            name: (choose(group, self.accuracy, self.budget), choose(group, self.accuracy, self.budget, corrected=True))
+            for name, group in groups.items()
+        }
+
+
+def _row(verdict: Verdict, guideline: Guideline) -> dict[str, Any]:
+    plain = {k: v for k, v in verdict.__dict__.items() if k not in ("labels", "mesh", "spread", "correction")}
+    spread = verdict.spread
+    keeps = verdict.is_judged and verdict.error <= guideline.accuracy and verdict.seconds <= guideline.budget
+    return {
+        **verdict.labels, "mesh": verdict.mesh, **plain, "judged": verdict.is_judged, "keeps": bool(keeps),
+        "ratio_min": spread.least, "ratio_max": spread.most, "ratio_spread": spread.width,
+        "ratio_spread_relative": spread.relative, "ratio_spread_over": dict(spread.over),
+        "correction": asdict(verdict.correction),
+    }  # fmt: skip
