@@ -1,6 +1,5 @@
 """Small studies for the tests, solved by the program's own run."""
 
-import copy
 from typing import Any
 
 from mpi4py import MPI
@@ -10,6 +9,7 @@ from pipeline.run.execute import compute
 from pipeline.run.record import Record
 from pipeline.study.load import parse
 from pipeline.study.sweep import Study
+from tests.studies import changed
 
 BASE: dict[str, Any] = {
     "body": {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "bottom"},
@@ -24,14 +24,8 @@ BLADE: dict[str, Any] = {"action": "cut", "shape": "blade", "length": "10 mm", "
 
 
 def raw(**changes: Any) -> dict[str, Any]:
-    """Return the base study with sections updated, or replaced where ``shape`` changes; None removes a key."""
-    study = copy.deepcopy(BASE)
-    for section, values in changes.items():
-        replaced = not isinstance(values, dict) or "shape" in values or section not in study
-        study[section] = values if replaced else {**study[section], **values}
-        if isinstance(study[section], dict):
-            study[section] = {key: value for key, value in study[section].items() if value is not None}
-    return study
+    """Return the base study with changes: see :func:`tests.studies.changed`."""
+    return changed(BASE, **changes)
 
 
 def study(**changes: Any) -> Study:

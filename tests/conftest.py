@@ -3,26 +3,9 @@
 import pytest
 
 from tests import commands
+from tests.studies import small_text
 
-SMALL = """
-title = "small"
-[body]
-shape = "box"
-size = ["20 mm", "20 mm", "10 mm"]
-[material]
-young = "10 kPa"
-poisson = [0.3, 0.4]
-[probe]
-shape = "disc"
-radius = "2 mm"
-depth = "0.1 mm"
-[mesh]
-epsilon = ["4 mm", "6 mm", "full"]
-fine = "2 mm"
-coarse = "4 mm"
-rim = "0.5 mm"
-outside = ["coarse", "free"]
-"""
+SMALL = small_text(material={"poisson": [0.3, 0.4]}, mesh={"outside": ["coarse", "free"]})
 
 
 @pytest.fixture(scope="session")

@@ -10,27 +10,13 @@ from mpi4py import MPI
 
 import pipeline
 from pipeline.plan.plan import Plan
+from tests.studies import small_text
 
 WORLD = MPI.COMM_WORLD
-TEXT = """
-title = "small"
-[body]
-shape = "box"
-size = ["20 mm", "20 mm", "10 mm"]
-[material]
-young = ["10 kPa", "20 kPa"]
-poisson = 0.3
-[probe]
-shape = "disc"
-radius = "2 mm"
-depth = "0.1 mm"
-[mesh]
-epsilon = ["4 mm", "full"]
-fine = "3 mm"
-coarse = "5 mm"
-rim = "0.5 mm"
-outside = "free"
-"""
+TEXT = small_text(
+    material={"young": ["10 kPa", "20 kPa"]},
+    mesh={"epsilon": ["4 mm", "full"], "fine": "3 mm", "coarse": "5 mm", "outside": "free"},
+)
 
 
 @pytest.fixture

@@ -12,31 +12,15 @@ from typer.testing import Result
 
 from tests.commands import epsmesh
 from tests.compare import all_done, assert_same
+from tests.studies import small_text
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="runs studies by itself")
 
-SMALL = """
-title = "small"
-[body]
-shape = "box"
-size = ["20 mm", "20 mm", "10 mm"]
-[material]
-young = ["5 kPa", "10 kPa"]
-poisson = [0.3, 0.4]
-[probe]
-shape = "disc"
-radius = "2 mm"
-depth = "0.1 mm"
-[mesh]
-epsilon = ["4 mm", "6 mm", "full"]
-fine = "2 mm"
-coarse = "4 mm"
-rim = "0.5 mm"
-growth = 0.8
-outside = ["coarse", "free"]
-[solve]
-exact = false
-"""
+SMALL = small_text(
+    material={"young": ["5 kPa", "10 kPa"], "poisson": [0.3, 0.4]},
+    mesh={"growth": 0.8, "outside": ["coarse", "free"]},
+    solve={"exact": False},
+)
 
 
 @pytest.fixture(scope="module")

@@ -17,6 +17,7 @@ import pytest
 from pipeline.run.reading import read_rows
 from pipeline.run.store import StoreError
 from tests.compare import all_done, assert_same
+from tests.studies import small_text
 
 pytestmark = pytest.mark.slurm
 
@@ -24,25 +25,13 @@ HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 JOBS = "scripts/slurm"
 # Meshes fine enough for a job to be caught in the middle of its work.
-STUDY = """
-title = "cluster"
-[body]
-shape = "box"
-size = ["20 mm", "20 mm", "10 mm"]
-[material]
-young = "10 kPa"
-poisson = [0.3, 0.4]
-[probe]
-shape = "disc"
-radius = "2 mm"
-depth = "0.1 mm"
-[mesh]
-epsilon = ["4 mm", "5 mm", "6 mm", "full"]
-fine = "1.2 mm"
-coarse = "4 mm"
-rim = "0.2 mm"
-outside = ["coarse", "free"]
-"""
+STUDY = small_text(
+    "cluster",
+    material={"poisson": [0.3, 0.4]},
+    mesh={
+        "epsilon": ["4 mm", "5 mm", "6 mm", "full"], "fine": "1.2 mm", "rim": "0.2 mm", "outside": ["coarse", "free"],
+    },
+)  # fmt: skip
 FINAL = ("COMPLETED", "FAILED", "TIMEOUT", "OUT_OF_MEMORY")  # on its way back into the queue a job may be CANCELLED
 PATIENCE = 400.0  # seconds, on a machine that is busy with other things
 

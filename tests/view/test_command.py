@@ -6,34 +6,17 @@ import pytest
 from mpi4py import MPI
 
 from tests.commands import epsmesh
+from tests.studies import small_text
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="one process")
 
-STUDY = """
-title = "small"
-[body]
-shape = "box"
-size = ["20 mm", "20 mm", "10 mm"]
-[material]
-young = "10 kPa"
-poisson = 0.3
-[[probe]]
-name = "disc, blunt"
-shape = "disc"
-radius = "2 mm"
-depth = "0.1 mm"
-[[probe]]
-name = "disc, thin"
-shape = "disc"
-radius = "1 mm"
-depth = "0.1 mm"
-[mesh]
-epsilon = ["2 mm", "4 mm"]
-fine = "2 mm"
-coarse = "4 mm"
-rim = "0.5 mm"
-outside = ["coarse", "fixed"]
-"""
+STUDY = small_text(
+    probe=[
+        {"name": "disc, blunt", "shape": "disc", "radius": "2 mm", "depth": "0.1 mm"},
+        {"name": "disc, thin", "shape": "disc", "radius": "1 mm", "depth": "0.1 mm"},
+    ],
+    mesh={"epsilon": ["2 mm", "4 mm"], "outside": ["coarse", "fixed"]},
+)
 
 
 @pytest.fixture
