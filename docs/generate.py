@@ -11,9 +11,8 @@ import typer
 from pipeline.cli import app
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build
-from pipeline.study.keys import SECTION_TEXTS, keys_of
+from pipeline.study.keys import SECTION_TEXTS, all_sections, heading, keys_of
 from pipeline.study.load import parse
-from pipeline.study.schema import SECTIONS
 from pipeline.study.starter import starter
 
 
@@ -34,10 +33,10 @@ def study_page() -> str:
         "(`[[probe]]`), labelled by the tables' `name`. Quantities are text with a unit (`\"10 mm\"`, `\"12 kPa\"`, "
         "`\"1 %\"`): prefixes of metre and pascal, `bar`, and `%`. `title` stands before the sections.",
     ]  # fmt: skip
-    for section in SECTIONS:
+    for section in all_sections():
         lines += [
             "",
-            f"## `[{section}]`",
+            f"## `{heading(section)}`",
             "",
             SECTION_TEXTS[section],
             "",
@@ -60,8 +59,8 @@ def dataset_page() -> str:
         "# Dataset", "",
         "`results/<study>.nc`: netCDF4, SI units, CF attributes. Its dimensions are what the study sweeps, in the "
         "file's order, with coordinates named like the keys of `body`, `material`, `probe` and `mesh`. An array of "
-        "tables gives the dimension `probe` or `body`; a radius or shape is `probe_radius`, `body_radius`. `epsilon` "
-        "is infinite for the full order.", "",
+        "tables gives the dimension `probe` or `body`; a radius or shape is `probe_radius`, `body_radius`; a key of a "
+        "layer or an inclusion has its name before it, `skin_young`. `epsilon` is infinite for the full order.", "",
         *_table(("variable", "unit", "meaning")),
     ]  # fmt: skip
     for name, variable in sorted(dataset.data_vars.items()):

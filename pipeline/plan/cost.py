@@ -150,7 +150,7 @@ def _row(cells: float, poisson: float) -> _Numbers:
 
 def _poisson(case: Case) -> float:
     """Return ν, as far as the cost depends on it: that of the mixed element does not."""
-    return 0.3 if case.element == "mixed" else case.material.poisson
+    return 0.3 if case.element == "mixed" else case.poisson
 
 
 def _prior(stage: str, kind: str) -> _Numbers:

@@ -8,6 +8,7 @@ from math import inf
 from typing import Any
 
 from pipeline.plan.symmetry import mirror_planes, model_planes
+from pipeline.shapes.body import Body
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.study.schema import Mesh
@@ -19,7 +20,9 @@ PHYSICS_VERSION = 5
 
 _MANY = 200_000  # sections of a large study
 # Keys that came later, with the value that stands for what was before: records of then stay valid.
-_LATER = {"motion": "press"}
+_LATER: dict[str, Any] = {"motion": "press", "layers": (), "inclusion": ()}
+# What a body may hold of other materials.
+_PIECES = ("layers", "inclusion")
 
 
 def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
@@ -30,7 +33,7 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
     """
     parts = [
         str(PHYSICS_VERSION),
-        text_of(case.body),
+        _body_text(case.body, case.scale.stress if scaled else 1.0),
         text_of(case.material, case.material.PROPORTIONAL_TO if scaled else ()),
         text_of(case.probe, case.probe.PROPORTIONAL_TO if scaled else ()),
         _ratios_text(case.probe) if scaled else "",
@@ -47,7 +50,7 @@ def reference_key(case: Case, accuracy: float) -> str:
     probe = case.probe.model_copy(update={"motion": "press"})
     ratios = "0.0" if _slides_across_a_mirror(case) else _ratios_text(probe)
     parts = [
-        f"{PHYSICS_VERSION} exact {accuracy!r}", text_of(case.body),
+        f"{PHYSICS_VERSION} exact {accuracy!r}", _body_text(case.body, case.scale.stress),
         text_of(case.material, case.material.PROPORTIONAL_TO), text_of(probe, probe.PROPORTIONAL_TO), ratios,
     ]  # fmt: skip
     return digest("\n".join(parts))
@@ -57,7 +60,7 @@ def mesh_key(case: Case) -> str:
     """Key of the case's mesh: body, footprint, sizes, and whether elements are straight or curved."""
     sizes = _mesh_text(case.mesh, case.is_full, case.probe.half_width, "")
     footprint = text_of(case.probe, ("action", "depth", "contact", "slice", "motion"))
-    return digest("\n".join([text_of(case.body), footprint, sizes, str(case.mesh.degree > 1)]))
+    return digest("\n".join([_body_text(case.body), footprint, sizes, str(case.mesh.degree > 1)]))
 
 
 def operator_key(case: Case) -> str:
@@ -72,7 +75,8 @@ def normalised(case: Case) -> Case:
         travel = {key: float(number == 0) for number, key in enumerate(travel)}
     pressed: dict[str, Any] = {**travel, "motion": "press"}
     material = case.material.model_copy(update={"young": 1.0})
-    return replace(case, material=material, probe=case.probe.model_copy(update=pressed))
+    body = _in_units_of(case.scale.stress, case.body)
+    return replace(case, body=body, material=material, probe=case.probe.model_copy(update=pressed))
 
 
 @lru_cache(_MANY)
@@ -80,6 +84,33 @@ def _ratios(probe: Probe) -> dict[str, float]:
     """Return all that F is proportional to, for a unit of the first of them: how far a blade slices for each depth."""
     values = {key: getattr(probe, key) for key in probe.PROPORTIONAL_TO}
     return {key: canonical(value / values[probe.PROPORTIONAL_TO[0]]) for key, value in values.items()}
+
+
+@lru_cache(_MANY)
+def _in_units_of(stress: float, body: Body) -> Body:
+    """Return the body with its regions' Young's moduli in units of ``stress`` (Pa)."""
+    changes = {
+        key: tuple(piece.model_copy(update={"young": canonical(piece.young / stress)}) for piece in getattr(body, key))
+        for key in _PIECES if getattr(body, key, ())
+    }  # fmt: skip
+    return body.model_copy(update=changes) if changes else body
+
+
+@lru_cache(_MANY)
+def _body_text(body: Body, stress: float | None = None) -> str:
+    """Write a body in canonical form, moduli in units of ``stress`` (Pa); without it, its geometry alone."""
+    if not body.regions:
+        return text_of(body)
+    content = (body if stress is None else _in_units_of(stress, body)).model_dump()
+    ends = (*body.interfaces, body.heights[0])
+    for number, layer in enumerate(content.get("layers", ())):
+        layer["thickness"] = ends[number]  # where it ends: one way to say it
+    for inclusion, ball in zip(content["inclusion"], body.inclusion, strict=True):
+        inclusion.update(axes=ball.surface.axes, radius=None)
+    for key in _PIECES if stress is None else ():
+        for piece in content.get(key, ()):
+            del piece["young"], piece["poisson"]
+    return _text({key: value for key, value in content.items() if _LATER.get(key) != value})
 
 
 def _ratios_text(probe: Probe) -> str:

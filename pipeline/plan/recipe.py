@@ -75,7 +75,7 @@ def _expected(case: Case, recipe: Recipe) -> float:
     thickness = 1 + _THICKNESS * min(case.probe.half_width / case.body.thickness(case.frame), _THINNEST)
     if case.element == "mixed":
         return recipe.bar * shape * thickness * _MIXED[recipe.degree]
-    locking = ((1 - 2 * case.material.poisson) / 0.4) ** -_LOCKING
+    locking = ((1 - 2 * case.poisson) / 0.4) ** -_LOCKING
     return float(recipe.bar * shape * thickness * locking)
 
 

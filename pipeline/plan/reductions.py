@@ -130,6 +130,8 @@ def _suits_a_basis(operator: OperatorStep) -> bool:
     """
     first = operator.solves[0]
     ratios = {solve.case.material.poisson for solve in operator.solves}
+    if first.case.body.regions:  # several materials are several parameters
+        return False
     plain = first.goal is None and not first.axisymmetric and first.case.element == "displacement"
     return plain and len(ratios) >= _FEWEST_RATIOS and first.case.movements == 1
 

@@ -29,7 +29,7 @@ def is_round(case: Case) -> bool:
     if probe.motion == "all":
         return False
     upright = frame.point[:2] == _ON_AXIS and frame.axis[:2] == _ON_AXIS and case.travel[:2] == _ON_AXIS
-    return upright and probe.is_round and body.half_plane() is not None and body.support.is_round()
+    return upright and probe.is_round and not body.regions and body.half_plane() is not None and body.support.is_round()
 
 
 @lru_cache(_MANY)
@@ -40,6 +40,8 @@ def _geometry(body: Body, probe: Probe) -> tuple[str, ...]:
     for number, (plane, normal) in enumerate(PLANES.items()):
         along, across = (sum(n * t for n, t in zip(normal, unit, strict=True)) for unit in (frame.along, frame.across))
         upright = frame.point[number] == frame.axis[number] == 0.0
+        # An inclusion is its own image, or there is no symmetry: pairs of images are not looked for.
+        upright = upright and all(inclusion.at[number] == 0.0 for inclusion in body.inclusion)
         if plane in held and upright and probe.is_mirrored(along, across):
             found.append(plane)
     return tuple(found)

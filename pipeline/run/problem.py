@@ -42,9 +42,15 @@ def loads_of(case: Case) -> Loads:
     return Loads.along(case.travel, apart=mirror_planes(case) != model_planes(case))
 
 
+def law_of(case: Case) -> MaterialLaw:
+    """Return what the regions of the body of ``case`` are made of."""
+    moduli = [tissue.lame for tissue in case.tissues]
+    return MaterialLaw(tuple(value for value, _ in moduli), tuple(value for _, value in moduli))
+
+
 def solve_problem(case: Case, problem: Problem, *, estimate: bool) -> Solution:
     """Solve a case; where iterations do not converge and the system is small, directly. Collective."""
-    law, loads = MaterialLaw.of(*case.material.lame), loads_of(case)
+    law, loads = law_of(case), loads_of(case)
     method, tolerance = case.solve.method, case.solve.tolerance
     try:
         return problem.solve(law, loads, method=method, tolerance=tolerance, estimate=estimate)

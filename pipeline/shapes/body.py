@@ -3,13 +3,19 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate
+from math import inf
 from typing import Annotated, Any
 
 from pipeline.shapes.arrays import FloatArray
 from pipeline.shapes.frame import Frame, Units, Vector
+from pipeline.shapes.regions import Inclusion, Layer, Region
 from pipeline.shapes.section import Section, Words
 from pipeline.shapes.support import Fixed, Support, support_of
 from pipeline.shapes.surface import Surface
+
+# Layers that miss the height by this share of it fill the body.
+_SAME = 1e-9
 
 
 @dataclass(frozen=True)
@@ -31,6 +37,24 @@ class Body(Section, ABC):
         Fixed,
         Words("Where the body is held: on its bottom, its sides, both, or everywhere below a height.", '"bottom"'),
     ] = "bottom"
+    inclusion: Annotated[
+        tuple[Inclusion, ...], Words("Balls and ellipsoids inside it, of another material.", "[[body.inclusion]]")
+    ] = ()
+
+    @property
+    def regions(self) -> tuple[Region, ...]:
+        """Its pieces of materials of their own, whose numbers in meshes begin with 1; 0 is what none of them is."""
+        return self.inclusion
+
+    @property
+    def interfaces(self) -> tuple[float, ...]:
+        """Heights z (m) at which one of its layers ends and another material begins, from the top down."""
+        return ()
+
+    @property
+    def is_filled(self) -> bool:
+        """Whether its layers leave nothing of it to any other material."""
+        return False
 
     @cached_property
     def support(self) -> Support:
@@ -86,6 +110,10 @@ class Body(Section, ABC):
         """Return a distance (m) from the point of contact within which the whole body lies."""
 
     @abstractmethod
+    def inside(self, points: FloatArray) -> FloatArray:
+        """Return the distance (m) of points (n, 3) of the body to its surface, negative outside."""
+
+    @abstractmethod
     def gap(self, point: Vector) -> float:
         """Return the distance (m) from a point of the face that is touched to the face's edge, negative outside."""
 
@@ -126,3 +154,28 @@ class Drawn(Body):
     @abstractmethod
     def draw(self, kernel: Any, units: Units) -> int:
         """Add it to a CAD ``kernel`` (gmsh's ``occ``), in the model's ``units``; return the tag of the volume."""
+
+
+class Layered(Drawn):
+    """A body with a flat top, which may be made of horizontal layers."""
+
+    layers: Annotated[
+        tuple[Layer, ...], Words("Horizontal layers of other materials, from the top down.", "[[body.layers]]")
+    ] = ()
+
+    @property
+    def regions(self) -> tuple[Region, ...]:
+        """Its layers from the top down, then its inclusions."""
+        return (*self.layers, *self.inclusion)
+
+    @property
+    def interfaces(self) -> tuple[float, ...]:
+        """Heights z (m) at which one of its layers ends and another material begins, from the top down."""
+        low, high = self.heights
+        ends = (high - total for total in accumulate(layer.thickness or inf for layer in self.layers))
+        return tuple(end for end in ends if end - low > _SAME * (high - low))
+
+    @property
+    def is_filled(self) -> bool:
+        """Whether its layers reach the bottom."""
+        return len(self.interfaces) < len(self.layers)

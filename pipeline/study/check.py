@@ -12,6 +12,7 @@ from pipeline.shapes.body import Body
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section, in_mm
 from pipeline.study.problems import Problems
+from pipeline.study.regions import tissues_of
 from pipeline.study.schema import Material, Mesh, Solving
 from pipeline.study.sweep import Axis
 
@@ -47,8 +48,8 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         _check_fit(body, probe, problems)
     for body, probe, mesh in itertools.product(bodies, placed, meshes):
         _check_gap(body, probe, mesh, problems)
-    for material, mesh in itertools.product(materials, meshes):
-        _check_locking(material, mesh, problems)
+    for body, material, mesh in itertools.product(bodies, materials, meshes):
+        _check_locking(dict(tissues_of(body, material)), mesh, problems)
     _check_reference(meshes, axes, problems)
     for solve in cast(Sequence[Solving], sections["solve"]):
         if "repeats" in solve.model_fields_set and not solve.timing:
@@ -143,30 +144,28 @@ def _check_outside(body: Body, mesh: Mesh, problems: Problems) -> None:
         )
 
 
-def _check_locking(material: Material, mesh: Mesh, problems: Problems) -> None:
-    if mesh.element_for(material.poisson) == "mixed":
-        _check_mixed(material, mesh, problems)
+def _check_locking(poissons: dict[str, float], mesh: Mesh, problems: Problems) -> None:
+    """Check elements against Poisson's ratios, by key, of all the materials of a body."""
+    if mesh.element_for(max(poissons.values())) == "mixed":
+        _check_mixed(max(poissons.values()), mesh, problems)
         return
     visible, most = _LOCKING[mesh.degree]
-    if material.poisson > most:
-        problems.error(
-            "material.poisson",
-            material.poisson,
-            f"displacement elements of degree {mesh.degree} lock: must be at most {most}; "
-            'with degree 2 or 3 and element = "auto", mixed elements take values up to 0.5',
-        )
-    elif material.poisson > visible or material.poisson == most:
-        problems.warn(
-            "material.poisson",
-            material.poisson,
-            f"displacement elements of degree {mesh.degree} lock at this value: F comes out too high",
-        )
+    for key, poisson in poissons.items():
+        if poisson > most:
+            problems.error(
+                key, poisson, f"displacement elements of degree {mesh.degree} lock: must be at most {most}; "
+                'with degree 2 or 3 and element = "auto", mixed elements take values up to 0.5',
+            )  # fmt: skip
+        elif poisson > visible or poisson == most:
+            problems.warn(
+                key, poisson, f"displacement elements of degree {mesh.degree} lock at this value: F comes out too high"
+            )
 
 
-def _check_mixed(material: Material, mesh: Mesh, problems: Problems) -> None:
+def _check_mixed(largest: float, mesh: Mesh, problems: Problems) -> None:
     if mesh.degree == 1:
         problems.error("mesh.element", mesh.element, "there is no stable mixed element of degree 1: use 2 or 3")
-    if material.poisson <= _LEAST_MIXED:
+    if largest <= _LEAST_MIXED:
         problems.error(
             "mesh.element", mesh.element, f"mixed elements are for Poisson's ratios above {_LEAST_MIXED}; "
             'use "auto" or "displacement"',

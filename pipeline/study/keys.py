@@ -12,7 +12,7 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from pipeline.shapes.section import Section, Words
-from pipeline.study.schema import SECTIONS
+from pipeline.study.schema import NESTED, SECTIONS
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,11 @@ class Key:
 
 SECTION_TEXTS = {
     "body": "The tissue, in its own coordinates: z points out of the top face, tissue lies at z <= 0.",
-    "material": "Isotropic, linear elastic tissue.",
+    "body.layers": "Horizontal layers of other materials under a flat top, one table each, from the top down. "
+    "Optional; every value can be swept.",
+    "body.inclusion": "Balls and ellipsoids of other materials inside the body, one table each: clear of its surface, "
+    "of each other and of where layers end. Optional; every value can be swept.",
+    "material": "Isotropic, linear elastic tissue: what no layer or inclusion is. Left out where layers fill the body.",
     "probe": "The tool, and how it moves.",
     "mesh": "Element sizes, elements, and what is kept of the body.",
     "solve": "How cases are solved and timed. Optional; lists are no sweeps here.",
@@ -47,9 +51,11 @@ def keys_of(section: str) -> tuple[Key, ...]:
     """Return every key that a section may hold, those of all its shapes: one for each meaning that it has."""
     models = shapes_of(section)
     found: dict[str, dict[str, list[str]]] = {}
+    # A section's name labels it; a piece's is a key like others.
+    hidden = {*NESTED.get(section, ()), *(() if "." in section else ("name",))}
     for shape, model in models.items():
         for name in model.model_fields:
-            if name != "name":
+            if name not in hidden:
                 found.setdefault(name, {}).setdefault(words_of(model, name).text, []).append(shape)
     keys = []
     for name, shapes in ((name, shapes) for name, meanings in found.items() for shapes in meanings.values()):
@@ -61,9 +67,22 @@ def keys_of(section: str) -> tuple[Key, ...]:
     return tuple(keys)
 
 
+def all_sections() -> tuple[str, ...]:
+    """Return the names of all sections, those of arrays of tables within one after it."""
+    return tuple(
+        name for section in SECTIONS for name in (section, *(f"{section}.{key}" for key in NESTED.get(section, ())))
+    )
+
+
+def heading(section: str) -> str:
+    """Return the heading of a section as it stands in a study file."""
+    return f"[[{section}]]" if "." in section else f"[{section}]"
+
+
 def shapes_of(section: str) -> dict[str, type[Section]]:
     """Return the models of a section by shape; one without shapes has the one shape ''."""
-    model = SECTIONS[section]
+    outer, _, piece = section.partition(".")
+    model = NESTED[outer][piece] if piece else SECTIONS[section]
     return dict(model) if isinstance(model, Mapping) else {"": model}
 
 

@@ -2,7 +2,7 @@
 
 import itertools
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +11,17 @@ from pydantic import BaseModel, ValidationError
 from pipeline.shapes.registry import LATER
 from pipeline.shapes.section import Section
 from pipeline.study.check import check_sense
-from pipeline.study.problems import Problem, Problems, StudyError, nearest
-from pipeline.study.schema import LATER_KEYS, LATER_SECTIONS, SECTIONS, SINGLE, Mesh
+from pipeline.study.problems import Problem, Problems, StudyError, nearest, nested_model
+from pipeline.study.regions import check_regions, material_without_section
+from pipeline.study.schema import LATER_KEYS, LATER_SECTIONS, NESTED, SECTIONS, SINGLE, Mesh
 from pipeline.study.sweep import Axis, Study
 
 # A label needs its section's axes only; more combinations than this in one section is a slip of the pen.
 _MOST_VARIANTS = 1_000_000
+
+
+# Where a value stands within a section: keys, and numbers in arrays of tables, from 0.
+Place = tuple[str | int, ...]
 
 
 def load(path: str | Path) -> Study:
@@ -49,12 +54,20 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "") -> Study:
         axes += own_axes
         sections[name] = variants
     if not problems.errors:
+        check_regions(sections, tuple(axes), problems)
+    if not problems.errors:
+        sections["material"] = sections["material"] or (material_without_section(sections["body"]),)
         check_sense(sections, tuple(axes), problems)
     if problems.errors:
         raise StudyError(file, problems.errors)
     warnings = tuple(f"{file}: {warning}" for warning in problems.warnings)
     title = str(raw.get("title", Path(file).stem))
     return Study(file, Path(file).stem, title, text, tuple(axes), sections, warnings)
+
+
+def written(place: Place) -> str:
+    """Write a place as messages do: ``layers[2].young``."""
+    return "".join(f"[{step + 1}]" if isinstance(step, int) else f".{step}" for step in place).removeprefix(".")
 
 
 def _check_top(raw: dict[str, Any], problems: Problems) -> None:
@@ -65,7 +78,9 @@ def _check_top(raw: dict[str, Any], problems: Problems) -> None:
             problems.error(key, None, f"unknown section; {nearest(key, [*SECTIONS, 'title'])}")
         elif key == "title" and not isinstance(value, str):
             problems.error(key, value, "must be text")
-    for name in ("body", "material", "probe", "mesh"):
+    bodies = raw.get("body")
+    layered = any("layers" in table for table in (bodies if isinstance(bodies, list) else [bodies]) if table)
+    for name in ("body", *(() if layered else ("material",)), "probe", "mesh"):
         if name not in raw:
             problems.error(f"[{name}]", None, "this section is required")
     meshes = raw.get("mesh")
@@ -86,24 +101,24 @@ def _read_section(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], 
     model = _model(name, raw, problems)
     if model is None or (not raw and name not in SINGLE):
         return [], ()
-    swept = {key: value for key, value in raw.items() if name not in SINGLE and _is_sweep(model, key, value)}
-    for key, values in swept.items():
+    swept = {} if name in SINGLE else dict(_sweeps(model, raw))
+    for place, values in swept.items():
         if not values:
-            problems.error(f"{name}.{key}", values, "an empty list sweeps nothing; give at least one value")
+            problems.error(f"{name}.{written(place)}", values, "an empty list sweeps nothing; give at least one value")
     if not all(swept.values()):
         return [], ()
     singles = _validate_each(name, model, raw, swept, problems)
     if singles is None:
         return [], ()
     axes = [
-        _axis(name, key, model, values, [s[i] for i in range(len(values))], problems)
-        for (key, values), s in zip(swept.items(), singles, strict=True)
+        _axis(name, place, values, parsed, problems)
+        for (place, values), parsed in zip(swept.items(), singles, strict=True)
     ]
     combinations = list(itertools.islice(itertools.product(*swept.values()), _MOST_VARIANTS + 1))
     if len(combinations) > _MOST_VARIANTS:
         problems.error(name, None, f"sweeps more than {_MOST_VARIANTS} combinations")
         return [], ()
-    variants = [_validate(model, raw | dict(zip(swept, values, strict=True))) for values in combinations]
+    variants = [_validate(model, _placed(raw, zip(swept, values, strict=True))) for values in combinations]
     return axes, tuple(variants)
 
 
@@ -120,11 +135,10 @@ def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[
         model = _model(name, table, problems, where)
         if model is None:
             continue
-        for key, value in table.items():
-            if _is_sweep(model, key, value):
-                problems.error(
-                    f"{where}.{key}", value, "a list inside an array of tables: write one table for each value"
-                )
+        for place, value in _sweeps(model, table):
+            problems.error(
+                f"{where}.{written(place)}", value, "a list inside an array of tables: write one table for each value"
+            )
         try:
             variants.append(_validate(model, table))
         except ValidationError as error:
@@ -148,6 +162,11 @@ def _model(name: str, raw: dict[str, Any], problems: Problems, where: str = "") 
         return model
     shape = raw.get("shape")
     if isinstance(shape, str) and shape in model:
+        for key in NESTED.get(name, {}):
+            if key in raw and key not in model[shape].model_fields:
+                having = " and ".join(other for other, kind in model.items() if key in kind.model_fields)
+                problems.error(f"{where}.{key}", None, f"a {shape} has no {key}: {having} have")
+                return None
         return model[shape]
     supported = ", ".join(model)
     if shape is None:
@@ -162,27 +181,49 @@ def _model(name: str, raw: dict[str, Any], problems: Problems, where: str = "") 
     return None
 
 
+def _sweeps(model: type[BaseModel], raw: dict[str, Any], where: Place = ()) -> Iterator[tuple[Place, list[Any]]]:
+    """Yield place and values of every sweep of a section, those of the pieces in its own arrays of tables, too."""
+    for key, value in raw.items():
+        inner = nested_model(model, key)
+        if inner is not None:
+            for number, table in enumerate(value if isinstance(value, list) else ()):
+                if isinstance(table, dict):
+                    yield from _sweeps(inner, table, (*where, key, number))
+        elif _is_sweep(model, key, value):
+            yield (*where, key), value
+
+
+def _placed(raw: Any, values: Iterable[tuple[Place, Any]]) -> Any:
+    """Return ``raw`` with each value put where it belongs."""
+    for (key, *rest), value in values:
+        inner = _placed(raw[key], [(tuple(rest), value)]) if rest else value
+        raw = raw.copy()
+        raw[key] = inner
+    return raw
+
+
 def _is_sweep(model: type[BaseModel], key: str, value: Any) -> bool:
     """Tell a list of values from a list that is one value (a point, a size)."""
     if not isinstance(value, list):
         return False
     info = model.model_fields.get(key)
-    if info is not None and getattr(info.annotation, "__origin__", None) is tuple:
+    kinds = () if info is None else (info.annotation, *getattr(info.annotation, "__args__", ()))
+    if any(getattr(kind, "__origin__", None) is tuple for kind in kinds):
         return bool(value) and isinstance(value[0], list)
     return info is not None and key not in ("name", "shape")
 
 
 def _validate_each(
-    name: str, model: type[Section], raw: dict[str, Any], swept: dict[str, list[Any]], problems: Problems
+    name: str, model: type[Section], raw: dict[str, Any], swept: dict[Place, list[Any]], problems: Problems
 ) -> list[list[Section]] | None:
     """Validate each value of each sweep once, so that an error is reported once however many cases it meets."""
     before = len(problems.errors)
-    first = {key: values[0] for key, values in swept.items()}
+    first = _placed(raw, ((place, values[0]) for place, values in swept.items()))
     singles: list[list[Section]] = []
-    for key, values in swept.items() or {"": [None]}.items():
+    for place, values in swept.items() or {(): [None]}.items():
         singles.append([])
         for value in values:
-            candidate = raw | first | ({key: value} if key else {})
+            candidate = _placed(first, [(place, value)]) if place else first
             try:
                 singles[-1].append(_validate(model, candidate))
             except ValidationError as error:
@@ -197,16 +238,17 @@ def _validate(model: type[Section], raw: dict[str, Any]) -> Section:
 
 
 def _tuples(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _tuples(v) for key, v in value.items()}
     return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
 
 
-def _axis(
-    section: str, key: str, model: type[Section], raw: list[Any], parsed: list[Section], problems: Problems
-) -> Axis:
-    values = [getattr(item, key) for item in parsed]
-    info = model.model_fields[key]
-    extra: Any = info.json_schema_extra or {}
-    unit = extra.get("unit", "")
+def _axis(section: str, place: Place, raw: list[Any], parsed: list[Section], problems: Problems) -> Axis:
+    *outer, key = place
+    owners = [_at(item, outer) for item in parsed]
+    values = [getattr(owner, str(key)) for owner in owners]
+    extra: Any = type(owners[0]).model_fields[str(key)].json_schema_extra or {}
+    unit = extra.get("unit", "") or _unit_of(type(owners[0]), str(key))
     if isinstance(values[0], tuple):
         labels = [" ".join(str(part) for part in value) for value in raw]
     elif any(isinstance(value, dict) for value in raw):
@@ -215,7 +257,23 @@ def _axis(
         labels = values
     for label in dict.fromkeys(labels):
         if labels.count(label) > 1:
-            problems.error(f"{section}.{key}", raw[labels.index(label)], "stands more than once in the list")
+            problems.error(f"{section}.{written(place)}", raw[labels.index(label)], "stands more than once in the list")
     if unit == "" and all(isinstance(label, float | int) for label in labels):
         unit = "1"
-    return Axis(section, key, tuple(labels), unit)
+    if not outer:
+        return Axis(section, str(key), tuple(labels), unit)
+    return Axis(section, str(key), tuple(labels), unit, written(tuple(outer)), owners[0].name)
+
+
+def _at(section: Any, place: list[str | int]) -> Any:
+    """Return what stands at a place within a section."""
+    for step in place:
+        section = section[step] if isinstance(step, int) else getattr(section, step)
+    return section
+
+
+def _unit_of(model: type[BaseModel], key: str) -> str:
+    """Return the unit of a number that may be left out."""
+    parts = getattr(model.model_fields[key].annotation, "__args__", ())
+    extras = [getattr(m, "json_schema_extra", None) for part in parts for m in getattr(part, "__metadata__", ())]
+    return next((str(extra["unit"]) for extra in extras if isinstance(extra, dict) and "unit" in extra), "")

@@ -49,13 +49,34 @@ class Problems:
     def from_pydantic(self, prefix: str, error: ValidationError, model: type[BaseModel], raw: dict[str, Any]) -> None:
         """Translate pydantic's errors of the section ``prefix``, read from ``raw``, for the study's author."""
         for item in error.errors():
-            key = str(item["loc"][0]) if item["loc"] else ""
-            self.error(f"{prefix}.{key}".rstrip("."), raw.get(key), _allowed(item, model))
+            self._from_item(prefix, item, item["loc"], model, raw)
+
+    def _from_item(self, where: str, item: Any, place: tuple[Any, ...], model: type[BaseModel], raw: Any) -> None:
+        """Translate an error at a ``place`` within the table ``raw``, or within one of its own arrays of tables."""
+        key = str(place[0]) if place else ""
+        inner = nested_model(model, key)
+        found: Any = raw.get(key) if isinstance(raw, dict) else raw
+        if inner is not None and len(place) > 1:
+            self._from_item(f"{where}.{key}[{place[1] + 1}]", item, place[2:], inner, found[place[1]])
+        elif inner is not None or not isinstance(raw, dict):
+            what = f"must be an array of tables: write [[{where}.{key}]]" if inner else "must be a table"
+            self.error(f"{where}.{key}".rstrip("."), found, what)
+        else:
+            self.error(f"{where}.{key}".rstrip("."), found, _allowed({**item, "loc": place}, model))
 
     @staticmethod
     def _add(problems: list[Problem], problem: Problem) -> None:
         if problem not in problems:
             problems.append(problem)
+
+
+def nested_model(model: type[BaseModel], key: str) -> type[BaseModel] | None:
+    """Return the model of the tables in an array of tables under ``key``, None if there is none."""
+    annotation: Any = model.model_fields[key].annotation if key in model.model_fields else None
+    if getattr(annotation, "__origin__", None) is not tuple:
+        return None
+    kind = annotation.__args__[0]
+    return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
@@ -81,7 +102,10 @@ def _allowed(item: Any, model: type[BaseModel]) -> str:
             return f"must be {context['allowed']}"
         case "missing" | "too_short" | "too_long" | "tuple_type":
             values = getattr(model.model_fields[str(item["loc"][0])].annotation, "__args__", ())
+            values = next((kind.__args__ for kind in values if getattr(kind, "__origin__", None) is tuple), values)
             return f"must be a list of {len(values)} values"
+        case "string_pattern_mismatch":
+            return "must begin with a letter, and have letters, digits, _ and - only"
         case "not_supported":
             return item["msg"]
         case _:

@@ -9,14 +9,16 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field
 
+from pipeline.shapes.regions import Inclusion, Layer
 from pipeline.shapes.registry import BODIES, PROBES
 from pipeline.shapes.section import Section, Words
+from pipeline.shapes.tissue import Tissue
 from pipeline.units import Length, Pressure, Share, parse_quantity
 
 # ---- material ---------------------------------------------------------------------------------------
 
 
-class Material(Section):
+class Material(Tissue):
     """Isotropic linear elasticity."""
 
     young: Annotated[Pressure, Words("Young's modulus. F is proportional to it.", '"10 kPa"', is_used=True)]
@@ -33,11 +35,10 @@ class Material(Section):
     # Keys that F is proportional to, if all of them change together.
     PROPORTIONAL_TO: ClassVar[tuple[str, ...]] = ("young",)
 
-    @property
-    def lame(self) -> tuple[float, float]:
-        """Lamé's λ and μ (Pa); λ is infinite for an incompressible material."""
-        mu = self.young / (2 * (1 + self.poisson))
-        return (2 * mu * self.poisson / (1 - 2 * self.poisson) if self.poisson < 0.5 else inf), mu
+
+def material_of(tissue: Tissue) -> Material:
+    """Return the material of a layer or an inclusion."""
+    return Material.model_construct(young=tissue.young, poisson=tissue.poisson)
 
 
 # ---- mesh and solver --------------------------------------------------------------------------------
@@ -202,11 +203,13 @@ SECTIONS: dict[str, type[Section] | Mapping[str, type[Section]]] = {
     "solve": Solving,
     "plan": Planning,
 }
+# Arrays of tables within a section: pieces of it, each with keys that can be swept.
+NESTED: dict[str, dict[str, type[Section]]] = {"body": {"layers": Layer, "inclusion": Inclusion}}
 # Sections that say how, not what: their lists are no sweeps.
 SINGLE = ("solve", "plan")
 # Keys of the format that this version does not compute: named as such, not as typing errors.
 LATER_KEYS = {
-    "body": ("layers", "inclusion", "file"),
+    "body": ("file",),
     "probe": ("incision", "angle", "path"),
 }
 LATER_SECTIONS = ("load",)

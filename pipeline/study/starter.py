@@ -4,8 +4,7 @@ import json
 import textwrap
 from pathlib import Path
 
-from pipeline.study.keys import SECTION_TEXTS, Key, keys_of
-from pipeline.study.schema import SECTIONS
+from pipeline.study.keys import SECTION_TEXTS, Key, all_sections, heading, keys_of
 
 # The studies of the checkout, which are installed with the package.
 EXAMPLES = Path(__file__).parent / "examples"
@@ -19,12 +18,13 @@ def starter(name: str) -> str:
         "# their units. Behind each key stands what it takes; keys that are commented out may be left out.",
         f"title = {json.dumps(name, ensure_ascii=False)}",
     ]
-    for section in SECTIONS:
-        lines += ["", *_comment(SECTION_TEXTS.get(section, "")), f"[{section}]"]
+    for section in all_sections():
+        is_piece = "." in section
+        lines += ["", *_comment(SECTION_TEXTS.get(section, "")), f"{'# ' if is_piece else ''}{heading(section)}"]
         keys = keys_of(section)
         chosen = next((json.loads(key.words.example) for key in keys if key.name == "shape"), "")
         for key in keys:
-            lines += _lines(key, chosen)
+            lines += _lines(key, chosen, is_left_out=is_piece)
     return "\n".join(lines) + "\n"
 
 
@@ -33,11 +33,11 @@ def examples() -> dict[str, Path]:
     return {path.stem: path for path in sorted(EXAMPLES.glob("*.toml"))}
 
 
-def _lines(key: Key, chosen: str) -> list[str]:
+def _lines(key: Key, chosen: str, *, is_left_out: bool) -> list[str]:
     """Return a key's comment and its line; the line is a comment, too, where the starter does without."""
     belongs = not key.shapes or chosen in key.shapes
     shape = "" if belongs else f"{' or '.join(key.shapes).capitalize()}. "
-    mark = "" if key.words.is_used and belongs else "# "
+    mark = "" if key.words.is_used and belongs and not is_left_out else "# "
     default = f"; default {key.default}" if key.default and not key.default.startswith("required") else ""
     line, takes = f"{mark}{key.name} = {key.words.example}", f"{key.takes}{default}"
     if len(line) + len(takes) + 4 > _WIDTH:

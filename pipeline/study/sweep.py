@@ -12,7 +12,8 @@ from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
-from pipeline.study.schema import Material, Mesh, Planning, Solving
+from pipeline.shapes.tissue import Tissue
+from pipeline.study.schema import Material, Mesh, Planning, Solving, material_of
 
 # Keys that both body and probe have, or a variable of the dataset: their dimension says whose it is.
 _AMBIGUOUS = ("radius", "shape", "accuracy")
@@ -28,18 +29,22 @@ class Axis:
     key: str  # "" for an array of tables, which sweeps the section as a whole
     labels: tuple[float | int | str, ...]
     unit: str
+    piece: str = ""  # of an array of tables within the section, such as layers[2]
+    owner: str = ""  # the name of that piece
 
     @property
     def name(self) -> str:
         """Name of the dimension in the dataset."""
         if not self.key:
             return self.section
+        if self.owner:
+            return f"{self.owner}_{self.key}"
         return f"{self.section}_{self.key}" if self.key in _AMBIGUOUS else self.key
 
     @property
     def path(self) -> str:
         """Where it stands in the study file."""
-        return f"{self.section}.{self.key}" if self.key else self.section
+        return ".".join(part for part in (self.section, self.piece, self.key) if part)
 
     def write(self, label: float | int | str) -> str:
         """Write one of its labels as people read it."""
@@ -96,9 +101,24 @@ class Case:
         return 6 if self.probe.motion == "all" else 1 + slides
 
     @property
+    def tissues(self) -> tuple[Tissue, ...]:
+        """What the regions of the body are made of, in the order of their numbers in meshes.
+
+        Where layers fill the body, no cell has number 0.
+        """
+        return self.material, *self.body.regions
+
+    @property
+    def poisson(self) -> float:
+        """The largest Poisson's ratio of all regions."""
+        return max(tissue.poisson for tissue in self.tissues)
+
+    @property
     def proportional_to(self) -> tuple[str, ...]:
-        """The keys that F is proportional to, those of one section changing together."""
-        return *self.material.PROPORTIONAL_TO, *self.probe.PROPORTIONAL_TO
+        """The keys that F is proportional to, those of one section, or of all materials, changing together."""
+        pieces = tuple(f"{region.name}.young" for region in self.body.regions)
+        first = () if self.body.is_filled else self.material.PROPORTIONAL_TO
+        return *first, *pieces, *self.probe.PROPORTIONAL_TO
 
     @property
     def scale(self) -> Scale:
@@ -123,7 +143,7 @@ class Case:
     @property
     def element(self) -> str:
         """The element that solves it: displacement or mixed."""
-        return self.mesh.element_for(self.material.poisson)
+        return self.mesh.element_for(self.poisson)
 
     def __str__(self) -> str:
         return ", ".join(f"{name} = {text}" for name, text in self.words.items()) or "the one case"
@@ -173,7 +193,7 @@ class Study:
             for position, length in own:
                 flat = flat * length + index[position]
             chosen.append(variants[flat])
-        return Case(index, self.axes, *chosen)
+        return Case(index, self.axes, *_with_material_in_use(*chosen))
 
     @cached_property
     def _layout(self) -> tuple[tuple[tuple[Section, ...], tuple[tuple[int, int], ...]], ...]:
@@ -182,3 +202,8 @@ class Study:
             (self.sections[name], tuple((i, len(axis)) for i, axis in enumerate(self.axes) if axis.section == name))
             for name in _PARTS
         )
+
+
+def _with_material_in_use(body: Body, material: Material, *others: Any) -> tuple[Any, ...]:
+    """Return the parts of a case: a body that layers fill has the first one's material, not the section's."""
+    return body, material_of(body.regions[0]) if body.is_filled else material, *others

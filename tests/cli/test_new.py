@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.plan.plan import make_plan
-from pipeline.study.keys import SECTION_TEXTS, keys_of, shapes_of, words_of
+from pipeline.study.keys import SECTION_TEXTS, all_sections, keys_of, shapes_of, words_of
 from pipeline.study.load import load, parse
-from pipeline.study.schema import SECTIONS
 from pipeline.study.starter import examples, starter
 from tests.commands import epsmesh
 
@@ -27,7 +26,7 @@ def new(*arguments):
 
 
 def test_every_key_of_the_schema_has_words_and_an_example():
-    for section in SECTIONS:
+    for section in all_sections():
         assert SECTION_TEXTS[section]
         for key in keys_of(section):
             assert key.words.text, f"nothing is said of {section}.{key.name}"
@@ -35,7 +34,7 @@ def test_every_key_of_the_schema_has_words_and_an_example():
 
 
 def test_a_key_of_several_shapes_says_what_it_means_for_each():
-    for section in SECTIONS:
+    for section in all_sections():
         said = {(key.name, shape): key.words.text for key in keys_of(section) for shape in key.shapes}
         for shape, model in shapes_of(section).items():
             for name in {*model.model_fields} & {name for name, _ in said}:
@@ -47,7 +46,7 @@ def test_starter_is_a_study_with_every_key():
     study = parse(tomllib.loads(text), file="mine.toml", text=text)
     assert len(make_plan(study).keys) > 1
     assert not study.warnings
-    for section in SECTIONS:
+    for section in all_sections():
         for key in keys_of(section):
             assert f"\n{key.name} = " in text or f"\n# {key.name} = " in text
 

@@ -5,14 +5,14 @@ from math import hypot, inf
 from typing import Annotated, Any, Literal
 
 from pipeline.shapes.arrays import FloatArray, np
-from pipeline.shapes.body import Drawn
+from pipeline.shapes.body import Layered
 from pipeline.shapes.frame import Frame, PlaceError, Units, Vector
 from pipeline.shapes.section import Words, in_mm
 from pipeline.shapes.surface import Plane, Surface
 from pipeline.units import Length
 
 
-class Box(Drawn):
+class Box(Layered):
     """A box with its top face centred on the origin, tissue at z <= 0."""
 
     shape: Literal["box"]
@@ -63,6 +63,13 @@ class Box(Drawn):
     def farthest(self, frame: Frame) -> float:
         """Return the distance (m) of the farthest corner."""
         return float((self.reach(frame) ** 2 + self.size[2] ** 2) ** 0.5)
+
+    def inside(self, points: FloatArray) -> FloatArray:
+        """Return the distance (m) of points inside to the nearest face, negative outside."""
+        x, y, z = points.T
+        return np.minimum.reduce(
+            [self.size[0] / 2 - np.abs(x), self.size[1] / 2 - np.abs(y), -z, z + self.size[2]]
+        )  # fmt: skip
 
     def gap(self, point: Vector) -> float:
         """Return the distance (m) to the edge of the top, negative outside."""

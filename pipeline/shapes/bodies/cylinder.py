@@ -4,7 +4,7 @@ from math import hypot, pi
 from typing import Annotated, Any, Literal
 
 from pipeline.shapes.arrays import FloatArray, np
-from pipeline.shapes.body import Drawn, Rectangle
+from pipeline.shapes.body import Layered, Rectangle
 from pipeline.shapes.frame import Frame, PlaceError, Units, Vector
 from pipeline.shapes.section import Words, in_mm
 from pipeline.shapes.surface import Plane, Surface, Tube
@@ -14,7 +14,7 @@ from pipeline.units import Length
 _ROUND = 200
 
 
-class Cylinder(Drawn):
+class Cylinder(Layered):
     """A cylinder about the z axis with its top face in z = 0."""
 
     shape: Literal["cylinder"]
@@ -58,6 +58,11 @@ class Cylinder(Drawn):
     def farthest(self, frame: Frame) -> float:
         """Return the distance (m) of the farthest point of the bottom's edge."""
         return float((self.reach(frame) ** 2 + self.height**2) ** 0.5)
+
+    def inside(self, points: FloatArray) -> FloatArray:
+        """Return the distance (m) of points inside to the nearest face, negative outside."""
+        x, y, z = points.T
+        return np.minimum.reduce([self.radius - np.hypot(x, y), -z, z + self.height])
 
     def gap(self, point: Vector) -> float:
         """Return the distance (m) to the edge of the top, negative outside."""

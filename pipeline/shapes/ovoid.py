@@ -1,0 +1,61 @@
+"""The surface of an ellipsoid whose axes are those of the coordinates."""
+
+from dataclasses import dataclass
+from math import pi
+
+from pipeline.shapes.arrays import FloatArray, np
+from pipeline.shapes.frame import Vector
+from pipeline.shapes.surface import Surface
+
+# Newton's method from the left converges monotonically; most steps are for points near the centre of flat ones.
+_STEPS = 200
+_SMALL, _NUDGE, _NEAR = 1e-15, 1e-12, 1e-3
+_GOLDEN = pi * (3 - 5**0.5)
+
+
+@dataclass(frozen=True)
+class Ovoid(Surface):
+    """The ellipsoid about ``centre`` with semi-``axes`` (m) along x, y and z."""
+
+    centre: Vector
+    axes: Vector
+    is_curved = True
+
+    def distance(self, points: FloatArray) -> FloatArray:
+        """Return the distance (m) of each point, positive outside."""
+        outside = self.level(points) > 1
+        return np.where(outside, 1, -1) * np.linalg.norm(points - self.project(points), axis=1)
+
+    def level(self, points: FloatArray) -> FloatArray:
+        """Return the factor by which the ellipsoid must be enlarged about its centre to hold each point."""
+        return np.linalg.norm((points - np.array(self.centre)) / np.array(self.axes), axis=1)
+
+    def project(self, points: FloatArray) -> FloatArray:
+        """Return the nearest points of the surface: y = a² x / (a² + t), with t such that y is on it.
+
+        The sum of (a x / (a² + t))² falls from t = -min a² on and is convex: Newton's method, begun where one term
+        alone is 1, goes to the root without passing it.
+        """
+        axes = np.array(self.axes) / max(self.axes)
+        x = (points - np.array(self.centre)) / max(self.axes)
+        # From deep inside, on a plane of symmetry, the nearest point is off that plane: a nudge shows the way.
+        nudged = np.where(np.abs(x) < _NUDGE, _NUDGE, x)
+        t = (axes * np.abs(nudged) - axes**2).max(axis=1)
+        for _ in range(_STEPS):
+            reach = axes**2 + t[:, None]
+            squares = (axes * nudged / reach) ** 2
+            step = (squares.sum(axis=1) - 1) / (2 * (squares / reach).sum(axis=1))
+            t = t + step
+            if np.all(np.abs(step) <= _SMALL * (1 + np.abs(t))):
+                break
+        reach = axes**2 + t[:, None]
+        stays = (x == 0) & (reach > _NEAR * axes**2)
+        return np.array(self.centre) + max(self.axes) * np.where(stays, 0.0, axes**2 * nudged / reach)
+
+    def sample(self, count: int) -> FloatArray:
+        """Return the six ends of its axes, and ``count`` points spread evenly over it, shape (count + 6, 3)."""
+        number = np.arange(count) + 0.5
+        height, angle = 1 - 2 * number / count, _GOLDEN * number
+        ring = np.sqrt(1 - height**2)
+        spread = np.column_stack([ring * np.cos(angle), ring * np.sin(angle), height])
+        return np.array(self.centre) + np.array(self.axes) * np.vstack([np.eye(3), -np.eye(3), spread])

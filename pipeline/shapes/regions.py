@@ -1,0 +1,51 @@
+"""Pieces of a body that are made of something else: layers under a flat top, and inclusions anywhere."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from pipeline.shapes.ovoid import Ovoid
+from pipeline.shapes.section import Words
+from pipeline.shapes.tissue import Tissue
+from pipeline.units import Coordinate, Length
+
+
+class Region(Tissue):
+    """A piece of a body with a material of its own; the ``name`` begins the names of its sweeps."""
+
+    name: Annotated[
+        str,
+        Field(exclude=True, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$"),
+        Words("Its name: letters, digits, _ and -. A sweep over its young is the dimension NAME_young.", '"skin"'),
+    ]
+
+
+class Layer(Region):
+    """A horizontal layer. The last one may leave its thickness out: it then reaches the bottom."""
+
+    thickness: Annotated[
+        Length | None,
+        Words("Thickness; the last layer may leave it out, and then reaches the bottom.", '"2 mm"'),
+    ] = None
+
+
+class Inclusion(Region):
+    """A ball, or an ellipsoid whose axes are those of the coordinates, wholly inside the body."""
+
+    at: Annotated[
+        tuple[Coordinate, Coordinate, Coordinate],
+        Words("Its centre, in the body's coordinates.", '["0 mm", "0 mm", "-10 mm"]'),
+    ]
+    radius: Annotated[Length | None, Words("Radius of a ball.", '"3 mm"', default="none: axes are given")] = None
+    axes: Annotated[
+        tuple[Length, Length, Length] | None,
+        Words("Semi-axes of an ellipsoid, along x, y and z.", '["6 mm", "6 mm", "4 mm"]', default="none: it is a ball"),
+    ] = None
+
+    @property
+    def surface(self) -> Ovoid:
+        """Its surface."""
+        if self.axes is not None:
+            return Ovoid(self.at, self.axes)
+        assert self.radius is not None  # checked as the study is read
+        return Ovoid(self.at, (self.radius,) * 3)

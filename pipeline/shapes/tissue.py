@@ -1,0 +1,22 @@
+"""What a piece of tissue is made of."""
+
+from math import inf
+from typing import Annotated
+
+from pydantic import Field
+
+from pipeline.shapes.section import Section, Words
+from pipeline.units import Pressure
+
+
+class Tissue(Section):
+    """Isotropic linear elasticity."""
+
+    young: Annotated[Pressure, Words("Young's modulus.", '"10 kPa"', is_used=True)]
+    poisson: Annotated[float, Field(ge=0, le=0.5), Words("Poisson's ratio; 0.5 is incompressible.", "0.45")]
+
+    @property
+    def lame(self) -> tuple[float, float]:
+        """Lamé's λ and μ (Pa); λ is infinite for an incompressible material."""
+        mu = self.young / (2 * (1 + self.poisson))
+        return (2 * mu * self.poisson / (1 - 2 * self.poisson) if self.poisson < 0.5 else inf), mu

@@ -1,0 +1,140 @@
+"""Layers and inclusions of a study: do they fit into the body, and is what they are made of all that it needs?"""
+
+import itertools
+from collections.abc import Iterator, Sequence
+from typing import cast
+
+from pipeline.shapes.body import Body, Layered
+from pipeline.shapes.regions import Inclusion
+from pipeline.shapes.section import Section, in_mm
+from pipeline.study.problems import Problems
+from pipeline.study.schema import Material, material_of
+from pipeline.study.sweep import Axis
+
+# What must be left round an inclusion, in units of its smallest semi-axis: elements there are no larger.
+GAP = 0.1
+# Points on an inclusion, besides the ends of its axes, that are looked at.
+_POINTS = 2000
+# Layers that are thicker than the body by this share of it: the rest is rounding.
+_SAME = 1e-9
+
+
+def check_regions(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
+    """Check layers and inclusions of every body, and whether there is a material for what they leave."""
+    bodies = cast(Sequence[Body], sections["body"])
+    for body in bodies:
+        _check_names(body, problems)
+        if isinstance(body, Layered):
+            _check_layers(body, problems)
+        for number, inclusion in enumerate(body.inclusion, start=1):
+            if (inclusion.radius is None) == (inclusion.axes is None):
+                problems.error(f"body.inclusion[{number}]", None, "needs a radius (a ball) or axes (an ellipsoid)")
+    if not problems.errors:
+        for body in bodies:
+            _check_inclusions(body, problems)
+    _check_axes(axes, problems)
+    _check_material(bodies, cast(Sequence[Material], sections["material"]), axes, problems)
+
+
+def material_without_section(bodies: Sequence[Section]) -> Material:
+    """Return what stands for [material] where layers fill every body: it is that of the first layer."""
+    return material_of(cast(Sequence[Body], bodies)[0].regions[0])
+
+
+def tissues_of(body: Body, material: Material) -> Iterator[tuple[str, float]]:
+    """Yield key and value of Poisson's ratio of every material in a body."""
+    if not body.is_filled:
+        yield "material.poisson", material.poisson
+    count = len(body.regions) - len(body.inclusion)
+    for number, region in enumerate(body.regions):
+        place = f"layers[{number + 1}]" if number < count else f"inclusion[{number - count + 1}]"
+        yield f"body.{place}.poisson", region.poisson
+
+
+def _check_names(body: Body, problems: Problems) -> None:
+    names = [region.name for region in body.regions]
+    for name in sorted({name for name in names if names.count(name) > 1}):
+        problems.error("body", name, "is the name of more than one layer or inclusion; names must differ")
+
+
+def _check_layers(body: Layered, problems: Problems) -> None:
+    height, total = body.heights[1] - body.heights[0], 0.0
+    for number, layer in enumerate(body.layers, start=1):
+        key = f"body.layers[{number}].thickness"
+        if layer.thickness is None:
+            if number < len(body.layers):
+                problems.error(key, None, "is required: only the last layer reaches the bottom by itself")
+                return
+            if height - total <= _SAME * height:
+                problems.error(key, None, f"nothing is left for it: the layers above take all of {in_mm(height)}")
+            return
+        total += layer.thickness
+        if total > height * (1 + _SAME):
+            problems.error(
+                key, in_mm(layer.thickness), f"layers down to this one take {in_mm(total)}: must be at most the "
+                f"body's height {in_mm(height)}",
+            )  # fmt: skip
+            return
+
+
+def _check_inclusions(body: Body, problems: Problems) -> None:
+    """Between an inclusion and all else there must be room for an element."""
+    for number, inclusion in enumerate(body.inclusion, start=1):
+        surface, key = inclusion.surface, f"body.inclusion[{number}].at"
+        gap, points, found = GAP * min(surface.axes), surface.sample(_POINTS), [in_mm(x) for x in inclusion.at]
+        if (room := float(body.inside(points).min())) < gap:
+            problems.error(
+                key, found, f"{inclusion.name} must lie inside the {body.shape}, {in_mm(gap)} (a tenth of its smallest "
+                f"semi-axis) or more from its surface; it is {_distance(room)}",
+            )  # fmt: skip
+        low, high = surface.centre[2] - surface.axes[2], surface.centre[2] + surface.axes[2]
+        for height in body.interfaces:
+            if (room := max(low - height, height - high)) < gap:
+                problems.error(
+                    key, found, f"{inclusion.name} must keep {in_mm(gap)} (a tenth of its smallest semi-axis) from "
+                    f"where a layer ends, at z = {in_mm(height)}; it is {_distance(room)}",
+                )  # fmt: skip
+    for (i, one), (j, other) in itertools.combinations(enumerate(body.inclusion, start=1), 2):
+        gap = GAP * min(*one.surface.axes, *other.surface.axes)
+        if (room := _apart(one, other)) < gap:
+            problems.error(
+                f"body.inclusion[{j}].at", [in_mm(x) for x in other.at], f"{other.name} must keep {in_mm(gap)} (a "
+                f"tenth of the smallest semi-axis) from {one.name}, inclusion[{i}]; it is {_distance(room)}",
+            )  # fmt: skip
+
+
+def _apart(one: Inclusion, other: Inclusion) -> float:
+    """Return the distance (m) between two inclusions, negative where one reaches into the other."""
+    return min(
+        float(b.distance(a.sample(_POINTS)).min())
+        for a, b in ((one.surface, other.surface), (other.surface, one.surface))
+    )
+
+
+def _distance(room: float) -> str:
+    return f"{in_mm(room)} from it" if room > 0 else "not"
+
+
+def _check_axes(axes: tuple[Axis, ...], problems: Problems) -> None:
+    names = [axis.name for axis in axes]
+    for axis in axes:
+        if axis.owner and names.count(axis.name) > 1:
+            problems.error(
+                axis.path, None, f"its sweep would be a second dimension {axis.name}: give {axis.owner} another name"
+            )
+
+
+def _check_material(
+    bodies: Sequence[Body], materials: Sequence[Material], axes: tuple[Axis, ...], problems: Problems
+) -> None:
+    """[material] is what no layer or inclusion is: it is needed for that, and says nothing where nothing is left."""
+    if not bodies:
+        return
+    if not all(body.is_filled for body in bodies):
+        if not materials and not any(p.key.startswith("material") for p in problems.errors):
+            problems.error("[material]", None, "this section is required: it is what no layer or inclusion is made of")
+        return
+    for axis in (axis for axis in axes if axis.section == "material"):
+        problems.error(axis.path, None, "sweeps nothing: layers fill the body, and nothing is made of [material]")
+    if materials:
+        problems.warn("[material]", None, "layers fill the body: nothing is made of this section; leave it out")
