@@ -1,110 +1,163 @@
-"""What is asked of a surface before tissue is meshed in it: closed, one piece, outward, of an organ's size."""
+"""What is asked of a surface before tissue is meshed in it: closed, one piece, outward, of an organ's size.
 
-from pipeline.shapes.arrays import FloatArray, IntArray, np
-from pipeline.shapes.files.edges import Edges
+Places in the messages are in the file's own numbers, by which other programs find them.
+"""
+
+from pipeline.shapes.arrays import BoolArray, FloatArray, IntArray, np
+from pipeline.shapes.files.crossings import crossings
+from pipeline.shapes.files.edges import Edges, components, oriented
+from pipeline.shapes.files.mend import flats
 from pipeline.shapes.files.raw import Raw
-from pipeline.shapes.files.weld import drop_unused, weld
-from pipeline.shapes.triangles import SurfaceError, Triangles, doubled_normals, enclosed
+from pipeline.shapes.triangles import SurfaceError, doubled_normals, enclosed
 
-# What a tool may press on (m).
+# Sizes of what a tool may press on (m).
 SMALLEST, LARGEST = 1e-3, 2.0
 _UNITS = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0}
-_MEND = "`repair = true`, or MeshLab"
-
-
-def made_whole(raw: Raw, unit: float) -> tuple[Triangles, tuple[str, ...]]:
-    """Return the surface in metres, welded and turned outwards, and what was done to it.
-
-    Raises:
-        SurfaceError: if it does not bound one piece of tissue; says what was found, and what mends it.
-    """
-    check_numbers(raw)
-    points, facets, notices = welded(raw)
-    points = points * unit
-    check_size(points, unit)
-    facets, more = without_doubles(points, facets)
-    notices += more
-    edges = Edges(facets)
-    check_edges(points, edges)
-    check_shells(points, edges)
-    volume = enclosed(points, facets)
-    if volume < 0:
-        facets = facets[:, ::-1]
-        notices += ("all facets were seen from inside: turned",)
-    points, facets = drop_unused(points, facets)
-    return Triangles(points, np.ascontiguousarray(facets)), notices
+# Facets that enclose less than this share of what a ball of their area does are a sheet.
+_SHEET = 1e-4
+# Points of a shell, at most, by which it is told whether it lies within another one.
+_SAMPLES = 60
 
 
 def check_numbers(raw: Raw) -> None:
-    """Refuse what is no number, and what has no facets."""
+    """Refuse what is not finite, and what has no facets."""
     if not len(raw.facets):
-        raise SurfaceError("has no facets: export the surface, not the points or an empty scene")
+        raise SurfaceError("has no facets: export the surface, not points alone or an empty scene")
     (wrong,) = np.nonzero(~np.isfinite(raw.points).all(axis=1))
     if len(wrong):
         values = ", ".join(f"{c:g}" for c in raw.points[wrong[0]])
         raise SurfaceError(
-            f"{len(wrong):,} points are not finite, such as number {wrong[0] + 1:,}: ({values}): export it again"
+            f"{len(wrong):,} of its points are not finite, such as point {wrong[0] + 1:,}, ({values}): export it again"
         )
 
 
-def welded(raw: Raw) -> tuple[FloatArray, IntArray, tuple[str, ...]]:
-    """Return points and facets with every point once."""
-    points, number = weld(raw.points)
-    return points, number[raw.facets], ()
-
-
-def check_size(points: FloatArray, unit: float) -> None:
+def check_size(points: FloatArray, facets: IntArray, unit: float) -> None:
     """Refuse what is too small or too large for an organ: most likely, the unit is another one."""
-    extent = float(np.ptp(points, axis=0).max())
-    if SMALLEST <= extent <= LARGEST:
+    extent = float(np.ptp(points[facets].reshape(-1, 3), axis=0).max())
+    if SMALLEST <= extent * unit <= LARGEST:
         return
-    fitting = [f'"{name}"' for name, size in _UNITS.items() if SMALLEST <= extent / unit * size <= LARGEST]
+    fitting = [f'"{name}"' for name, size in _UNITS.items() if SMALLEST <= extent * size <= LARGEST]
     hint = f"unit = {' or '.join(fitting)} would fit" if fitting else "no usual unit makes an organ of it"
     raise SurfaceError(
-        f"is {extent:.3g} m across, allowed are {SMALLEST * 1e3:g} mm to {LARGEST:g} m; "
-        f"its numbers span {extent / unit:.4g}: {hint}"
+        f"is {_length(extent * unit)} across, allowed are {_length(SMALLEST)} to {_length(LARGEST)}; its numbers span "
+        f"{extent:.4g}: {hint}"
     )
 
 
-def without_doubles(points: FloatArray, facets: IntArray) -> tuple[IntArray, tuple[str, ...]]:
-    """Return facets without those that have two corners in one point."""
-    flat = (facets == np.roll(facets, 1, axis=1)).any(axis=1)
-    if not flat.any():
-        return facets, ()
-    return facets[~flat], (f"{flat.sum():,} facets with two corners in one point left out",)
-
-
-def check_edges(points: FloatArray, edges: Edges) -> None:
-    """Refuse holes, fins and facets seen from opposite sides."""
+def check_edges(points: FloatArray, edges: Edges, unit: float) -> None:
+    """Refuse fins, holes and facets seen from opposite sides."""
     if len(edges.fins):
         where = _place(points[edges.half[edges.fins[0]]].mean(axis=0))
-        raise SurfaceError(f"{len(edges.fins):,} edges have more than two facets, such as at {where}: {_MEND}")
-    if len(edges.open):
-        where = _place(points[edges.half[edges.open[0]]].mean(axis=0))
-        raise SurfaceError(f"not closed: {len(edges.open):,} edges have one facet alone, such as at {where}: {_MEND}")
-    if len(edges.turned):
-        where = _place(points[edges.half[edges.turned[0, 0]]].mean(axis=0))
         raise SurfaceError(
-            f"at {len(edges.turned):,} edges the two facets are seen from opposite sides, such as at {where}: {_MEND}"
+            f"{len(edges.fins):,} edges have more than two facets (fins, walls within, or parts that touch), "
+            f"such as at {where}: `repair = true`, or MeshLab: Repair Non Manifold Edges"
+        )
+    if len(edges.open):
+        raise SurfaceError(_holes(points, edges, unit))
+    if len(edges.turned):
+        _, flipped = oriented(edges)
+        if flipped is None:
+            raise SurfaceError("its facets have but one side, like a Möbius strip's: it bounds nothing")
+        where = _place(points[edges.facets[flipped[0]]].mean(axis=0))
+        raise SurfaceError(
+            f"{len(flipped):,} facets are inverted: seen from the side opposite to that of their neighbours, "
+            f"such as at {where}: `repair = true`, or MeshLab: Re-Orient All Faces Coherently"
         )
 
 
-def check_shells(points: FloatArray, edges: Edges) -> None:
-    """Refuse more than one piece, and pieces that hang together by a point."""
-    count, _ = edges.shells
+def _holes(points: FloatArray, edges: Edges, unit: float) -> str:
+    ends = edges.half[edges.open]
+    numbers, local = np.unique(ends, return_inverse=True)
+    count, loop = components(local.reshape(-1, 2), len(numbers))
+    lengths = np.bincount(
+        loop[local.reshape(-1, 2)[:, 0]], np.linalg.norm(points[ends[:, 1]] - points[ends[:, 0]], axis=1), count
+    )
+    largest = int(lengths.argmax())
+    where = _place(points[numbers[loop == largest]].mean(axis=0))
+    holes = "1 hole" if count == 1 else f"{count:,} holes, the largest"
+    return (
+        f"is not closed: {holes} with an edge {_length(float(lengths[largest]) * unit)} long "
+        f"({len(ends):,} open edges in all), round {where}: `repair = true`, or MeshLab: Close Holes"
+    )
+
+
+def check_shells(points: FloatArray, edges: Edges, unit: float) -> None:
+    """Refuse more than one piece, pieces that hang together by a point, and sheets."""
+    count, shell = edges.shells
+    facets = edges.facets
     if count > 1:
-        raise SurfaceError(f"{count:,} separate shells, where one bounds the tissue: delete the others, or {_MEND}")
+        raise SurfaceError(_shells(points, facets, shell, count, unit))
     pinched = edges.pinched()
     if len(pinched):
         raise SurfaceError(
-            f"{len(pinched):,} points join two parts that have nothing else in common, "
-            f"such as at {_place(points[pinched[0]])}: {_MEND}"
+            f"{len(pinched):,} points join parts that have nothing else in common there, such as "
+            f"{_place(points[pinched[0]])}: `repair = true`, or MeshLab: Repair Non Manifold Vertices by Splitting"
         )
-    size = np.linalg.norm(doubled_normals(points, edges.facets), axis=1).sum() / 2
-    if abs(enclosed(points, edges.facets)) < 1e-6 * size**1.5:
-        raise SurfaceError("its facets enclose no volume: it is a sheet; export a closed surface")
+    area = float(np.linalg.norm(doubled_normals(points, facets), axis=1).sum()) / 2
+    if abs(enclosed(points, facets)) < _SHEET * area**1.5 / (6 * np.sqrt(np.pi)):
+        raise SurfaceError("encloses no volume: it is a sheet; export a closed surface, or thicken it")
+    flat = flats(points, facets)
+    if len(flat):
+        where = _place(points[facets[flat[0]]].mean(axis=0))
+        raise SurfaceError(
+            f"{len(flat):,} facets have no area, such as at {where}: `repair = true`, or MeshLab: Remove T-Vertices"
+        )
+
+
+def shell_volumes(points: FloatArray, facets: IntArray, shell: IntArray, count: int) -> FloatArray:
+    """Return the volume within each shell, in the cube of the unit of the points."""
+    a, b, c = (points[facets[:, k]] - points[facets[0, 0]] for k in range(3))
+    volumes: FloatArray = np.bincount(shell, np.einsum("ij,ij->i", a, np.cross(b, c)), count) / 6
+    return volumes
+
+
+def _shells(points: FloatArray, facets: IntArray, shell: IntArray, count: int, unit: float) -> str:
+    volumes = np.abs(shell_volumes(points, facets, shell, count)) * unit**3
+    order = np.argsort(-volumes, kind="stable")
+    sizes = ", ".join(f"{1e6 * v:.3g}" for v in volumes[order[:3]]) + (", …" if count > 3 else "")
+    second = np.unique(facets[shell == order[1]])
+    inside = _within(points, facets[shell == order[0]], second)
+    how = "inside" if inside.all() else "beside" if not inside.any() else "across"
+    return (
+        f"has {count:,} separate shells, of {sizes} cm³, where one bounds the tissue; the second lies {how} the first, "
+        f"round {_place(points[second].mean(axis=0))}: delete what does not belong to it, or `repair = true` "
+        "(keeps the largest), or unite them in MeshLab: Mesh Boolean: Union"
+    )
+
+
+def _within(points: FloatArray, facets: IntArray, chosen: IntArray) -> BoolArray:
+    """Tell which of some points, evenly taken from those ``chosen``, lie within closed facets."""
+    some = chosen[:: -(-len(chosen) // _SAMPLES)]
+    turns = np.zeros(len(some))
+    for k, point in enumerate(points[some]):
+        a, b, c = (points[facets[:, corner]] - point for corner in range(3))
+        la, lb, lc = (np.linalg.norm(edge, axis=1) for edge in (a, b, c))
+        # The solid angle of each facet: Van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 125 (1983).
+        dots = [np.einsum("ij,ij->i", u, v) for u, v in ((a, b), (b, c), (c, a))]
+        below = la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb
+        turns[k] = np.arctan2(np.einsum("ij,ij->i", a, np.cross(b, c)), below).sum() / (2 * np.pi)
+    within: BoolArray = np.abs(turns) > 0.5
+    return within
+
+
+def check_crossings(points: FloatArray, facets: IntArray) -> None:
+    """Refuse facets that cross or touch others."""
+    found = crossings(points, facets)
+    if len(found):
+        where = _place(points[facets[found[0]]].mean(axis=(0, 1)))
+        raise SurfaceError(
+            f"{len(found):,} pairs of facets cross or lie upon each other, such as at {where}: `repair = true`, "
+            "or MeshLab: Select Self Intersecting Faces, delete them, Close Holes"
+        )
 
 
 def _place(point: FloatArray) -> str:
-    x, y, z = 1e3 * point
-    return f"({x:.4g}, {y:.4g}, {z:.4g}) mm"
+    x, y, z = point + 0.0
+    return f"({x:.4g}, {y:.4g}, {z:.4g})"
+
+
+def _length(metres: float) -> str:
+    for unit, size in (("km", 1e3), ("m", 1.0), ("mm", 1e-3)):
+        if metres >= size:
+            return f"{metres / size:.3g} {unit}"
+    return f"{metres * 1e3:.3g} mm"

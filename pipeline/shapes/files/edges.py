@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-from pipeline.shapes.arrays import BoolArray, FloatArray, IntArray, np
+from pipeline.shapes.arrays import IntArray, np
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,16 +90,21 @@ def components(links: IntArray, count: int) -> tuple[int, IntArray]:
     return int(parts), part.astype(np.int64)
 
 
-def oriented(points: FloatArray, facets: IntArray, edges: Edges) -> tuple[IntArray, int]:
-    """Return facets turned so that all of a shell are seen from one side, and how many were turned: the fewer."""
-    flips = np.zeros(len(edges.pairs), dtype=np.int64)
-    flips[edges.half[edges.pairs[:, 0], 0] == edges.half[edges.pairs[:, 1], 0]] = 1
+def oriented(edges: Edges) -> tuple[IntArray, IntArray | None]:
+    """Return facets turned so that all of a shell are seen from one side, and which ones were turned: the fewer.
+
+    None instead of these, and the facets as they are, if a shell has but one side.
+    """
+    facets, count = edges.facets, len(edges.facets)
+    first, second = edges.pairs.T
+    flip = (edges.half[first, 0] == edges.half[second, 0]).astype(np.int64)
     # Each facet twice, as it is and turned: what hangs together is seen from the same side.
-    count = len(facets)
-    a, b = (edges.pairs // 3).T
-    links = np.concatenate([np.stack([a, b + flips * count], 1), np.stack([a + count, b + (1 - flips) * count], 1)])
-    _, part = components(links, 2 * count)
+    a, b = first // 3, second // 3
+    links = np.concatenate([np.stack([a, b + flip * count], 1), np.stack([a + count, b + (1 - flip) * count], 1)])
+    parts, part = components(links, 2 * count)
     as_is, turned = part[:count], part[count:]
-    weight = np.bincount(as_is, minlength=part.max() + 1)
-    flip: BoolArray = weight[as_is] < weight[turned]
-    return np.where(flip[:, None], facets[:, ::-1], facets), int(flip.sum())
+    if (as_is == turned).any():
+        return facets, None
+    kept = np.bincount(as_is, minlength=parts)
+    chosen = (kept[as_is] < kept[turned]) | ((kept[as_is] == kept[turned]) & (as_is > turned))
+    return np.where(chosen[:, None], facets[:, ::-1], facets), np.nonzero(chosen)[0]

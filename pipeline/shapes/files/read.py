@@ -6,8 +6,8 @@ from functools import lru_cache
 from pathlib import Path
 
 from pipeline.shapes.files import obj, ply, stl
-from pipeline.shapes.files.check import made_whole
 from pipeline.shapes.files.raw import Raw
+from pipeline.shapes.files.whole import made_whole
 from pipeline.shapes.triangles import SurfaceError, Triangles
 
 _PARSERS: dict[str, Callable[[bytes], Raw]] = {".stl": stl.parse, ".ply": ply.parse, ".obj": obj.parse}
@@ -61,7 +61,7 @@ def _load(path: Path, _changed: int, size: int, unit: float, repair: bool, smoot
         raise SurfaceError(f"cannot be read: {error.strerror or error}") from None
     raw = _parsed(data, path.suffix.lower())
     triangles, notices = made_whole(raw, unit)
-    return Loaded(triangles, (*raw.notices, *notices))
+    return Loaded(triangles, notices)
 
 
 def _parsed(data: bytes, ending: str) -> Raw:

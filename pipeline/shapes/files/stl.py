@@ -60,7 +60,7 @@ def _text(data: bytes) -> FloatArray:
     count = content.count(b"endfacet")
     limit(count)
     bare = _without_names(content)
-    if content.rfind(b"endsolid") < content.rfind(b"facet"):
+    if content.rfind(b"endsolid") <= content.rfind(b"endfacet"):
         raise SurfaceError(
             f"truncated: it ends without `endsolid`, after {count:,} whole facets: copy or export it again"
         )

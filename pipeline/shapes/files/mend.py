@@ -1,0 +1,125 @@
+"""What is mended unasked, because nothing is lost by it, and told."""
+
+from pipeline.shapes.arrays import FloatArray, IntArray, np
+from pipeline.shapes.files.edges import Edges
+from pipeline.shapes.files.weld import weld
+from pipeline.shapes.triangles import doubled_normals
+
+# Points of open edges that are nearer to each other than this share of the extent are one: a file's numbers have six
+# digits or so.
+NEAR = 1e-5
+# A facet whose height is this share of its longest edge has no area.
+FLAT = 1e-7
+_PASSES = 20
+
+
+def joined(points: FloatArray, facets: IntArray) -> tuple[FloatArray, IntArray, list[str]]:
+    """Return a surface whose facets hang together, as far as their corners are in the same places."""
+    facets, notices = without_doubles(facets)
+    if not len(Edges(facets).open):
+        return points, facets, notices
+    points, number = weld(points)
+    facets, more = without_doubles(number[facets])
+    edges = Edges(facets)
+    if not len(edges.open):
+        return points, facets, notices + more
+    near = _near(points, np.unique(edges.half[edges.open]))
+    if near is None:
+        return points, facets, notices + more
+    facets, last = without_doubles(near[facets])
+    moved = int((near != np.arange(len(points))).sum())
+    notice = f"{moved:,} points along gaps joined to their neighbours, at most {NEAR:g} of its extent away"
+    return points, facets, [*notices, *more, notice, *last]
+
+
+def _near(points: FloatArray, chosen: IntArray) -> IntArray | None:
+    """Return, of each point, the first one near it, among those ``chosen``; None if there are none."""
+    from scipy.spatial import cKDTree  # noqa: PLC0415 (most files need none)
+
+    reach = NEAR * float(np.ptp(points, axis=0).max())
+    pairs = cKDTree(points[chosen]).query_pairs(reach, output_type="ndarray")
+    if not len(pairs):
+        return None
+    result = np.arange(len(points))
+    for first, second in chosen[np.sort(pairs, axis=1)[np.lexsort(pairs.T)]]:
+        result[second] = min(result[second], result[first])
+    return result
+
+
+def without_doubles(facets: IntArray) -> tuple[IntArray, list[str]]:
+    """Return facets without those with two corners in one point, and without copies of others."""
+    notices = []
+    flat = (facets == np.roll(facets, 1, axis=1)).any(axis=1)
+    if flat.any():
+        facets = facets[~flat]
+        notices.append(f"{flat.sum():,} facets with two corners in one point left out")
+    # Turned so that the lowest number comes first, which keeps the side from which they are seen.
+    shift = facets.argmin(axis=1)
+    turned = facets[np.arange(len(facets))[:, None], (shift[:, None] + np.arange(3)) % 3]
+    _, first = np.unique(_key(turned), return_index=True)
+    if len(first) < len(facets):
+        notices.append(f"{len(facets) - len(first):,} facets that are there twice left out")
+        facets = facets[np.sort(first)]
+    return facets, notices
+
+
+def _key(facets: IntArray) -> IntArray:
+    """Return one number for each row of three."""
+    count = int(facets.max(initial=0)) + 1
+    if count**3 < 2**63:
+        return (facets[:, 0] * count + facets[:, 1]) * count + facets[:, 2]
+    return np.unique(facets, axis=0, return_inverse=True)[1].ravel()
+
+
+def without_flats(points: FloatArray, facets: IntArray) -> tuple[IntArray, list[str]]:
+    """Return a closed surface without facets whose corners lie in a line.
+
+    The longest edge of each is turned: it gives its middle corner to the facet on the other side, which it splits.
+    """
+    total = 0
+    for _ in range(_PASSES):
+        flat = flats(points, facets)
+        if not len(flat):
+            break
+        turned = _turn(points, facets, flat)
+        if turned is None:
+            break
+        facets, count = turned
+        total += count
+    return facets, [f"{total:,} edges beside facets without area turned"] if total else []
+
+
+def flats(points: FloatArray, facets: IntArray) -> IntArray:
+    """Return the facets without area."""
+    longest = _lengths(points, facets).max(axis=1)
+    (found,) = np.nonzero(np.linalg.norm(doubled_normals(points, facets), axis=1) <= FLAT * longest**2)
+    return found
+
+
+def _lengths(points: FloatArray, facets: IntArray) -> FloatArray:
+    """Return the lengths (m, 3) of edges, each from a corner to the next one."""
+    corners = points[facets]
+    return np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+
+
+def _turn(points: FloatArray, facets: IntArray, flat: IntArray) -> tuple[IntArray, int] | None:
+    """Turn the longest edges of the ``flat`` facets, as far as no two of them are neighbours."""
+    pairs = Edges(facets).pairs
+    other = np.full(3 * len(facets), -1)
+    other[pairs[:, 0]], other[pairs[:, 1]] = pairs[:, 1], pairs[:, 0]
+    longest = 3 * flat + _lengths(points, facets[flat]).argmax(axis=1)
+    result, touched, count = facets.copy(), set[int](), 0
+    for half in longest.tolist():
+        across = int(other[half])
+        facet, neighbour = half // 3, across // 3
+        if across < 0 or touched & {facet, neighbour}:
+            continue
+        a, b, middle = (int(facets[facet, (half + k) % 3]) for k in range(3))
+        far = int(facets[neighbour, (across + 2) % 3])
+        if far == middle or int(facets[neighbour, across % 3]) != b:
+            continue
+        result[facet], result[neighbour] = (a, far, middle), (far, b, middle)
+        # Their neighbours, too: what is across an edge has changed.
+        touched |= {facet, neighbour} | {int(other[3 * f + k]) // 3 for f in (facet, neighbour) for k in range(3)}
+        count += 1
+    return (result, count) if count else None

@@ -1,0 +1,230 @@
+"""Files with what goes wrong with surfaces of organs, each with the words by which it is refused."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.arrays import FloatArray
+from tests.shapes.files.solids import Surface, ball, both, obj, ply, stl, stl_text
+
+
+@dataclass(frozen=True)
+class Broken:
+    """A file and what is said of it; ``repairs`` if `repair = true` makes a body of it."""
+
+    name: str
+    data: bytes
+    words: tuple[str, ...]
+    unit: float = 1e-3
+    repairs: bool = False
+
+
+def _near(points: FloatArray, place: tuple[float, float, float]) -> int:
+    return int(np.linalg.norm(points - place, axis=1).argmin())
+
+
+def _without(surface: Surface, *places: tuple[float, float, float]) -> Surface:
+    """The facets round points of a surface taken out."""
+    points, facets = surface
+    gone = np.zeros(len(facets), dtype=bool)
+    for place in places:
+        gone |= (facets == _near(points, place)).any(axis=1)
+    return points, facets[~gone]
+
+
+def _moved(surface: Surface, place: tuple[float, float, float], to: tuple[float, float, float]) -> Surface:
+    points = surface[0].copy()
+    points[_near(points, place)] = to
+    return points, surface[1]
+
+
+def _turned(surface: Surface, count: int) -> Surface:
+    facets = surface[1].copy()
+    facets[:count] = facets[:count, ::-1]
+    return surface[0], facets
+
+
+def _fin(surface: Surface) -> Surface:
+    points, facets = surface
+    a, b = facets[0, :2]
+    return np.concatenate([points, 1.3 * points[a : a + 1]]), np.concatenate([facets, [(a, b, len(points))]])
+
+
+def _wall(surface: Surface) -> Surface:
+    """A wall within, from one side to the other."""
+    points, facets = surface
+    rim = np.nonzero(np.abs(points[:, 2]) < 1e-9)[0]
+    rim = rim[np.argsort(np.arctan2(points[rim, 1], points[rim, 0]))]
+    centre = len(points)
+    wall = [(a, b, centre) for a, b in zip(rim, np.roll(rim, -1), strict=True)]
+    return np.concatenate([points, [(0.0, 0.0, 0.0)]]), np.concatenate([facets, wall])
+
+
+def _sheet(count: int = 12) -> Surface:
+    x, y = np.meshgrid(np.arange(count + 1.0), np.arange(count + 1.0), indexing="ij")
+    points = 5 * np.column_stack([x.ravel(), y.ravel(), 0.1 * np.sin(x + y).ravel()])
+    i, j = np.meshgrid(np.arange(count), np.arange(count), indexing="ij")
+    a = (i * (count + 1) + j).ravel()
+    b, c, d = a + count + 1, a + count + 2, a + 1
+    return points, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+
+
+def _klein(count: int = 40) -> Surface:
+    """A closed surface with one side: a tube that closes upon itself inside out."""
+    i, j = np.meshgrid(np.arange(count), np.arange(8), indexing="ij")
+
+    def number(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return (u % count) * 8 + np.where(u >= count, -v, v) % 8
+
+    corners = [number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)]
+    a, b, c, d = (k.ravel() for k in corners)
+    angle, turn = 2 * np.pi * i.ravel() / count, 2 * np.pi * j.ravel() / 8
+    ring = 30 + 8 * np.cos(turn + angle / 2)
+    points = np.column_stack([ring * np.cos(angle), ring * np.sin(angle), 8 * np.sin(turn + angle / 2)])
+    return points, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+
+
+def _pinched() -> Surface:
+    """A ball pressed together until top and bottom are one point."""
+    points, facets = ball(3)
+    top, bottom = _near(points, (0, 0, 20)), _near(points, (0, 0, -20))
+    points = points.copy()
+    points[top] = points[bottom] = (0.0, 0.0, 0.0)
+    facets = np.where(facets == bottom, top, facets)
+    return points, facets
+
+
+def _changed(data: bytes, old: bytes, new: bytes, times: int = 1) -> bytes:
+    assert old in data
+    return data.replace(old, new, times)
+
+
+def _finite(surface: Surface, value: float) -> Surface:
+    points = surface[0].copy()
+    points[17, 1] = value
+    return points, surface[1]
+
+
+def _half_welded() -> Surface:
+    """Each facet with corners of its own, moved by more than rounding."""
+    points, facets = ball(2)
+    corners = points[facets].reshape(-1, 3)
+    corners = corners * (1 + 1e-3 * np.random.default_rng(1).standard_normal(corners.shape))
+    return corners, np.arange(len(corners)).reshape(-1, 3)
+
+
+def _slit(surface: Surface) -> Surface:
+    """Open along a line: two points where one should be."""
+    points, facets = surface
+    facets = facets.copy()
+    one = _near(points, (0, 0, 20))
+    around = np.nonzero((facets == one).any(axis=1))[0][:3]
+    facets[around] = np.where(facets[around] == one, len(points), facets[around])
+    return np.concatenate([points, points[[one]] + np.array([0, 0, 0.5])]), facets
+
+
+def corpus() -> list[Broken]:
+    """Return the broken files."""
+    good = ball()
+    whole = stl(good)
+    text, lines = stl_text(ball(1)), obj(ball(1))
+    nan, inf = float("nan"), float("inf")
+    inner = ball(2, (8.0, 8.0, 8.0))
+    numbers = [
+        Broken("nan.stl", stl(_finite(good, nan)), ("not finite", "nan", "export")),
+        Broken("infinite.stl", stl(_finite(good, inf)), ("not finite", "inf")),
+        Broken("nan-text.stl", stl_text(_finite(ball(2), nan)), ("not finite", "nan")),
+        Broken("nan.ply", ply(_finite(good, nan), "ascii"), ("not finite", "point 18")),
+        Broken("nan.obj", obj(_finite(good, -inf)), ("not finite", "-inf")),
+    ]
+    files = [
+        Broken("empty.stl", b"", ("is empty",)),
+        Broken("short.stl", b"solid", ("truncated", "endsolid")),
+        Broken("truncated.stl", whole[:20_000], ("truncated", "1,280 facets", "398 are there")),
+        Broken("header.stl", whole[:84], ("truncated", "0 are there")),
+        Broken("truncated-text.stl", text[: len(text) // 2], ("truncated", "endsolid")),
+        Broken("truncated.ply", ply(good)[:5000], ("truncated", "vertex")),
+        Broken("truncated-faces.ply", ply(good)[:-500], ("truncated", "1,280 of face")),
+        Broken("truncated-text.ply", ply(good, "ascii")[:-400], ("truncated", "face")),
+        Broken("truncated.obj", _changed(lines, b"\nv ", b"\n# "), ("a facet has point 42", "there are 41")),
+        Broken(
+            "letter.stl", b"Dear colleague, here is the liver that you asked for.\n" * 9, ("not an STL file", "Dear")
+        ),
+        Broken("letter.ply", b"Dear colleague\n", ("not a PLY file",)),
+        Broken("letter.obj", b"Dear colleague\n", ("not an OBJ surface", "0 lines of points")),
+        Broken("word.stl", _changed(text, b"vertex", b"corner"), ("239 times `vertex` in 80 facets",)),
+        Broken("comma.stl", text.replace(b".", b","), ("line 4", "three numbers")),
+        Broken("comma.obj", lines.replace(b".", b","), ("line", "three coordinates")),
+        Broken("names.obj", _changed(lines, b"\nf 1", b"\nf one"), ("line", "numbers of points")),
+        Broken("zero.obj", _changed(lines, b"\nf ", b"\nf 0 "), ("line", "from 1 on")),
+        Broken("really-ply.stl", ply(good), ("content is that of `.ply`", "rename")),
+        Broken("really-stl.obj", whole, ("content is that of `.stl`", "rename")),
+        Broken("really-stl.ply", text, ("content is that of `.stl`", "rename")),
+        Broken("organ.vtk", b"# vtk DataFile", ("`.vtk`", ".stl, .ply, .obj")),
+        Broken(
+            "cloud.ply", _changed(ply(good, "ascii"), b"element face", b"element edge"), ("no surface", "vertex, edge")
+        ),
+        Broken("format.ply", _changed(ply(good, "ascii"), b"ascii", b"morse"), ("`format morse 1.0`",)),
+        Broken("flat.ply", _changed(ply(good, "ascii"), b"float z", b"float w"), ("x, y, w", "wanted are x, y and z")),
+        Broken("words.ply", ply(good, "ascii").replace(b".", b","), ("no number",)),
+        Broken("wrong-point.ply", ply((good[0], good[1] + 1)), ("a facet has point 642", "0 to 641")),
+        Broken("line.ply", ply((good[0], good[1][:, :2])), ("2 corners",)),
+        Broken("none.stl", stl((good[0], good[1][:0])), ("no facets",)),
+        Broken("none.ply", ply((good[0], good[1][:0])), ("no facets",)),
+        Broken(
+            "huge.stl",
+            b"x" * 80 + np.array(4_000_000, "<u4").tobytes() + bytes(200_000_000),
+            ("4,000,000 facets", "Decimation"),
+        ),
+    ]
+    units = [
+        Broken("metres.stl", whole, ("80 m across", '"mm" or "cm"'), unit=1.0),
+        Broken("millimetres.stl", stl((good[0] / 1e3, good[1])), ("0.08 mm across", '"m"'), unit=1e-3),
+        Broken("microns.stl", stl((good[0] * 1e3, good[1])), ("80 m across", '"um"'), unit=1e-3),
+        Broken("point.stl", stl((good[0] * 0, good[1])), ("0 mm across", "no usual unit")),
+        Broken("galaxy.obj", obj((good[0] * 1e18, good[1])), ("km across", "no usual unit")),
+    ]
+    shapes = [
+        Broken(
+            "hole.stl", stl(_without(good, (0, 0, 20))), ("not closed", "1 hole", "mm long", "repair"), repairs=True
+        ),
+        Broken(
+            "holes.ply",
+            ply(_without(good, (0, 0, 20), (40, 0, 0))),
+            ("2 holes, the largest", "Close Holes"),
+            repairs=True,
+        ),
+        Broken("facet.obj", obj((good[0], good[1][1:])), ("1 hole", "3 open edges"), repairs=True),
+        Broken("half.stl", stl((good[0], good[1][good[0][good[1]].mean(axis=1)[:, 2] > 0])), ("not closed", "1 hole")),
+        Broken("sheet.stl", stl(_sheet()), ("not closed", "1 hole")),
+        Broken("slit.stl", stl(_slit(good)), ("not closed", "4 open edges"), repairs=True),
+        Broken("torn.ply", ply(_half_welded()), ("not closed", "318 holes")),
+        Broken("fin.stl", stl(_fin(good)), ("1 edges have more than two facets", "Non Manifold"), repairs=True),
+        Broken("wall.stl", stl(_wall(good)), ("edges have more than two facets", "walls within"), repairs=True),
+        Broken("inverted-some.stl", stl(_turned(good, 5)), ("5 facets are inverted", "Re-Orient"), repairs=True),
+        Broken("klein.ply", ply(_klein()), ("but one side",)),
+        Broken("flat.stl", stl(ball(axes=(40.0, 30.0, 1e-6))), ("no volume", "sheet")),
+        Broken("two.stl", stl(both(good, ball(2, centre=(90, 0, 0)))), ("2 separate shells", "beside", "cm³")),
+        Broken(
+            "crumb.stl", stl(both(good, ball(1, (1, 1, 1), (60, 0, 0)))), ("2 separate shells", "beside"), repairs=True
+        ),
+        Broken(
+            "cavity.stl", stl(both(good, (inner[0], inner[1][:, ::-1]))), ("2 separate shells", "inside"), repairs=True
+        ),
+        Broken("nested.obj", obj(both(good, ball(3, (38.0, 28.0, 18.0)))), ("2 separate shells", "inside")),
+        Broken(
+            "overlapping.stl", stl(both(good, ball(3, centre=(30, 5, 5)))), ("2 separate shells", "across", "Union")
+        ),
+        Broken("twice-moved.stl", stl(both(good, (good[0] + 1e-2, good[1]))), ("2 separate shells",)),
+        Broken(
+            "pierced.stl", stl(_moved(good, (0, 0, 20), (0, 0, -40))), ("pairs of facets cross", "repair"), repairs=True
+        ),
+        Broken(
+            "tangled.ply",
+            ply(_moved(good, (0, 0, 20), (14, 2, 19.5))),
+            ("pairs of facets cross", "MeshLab"),
+            repairs=True,
+        ),
+        Broken("pinched.stl", stl(_pinched()), ("1 points join parts", "(0, 0, 0)")),
+    ]
+    return [*numbers, *files, *units, *shapes]
