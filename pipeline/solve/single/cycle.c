@@ -48,65 +48,43 @@ int invert_diagonal(int rows, const int* offsets, const float* values, float* in
   return singular;
 }
 
-/* y = A x */
-void multiply(int rows, const int* restrict offsets, const int* restrict columns, const float* restrict values,
-              const float* restrict x, float* restrict y)
-{
-  memset(y, 0, 3 * (size_t)rows * sizeof(float));
-  for (int i = 0; i < rows; ++i)
-  {
-    const float x0 = x[3 * i], x1 = x[3 * i + 1], x2 = x[3 * i + 2];
-    const float* b = values + 9 * (size_t)offsets[i];
-    float s0 = b[0] * x0 + b[1] * x1 + b[2] * x2;
-    float s1 = b[3] * x0 + b[4] * x1 + b[5] * x2;
-    float s2 = b[6] * x0 + b[7] * x1 + b[8] * x2;
-    b += 9;
-    for (int k = offsets[i] + 1; k < offsets[i + 1]; ++k, b += 9)
-    {
-      const int j = 3 * columns[k];
-      const float z0 = x[j], z1 = x[j + 1], z2 = x[j + 2];
-      s0 += b[0] * z0 + b[1] * z1 + b[2] * z2;
-      s1 += b[3] * z0 + b[4] * z1 + b[5] * z2;
-      s2 += b[6] * z0 + b[7] * z1 + b[8] * z2;
-      y[j] += b[0] * x0 + b[3] * x1 + b[6] * x2;
-      y[j + 1] += b[1] * x0 + b[4] * x1 + b[7] * x2;
-      y[j + 2] += b[2] * x0 + b[5] * x1 + b[8] * x2;
-    }
-    y[3 * i] += s0;
-    y[3 * i + 1] += s1;
-    y[3 * i + 2] += s2;
-  }
+/* y = A x, of which the blocks from the diagonal on are read: those of row i from first[i] to before offsets[i + 1]. */
+#define DEFINE_MULTIPLY(NAME, TYPE, AT)                                                                                \
+void NAME(int rows, const int* restrict first, const int* restrict offsets, const int* restrict columns,               \
+          const TYPE* restrict blocks, const TYPE* restrict x, TYPE* restrict y)                                       \
+{                                                                                                                      \
+  memset(y, 0, 3 * (size_t)rows * sizeof(TYPE));                                                                       \
+  for (int i = 0; i < rows; ++i)                                                                                       \
+  {                                                                                                                    \
+    const TYPE x0 = x[3 * i], x1 = x[3 * i + 1], x2 = x[3 * i + 2];                                                    \
+    const TYPE* b = blocks + 9 * (size_t)first[i];                                                                     \
+    TYPE s0 = b[AT(0, 0)] * x0 + b[AT(0, 1)] * x1 + b[AT(0, 2)] * x2;                                                  \
+    TYPE s1 = b[AT(1, 0)] * x0 + b[AT(1, 1)] * x1 + b[AT(1, 2)] * x2;                                                  \
+    TYPE s2 = b[AT(2, 0)] * x0 + b[AT(2, 1)] * x1 + b[AT(2, 2)] * x2;                                                  \
+    b += 9;                                                                                                            \
+    for (int k = first[i] + 1; k < offsets[i + 1]; ++k, b += 9)                                                        \
+    {                                                                                                                  \
+      const int j = 3 * columns[k];                                                                                    \
+      const TYPE z0 = x[j], z1 = x[j + 1], z2 = x[j + 2];                                                              \
+      s0 += b[AT(0, 0)] * z0 + b[AT(0, 1)] * z1 + b[AT(0, 2)] * z2;                                                    \
+      s1 += b[AT(1, 0)] * z0 + b[AT(1, 1)] * z1 + b[AT(1, 2)] * z2;                                                    \
+      s2 += b[AT(2, 0)] * z0 + b[AT(2, 1)] * z1 + b[AT(2, 2)] * z2;                                                    \
+      y[j] += b[AT(0, 0)] * x0 + b[AT(1, 0)] * x1 + b[AT(2, 0)] * x2;                                                  \
+      y[j + 1] += b[AT(0, 1)] * x0 + b[AT(1, 1)] * x1 + b[AT(2, 1)] * x2;                                              \
+      y[j + 2] += b[AT(0, 2)] * x0 + b[AT(1, 2)] * x1 + b[AT(2, 2)] * x2;                                              \
+    }                                                                                                                  \
+    y[3 * i] += s0;                                                                                                    \
+    y[3 * i + 1] += s1;                                                                                                \
+    y[3 * i + 2] += s2;                                                                                                \
+  }                                                                                                                    \
 }
 
-/* y = A x in double, for a symmetric matrix with all its blocks, by columns, of which those from `diagonal` on are read. */
-void multiply_double(int rows, const int* restrict diagonal, const int* restrict offsets, const int* restrict columns,
-                     const double* restrict blocks, const double* restrict x, double* restrict y)
-{
-  memset(y, 0, 3 * (size_t)rows * sizeof(double));
-  for (int i = 0; i < rows; ++i)
-  {
-    const double x0 = x[3 * i], x1 = x[3 * i + 1], x2 = x[3 * i + 2];
-    const double* b = blocks + 9 * (size_t)diagonal[i];
-    double s0 = b[0] * x0 + b[3] * x1 + b[6] * x2;
-    double s1 = b[1] * x0 + b[4] * x1 + b[7] * x2;
-    double s2 = b[2] * x0 + b[5] * x1 + b[8] * x2;
-    b += 9;
-    for (int k = diagonal[i] + 1; k < offsets[i + 1]; ++k, b += 9)
-    {
-      const int j = 3 * columns[k];
-      const double z0 = x[j], z1 = x[j + 1], z2 = x[j + 2];
-      s0 += b[0] * z0 + b[3] * z1 + b[6] * z2;
-      s1 += b[1] * z0 + b[4] * z1 + b[7] * z2;
-      s2 += b[2] * z0 + b[5] * z1 + b[8] * z2;
-      y[j] += b[0] * x0 + b[1] * x1 + b[2] * x2;
-      y[j + 1] += b[3] * x0 + b[4] * x1 + b[5] * x2;
-      y[j + 2] += b[6] * x0 + b[7] * x1 + b[8] * x2;
-    }
-    y[3 * i] += s0;
-    y[3 * i + 1] += s1;
-    y[3 * i + 2] += s2;
-  }
-}
+/* Where the entry of row r and column c is in a block: in one of ours, and in one of PETSc's. */
+#define BY_ROWS(r, c) (3 * (r) + (c))
+#define BY_COLUMNS(r, c) (3 * (c) + (r))
+
+DEFINE_MULTIPLY(multiply, float, BY_ROWS)
+DEFINE_MULTIPLY(multiply_double, double, BY_COLUMNS)
 
 /* d = a d + b D^-1 r, and x += d: a step of Chebyshev's iteration. */
 void advance(int rows, const float* restrict inverse, float a, float b, const float* restrict r, float* restrict d,

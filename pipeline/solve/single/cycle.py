@@ -24,8 +24,9 @@ _DECLARATIONS = """
 void take_upper(int rows, const int* offsets, const int* columns, const double* blocks, const int* upper_offsets,
                 int* upper_columns, float* upper);
 int invert_diagonal(int rows, const int* offsets, const float* values, float* inverse);
-void multiply(int rows, const int* offsets, const int* columns, const float* values, const float* x, float* y);
-void multiply_double(int rows, const int* diagonal, const int* offsets, const int* columns, const double* blocks,
+void multiply(int rows, const int* first, const int* offsets, const int* columns, const float* blocks, const float* x,
+              float* y);
+void multiply_double(int rows, const int* first, const int* offsets, const int* columns, const double* blocks,
                      const double* x, double* y);
 void advance(int rows, const float* inverse, float a, float b, const float* r, float* d, float* x);
 void subtract(int count, const float* q, float* r);
@@ -124,7 +125,7 @@ class SmoothedLevel:
 
     def subtract_product(self, x: Single, r: Single) -> None:
         """Take A x away from ``r``."""
-        library()("multiply", self._rows, self._offsets, self._columns, self._values, x, self._product)
+        self._multiply(x)
         library()("subtract", self.size, self._product, r)
 
     def smooth(self, x: Single, r: Single) -> Single:
@@ -142,6 +143,10 @@ class SmoothedLevel:
             library()("advance", self._rows, self._inverse, rho * previous, 2 * rho / delta, r, d, x)
         return d
 
+    def _multiply(self, x: Single) -> None:
+        """Write A x into the product."""
+        library()("multiply", self._rows, self._offsets, self._offsets, self._columns, self._values, x, self._product)
+
     def _largest_eigenvalue(self) -> float:
         """Return the largest eigenvalue of D⁻¹ A, from below, by Lanczos' method from noise."""
         r = np.random.default_rng(0).standard_normal(self.size, dtype=np.float32)
@@ -154,7 +159,7 @@ class SmoothedLevel:
             ratio = rz / previous if previous else 0.0
             p *= ratio
             p += z
-            library()("multiply", self._rows, self._offsets, self._columns, self._values, p, self._product)
+            self._multiply(p)
             before, step = step, rz / library()("dot", self.size, p, self._product)
             diagonal.append(1 / step + (ratio / before if before else 0.0))
             beside.append(ratio**0.5 / before if before else 0.0)
