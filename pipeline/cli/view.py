@@ -7,7 +7,7 @@ import typer
 
 from pipeline.cli.console import error
 from pipeline.cli.plan import find_case
-from pipeline.cli.words import DEFAULT_OUTPUT, SOME_FAILED, File, Output, fail, load_all
+from pipeline.cli.words import DEFAULT_OUTPUT, SOME_FAILED, File, Output, load_all
 from pipeline.study.sweep import Case, Study
 
 if TYPE_CHECKING:
@@ -22,35 +22,38 @@ def view(
     output: Output = DEFAULT_OUTPUT,
     mesh_only: Annotated[bool, typer.Option("--mesh-only", help="Mesh, but do not solve.")] = False,
     export: Annotated[
-        Literal["vtu", "xdmf"] | None, typer.Option(help="Write a file for ParaView, and no pictures.")
+        Literal["html", "vtu", "xdmf"] | None,
+        typer.Option(help="Write the page, or a file for ParaView, and no pictures."),
     ] = None,
     meshes: Annotated[Path, typer.Option(help="Folder of the meshes that are kept.")] = Path("meshes/cache"),
 ) -> None:
     """Show one case: its mesh by element size, cut open, and the body as the probe deforms it.
 
-    Writes <study>_<number>_mesh.png and <study>_<number>_deformed.png, or with --export <study>_<number>.vtu.
+    Writes <study>_<number>_mesh.png and <study>_<number>_deformed.png where PyVista is installed; otherwise
+    <study>_<number>.html, a page on which the body is turned round and cut open. --export says what to write instead.
 
     Example: epsmesh view studies/figure3.toml "poisson=0.3, epsilon=10 mm, outside=coarse"
 
     Example: epsmesh view studies/figure3.toml 12 --mesh-only
 
-    Example: epsmesh view studies/figure3.toml 12 --export vtu
+    Example: epsmesh view studies/figure3.toml 12 --export html
     """
     (study,) = load_all([file])
     chosen = find_case(study, case)
-    if not export and (missing := _missing()):
-        fail(f"pictures need {missing}; --export vtu writes a file for ParaView without it")
     from pipeline.workflow import abort_on_exception, world
 
     comm = world()
+    if not export and (missing := _missing()):
+        (error if comm.rank == 0 else _say_nothing)(f"a page instead of pictures: these need {missing}")
+        export = "html"
     with abort_on_exception(comm):
-        fields = _fields(study, chosen, comm, mesh_only, meshes)
+        fields = _fields(study, chosen, comm, mesh_only, export == "html", meshes)
         if fields is not None:
             stem = output / f"{study.name}_{_number(study, chosen)}"
             _write(study, fields, stem, export)
 
 
-def _fields(study: Study, case: Case, comm: "MPI.Comm", mesh_only: bool, meshes: Path) -> "Fields | None":
+def _fields(study: Study, case: Case, comm: "MPI.Comm", mesh_only: bool, bar: bool, meshes: Path) -> "Fields | None":
     """Return the case's fields, on the first rank; if it cannot be computed, exit on all of them."""
     from pipeline.mesh.generate import MeshError
     from pipeline.run.mesh_cache import MeshCache
@@ -61,7 +64,8 @@ def _fields(study: Study, case: Case, comm: "MPI.Comm", mesh_only: bool, meshes:
     note = error if comm.rank == 0 else _say_nothing
     note(str(case))
     try:
-        return compute_fields(solve_to_view(study, case), comm, mesh_only=mesh_only, cache=MeshCache(meshes), note=note)
+        solve = solve_to_view(study, case)
+        return compute_fields(solve, comm, mesh_only=mesh_only, bar=bar, cache=MeshCache(meshes), note=note)
     except (CaseFailure, MeshError, SolveError) as failure:
         note(f"failed: {failure}")
     except (MemoryError, RuntimeError) as failure:
@@ -75,6 +79,13 @@ def _write(study: Study, fields: "Fields", stem: Path, export: str | None) -> No
     """Write what was asked for, and say what is in it."""
     unknowns = f", {fields.dofs:,} unknowns" if fields.dofs else ""
     print(f"{len(fields.cells):,} elements{unknowns}")
+    title = str(fields.case) if study.axes else study.title
+    if export == "html":
+        from pipeline.view.page import write_page
+
+        path = write_page(fields, stem.with_name(f"{stem.name}.html"), study.title)
+        print(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB), to be opened in a browser")
+        return
     if export:
         from pipeline.view.export import write_fields
 
@@ -82,7 +93,6 @@ def _write(study: Study, fields: "Fields", stem: Path, export: str | None) -> No
         return
     from pipeline.view.picture import draw_deformed, draw_mesh
 
-    title = str(fields.case) if study.axes else study.title
     print(f"wrote {draw_mesh(fields, stem.with_name(f'{stem.name}_mesh.png'), title)}")
     if fields.displacement is not None:
         path, factor = draw_deformed(fields, stem.with_name(f"{stem.name}_deformed.png"), title)

@@ -19,10 +19,11 @@ from pipeline.plan.plan import declare, first_attempts
 from pipeline.plan.steps import Solve
 from pipeline.plan.symmetry import mirror_planes, model_planes
 from pipeline.run.compile import prepare
+from pipeline.run.measure import record_of
 from pipeline.run.memory import FreeMemory
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import cached_arrays, on_first_rank
-from pipeline.run.problem import check_memory, problem_of, solve_problem
+from pipeline.run.problem import check_memory, lacks_memory, problem_of, solve_problem
 from pipeline.solve.compiled import vector_space
 from pipeline.solve.linear import is_direct
 from pipeline.solve.solution import FieldProblem
@@ -41,13 +42,14 @@ def solve_to_view(study: Study, case: Case) -> Solve:
 
 
 def compute_fields(
-    solve: Solve, comm: MPI.Comm, *, mesh_only: bool = False, cache: MeshCache | None = None,
+    solve: Solve, comm: MPI.Comm, *, mesh_only: bool = False, bar: bool = False, cache: MeshCache | None = None,
     note: Note = lambda text: None,
 ) -> Fields | None:  # fmt: skip
     """Return the fields of a case, on rank 0 (None elsewhere); collective.
 
     Where an accuracy is asked for, they are those of the first mesh that proves it, or of the finest that is tried;
-    of the first mesh if ``mesh_only``. ``note`` is told, on every rank, what is being worked on.
+    of the first mesh if ``mesh_only``. With ``bar`` the force has its error bar, if there is the memory for it.
+    ``note`` is told, on every rank, what is being worked on.
 
     Raises:
         CaseFailure, MeshError, SolveError: on every rank, with what to tell the user.
@@ -58,30 +60,33 @@ def compute_fields(
             arrays = _arrays(solve, comm, cache, note)
             return _whole(solve, arrays) if arrays is not None else None
         while True:
-            fields, bar = _attempt(solve, comm, cache, note)
-            if solve.goal is None or 0 <= bar <= solve.goal or not solve.later:
+            fields, proved = _attempt(solve, comm, bar, cache, note)
+            if solve.goal is None or 0 <= proved <= solve.goal or not solve.later:
                 return fields
             solve = solve.again()
 
 
-def _attempt(solve: Solve, comm: MPI.Comm, cache: MeshCache | None, note: Note) -> tuple[Fields | None, float]:
+def _attempt(
+    solve: Solve, comm: MPI.Comm, bar: bool, cache: MeshCache | None, note: Note
+) -> tuple[Fields | None, float]:
     """Solve on one mesh; return the fields on rank 0, and the error bar of F."""
-    case = solve.case
+    case, degree = solve.case, solve.case.mesh.degree
     arrays = _arrays(solve, comm, cache, note)
     prepare(comm, [solve])
     mesh = distribute(comm, arrays)
     with Spaces(mesh) as spaces, problem_of(spaces, case, shared=False) as problem:
-        direct = is_direct(case.solve.method, problem.dofs, case.mesh.degree)
-        check_memory(
-            FreeMemory(comm), estimate.solving_memory(problem.dofs, case.mesh.degree, direct=direct), "solving"
-        )
+        direct = is_direct(case.solve.method, problem.dofs, degree)
+        check_memory(FreeMemory(comm), estimate.solving_memory(problem.dofs, degree, direct=direct), "solving")
+        room = bar and not lacks_memory(FreeMemory(comm), estimate.enriched_memory(problem.dofs, degree), "")
         note(f"solving for {problem.dofs} unknowns")
-        solution = solve_problem(case, problem, estimate=solve.goal is not None)
+        solution = solve_problem(case, problem, estimate=room or solve.goal is not None)
         points = comm.bcast(len(arrays.points) if arrays is not None else 0)
         displacement, strain = _gathered(mesh, problem, points)
     if arrays is None:
         return None, solution.bar
-    return replace(_whole(solve, arrays, displacement, strain), dofs=solution.dofs), solution.bar
+    record = record_of(solve, solution)
+    fields = _whole(solve, arrays, displacement, strain)
+    return replace(fields, dofs=solution.dofs, force=record.force, force_error=record.force_error), solution.bar
 
 
 def _arrays(solve: Solve, comm: MPI.Comm, cache: MeshCache | None, note: Note) -> MeshArrays | None:
@@ -133,4 +138,6 @@ def _whole(
     if strain is not None:
         strain = np.tile(strain, 2 ** len(mirrors))
     whole = reflect(arrays, mirrors)
-    return Fields(case, whole.points, whole.cells, whole.facets, mirror_planes(case), displacement, strain)
+    return Fields(
+        case, whole.points, whole.cells, whole.facets, mirror_planes(case), displacement, strain, regions=whole.regions
+    )

@@ -10,13 +10,13 @@ import numpy.typing as npt
 from pipeline.arrays import FloatArray
 from pipeline.scene.model import PROBE
 from pipeline.view.fields import Fields
+from pipeline.view.palette import FOOTPRINT, INK, OUTLINE
 
 # On a machine without a display VTK would ask for one first, and complain.
 if not os.environ.get("DISPLAY"):
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 import pyvista as pv
 
-INK, OUTLINE, FOOTPRINT = "#111111", "#b5b5b5", "#e8110f"
 MM = 1e3
 # How often the triangles at ε are halved, so that its outline is smooth on coarse ones.
 _HALVINGS = 3

@@ -1,12 +1,15 @@
 """What there is to see of one case: mesh, element sizes, displacement and strain as arrays of the whole body."""
 
 from dataclasses import dataclass
-from math import inf
+from math import floor, inf, log10, nan
 
 import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.study.sweep import Case
+
+# Displacements are drawn so large that the largest is about this share of the body's smallest extent.
+_VISIBLE = 0.15
 
 
 @dataclass(frozen=True)
@@ -16,7 +19,9 @@ class Fields:
     ``points`` (n, 3); ``cells`` (m, 4), or (m, 10) with mid nodes in basix's order; ``facets`` maps the name of a group
     to its boundary triangles (k, 3). ``displacement`` (n, 3) and ``strain`` (m,), the largest principal strain of each
     cell by magnitude, are None where only the mesh was asked for. The mesh is conforming to the mirror ``planes``
-    ("x": x = 0); ``dofs`` counts the whole body's unknowns.
+    ("x": x = 0); ``dofs`` counts the whole body's unknowns. ``regions`` (m,) numbers the material of each cell, by its
+    position in ``region_names``; None where there is one only. ``force`` (N) is the probe's, with its relative error
+    bar ``force_error``; not a number where they were not asked for.
     """
 
     case: Case
@@ -27,6 +32,10 @@ class Fields:
     displacement: FloatArray | None = None
     strain: FloatArray | None = None
     dofs: int = 0
+    regions: IntArray | None = None
+    region_names: tuple[str, ...] = ("tissue",)
+    force: float = nan
+    force_error: float = nan
 
     @property
     def contact(self) -> FloatArray:
@@ -54,3 +63,29 @@ class Fields:
     def within_epsilon(self) -> BoolArray:
         """Whether the middle of each cell is nearer to the contact than ε."""
         return np.asarray(np.linalg.norm(self.centres - self.contact, axis=1) <= self.epsilon)
+
+    @property
+    def magnitude(self) -> FloatArray:
+        """Length (m) of each point's displacement, shape (n,).
+
+        Raises:
+            ValueError: if the fields hold no displacement.
+        """
+        if self.displacement is None:
+            raise ValueError("the case has been meshed only: there is no displacement to draw")
+        return np.asarray(np.linalg.norm(self.displacement, axis=1))
+
+    @property
+    def visible_factor(self) -> float:
+        """How many times as large as they are displacements are drawn: 1, 2, 5, 10, …
+
+        Raises:
+            ValueError: if the fields hold no displacement.
+        """
+        return _round_down(_VISIBLE * float(np.ptp(self.points, axis=0).min()) / float(self.magnitude.max()))
+
+
+def _round_down(value: float) -> float:
+    """Return the largest of 1, 2, 5, 10, 20, … that is at most ``value``, and 1 if there is none."""
+    power = 10.0 ** floor(log10(max(value, 1.0)))
+    return power * max(step for step in (1, 2, 5) if step * power <= max(value, 1.0))

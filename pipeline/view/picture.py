@@ -1,11 +1,10 @@
 """Pictures of one case: its mesh cut open, and the body as the probe deforms it, whole and close to the probe."""
 
-from math import floor, inf, log10
+from math import inf
 from pathlib import Path
 from textwrap import shorten
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
@@ -14,8 +13,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from pipeline.report.figures import save
-from pipeline.view.drawing import FOOTPRINT, INK, MM, Colouring, Drawing
+from pipeline.view.drawing import MM, Colouring, Drawing
 from pipeline.view.fields import Fields
+from pipeline.view.palette import FOOTPRINT, INK
 
 # Inches, at 200 dots each: 1200 × 720 pixels.
 _WIDTH, _HEIGHT = 6.0, 3.6
@@ -24,8 +24,6 @@ _DOTS = 200
 _WHOLE, _CLOSE = (0.01, 0.19, 0.60, 0.70), (0.63, 0.19, 0.36, 0.70)
 _BAR = (0.1, 0.115, 0.4, 0.03)
 _STYLE = {"font.size": 8, "axes.linewidth": 0.6}
-# Displacements are drawn so large that the largest is about this share of the body's smallest extent.
-_VISIBLE = 0.15
 # Letters of a title that fit the width.
 _LONGEST = 92
 # Below this (m) displacements are read in µm.
@@ -46,11 +44,9 @@ def draw_deformed(fields: Fields, path: Path, title: str) -> tuple[Path, float]:
     Raises:
         ValueError: if the fields hold no displacement.
     """
-    if fields.displacement is None:
-        raise ValueError("the case has been meshed only: there is no displacement to draw")
-    moved = np.linalg.norm(fields.displacement, axis=1)
+    factor = fields.visible_factor
+    moved = fields.magnitude
     largest = float(moved.max())
-    factor = _round_down(_VISIBLE * float(np.ptp(fields.points, axis=0).min()) / largest)
     unit, scale = ("µm", 1e6) if largest < _SMALL else ("mm", MM)
     colouring = Colouring(scale * moved, "YlGnBu", (0.0, scale * largest))
     words = "true to scale" if factor == 1 else f"displacement drawn {factor:,.0f} × as large"
@@ -97,9 +93,3 @@ def _lines(fields: Fields) -> list[Line2D]:
     if fields.epsilon < inf:
         lines.insert(0, Line2D([], [], color=INK, linewidth=1.6, label=f"ε = {MM * fields.epsilon:g} mm"))
     return lines
-
-
-def _round_down(value: float) -> float:
-    """Return the largest of 1, 2, 5, 10, 20, … that is at most ``value``, and 1 if there is none."""
-    power = 10.0 ** floor(log10(max(value, 1.0)))
-    return power * max(step for step in (1, 2, 5) if step * power <= max(value, 1.0))

@@ -1,4 +1,4 @@
-"""A real browser for the report's tests: Chromium without a window, told what to do over a pipe."""
+"""A real browser for the tests of pages: Chromium without a window, told what to do over a pipe."""
 
 import base64
 import json
@@ -17,14 +17,15 @@ class Browser:
     """One tab of a browser; a context manager.
 
     ``messages`` collects what the page wrote to the console, and the errors that it met; ``requests`` the addresses
-    that it asked for.
+    that it asked for. With ``webgl`` it draws in three dimensions, on the processor.
     """
 
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Path, *, webgl: bool = False):
         assert CHROMIUM, "chromium is not installed"
         their_input, self._output = os.pipe()
         self._input, their_output = os.pipe()
-        options = ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run",
+        drawing = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"] if webgl else ["--disable-gpu"]
+        options = ["--headless=new", "--no-sandbox", *drawing, "--disable-dev-shm-usage", "--no-first-run",
                    "--disable-extensions", "--disable-background-networking", "--remote-debugging-pipe",
                    f"--user-data-dir={folder}", "about:blank"]  # fmt: skip
         # The protocol wants descriptors 3 (its input) and 4 (its output).

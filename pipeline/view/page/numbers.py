@@ -1,0 +1,127 @@
+"""The numbers of a page: the mesh and what happens on it, small enough for a file that is sent by mail.
+
+Every corner and every cell of the body is in it, as the page cuts it wherever it is asked to. Points are sorted along
+Morton's curve and cells by their points, which leaves differences of few bits; arrays are stored by planes of bytes and
+deflated: about 7 bytes a cell, where a list of cells and points takes 30.
+"""
+
+import zlib
+from base64 import b64encode
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.arrays import FloatArray, IntArray
+from pipeline.scene.model import CUT, FIXED, PROBE
+from pipeline.view.boundary import boundary
+from pipeline.view.fields import Fields
+from pipeline.view.palette import VIRIDIS, YLGNBU, YLORRD, region_colours
+
+_MM = 1e3
+# Numbers that the script knows groups of the boundary by; 0 is free.
+_GROUPS = {PROBE: 1, FIXED: 2, CUT: 3}
+# Strains are shown over this range below the largest, which the singular edge of the probe has.
+_STRAINS = 1e-3
+# Below this (m) displacements are read in µm.
+_SMALL = 1e-4
+# The largest displacement, in its units.
+_HALF = 32767
+# Bits of a coordinate along Morton's curve.
+_BITS = 10
+_DEFLATE = 6
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """Arrays as base64 ``text``, in order the (name, type, length) of each, and what they can colour.
+
+    ``shift`` is the length (mm) of a displacement's unit.
+    """
+
+    text: str
+    layout: list[tuple[str, str, int]]
+    colours: list[dict[str, Any]]
+    shift: float
+
+
+def mesh_numbers(fields: Fields) -> Numbers:
+    """Return the numbers of a case's page.
+
+    ``points`` (3, n) in mm from the contact; ``cells`` (4, m), each number the difference to the corner before it, the
+    first one's to the cell before; ``faces`` of the boundary, 4 × cell + the corner that it lies opposite to, each the
+    difference to the one before, and their ``groups``; ``shift`` (3, n), displacements; ``regions``, ``sizes`` and
+    ``strains`` (m), the last two in 0 … 255 of the scale of their colours.
+    """
+    used, number = _along_curve(fields.points, fields.cells[:, :4])
+    corners = np.sort(number[fields.cells[:, :4]], axis=1)
+    order = np.lexsort(corners.T[::-1])
+    corners = corners[order]
+    arrays: dict[str, npt.NDArray[Any]] = {
+        "points": (_MM * (fields.points[used] - fields.contact)).T.astype("<f4"),
+        "cells": np.vstack([np.diff(corners[:, 0], prepend=0), np.diff(corners, axis=1).T]).astype("<i4"),
+        **_faces(corners, {name: number[triangles] for name, triangles in fields.facets.items()}),
+    }
+    regions = np.zeros(len(corners), dtype=np.int64) if fields.regions is None else fields.regions
+    arrays["regions"] = regions[order].astype("u1")
+    names = list(fields.region_names)
+    colours: list[dict[str, Any]] = [
+        {"name": "region", "array": "regions", "labels": names, "stops": region_colours(len(names))}
+    ]
+    sizes = _MM * fields.sizes
+    arrays["sizes"] = _steps(sizes, float(sizes.min()), float(sizes.max()))[order]
+    colours.append(_scale("element size", "mm", float(sizes.min()), float(sizes.max()), VIRIDIS, array="sizes"))
+    shift = 1.0
+    if fields.displacement is not None and fields.strain is not None:
+        shift = float(np.abs(fields.displacement).max()) / _HALF
+        arrays["shift"] = np.round(fields.displacement[used] / shift).T.astype("<i2")
+        largest = float(fields.magnitude.max())
+        unit, factor = ("µm", 1e6) if largest < _SMALL else ("mm", _MM)
+        colours.insert(1, _scale("displacement", unit, 0.0, factor * largest, YLGNBU))
+        worst = float(fields.strain.max())
+        arrays["strains"] = _steps(fields.strain, _STRAINS * worst, worst)[order]
+        name = "largest principal strain"
+        colours.insert(2, _scale(name, "%", 100 * _STRAINS * worst, 100 * worst, YLORRD, array="strains"))
+    return Numbers(_text(arrays), [(name, a.dtype.str[1:], a.size) for name, a in arrays.items()], colours, _MM * shift)
+
+
+def _scale(name: str, unit: str, low: float, high: float, stops: tuple[str, ...], array: str = "") -> dict[str, Any]:
+    """Describe a scale of colours: logarithmic, of an array of the cells, or linear, of the displacement."""
+    return {"name": name, "unit": unit, "limits": [low, high], "stops": list(stops), "array": array}
+
+
+def _along_curve(points: FloatArray, corners: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the points that are ``corners``, sorted along Morton's curve, and every point's number among them."""
+    used = np.unique(corners)
+    offset = points[used] - points[used].min(axis=0)
+    grid = (offset / offset.max() * (2**_BITS - 1)).astype(np.int64)
+    code = np.zeros(len(used), dtype=np.int64)
+    for bit in range(_BITS):
+        for axis in range(3):
+            code |= ((grid[:, axis] >> bit) & 1) << (3 * bit + axis)
+    used = used[np.argsort(code, kind="stable")]
+    number = np.full(len(points), -1, dtype=np.int64)
+    number[used] = np.arange(len(used))
+    return used, number
+
+
+def _faces(corners: IntArray, facets: dict[str, IntArray]) -> dict[str, npt.NDArray[Any]]:
+    found = boundary(corners, facets)
+    groups = np.array([_GROUPS.get(name, 0) for name in found.names])[found.groups]
+    codes = 4 * found.cells + found.opposite
+    order = np.argsort(codes)
+    return {"faces": np.diff(codes[order], prepend=0).astype("<i4"), "groups": groups[order].astype("u1")}
+
+
+def _steps(values: FloatArray, low: float, high: float) -> npt.NDArray[np.uint8]:
+    """Return where positive values lie between ``low`` and ``high``, by their logarithms, in 0 … 255."""
+    span = np.log(high / low) or 1.0
+    share = np.log(np.maximum(values, low) / low) / span
+    return np.round(255 * np.clip(share, 0, 1)).astype("u1")
+
+
+def _text(arrays: dict[str, npt.NDArray[Any]]) -> str:
+    """Return arrays, of each first every number's first byte, then every second one, deflated, as base64."""
+    planes = [np.ascontiguousarray(a).view("u1").reshape(-1, a.itemsize).T.tobytes() for a in arrays.values()]
+    return b64encode(zlib.compress(b"".join(planes), _DEFLATE)).decode()

@@ -1,0 +1,51 @@
+"""From where a case is looked at: the plane that opens its body through the contact, and the direction of the eye."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from pipeline.arrays import FloatArray
+from pipeline.shapes.frame import Frame
+
+_UP = np.array((0.0, 0.0, 1.0))
+# The horizontal part of a probe's direction below which it stands upright.
+_UPRIGHT = 1e-9
+# From where the picture is taken: in front of the cut, beside it, out of the tissue.
+_FROM = (1.0, 0.45, 0.6)
+# Where the side would be seen from below by more than 30 degrees, the eye goes to the other one.
+_BELOW = -0.5
+
+
+@dataclass(frozen=True)
+class Viewpoint:
+    """Unit vectors (3,) in the body's coordinates.
+
+    ``front`` is normal to the cut, which holds the probe's axis, and points to the eye; ``side`` lies in the cut,
+    normal to the axis; ``outward`` points back along the axis.
+    """
+
+    front: FloatArray
+    side: FloatArray
+    outward: FloatArray
+
+    @classmethod
+    def of(cls, frame: Frame, planes: tuple[str, ...]) -> Self:
+        """Return how a probe's place is looked at; a plane of symmetry ("x": x = 0) is the cut where there is one."""
+        outward = np.array(frame.outward)
+        if np.hypot(outward[0], outward[1]) < _UPRIGHT:
+            front = np.array((1.0, 0.0, 0.0) if planes == ("x",) else (0.0, -1.0, 0.0))
+        else:
+            # Upright, too, as the axis and z span it: so lies every plane of symmetry that holds a tilted axis.
+            front = np.cross(outward, _UP)
+            front *= (-1.0 if front[1] > 0 or (front[1] == 0 and front[0] < 0) else 1.0) / np.linalg.norm(front)
+        side = np.cross(outward, front)
+        return cls(front, -side if side[2] < _BELOW else side, outward)
+
+    @property
+    def eye(self) -> FloatArray:
+        """Unit vector from the body to the eye."""
+        direction = sum(
+            share * vector for share, vector in zip(_FROM, (self.front, self.side, self.outward), strict=True)
+        )
+        return np.asarray(direction / np.linalg.norm(direction))
