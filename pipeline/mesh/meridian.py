@@ -1,15 +1,17 @@
 """The half plane (r, z) of a round scene, meshed by triangles that shrink towards every singular point.
 
-The half plane is a rectangle: it is halved into boxes until each is small enough for where it lies, and the boxes
-are cut into triangles. This takes milliseconds, gives the same mesh with every version of every library, and goes
-down to elements that are 1e-9 of the body without harm; gmsh 4.8 aborts the process at 1e-7.
+The half plane is a rectangle, or several on top of each other where the body has layers: it is halved into boxes until
+each is small enough for where it lies, and the boxes are cut into triangles. This takes milliseconds, gives the same
+mesh with every version of every library, and goes down to elements that are 1e-9 of the body without harm; gmsh 4.8
+aborts the process at 1e-7.
 
 Lengths of the mesh are in units of the footprint's radius a, rounded to 12 digits: a body of a millimetre and one
 of ten metres give the same mesh.
 """
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import hypot, inf
 from typing import Any, Literal
 
@@ -18,10 +20,12 @@ import numpy as np
 from mpi4py import MPI
 
 from pipeline import compat
-from pipeline.arrays import FloatArray, Int32Array, IntArray
+from pipeline.arrays import BoolArray, FloatArray, Int32Array, IntArray
+from pipeline.mesh.boxes import halve_boxes, triangulate
 from pipeline.scene.model import CUT, FIXED, FREE, PROBE
 
 AXIS = "axis"
+JOINT = "joint"
 
 # A body more slender than this is meshed by stretched boxes: nothing varies over a thickness far from the contact.
 _MOST_SLENDER = 1000
@@ -35,6 +39,8 @@ class Meridian:
 
     ``fixed`` says what is held: the bottom, the side, both, or all of the boundary below the level z = ``fixed`` < 0.
     Of the body, only r < ``column`` is kept; the face of that cut is free, or held if ``column_fixed``.
+    ``interfaces`` are the heights z (m), from the top down, at which one layer ends and the next begins: regions 1, 2,
+    ... of the mesh. What lies below them all is another layer if ``is_filled``, else region 0.
     """
 
     radius: float
@@ -43,6 +49,8 @@ class Meridian:
     fixed: Literal["bottom", "sides", "bottom+sides"] | float = "bottom"
     column: float = inf
     column_fixed: bool = False
+    interfaces: tuple[float, ...] = ()
+    is_filled: bool = False
 
     @property
     def is_cut(self) -> bool:
@@ -92,12 +100,14 @@ class Grading:
 class MeridianArrays:
     """A mesh of the meridian, in units of ``unit`` metres.
 
-    ``points`` (n, 2) holds (r, z), ``cells`` (m, 3) the triangles; ``facets`` maps the name of a group of the
-    boundary to its edges (k, 2); ``singular`` (s, 2) are the points to which the mesh is graded.
+    ``points`` (n, 2) holds (r, z), ``cells`` (m, 3) the triangles, ``regions`` (m,) what each is made of; ``facets``
+    maps the name of a group of the boundary to its edges (k, 2); ``singular`` (s, 2) are the points to which the mesh
+    is graded.
     """
 
     points: FloatArray
     cells: IntArray
+    regions: IntArray
     facets: dict[str, IntArray]
     singular: FloatArray
     unit: float
@@ -108,14 +118,41 @@ def generate_meridian(meridian: Meridian, grading: Grading) -> MeridianArrays:
     """Mesh the meridian: the same input gives the same arrays, bit for bit."""
     start = time.perf_counter()
     singular = _singular_points(meridian)
-    points, cells = _triangulate(_boxes(meridian, singular, grading))
+    boxes = _boxes(meridian, singular, grading)
+    points, cells, box = triangulate(boxes)
+    layer = np.sum(boxes[box, 2, None] < np.array(_interfaces(meridian)), axis=1)  # as many interfaces are above it
+    regions = np.where((layer < len(meridian.interfaces)) | meridian.is_filled, layer + 1, 0)
     facets = _name_edges(meridian, points)
     places = np.array([(r, z) for r, z, _ in singular]).reshape(-1, 2)
-    return MeridianArrays(points, cells, facets, places, meridian.unit, time.perf_counter() - start)
+    return MeridianArrays(points, cells, regions, facets, places, meridian.unit, time.perf_counter() - start)
+
+
+def split_regions(arrays: MeridianArrays) -> dict[int, MeridianArrays]:
+    """Return a mesh of each region, by its number; one alone is the mesh itself."""
+    numbers = np.unique(arrays.regions)
+    if len(numbers) == 1:
+        return {int(numbers[0]): arrays}
+    return {int(number): _part(arrays, arrays.regions == number) for number in numbers}
+
+
+def _part(arrays: MeridianArrays, chosen: BoolArray) -> MeridianArrays:
+    """Return the mesh of the chosen cells."""
+    kept, cells = np.unique(arrays.cells[chosen], return_inverse=True)
+    number = np.full(len(arrays.points), -1)
+    number[kept] = np.arange(len(kept))
+    edges = {name: number[pairs] for name, pairs in arrays.facets.items()}
+    facets = {name: pairs[np.all(pairs >= 0, axis=1)] for name, pairs in edges.items()}
+    facets = {name: pairs for name, pairs in facets.items() if len(pairs)}
+    return replace(
+        arrays, points=arrays.points[kept], cells=cells.reshape(-1, 3), regions=arrays.regions[chosen], facets=facets
+    )
 
 
 def meridian_mesh(arrays: MeridianArrays) -> tuple[Any, dict[str, Int32Array]]:
-    """Return the dolfinx mesh of ``arrays`` on this process alone, and the facets of each group."""
+    """Return the dolfinx mesh of ``arrays`` on this process alone, and the facets of each group.
+
+    What of its boundary is in no group of the body's is where it is joined to other regions.
+    """
     mesh = compat.create_mesh(MPI.COMM_SELF, arrays.cells, arrays.points, order=1)
     topology = mesh.topology
     for dims in ((1, 2), (1, 0), (2, 0)):
@@ -129,7 +166,8 @@ def meridian_mesh(arrays: MeridianArrays) -> tuple[Any, dict[str, Int32Array]]:
     def keys(edges: IntArray) -> IntArray:
         return edges.min(axis=1) * len(arrays.points) + edges.max(axis=1)
 
-    return mesh, {name: exterior[np.isin(keys(ends), keys(edges))] for name, edges in arrays.facets.items()}
+    facets = {name: exterior[np.isin(keys(ends), keys(edges))] for name, edges in arrays.facets.items()}
+    return mesh, facets | {JOINT: np.setdiff1d(exterior, np.concatenate([*facets.values()]))}
 
 
 def _ratio(length: float, unit: float) -> float:
@@ -161,6 +199,11 @@ def _outline(meridian: Meridian) -> tuple[list[tuple[float, float]], list[str]]:
     return corners, groups
 
 
+def _interfaces(meridian: Meridian) -> list[float]:
+    """Heights at which one layer ends and the next begins, in units of a, from the top."""
+    return [_ratio(height, meridian.unit) for height in meridian.interfaces]
+
+
 def _singular_points(meridian: Meridian) -> list[tuple[float, float, float]]:
     """Points (r, z) at which the displacement is singular, and how much larger than at the rim an element may be."""
     corners, groups = _outline(meridian)
@@ -174,66 +217,35 @@ def _singular_points(meridian: Meridian) -> list[tuple[float, float, float]]:
         distance = hypot(r - 1, z)
         factor = min(max(1.0, min(distance, radius) ** 2), max(1.0, 100 * smallest))
         points.append((r, z, factor if held.get(before) != held.get(after) else _MILD * factor))
+    for z in _interfaces(meridian):
+        factor = min(max(1.0, min(hypot(radius - 1, z), radius) ** 2), max(1.0, 100 * smallest))
+        points.append((radius, z, _MILD * factor))
     return points
 
 
 def _boxes(meridian: Meridian, singular: list[tuple[float, float, float]], grading: Grading) -> FloatArray:
-    """Halve the meridian along the longer side of each box until all are small enough: (n, 4) of r0, r1, z0, z1.
+    """Halve each layer of the meridian along the longer side of its boxes until all are small enough.
 
-    Where a side is cut depends on that side alone. Corners of neighbours then either agree to the last bit or are a
-    good part of a side apart.
+    The boxes are (n, 4) of r0, r1, z0, z1.
     """
     corners = np.array(_outline(meridian)[0])
     (r_end, _), (_, z_end) = corners.max(axis=0), corners.min(axis=0)
     most = grading.cap * max(min(r_end, -z_end), max(r_end, -z_end) / _MOST_SLENDER)
-    marks = [np.unique(corners[:, axis]) for axis in (0, 1)]
+    ends = [0.0, *_interfaces(meridian), float(z_end)]
+    marks = [np.unique(corners[:, 0]), np.unique([*corners[:, 1], *ends])]
     # Boxes smaller than any distance between marks have all of them among their corners.
     least = min(np.diff(m).min() for m in marks) / 4
-    todo, done = np.array([[0.0, r_end, z_end, 0.0]]), []
-    while len(todo):
-        r0, r1, z0, z1 = todo.T
-        size = np.full(len(todo), most)
+
+    def judge(boxes: FloatArray) -> tuple[BoolArray, BoolArray]:
+        r0, r1, z0, z1 = boxes.T
+        size = np.full(len(boxes), most)
         for r, z, factor in singular:
             distance = np.hypot(np.maximum(np.maximum(r0 - r, r - r1), 0), np.maximum(np.maximum(z0 - z, z - z1), 0))
             size = np.minimum(size, min(grading.floor * factor, least) + grading.growth * distance)
-        tall = z1 - z0 > r1 - r0
-        large = np.maximum(r1 - r0, z1 - z0) > size
-        done.append(todo[~large])
-        todo = np.vstack([_halve(todo[large & (tall == bool(axis))], axis, marks[axis]) for axis in (0, 1)])
-    return np.vstack(done)
+        return np.maximum(r1 - r0, z1 - z0) > size, z1 - z0 > r1 - r0
 
-
-def _halve(boxes: FloatArray, axis: int, marks: FloatArray) -> FloatArray:
-    """Cut boxes across ``axis`` at the mark in the middle half of their side, if there is one, else in the middle."""
-    low, high = boxes[:, 2 * axis], boxes[:, 2 * axis + 1]
-    middle = cut = (low + high) / 2
-    for mark in marks:
-        cut = np.where(np.abs(mark - middle) <= (high - low) / 4, mark, cut)
-    first, second = boxes.copy(), boxes.copy()
-    first[:, 2 * axis + 1] = second[:, 2 * axis] = cut
-    return np.vstack([first, second])
-
-
-def _triangulate(boxes: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Join the centre of each box to all the corners, its own and its neighbours', on its boundary."""
-    r0, r1, z0, z1 = boxes.T
-    corners = np.array([(r0, z0), (r1, z0), (r1, z1), (r0, z1)])  # (4, 2, n), counter-clockwise
-    points, number = np.unique(corners.transpose(0, 2, 1).reshape(-1, 2), axis=0, return_inverse=True)
-    number = number.reshape(4, -1)
-    centre = len(points) + np.arange(len(boxes))
-    cells = []
-    for side, fixed in enumerate((1, 0, 1, 0)):
-        # In this order, the points between the two ends of a side are those that lie on it.
-        order = np.lexsort((points[:, 1 - fixed], points[:, fixed]))
-        place = np.argsort(order)
-        start, end = place[number[side]], place[number[(side + 1) % 4]]
-        count, step = np.abs(end - start), np.sign(end - start)
-        box = np.repeat(np.arange(len(boxes)), count)
-        along = np.arange(len(box)) - np.repeat(np.cumsum(count) - count, count)
-        first = start[box] + step[box] * along
-        cells.append(np.column_stack([centre[box], order[first], order[first + step[box]]]))
-    middles = np.column_stack([(r0 + r1) / 2, (z0 + z1) / 2])
-    return np.vstack([points, middles]), np.vstack(cells)
+    layers = [(0.0, r_end, low, high) for high, low in pairwise(ends)]
+    return halve_boxes(np.array(layers), marks, judge)
 
 
 def _name_edges(meridian: Meridian, points: FloatArray) -> dict[str, IntArray]:

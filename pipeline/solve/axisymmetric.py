@@ -17,14 +17,22 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from pipeline.arrays import FloatArray
-from pipeline.mesh.meridian import AXIS, Grading, Meridian, MeridianArrays, generate_meridian, meridian_mesh
+from pipeline.arrays import FloatArray, Int32Array
+from pipeline.mesh.meridian import (
+    AXIS,
+    Grading,
+    Meridian,
+    MeridianArrays,
+    generate_meridian,
+    meridian_mesh,
+    split_regions,
+)
 from pipeline.scene.model import FIXED, PROBE
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
-from pipeline.solve.meridian_forms import MeridianForms
+from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
 from pipeline.solve.reaction import reaction
 from pipeline.solve.solution import BALANCE_LIMIT, Solution
 from pipeline.stages import stage
@@ -44,6 +52,10 @@ _SPARE_MEMORY = 100
 _MOST_REFINEMENTS, _BALANCED = 20, 1e-9
 # Strain is not read nearer to a singular point than this (in units of a).
 _STRAIN_DISTANCE = 0.1
+
+
+# Of each region of a body, by its number: its mesh and the facets of each group.
+Meshes = dict[int, tuple[Any, dict[str, Int32Array]]]
 
 
 class MeridianProblem:
@@ -85,8 +97,9 @@ class MeridianProblem:
         """
         if len(loads.motions) > 1 or loads.motions[0].is_rotation or any(loads.motions[0].direction[:2]):
             raise SolveError("the meridian serves movements along its axis only")
-        if not 0 <= law.poisson <= 0.5:
-            raise SolveError(f"Poisson's ratio is {law.poisson:g}, must be between 0 and 0.5")
+        for nu in map(_poisson, law.lame_lambda, law.lame_mu):
+            if not 0 <= nu <= 0.5:
+                raise SolveError(f"Poisson's ratio is {nu:g}, must be between 0 and 0.5")
         clock, best, failure = _Clock(), None, SolveError("no mesh was tried")
         for grading in _GRADINGS:
             try:
@@ -104,7 +117,7 @@ class MeridianProblem:
             raise failure
         if best.error > _WORST_ERROR:
             raise SolveError(f"the force is known to {best.error:.0e} only, allowed {_WORST_ERROR:.0e}")
-        a, (_, mu), (amount,) = self._meridian.unit, law.lame, loads.amounts
+        a, mu, (amount,) = self._meridian.unit, law.lame_mu[0], loads.amounts
         response = reaction(
             loads, np.array([[mu * a * best.stationary]]), np.array([[0.0, 0.0, mu * a * best.on_probe]]),
             balance=best.balance,
@@ -119,10 +132,10 @@ class MeridianProblem:
 
 def compile_axisymmetric(degree: int = DEGREE) -> None:
     """Compile every form that a :class:`MeridianProblem` needs, on this process; call it within ``compiling()``."""
-    mesh, _ = meridian_mesh(generate_meridian(Meridian(2.0, 1.0, 1.0), Grading(1.0)))
+    mesh, facets = meridian_mesh(generate_meridian(Meridian(2.0, 1.0, 1.0), Grading(1.0)))
     for mixed in (False, True):
         for p in (degree - 1, degree):
-            MeridianForms(mesh, p, mixed)
+            MeridianForms(mesh, facets, p, mixed)
 
 
 class _Unbalanced(SolveError):
@@ -146,12 +159,15 @@ class _Clock:
 
 @dataclass(frozen=True)
 class _Scaled:
-    """A solution for a = μ = d = 1: the residual on the probe, and twice the energy; ``error`` is relative."""
+    """A solution for a = d = 1 and μ = 1 in region 0: the residual on the probe, and twice the energy.
+
+    ``error`` is relative.
+    """
 
     on_probe: float
     stationary: float
     balance: float
-    forms: MeridianForms
+    forms: MeridianForms | JoinedForms
     iterations: int
     error: float = inf
     max_strain: float = 0.0
@@ -170,10 +186,9 @@ def _solve_on(arrays: MeridianArrays, law: MaterialLaw, bonded: bool, degree: in
     if len(np.intersect1d(arrays.facets[PROBE], arrays.facets[FIXED])):
         raise SolveError("the probe covers the top right to the held side: no displacement satisfies both conditions")
     with clock("mesh"):
-        mesh, facets = meridian_mesh(arrays)
-    mixed = law.poisson >= MIXED_FROM
-    coarse = _solve_degree(mesh, facets, degree - 1, mixed, law, bonded, clock)
-    fine = _solve_degree(mesh, facets, degree, mixed, law, bonded, clock)
+        meshes = {region: meridian_mesh(part) for region, part in split_regions(arrays).items()}
+    coarse = _solve_degree(meshes, degree - 1, law, bonded, clock)
+    fine = _solve_degree(meshes, degree, law, bonded, clock)
     theta = (degree - 1) ** 2 / (2 * degree - 1)
     step = abs(coarse.on_probe / fine.on_probe - 1)
     error = 1.25 * theta * step + 3 * max(coarse.balance, fine.balance)
@@ -184,23 +199,20 @@ def _solve_on(arrays: MeridianArrays, law: MaterialLaw, bonded: bool, degree: in
     return replace(fine, error=error, max_strain=max_strain)
 
 
-def _solve_degree(
-    mesh: Any, facets: dict[str, Any], degree: int, mixed: bool, law: MaterialLaw, bonded: bool, clock: _Clock
-) -> _Scaled:
+def _solve_degree(meshes: Meshes, degree: int, law: MaterialLaw, bonded: bool, clock: _Clock) -> _Scaled:
     """Solve with one degree; refine the solution until round-off stops it."""
     with clock("assemble"):
-        forms = MeridianForms(mesh, degree, mixed)
-        forms.set_ratio(law.ratio)
+        forms, definite = _forms(meshes, degree, law)
         stiffness = forms.stiffness()
-        probe, support = forms.locate(facets, PROBE, 1), forms.locate(facets, FIXED, 1)
-        zero = [support, forms.locate(facets, FIXED, 0), forms.locate(facets, AXIS, 0)]
+        probe, support = forms.locate(PROBE, 1), forms.locate(FIXED, 1)
+        zero = [support, forms.locate(FIXED, 0), forms.locate(AXIS, 0)]
         if bonded:
-            zero.append(forms.locate(facets, PROBE, 0))
+            zero.append(forms.locate(PROBE, 0))
         free = np.setdiff1d(np.arange(forms.dofs), np.concatenate([probe, *zero]))
         solution = np.zeros(forms.dofs)
         solution[probe] = -1.0
         unknown = stiffness[free][:, free]
-    with _factorised(unknown, definite=not mixed, clock=clock) as solve, clock("solve"):
+    with _factorised(unknown, definite=definite, clock=clock) as solve, clock("solve"):
         residual, balance = forms.residual(solution), np.inf
         for iteration in range(1, _MOST_REFINEMENTS + 1):  # noqa: B007
             solution[free] -= solve(residual[free])
@@ -219,6 +231,24 @@ def _solve_degree(
             "the body is so slender that its stiffness drowns in round-off"
         )
     return _Scaled(on_probe, twice_energy, balance, forms, iteration)
+
+
+def _forms(meshes: Meshes, degree: int, law: MaterialLaw) -> tuple[MeridianForms | JoinedForms, bool]:
+    """Return the forms of all materials, in units of the μ of region 0, and whether their operator is definite."""
+    parts, weights, definite = [], [], True
+    for region, (mesh, facets) in meshes.items():
+        lame_lambda, lame_mu = law.lame_lambda[region], law.lame_mu[region]
+        mixed = _poisson(lame_lambda, lame_mu) >= MIXED_FROM
+        part = MeridianForms(mesh, facets, degree, mixed)
+        part.set_ratio(lame_lambda / lame_mu)
+        parts.append(part)
+        weights.append(lame_mu / law.lame_mu[0])
+        definite = definite and not mixed
+    return parts[0] if len(parts) == 1 and weights == [1.0] else JoinedForms(parts, weights), definite
+
+
+def _poisson(lame_lambda: float, lame_mu: float) -> float:
+    return MaterialLaw.of(lame_lambda, lame_mu).poisson
 
 
 @contextmanager

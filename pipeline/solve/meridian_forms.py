@@ -7,25 +7,35 @@ With ε_rr = ∂u_r/∂r, ε_zz = ∂u_z/∂z, ε_θθ = u_r/r, ε_rz = (∂u_r/
 
 the mixed form (Taylor–Hood, p one degree lower) has no λ but 1/λ, which is 0 for ν = 0.5. On the axis u_r = 0.
 Stresses are in units of μ.
+
+A body of several materials has a mesh, a space and forms for each, joined where they meet: displacements are the same on
+either side, pressures are not. Where the material jumps so does the pressure, and a continuous one would err there.
 """
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 import ufl
 from dolfinx import fem
+from scipy.spatial import cKDTree
 
 from pipeline import compat
-from pipeline.arrays import FloatArray, IntArray
+from pipeline.arrays import FloatArray, Int32Array, IntArray
+from pipeline.mesh.meridian import JOINT
 from pipeline.solve.compiled import cellwise_space, form, taylor_hood_space, vector_space
+from pipeline.solve.linear import SolveError
+
+# Of the larger coordinate: what rounding may put between one place and itself.
+_SAME_PLACE = 1e-11
 
 
 class MeridianForms:
-    """Space and forms of one ``degree`` on a mesh of the meridian; all on this process."""
+    """Space and forms of one ``degree`` on a mesh of the meridian, of one material; all on this process."""
 
-    def __init__(self, mesh: Any, degree: int, mixed: bool):
-        self._mesh, self._mixed = mesh, mixed
+    def __init__(self, mesh: Any, facets: dict[str, Int32Array], degree: int, mixed: bool):
+        self._mesh, self._facets, self._mixed = mesh, facets, mixed
         self._space = taylor_hood_space(mesh, degree) if mixed else vector_space(mesh, degree)
         self._solution = fem.Function(self._space)
         self._compressibility = fem.Constant(mesh, 1.0)  # λ/μ, or μ/λ if mixed
@@ -55,12 +65,19 @@ class MeridianForms:
         """Set λ/μ, which may be infinite if mixed, or there its inverse."""
         self._compressibility.value = 1 / ratio if self._mixed else ratio
 
-    def locate(self, facets: dict[str, Any], name: str, component: int) -> IntArray:
+    def locate(self, name: str, component: int) -> IntArray:
         """Return the dofs of u_r (0) or u_z (1) on a group of facets."""
-        if name not in facets:
+        if name not in self._facets:
             return np.empty(0, dtype=np.int64)
         space = (self._space.sub(0) if self._mixed else self._space).sub(component)
-        return np.asarray(fem.locate_dofs_topological(space, 1, facets[name]), dtype=np.int64)
+        return np.asarray(fem.locate_dofs_topological(space, 1, self._facets[name]), dtype=np.int64)
+
+    def joints(self) -> tuple[IntArray, FloatArray]:
+        """Return the dofs (n, 2) of u_r and u_z where other materials are joined, and where they are (n, 2)."""
+        space, dofs = self._space.sub(0).collapse() if self._mixed else (self._space, np.arange(self.dofs))
+        blocks = np.asarray(fem.locate_dofs_topological(space, 1, self._facets[JOINT]), dtype=np.int64)
+        places: FloatArray = space.tabulate_dof_coordinates()[blocks, :2]
+        return np.asarray(dofs, dtype=np.int64).reshape(-1, 2)[blocks], places
 
     def stiffness(self) -> sp.csr_matrix:
         """Assemble the operator (μ a, per radian), with nothing prescribed."""
@@ -88,6 +105,64 @@ class MeridianForms:
         rr, zz, tt, rz = (np.asarray(fem.assemble_vector(self._strains).array).reshape(-1, 4) / area[:, None]).T
         in_plane = np.abs(rr + zz) / 2 + np.hypot((rr - zz) / 2, rz)
         return np.maximum(in_plane, np.abs(tt)), corners
+
+
+class JoinedForms:
+    """The forms of several materials as one, with the displacement continuous; all on this process.
+
+    What a part calls a unit of stress, its μ, is ``weights`` of it here.
+    """
+
+    def __init__(self, parts: list[MeridianForms], weights: list[float]):
+        self._parts, self._weights = parts, weights
+        self._numbers: list[IntArray] = []  # of the dofs of each part
+        self.dofs, joined = 0, 0
+        dofs, places = np.empty((0, 2), dtype=np.int64), np.empty((0, 2))
+        for part in parts:
+            own, where = part.joints()
+            number = np.full(part.dofs, -1)
+            if len(places):
+                distance, nearest = cKDTree(places).query(where)
+                same = distance < _SAME_PLACE * np.maximum(np.abs(where).max(axis=1), 1.0)
+                number[own[same]] = dofs[nearest[same]]
+                joined += 2 * np.count_nonzero(same)
+            new = np.flatnonzero(number < 0)
+            number[new] = self.dofs + np.arange(len(new))
+            self.dofs += len(new)
+            self._numbers.append(number)
+            dofs, places = np.vstack([dofs, number[own]]), np.vstack([places, where])
+        if joined != len(places):
+            raise SolveError(f"{len(places) - joined} places where materials meet have none on the other side")
+
+    def locate(self, name: str, component: int) -> IntArray:
+        """Return the dofs of u_r (0) or u_z (1) on a group of facets."""
+        found = [n[part.locate(name, component)] for part, n in zip(self._parts, self._numbers, strict=True)]
+        return np.unique(np.concatenate(found))
+
+    def stiffness(self) -> sp.csr_matrix:
+        """Assemble the operator (μ a, per radian), with nothing prescribed."""
+        total = sp.csr_matrix((self.dofs, self.dofs))
+        for part, weight, number in self._each:
+            matrix = part.stiffness().tocoo()
+            entries = weight * matrix.data, (number[matrix.row], number[matrix.col])
+            total = total + sp.csr_matrix(entries, shape=total.shape)
+        return total
+
+    def residual(self, solution: FloatArray) -> FloatArray:
+        """Apply the operator to ``solution`` by way of its strains."""
+        total = np.zeros(self.dofs)
+        for part, weight, number in self._each:
+            total[number] += weight * part.residual(solution[number])  # no number is there twice in one part
+        return total
+
+    def mean_strains(self) -> tuple[FloatArray, FloatArray]:
+        """Return the largest principal strain of each cell's mean strain, and its corners (m, 3, 2)."""
+        strains, corners = zip(*(part.mean_strains() for part in self._parts), strict=True)
+        return np.concatenate(strains), np.concatenate(corners)
+
+    @property
+    def _each(self) -> Iterator[tuple[MeridianForms, float, IntArray]]:
+        return zip(self._parts, self._weights, self._numbers, strict=True)
 
 
 def _strain(u: Any, r: Any) -> tuple[Any, Any, Any, Any]:
