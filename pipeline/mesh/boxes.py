@@ -1,7 +1,7 @@
 """Boxes of a plane, halved until each is small enough for where it lies, and cut into triangles.
 
-A box is a row of r0, r1, z0, z1. Where a side is cut depends on that side alone. Corners of neighbours then either agree
-to the last bit or are a good part of a side apart.
+A box is a row of r0, r1, z0, z1. Where a side is cut depends on that side alone. Corners of neighbours then either
+agree to the last bit or are a good part of a side apart.
 """
 
 from collections.abc import Callable, Sequence

@@ -48,4 +48,6 @@ def meridian_of(case: Case) -> Meridian:
         raise ValueError(f"a {case.body.shape} has no half plane")
     fixed = case.body.support.on_half_plane()
     held = case.is_truncated and case.mesh.outside == "fixed"
-    return Meridian(body.radius, body.height, case.probe.circumradius, fixed, case.column, held)
+    return Meridian(
+        body.radius, body.height, case.probe.circumradius, fixed, case.column, held, body.interfaces, body.is_filled
+    )

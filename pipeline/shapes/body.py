@@ -1,7 +1,6 @@
 """What every body tells of itself. There are no defaults: a body that leaves something out cannot be made."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
 from math import inf
@@ -9,6 +8,7 @@ from typing import Annotated, Any
 
 from pipeline.shapes.arrays import FloatArray
 from pipeline.shapes.frame import Frame, Units, Vector
+from pipeline.shapes.half_plane import Rectangle
 from pipeline.shapes.regions import Inclusion, Layer, Region
 from pipeline.shapes.section import Section, Words
 from pipeline.shapes.support import Fixed, Support, support_of
@@ -16,14 +16,6 @@ from pipeline.shapes.surface import Surface
 
 # Layers that miss the height by this share of it fill the body.
 _SAME = 1e-9
-
-
-@dataclass(frozen=True)
-class Rectangle:
-    """The half plane (r, z) of a body round about the z axis: r up to ``radius``, z from -``height`` to 0 (m)."""
-
-    radius: float
-    height: float
 
 
 class Body(Section, ABC):
@@ -130,7 +122,7 @@ class Body(Section, ABC):
 
     @abstractmethod
     def half_plane(self) -> Rectangle | None:
-        """Return its half plane if it is the same all round the z axis, None if it is not."""
+        """Return its half plane if it and its regions are the same all round the z axis, None if they are not."""
 
     # ---- geometry -------------------------------------------------------------------------------------
 

@@ -8,8 +8,8 @@ With ε_rr = ∂u_r/∂r, ε_zz = ∂u_z/∂z, ε_θθ = u_r/r, ε_rz = (∂u_r/
 the mixed form (Taylor–Hood, p one degree lower) has no λ but 1/λ, which is 0 for ν = 0.5. On the axis u_r = 0.
 Stresses are in units of μ.
 
-A body of several materials has a mesh, a space and forms for each, joined where they meet: displacements are the same on
-either side, pressures are not. Where the material jumps so does the pressure, and a continuous one would err there.
+A body of several materials has a mesh, a space and forms for each, joined where they meet: displacements are the same
+on either side, pressures are not. Where the material jumps so does the pressure, and a continuous one would err there.
 """
 
 from collections.abc import Iterator

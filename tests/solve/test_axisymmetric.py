@@ -23,8 +23,15 @@ def _forms():
 
 
 def solve_axisymmetric(meridian, poisson, bonded, *, young=1.0, depth=1.0, **options):
+    return solve_layers(meridian, [(young, poisson)], bonded, depth=depth, **options)
+
+
+def solve_layers(meridian, moduli, bonded, *, depth=1.0, **options):
+    """Solve for the moduli (E, ν) of each region."""
+    laws = [MaterialLaw.of_moduli(*each) for each in moduli]
+    law = MaterialLaw(*(tuple(each[n] for each in (law.lame for law in laws)) for n in (0, 1)))
     with MeridianProblem(meridian, Conditions(bonded), **options) as problem:
-        return problem.solve(MaterialLaw.of_moduli(young, poisson), Loads.along((0.0, 0.0, -depth)))
+        return problem.solve(law, Loads.along((0.0, 0.0, -depth)))
 
 
 @pytest.mark.parametrize(("contact", "poisson"), known.CYLINDER)
@@ -140,6 +147,66 @@ def test_error_bar_holds_the_truth(seed, monkeypatch):
     rough = solve_axisymmetric(meridian, poisson, seed % 2 == 0, degree=4)
     assert exact.bar < rough.bar
     assert rough.reaction[2] == pytest.approx(exact.reaction[2], rel=rough.bar + exact.bar)
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.5])
+def test_layers_of_one_material_change_nothing(poisson):
+    layered = solve_layers(Meridian(5, 4, 1, interfaces=(-0.3, -1.7)), [(2.0, poisson)] * 3, True)
+    assert layered.reaction[2] == pytest.approx(
+        solve_axisymmetric(Meridian(5, 4, 1), poisson, True, young=2.0).reaction[2], rel=1e-7
+    )
+
+
+def test_layers_under_a_wide_punch_are_springs_in_series():
+    """Without lateral contraction, compliances of layers that a probe covers add: F = d / Σ h/(E A)."""
+    meridian = Meridian(1, 3, 2, interfaces=(-0.5, -2.0), is_filled=True)
+    solution = solve_layers(meridian, [(1e9, 0.3), (2.0, 0.0), (100.0, 0.0), (0.5, 0.0)], True)
+    assert solution.reaction[2] == pytest.approx(pi / (0.5 / 2 + 1.5 / 100 + 1 / 0.5), rel=1e-10)
+
+
+def test_soft_layer_on_a_rigid_one_is_a_layer_on_a_rigid_base():
+    alone = solve_axisymmetric(Meridian(20, 1, 1), 0.45, False).reaction[2]
+    ratios = [1e4, 1e5]
+    on = [
+        solve_layers(Meridian(20, 2, 1, interfaces=(-1.0,)), [(r, 0.3), (1.0, 0.45)], False).reaction[2] for r in ratios
+    ]
+    gaps = [force / alone - 1 for force in on]
+    assert -1e-3 < gaps[0] < 0
+    assert gaps[1] == pytest.approx(gaps[0] / 10, rel=0.05)
+
+
+LAYERED = [
+    (Meridian(10, 8, 1, interfaces=(-0.7, -2.0)), [(0.3, 0.3), (1.0, 0.45), (60.0, 0.48)]),
+    (Meridian(6, 4, 1, interfaces=(-1.0,)), [(1.0, 0.3), (5.0, 0.49)]),
+    (Meridian(6, 4, 1, interfaces=(-1.0,)), [(1.0, 0.0), (1.0, 0.5)]),
+    (Meridian(4, 3, 1, "sides", interfaces=(-1.0, -2.0)), [(1e3, 0.3), (1.0, 0.45), (0.1, 0.5)]),
+    (Meridian(1.3, 3, 1, interfaces=(-0.2, -1.0)), [(1e3, 0.3), (1.0, 0.45), (0.1, 0.49)]),
+    (Meridian(30, 20, 1, interfaces=(-0.02,)), [(1.0, 0.45), (100.0, 0.49)]),
+    (Meridian(3, 3, 1, -1.0, interfaces=(-1.0,)), [(10.0, 0.45), (1.0, 0.3)]),
+    (Meridian(9, 3, 1, column=2.0, interfaces=(-1.0,)), [(10.0, 0.45), (1.0, 0.3)]),
+]
+
+
+@pytest.mark.parametrize("number", range(len(LAYERED)))
+def test_error_bar_of_layers_holds_the_truth(number, monkeypatch):
+    """The bar of a rough mesh holds the answer of a fine one of higher degree, and the fine one has 1e-5."""
+    meridian, moduli = LAYERED[number]
+    exact = solve_layers(meridian, moduli, number % 2 == 0)
+    assert exact.bar < 1e-5
+    monkeypatch.setattr("pipeline.solve.axisymmetric._GRADINGS", (Grading(1e-4, 1.4, 4.0),))
+    rough = solve_layers(meridian, moduli, number % 2 == 0, degree=4)
+    assert exact.bar < rough.bar < 1e-2
+    assert rough.reaction[2] == pytest.approx(exact.reaction[2], rel=rough.bar + exact.bar)
+
+
+def test_regions_of_the_mesh_are_the_layers():
+    arrays = generate_meridian(Meridian(7.3, 2.1, 0.9, -1.3, interfaces=(-0.2, -1.31)), Grading())
+    corners = arrays.points[arrays.cells] * arrays.unit
+    area = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 2
+    sizes = [area[arrays.regions == n].sum() for n in range(3)]
+    assert sizes == pytest.approx([7.3 * (2.1 - 1.31), 7.3 * 0.2, 7.3 * 1.11], rel=1e-10)
+    heights = [corners[arrays.regions == n][..., 1] for n in range(3)]
+    assert [float(z.max()) for z in heights] == pytest.approx([-1.31, 0.0, -0.2], rel=1e-10)
 
 
 def test_mesh_is_repeatable_and_exact():

@@ -4,8 +4,9 @@ from math import hypot, pi
 from typing import Annotated, Any, Literal
 
 from pipeline.shapes.arrays import FloatArray, np
-from pipeline.shapes.body import Layered, Rectangle
+from pipeline.shapes.body import Layered
 from pipeline.shapes.frame import Frame, PlaceError, Units, Vector
+from pipeline.shapes.half_plane import Rectangle
 from pipeline.shapes.section import Words, in_mm
 from pipeline.shapes.surface import Plane, Surface, Tube
 from pipeline.units import Length
@@ -77,9 +78,9 @@ class Cylinder(Layered):
         """Return both planes."""
         return "x", "y"
 
-    def half_plane(self) -> Rectangle:
-        """Return radius and height."""
-        return Rectangle(self.radius, self.height)
+    def half_plane(self) -> Rectangle | None:
+        """Return radius, height and layers; inclusions have none."""
+        return None if self.inclusion else Rectangle(self.radius, self.height, self.interfaces, self.is_filled)
 
     def draw(self, kernel: Any, units: Units) -> int:
         """Add the cylinder."""

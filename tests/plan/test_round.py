@@ -1,0 +1,48 @@
+"""Which scenes are solved in two dimensions."""
+
+from typing import Any
+
+import pytest
+
+from pipeline.mesh.of_case import meridian_of
+from pipeline.plan.symmetry import is_round
+from pipeline.study.load import parse
+from tests.cases import raw
+
+CYLINDER = {"shape": "cylinder", "radius": "20 mm", "height": "10 mm", "fixed": "bottom", "size": None}
+SKIN: dict[str, Any] = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.48}
+FAT: dict[str, Any] = {"name": "fat", "young": "2 kPa", "poisson": 0.45}
+BALL = {"name": "tumour", "at": ["0 mm", "0 mm", "-6 mm"], "radius": "2 mm", "young": "50 kPa", "poisson": 0.45}
+
+
+def case(**changes: Any):
+    """Return the case of a study with a cylinder, with changes."""
+    content = raw()
+    content["body"] = {key: value for key, value in (CYLINDER | changes.pop("body", {})).items() if value is not None}
+    for section, values in changes.items():
+        content[section] |= values
+    return parse(content).case(())
+
+
+@pytest.mark.parametrize(
+    ("body", "expected"),
+    [
+        ({}, True),
+        ({"layers": [SKIN]}, True),
+        ({"layers": [SKIN, FAT]}, True),
+        ({"inclusion": [BALL]}, False),
+        ({"layers": [SKIN], "inclusion": [BALL]}, False),
+        # Held from where a stiff layer ends: the displacement goes like r to a power below one half.
+        ({"layers": [SKIN], "fixed": {"below": "-2 mm"}}, False),
+        ({"layers": [SKIN], "fixed": {"below": "-2.1 mm"}}, True),
+        ({"layers": [SKIN | {"young": "5 kPa"}], "fixed": {"below": "-2 mm"}}, True),
+    ],
+)
+def test_layered_cylinders_are_round(body, expected):
+    assert is_round(case(body=body)) is expected
+
+
+def test_layers_reach_the_meridian():
+    whole, part = (meridian_of(case(body={"layers": layers})) for layers in ([SKIN, FAT], [SKIN]))
+    assert (whole.interfaces, whole.is_filled) == ((-0.002,), True)
+    assert (part.interfaces, part.is_filled) == ((-0.002,), False)
