@@ -49,9 +49,8 @@ class Records:
                 raise StoreError(damaged(self.path, error)) from error
             if row:
                 found[key] = record = _readable(row[0])
-                if record is None or record.key != key:
-                    what = "cannot be read" if record is None else f"is that of {record.key}"
-                    raise StoreError(f"the case store {self.path}: record {key} {what}; {_mend(self.path)} removes it")
+                if fault := _fault(key, record):
+                    raise StoreError(f"the case store {self.path}: record {key} {fault}; {_mend(self.path)} removes it")
         return {key: record for key, record in found.items() if record is not None}
 
     def records(self) -> Iterator[Record]:
@@ -73,11 +72,9 @@ class Records:
             yield f"the file: {state}"
         for key, text, _ in self.rows():
             record = _readable(text)
-            if record is None:
-                yield f"record {key}: cannot be read"
-            elif record.key != key:
-                yield f"record {key}: is that of {record.key}"
-            elif record.status == "ok" and not (isfinite(record.force) and record.force > 0):
+            if fault := _fault(key, record):
+                yield f"record {key}: {fault}"
+            elif record and record.status == "ok" and not (isfinite(record.force) and record.force > 0):
                 yield f"record {key}: is ok, and its force {record.force}"
 
     def close(self) -> None:
@@ -150,9 +147,8 @@ class Store(Records):
         gone = []
         for key, text, stored in self.rows():
             record = _readable(text)
-            is_lost = record is None or record.key != key
             is_old = older_than is not None and time.time() - stored > older_than
-            if is_lost or is_old or (failed and record is not None and not record.is_ok):
+            if is_old or _fault(key, record) or (failed and record and not record.is_ok):
                 gone.append(key)
         self._database.executemany("DELETE FROM records WHERE key = ?", [(key,) for key in gone])
         self._database.execute("VACUUM")
@@ -196,3 +192,10 @@ def _readable(text: str) -> Record | None:
         return Record.from_json(text)
     except (ValueError, TypeError, KeyError):
         return None
+
+
+def _fault(key: str, record: Record | None) -> str:
+    """Return what is wrong with what is stored under ``key``, if anything is."""
+    if record is None:
+        return "cannot be read"
+    return "" if record.key == key else f"is that of {record.key}"
