@@ -171,7 +171,7 @@ def elements(mesh: Labels) -> str:
         parts.append(f"{write('fine', mesh['fine'])} {'everywhere' if full else 'within ε'}")
         parts += [] if full else [f"{write('coarse', mesh['coarse'])} far away"]
         rim = mesh["rim"]
-        edge = "a tenth of its half width" if rim is None else f"{1e3 * rim:g} mm"
+        edge = "a tenth of its half width" if rim is None else write("rim", rim)
         parts.append(f"{edge} at the probe's edge")
         parts.append(f"growth {mesh['growth']:g}, degree {mesh['degree']}, element {mesh['element']}")
     return ", ".join(parts) or words(mesh)

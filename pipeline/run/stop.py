@@ -4,6 +4,7 @@ from collections.abc import Callable, Collection, Mapping
 
 from pipeline.plan.plan import Plan
 from pipeline.plan.steps import Solve
+from pipeline.quantities import write
 from pipeline.run.record import Record
 
 SKIPPED = "skipped"
@@ -40,7 +41,7 @@ def reason_to_skip(plan: Plan, solve: Solve, find: Callable[[str], Record | None
     last = [is_near for is_near, _ in near[-_IN_A_ROW:]]
     if len(last) < _IN_A_ROW or not all(last):
         return ""
-    return f"F is within {100 * limit:g} % of F_exact up to ε = {1e3 * near[-1][1]:g} mm: larger ε are not run"
+    return f"F is within {100 * limit:g} % of F_exact up to ε = {write('epsilon', near[-1][1])}: larger ε are not run"
 
 
 def skipped(plan: Plan, records: Mapping[str, Record]) -> dict[str, Record]:
