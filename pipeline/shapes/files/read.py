@@ -31,11 +31,20 @@ def load_surface(path: Path, unit: float, repair: bool = False, smooth: float | 
     Raises:
         SurfaceError: if it does not bound one piece of tissue; says what was found, and what mends it.
     """
+    return _load(path, *state_of(path), unit, repair, smooth)
+
+
+def state_of(path: Path) -> tuple[int, int]:
+    """Return when a file was changed last (ns), and its size (bytes): what it is read again for.
+
+    Raises:
+        SurfaceError: if it is not there.
+    """
     try:
         state = path.stat()
     except OSError as error:
         raise SurfaceError(f"cannot be read: {error.strerror or error}") from None
-    return _load(path, state.st_mtime_ns, state.st_size, unit, repair, smooth)
+    return state.st_mtime_ns, state.st_size
 
 
 def read_surface(path: Path, unit: float) -> Triangles:

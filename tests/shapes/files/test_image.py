@@ -1,0 +1,170 @@
+"""Label maps: the surface round a label, where the header says, and what is wrong with files that are none."""
+
+import gzip
+from pathlib import Path
+from typing import Any
+
+import nibabel
+import nrrd
+import numpy as np
+import pytest
+
+from pipeline.arrays import FloatArray
+from pipeline.shapes.files.image import default_smooth, load_image
+from pipeline.shapes.triangles import SurfaceError, Triangles, doubled_normals
+
+AXES = np.array([40.0, 30.0, 20.0])  # mm
+CENTRE = np.array([10.31, -20.17, 55.43])  # mm: right, front, head; on no voxel
+VOLUME = 4 / 3 * np.pi * AXES.prod() * 1e-9  # m³
+LPS = np.diag([-1.0, -1.0, 1.0])
+
+
+def _affine(spacing: Any, low: Any = (-40, -70, 5)) -> FloatArray:
+    affine = np.diag([*np.broadcast_to(spacing, 3), 1.0])
+    affine[:3, 3] = low
+    return affine
+
+
+def _ellipsoid(affine: FloatArray, shape: tuple[int, ...], label: int = 2) -> np.ndarray:
+    places = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), -1) @ affine[:3, :3].T + affine[:3, 3]
+    return (((((places - CENTRE) / AXES) ** 2).sum(-1) < 1) * label).astype(np.uint8)
+
+
+def _nifti(path: Path, values: np.ndarray, affine: FloatArray, unit: str = "mm") -> Path:
+    image = nibabel.Nifti1Image(values, affine)
+    image.header.set_xyzt_units(unit)
+    nibabel.save(image, path)
+    return path
+
+
+def _distances(triangles: Triangles) -> FloatArray:
+    """Distances (m) of its points from the ellipsoid, to first order."""
+    place, axes = triangles.points - CENTRE / 1e3, AXES / 1e3
+    level = np.sqrt(((place / axes) ** 2).sum(axis=1))
+    return (level - 1) * level / np.linalg.norm(place / axes**2, axis=1)
+
+
+@pytest.fixture
+def scan(tmp_path: Path) -> Path:
+    affine = _affine(2.0)
+    return _nifti(tmp_path / "scan.nii.gz", _ellipsoid(affine, (51, 51, 51)), affine)
+
+
+@pytest.mark.parametrize("size", [1.0, 2.0])
+def test_the_surface_is_within_a_tenth_of_a_voxel_and_keeps_the_volume(size: float, tmp_path: Path):
+    affine = _affine(size)
+    path = _nifti(tmp_path / "scan.nii", _ellipsoid(affine, (int(100 / size) + 1,) * 3), affine)
+    triangles = load_image(path, 2).triangles
+    assert np.sqrt((_distances(triangles) ** 2).mean()) < 0.1e-3 * size
+    assert triangles.volume == pytest.approx(VOLUME, rel=0.005)
+
+
+def test_without_the_filter_the_steps_between_voxels_stay(scan: Path):
+    def normals_off(triangles: Triangles) -> float:
+        normal = doubled_normals(triangles.points, triangles.facets)
+        area = np.linalg.norm(normal, axis=1)
+        middle = triangles.points[triangles.facets].mean(axis=1) - CENTRE / 1e3
+        exact = middle / AXES**2
+        cosine = np.einsum("ij,ij->i", normal, exact) / area / np.linalg.norm(exact, axis=1)
+        return float(np.degrees(np.sqrt((area * np.arccos(np.clip(cosine, -1, 1)) ** 2).sum() / area.sum())))
+
+    assert normals_off(load_image(scan, 2).triangles) < 4
+    assert normals_off(load_image(scan, 2, smooth=0.0).triangles) > 15
+
+
+def test_thick_slices_are_smoothed_over_their_distance(tmp_path: Path):
+    affine = _affine((1.0, 1.0, 5.0))
+    triangles = load_image(_nifti(tmp_path / "scan.nii", _ellipsoid(affine, (101, 101, 21)), affine), 2).triangles
+    assert default_smooth(np.array([1e-3, 1e-3, 5e-3])) == pytest.approx(5e-3)
+    assert np.sqrt((_distances(triangles) ** 2).mean()) < 0.12 * 5e-3
+    assert triangles.volume == pytest.approx(VOLUME, rel=0.01)
+
+
+def test_voxels_may_be_turned_and_mirrored(tmp_path: Path):
+    turn = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))[0] @ np.diag([2.0, 2.0, -2.0])
+    affine = np.eye(4)
+    affine[:3, :3], affine[:3, 3] = turn, CENTRE - turn @ (40, 40, 40)
+    triangles = load_image(_nifti(tmp_path / "scan.nii", _ellipsoid(affine, (81, 81, 81)), affine), 2).triangles
+    assert triangles.volume == pytest.approx(VOLUME, rel=0.005)
+    assert abs(_distances(triangles)).max() < 1.2e-3
+
+
+def test_the_same_place_from_both_formats(scan: Path, tmp_path: Path):
+    affine = _affine(2.0)
+    values = _ellipsoid(affine, (51, 51, 51))
+    header = {
+        "space": "left-posterior-superior",
+        "space directions": (LPS @ affine[:3, :3]).T,
+        "space origin": LPS @ affine[:3, 3],
+    }
+    nrrd.write(str(tmp_path / "scan.nrrd"), values, header)
+    assert load_image(tmp_path / "scan.nrrd", 2).triangles.hash == load_image(scan, 2).triangles.hash
+
+
+def test_units_of_the_header(tmp_path: Path):
+    affine = _affine(2.0)
+    values = _ellipsoid(affine, (51, 51, 51))
+    metres = affine * np.array([[1e-3]] * 3 + [[1.0]])
+    assert load_image(_nifti(tmp_path / "m.nii", values, metres, "meter"), 2).triangles.volume == pytest.approx(
+        VOLUME, rel=0.01
+    )
+    unknown = _nifti(tmp_path / "unknown.nii", values, affine, "unknown")
+    with pytest.raises(SurfaceError, match="names no unit"):
+        load_image(unknown, 2)
+    assert load_image(unknown, 2, unit=1e-3).triangles.volume == pytest.approx(VOLUME, rel=0.01)
+    with pytest.raises(SurfaceError, match="another unit"):
+        load_image(_nifti(tmp_path / "mm.nii", values, affine), 2, unit=1e-2)
+    with pytest.raises(SurfaceError, match=r"2 mm allowed|across, allowed"):
+        load_image(_nifti(tmp_path / "um.nii", values, affine, "micron"), 2)
+
+
+def test_crumbs_hollows_and_the_image_s_end_are_told(tmp_path: Path):
+    affine = _affine(2.0)
+    values = _ellipsoid(affine, (51, 51, 51))
+    values[0:2, 0:2, 0:2] = 2
+    values[25, 25, 25] = 7
+    loaded = load_image(_nifti(tmp_path / "scan.nii", values, affine), 2)
+    assert any("1 pieces apart" in notice for notice in loaded.notices)
+    assert any("1 voxels that it encloses" in notice for notice in loaded.notices)
+    assert loaded.triangles.volume == pytest.approx(VOLUME, rel=0.01)
+    half = load_image(_nifti(tmp_path / "half.nii", values[25:], _affine(2.0, (10, -70, 5))), 2)
+    assert any("image's end on 1 of 6 sides" in notice for notice in half.notices)
+    more = np.pi * AXES[1] * AXES[2] * (CENTRE[0] - 9.0) * 1e-9  # the outermost voxels reach to x = 9 mm
+    assert half.triangles.volume == pytest.approx(VOLUME / 2 + more, rel=0.01)
+
+
+def test_what_is_no_label_map_is_refused(scan: Path, tmp_path: Path):
+    affine = _affine(2.0)
+    values = _ellipsoid(affine, (51, 51, 51))
+    two = values.copy()
+    two[0:14, 0:14, 0:14] = 2
+    shell = values.copy()
+    shell[15:35, 18:32, 20:30] = 0
+    broken = gzip.compress(gzip.decompress(scan.read_bytes())[:5000])
+    files: dict[str, tuple[Any, int, str]] = {
+        "missing.nii": (values, 5, "no voxel has label 5; there are 2"),
+        "nothing.nii": (values * 0, 1, "all are 0"),
+        "grey.nii": (values * np.float32(0.37), 1, "no whole numbers"),
+        "times.nii": (np.stack([values, values], 3), 2, "4 dimensions"),
+        "two.nii": (two, 2, "which one is meant"),
+        "hollow.nii": (shell, 2, "encloses"),
+        "one.nii": ((values * 0)[:1, :1, :1] + 2, 2, "thinner than the filter"),
+        "truncated.nii.gz": (scan.read_bytes()[:300], 2, "cannot be read as NIfTI"),
+        "short.nii.gz": (broken, 2, "cannot be read as NIfTI"),
+        "letter.nrrd": (b"Dear colleague", 2, "cannot be read as NRRD"),
+        "empty.nii": (b"", 2, "is empty"),
+        "organ.mha": (b"x", 2, "label maps are read from"),
+    }
+    for name, (content, label, words) in files.items():
+        path = tmp_path / name
+        if isinstance(content, bytes):
+            path.write_bytes(content)
+        else:
+            _nifti(path, content, affine)
+        with pytest.raises(SurfaceError, match=words):
+            load_image(path, label)
+    nrrd.write(str(tmp_path / "nowhere.nrrd"), values, {})
+    with pytest.raises(SurfaceError, match="names no unit"):
+        load_image(tmp_path / "nowhere.nrrd", 2)
+    with pytest.raises(SurfaceError, match="how large"):
+        load_image(tmp_path / "nowhere.nrrd", 2, unit=1e-3)
