@@ -138,6 +138,10 @@ def _whole(
     if strain is not None:
         strain = np.tile(strain, 2 ** len(mirrors))
     whole = reflect(arrays, mirrors)
-    return Fields(
-        case, whole.points, whole.cells, whole.facets, mirror_planes(case), displacement, strain, regions=whole.regions
-    )
+    fields = Fields(case, whole.points, whole.cells, whole.facets, mirror_planes(case), displacement, strain)
+    if whole.regions is None:
+        return fields
+    # Where layers fill the body nothing is left of the tissue that has number 0.
+    present, regions = np.unique(whole.regions, return_inverse=True)
+    names = "tissue", *(region.name for region in case.body.regions)
+    return replace(fields, regions=regions, region_names=tuple(names[number] for number in present))

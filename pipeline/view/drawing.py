@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.arrays import FloatArray
-from pipeline.scene.model import PROBE
+from pipeline.arrays import FloatArray, IntArray
+from pipeline.scene.model import FIXED, PROBE
 from pipeline.view.fields import Fields
-from pipeline.view.palette import FOOTPRINT, INK, OUTLINE
+from pipeline.view.palette import FOOTPRINT, HELD, INK, OUTLINE, TOOL
+from pipeline.view.viewpoint import Viewpoint
 
 # On a machine without a display VTK would ask for one first, and complain.
 if not os.environ.get("DISPLAY"):
@@ -24,18 +25,25 @@ _HALVINGS = 3
 _CLOSE = 2.2
 # Degrees between the faces at an edge of the body.
 _SHARP = 40
-# From where the picture is taken: in front of the cut, beside it, above.
-_FROM = (1.0, 0.45, 0.6)
+# Length of what is drawn of the tool, in radii of the footprint, and how much of what is behind it is seen.
+_TOOL, _GLASS = 2.5, 0.35
+# What is nearer to 1 is one, of a unit vector's parts.
+_ALIGNED = 1 - 1e-9
+_HELD = 0.45  # of the colour of what is held
 
 
 @dataclass(frozen=True)
 class Colouring:
-    """What colours the body: a value for each point or each cell, and the map from values to colours."""
+    """What colours the body: a value for each point or each cell, and the map from values to colours.
 
-    values: FloatArray
-    cmap: str
+    With ``names``, values are positions among them, and ``cmap`` holds the colours.
+    """
+
+    values: FloatArray | IntArray
+    cmap: str | list[str]
     limits: tuple[float, float]
     logarithmic: bool = False
+    names: tuple[str, ...] = ()
 
 
 class Drawing:
@@ -46,22 +54,26 @@ class Drawing:
 
     def __init__(self, fields: Fields, colouring: Colouring, factor: float = 0.0):
         self._fields, self._colouring = fields, colouring
-        self._axis, self._sign = (0, -1) if fields.planes == ("x",) else (1, 1)
+        self._view = Viewpoint.of(fields.case.frame, fields.planes)
         self._contact = MM * fields.contact
         grid = self._opened(self._grid())
         # A clipped body's faces turn either way: the angle between two of them would not tell an edge.
         surface = grid.extract_surface(algorithm="dataset_surface").compute_normals(
             point_normals=False, split_vertices=False, auto_orient_normals=True
         )
-        footprint = self._opened(self._footprint()).extract_surface(algorithm="dataset_surface")
+        patch = self._patch(PROBE)
+        footprint = self._opened(patch).extract_surface(algorithm="dataset_surface")
+        held = self._opened(self._patch(FIXED)).extract_surface(algorithm="dataset_surface")
         edge = footprint.extract_feature_edges(
             boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False
         )
         sharp = surface.extract_feature_edges(
             _SHARP, boundary_edges=False, feature_edges=True, manifold_edges=False, non_manifold_edges=False
         )
-        parts = surface, sharp, edge, self._at_epsilon(surface)
-        self._surface, self._sharp, self._edge, self._ring = (_moved(part, factor) for part in parts)
+        parts = surface, sharp, edge, self._at_epsilon(surface), patch, held
+        self._surface, self._sharp, self._edge, self._ring, patch, self._held = (_moved(part, factor) for part in parts)
+        length = _TOOL * MM * fields.case.probe.circumradius
+        self._tool = patch.extrude(length * self._view.outward, capping=True)
 
     def render(self, size: tuple[int, int], *, close: bool) -> npt.NDArray[np.uint8]:
         """Return a picture of ``size`` pixels (width, height), of the whole or ``close`` to the probe."""
@@ -74,6 +86,11 @@ class Drawing:
             lighting=False, show_scalar_bar=False, show_edges=True, edge_color=INK, edge_opacity=0.5 if close else 0.3,
             line_width=1.2,
         )  # fmt: skip
+        if self._held.n_points:
+            held = self._held.translate(1e-3 * self._surface.length * self._view.eye)
+            plotter.add_mesh(held, color=HELD, opacity=_HELD, lighting=False)
+        if not close:
+            plotter.add_mesh(self._tool, color=TOOL, opacity=_GLASS)
         plotter.add_mesh(_outline(self._fields), color=OUTLINE, line_width=1.5, lighting=False)
         self._add_lines(plotter, self._sharp, INK, 2)
         self._add_lines(plotter, self._ring, INK, 5)
@@ -92,8 +109,8 @@ class Drawing:
         self._add_shift(grid)
         return grid
 
-    def _footprint(self) -> Any:
-        facets = self._fields.facets[PROBE]
+    def _patch(self, group: str) -> Any:
+        facets = self._fields.facets[group]
         patch = pv.PolyData(MM * self._fields.points, np.hstack([np.full((len(facets), 1), 3), facets]))
         self._add_shift(patch)
         return patch
@@ -104,10 +121,10 @@ class Drawing:
 
     def _opened(self, part: Any) -> Any:
         """Take away what is in front of the cut: whole elements where they end in it."""
-        axis, sign = self._axis, self._sign
-        if "xy"[axis] in self._fields.planes:
-            return part.extract_cells(np.flatnonzero(sign * part.cell_centers().points[:, axis] > 0))
-        return part.clip(normal=-sign * np.eye(3)[axis], origin=self._contact)
+        front = self._view.front
+        if any(abs(front["xy".index(plane)]) > _ALIGNED for plane in self._fields.planes):
+            return part.extract_cells(np.flatnonzero(part.cell_centers().points @ front < self._contact @ front))
+        return part.clip(normal=front, origin=self._contact)
 
     def _at_epsilon(self, surface: Any) -> Any:
         """Return the lines at the distance ε from the contact on a surface: an arc on the top, and one in the cut."""
@@ -125,18 +142,13 @@ class Drawing:
     def _add_lines(self, plotter: Any, lines: Any, colour: str, width: float) -> None:
         if lines.n_points:
             # A little nearer to the eye, so that the surface does not hide half of each line.
-            lines = lines.translate(2e-3 * self._surface.length * self._towards_eye())
+            lines = lines.translate(2e-3 * self._surface.length * self._view.eye)
             plotter.add_mesh(lines, color=colour, line_width=width, lighting=False)
-
-    def _towards_eye(self) -> FloatArray:
-        front, up = -self._sign * np.eye(3)[self._axis], np.eye(3)[2]
-        direction = sum(share * vector for share, vector in zip(_FROM, (front, np.cross(up, front), up), strict=True))
-        return np.asarray(direction / np.linalg.norm(direction))
 
     def _aim(self, plotter: Any, *, close: bool) -> None:
         centre = self._contact if close else np.array(self._surface.center)
         plotter.camera.focal_point = centre
-        plotter.camera.position = centre + 2 * self._surface.length * self._towards_eye()
+        plotter.camera.position = centre + 2 * self._surface.length * self._view.eye
         plotter.camera.up = (0, 0, 1)
         plotter.enable_parallel_projection()
         if close:

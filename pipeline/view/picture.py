@@ -5,17 +5,19 @@ from pathlib import Path
 from textwrap import shorten
 
 import matplotlib as mpl
+from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from pipeline.report.figures import save
 from pipeline.view.drawing import MM, Colouring, Drawing
 from pipeline.view.fields import Fields
-from pipeline.view.palette import FOOTPRINT, INK
+from pipeline.view.palette import FOOTPRINT, HELD, INK, TOOL, region_colours
 
 # Inches, at 200 dots each: 1200 × 720 pixels.
 _WIDTH, _HEIGHT = 6.0, 3.6
@@ -24,6 +26,8 @@ _DOTS = 200
 _WHOLE, _CLOSE = (0.01, 0.19, 0.60, 0.70), (0.63, 0.19, 0.36, 0.70)
 _BAR = (0.1, 0.115, 0.4, 0.03)
 _STYLE = {"font.size": 8, "axes.linewidth": 0.6}
+# Names of regions side by side.
+_COLUMNS = 4
 # Letters of a title that fit the width.
 _LONGEST = 92
 # Below this (m) displacements are read in µm.
@@ -31,9 +35,12 @@ _SMALL = 1e-4
 
 
 def draw_mesh(fields: Fields, path: Path, title: str) -> Path:
-    """Draw the mesh, cut open through the contact and coloured by element size, to ``path``."""
-    sizes = MM * fields.sizes
-    colouring = Colouring(sizes, "viridis", (float(sizes.min()), float(sizes.max())), logarithmic=True)
+    """Draw the mesh, cut open through the contact, coloured by region or, if there is one, by element size."""
+    sizes, names = MM * fields.sizes, fields.region_names
+    if fields.regions is None:
+        colouring = Colouring(sizes, "viridis", (float(sizes.min()), float(sizes.max())), logarithmic=True)
+    else:
+        colouring = Colouring(fields.regions, region_colours(len(names)), (-0.5, len(names) - 0.5), names=names)
     words = f"{len(fields.cells):,} elements" + (", fine everywhere" if fields.epsilon == inf else "")
     return _compose(fields, Drawing(fields, colouring), colouring, "element size (mm)", (title, words), path)
 
@@ -68,13 +75,19 @@ def _compose(
             axes.set(xticks=[], yticks=[])
             axes.spines[:].set_visible(close)
             axes.spines[:].set_color("#777777")
-        _add_scale(figure, colouring, quantity)
+        _add_names(figure, colouring) if colouring.names else _add_scale(figure, colouring, quantity)
         figure.legend(handles=_lines(fields), loc="lower right", bbox_to_anchor=(0.99, 0.02), frameon=False, ncols=2,
                       handlelength=1.5)  # fmt: skip
         figure.text(0.012, 0.965, shorten(words[0], _LONGEST, placeholder=" …"), fontweight="bold", va="center")
         figure.text(0.012, 0.915, words[1], va="center")
         figure.text(0.99, 0.915, "close to the probe", ha="right", va="center")
         return save(figure, path)
+
+
+def _add_names(figure: Figure, colouring: Colouring) -> None:
+    patches = [Patch(color=c, label=n) for c, n in zip(colouring.cmap, colouring.names, strict=True)]
+    figure.legend(handles=patches, loc="lower left", bbox_to_anchor=(0.01, 0.02), frameon=False, ncols=_COLUMNS,
+                  handlelength=1.2, columnspacing=1.2)  # fmt: skip
 
 
 def _add_scale(figure: Figure, colouring: Colouring, quantity: str) -> None:
@@ -88,8 +101,12 @@ def _add_scale(figure: Figure, colouring: Colouring, quantity: str) -> None:
         bar.ax.xaxis.set_minor_formatter(NullFormatter())
 
 
-def _lines(fields: Fields) -> list[Line2D]:
-    lines = [Line2D([], [], color=FOOTPRINT, linewidth=1.6, label="edge of the probe")]
+def _lines(fields: Fields) -> list[Artist]:
+    lines: list[Artist] = [
+        Line2D([], [], color=FOOTPRINT, linewidth=1.6, label="edge of the probe"),
+        Patch(color=TOOL, alpha=0.5, label="probe"),
+        Patch(color=HELD, alpha=0.6, label="held"),
+    ]
     if fields.epsilon < inf:
         lines.insert(0, Line2D([], [], color=INK, linewidth=1.6, label=f"ε = {MM * fields.epsilon:g} mm"))
     return lines

@@ -70,5 +70,5 @@ def _told(fields: Fields, numbers: Numbers) -> dict[str, Any]:
         "factor": 0 if fields.displacement is None else fields.visible_factor,
         "shift": numbers.shift,
         "outline": [line.round(4).tolist() for line in outline],
-        "ink": {"footprint": palette.FOOTPRINT, "held": palette.HELD, "probe": palette.PROBE},
+        "ink": {"footprint": palette.FOOTPRINT, "held": palette.HELD, "probe": palette.TOOL},
     }  # fmt: skip
