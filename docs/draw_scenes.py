@@ -17,7 +17,7 @@ MOST = 150_000
 
 _HEAD = """# Scenes
 
-Every body and every probe with its mesh, cut open through the contact: the black line is the sphere of radius ε, red the
+Every body and every probe with its mesh, cut open at the contact: the black line is the sphere of radius ε, red the
 edge of the probe's footprint. `epsmesh view docs/scenes/box.toml` draws the first of them; where PyVista is not
 installed, it writes a page to turn it round ([Looking at a case](view.md)).
 
