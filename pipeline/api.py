@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipeline.plan.cost import CostModel
 from pipeline.plan.describe import summary
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.run.progress import Terminal
@@ -65,7 +64,10 @@ class RunnableStudy:
         bare = make_plan(self.declared, without=without)
         if store is None or not Path(store).is_file():
             return bare
-        keys, cost = _on_record(Path(store), bare)
+        from pipeline.run.reading import known_of  # noqa: PLC0415 (only where there is a store)
+
+        records, cost = known_of(Path(store), bare)
+        keys = [key for key, record in records.items() if record.is_ok]
         return replace(make_plan(self.declared, keys, without), cost=cost)
 
     def summary(self, **options: Any) -> dict[str, Any]:
@@ -125,12 +127,3 @@ def open_dataset(path: str | Path, output: str | Path = "results") -> "xr.Datase
     from pipeline.report.read import read  # noqa: PLC0415 (xarray is slow to load)
 
     return read(path, output)
-
-
-def _on_record(path: Path, plan: Plan) -> tuple[list[str], CostModel]:
-    """Return which of a plan's keys have a force on record, and what cases cost."""
-    from pipeline.run.reading import open_to_read  # noqa: PLC0415
-
-    with open_to_read(path) as opened:
-        records = opened.get({*plan.keys, *plan.reference_keys})
-        return [key for key, record in records.items() if record.is_ok], opened.cost_model()

@@ -84,13 +84,12 @@ def stored_records(path: Path, plan: Plan) -> tuple[dict[str, "Record"], CostMod
     """Return what the store at ``path`` has of a plan's cases and of their F_exact, and what cases cost."""
     if not path.exists():
         return {}, CostModel()
-    from pipeline.run.reading import open_to_read
+    from pipeline.run.reading import known_of
     from pipeline.run.store import StoreError
 
     check_store(path)
     try:
-        with open_to_read(path) as store:
-            return store.get({*plan.keys, *plan.reference_keys}), store.cost_model()
+        return known_of(path, plan)
     except StoreError as problem:
         fail(str(problem))
 

@@ -7,6 +7,9 @@ from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from pipeline.plan.cost import CostModel
+from pipeline.plan.work import Plan
+from pipeline.run.record import Record
 from pipeline.run.store import PATIENCE, SCHEMA, Records, Row, StoreError, damaged
 
 
@@ -26,6 +29,16 @@ def open_to_read(path: Path) -> Iterator[Records]:
         raise StoreError(damaged(path, error)) from error
     except OSError as error:
         raise StoreError(f"the case store {path} cannot be read: {error.strerror}") from error
+
+
+def known_of(path: Path, plan: Plan) -> tuple[dict[str, Record], CostModel]:
+    """Return what the store at ``path`` has of a plan's cases and of their F_exact, and what cases cost.
+
+    Raises:
+        StoreError: as :func:`open_to_read`, or if a record cannot be read.
+    """
+    with open_to_read(path) as store:
+        return store.get({*plan.keys, *plan.reference_keys}), store.cost_model()
 
 
 def read_rows(path: Path) -> list[Row]:
