@@ -19,6 +19,13 @@ _SHEET = 1e-4
 _SAMPLES = 60
 
 
+def check_whole(points: FloatArray, edges: Edges, unit: float) -> None:
+    """Refuse what does not bound one piece of tissue."""
+    check_edges(points, edges, unit)
+    check_shells(points, edges, unit)
+    check_crossings(points, edges.facets)
+
+
 def check_numbers(raw: Raw) -> None:
     """Refuse what is not finite, and what has no facets."""
     if not len(raw.facets):

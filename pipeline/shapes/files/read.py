@@ -26,7 +26,8 @@ class Loaded:
 def load_surface(path: Path, unit: float, repair: bool = False, smooth: float | None = None) -> Loaded:
     """Return the surface in an STL, PLY or OBJ file whose numbers are in a ``unit`` (m).
 
-    The file is read again only when it has changed.
+    ``repair`` mends what can be mended; ``smooth`` (m) takes bumps of such lengths off. The file is read again only
+    when it has changed.
 
     Raises:
         SurfaceError: if it does not bound one piece of tissue; says what was found, and what mends it.
@@ -54,8 +55,6 @@ def read_surface(path: Path, unit: float) -> Triangles:
 
 @lru_cache(maxsize=8)
 def _load(path: Path, _changed: int, size: int, unit: float, repair: bool, smooth: float | None) -> Loaded:
-    if repair or smooth:
-        raise SurfaceError("`repair` and `smooth` are not supported")
     if path.suffix.lower() not in _PARSERS:
         raise SurfaceError(f"its name ends in `{path.suffix}`; read are {', '.join(_PARSERS)}")
     if size == 0:
@@ -69,7 +68,7 @@ def _load(path: Path, _changed: int, size: int, unit: float, repair: bool, smoot
     except OSError as error:
         raise SurfaceError(f"cannot be read: {error.strerror or error}") from None
     raw = _parsed(data, path.suffix.lower())
-    triangles, notices = made_whole(raw, unit)
+    triangles, notices = made_whole(raw, unit, repair, smooth)
     return Loaded(triangles, notices)
 
 

@@ -1,0 +1,67 @@
+"""What `repair = true` does: what is lost or made up by it is measured, told, and refused where it is much.
+
+First what is exact, facets turned and crumbs left out; then MeshFix (M. Attene, The Visual Computer 26, 1393, 2010),
+which closes holes, and cuts out and closes anew where facets cross.
+"""
+
+from pipeline.shapes.arrays import FloatArray, IntArray, np
+from pipeline.shapes.files.check import check_whole
+from pipeline.shapes.files.edges import Edges, oriented
+from pipeline.shapes.files.mend import joined
+from pipeline.shapes.files.shells import largest_shell
+from pipeline.shapes.files.weld import drop_unused, weld
+from pipeline.shapes.triangles import SurfaceError, enclosed
+
+# Shares by which the volume, and the extent along each axis, may change: what changes more is another body.
+MOST_VOLUME, MOST_EXTENT = 0.05, 0.02
+_MENDS = "`repair = true`"
+
+
+def repaired(points: FloatArray, facets: IntArray, unit: float) -> tuple[FloatArray, IntArray, list[str]]:
+    """Return a surface that bounds one piece of tissue, and what was done.
+
+    Raises:
+        SurfaceError: if it cannot be mended, or would be another body.
+    """
+    turned, which = oriented(Edges(facets))
+    notices = []
+    if which is not None and len(which):
+        facets = turned
+        notices.append(f"repaired: {len(which):,} inverted facets turned")
+    try:
+        facets, more = largest_shell(points, facets, unit, MOST_VOLUME)
+        notices += [f"repaired: {said}" for said in more]
+        check_whole(points, Edges(facets), unit)
+    except SurfaceError as error:
+        if _MENDS not in str(error):
+            raise
+        found = str(error).partition(f": {_MENDS}")[0].partition(": delete")[0]
+        points, facets, said = _meshfix(points, facets, found)
+        return points, facets, [*notices, said]
+    return points, facets, notices
+
+
+def _meshfix(points: FloatArray, facets: IntArray, found: str) -> tuple[FloatArray, IntArray, str]:
+    from pymeshfix._meshfix import PyTMesh  # noqa: PLC0415 (files that are right do without)
+
+    before, used = drop_unused(points, facets)
+    program = PyTMesh()
+    program.set_quiet(1)
+    program.load_array(np.ascontiguousarray(before), np.ascontiguousarray(used, dtype=np.int32))
+    program.fill_small_boundaries(0, True)
+    is_clean = program.clean(10, 3)
+    after, mended = program.return_arrays()
+    if not is_clean or not len(mended):
+        raise SurfaceError(f"{found}; `repair` did not succeed: mend it in MeshLab")
+    points, number = weld(np.asarray(after, dtype=np.float64))
+    points, facets, _ = joined(points, number[mended.astype(np.int64)])
+    volume = enclosed(points, facets) / enclosed(before, used) - 1
+    extents = np.ptp(points[facets].reshape(-1, 3), axis=0) / np.ptp(before, axis=0) - 1
+    extent = float(extents[np.abs(extents).argmax()])
+    said = f"volume {volume:+.2%}, extent {extent:+.2%}, {len(used):,} facets before, {len(facets):,} after"
+    if not abs(volume) <= MOST_VOLUME or not abs(extent) <= MOST_EXTENT:
+        raise SurfaceError(
+            f"{found}; `repair` would make another body of it ({said}; allowed are {MOST_VOLUME:.0%} and "
+            f"{MOST_EXTENT:.0%}): mend it in MeshLab, or segment it anew"
+        )
+    return points, facets, f"repaired by MeshFix: {found}. Changes: {said}"
