@@ -1,0 +1,176 @@
+"""Make the surfaces and the label map in meshes/: shapes like organs', copied from nobody's.
+
+Ellipsoids that run into each other, with smooth noise, sampled as the voxels of a segmented image; the surface round
+them, as a body `image` has it, with fewer facets. The same files every time: python scripts/make_organs.py
+"""
+
+import gzip
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import igl
+import nibabel
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
+from pipeline.files import atomic
+from pipeline.shapes.files.image import surface_of
+from pipeline.shapes.files.labels import LabelMap
+from pipeline.shapes.triangles import Triangles
+
+MESHES = Path(__file__).resolve().parents[1] / "meshes"
+Field = Callable[[FloatArray], FloatArray]
+
+
+@dataclass(frozen=True)
+class Organ:
+    """A body where ``field`` of places (…, 3), in mm, is negative, within ``half`` of the origin in x, y and z (mm)."""
+
+    field: Field
+    half: tuple[float, float, float]
+    voxel: float  # mm
+    facets: int
+
+
+def ellipsoid(centre: tuple[float, float, float], axes: tuple[float, float, float]) -> Field:
+    """About the distance (mm) from an ellipsoid, negative within."""
+
+    def field(places: FloatArray) -> FloatArray:
+        scaled = (places - centre) / axes
+        level = np.linalg.norm(scaled, axis=-1)
+        return np.asarray((level - 1) * level / np.maximum(np.linalg.norm(scaled / axes, axis=-1), 1e-9))
+
+    return field
+
+
+def blend(first: FloatArray, second: FloatArray, width: float) -> FloatArray:
+    """The smaller of two distances, rounded over a width (mm) where they are alike."""
+    share = np.clip(0.5 + (second - first) / (2 * width), 0, 1)
+    return second + share * (first - second) - width * share * (1 - share)
+
+
+def noise(places: FloatArray, length: float, seed: int, waves: int = 24) -> FloatArray:
+    """Smooth noise of variance 1, with waves about as long as ``length`` (mm), in all directions."""
+    random = np.random.Generator(np.random.PCG64(seed))
+    directions = random.standard_normal((waves, 3))
+    directions *= 2 * np.pi / length / np.linalg.norm(directions, axis=1, keepdims=True)
+    phases = random.uniform(0, 2 * np.pi, waves)
+    total = np.zeros(places.shape[:-1])
+    for direction, phase in zip(directions, phases, strict=True):
+        total += np.cos(places @ direction + phase)
+    return total * np.sqrt(2 / waves)
+
+
+def liver(places: FloatArray) -> FloatArray:
+    """Like a liver: a thick lobe that runs out into a thin one, hollow below."""
+    right = ellipsoid((-25, 0, -4), (52, 48, 34))(places)
+    left = ellipsoid((42, -8, 4), (48, 32, 17))(places)
+    hollow = ellipsoid((0, 10, -52), (45, 40, 32))(places)
+    return -blend(-blend(right, left, 14), hollow, 8) + 0.8 * noise(places, 45, 1)
+
+
+def kidney(places: FloatArray) -> FloatArray:
+    """Like a kidney: a bean."""
+    bean = ellipsoid((0, 0, 0), (54, 27, 22))(places)
+    notch = ellipsoid((0, -30, 0), (15, 16, 14))(places)
+    return -blend(-bean, notch, 7) + 0.4 * noise(places, 30, 2)
+
+
+def brain(places: FloatArray) -> FloatArray:
+    """Like a brain: two halves, folded all over."""
+    halves = [ellipsoid((side * 26, 0, 0), (34, 62, 42))(places) for side in (-1, 1)]
+    folds = np.abs(noise(places, 34, 3)) - 0.6
+    return blend(*halves, 4) - 3.5 * np.tanh(2 * folds)
+
+
+def tumour(places: FloatArray) -> FloatArray:
+    """A ball in the liver."""
+    return ellipsoid((-28.3, 4.4, 6.7), (9, 9, 9))(places)
+
+
+ORGANS = {
+    "liver.stl": Organ(liver, (100, 60, 50), 2.0, 5000),
+    "kidney.obj": Organ(kidney, (62, 38, 32), 1.25, 3000),
+    "brain.ply": Organ(brain, (72, 74, 54), 1.5, 12000),
+}
+
+
+def label_map(organ: Organ, inside: Field | None = None) -> LabelMap:
+    """The organ as an image: label 1, and 2 where another body lies ``inside``."""
+    counts = [int(2 * half / organ.voxel) + 1 for half in organ.half]
+    affine = np.column_stack([np.eye(3) * organ.voxel, -np.array(organ.half)])
+    places = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), -1) @ affine[:, :3].T + affine[:, 3]
+    values = (organ.field(places) < 0).astype(np.uint8)
+    if inside is not None:
+        values[inside(places) < 0] = 2
+    return LabelMap(values, affine * 1e-3)
+
+
+def surface(organ: Organ) -> tuple[FloatArray, IntArray]:
+    """The surface round an organ's voxels, in mm, with fewer facets."""
+    whole: Triangles = surface_of(label_map(organ), 1).triangles
+    points, facets, _, _ = igl.qslim(
+        np.asfortranarray(1e3 * whole.points), np.asfortranarray(whole.facets, dtype=np.int32), organ.facets, True
+    )
+    return np.round(points, 3), np.asarray(facets, dtype=np.int64)
+
+
+def stl(points: FloatArray, facets: IntArray) -> bytes:
+    """A binary STL file."""
+    rows = np.zeros(len(facets), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    rows["corners"] = points[facets]
+    return (
+        b"Like an organ; made by scripts/make_organs.py, mm".ljust(80)
+        + len(facets).to_bytes(4, "little")
+        + rows.tobytes()
+    )
+
+
+def obj(points: FloatArray, facets: IntArray) -> bytes:
+    """An OBJ file."""
+    lines = ["# Like an organ; made by scripts/make_organs.py, mm"]
+    lines += [f"v {x:.3f} {y:.3f} {z:.3f}" for x, y, z in points] + [f"f {a} {b} {c}" for a, b, c in facets + 1]
+    return "\n".join([*lines, ""]).encode()
+
+
+def ply(points: FloatArray, facets: IntArray) -> bytes:
+    """A binary PLY file."""
+    header = (
+        "ply\nformat binary_little_endian 1.0\ncomment Like an organ; made by scripts/make_organs.py, mm\n"
+        f"element vertex {len(points)}\nproperty float x\nproperty float y\nproperty float z\n"
+        f"element face {len(facets)}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    rows = np.zeros(len(facets), dtype=[("count", "u1"), ("corners", "<i4", 3)])
+    rows["count"], rows["corners"] = 3, facets
+    return header.encode() + points.astype("<f4").tobytes() + rows.tobytes()
+
+
+WRITERS = {".stl": stl, ".obj": obj, ".ply": ply}
+
+
+def image() -> bytes:
+    """The liver, with a tumour, as a NIfTI label map."""
+    labels = label_map(ORGANS["liver.stl"], tumour)
+    found = nibabel.Nifti1Image(labels.values, np.vstack([labels.affine * 1e3, [0, 0, 0, 1]]))
+    found.header.set_xyzt_units("mm")
+    return gzip.compress(found.to_bytes(), mtime=0)
+
+
+def make(name: str) -> bytes:
+    """The content of one of the files."""
+    return image() if name == "liver.nii.gz" else WRITERS[Path(name).suffix](*surface(ORGANS[name]))
+
+
+def main(folder: Path = MESHES) -> None:
+    """Write the files."""
+    for name in (*ORGANS, "liver.nii.gz"):
+        content = make(name)
+        with atomic(folder / name) as temporary:
+            temporary.write_bytes(content)
+        print(f"{folder / name}: {len(content) / 1e3:.0f} kB")
+
+
+if __name__ == "__main__":
+    main(*map(Path, sys.argv[1:]))
