@@ -110,7 +110,7 @@ def test_mesh_alone_has_no_force_and_no_displacement():
     (case,) = made.cases()
     found = compute_fields(solve_to_view(made, case), MPI.COMM_SELF, mesh_only=True)
     text = render(found, "mesh")
-    assert "F = " not in text
+    assert "<p>F = " not in text
     assert [c["name"] for c in json.loads(element(text, "told"))["colours"]] == ["region", "element size"]
 
 

@@ -17,6 +17,7 @@ from pipeline.view.page.numbers import Numbers, mesh_numbers
 from pipeline.view.viewpoint import Viewpoint
 
 _TEMPLATES = Path(__file__).parent / "templates"
+_SCRIPTS = ("mesh.js", "scene.js", "camera.js", "page.js")  # each knows those before it
 _MM = 1e3
 
 
@@ -30,7 +31,7 @@ def write_page(fields: Fields, path: Path, title: str) -> Path:
 
 def render(fields: Fields, title: str) -> str:
     """Return the page of a case as HTML; it loads nothing else."""
-    script = (_TEMPLATES / "view.js").read_text(encoding="utf-8")
+    script = "\n".join((_TEMPLATES / name).read_text(encoding="utf-8") for name in _SCRIPTS)
     numbers = mesh_numbers(fields)
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
