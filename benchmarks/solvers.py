@@ -96,13 +96,13 @@ def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple
     from pipeline.solve.vectors import vector
 
     space = problem.space
-    unit, _ = stack.enter_context(space.operators.lend(law.lame, blocked=space.degree > 1))
+    unit, _ = stack.enter_context(space.operators.lend(law, blocked=space.degree > 1))
     held = space.dofs.held(PRESS)
 
     def once() -> tuple[float, float, float, int]:
         start = time.process_time()
         with problem.solver(law, method) as lent, vector(space.dofs.space) as rhs, vector(space.dofs.space) as unknown:
-            space.lift(rhs, held, law.lame)
+            space.lift(rhs, held, law)
             made = time.process_time()
             solver = LinearSolver(lent.levels, direct=method == "direct", tolerance=TOLERANCE)
             ready = time.process_time()
@@ -120,7 +120,7 @@ def _mixed_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[A
     from pipeline.solve.saddle import SaddleSolver
     from pipeline.solve.solution import TOLERANCE
 
-    direct, space, c = method == "direct", problem.space, 1 / (law.ratio - LAME[0])
+    direct, space, c = method == "direct", problem.space, 1 / (law.ratio - LAME.lame[0])
     start = time.process_time()
     saddle, _ = problem.saddle(direct=direct)
     assemble = time.process_time() - start

@@ -7,7 +7,7 @@ import dolfinx
 import gmsh
 from petsc4py import PETSc
 
-from pipeline.compat.code import EVERYWHERE, Code, compile_code, function_space, make_form
+from pipeline.compat.code import EVERYWHERE, Code, compile_code, function_space, make_form, renumbered_space
 from pipeline.compat.elements import cell_dofs, degree, element, mixed_element, reference_element
 from pipeline.compat.matrices import add_matrix, assemble_matrix, dirichletbc
 from pipeline.compat.meshes import cell_tags, create_mesh, geometry_dofs, gmsh_session, original_cells
@@ -15,7 +15,7 @@ from pipeline.compat.meshes import cell_tags, create_mesh, geometry_dofs, gmsh_s
 __all__ = [
     "EVERYWHERE", "Code", "add_matrix", "assemble_matrix", "cell_dofs", "cell_tags", "compile_code", "create_mesh",
     "degree", "dirichletbc", "element", "function_space", "geometry_dofs", "gmsh_session", "make_form",
-    "mixed_element", "original_cells", "reference_element", "versions",
+    "mixed_element", "original_cells", "reference_element", "renumbered_space", "versions",
 ]  # fmt: skip
 
 

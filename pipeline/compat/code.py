@@ -54,13 +54,25 @@ def function_space(mesh: Any, element: Any, code: Callable[[], Code]) -> Any:
     return fem.FunctionSpace(mesh, element, cpp.fem.FunctionSpace(cpp_mesh, cpp_element, cpp_dofmap))
 
 
+def renumbered_space(space: Any, dofs: np.ndarray, owned: int, ghosts: np.ndarray, owners: np.ndarray) -> Any:
+    """Return a space of scalars like ``space``, but with other ``dofs`` (cells, dofs a cell), local numbers.
+
+    This rank owns the first ``owned``; ``ghosts`` are the global numbers of the others, which ``owners`` own.
+    """
+    mesh = space.mesh
+    index_map = cpp.common.IndexMap(mesh.comm, owned, ghosts.astype(np.int64), owners.astype(np.int32))
+    offsets = np.arange(0, dofs.size + 1, dofs.shape[1], dtype=np.int32)
+    rows = cpp.graph.AdjacencyList_int32(np.ascontiguousarray(dofs.reshape(-1), dtype=np.int32), offsets)
+    dofmap = cpp.fem.DofMap(space.dofmap.dof_layout, index_map, 1, rows, 1)
+    inner = space._cpp_object
+    made = type(inner)(inner.mesh, inner.element, dofmap)
+    return fem.FunctionSpace(mesh, space.ufl_element(), made)
+
+
 def _form_of_code(expression: Any, mesh: Any, tags: Any, code: Code, _: dict[int, int]) -> Any:
     """Make the C++ form as ``fem.form`` does after it has compiled."""
     compiled, module, _ = code
-    name = "original_coefficient_position"
-    positions = getattr(compiled, name if _IS_OLD else name + "s")
-    functions = expression.coefficients()
-    coefficients = [functions[positions[i]]._cpp_object for i in range(compiled.num_coefficients)]
+    coefficients = _coefficients(expression, compiled)
     address, spaces, constants = _address(module, compiled), _spaces(expression), _constants(expression)
     if _IS_OLD:
         marked = {fem.IntegralType.cell: tags}
@@ -74,13 +86,14 @@ def _form_of_code(expression: Any, mesh: Any, tags: Any, code: Code, _: dict[int
 def _form_of_addresses(expression: Any, mesh: Any, tags: Any, code: Code, kernels: dict[int, int]) -> Any:
     """Make the C++ form of kernels: those of ``kernels``, and the generated ones for other marks."""
     chosen = _kernels(code) | {mark: kernel for mark, kernel in kernels.items() if mark in _kernels(code)}
-    spaces, constants = _spaces(expression), _constants(expression)
+    spaces, constants, coefficients = _spaces(expression), _constants(expression), _coefficients(expression, code[0])
     if _IS_OLD:
-        integrals = {fem.IntegralType.cell: (list(chosen.items()), tags)}
-        return _wrapped(code, spaces, integrals, [], constants, False, mesh)
-    none = np.array([], dtype=np.int8)
-    parts = [(mark, kernel, _cells(mesh, tags, mark), none) for mark, kernel in chosen.items()]
-    return _wrapped(code, spaces, {fem.IntegralType.cell: parts}, [], constants, False, _entity_maps(), mesh)
+        marked = {fem.IntegralType.cell: (list(chosen.items()), tags)}
+        return _wrapped(code, spaces, marked, coefficients, constants, False, mesh)
+    used = np.arange(len(coefficients), dtype=np.int8)
+    parts = [(mark, kernel, _cells(mesh, tags, mark), used) for mark, kernel in chosen.items()]
+    integrals = {fem.IntegralType.cell: parts}
+    return _wrapped(code, spaces, integrals, coefficients, constants, False, _entity_maps(), mesh)
 
 
 def _wrapped(code: Code, *arguments: Any) -> Any:
@@ -118,6 +131,14 @@ def _marked(tags: Any) -> Any:
 
 def _spaces(expression: Any) -> list[Any]:
     return [argument.ufl_function_space()._cpp_object for argument in expression.arguments()]
+
+
+def _coefficients(expression: Any, compiled: Any) -> list[Any]:
+    """Return the functions of an expression, in the order in which its compiled code has them."""
+    name = "original_coefficient_position"
+    positions = getattr(compiled, name if _IS_OLD else name + "s")
+    functions = expression.coefficients()
+    return [functions[positions[i]]._cpp_object for i in range(compiled.num_coefficients)]
 
 
 def _constants(expression: Any) -> list[Any]:

@@ -13,6 +13,7 @@ import numpy as np
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.generate import MeshArrays
 from pipeline.scene.model import Scene
+from pipeline.shapes.surface import Surface
 from pipeline.stages import stage
 
 # Edges of the reference tetrahedron in the order of basix's quadratic nodes 4 to 9.
@@ -21,6 +22,8 @@ EDGES = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
 _CLOSE = 1e-6
 # A cell is straightened where its Jacobian falls below this share of the straight cell's.
 _LEAST_JACOBIAN = 1e-3
+# Projections onto two surfaces in turn, until a point is on both.
+_ALTERNATIONS = 30
 
 
 @stage("curved rim and sides")
@@ -34,7 +37,8 @@ def curve(mesh: MeshArrays, scene: Scene) -> MeshArrays:
     edges = pairs[first]
     straight = mesh.points[edges].mean(axis=1)
     of_cell = inverse.reshape(-1, len(EDGES))
-    curved = _on_rim(mesh, scene, edges, _on_sides(mesh, scene, edges, straight, keys))
+    curved = _on_inclusions(mesh, scene, edges, _on_sides(mesh, scene, edges, straight, keys))
+    curved = _on_rim(mesh, scene, edges, curved)
     middle = _quarter_points(mesh, edges, curved.copy())
     # A folded cell gives up its quarter points first: without its arcs the footprint would be a smaller one.
     for milder in (curved, straight):
@@ -71,6 +75,36 @@ def _on_sides(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArra
         chosen = outer & on_side[edges].all(axis=1)
         middle[chosen] = surface.project(middle[chosen])
     return middle
+
+
+def _on_inclusions(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray) -> FloatArray:
+    """Move the mid nodes of edges in the surface of an inclusion onto it, and onto the column that cuts it, too."""
+    if mesh.regions is None or not scene.body.inclusion:
+        return middle
+    between = np.isin(_key(mesh, edges), _interface_edges(mesh, mesh.regions))
+    middle, close = middle.copy(), _CLOSE * scene.body.extent
+    for inclusion in scene.body.inclusion:
+        surfaces: list[Surface] = [inclusion.surface]
+        on_side = np.abs(inclusion.surface.distance(mesh.points)) < close
+        chosen = between & on_side[edges].all(axis=1)
+        middle[chosen] = inclusion.surface.project(middle[chosen])
+        if scene.is_cut:
+            beyond = np.abs(scene.cut_face.distance(mesh.points)) < close
+            both = chosen & beyond[edges].all(axis=1)
+            surfaces.append(scene.cut_face)
+            for surface in _ALTERNATIONS * surfaces:
+                middle[both] = surface.project(middle[both])
+    return middle
+
+
+def _interface_edges(mesh: MeshArrays, regions: IntArray) -> IntArray:
+    """Keys of the edges of the triangles between two regions."""
+    corners = np.sort(mesh.cells[:, [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)]].reshape(-1, 3), axis=1)
+    order = np.lexsort(corners.T)
+    sorted_corners, owner = corners[order], np.repeat(regions, 4)[order]
+    twins = np.all(sorted_corners[1:] == sorted_corners[:-1], axis=1) & (owner[1:] != owner[:-1])
+    triangles = sorted_corners[1:][twins]
+    return np.unique(np.concatenate([_key(mesh, triangles[:, pair]) for pair in combinations(range(3), 2)]))
 
 
 def _key(mesh: MeshArrays, edges: IntArray) -> IntArray:

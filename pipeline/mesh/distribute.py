@@ -52,7 +52,15 @@ def distribute(comm: MPI.Comm, arrays: MeshArrays | None) -> BodyMesh:
         cells, points, width, surface, count = np.empty((0, 0), np.int64), np.empty((0, 3)), 0, {}, 0
     width, surface, count = comm.bcast((width, surface, count))
     mesh = compat.create_mesh(comm, cells.reshape(-1, width), points, order=1 if width == 4 else 2)
-    return BodyMesh(mesh, _find_facets(mesh, surface), count)
+    return BodyMesh(mesh, _find_facets(mesh, surface), count, _find_regions(comm, mesh, arrays))
+
+
+def _find_regions(comm: MPI.Comm, mesh: Any, arrays: MeshArrays | None) -> Int32Array | None:
+    """Return the region of each local cell, from the arrays on rank 0; collective."""
+    # A byte for each cell of the whole mesh goes to every rank: less than its coordinates did.
+    small = None if arrays is None or arrays.regions is None else arrays.regions.astype(np.uint8)
+    regions = comm.bcast(small)
+    return None if regions is None else regions[compat.original_cells(mesh)].astype(np.int32)
 
 
 def _find_facets(mesh: Any, surface: dict[str, IntArray]) -> dict[str, Int32Array]:

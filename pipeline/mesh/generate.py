@@ -10,8 +10,9 @@ import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.compat import gmsh_session
+from pipeline.mesh.regions import region_sizes
 from pipeline.mesh.size import Sizes, set_size_field
-from pipeline.scene.model import CUT, FIXED, FREE, MIRROR, PROBE, Scene, SceneError, build
+from pipeline.scene.model import CUT, FIXED, FREE, MIRROR, PROBE, TISSUE, Scene, SceneError, build
 from pipeline.stages import stage
 
 # gmsh's HXT is 3 to 6 times faster, but numbers its points by memory address: no two runs give the same mesh,
@@ -77,7 +78,8 @@ def _generate(scene: Scene, sizes: Sizes, start: float) -> MeshArrays:
             if scene.rim_segments and len(rim_curves) == 1:
                 edges = scene.rim_segments // 2 ** len(scene.mirrors)
                 gmsh.model.mesh.setTransfiniteCurve(rim_curves[0], edges + 1)
-            set_size_field(sizes, scene.probe, scene.frame, scene.scale)
+            more = region_sizes(scene, sizes.growth)
+            set_size_field(sizes, scene.probe, scene.frame, scene.scale, more)
             gmsh.model.mesh.generate(3)
         except Exception as error:  # gmsh raises bare Exception
             raise MeshError(f"gmsh: {error or gmsh.logger.getLastError()}") from error
@@ -120,6 +122,7 @@ def _collect(scale: float, rim_curves: list[int], start: float) -> MeshArrays:
     cells = _elements(3, [tag for _, tag in gmsh.model.getEntities(3)], 4, position)
     if not len(cells):
         raise MeshError("gmsh made no tetrahedra")
+    regions = _regions()
     facets = {}
     for dim, group in gmsh.model.getPhysicalGroups(2):
         name = gmsh.model.getPhysicalName(dim, group)
@@ -127,7 +130,21 @@ def _collect(scale: float, rim_curves: list[int], start: float) -> MeshArrays:
     assert set(facets) <= {PROBE, FIXED, FREE, CUT, *MIRROR.values()}
     rim = [position[mesh.getNodes(1, curve, includeBoundary=True)[0]] for curve in rim_curves]
     points, cells, facets, rim_points = _drop_unused(points, cells, facets, np.unique(np.concatenate(rim)))
-    return MeshArrays(points, _orient(points, cells), facets, rim_points, time.perf_counter() - start)
+    return MeshArrays(points, _orient(points, cells), facets, rim_points, time.perf_counter() - start, regions)
+
+
+def _regions() -> IntArray | None:
+    """Return the region of each tetrahedron, in the order of the entities, None if there is one only."""
+    groups = gmsh.model.getPhysicalGroups(3)
+    if len(groups) == 1 and gmsh.model.getPhysicalName(*groups[0]) == TISSUE:
+        return None
+    number: dict[int, int] = {}
+    for dim, group in groups:
+        region = int(gmsh.model.getPhysicalName(dim, group).removeprefix(TISSUE) or 0)
+        number |= dict.fromkeys(gmsh.model.getEntitiesForPhysicalGroup(dim, group), region)
+    tags = [tag for _, tag in gmsh.model.getEntities(3)]
+    counts = [sum(map(len, gmsh.model.mesh.getElements(3, tag)[1])) for tag in tags]
+    return np.repeat(np.array([number[tag] for tag in tags], dtype=np.int64), counts)
 
 
 def _elements(dim: int, entities: list[int], size: int, position: IntArray) -> IntArray:

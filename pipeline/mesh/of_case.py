@@ -5,7 +5,7 @@ from math import inf
 from time import perf_counter
 
 from pipeline.mesh.curve import curve
-from pipeline.mesh.generate import MeshArrays, MeshError, generate
+from pipeline.mesh.generate import MeshArrays, generate
 from pipeline.mesh.meridian import Meridian
 from pipeline.mesh.reflect import reflect
 from pipeline.mesh.size import Sizes
@@ -16,8 +16,6 @@ from pipeline.study.sweep import Case
 
 def mesh_arrays(case: Case, mirrors: tuple[str, ...]) -> MeshArrays:
     """Return the mesh of a case as arrays, of the part that ``mirrors`` leave of it."""
-    if case.body.regions:
-        raise MeshError("layers and inclusions are read and checked, but not computed by this version")
     start = perf_counter()
     straight, planes, sizes = case.mesh.degree == 1, mirror_planes(case), sizes_of(case)
     segments = sizes.rim_segments(case.probe)

@@ -47,6 +47,7 @@ def _reflect_once(mesh: MeshArrays, plane: str) -> MeshArrays:
         cells=np.vstack([mesh.cells, image[mesh.cells][:, _TURNED[mesh.cells.shape[1]]]]),
         facets=facets,
         rim=np.union1d(mesh.rim, image[mesh.rim]),
+        regions=None if mesh.regions is None else np.tile(mesh.regions, 2),
     )
 
 

@@ -1,5 +1,6 @@
 """The size field: fine within ε of the contact, growing to coarse, and refined to the probe's edge."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import ceil, inf
 
@@ -39,8 +40,11 @@ class Sizes:
         return max(_FEWEST_SEGMENTS, _SEGMENT_MULTIPLE * quarters)
 
 
-def set_size_field(sizes: Sizes, probe: Probe, frame: Frame, scale: float) -> None:
-    """Make ``sizes`` the background field of gmsh's current model, whose unit is ``scale`` metres."""
+def set_size_field(sizes: Sizes, probe: Probe, frame: Frame, scale: float, more: Iterable[str] = ()) -> None:
+    """Make ``sizes`` the background field of gmsh's current model, whose unit is ``scale`` metres.
+
+    ``more`` are sizes that elements must not be above either, written in that unit.
+    """
     unit = 1 / scale
     to_rim = probe.edge_distance(*frame.expressions(unit), unit)
     terms = [f"{unit * sizes.rim:.12g}+{sizes.growth:.12g}*{to_rim}"]
@@ -53,6 +57,7 @@ def set_size_field(sizes: Sizes, probe: Probe, frame: Frame, scale: float) -> No
         terms.append(f"{unit * sizes.coarse:.12g}")
     if sizes.column < inf:
         terms.append(f"{unit * sizes.column / _EDGES_PER_RADIUS:.12g}")
+    terms += more
     field = gmsh.model.mesh.field
     tags = []
     for term in terms:

@@ -14,28 +14,33 @@ from pipeline.solve.straight.pattern import library
 from pipeline.stages import stage
 
 # What this process has seen to.
-_compiled: set[tuple[str, int]] = set()
+_compiled: set[tuple[str, int, bool]] = set()
 
 
 @stage("compiler")
 def prepare(comm: MPI.Comm, solves: Collection[Solve]) -> None:
     """Compile what ``solves`` need and the cache does not have; collective."""
     if comm.rank == 0:
-        needed = {("axisymmetric", 0) if s.axisymmetric else (s.case.element, s.case.mesh.degree) for s in solves}
+        needed = {
+            ("axisymmetric", 0, False)
+            if s.axisymmetric
+            else (s.case.element, s.case.mesh.degree, bool(s.case.body.regions))
+            for s in solves
+        }
         if missing := needed - _compiled:
             with compiling():
-                for element, degree in sorted(missing):
-                    _compile(element, degree)
+                for element, degree, of_regions in sorted(missing):
+                    _compile(element, degree, of_regions=of_regions)
             _compiled.update(missing)
     comm.barrier()
 
 
-def _compile(element: str, degree: int) -> None:
+def _compile(element: str, degree: int, *, of_regions: bool) -> None:
     if element == "axisymmetric":
         compile_axisymmetric()
         return
     library()
     compiles()
-    compile_elastic(degree, straight=degree == 1)
+    compile_elastic(degree, straight=degree == 1, of_regions=of_regions)
     if element == "mixed":
         compile_mixed(degree)

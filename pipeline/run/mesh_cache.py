@@ -38,7 +38,8 @@ class MeshCache:
             with np.load(path, allow_pickle=False) as content:
                 facets = {name.removeprefix("facets_"): content[name] for name in content if name.startswith("facets_")}
                 mesh = MeshArrays(
-                    content["points"], content["cells"], facets, content["rim"], float(content["seconds"])
+                    content["points"], content["cells"], facets, content["rim"], float(content["seconds"]),
+                    content.get("regions"),
                 )  # fmt: skip
             _touch(path)
         except FileNotFoundError:
@@ -52,12 +53,14 @@ class MeshCache:
     @stage("mesh cache")
     def put(self, path: Path, mesh: MeshArrays) -> None:
         """Keep a mesh. A full disk is no reason to end a run: it is then not kept."""
-        facets = {f"facets_{name}": value for name, value in mesh.facets.items()}
+        arrays = {f"facets_{name}": value for name, value in mesh.facets.items()}
+        if mesh.regions is not None:
+            arrays["regions"] = mesh.regions
         with suppress(OSError):
             with atomic(path) as temporary:
                 np.savez(
                     temporary, points=mesh.points, cells=mesh.cells, rim=mesh.rim, seconds=np.float64(mesh.seconds),
-                    **facets,
+                    **arrays,
                 )  # fmt: skip
                 _touch(temporary)
             self._shrink()

@@ -13,6 +13,7 @@ from typing import Any
 import gmsh
 import numpy as np
 
+from pipeline.scene.regions import draw_inclusions, regions_of, remove_beyond
 from pipeline.shapes.body import Body, Drawn
 from pipeline.shapes.frame import Frame
 from pipeline.shapes.probe import Probe
@@ -92,9 +93,13 @@ def build(scene: Scene) -> list[int]:
     if scene.mirrors:
         volumes, _ = occ.intersect(volumes, [(3, _add_positive_side(scene))])
     tools = [(2, scene.footprint.draw(occ, scene.frame, scene.units))]
-    tools += [(2, _add_level(scene.units(height))) for height in scene.body.support.edges()]
+    heights = (*scene.body.support.edges(), *scene.body.interfaces)
+    tools += [(2, _add_level(scene.units(height))) for height in heights]
+    tools += draw_inclusions(scene.body.inclusion, scene.units)
     _, children = occ.fragment(volumes, tools)
     occ.synchronize()
+    if scene.body.inclusion:
+        remove_beyond({tag for pieces in children[: len(volumes)] for dim, tag in pieces if dim == 3})
     # Pieces of a tool that stick out of the body bound no volume: drop them.
     inside = {
         tag for volume in gmsh.model.getEntities(3) for _, tag in gmsh.model.getBoundary([volume], oriented=False)
@@ -106,7 +111,8 @@ def build(scene: Scene) -> list[int]:
     footprint = [tag for _, tag in children[len(volumes)] if tag in inside]
     if not footprint:
         raise SceneError("no part of the probe's footprint lies on the body")
-    _name_groups(scene, footprint)
+    inclusions = children[len(volumes) + 1 + len(heights) :]
+    _name_groups(scene, footprint, regions_of(scene.body, inclusions, scene.scale))
     edge = gmsh.model.getBoundary([(2, tag) for tag in footprint], oriented=False)
     return [abs(tag) for _, tag in edge if not _is_on_mirror(scene, abs(tag))]
 
@@ -137,7 +143,7 @@ def _add_level(height: float) -> int:
     return int(gmsh.model.occ.addRectangle(-size / 2, -size / 2, height, size, size))
 
 
-def _name_groups(scene: Scene, footprint: list[int]) -> None:
+def _name_groups(scene: Scene, footprint: list[int], regions: dict[int, list[int]]) -> None:
     """Put every volume and every boundary face into its physical group."""
     model = gmsh.model
     volumes = model.getEntities(3)
@@ -155,7 +161,8 @@ def _name_groups(scene: Scene, footprint: list[int]) -> None:
     for name, tags in groups.items():
         if tags:
             model.setPhysicalName(2, model.addPhysicalGroup(2, sorted(tags)), name)
-    model.setPhysicalName(3, model.addPhysicalGroup(3, [tag for _, tag in volumes]), TISSUE)
+    for number, tags in regions.items():
+        model.setPhysicalName(3, model.addPhysicalGroup(3, tags), f"{TISSUE} {number}" if number else TISSUE)
 
 
 def _sample(face: int) -> Any:

@@ -32,8 +32,6 @@ from pipeline.solve.strain import largest_strain, principal_strains
 from pipeline.solve.vectors import global_sum, vector
 from pipeline.stages import stage
 
-Lame = tuple[float, float]
-
 
 class DisplacementProblem:
     """The spaces of a mesh, a degree and conditions: solves for any material and loads. A context manager."""
@@ -83,30 +81,30 @@ class DisplacementProblem:
         Raises:
             SolveError: if the solver did not converge, or the solution fails a check.
         """
-        fine, lame, asked = self._fine, law.lame, tolerance
+        fine, asked = self._fine, tolerance
         direct = is_direct(method, self.dofs, fine.degree)
         held = [fine.dofs.held(motion) for motion in loads.motions]
         with ExitStack() as stack:
             start = time.perf_counter()
             rhs, unknowns = ([stack.enter_context(vector(fine.dofs.space)) for _ in held] for _ in range(2))
             for motion, values, load, unknown in zip(loads.motions, held, rhs, unknowns, strict=True):
-                fine.lift(load, values, lame)
+                fine.lift(load, values, law)
                 if self._reuse and motion in self.corrections:
                     unknown.array[:] = self.corrections[motion]
             assemble = time.perf_counter() - start
-            levels, seconds = self._hierarchy(lame, stack, direct=direct)
+            levels, seconds = self._hierarchy(law, stack, direct=direct)
             assemble += seconds
             solver = LinearSolver(levels, direct=direct, tolerance=tolerance)
             stack.callback(solver.close)
             start = time.perf_counter()
             iterations = sum(map(solver.solve, rhs, unknowns))
-            response = self._response(unknowns, held, lame, loads)
+            response = self._response(unknowns, held, law, loads)
             for _ in range(MOST_ROUNDS):
                 if direct or (share := rest(response.balance, asked)) == 1.0:
                     break
                 tolerance *= share
                 iterations += sum(solver.solve(*pair, tolerance) for pair in zip(rhs, unknowns, strict=True))
-                response = self._response(unknowns, held, lame, loads)
+                response = self._response(unknowns, held, law, loads)
             if response.balance > BALANCE_LIMIT:
                 raise SolveError(
                     f"forces do not balance: relative error {response.balance:.1e}, allowed {BALANCE_LIMIT:.0e}"
@@ -122,7 +120,7 @@ class DisplacementProblem:
                 return solution
             solver.close()  # what the next degree takes is the most memory of all
             start = time.perf_counter()
-            found, more = self._decrements(lame, levels, held, loads, stack)
+            found, more = self._decrements(law, levels, held, loads, stack)
             plain = plain_share(self._body)
         shares = np.diag(found) / np.diag(response.stiffness)
         relative = np.array([error_bar(share, fine.degree, plain=plain) for share in shares])
@@ -141,7 +139,7 @@ class DisplacementProblem:
         """
         direct = is_direct(method, self.dofs, self._fine.degree)
         with ExitStack() as stack:
-            levels, _ = self._hierarchy(law.lame, stack, direct=direct)
+            levels, _ = self._hierarchy(law, stack, direct=direct)
             solver = LinearSolver(levels, direct=direct, tolerance=0.5, linear=True)
             stack.callback(solver.close)
             yield solver
@@ -155,23 +153,23 @@ class DisplacementProblem:
         self._fine.set_displacement(displacement)
         return largest_strain(self._strain, self._body)
 
-    def _hierarchy(self, lame: Lame, stack: ExitStack, *, direct: bool) -> tuple[list[Level], float]:
+    def _hierarchy(self, law: MaterialLaw, stack: ExitStack, *, direct: bool) -> tuple[list[Level], float]:
         """Return the levels of multigrid, or the one of a direct solve, and the seconds that one assembly takes.
 
         Their operators are given back with the ``stack``.
         """
         spaces = [self._fine] if direct else [*self._coarser(), self._fine]
-        found = [self._level(space, lame, stack, blocked=not direct) for space in spaces]
+        found = [self._level(space, law, stack, blocked=not direct) for space in spaces]
         return [level for level, _ in found], sum(seconds for _, seconds in found)
 
     def _coarser(self) -> list[ElasticSpace]:
         """Return the spaces of lower degree; collective."""
         return [self._spaces.get(degree, self._conditions) for degree in range(1, self._fine.degree)]
 
-    def _level(self, space: ElasticSpace, lame: Lame, stack: ExitStack, *, blocked: bool) -> tuple[Level, float]:
+    def _level(self, space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, blocked: bool) -> tuple[Level, float]:
         blocked = blocked and space.degree > 1
-        matrix, seconds = stack.enter_context(space.operators.lend(lame, blocked=blocked, shared=self._shared))
-        return Level(space.dofs.space, matrix, space.dofs.prescribed), seconds
+        matrix, seconds = stack.enter_context(space.operators.lend(law, blocked=blocked, shared=self._shared))
+        return Level(space.dofs.space, matrix, space.dofs.prescribed, not law.is_uniform), seconds
 
     def _unit(self, motion: Motion, held: FloatArray) -> FloatArray:
         """Return the last solution for a unit of ``motion``, owned dofs."""
@@ -186,14 +184,14 @@ class DisplacementProblem:
 
     @stage("error bar")
     def _decrements(
-        self, lame: Lame, levels: list[Level], held: list[FloatArray], loads: Loads, stack: ExitStack
+        self, law: MaterialLaw, levels: list[Level], held: list[FloatArray], loads: Loads, stack: ExitStack
     ) -> tuple[FloatArray, int]:
         """Return what one degree more takes away from the last stiffness of the whole body, and the iterations."""
         fine = self._fine
         finer = self._spaces.get(fine.degree + 1, self._conditions)
         if len(levels) == 1:
-            levels = [*(self._level(space, lame, stack, blocked=True)[0] for space in self._coarser()), *levels]
-        level, _ = self._level(finer, lame, stack, blocked=True)
+            levels = [*(self._level(space, law, stack, blocked=True)[0] for space in self._coarser()), *levels]
+        level, _ = self._level(finer, law, stack, blocked=True)
         solver = LinearSolver([*levels, level], direct=False, tolerance=0.5)
         stack.callback(solver.close)
         residuals = [stack.enter_context(vector(finer.dofs.space)) for _ in held]
@@ -201,7 +199,7 @@ class DisplacementProblem:
         for motion, values, residual in zip(loads.motions, held, residuals, strict=True):
             self._move([values], Loads((motion,), (1.0,)))
             finer.forms.displacement.interpolate(fine.forms.displacement)
-            finer.apply(residual, lame)
+            finer.apply(residual, law)
             residual.scale(-1.0)
             residual.array[finer.dofs.prescribed_owned] = 0.0
         fine.forms.displacement.x.array[:] = moved
@@ -210,7 +208,7 @@ class DisplacementProblem:
             decrements = np.diag(np.diag(decrements))
         return 2.0 ** len(self._body.mirrored) * decrements, iterations
 
-    def _response(self, unknowns: list[PETSc.Vec], held: list[FloatArray], lame: Lame, loads: Loads) -> Response:
+    def _response(self, unknowns: list[PETSc.Vec], held: list[FloatArray], law: MaterialLaw, loads: Loads) -> Response:
         """Return the response to the motions whose solutions, less the prescribed displacements, are ``unknowns``."""
         fine, owned = self._fine, self._fine.dofs.owned
         units = [unknown.array + values[:owned] for unknown, values in zip(unknowns, held, strict=True)]
@@ -219,7 +217,7 @@ class DisplacementProblem:
             with vector(fine.dofs.space) as residual, vector(fine.dofs.space) as displacement:
                 displacement.array[:] = unit
                 fine.set_displacement(displacement)
-                fine.apply(residual, lame)
+                fine.apply(residual, law)
                 residuals.append(residual.array.copy())
         stationary = global_sum(fine.dofs.comm, np.array([[u @ r for r in residuals] for u in units]))
         found = sums(fine.dofs, residuals, held)

@@ -22,6 +22,8 @@ from pipeline.solve.vectors import global_sum
 # Iterations end when one adds less than this share of the sum; the first few may be short by chance.
 _SMALL = 0.02
 _FEWEST, _MOST = 3, 60
+# What is below zero by less than this share of the sum is nought.
+_ROUNDING = 1e-6
 
 
 def energy_decrements(solver: LinearSolver, residuals: Sequence[PETSc.Vec]) -> tuple[FloatArray, int]:
@@ -61,6 +63,8 @@ def _correct(solver: LinearSolver, residual: PETSc.Vec, *, keep: bool) -> tuple[
         for iteration in range(1, _MOST + 1):
             solver.precondition(residual, preconditioned)
             rz = residual.dot(preconditioned)
+            if rz < -_ROUNDING * total:
+                raise SolveError("the error estimate has no positive preconditioner")
             if rz <= 0.0:  # nothing is left to gain
                 return total, solution, iteration
             direction.aypx(rz / previous if previous else 0.0, preconditioned)

@@ -1,7 +1,7 @@
 """Forms of linear elasticity, compiled once and kept in a cache of the project's own.
 
 K = λ A_λ + μ A_μ with A_λ(u, v) = ∫ div u div v, A_μ(u, v) = ∫ 2 ε(u) : ε(v). λ and μ are constants of the
-compiled form, so that no value of them is ever compiled in.
+compiled form, or functions that are constant on each cell, so that no value of them is ever compiled in.
 """
 
 from functools import cached_property
@@ -14,11 +14,12 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from pipeline import compat
-from pipeline.arrays import BoolArray
+from pipeline.arrays import BoolArray, Int32Array
 from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import distribute
 from pipeline.mesh.generate import MeshArrays
 from pipeline.solve.compiled import cellwise_space, form, vector_space
+from pipeline.solve.material import MaterialLaw
 from pipeline.solve.straight import has_kernel, suits
 from pipeline.solve.straight.stiffness import cell_kernel
 
@@ -31,18 +32,27 @@ _curved: WeakKeyDictionary[Any, BoolArray | None] = WeakKeyDictionary()
 class ElasticForms:
     """Forms of elasticity on one space, each made when first asked for (collective).
 
-    ``lame`` are their constants λ and μ, ``displacement`` is the function that ``action``, K u, acts on.
+    ``lame`` are λ and μ in them: constants, or, on a mesh of several ``regions`` (of the local cells, ghosts too),
+    functions that are constant on each cell. ``displacement`` is the function that ``action``, K u, acts on.
     """
 
-    def __init__(self, space: Any):
-        self._space = space
+    def __init__(self, space: Any, regions: Int32Array | None = None):
+        self._space, self._regions = space, regions
         self.displacement = fem.Function(space)
-        self.lame = fem.Constant(space.mesh, 1.0), fem.Constant(space.mesh, 1.0)
+        if regions is None:
+            self.lame = fem.Constant(space.mesh, 1.0), fem.Constant(space.mesh, 1.0)
+            return
+        cellwise = cellwise_space(space.mesh, ())
+        self.lame = fem.Function(cellwise), fem.Function(cellwise)
+        self._cells = compat.cell_dofs(cellwise).reshape(-1)
 
-    def set_lame(self, lame_lambda: float, lame_mu: float) -> None:
+    def set_law(self, law: MaterialLaw) -> None:
         """Set λ and μ (Pa) for the next assembly."""
-        for constant, value in zip(self.lame, (lame_lambda, lame_mu), strict=True):
-            constant.value = value
+        for place, values in zip(self.lame, (law.lame_lambda, law.lame_mu), strict=True):
+            if self._regions is None:
+                (place.value,) = values
+            else:
+                place.x.array[self._cells] = np.array(values)[self._regions if len(values) > 1 else 0]
 
     @cached_property
     def stiffness(self) -> Any:
@@ -64,11 +74,13 @@ class ElasticForms:
         degree, mesh = compat.degree(self._space), self._space.mesh
         if suits(self._space) or not has_kernel(degree):
             return {}
-        return {compat.EVERYWHERE if curved_cells(mesh) is None else _STRAIGHT: cell_kernel(degree)}
+        kernel = cell_kernel(degree, of_regions=self._regions is not None)
+        return {compat.EVERYWHERE if curved_cells(mesh) is None else _STRAIGHT: kernel}
 
     def _form(self, name: str, u: Any, measure: Any, kernels: dict[int, int] | None = None) -> Any:
         v, (lame_lambda, lame_mu) = ufl.TestFunction(self._space), self.lame
         energy = lame_lambda * ufl.div(u) * ufl.div(v) + 2 * lame_mu * ufl.inner(strain(u), strain(v))
+        name = name if self._regions is None else f"{name} of regions"
         return form(energy * measure, form_name(name, self._space), kernels)
 
 
@@ -130,12 +142,13 @@ def mean_strain_form(space: Any, displacement: Any) -> tuple[Any, Any]:
     return integral, volume
 
 
-def compile_elastic(degree: int, *, straight: bool) -> None:
+def compile_elastic(degree: int, *, straight: bool, of_regions: bool) -> None:
     """Compile the forms of displacements of ``degree`` and of those below, and of one degree more for the error bar."""
+    regions = np.zeros(1, dtype=np.int32) if of_regions else None
     mesh = distribute(MPI.COMM_SELF, one_cell(straight=straight)).mesh
     for level in range(1, degree + 2):
         space = vector_space(mesh, level)
-        forms = ElasticForms(space)
+        forms = ElasticForms(space, regions)
         _ = forms.stiffness, forms.action
         if level == degree:
             mean_strain_form(space, forms.displacement)

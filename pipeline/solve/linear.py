@@ -27,6 +27,8 @@ _SMOOTHER = {
     "ksp_type": "chebyshev", "ksp_max_it": 2, "ksp_chebyshev_esteig": "0,0.1,0,1.15", "ksp_chebyshev_esteig_steps": 5,
     "pc_type": "pbjacobi",
 }  # fmt: skip
+# Where the material jumps, the mode of the largest one sits in the stiffest region, of which noise has little.
+_SMOOTHER_JUMPS = {"ksp_chebyshev_esteig_steps": 12}
 # Symmetric: Gauss–Seidel down, backwards up. Three entries to a row of the interpolation keep the coarse levels sparse.
 _BOOMERAMG = {
     "coarsen_type": "HMIS", "interp_type": "ext+i", "strong_threshold": 0.5, "P_max": 3, "no_CF": "",
@@ -42,7 +44,10 @@ class SolveError(Exception):
 
 @dataclass(frozen=True)
 class Level:
-    """One level of a hierarchy: its space, its operator and the local dofs (unrolled) that are prescribed."""
+    """One level of a hierarchy: its space, its operator and the local dofs (unrolled) that are prescribed.
+
+    ``jumps`` says that the material does, from one region to the next.
+    """
 
     space: Any
     matrix: PETSc.Mat
@@ -52,6 +57,8 @@ class Level:
     def degree(self) -> int:
         """Polynomial degree of the space."""
         return compat.degree(self.space)
+
+    jumps: bool = False
 
 
 def is_direct(method: str, dofs: int, degree: int) -> bool:
@@ -198,7 +205,7 @@ class LinearSolver:
         self._algebraic(coarse, prefix)
         coarse.setFromOptions()
         coarse.setUp()
-        smoothed = [SmoothedLevel(level.matrix) for level in self._levels[1:]]
+        smoothed = [SmoothedLevel(level.matrix, jumps=level.jumps) for level in self._levels[1:]]
         pc.setType("python")
         pc.setPythonContext(SingleCycle(smoothed, list(map(interpolation, self._levels, self._levels[1:])), coarse))
 
@@ -210,7 +217,8 @@ class LinearSolver:
         for number, (coarse, fine) in enumerate(itertools.pairwise(levels), start=1):
             pc.setMGInterpolation(number, self._own(transfer(coarse, fine)))
             pc.getMGSmoother(number).setOperators(fine.matrix)
-            self._option(f"{self._prefix}mg_levels_{number}_", **_SMOOTHER)
+            smoother = _SMOOTHER | _SMOOTHER_JUMPS if fine.jumps else _SMOOTHER
+            self._option(f"{self._prefix}mg_levels_{number}_", **smoother)
         bottom = pc.getMGCoarseSolve()
         bottom.setOperators(levels[0].matrix)
         bottom.setType("preonly")

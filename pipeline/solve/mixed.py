@@ -5,7 +5,8 @@ With λ split into λ₀ = μ, which stays with the displacement, and λ₁ = λ
 
     a₀(u, v) + b(v, p) = 0,    b(u, q) − (1/λ₁) (p, q) = 0,    b(v, q) = ∫ q div v,
 
-holds for ν = ½, where 1/λ₁ = 0. Divided by μ, all but 1/λ₁ is the same for every material: it is assembled once.
+holds for ν = ½, where 1/λ₁ = 0. Divided by μ, all but 1/λ₁ is the same for every material: it is assembled once. Of
+several materials λ₀, λ₁ and μ are those of each region; pressures jump from one to the next.
 
 The force is the reaction K₀ u + Bᵀ p on the probe; the probe's stiffness is, for each pair of motions,
 a₀(u, v) + b(u, q) + b(v, p) − (p, q)/λ₁, which is stationary: its error is the product of the solver's.
@@ -20,7 +21,6 @@ import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from math import inf
 from typing import Any
 
 import numpy as np
@@ -31,7 +31,7 @@ from pipeline.solve.error import error_bar, stiffness_bars
 from pipeline.solve.forms import mean_strain_form
 from pipeline.solve.linear import Level, SolveError
 from pipeline.solve.loads import Loads
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.material import MaterialLaw, SplitLaw
 from pipeline.solve.mixed_space import MixedSpace
 from pipeline.solve.reaction import Response, reaction, sums
 from pipeline.solve.rim import plain_share
@@ -43,7 +43,7 @@ from pipeline.solve.vectors import global_sum
 from pipeline.stages import stage
 
 # λ₀/μ = 1 (ν = ¼): small enough for the multigrid, large enough for the pressure's mass to be a good preconditioner.
-LAME = (1.0, 1.0)
+LAME = MaterialLaw.of(1.0, 1.0)
 # Dofs up to which a direct solve is faster, measured for degrees 2 and 3 (docs/solvers.md).
 DIRECT_LIMIT = 1_500
 # Relative energy norm of the error to which the solution of degree k + 1 is found for the error bar.
@@ -65,7 +65,8 @@ class MixedProblem:
             SolveError: if footprint and support share a point: no displacement satisfies both.
         """
         self._spaces, self._body, self._conditions = spaces, spaces.body, conditions
-        self._stack = ExitStack()
+        self._stack, self._set_up = ExitStack(), ExitStack()
+        self._elastic = LAME
         self._mixed: dict[int, MixedSpace] = {}
         self._levels: dict[tuple[int, bool], tuple[Level, float]] = {}
         self._solvers: dict[tuple[int, bool], SaddleSolver] = {}
@@ -78,6 +79,7 @@ class MixedProblem:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._set_up.close()
         self._stack.close()
 
     @property
@@ -95,13 +97,13 @@ class MixedProblem:
         degree more, for the solution's ``decrements``, which may be negative, and ``bars``.
 
         Raises:
-            SolveError: if λ <= μ, the solver did not converge, or the solution fails a check.
+            SolveError: if λ <= μ everywhere, the solver did not converge, or the solution fails a check.
         """
-        lame_lambda, mu = law.lame
-        if not lame_lambda > mu:
+        if not any(lame_lambda > mu for lame_lambda, mu in zip(law.lame_lambda, law.lame_mu, strict=True)):
             raise SolveError("mixed elements are for Poisson's ratios above 0.25; use displacement elements")
         tolerance = STRICTER * tolerance
-        c = 0.0 if lame_lambda == inf else 1 / (lame_lambda / mu - LAME[0])
+        split = SplitLaw.of(law)
+        self._use(split.elastic)
         direct = method == "direct" or (method == "auto" and self.dofs <= DIRECT_LIMIT)
         solver, assemble = self._solver(self._degree, direct=direct)
         fine = self._fine
@@ -109,11 +111,11 @@ class MixedProblem:
         held = [fine.displacements.dofs.held(motion) for motion in loads.motions]
         with ExitStack() as stack:
             unknowns = [stack.enter_context(fine.pair()) for _ in held]
-            iterations = self._correct(fine, solver, c, unknowns, held, tolerance)
-            response = self._response(fine, c, unknowns, held, loads)
+            iterations = self._correct(fine, solver, split, unknowns, held, tolerance)
+            response = self._response(fine, split, unknowns, held, loads)
             if (share := rest(response.balance, tolerance)) < 1:
-                iterations += self._correct(fine, solver, c, unknowns, held, share)
-                response = self._response(fine, c, unknowns, held, loads)
+                iterations += self._correct(fine, solver, split, unknowns, held, share)
+                response = self._response(fine, split, unknowns, held, loads)
             seconds = time.perf_counter() - start - (solver.setup_seconds if direct else 0.0)
             if response.balance > BALANCE_LIMIT:
                 raise SolveError(
@@ -122,12 +124,12 @@ class MixedProblem:
             self._move(unknowns, held, loads.amounts)
             strain = largest_strain(self._strain, self._body)
             solution = Solution(
-                _times(response, mu), strain, fine.whole_dofs, self._body.cells, iterations,
+                _times(response, split.unit), strain, fine.whole_dofs, self._body.cells, iterations,
                 assemble, solver.setup_seconds, seconds,
             )  # fmt: skip
             if not estimate:
                 return solution
-            solution = self._estimate(solution, response, unknowns, held, c, mu)
+            solution = self._estimate(solution, response, unknowns, held, split)
             self._move(unknowns, held, loads.amounts)
         return solution
 
@@ -146,9 +148,9 @@ class MixedProblem:
 
     @stage("error bar")
     def _estimate(
-        self, solution: Solution, coarse: Response, unknowns: list[Pair], held: list[FloatArray], c: float, mu: float
+        self, solution: Solution, coarse: Response, unknowns: list[Pair], held: list[FloatArray], split: SplitLaw
     ) -> Solution:
-        """Return ``solution``, whose response for μ = 1 is ``coarse``, with its error bars; collective."""
+        """Return ``solution``, whose response in the law's unit is ``coarse``, with its error bars; collective."""
         start, loads = time.perf_counter(), coarse.loads
         solver, _ = self._solver(self._degree + 1, direct=False)
         finer = self._space(self._degree + 1)
@@ -158,8 +160,8 @@ class MixedProblem:
             for pair, unknown, values, fine_values in zip(found, unknowns, held, finer_held, strict=True):
                 self._move([unknown], [values], [1.0])
                 finer.start_from(self._fine, pair, fine_values)
-            iterations = self._correct(finer, solver, c, found, finer_held, _ESTIMATE_TOLERANCE)
-            fine = self._response(finer, c, found, finer_held, loads)
+            iterations = self._correct(finer, solver, split, found, finer_held, _ESTIMATE_TOLERANCE)
+            fine = self._response(finer, split, found, finer_held, loads)
         decrements, energies = coarse.stiffness - fine.stiffness, np.diag(coarse.stiffness)
         unseen = 2.0 ** len(self._body.mirrored) * np.array(solver.first_energies) / energies
         plain = plain_share(self._body)
@@ -168,34 +170,35 @@ class MixedProblem:
             for d, n in zip(np.diag(decrements) / energies, unseen, strict=True)
         ]
         return replace(
-            solution, decrements=mu * decrements, plain=plain,
+            solution, decrements=split.unit * decrements, plain=plain,
             bars=stiffness_bars(solution.stiffness, np.array(relative), apart=loads.apart),
             estimate_iterations=iterations, time_estimate=time.perf_counter() - start,
         )  # fmt: skip
 
     @stage("iterations")
     def _correct(
-        self, space: MixedSpace, solver: SaddleSolver, c: float, unknowns: list[Pair], held: list[FloatArray],
+        self, space: MixedSpace, solver: SaddleSolver, split: SplitLaw, unknowns: list[Pair], held: list[FloatArray],
         tolerance: float,
     ) -> int:  # fmt: skip
         """Improve ``unknowns``, each less the prescribed displacements ``held``; return the iterations."""
         with ExitStack() as stack:
             loads = [stack.enter_context(space.pair()) for _ in held]
             for load, values in zip(loads, held, strict=True):
-                space.lift(load, values, LAME)
-            return solver.solve(c, loads, unknowns, tolerance)
+                space.lift(load, values, split.elastic)
+            return solver.solve(space.by_region(split.compliance), loads, unknowns, tolerance)
 
     def _response(
-        self, space: MixedSpace, c: float, unknowns: list[Pair], held: list[FloatArray], loads: Loads
+        self, space: MixedSpace, split: SplitLaw, unknowns: list[Pair], held: list[FloatArray], loads: Loads
     ) -> Response:
-        """Return the response, for μ = 1, to the motions whose solutions less ``held`` are ``unknowns``; collective."""
+        """Return the response, in the law's unit, to motions of solutions ``unknowns`` less ``held``; collective."""
         dofs, elastic, residuals, dilations, masses, moved = space.displacements.dofs, [], [], [], [], []
+        c = space.by_region(split.compliance)
         for unknown, values in zip(unknowns, held, strict=True):
             with space.pair() as (residual, dilation), space.pair() as (pull, mass_p), space.pair() as total:
                 total[0].array[:] = unknown[0].array + values[: dofs.owned]
                 unknown[1].copy(total[1])
                 space.set_fields(total)
-                space.apply(residual, pull, dilation, LAME)
+                space.apply(residual, pull, dilation, split.elastic)
                 space.mass.mult(total[1], mass_p)
                 elastic.append(residual.array.copy())
                 residuals.append(residual.array + pull.array)
@@ -238,7 +241,9 @@ class MixedProblem:
         space = self._space(degree)
         degrees = [degree] if direct else range(1, degree + 1)
         levels, seconds = zip(*(self._level(d, blocked=not direct and d > 1) for d in degrees), strict=True)
-        saddle = Saddle(list(levels), space.coupling, space.mass, LAME[0] + 2 * LAME[1], degree - 1)
+        moduli = zip(self._elastic.lame_lambda, self._elastic.lame_mu, strict=True)
+        stiffness = space.by_region(tuple(lame_lambda + 2 * mu for lame_lambda, mu in moduli))
+        saddle = Saddle(list(levels), space.coupling, space.mass, stiffness, degree - 1)
         return saddle, space.assembly_seconds + sum(seconds)
 
     @stage("set-up")
@@ -246,18 +251,27 @@ class MixedProblem:
         """Return the solver for elements of ``degree``, and the seconds that its assembly took; collective."""
         saddle, seconds = self.saddle(direct=direct, degree=degree)
         if (degree, direct) not in self._solvers:
-            self._solvers[degree, direct] = self._stack.enter_context(SaddleSolver(saddle, direct=direct))
+            self._solvers[degree, direct] = self._set_up.enter_context(SaddleSolver(saddle, direct=direct))
         return self._solvers[degree, direct], seconds
 
+    def _use(self, elastic: MaterialLaw) -> None:
+        """Make ``elastic`` the law of K₀: of one material it is always the same, and what is set up serves on."""
+        if elastic != self._elastic:
+            self._set_up.close()
+            self._levels.clear()
+            self._solvers.clear()
+            self._elastic = elastic
+
     def _level(self, degree: int, *, blocked: bool) -> tuple[Level, float]:
-        """Return K₀ for μ = 1 in displacements of ``degree``, and the seconds that its assembly took; collective."""
+        """Return K₀ in displacements of ``degree``, and the seconds that its assembly took; collective."""
         if (degree, blocked) not in self._levels:
             space = self._spaces.get(degree, self._conditions)
-            matrix, seconds = self._stack.enter_context(space.operators.lend(LAME, blocked=blocked))
-            self._levels[degree, blocked] = Level(space.dofs.space, matrix, space.dofs.prescribed), seconds
+            matrix, seconds = self._set_up.enter_context(space.operators.lend(self._elastic, blocked=blocked))
+            jumps = not self._elastic.is_uniform
+            self._levels[degree, blocked] = Level(space.dofs.space, matrix, space.dofs.prescribed, jumps), seconds
         return self._levels[degree, blocked]
 
 
-def _times(response: Response, mu: float) -> Response:
-    """Return the response for ``mu`` (Pa), given that for 1."""
-    return replace(response, stiffness=mu * response.stiffness, forces=mu * response.forces)
+def _times(response: Response, unit: float) -> Response:
+    """Return the response in newtons, given that for moduli in a ``unit`` (Pa)."""
+    return replace(response, stiffness=unit * response.stiffness, forces=unit * response.forces)

@@ -1,19 +1,24 @@
-"""Taylor–Hood spaces: displacements of degree k with their conditions, continuous pressures of degree k − 1."""
+"""Taylor–Hood spaces: displacements of degree k with their conditions, pressures of degree k − 1.
+
+Pressures are continuous, but from one region of the body to the next.
+"""
 
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
+import numpy as np
 from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
-from pipeline.solve.compiled import scalar_space
 from pipeline.solve.conditions import whole_points
 from pipeline.solve.forms import curved_cells
+from pipeline.solve.material import MaterialLaw
 from pipeline.solve.mixed_forms import MixedForms
+from pipeline.solve.region_space import region_wise_space
 from pipeline.solve.saddle import Pair
 from pipeline.solve.spaces import ElasticSpace
 from pipeline.solve.straight import mixed as straight
@@ -32,7 +37,8 @@ class MixedSpace:
         """Add the pressures to the ``displacements`` on a mesh; collective."""
         self.comm, self.degree = body.comm, displacements.degree
         self.displacements = displacements
-        self.pressures = scalar_space(body.mesh, displacements.degree - 1)
+        self.pressures, self._region = region_wise_space(body, displacements.degree - 1)
+        self._has_regions = body.regions is not None
         self.forms = MixedForms(displacements.forms.displacement, self.pressures)
         index_map = self.pressures.dofmap.index_map
         self._owned, self._size = index_map.size_local, index_map.size_global
@@ -56,15 +62,19 @@ class MixedSpace:
         """Free the matrices that pressures take part in."""
         self._stack.close()
 
+    def by_region(self, values: tuple[float, ...]) -> float | FloatArray:
+        """Return what a pressure dof has of a value by region: one for all, or an array for this rank's dofs."""
+        return np.array(values)[self._region] if self._has_regions else values[0]
+
     @contextmanager
     def pair(self) -> Iterator[Pair]:
         """Lend ghosted vectors of zeros for displacement and pressure."""
         with vector(self.displacements.dofs.space) as u, vector(self.pressures) as p:
             yield u, p
 
-    def lift(self, rhs: Pair, held: FloatArray, lame: tuple[float, float]) -> None:
-        """Put the loads of the prescribed displacements ``held`` into ``rhs``, λ and μ being K₀'s; collective."""
-        self.displacements.lift(rhs[0], held, lame)
+    def lift(self, rhs: Pair, held: FloatArray, law: MaterialLaw) -> None:
+        """Put the loads of the prescribed displacements ``held`` into ``rhs``, the law being K₀'s; collective."""
+        self.displacements.lift(rhs[0], held, law)
         self._dilate(rhs[1])
         rhs[1].scale(-1.0)
 
@@ -73,9 +83,9 @@ class MixedSpace:
         self.displacements.set_displacement(unknown[0])
         fill(self.forms.pressure, unknown[1], self.unit)
 
-    def apply(self, elastic: PETSc.Vec, pull: PETSc.Vec, dilation: PETSc.Vec, lame: tuple[float, float]) -> None:
+    def apply(self, elastic: PETSc.Vec, pull: PETSc.Vec, dilation: PETSc.Vec, law: MaterialLaw) -> None:
         """Add K₀ u, Bᵀ p and B u, all with the unmodified operator, to the three vectors; collective."""
-        self.displacements.apply(elastic, lame)
+        self.displacements.apply(elastic, law)
         fem_petsc.assemble_vector(pull, self.forms.pull)
         add_from_ghosts(pull)
         self._dilate(dilation)

@@ -9,6 +9,7 @@ from petsc4py import PETSc
 from pipeline import compat
 from pipeline.solve.conditions import ConstrainedSpace
 from pipeline.solve.forms import ElasticForms, curved_cells
+from pipeline.solve.material import MaterialLaw
 from pipeline.solve.straight import suits
 from pipeline.solve.straight.stiffness import StraightStiffness
 from pipeline.stages import stage
@@ -40,16 +41,15 @@ class Operators:
                 matrices.pop().destroy()
 
     @contextmanager
-    def lend(
-        self, lame: tuple[float, float], *, blocked: bool, shared: bool = False
-    ) -> Iterator[tuple[PETSc.Mat, float]]:
+    def lend(self, law: MaterialLaw, *, blocked: bool, shared: bool = False) -> Iterator[tuple[PETSc.Mat, float]]:
         """Lend K for λ and μ (Pa), and the seconds that one assembly takes; collective.
 
-        The diagonal of prescribed dofs is μ. ``shared`` keeps A_λ and A_μ for the next pair of λ and μ.
+        The diagonal of prescribed dofs is the first region's μ. ``shared`` keeps A_λ and A_μ for the next pair of λ
+        and μ of one material.
         """
         mat_type = "baij" if blocked else "aij"
         idle = self._idle.setdefault(mat_type, [])
-        matrix, seconds = self._make(lame, mat_type, idle.pop() if idle else None, shared=shared)
+        matrix, seconds = self._make(law, mat_type, idle.pop() if idle else None, shared=shared)
         try:
             yield matrix, seconds
         finally:
@@ -60,24 +60,25 @@ class Operators:
 
     @stage("assembly")
     def _make(
-        self, lame: tuple[float, float], mat_type: str, into: PETSc.Mat | None, *, shared: bool
+        self, law: MaterialLaw, mat_type: str, into: PETSc.Mat | None, *, shared: bool
     ) -> tuple[PETSc.Mat, float]:
         start = time.perf_counter()
-        if not shared:
-            return self._assemble(lame, lame[1], mat_type, into), time.perf_counter() - start
+        if not (shared and law.is_uniform):
+            return self._assemble(law, law.lame_mu[0], mat_type, into), time.perf_counter() - start
         # The parts are the copies: PETSc multiplies with a copy of a blocked matrix at less than half the speed.
         if mat_type not in self._parts:
             self._drop_parts()
-            whole = self._assemble((1.0, 0.0), 0.0, mat_type, into)
+            whole = self._assemble(MaterialLaw.of(1.0, 0.0), 0.0, mat_type, into)
             first = whole.copy()
-            into = self._assemble((0.0, 1.0), 1.0, mat_type, whole)
+            into = self._assemble(MaterialLaw.of(0.0, 1.0), 1.0, mat_type, whole)
             self._parts[mat_type] = first, into.copy()
             self._part_seconds = (time.perf_counter() - start) / 2
-        matrix = into if into is not None else self._assemble((0.0, 1.0), 1.0, mat_type, None)
+        matrix = into if into is not None else self._assemble(MaterialLaw.of(0.0, 1.0), 1.0, mat_type, None)
         of_lambda, of_mu = self._parts[mat_type]
+        lame_lambda, lame_mu = law.lame
         of_lambda.copy(matrix, structure=_SAME)
-        matrix.scale(lame[0])
-        matrix.axpy(lame[1], of_mu, structure=_SAME)
+        matrix.scale(lame_lambda)
+        matrix.axpy(lame_mu, of_mu, structure=_SAME)
         _mark(matrix)
         return matrix, self._part_seconds
 
@@ -86,27 +87,26 @@ class Operators:
             for part in self._parts.popitem()[1]:
                 part.destroy()
 
-    def _assemble(self, lame: tuple[float, float], diagonal: float, mat_type: str, into: PETSc.Mat | None) -> PETSc.Mat:
-        self._forms.set_lame(*lame)
+    def _assemble(self, law: MaterialLaw, diagonal: float, mat_type: str, into: PETSc.Mat | None) -> PETSc.Mat:
+        self._forms.set_law(law)
         if suits(self._space.space):
-            matrix = self._assemble_alone(lame, diagonal, mat_type, into)
+            matrix = self._assemble_alone(law, diagonal, mat_type, into)
         else:
             matrix = compat.assemble_matrix(self._forms.stiffness, self._space.dirichlet, diagonal, mat_type, into)
         _mark(matrix)
         return matrix
 
-    def _assemble_alone(
-        self, lame: tuple[float, float], diagonal: float, mat_type: str, into: PETSc.Mat | None
-    ) -> PETSc.Mat:
+    def _assemble_alone(self, law: MaterialLaw, diagonal: float, mat_type: str, into: PETSc.Mat | None) -> PETSc.Mat:
         """Assemble on one process: the straight cells, which are most, the fast way, and dolfinx the others."""
         curved = curved_cells(self._space.body.mesh)
         if self._straight is None:
-            self._straight = StraightStiffness(self._space.space, curved, self._space.prescribed)
+            regions = self._space.body.regions
+            self._straight = StraightStiffness(self._space.space, curved, self._space.prescribed, regions)
         matrix = self._straight.matrix(mat_type) if into is None else into
         matrix.zeroEntries()
         if curved is not None and curved.any():
             compat.add_matrix(matrix, self._forms.curved_stiffness, self._space.dirichlet, diagonal)
-        self._straight.add(matrix, lame, diagonal)
+        self._straight.add(matrix, law, diagonal)
         return matrix
 
 

@@ -26,7 +26,7 @@ from pipeline.solve.vectors import global_sum, vector
 
 # λ_min is estimated from above, by Lanczos: its share that is relied on.
 _TRUST = 0.5
-_LAMBDA, _MU = (1.0, 0.0), (0.0, 1.0)
+_LAMBDA, _MU = MaterialLaw.of(1.0, 0.0), MaterialLaw.of(0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class ReducedBasis:
         held = self._vector()
         held.array[:] = self._space.dofs.held(motion)[: self._space.dofs.owned]
         self._held = held
-        self._held_energy = [self._add(held, lame, sign=-1.0) for lame in (_LAMBDA, _MU)]
+        self._held_energy = [self._add(held, law, sign=-1.0) for law in (_LAMBDA, _MU)]
         load = self._vector()
         load.array[:] = self._parts[0].array + self._parts[1].array
         self._least = _TRUST * smallest_eigenvalue(self._solver, load)
@@ -85,8 +85,8 @@ class ReducedBasis:
         added.scale(1 / norm)
         known = len(self._parts)
         self._solutions.append(added)
-        for lame in (_LAMBDA, _MU):
-            self._add(added, lame, sign=1.0)
+        for law in (_LAMBDA, _MU):
+            self._add(added, law, sign=1.0)
         new = self._parts[known:]
         products = np.zeros((len(self._solutions), len(self._parts)))
         products[:-1, :known] = self._products
@@ -123,11 +123,11 @@ class ReducedBasis:
         self._result.scale(self._loads.amounts[0])
         return self._result
 
-    def _add(self, values: PETSc.Vec, lame: tuple[float, float], *, sign: float) -> float:
+    def _add(self, values: PETSc.Vec, law: MaterialLaw, *, sign: float) -> float:
         """Take sign · A·``values`` among the parts of the residual; return ``values``·A·``values``; collective."""
         space, part, under_p = self._space, self._vector(), self._vector()
         space.set_displacement(values)
-        space.apply(part, lame)
+        space.apply(part, law)
         energy = float(part.dot(values))
         on_probe = part.array.reshape(-1, 3)[space.dofs.probe_owned].sum(axis=0)
         self._reactions.append(global_sum(space.dofs.comm, on_probe))

@@ -18,9 +18,11 @@ from typing import Any
 
 from petsc4py import PETSc
 
+from pipeline.arrays import FloatArray
 from pipeline.solve.linear import Level, LinearSolver, SolveError, explain, reason_name
 
 Pair = tuple[PETSc.Vec, PETSc.Vec]
+Weight = float | FloatArray
 
 _MOST_ITERATIONS = 300
 # More directions than a solve takes, as a rule.
@@ -40,22 +42,24 @@ _prefixes = itertools.count()
 class Saddle:
     """The blocks: ``levels`` end with K₀, ``coupling`` is B, with columns of zeros for prescribed displacements.
 
-    ``stiffness`` is λ₀ + 2μ in units of the pressure, and ``degree`` that of the pressure.
+    ``stiffness`` is λ₀ + 2μ in units of the pressure, one number or one for each pressure of this rank; ``degree`` is
+    that of the pressure.
     """
 
     levels: list[Level]
     coupling: PETSc.Mat
     mass: PETSc.Mat
-    stiffness: float
+    stiffness: Weight
     degree: int
 
 
 class SaddleSolver:
     """Solves a saddle point for any c; a context manager, which frees what it made.
 
-    What does not depend on c is set up once. ``setup_seconds`` is the time of all set-up that the last solve relied
-    on, whether it was done for it or before; ``first_energies`` are the energy norms, squared, of the errors that an
-    iterative solve began with, as its preconditioner sees them, one for each right-hand side.
+    c is one number, or one for each pressure of this rank. What does not depend on it is set up once.
+    ``setup_seconds`` is the time of all set-up that the last solve relied on, whether it was done for it or before;
+    ``first_energies`` are the energy norms, squared, of the errors that an iterative solve began with, as its
+    preconditioner sees them, one for each right-hand side.
     """
 
     def __init__(self, saddle: Saddle, *, direct: bool):
@@ -77,7 +81,7 @@ class SaddleSolver:
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
-    def solve(self, c: float, rhs: Sequence[Pair], unknowns: Sequence[Pair], tolerance: float) -> int:
+    def solve(self, c: Weight, rhs: Sequence[Pair], unknowns: Sequence[Pair], tolerance: float) -> int:
         """Improve each of ``unknowns``, (u, p), until the energy norm of its error has fallen by ``tolerance``.
 
         Returns the iterations of all; collective. A direct solve is exact and does not look at what they hold.
@@ -108,10 +112,10 @@ class SaddleSolver:
                 raise SolveError(explain(error)) from error
         return iterations
 
-    def _matrix(self, c: float, stack: ExitStack) -> PETSc.Mat:
+    def _matrix(self, c: Weight, stack: ExitStack) -> PETSc.Mat:
         saddle = self._saddle
         mass = _keep(stack, saddle.mass.copy())
-        mass.scale(-c)
+        _weigh(mass, -c)
         transpose = PETSc.Mat()
         if self._direct:
             saddle.coupling.transpose(transpose)
@@ -134,7 +138,7 @@ class SaddleSolver:
         self.setup_seconds = time.perf_counter() - start
         return ksp
 
-    def _preconditioner(self, c: float, stack: ExitStack) -> "_BlockTriangular":
+    def _preconditioner(self, c: Weight, stack: ExitStack) -> "_BlockTriangular":
         saddle = self._saddle
         block = _BlockTriangular(self._multigrid, saddle.coupling, self._mass, c + _SCHUR / saddle.stiffness)
         stack.callback(block.close)
@@ -161,7 +165,7 @@ class _BlockTriangular:
     error of the energy, and the sum a norm of the error that does not depend on units.
     """
 
-    def __init__(self, multigrid: LinearSolver, coupling: PETSc.Mat, mass: PETSc.KSP, schur: float):
+    def __init__(self, multigrid: LinearSolver, coupling: PETSc.Mat, mass: PETSc.KSP, schur: Weight):
         self._multigrid, self._coupling, self._mass, self._schur = multigrid, coupling, mass, schur
         right, left = (coupling.createVecRight, coupling.createVecLeft)
         self._vectors = [right(), right(), left(), left()]
@@ -176,7 +180,7 @@ class _BlockTriangular:
         self._coupling.mult(z_u, rest)
         rest.array[:] = residual.getArray(readonly=True)[split:] - rest.array
         self._mass.solve(rest, z_p)
-        z_p.scale(-1 / self._schur)
+        z_p.array[:] *= -1 / self._schur
         self.energy = abs(r_u.dot(z_u)) + abs(rest.dot(z_p))
         result.array[:split], result.array[split:] = z_u.array, z_p.array
 
@@ -222,6 +226,17 @@ def _iteration(matrix: PETSc.Mat, block: _BlockTriangular, tolerance: float, sta
     ksp.setConvergenceTest(_EnergyTest(block, tolerance))
     ksp.setUp()
     return ksp
+
+
+def _weigh(mass: PETSc.Mat, weight: Weight) -> None:
+    """Multiply a mass by a weight; pressures of different weights have no entry between them."""
+    if isinstance(weight, float):
+        mass.scale(weight)
+        return
+    weights = mass.createVecLeft()
+    weights.array[:] = weight
+    mass.diagonalScale(weights, None)
+    weights.destroy()
 
 
 def _krylov(matrix: PETSc.Mat, stack: ExitStack) -> PETSc.KSP:

@@ -7,6 +7,7 @@ from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.conditions import Conditions, ConstrainedSpace
 from pipeline.solve.forms import ElasticForms
+from pipeline.solve.material import MaterialLaw
 from pipeline.solve.operator import Operators
 from pipeline.solve.vectors import add_from_ghosts, fill
 from pipeline.stages import stage
@@ -22,7 +23,7 @@ class ElasticSpace:
             SolveError: if footprint and support share a point: no displacement satisfies both.
         """
         self.dofs = ConstrainedSpace(body, degree, conditions)
-        self.forms = ElasticForms(self.dofs.space)
+        self.forms = ElasticForms(self.dofs.space, body.regions)
         self.operators = Operators(self.dofs, self.forms)
 
     @property
@@ -31,20 +32,20 @@ class ElasticSpace:
         return self.dofs.degree
 
     @stage("residuals")
-    def apply(self, result: PETSc.Vec, lame: tuple[float, float]) -> None:
+    def apply(self, result: PETSc.Vec, law: MaterialLaw) -> None:
         """Add K u (N), with the unmodified operator and the forms' displacement, to ``result``; collective."""
-        self.forms.set_lame(*lame)
+        self.forms.set_law(law)
         fem_petsc.assemble_vector(result, self.forms.action)
         add_from_ghosts(result)
 
-    def lift(self, rhs: PETSc.Vec, held: FloatArray, lame: tuple[float, float]) -> None:
+    def lift(self, rhs: PETSc.Vec, held: FloatArray, law: MaterialLaw) -> None:
         """Put the loads of the prescribed displacements ``held`` into ``rhs``; collective.
 
         What is left to find is zero on the prescribed dofs, and so is its load: the solver's norms then measure the
         energy of the error and nothing else, in any unit of length.
         """
         self.forms.displacement.x.array[:] = held
-        self.apply(rhs, lame)
+        self.apply(rhs, law)
         rhs.scale(-1.0)
         rhs.array[self.dofs.prescribed_owned] = 0.0
 

@@ -20,6 +20,7 @@ from pipeline.mesh.of_case import mesh_arrays
 from pipeline.plan.plan import make_plan
 from pipeline.solve.compiled import form, scalar_space, vector_space
 from pipeline.solve.forms import ElasticForms
+from pipeline.solve.material import MaterialLaw
 from pipeline.solve.mixed_forms import MixedForms
 from pipeline.study.load import parse
 from pipeline.verify.row import Row
@@ -68,7 +69,7 @@ def _patch(degree: int, *, mixed: bool) -> float:
     body = distribute(MPI.COMM_SELF, mesh_arrays(solve.case, ("x", "y")))
     space = vector_space(body.mesh, degree)
     forms = ElasticForms(space)
-    forms.set_lame(1.0, 1.0)
+    forms.set_law(MaterialLaw.of(1.0, 1.0))
     gradient = np.array([[0.2, 0.5, -0.3], [0.1, -0.4, 0.7], [0.6, 0.3, 0.9]])
     forms.displacement.interpolate(lambda x: gradient @ x)
     parts = [forms.action]
@@ -110,7 +111,7 @@ def _manufactured(degree: int, cubes: int, *, poisson: float, mixed: bool) -> fl
     lame_lambda = 1.0 if mixed else 2 * poisson / (1 - 2 * poisson)
     space = vector_space(mesh, degree)
     forms = ElasticForms(space)
-    forms.set_lame(lame_lambda, 1.0)
+    forms.set_law(MaterialLaw.of(lame_lambda, 1.0))
     exact = _exact(mesh, 0.0 if mixed else lame_lambda)
     dx = ufl.dx(metadata={"quadrature_degree": 2 * degree + 2})
     load = form(ufl.inner(exact.load, ufl.TestFunction(space)) * dx)

@@ -70,7 +70,7 @@ def test_a_plain_form_has_the_generated_kernel(degree):
     """Even of the very expression, in the very folder, of which a form with another kernel was made before."""
     space = vector_space(make_mesh(mesh={"degree": 1, "fine": "8 mm", "rim": "3 mm"}).mesh, degree)
     expression = stiffness(space)
-    address = cell_kernel(degree)
+    address = cell_kernel(degree, of_regions=False)
     own = form(expression, kernels={compat.EVERYWHERE: address})
     jit = {"cache_dir": str(form_cache()), "cffi_extra_compile_args": ["-O2", "-march=native"]}
     key = "jit_options" if "jit_options" in inspect.signature(fem.form).parameters else "jit_params"
@@ -90,9 +90,14 @@ def test_a_kernel_of_ones_own_is_used():
     u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
     lame = fem.Constant(space.mesh, 1.7), fem.Constant(space.mesh, 0.6)
     other = (lame[0] + lame[1]) * ufl.inner(u, v) * ufl.dx
+    kernels = {compat.EVERYWHERE: cell_kernel(2, of_regions=False)}
     mass, replaced, wanted = (
         compat.assemble_matrix(f, [], 1.0, "aij")
-        for f in (form(other), form(other, kernels={compat.EVERYWHERE: cell_kernel(2)}), form(stiffness(space)))
+        for f in (
+            form(other),
+            form(other, kernels=kernels),
+            form(stiffness(space)),
+        )
     )
     assert abs(mass.norm() / wanted.norm() - 1) > 0.5
     replaced.axpy(-1.0, wanted)

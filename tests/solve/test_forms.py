@@ -15,6 +15,7 @@ from pipeline.mesh.size import Sizes
 from pipeline.scene.model import Scene
 from pipeline.solve.compiled import form, vector_space
 from pipeline.solve.forms import ElasticForms, strain
+from pipeline.solve.material import MaterialLaw
 from tests.cases import study
 
 LAME = (2.0, 1.0)
@@ -38,7 +39,7 @@ def test_patch(degree):
     """A linear displacement leaves no force on any inner dof, on a graded mesh with curved elements."""
     space = vector_space(make_mesh(degree, 5e-3, 0.5e-3).mesh, degree)
     forms = ElasticForms(space)
-    forms.set_lame(*LAME)
+    forms.set_law(MaterialLaw.of(*LAME))
     gradient = np.array([[0.3, -0.2, 0.1], [0.4, 0.1, -0.5], [0.2, 0.6, -0.3]])
     forms.displacement.interpolate(lambda x: gradient @ x)
     residual = np.asarray(fem.assemble_vector(forms.action).array).reshape(-1, 3)
@@ -53,7 +54,7 @@ def manufactured_error(degree: int, size: float) -> tuple[float, int]:
     body = make_mesh(degree, size, size)
     space = vector_space(body.mesh, degree)
     forms = ElasticForms(space)
-    forms.set_lame(*LAME)
+    forms.set_law(MaterialLaw.of(*LAME))
     k = 2 * np.pi / 40e-3
 
     def exact(x, sin, cos):

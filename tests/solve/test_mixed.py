@@ -61,7 +61,7 @@ def test_patch(degree):
         unknown[0].array[:] = u.x.array
         unknown[1].set(np.trace(gradient) / c / space.unit)
         space.set_fields(unknown)
-        space.apply(force, pull, dilation, (1.0, 1.0))
+        space.apply(force, pull, dilation, MaterialLaw.of(1.0, 1.0))
         space.mass.mult(unknown[1], compression)
         assert np.abs(dilation.array - c * compression.array).max() < 1e-12 * np.abs(dilation.array).max()
         surface = mesh.exterior_facet_indices(body.mesh.topology)

@@ -12,6 +12,7 @@ from pipeline.mesh.generate import MeshArrays
 from pipeline.solve.compiled import vector_space
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.displacement import DisplacementProblem
+from pipeline.solve.material import MaterialLaw
 from pipeline.solve.mixed import MixedProblem
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.straight.pattern import pattern
@@ -24,9 +25,9 @@ def test_what_is_lent_stays_as_it_is(shared):
     """An operator is its borrower's: those made after it are others, until it is given back."""
     space = ElasticSpace(make_mesh(MPI.COMM_WORLD), 2, Conditions())
     lend = partial(space.operators.lend, blocked=True, shared=shared)
-    with lend((2.0, 1.0)) as (first, _):
+    with lend(MaterialLaw.of(2.0, 1.0)) as (first, _):
         before = first.norm()
-        with lend((5.0, 1.0)) as (second, _):
+        with lend(MaterialLaw.of(5.0, 1.0)) as (second, _):
             assert second.handle != first.handle
             assert second.norm() != before
         assert first.norm() == before

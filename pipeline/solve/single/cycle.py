@@ -43,6 +43,8 @@ void to_double(int count, double scale, const float* x, double* y);
 # Chebyshev's iteration: steps, the share of the spectrum that is left to the coarser level, and by how much the
 # largest eigenvalue that so many of Lanczos' steps find is raised. Measured: docs/solvers.md.
 _STEPS, _LEFT, _RAISED, _LANCZOS = 2, 0.1, 1.15, 5
+# Where the material jumps, as PETSc's own: see :mod:`pipeline.solve.linear`.
+_LANCZOS_JUMPS = 12
 
 
 def suits(matrices: list[PETSc.Mat]) -> bool:
@@ -102,8 +104,8 @@ def interpolation(coarse: Side, fine: Side) -> Interpolation:
 class SmoothedLevel:
     """An operator in single precision, upper blocks only, and its smoother."""
 
-    def __init__(self, matrix: PETSc.Mat):
-        """Take the entries of a matrix, of type seqbaij and symmetric.
+    def __init__(self, matrix: PETSc.Mat, *, jumps: bool = False):
+        """Take the entries of a matrix, of type seqbaij and symmetric; ``jumps``: the material does.
 
         Raises:
             ArithmeticError: if a block of the diagonal is not positive.
@@ -121,7 +123,7 @@ class SmoothedLevel:
             raise ArithmeticError("the operator is not positive definite")
         self.size = 3 * rows
         self._product, self._direction, self.scratch = (np.zeros(self.size, dtype=np.float32) for _ in range(3))
-        self._most = _RAISED * self._largest_eigenvalue()
+        self._most = _RAISED * self._largest_eigenvalue(_LANCZOS_JUMPS if jumps else _LANCZOS)
 
     def subtract_product(self, x: Single, r: Single) -> None:
         """Take A x away from ``r``."""
@@ -147,12 +149,12 @@ class SmoothedLevel:
         """Write A x into the product."""
         library()("multiply", self._rows, self._offsets, self._offsets, self._columns, self._values, x, self._product)
 
-    def _largest_eigenvalue(self) -> float:
+    def _largest_eigenvalue(self, steps: int) -> float:
         """Return the largest eigenvalue of D⁻¹ A, from below, by Lanczos' method from noise."""
         r = np.random.default_rng(0).standard_normal(self.size, dtype=np.float32)
         z, p, diagonal, beside = np.empty_like(r), np.zeros_like(r), [], []
         previous = step = 0.0
-        for _ in range(_LANCZOS):
+        for _ in range(steps):
             z[:] = 0.0
             library()("advance", self._rows, self._inverse, 0.0, 1.0, r, self._direction, z)
             rz = library()("dot", self.size, r, z)

@@ -115,10 +115,12 @@ static void scatter(int points, const int* places, const double B[restrict 9][MO
 /* Add the stiffness of some cells to the blocks of a matrix.
  *
  * corners (cells, 4, 3); dofs (cells, points); places (cells, points, points) from find_entries; S (3, 3, pairs);
- * free (dofs, 3): 1, or 0 where a displacement is prescribed; `which` are the `count` cells to add.
+ * free (dofs, 3): 1, or 0 where a displacement is prescribed; `which` are the `count` cells to add; region (cells)
+ * numbers what each is made of, with its lambda and mu.
  */
 void add_stiffness(int count, const int* which, int points, const double* corners, const int* dofs, const int* places,
-                   const double* S, const double* free, double lambda, double mu, double* blocks)
+                   const double* S, const double* free, const int* region, const double* lambda, const double* mu,
+                   double* blocks)
 {
   const int pairs = points * (points + 1) / 2, places_each = points * points;
   for (int k = 0; k < count; ++k)
@@ -133,7 +135,7 @@ void add_stiffness(int count, const int* which, int points, const double* corner
     const size_t cell = which[k];
     double K[3][3], B[9][MOST_PAIRS];
     mapping((const double(*)[3])(corners + 12 * cell), K);
-    stiffness(pairs, S, K, lambda, mu, B);
+    stiffness(pairs, S, K, lambda[region[cell]], mu[region[cell]], B);
     hold(points, dofs + points * cell, free, B);
     scatter(points, places + places_each * cell, B, blocks);
   }
@@ -141,13 +143,13 @@ void add_stiffness(int count, const int* which, int points, const double* corner
 
 /* The same as a kernel for dolfinx, which puts matrices of cells together by itself (the interface is UFCx's).
  *
- * A (3 points, 3 points) of one cell, constants lambda and mu, x the cell's nodes, corners first.
+ * A (3 points, 3 points) of one cell, lame its lambda and mu, x the cell's nodes, corners first.
  */
-static void add_cell(int points, const double* S, double* restrict A, const double* constants, const double* x)
+static void add_cell(int points, const double* S, double* restrict A, const double* lame, const double* x)
 {
   double K[3][3], B[9][MOST_PAIRS];
   mapping((const double(*)[3])x, K);
-  stiffness(points * (points + 1) / 2, S, K, constants[0], constants[1], B);
+  stiffness(points * (points + 1) / 2, S, K, lame[0], lame[1], B);
   for (int i = 0, p = 0; i < points; ++i)
     for (int j = i; j < points; ++j, ++p)
       for (int s = 0; s < 3; ++s)
@@ -161,16 +163,21 @@ static void add_cell(int points, const double* S, double* restrict A, const doub
 
 const double *tensors_1, *tensors_2, *tensors_3, *tensors_4; /* S of each degree, to be set before its kernel is used */
 
-#define KERNEL(degree, points)                                                                                         \
-  void kernel_##degree(double* restrict A, const double* restrict w, const double* restrict c,                         \
-                       const double* restrict x, const int* restrict entity, const uint8_t* restrict permutation)      \
+/* Lambda and mu are constants c of the form; or, of several regions, functions w that are constant on each cell. */
+#define KERNEL(name, points, S, lame)                                                                                  \
+  void name(double* restrict A, const double* restrict w, const double* restrict c, const double* restrict x,          \
+            const int* restrict entity, const uint8_t* restrict permutation)                                           \
   {                                                                                                                    \
-    add_cell(points, tensors_##degree, A, c, x);                                                                       \
+    add_cell(points, S, A, lame, x);                                                                                   \
   }
-KERNEL(1, 4)
-KERNEL(2, 10)
-KERNEL(3, 20)
-KERNEL(4, 35)
+KERNEL(kernel_1, 4, tensors_1, c)
+KERNEL(kernel_2, 10, tensors_2, c)
+KERNEL(kernel_3, 20, tensors_3, c)
+KERNEL(kernel_4, 35, tensors_4, c)
+KERNEL(regions_1, 4, tensors_1, w)
+KERNEL(regions_2, 10, tensors_2, w)
+KERNEL(regions_3, 20, tensors_3, w)
+KERNEL(regions_4, 35, tensors_4, w)
 
 /* Add products of factors of each cell with tensors of the reference cell, sum_t factors(t, s) R_t(i, j).
  *

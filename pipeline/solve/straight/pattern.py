@@ -17,7 +17,8 @@ _DECLARATIONS = """
 void find_entries(int rows, int height, int width, const int* dofs, const int* offsets, const int* columns,
                   const int* first_visit, const int* visits, int* entry, int* places);
 void add_stiffness(int count, const int* which, int points, const double* corners, const int* dofs, const int* places,
-                   const double* S, const double* free, double lambda, double mu, double* blocks);
+                   const double* S, const double* free, const int* region, const double* lambda, const double* mu,
+                   double* blocks);
 void add_products(int count, const int* which, int pairs, int terms, int size, const double* factors, const double* R,
                   const int* places, double* values);
 extern const double *tensors_1, *tensors_2, *tensors_3, *tensors_4;
@@ -25,6 +26,10 @@ void kernel_1(double* A, const double* w, const double* c, const double* x, cons
 void kernel_2(double* A, const double* w, const double* c, const double* x, const int* l, const uint8_t* p);
 void kernel_3(double* A, const double* w, const double* c, const double* x, const int* l, const uint8_t* p);
 void kernel_4(double* A, const double* w, const double* c, const double* x, const int* l, const uint8_t* p);
+void regions_1(double* A, const double* w, const double* c, const double* x, const int* l, const uint8_t* p);
+void regions_2(double* A, const double* w, const double* c, const double* x, const int* l, const uint8_t* p);
+void regions_3(double* A, const double* w, const double* c, const double* x, const int* l, const uint8_t* p);
+void regions_4(double* A, const double* w, const double* c, const double* x, const int* l, const uint8_t* p);
 """
 
 

@@ -8,6 +8,7 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
+from pipeline.solve.material import MaterialLaw
 from pipeline.solve.straight.arrays import entries, sparse_matrix
 from pipeline.solve.straight.pattern import corners, library, pattern, reference, straight_cells
 
@@ -16,12 +17,13 @@ class StraightStiffness:
     """The straight cells of a space of displacements, and the pattern of the operator on all of its cells.
 
     ``curved`` tells for each cell whether it is left to others, None if none is; ``prescribed`` are the dofs
-    (unrolled) whose rows and columns the operator does not have.
+    (unrolled) whose rows and columns the operator does not have; ``regions`` number what cells are made of.
     """
 
-    def __init__(self, space: Any, curved: BoolArray | None, prescribed: Int32Array):
+    def __init__(self, space: Any, curved: BoolArray | None, prescribed: Int32Array, regions: Int32Array | None = None):
         self._dofs = np.ascontiguousarray(compat.cell_dofs(space))
         self._which = straight_cells(curved, len(self._dofs))
+        self._regions = np.zeros(len(self._dofs), dtype=np.int32) if regions is None else regions
         self._corners = corners(space.mesh)
         self._tensors = _reference_tensors(compat.degree(space))
         self._pattern = pattern(space, space)
@@ -42,21 +44,24 @@ class StraightStiffness:
         unrolled[self._unblocked] = np.repeat(3 * columns[:, None] + np.arange(3, dtype=np.int32), 3, axis=1)
         return sparse_matrix(np.concatenate([[0], np.cumsum(rows)]), unrolled, 1)
 
-    def add(self, matrix: PETSc.Mat, lame: tuple[float, float], diagonal: float) -> None:
+    def add(self, matrix: PETSc.Mat, law: MaterialLaw, diagonal: float) -> None:
         """Add the straight cells to ``matrix``, which has this pattern; set the diagonal of prescribed dofs."""
         count = 9 * len(self._pattern.columns)
         with entries(matrix, count) as values:
             if matrix.getType() == "seqbaij":
-                self._add(values.reshape(-1, 9), lame, diagonal)
+                self._add(values.reshape(-1, 9), law, diagonal)
                 return
             blocks = values[self._unblocked]
-            self._add(blocks, lame, diagonal)
+            self._add(blocks, law, diagonal)
             values[self._unblocked] = blocks
 
-    def _add(self, blocks: FloatArray, lame: tuple[float, float], diagonal: float) -> None:
+    def _add(self, blocks: FloatArray, law: MaterialLaw, diagonal: float) -> None:
+        # A law of one material holds for every region.
+        regions = self._regions if len(law.lame_mu) > 1 else np.zeros_like(self._regions)
         library()(
             "add_stiffness", len(self._which), self._which, self._dofs.shape[1], self._corners, self._dofs,
-            self._pattern.places, self._tensors, self._free, *lame, blocks,
+            self._pattern.places, self._tensors, self._free, regions, np.array(law.lame_lambda, dtype=float),
+            np.array(law.lame_mu, dtype=float), blocks,
         )  # fmt: skip
         blocks[self._diagonal] = diagonal
 
@@ -72,10 +77,13 @@ class StraightStiffness:
 
 
 @cache
-def cell_kernel(degree: int) -> int:
-    """Return the address of a kernel for the stiffness of a straight cell, of the constants λ and μ, for dolfinx."""
+def cell_kernel(degree: int, *, of_regions: bool) -> int:
+    """Return the address of a kernel for the stiffness of a straight cell, for dolfinx.
+
+    λ and μ are constants of the form, or, ``of_regions``, functions that are constant on each cell.
+    """
     library().set(f"tensors_{degree}", _reference_tensors(degree))
-    return library().address(f"kernel_{degree}")
+    return library().address(f"regions_{degree}" if of_regions else f"kernel_{degree}")
 
 
 @cache
