@@ -20,6 +20,7 @@ if [[ ${EXTRAS:-} == view ]] || compgen -G "$venv/lib/python*/site-packages/pyvi
     packages+=(libegl1)
 fi
 stamp=$venv/.epsmesh-setup
+mmg=mmgpy==0.17.1
 
 fail() { echo "setup: $*" >&2; exit 1; }
 
@@ -85,6 +86,10 @@ PYTHON
 # A pip configured for --user would install beside the venv.
 PIP_USER=0 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input -c "$constraints" -e ".[$extras]" ||
     fail "pip could not install the project"
+# The remesher of surfaces, mmgs, comes as a program within this package, whose Python part nothing imports: what that
+# asks for (a newer numpy than Debian 12's) is not installed.
+PIP_USER=0 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input --no-deps "$mmg" ||
+    fail "pip could not install $mmg"
 
 # ---- check --------------------------------------------------------------------------------------------
 "$venv/bin/python" - <<'PYTHON' || fail "the installed libraries do not work together"

@@ -13,6 +13,7 @@ import numpy as np
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.generate import MeshArrays
 from pipeline.scene.model import Scene
+from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.surface import Surface
 from pipeline.stages import stage
 
@@ -50,7 +51,7 @@ def curve(mesh: MeshArrays, scene: Scene) -> MeshArrays:
 def _on_rim(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray) -> FloatArray:
     """Move the mid nodes of edges along a curved rim onto it, or onto the column where that cuts the footprint."""
     both = np.isin(edges, mesh.rim).all(axis=1) & np.isin(_key(mesh, edges), _facet_edges(mesh, ["probe"]))
-    if not scene.probe.is_curved:
+    if not (scene.probe.is_curved or isinstance(scene.body, Scanned)):
         return middle
     beyond = np.zeros(len(mesh.points), dtype=bool)
     if scene.is_cut:
@@ -61,6 +62,9 @@ def _on_rim(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray)
     chosen = both & ~of_column
     local = scene.frame.local(middle[chosen])
     local[:, :2] = scene.probe.to_edge(local[:, :2])
+    if isinstance(scene.body, Scanned):
+        middle[chosen], _ = scene.body.lift(scene.frame, local[:, :2])
+        return middle
     middle[chosen] = scene.frame.world(local)
     return middle
 

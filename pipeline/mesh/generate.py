@@ -99,17 +99,22 @@ def _built(scene: Scene) -> list[int]:
 @contextmanager
 def _model() -> Iterator[None]:
     with gmsh_session():
-        for name, value in {
-            "General.Terminal": 0,
-            "General.NumThreads": 1,
-            "Mesh.Algorithm3D": _DELAUNAY,
-            "Mesh.MeshSizeExtendFromBoundary": 0,
-            "Mesh.MeshSizeFromPoints": 0,
-            "Mesh.MeshSizeFromCurvature": 0,
-            "Mesh.LcIntegrationPrecision": _ON_EDGES,
-        }.items():
-            gmsh.option.setNumber(name, value)
+        model_options()
         yield
+
+
+def model_options() -> None:
+    """Set gmsh's options: sizes are those of the field alone, and the same input gives the same mesh."""
+    for name, value in {
+        "General.Terminal": 0,
+        "General.NumThreads": 1,
+        "Mesh.Algorithm3D": _DELAUNAY,
+        "Mesh.MeshSizeExtendFromBoundary": 0,
+        "Mesh.MeshSizeFromPoints": 0,
+        "Mesh.MeshSizeFromCurvature": 0,
+        "Mesh.LcIntegrationPrecision": _ON_EDGES,
+    }.items():
+        gmsh.option.setNumber(name, value)
 
 
 def _collect(scale: float, rim_curves: list[int], start: float) -> MeshArrays:
@@ -130,7 +135,7 @@ def _collect(scale: float, rim_curves: list[int], start: float) -> MeshArrays:
     assert set(facets) <= {PROBE, FIXED, FREE, CUT, *MIRROR.values()}
     rim = [position[mesh.getNodes(1, curve, includeBoundary=True)[0]] for curve in rim_curves]
     points, cells, facets, rim_points = _drop_unused(points, cells, facets, np.unique(np.concatenate(rim)))
-    return MeshArrays(points, _orient(points, cells), facets, rim_points, time.perf_counter() - start, regions)
+    return MeshArrays(points, orient(points, cells), facets, rim_points, time.perf_counter() - start, regions)
 
 
 def _regions() -> IntArray | None:
@@ -163,7 +168,7 @@ def _drop_unused(
     return points[used], number[cells], {name: number[f] for name, f in facets.items()}, number[rim[used[rim]]]
 
 
-def _orient(points: FloatArray, cells: IntArray) -> IntArray:
+def orient(points: FloatArray, cells: IntArray) -> IntArray:
     """Return the cells with positive volume; a flat one means that the mesh is unusable."""
     corners = points[cells]
     volume = np.linalg.det(corners[:, 1:] - corners[:, :1])

@@ -5,25 +5,41 @@ from math import inf
 from time import perf_counter
 
 from pipeline.mesh.curve import curve
-from pipeline.mesh.generate import MeshArrays, generate
+from pipeline.mesh.generate import MeshArrays, MeshError, generate
 from pipeline.mesh.meridian import Meridian
+from pipeline.mesh.organ.base import Kept, far_surface
+from pipeline.mesh.organ.make import mesh_organ
 from pipeline.mesh.reflect import reflect
 from pipeline.mesh.size import Sizes
 from pipeline.plan.symmetry import mirror_planes
 from pipeline.scene.model import Scene
+from pipeline.shapes.scanned import Scanned
 from pipeline.study.sweep import Case
 
 
-def mesh_arrays(case: Case, mirrors: tuple[str, ...]) -> MeshArrays:
-    """Return the mesh of a case as arrays, of the part that ``mirrors`` leave of it."""
+def mesh_arrays(case: Case, mirrors: tuple[str, ...], kept: Kept | None = None) -> MeshArrays:
+    """Return the mesh of a case as arrays, of the part that ``mirrors`` leave of it.
+
+    ``kept`` holds what the meshes of one scanned body share.
+    """
     start = perf_counter()
     straight, planes, sizes = case.mesh.degree == 1, mirror_planes(case), sizes_of(case)
     segments = sizes.rim_segments(case.probe)
     scene = Scene(case.body, case.probe, case.column, case.mesh.outside == "fixed", segments, straight, planes)
-    arrays = generate(scene, sizes)
+    if isinstance(case.body, Scanned):
+        _check_upright(case)
+        arrays = mesh_organ(scene, sizes, far_surface(case.body, kept))
+    else:
+        arrays = generate(scene, sizes)
     arrays = arrays if straight else curve(arrays, scene)
     whole = reflect(arrays, tuple(plane for plane in planes if plane not in mirrors))
     return replace(whole, seconds=perf_counter() - start)
+
+
+def _check_upright(case: Case) -> None:
+    """Refuse what the solver would take for pressed along z."""
+    if case.frame.axis != (0.0, 0.0, -1.0):
+        raise MeshError("a probe that is inclined to the z axis is not supported by this version")
 
 
 def sizes_of(case: Case) -> Sizes:

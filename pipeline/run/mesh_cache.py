@@ -3,8 +3,10 @@
 import os
 import time
 import zipfile
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -64,6 +66,25 @@ class MeshCache:
                 )  # fmt: skip
                 _touch(temporary)
             self._shrink()
+
+    @stage("mesh cache")
+    def arrays(self, key: str, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """Return the arrays kept under ``key``, or those that ``make`` returns, which are then kept."""
+        path = self._folder / f"{digest(key)}.npz"
+        try:
+            with np.load(path, allow_pickle=False) as content:
+                found = {name: content[name] for name in content}
+            _touch(path)
+            return found
+        except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile):
+            pass
+        made = make()
+        with suppress(OSError):
+            with atomic(path) as temporary:
+                np.savez(temporary, **made)
+                _touch(temporary)
+            self._shrink()
+        return made
 
     def _shrink(self) -> None:
         """Remove the least recently used files until the rest is within the limit."""

@@ -39,7 +39,7 @@ def cached_arrays(case: Case, mirrors: tuple[str, ...], cache: MeshCache | None)
     path = cache.path(case, mirrors)
     found = cache.get(path)
     if found is None:
-        found = mesh_arrays(case, mirrors)
+        found = mesh_arrays(case, mirrors, cache)
         cache.put(path, found)
     return found
 

@@ -2,6 +2,7 @@
 
 from pipeline.shapes.bodies.box import Box
 from pipeline.shapes.bodies.cylinder import Cylinder
+from pipeline.shapes.bodies.surface import FromSurface
 from pipeline.shapes.body import Body
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.probes.blade import Blade
@@ -11,6 +12,7 @@ from pipeline.shapes.probes.ellipse import Ellipse
 BODIES: dict[str, type[Body]] = {
     "box": Box,
     "cylinder": Cylinder,
+    "surface": FromSurface,
 }
 PROBES: dict[str, type[Probe]] = {
     "disc": Disc,
@@ -18,4 +20,4 @@ PROBES: dict[str, type[Probe]] = {
     "ellipse": Ellipse,
 }
 # Shapes of the format that this version does not compute: named as such, not as typing errors.
-LATER = {"body": ("ellipsoid", "cad", "surface", "image"), "probe": ("sphere", "cone", "wedge")}
+LATER = {"body": ("ellipsoid", "cad", "image"), "probe": ("sphere", "cone", "wedge")}

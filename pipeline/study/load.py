@@ -46,6 +46,7 @@ def load(path: str | Path) -> Study:
 def parse(raw: dict[str, Any], *, file: str = "study", text: str = "") -> Study:
     """Turn a study, read from TOML into ``raw``, into a :class:`Study`; ``file`` is for messages."""
     problems = Problems()
+    raw = _beside(raw, Path(file).parent)
     _check_top(raw, problems)
     axes: list[Axis] = []
     sections: dict[str, tuple[Section, ...]] = {}
@@ -68,6 +69,21 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "") -> Study:
 def written(place: Place) -> str:
     """Write a place as messages do: ``layers[2].young``."""
     return "".join(f"[{step + 1}]" if isinstance(step, int) else f".{step}" for step in place).removeprefix(".")
+
+
+def _beside(raw: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Return the study with the files that bodies name found from the ``folder`` of the study."""
+
+    def found(value: Any) -> Any:
+        if isinstance(value, list):
+            return [found(v) for v in value]
+        return str(folder / value) if isinstance(value, str) else value
+
+    def table(body: Any) -> Any:
+        return body | {"file": found(body["file"])} if isinstance(body, dict) and "file" in body else body
+
+    bodies = raw.get("body")
+    return raw | {"body": [table(b) for b in bodies] if isinstance(bodies, list) else table(bodies)} if bodies else raw
 
 
 def _check_top(raw: dict[str, Any], problems: Problems) -> None:

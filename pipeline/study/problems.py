@@ -58,7 +58,7 @@ class Problems:
         found: Any = raw.get(key) if isinstance(raw, dict) else raw
         if inner is not None and len(place) > 1:
             self._from_item(f"{where}.{key}[{place[1] + 1}]", item, place[2:], inner, found[place[1]])
-        elif inner is not None or not isinstance(raw, dict):
+        elif (inner is not None and item["type"] != "not_supported") or not isinstance(raw, dict):
             what = f"must be an array of tables: write [[{where}.{key}]]" if inner else "must be a table"
             self.error(f"{where}.{key}".rstrip("."), found, what)
         else:

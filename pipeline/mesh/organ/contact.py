@@ -1,0 +1,249 @@
+"""The surface round a contact: meshed in the plane of the probe, lifted along its axis, and set into the rest.
+
+The footprint's edge is then made of points that are on its true curve, at the distance that its elements ask for.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import gmsh
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
+from pipeline.compat import gmsh_session
+from pipeline.mesh.generate import GeometryError, MeshError, model_options
+from pipeline.mesh.organ.sheet import FIXED, PROBE, Sheet, compact, edges_of
+from pipeline.mesh.size import Sizes, set_size_field
+from pipeline.shapes.frame import Frame
+from pipeline.shapes.probe import Probe
+from pipeline.shapes.rays import facing
+
+Lift = Callable[[FloatArray], FloatArray]
+# What is meshed anew reaches this far past the footprint, in units of its radius, if facets are small.
+_COLLAR = 1.25
+# Corners of an outline turn by more than this (cosine).
+_CORNER = 0.9
+# A round outline is followed this many times closer than its elements.
+_FOLLOW = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """The ``sheet`` with the footprint in it; ``rim`` (k) are the points along its edge, in order.
+
+    ``edge`` (n, 3), in m, follows the true edge closely.
+    """
+
+    sheet: Sheet
+    rim: IntArray
+    edge: FloatArray
+
+
+def rim_points(probe: Probe, sizes: Sizes) -> FloatArray:
+    """Return points (n, 2), in m, along the footprint's edge, at the distance that elements there have."""
+    outline = probe.outline()
+    if probe.is_curved:
+        count = sizes.rim_segments(probe)
+        return probe.to_edge(_resample(outline, count))
+    legs = _legs(outline)
+    parts = []
+    for start, end in legs:
+        count = max(2, int(np.ceil(np.linalg.norm(end - start) / sizes.rim)))
+        parts.append(start + (np.arange(count) / count)[:, None] * (end - start))
+    return np.vstack(parts)
+
+
+def edge_points(probe: Probe, rim: FloatArray) -> FloatArray:
+    """Return points (n, 2), in m, closer along the footprint's edge than those of its elements."""
+    following = np.roll(rim, -1, axis=0)
+    share = np.arange(_FOLLOW)[:, None, None] / _FOLLOW
+    return probe.to_edge((rim + share * (following - rim)).reshape(-1, 2))
+
+
+def _resample(outline: FloatArray, count: int) -> FloatArray:
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(outline, axis=0), axis=1))])
+    wanted = length[-1] * np.arange(count) / count
+    return np.column_stack([np.interp(wanted, length, outline[:, k]) for k in range(2)])
+
+
+def _legs(outline: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+    return [(outline[k], outline[k + 1]) for k in range(len(outline) - 1)]
+
+
+def set_in(sheet: Sheet, frame: Frame, probe: Probe, sizes: Sizes, lift: Lift) -> Contact:
+    """Return the sheet with the footprint's surroundings meshed to ``sizes``, and its edge as edges of the mesh.
+
+    ``lift`` takes points (n, 2) of the probe's plane along its axis onto the true surface.
+
+    Raises:
+        GeometryError: if a part of the footprint has no tissue below it.
+    """
+    rim = rim_points(probe, sizes)
+    edge = edge_points(probe, rim)
+    lifted, followed = lift(rim), lift(edge)
+    if not (np.isfinite(lifted).all() and np.isfinite(followed).all()):
+        raise GeometryError("a part of the footprint's edge has no tissue below it that is joined to the contact")
+    local = frame.local(sheet.points)
+    patch = _patch(sheet, local, _COLLAR * probe.circumradius + sizes.rim)
+    if (sheet.group[patch] == FIXED).any():
+        raise GeometryError("the footprint lies on, or next to, what is held of the body")
+    loops = _loops(sheet.facets[patch])
+    plane = _mesh_plane(local[:, :2], loops, rim, probe, sizes)
+    return _joined(sheet, patch, plane, lift, lifted, followed)
+
+
+def _patch(sheet: Sheet, local: FloatArray, radius: float) -> IntArray:
+    """Return the facets that meet the disc, or a little more: a patch without points where it touches itself."""
+    reachable = facing(local, sheet.facets, 4 * radius)
+    corners = local[sheet.facets[reachable]][:, :, :2]
+    chosen = reachable[_distance_to_origin(corners) <= radius]
+    chosen = chosen[np.isin(chosen, facing(local, sheet.facets, radius))]
+    if not len(chosen):
+        raise GeometryError("the probe's axis does not meet the surface")
+    for _ in range(20):
+        pairs = _outer_edges(sheet.facets[chosen])
+        points, count = np.unique(pairs, return_counts=True)
+        pinched = points[count > 2]
+        if not len(pinched):
+            return chosen
+        more = reachable[np.isin(sheet.facets[reachable], pinched).any(axis=1)]
+        if np.isin(more, chosen).all():
+            break
+        chosen = np.union1d(chosen, more)
+    raise GeometryError("the surface is folded round the contact: the probe's own plane cannot hold it")
+
+
+def _distance_to_origin(corners: FloatArray) -> FloatArray:
+    """Distance of triangles (m, 3, 2) in a plane from its origin."""
+    best = np.full(len(corners), np.inf)
+    inside = np.ones(len(corners), dtype=bool)
+    for k in range(3):
+        start, end = corners[:, k], corners[:, (k + 1) % 3]
+        along = end - start
+        t = np.clip(-(start * along).sum(axis=1) / (along**2).sum(axis=1), 0, 1)
+        best = np.minimum(best, np.linalg.norm(start + t[:, None] * along, axis=1))
+        inside &= start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0] >= 0
+    return np.where(inside, 0.0, best)
+
+
+def _outer_edges(facets: IntArray) -> IntArray:
+    """Edges (k, 2) of facets, in their sense, that no other of them has."""
+    pairs = np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]])
+    there = set(map(tuple, pairs.tolist()))
+    return np.array([pair for pair in pairs.tolist() if (pair[1], pair[0]) not in there], dtype=np.int64)
+
+
+def _loops(facets: IntArray) -> list[list[int]]:
+    """Return the closed lines of points that bound facets."""
+    following = dict(_outer_edges(facets).tolist())
+    loops = []
+    while following:
+        start = min(following)
+        loop, point = [start], following.pop(start)
+        while point != start:
+            loop.append(point)
+            point = following.pop(point)
+        loops.append(loop)
+    return loops
+
+
+@dataclass(frozen=True, eq=False)
+class _Plane:
+    """A mesh in the plane: points (n, 2), facets, whether each is within the rim, and the given points."""
+
+    points: FloatArray
+    facets: IntArray
+    inside: np.ndarray
+    outer: IntArray  # points of the mesh on the loops
+    outer_of: IntArray  # points of the sheet that they are
+    rim: IntArray
+
+
+def _mesh_plane(local: FloatArray, loops: list[list[int]], rim: FloatArray, probe: Probe, sizes: Sizes) -> _Plane:
+    """Mesh what ``loops`` of points bound, with the rim's edges in it."""
+    scale = probe.circumradius / 10
+    with gmsh_session():
+        model_options()
+        geo, mesh = gmsh.model.geo, gmsh.model.mesh
+        curves, outer = [], []
+        for loop in loops:
+            tags = [geo.addPoint(*(local[i] / scale), 0) for i in loop]
+            outer += list(zip(tags, loop, strict=True))
+            curves.append(_closed(tags))
+        rim_tags = [geo.addPoint(*p, 0) for p in (rim / scale).tolist()]
+        around = _closed(rim_tags)
+        geo.addPlaneSurface([*curves, around], 1)
+        geo.addPlaneSurface([around], 2)
+        geo.synchronize()
+        for _, curve in gmsh.model.getEntities(1):
+            mesh.setTransfiniteCurve(curve, 2)
+        set_size_field(sizes, probe, Frame((0.0, 0.0, 0.0)), scale)
+        try:
+            mesh.generate(2)
+        except Exception as error:
+            raise MeshError(f"gmsh: {error or gmsh.logger.getLastError()}") from error
+        tags, coordinates, _ = mesh.getNodes()
+        position = np.full(int(tags.max()) + 1, -1, dtype=np.int64)
+        order = np.argsort(tags)
+        position[tags[order]] = np.arange(len(tags))
+        points = coordinates.reshape(-1, 3)[order][:, :2] * scale
+        parts = [position[mesh.getElementsByType(2, face)[1]].reshape(-1, 3) for face in (1, 2)]
+
+        def node(point: int) -> int:
+            return int(position[mesh.getNodes(0, point)[0][0]])
+
+        facets = np.vstack(parts)
+        a, b, c = (points[facets[:, k]] for k in range(3))
+        area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+        facets = np.where((area < 0)[:, None], facets[:, [0, 2, 1]], facets)
+        inside = np.arange(len(facets)) >= len(parts[0])
+        return _Plane(
+            points, facets, inside, np.array([node(tag) for tag, _ in outer]), np.array([i for _, i in outer]),
+            np.array([node(tag) for tag in rim_tags]),
+        )  # fmt: skip
+
+
+def _closed(tags: list[int]) -> int:
+    geo = gmsh.model.geo
+    lines = [geo.addLine(start, end) for start, end in zip(tags, [*tags[1:], tags[0]], strict=True)]
+    return int(geo.addCurveLoop(lines))
+
+
+def _joined(
+    sheet: Sheet, patch: IntArray, plane: _Plane, lift: Lift, lifted: FloatArray, followed: FloatArray
+) -> Contact:
+    """Put the plane's mesh, lifted, in the place of a patch of the sheet."""
+    number = np.full(len(plane.points), -1, dtype=np.int64)
+    number[plane.outer] = plane.outer_of
+    (new,) = np.nonzero(number < 0)
+    number[new] = len(sheet.points) + np.arange(len(new))
+    points = np.full((len(new), 3), np.nan)
+    on_rim = np.full(len(plane.points), -1, dtype=np.int64)
+    on_rim[plane.rim] = np.arange(len(plane.rim))
+    is_rim = on_rim[new] >= 0
+    points[is_rim] = lifted[on_rim[new[is_rim]]]
+    points[~is_rim] = lift(plane.points[new[~is_rim]])
+    if not np.isfinite(points).all():
+        raise GeometryError("a part of the surface round the footprint cannot be seen along the probe's axis")
+    rest = np.ones(len(sheet.facets), dtype=bool)
+    group = np.where(plane.inside, PROBE, sheet.group[patch[0]])
+    rest[patch] = False
+    whole = Sheet(
+        np.vstack([sheet.points, points]),
+        np.vstack([sheet.facets[rest], number[plane.facets]]),
+        np.concatenate([sheet.group[rest], group]),
+        _outside(sheet, patch),
+    )
+    result, renumbered = compact(whole)
+    edges_of(result.facets)
+    return Contact(result, renumbered[number[plane.rim]], followed)
+
+
+def _outside(sheet: Sheet, patch: IntArray) -> IntArray:
+    """Sharp edges that are not within the patch."""
+    edges, sides = edges_of(sheet.facets)
+    within = np.isin(sides, patch).all(axis=1)
+    base = len(sheet.points)
+    gone = edges[within] @ np.array([base, 1])
+    sharp = np.sort(sheet.sharp, axis=1)
+    return sharp[~np.isin(sharp @ np.array([base, 1]), gone)]

@@ -1,0 +1,117 @@
+"""Surfaces cut at the height below which a body is held."""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pipeline.arrays import FloatArray, IntArray
+from pipeline.mesh.organ.sheet import FIXED, FREE, Sheet, compact, edges_of
+
+# A point this near to the level along an edge, in units of the edge, is moved onto it.
+_NEAR = 0.02
+
+
+def cut(points: FloatArray, facets: IntArray, below: float) -> Sheet:
+    """Return the surface with edges along the level ``below`` (m), its facets free above and fixed below it."""
+    edges, _ = edges_of(facets)
+    points = _moved_onto(points, edges, below)
+    side = np.sign(points[:, 2] - below).astype(np.int64)
+    crossing = edges[side[edges[:, 0]] * side[edges[:, 1]] < 0]
+    z = points[crossing][:, :, 2] - below
+    t = z[:, 0] / (z[:, 0] - z[:, 1])
+    new = points[crossing[:, 0]] + t[:, None] * (points[crossing[:, 1]] - points[crossing[:, 0]])
+    new[:, 2] = below
+    count = len(points)
+    keys = crossing[:, 0] * count + crossing[:, 1]  # sorted, as edges are
+    number = dict(zip(keys.tolist(), range(count, count + len(keys)), strict=True))
+
+    def middle(i: int, j: int) -> int:
+        return number[min(i, j) * count + max(i, j)]
+
+    low, high = side[facets].min(axis=1), side[facets].max(axis=1)
+    whole = low * high >= 0
+    pieces, groups = [facets[whole]], [np.where(low[whole] < 0, FIXED, FREE)]
+    # A facet that lies in the level is held if its neighbours below are: it is the bottom of what is above, or a top.
+    flat = (low == 0) & (high == 0)
+    normal_down = (
+        np.cross(points[facets[:, 1]] - points[facets[:, 0]], points[facets[:, 2]] - points[facets[:, 0]])[:, 2] < 0
+    )
+    groups[0] = np.where((flat & normal_down)[whole], FIXED, groups[0])
+    split = []
+    for facet in facets[~whole].tolist():
+        split += _split(facet, [int(side[i]) for i in facet], middle)
+    if split:
+        array = np.array(split, dtype=np.int64)
+        pieces.append(array[:, :3])
+        groups.append(array[:, 3])
+    sheet = Sheet(np.vstack([points, new]), np.vstack(pieces), np.concatenate(groups), np.empty((0, 2), np.int64))
+    return compact(sheet)[0]
+
+
+def level_line(points: FloatArray, facets: IntArray, below: float) -> FloatArray:
+    """Return the line at the height ``below`` (m) as segments (k, 2, 3), one in each facet that reaches over it."""
+    over = points[:, 2] > below
+    crossed = facets[over[facets].any(axis=1) & ~over[facets].all(axis=1)]
+    ends = []
+    for k in range(3):
+        start, end = points[crossed[:, k]], points[crossed[:, (k + 1) % 3]]
+        crosses = over[crossed[:, k]] != over[crossed[:, (k + 1) % 3]]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = (below - start[:, 2]) / (end[:, 2] - start[:, 2])
+            ends.append(np.where(crosses[:, None], start + t[:, None] * (end - start), np.nan))
+    found = np.stack(ends, axis=1)
+    segments = found[np.isfinite(found[:, :, 0])].reshape(-1, 2, 3)
+    segments[:, :, 2] = below
+    return segments
+
+
+def _split(facet: list[int], side: list[int], middle: Callable[[int, int], int]) -> list[tuple[int, int, int, int]]:
+    """Split a facet across the level: a corner on it goes into two, others into a triangle and a quadrilateral."""
+    if 0 in side:
+        first = side.index(0)
+        a, b, c = (facet[(first + k) % 3] for k in range(3))
+        m = middle(b, c)
+        over = side[(first + 1) % 3]
+        return [(a, b, m, FREE if over > 0 else FIXED), (a, m, c, FIXED if over > 0 else FREE)]
+    alone = next(k for k in range(3) if side[k] != side[k - 1] and side[k] != side[(k + 1) % 3])
+    a, b, c = (facet[(alone + k) % 3] for k in range(3))
+    p, q = middle(a, b), middle(a, c)
+    here, there = (FREE, FIXED) if side[alone] > 0 else (FIXED, FREE)
+    return [(a, p, q, here), (p, b, c, there), (p, c, q, there)]
+
+
+def _moved_onto(points: FloatArray, edges: IntArray, below: float) -> FloatArray:
+    """Move points that are next to the level onto it, along an edge: no facets that are needles then remain."""
+    points = points.copy()
+    z = points[edges][:, :, 2] - below
+    crossing = z[:, 0] * z[:, 1] < 0
+    t = np.divide(z[:, 0], z[:, 0] - z[:, 1], out=np.full(len(z), 0.5), where=crossing)
+    length = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
+    shortest = np.full(len(points), np.inf)
+    for end in (0, 1):
+        np.minimum.at(shortest, edges[:, end], length)
+    for end, share in ((0, t), (1, 1 - t)):
+        here, there = edges[:, end], edges[:, 1 - end]
+        near = crossing & (share < _NEAR) & (share * length < 5 * _NEAR * shortest[here])
+        move = points[here[near]] + share[near, None] * (points[there[near]] - points[here[near]])
+        move[:, 2] = below
+        points[here[near]] = move
+    return points
+
+
+def on_segments(points: FloatArray, segments: FloatArray) -> FloatArray:
+    """Return the nearest points of a line of segments (k, 2, 3) to ``points`` (n, 3) near it."""
+    start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
+    length = np.linalg.norm(along, axis=1)
+    middle = cKDTree(segments.mean(axis=1))
+    result = np.empty_like(points)
+    square = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
+    for number, point in enumerate(points):
+        least, _ = middle.query(point)
+        near = middle.query_ball_point(point, least + length.max() / 2 + 1e-12)
+        near = np.sort(np.array(near))
+        t = np.clip(((point - start[near]) * along[near]).sum(axis=1) / square[near], 0.0, 1.0)
+        found = start[near] + t[:, None] * along[near]
+        result[number] = found[np.argmin(((found - point) ** 2).sum(axis=1))]
+    return result

@@ -1,0 +1,97 @@
+"""The mesh of a scene on a body of triangles: coarse surface, contact, surface to the size field, volume, groups."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pipeline.arrays import FloatArray, IntArray
+from pipeline.mesh.generate import GeometryError, MeshArrays, MeshError, orient
+from pipeline.mesh.organ.base import DEVIATION, Base, put_back
+from pipeline.mesh.organ.contact import Contact, set_in
+from pipeline.mesh.organ.field import Field
+from pipeline.mesh.organ.remesh import remesh
+from pipeline.mesh.organ.sheet import PROBE, Sheet, group_names
+from pipeline.mesh.organ.volume import fill
+from pipeline.mesh.size import Sizes
+from pipeline.scene.model import Scene
+
+# The surface is meshed twice: only the second time its points are dense where sizes change fast.
+_PASSES = 2
+# The remesher turns lengths into units of its own and back, which moves points by rounding.
+_SAME = 1e-6
+
+Lift = Callable[[FloatArray], FloatArray]
+
+
+def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
+    """Mesh a ``scene`` whose body is bounded by triangles, from its surface ``far`` from the contact.
+
+    The same input gives the same arrays, bit for bit.
+
+    Raises:
+        GeometryError: if the footprint does not fit there, or the scene has what such a body cannot.
+        MeshError: if a mesh generator fails.
+    """
+    start = perf_counter()
+    _check(scene)
+
+    def lift(points: FloatArray) -> FloatArray:
+        return scene.body.lift(scene.frame, points)[0]
+
+    contact = set_in(far.sheet, scene.frame, scene.footprint, sizes, lift)
+    field = Field(sizes, scene.frame, contact.edge)
+    sheet = _to_sizes(contact, field, _Truth(scene, far, lift))
+    points, cells = fill(sheet.points, sheet.facets, field)
+    facets = {name: sheet.facets[sheet.group == number] for number, name in group_names().items()}
+    rim = np.unique(sheet.border(PROBE))
+    return MeshArrays(points, orient(points, cells), facets, rim, perf_counter() - start)
+
+
+def _check(scene: Scene) -> None:
+    """Refuse what is not meshed here."""
+    if scene.body.regions:
+        raise GeometryError(f"inclusions in a {scene.body.shape} are not supported by this version")
+    if scene.is_cut:
+        raise GeometryError(f'no column is cut out of a {scene.body.shape}: use outside = "coarse"')
+    if scene.mirrors:
+        raise GeometryError(f"a {scene.body.shape} is not its own mirror image")
+
+
+@dataclass(frozen=True, eq=False)
+class _Truth:
+    """Where points of the mesh belong: those in the footprint are lifted, the rest goes to the nearest ones."""
+
+    scene: Scene
+    far: Base
+    lift: Lift
+
+    def put_back(self, sheet: Sheet, rim: IntArray, true_rim: FloatArray) -> Sheet:
+        """Return the sheet on the true surface; its ``rim`` points (k) are at ``true_rim`` (k, 3)."""
+        points = sheet.points.copy()
+        points[rim] = true_rim
+        inner = np.setdiff1d(np.unique(sheet.facets[sheet.group == PROBE]), rim)
+        lifted = self.lift(self.scene.frame.local(points[inner])[:, :2])
+        seen = np.isfinite(lifted).all(axis=1)
+        known = np.concatenate([rim, inner[seen]])
+        places = np.vstack([true_rim, lifted[seen]])
+        (skin,) = self.scene.body.surfaces()["skin"]
+        return put_back(Sheet(points, sheet.facets, sheet.group, sheet.sharp), skin, self.far.level, known, places)
+
+
+def _to_sizes(contact: Contact, field: Field, truth: _Truth) -> Sheet:
+    """Mesh the surface to the sizes, its points on the true one and those of the footprint's edge as they are."""
+    sheet, rim = contact.sheet, contact.rim
+    true_rim, extent = sheet.points[rim], float(np.ptp(sheet.points, axis=0).max())
+    for _ in range(_PASSES):
+        kept = np.column_stack([rim, np.roll(rim, -1)])
+        sheet = remesh(sheet, field.at(sheet.points), DEVIATION * min(field.largest, extent), kept)
+        found = np.unique(sheet.border(PROBE))
+        distance, nearest = cKDTree(sheet.points[found]).query(true_rim)
+        rim = found[nearest]
+        if not len(found) == len(true_rim) == len(np.unique(rim)) or distance.max() > _SAME * extent:
+            raise MeshError("the remesher of surfaces changed the footprint's edge")
+        sheet = truth.put_back(sheet, rim, true_rim)
+    return sheet

@@ -1,0 +1,135 @@
+"""Surfaces meshed anew to given sizes, by the program `mmgs` (C. Dapogny, C. Dobrzynski, P. Frey, JCP 262, 2014).
+
+It runs as a process of its own: what it may do wrong cannot take the program with it, and the same input gives the
+same output, bit for bit.
+"""
+
+import subprocess
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
+from pipeline.mesh.generate import MeshError
+from pipeline.mesh.organ.sheet import Sheet, edges_of
+from pipeline.stages import stage
+
+_PACKAGE, _PROGRAM = "mmgpy", "bin/mmgs_O3"
+# Where nothing was asked for, the remesher neither finds ridges by itself nor smooths the sizes: both are given.
+_OPTIONS = ("-v", "-1", "-nr", "-hgrad", "-1")
+_LONGEST = 600  # seconds
+# Elements may be this much smaller and larger than any size asked for.
+_ROOM = 3.0
+
+
+def program() -> Path:
+    """Return where `mmgs` is.
+
+    Raises:
+        MeshError: if it is not installed.
+    """
+    spec = find_spec(_PACKAGE)
+    for place in (spec.submodule_search_locations or []) if spec else []:
+        if (found := Path(place) / _PROGRAM).exists():
+            return found
+    raise MeshError("the remesher of surfaces, mmgs, is not installed: run `make setup`")
+
+
+def release() -> str:
+    """Return the version of what `mmgs` came with: another may make other meshes."""
+    try:
+        return version(_PACKAGE)
+    except PackageNotFoundError:
+        return ""
+
+
+@stage("surface")
+def remesh(sheet: Sheet, size: FloatArray, deviation: float, kept: IntArray | None = None) -> Sheet:
+    """Return the surface with elements of the ``size`` (n) asked for at its points, all in m.
+
+    It stays within ``deviation`` (m) of what it was. Edges between groups stay, and so do the ``kept`` ones (k, 2),
+    with their points.
+
+    Raises:
+        MeshError: with what the remesher said, if it fails.
+    """
+    with TemporaryDirectory(prefix="surface-") as folder:
+        source, result = Path(folder, "in.mesh"), Path(folder, "out.mesh")
+        source.write_text(_mesh_text(sheet, np.empty((0, 2), np.int64) if kept is None else kept))
+        source.with_suffix(".sol").write_text(_size_text(size))
+        limits = ("-hmin", f"{size.min() / _ROOM!r}", "-hmax", f"{size.max() * _ROOM!r}", "-hausd", f"{deviation!r}")
+        command = [str(program()), *_OPTIONS, *map(str, limits), "-sol", str(source.with_suffix(".sol")),
+                   str(source), str(result)]  # fmt: skip
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST, check=False)
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise MeshError(f"the remesher of surfaces: {error}") from error
+        if done.returncode or not result.exists():
+            said = " ".join((done.stderr + done.stdout).split())[-300:]
+            raise MeshError(f"the remesher of surfaces failed ({done.returncode}): {said}")
+        return _read(result.read_text())
+
+
+def _mesh_text(sheet: Sheet, kept: IntArray) -> str:
+    edges, sides = edges_of(sheet.facets)
+    groups = sheet.group[sides]
+    border = edges[groups[:, 0] != groups[:, 1]]
+    base = len(sheet.points)
+    keys = np.concatenate([_keys(part, base) for part in (border, sheet.sharp, kept)])
+    keys, first = np.unique(keys, return_index=True)
+    lines = np.concatenate([border, np.sort(sheet.sharp, axis=1), np.sort(kept, axis=1)])[first]
+    required = 1 + np.flatnonzero(np.isin(keys, _keys(kept, base)))
+    ridges = 1 + np.flatnonzero(np.isin(keys, _keys(sheet.sharp, base)))
+    fixed = 1 + np.unique(np.concatenate([kept.ravel(), _corners(sheet.sharp, base)]))
+    parts = [
+        "MeshVersionFormatted 2\nDimension 3\n",
+        _section("Vertices", np.column_stack([sheet.points, np.zeros(base)]), "%.17g %.17g %.17g %d"),
+        _section("Triangles", np.column_stack([sheet.facets + 1, sheet.group]), "%d %d %d %d"),
+        _section("Edges", np.column_stack([lines + 1, np.ones(len(lines), np.int64)]), "%d %d %d"),
+        _section("Ridges", ridges[:, None], "%d"),
+        _section("RequiredEdges", required[:, None], "%d"),
+        _section("RequiredVertices", fixed[:, None], "%d"),
+        "End\n",
+    ]
+    return "".join(parts)
+
+
+def _keys(edges: IntArray, base: int) -> IntArray:
+    return edges.min(axis=1) * base + edges.max(axis=1)
+
+
+def _corners(sharp: IntArray, count: int) -> IntArray:
+    """Points where other than two sharp edges meet."""
+    meeting = np.bincount(sharp.ravel(), minlength=count)
+    return np.flatnonzero((meeting > 0) & (meeting != 2))
+
+
+def _section(name: str, rows: FloatArray | IntArray, form: str) -> str:
+    if not len(rows):
+        return ""
+    lines = "\n".join([form] * len(rows)) % tuple(rows.ravel().tolist())
+    return f"{name}\n{len(rows)}\n{lines}\n"
+
+
+def _size_text(size: FloatArray) -> str:
+    values = "\n".join(map(repr, size.tolist()))
+    return f"MeshVersionFormatted 2\nDimension 3\nSolAtVertices\n{len(size)}\n1 1\n{values}\nEnd\n"
+
+
+def _read(text: str) -> Sheet:
+    words = text.split()
+    columns = {"Vertices": 4, "Triangles": 4, "Edges": 3, "Ridges": 1}
+    found = {}
+    for name, width in columns.items():
+        if name not in words:
+            found[name] = np.empty((0, width))
+            continue
+        start = words.index(name)
+        count = int(words[start + 1])
+        found[name] = np.array(words[start + 2 : start + 2 + width * count], dtype=float).reshape(-1, width)
+    triangles, edges = found["Triangles"].astype(np.int64), found["Edges"].astype(np.int64)
+    ridges = found["Ridges"].astype(np.int64).ravel() - 1
+    return Sheet(found["Vertices"][:, :3], triangles[:, :3] - 1, triangles[:, 3], edges[ridges, :2] - 1)

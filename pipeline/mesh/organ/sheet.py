@@ -1,0 +1,66 @@
+"""Triangulated surfaces whose facets belong to named groups, and the lines between the groups."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
+from pipeline.scene import model
+
+# Numbers of the groups, which the remesher keeps apart.
+FREE, FIXED, PROBE = 1, 2, 3
+
+
+def group_names() -> dict[int, str]:
+    """Return the names that the groups have in meshes."""
+    return {FREE: model.FREE, FIXED: model.FIXED, PROBE: model.PROBE}
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A closed surface: ``points`` (n, 3) in m, ``facets`` (m, 3), and the group (m) of each facet.
+
+    ``sharp`` (k, 2) are edges that must stay, other than those between groups.
+    """
+
+    points: FloatArray
+    facets: IntArray
+    group: IntArray
+    sharp: IntArray
+
+    @property
+    def normals(self) -> FloatArray:
+        """Unit normals (m, 3) of the facets."""
+        a, b, c = (self.points[self.facets[:, k]] for k in range(3))
+        normal = np.cross(b - a, c - a)
+        length = np.linalg.norm(normal, axis=1, keepdims=True)
+        return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+
+    def border(self, one: int, other: int | None = None) -> IntArray:
+        """Return the edges (k, 2), lower number first, between facets of group ``one`` and of the ``other``, or all."""
+        edges, facets = edges_of(self.facets)
+        groups = self.group[facets]
+        mine = groups == one
+        theirs = ~mine if other is None else groups == other
+        return edges[mine.any(axis=1) & theirs.any(axis=1)]
+
+
+def edges_of(facets: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the edges (k, 2) of a closed surface, lower number first, and the two facets (k, 2) of each."""
+    pairs = np.sort(np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]]), axis=1)
+    owner = np.tile(np.arange(len(facets)), 3)
+    order = np.lexsort((pairs[:, 1], pairs[:, 0]))
+    edges = pairs[order].reshape(-1, 2, 2)
+    if not np.array_equal(edges[:, 0], edges[:, 1]):
+        raise ValueError("the surface is not closed")
+    return edges[:, 0], owner[order].reshape(-1, 2)
+
+
+def compact(sheet: Sheet) -> tuple[Sheet, IntArray]:
+    """Number the points that facets use without gaps; return the new number of each point, too, -1 for none."""
+    used = np.zeros(len(sheet.points), dtype=bool)
+    used[sheet.facets] = True
+    number = np.where(used, np.cumsum(used) - 1, -1)
+    sharp = number[sheet.sharp]
+    sharp = sharp[(sharp >= 0).all(axis=1)]
+    return Sheet(sheet.points[used], number[sheet.facets], sheet.group, sharp), number

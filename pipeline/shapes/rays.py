@@ -1,0 +1,114 @@
+"""Lines along a probe's axis through a triangulated surface, and its nearest points: what places a probe there."""
+
+from typing import Any
+
+from pipeline.shapes.arrays import FloatArray, IntArray, np
+
+# Points and facets that are looked at together: arrays of some ten megabytes.
+_AT_ONCE = 2_000_000
+# A point this far outside a facet, in units of it, is on its edge.
+_ON_EDGE = 1e-9
+
+
+def facing(local: FloatArray, facets: IntArray, radius: float) -> IntArray:
+    """Return the numbers of the facets, seen from above, that lie within ``radius`` of the z axis.
+
+    They are those that are connected to where the axis meets the surface next to the origin, none if it does not.
+    """
+    corners = local[facets][:, :, :2]
+    near = ((corners.min(axis=1) <= radius) & (corners.max(axis=1) >= -radius)).all(axis=1)
+    (chosen,) = np.nonzero(near)
+    chosen = chosen[_areas(corners[chosen]) > 0]
+    hit, _ = pierce(local, facets[chosen], np.zeros((1, 2)), nearest=True)
+    if hit[0] < 0 or not len(chosen):
+        return chosen[:0]
+    return chosen[_connected(facets[chosen], int(hit[0]))]
+
+
+def pierce(
+    local: FloatArray, facets: IntArray, points: FloatArray, nearest: bool = False
+) -> tuple[IntArray, FloatArray]:
+    """Return which of the facets lines along z through ``points`` (n, 2) meet first from above, and the z there.
+
+    It is -1 where they meet none. With ``nearest``, it is the one next to z = 0.
+    """
+    a, b, c = (local[facets[:, k]] for k in range(3))
+    double = _areas(np.stack([a[:, :2], b[:, :2], c[:, :2]], axis=1))
+    hit, height = np.full(len(points), -1), np.full(len(points), np.nan)
+    step = max(1, _AT_ONCE // max(1, len(facets)))
+    for start in range(0, len(points), step):
+        x, y = (points[start : start + step, k, None] for k in (0, 1))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u = ((b[:, 0] - x) * (c[:, 1] - y) - (b[:, 1] - y) * (c[:, 0] - x)) / double
+            v = ((c[:, 0] - x) * (a[:, 1] - y) - (c[:, 1] - y) * (a[:, 0] - x)) / double
+            inside = (u >= -_ON_EDGE) & (v >= -_ON_EDGE) & (u + v <= 1 + _ON_EDGE)
+        row, column = np.nonzero(inside)
+        s, t = u[row, column], v[row, column]
+        z = s * a[column, 2] + t * b[column, 2] + (1 - s - t) * c[column, 2]
+        # The last one written of each row is the one wanted.
+        order = np.lexsort((column, -np.abs(z) if nearest else z))
+        hit[start + row[order]], height[start + row[order]] = column[order], z[order]
+    return hit, height
+
+
+def nearest_point(points: FloatArray, facets: IntArray, place: FloatArray) -> tuple[int, FloatArray]:
+    """Return the facet next to a ``place`` (3), and its nearest point."""
+    corners = points[facets]
+    middle = corners.mean(axis=1)
+    radius = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+    distance = np.linalg.norm(middle - place, axis=1)
+    (candidates,) = np.nonzero(distance - radius <= (distance + radius).min())
+    found = _closest(corners[candidates], place)
+    best = int(np.argmin(((found - place) ** 2).sum(axis=1)))
+    return int(candidates[best]), found[best]
+
+
+def _closest(corners: FloatArray, place: FloatArray) -> FloatArray:
+    """Return the point of each of the triangles (m, 3, 3) that is next to ``place``."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    normal = np.cross(b - a, c - a)
+    square = (normal**2).sum(axis=1)
+    u = (np.cross(c - b, place - b) * normal).sum(axis=1)
+    v = (np.cross(a - c, place - c) * normal).sum(axis=1)
+    w = square - u - v
+    inside = (u >= 0) & (v >= 0) & (w >= 0) & (square > 0)
+    best = np.full(len(corners), np.inf)
+    result = np.empty((len(corners), 3))
+    for start, end in ((a, b), (b, c), (c, a)):
+        along = end - start
+        length = (along**2).sum(axis=1)
+        t = np.clip(((place - start) * along).sum(axis=1) / np.where(length > 0, length, 1.0), 0.0, 1.0)
+        point = start + t[:, None] * along
+        distance = ((point - place) ** 2).sum(axis=1)
+        closer = distance < best
+        best[closer], result[closer] = distance[closer], point[closer]
+    weights = np.stack([u, v, w], axis=1)[inside] / square[inside, None]
+    result[inside] = (weights[:, :, None] * corners[inside]).sum(axis=1)
+    return result
+
+
+def _areas(corners: FloatArray) -> FloatArray:
+    """Twice the areas of triangles (m, 3, 2) in a plane, negative where they are seen from below."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    area: Any = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    return area
+
+
+def _connected(facets: IntArray, start: int) -> IntArray:
+    """Return the numbers of the facets that are joined to one of them through edges."""
+    pairs = np.sort(np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]]), axis=1)
+    owner = np.tile(np.arange(len(facets)), 3)
+    order = np.lexsort((pairs[:, 1], pairs[:, 0]))
+    pairs, owner = pairs[order], owner[order]
+    (same,) = np.nonzero((pairs[1:] == pairs[:-1]).all(axis=1))
+    one, other = owner[same], owner[same + 1]
+    reached = np.zeros(len(facets), dtype=bool)
+    reached[start] = True
+    while True:
+        grown = reached.copy()
+        grown[other[reached[one]]] = True
+        grown[one[reached[other]]] = True
+        if np.array_equal(grown, reached):
+            break
+        reached = grown
+    return np.flatnonzero(reached)

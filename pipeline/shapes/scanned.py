@@ -1,0 +1,220 @@
+"""Bodies whose surface is a file's triangles: where a probe meets them, and how large they are."""
+
+from abc import abstractmethod
+from functools import lru_cache
+from math import inf
+
+from pipeline.shapes.arrays import FloatArray, IntArray, np
+from pipeline.shapes.body import Body
+from pipeline.shapes.frame import Frame, PlaceError, Vector
+from pipeline.shapes.rays import facing, nearest_point, pierce
+from pipeline.shapes.section import in_mm
+from pipeline.shapes.skin import Skin
+from pipeline.shapes.surface import Surface
+from pipeline.shapes.triangles import Triangles, doubled_normals
+
+# The normal is that of the tissue below the footprint: rays over a disc, sunflower-wise, and twice, since the disc
+# turns with it.
+_RAYS, _TURNS = 400, 2
+_GOLDEN = 2.399963229728653  # rad
+# Where no footprint is known, the normal is that of a disc of this share of the body.
+_AROUND = 0.02
+_STEEP = 1e-9
+_SAME = 1e-12
+# Normals are means over this share of a footprint's radius, to each side.
+_OF_FOOTPRINT, _MOST_CELLS = 0.1, 400
+_FEW = 8  # surfaces whose trees are kept
+
+
+class Scanned(Body):
+    """A body bounded by triangles."""
+
+    @property
+    @abstractmethod
+    def triangles(self) -> Triangles:
+        """Its surface, in m."""
+
+    # ---- size -----------------------------------------------------------------------------------------
+
+    @property
+    def extent(self) -> float:
+        """Largest extent (m) along x, y or z."""
+        return self.triangles.extent
+
+    @property
+    def heights(self) -> tuple[float, float]:
+        """Lowest and highest z (m)."""
+        low, high = self.triangles.bounds
+        return low[2], high[2]
+
+    @property
+    def volume(self) -> float:
+        """Volume (m³) within the triangles."""
+        return self.triangles.volume
+
+    # ---- under a probe --------------------------------------------------------------------------------
+
+    def frame(self, at: tuple[float, ...], axis: Vector | None = None, around: float = 0.0) -> Frame:
+        """Return the place at two or three coordinates (m).
+
+        The normal is the mean one, by area, of what a disc of radius ``around`` (m) covers, not that of one facet.
+        """
+        point, facet = self._touched(at)
+        inward = -doubled_normals(self.triangles.points, self.triangles.facets[facet : facet + 1])[0]
+        frame = _frame(point, inward, inward if axis is None else axis)
+        for _ in range(_TURNS):
+            inward = self._mean_normal(frame, around or _AROUND * self.extent)
+            frame = _frame(point, inward, inward if axis is None else axis)
+        return frame
+
+    def _touched(self, at: tuple[float, ...]) -> tuple[FloatArray, int]:
+        """Return the point of the surface that coordinates name, and its facet."""
+        points, facets = self.triangles.points, self.triangles.facets
+        if len(at) == 3:
+            facet, point = nearest_point(points, facets, np.array(at))
+            return point, facet
+        hit, height = pierce(points, facets, np.array([at]))
+        if hit[0] < 0:
+            low, high = self.triangles.bounds
+            raise PlaceError(
+                f"no part of the surface lies above or below x = {in_mm(at[0])}, y = {in_mm(at[1])}: it reaches from "
+                f"{in_mm(low[0])} to {in_mm(high[0])} in x and from {in_mm(low[1])} to {in_mm(high[1])} in y"
+            )
+        return np.array([*at, height[0]]), int(hit[0])
+
+    def _mean_normal(self, frame: Frame, radius: float) -> FloatArray:
+        """Return the mean inward normal, by area, of the tissue that a disc covers."""
+        number = np.arange(_RAYS)
+        r, angle = radius * np.sqrt((number + 0.5) / _RAYS), _GOLDEN * number
+        points, normals = self.lift(frame, np.column_stack([r * np.cos(angle), r * np.sin(angle)]))
+        hit = np.isfinite(points[:, 0])
+        if hit.sum() < _RAYS / 2:
+            return np.array(frame.normal)
+        # Each ray stands for the same area across the axis, and for 1 / cos as much of the surface.
+        cosine = normals[hit] @ np.array(frame.outward)
+        vector: FloatArray = -(normals[hit] / np.maximum(cosine, _STEEP)[:, None]).sum(axis=0)
+        return vector
+
+    def lift(self, frame: Frame, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return where lines along a probe's axis enter the part of the surface that is joined to the contact.
+
+        That is (n, 3), in m, not a number where they miss it; and the outward normals there: means, by area, over the
+        facets within about a tenth of what the points span, since single ones are as noisy as their image was.
+        """
+        local, facets = frame.local(self.triangles.points), self.triangles.facets
+        patch = facets[facing(local, facets, float(np.abs(points).max(initial=0.0)))]
+        hit, height = pierce(local, patch, points)
+        found = hit >= 0
+        result = frame.world(np.column_stack([points, height]))
+        normals = np.full((len(points), 3), np.nan)
+        if found.any():
+            around = _OF_FOOTPRINT * float(np.hypot(points[:, 0], points[:, 1]).max())
+            normals[found] = _smoothed(self.triangles.points, local, patch, hit[found], points[found], around)
+        return result, normals
+
+    def thickness(self, frame: Frame) -> float:
+        """Return the distance (m) along the axis to where it leaves the tissue again, over hollows and all."""
+        points, facets = self.triangles.points, self.triangles.facets
+        _, height = pierce(-frame.local(points), facets, np.zeros((1, 2)))
+        return max(float(height[0]), 0.0) if np.isfinite(height[0]) else 0.0
+
+    def reach(self, frame: Frame) -> float:
+        """Return the largest distance (m) of a point from the axis."""
+        local = frame.local(self.triangles.points)
+        return float(np.hypot(local[:, 0], local[:, 1]).max())
+
+    def farthest(self, frame: Frame) -> float:
+        """Return the largest distance (m) of a point from the contact."""
+        return float(np.linalg.norm(self.triangles.points - np.array(frame.point), axis=1).max())
+
+    def inside(self, points: FloatArray) -> FloatArray:
+        """Return the distance (m) of points (n, 3) of the body to its surface, negative outside."""
+        return _skin(self.triangles).depth(points)
+
+    def gap(self, point: Vector) -> float:
+        """Return that there is no edge: how far a footprint reaches is told by where its edge can be lifted."""
+        return inf
+
+    @property
+    def face(self) -> str:
+        """The extents."""
+        low, high = self.triangles.bounds
+        return " × ".join(in_mm(top - bottom) for bottom, top in zip(low, high, strict=True))
+
+    # ---- symmetry -------------------------------------------------------------------------------------
+
+    def mirror_planes(self) -> tuple[str, ...]:
+        """Return none: no organ is its own image."""
+        return ()
+
+    def half_plane(self) -> None:
+        """Return none: no organ is round."""
+
+    # ---- geometry -------------------------------------------------------------------------------------
+
+    def surfaces(self) -> dict[str, tuple[Surface, ...]]:
+        """Return the one surface."""
+        return {"skin": (_skin(self.triangles),)}
+
+    @property
+    def bend(self) -> float:
+        """Half of the smallest extent (m) along x, y or z: elements are to be a few through the body, everywhere."""
+        low, high = self.triangles.bounds
+        return min(high[0] - low[0], high[1] - low[1], high[2] - low[2]) / 2
+
+    def outline(self) -> list[FloatArray]:
+        """Return silhouettes along x, y and z as lines: edges between facets of either side."""
+        return _silhouettes(self.triangles)
+
+
+def _frame(point: FloatArray, normal: FloatArray, axis: FloatArray | Vector) -> Frame:
+    """Return the frame with these, and ``along`` x as far as it is normal to the axis."""
+    unit, inward = map(_unit, (axis, normal))
+    start = (1.0, 0.0, 0.0) if abs(unit[0]) < 0.9 else (0.0, 1.0, 0.0)
+    x, y, z = ((float(v[0]), float(v[1]), float(v[2])) for v in (point, inward, unit))
+    return Frame(x, y, z).turned(start)
+
+
+def _unit(vector: FloatArray | Vector) -> FloatArray:
+    """Return the unit vector, upright if it is but for rounding."""
+    unit = np.array(vector) / np.linalg.norm(vector)
+    return np.where(np.abs(unit) < _SAME, 0.0, unit) + 0.0 if np.abs(unit).max() > 1 - _SAME else unit
+
+
+def _smoothed(
+    points: FloatArray, local: FloatArray, patch: IntArray, hit: IntArray, places: FloatArray, around: float
+) -> FloatArray:
+    """Return unit normals (n, 3) at ``places`` (n, 2) in the facets ``hit``, with those of their surroundings."""
+    vectors, middle = doubled_normals(points, patch), local[patch].mean(axis=1)[:, :2]
+    size = max(around, float(np.finfo(float).tiny))
+    low = np.minimum(middle.min(axis=0), places.min(axis=0)) - 2 * size
+    cell, own = (np.floor((p - low) / size).astype(np.int64) for p in (middle, places))
+    counts = np.maximum(cell.max(axis=0), own.max(axis=0)) + 2
+    total = np.zeros((*np.minimum(counts, _MOST_CELLS), 3))
+    inside = (cell < _MOST_CELLS - 1).all(axis=1)
+    np.add.at(total, tuple(cell[inside].T), vectors[inside])
+    result = vectors[hit].copy()
+    for i in (-1, 0, 1):
+        for j in (-1, 0, 1):
+            at = np.clip(own + np.array((i, j)), 0, np.array(total.shape[:2]) - 1)
+            result += total[at[:, 0], at[:, 1]]
+    return result / np.linalg.norm(result, axis=1, keepdims=True)
+
+
+@lru_cache(_FEW)
+def _skin(triangles: Triangles) -> Skin:
+    return Skin(triangles)
+
+
+def _silhouettes(triangles: Triangles) -> list[FloatArray]:
+    facets, points = triangles.facets, triangles.points
+    pairs = np.sort(np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]]), axis=1)
+    order = np.lexsort((pairs[:, 1], pairs[:, 0]))
+    owner = np.tile(np.arange(len(facets)), 3)[order].reshape(-1, 2)
+    edges = pairs[order].reshape(-1, 2, 2)[:, 0]
+    normals = doubled_normals(points, facets)
+    lines = []
+    for axis in range(3):
+        side = normals[:, axis] > 0
+        lines += list(points[edges[side[owner[:, 0]] != side[owner[:, 1]]]])
+    return lines

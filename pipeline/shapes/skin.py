@@ -1,0 +1,49 @@
+"""A surface of triangles: nearest points of it, from a tree of its facets."""
+
+from functools import cached_property
+from importlib import import_module
+from typing import Any
+
+from pipeline.shapes.arrays import FloatArray, np
+from pipeline.shapes.surface import Surface
+from pipeline.shapes.triangles import Triangles
+
+
+class Skin(Surface):
+    """The surface of ``triangles``; its tree (libigl's) is made when it is first asked."""
+
+    is_curved = True
+
+    def __init__(self, triangles: Triangles):
+        self._triangles = triangles
+
+    @cached_property
+    def _tree(self) -> Any:
+        tree = import_module("igl").AABB()
+        tree.init(np.array(self._triangles.points), np.array(self._triangles.facets))
+        return tree
+
+    def distance(self, points: FloatArray) -> FloatArray:
+        """Return the distance (m) of each point, never negative."""
+        return np.sqrt(self._nearest(points)[0])
+
+    def project(self, points: FloatArray) -> FloatArray:
+        """Return the nearest points."""
+        return self._nearest(points)[1]
+
+    def depth(self, points: FloatArray) -> FloatArray:
+        """Return the distance (m) of each point, negative outside."""
+        triangles = self._triangles
+        signed, *_ = import_module("igl").signed_distance(
+            np.ascontiguousarray(points), np.array(triangles.points), np.array(triangles.facets)
+        )
+        return -np.asarray(signed).ravel()
+
+    def _nearest(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        if not len(points):
+            return np.zeros(0), np.zeros((0, 3))
+        triangles = self._triangles
+        square, _, nearest = self._tree.squared_distance(
+            np.array(triangles.points), np.array(triangles.facets), np.ascontiguousarray(points)
+        )
+        return square, nearest

@@ -1,0 +1,172 @@
+"""Meshes of bodies of triangles: true to the file where it is finer than the elements, and where it is coarser."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from math import inf, pi
+
+import numpy as np
+import pytest
+
+from pipeline.mesh.curve import curve
+from pipeline.mesh.generate import MeshError
+from pipeline.mesh.organ.base import far_surface
+from pipeline.mesh.organ.make import mesh_organ
+from pipeline.mesh.size import Sizes
+from pipeline.scene.model import Scene
+from pipeline.shapes.bodies.surface import FromSurface
+from pipeline.shapes.frame import Frame
+from pipeline.shapes.surface import Surface
+from tests.cases import study
+from tests.mesh.test_mesh import area, volume
+from tests.organs import AXES, box, ellipsoid, write_stl
+
+BELOW = -10e-3
+SIZES = Sizes(epsilon=inf, fine=15e-3, coarse=60e-3, rim=0.4e-3, growth=0.5, column=30e-3)
+
+
+def surface(path, **changes) -> FromSurface:
+    return study(
+        body={"shape": "surface", "file": str(path), "unit": "mm", "fixed": {"below": "-10 mm"}} | changes,
+        probe={"at": ["5 mm", "3 mm"], "radius": "4 mm"},
+    ).case(()).body  # fmt: skip
+
+
+class Placed(Scene):
+    """A scene whose probe stands upright at (5, 3) mm."""
+
+    @property
+    def frame(self) -> Frame:
+        return self.body.frame((5e-3, 3e-3), (0.0, 0.0, -1.0))
+
+
+def probe():
+    return study(probe={"radius": "4 mm"}).case(()).probe
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    return write_stl(tmp_path_factory.mktemp("organ") / "ellipsoid.stl", *ellipsoid())
+
+
+def scene(path, sizes=SIZES, **changes) -> Placed:
+    return Placed(surface(path, **changes), probe(), rim_segments=sizes.rim_segments(probe()))
+
+
+@pytest.fixture(scope="module")
+def meshed(file):
+    a_scene = scene(file)
+    return a_scene, mesh_organ(a_scene, SIZES, far_surface(a_scene.body))
+
+
+def qualities(mesh):
+    corners = mesh.points[mesh.cells[:, :4]]
+    edges = [np.linalg.norm(corners[:, i] - corners[:, j], axis=1) for i in range(4) for j in range(i)]
+    double = np.linalg.det(corners[:, 1:] - corners[:, :1])
+    return double * 2**0.5 / (np.square(edges).sum(axis=0) / 6) ** 1.5
+
+
+def test_same_file_same_mesh_in_another_process(file):
+    code = (
+        "import sys, hashlib; from tests.mesh.test_organ import *; s = scene(sys.argv[1]);"
+        "m = curve(mesh_organ(s, SIZES, far_surface(s.body)), s);"
+        "print(hashlib.sha256(m.points.tobytes() + m.cells.tobytes()).hexdigest())"
+    )
+    command = [sys.executable, "-c", code, str(file)]
+    outputs = {subprocess.run(command, capture_output=True, text=True, check=True).stdout for _ in "ab"}
+    assert len(outputs) == 1
+
+
+def test_groups_cover_the_surface(meshed):
+    a_scene, mesh = meshed
+    corners = mesh.cells
+    faces = np.sort(np.concatenate([np.delete(corners, i, axis=1) for i in range(4)]), axis=1)
+    _, counts = np.unique(faces, axis=0, return_counts=True)
+    assert (counts == 1).sum() == sum(map(len, mesh.facets.values()))
+    assert volume(mesh) == pytest.approx(a_scene.body.volume, rel=0.01)
+    assert sum(area(mesh, group) for group in mesh.facets) == pytest.approx(a_scene.body.triangles.area, rel=0.01)
+    held = mesh.points[np.unique(mesh.facets["fixed"])][:, 2]
+    free = mesh.points[np.unique(mesh.facets["free"])][:, 2]
+    assert held.max() < BELOW + 1e-9 and free.min() > BELOW - 1e-9
+    assert qualities(mesh).min() > 0.1
+
+
+def test_the_footprint_is_what_projects_into_the_disc(meshed):
+    a_scene, mesh = meshed
+    curved = curve(mesh, a_scene)
+    local = a_scene.frame.local(curved.points)
+    rim = np.hypot(*local[mesh.rim, :2].T)
+    np.testing.assert_allclose(rim, 4e-3, rtol=1e-12)
+    edges = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
+    ends, middle = curved.cells[:, :4][:, edges].reshape(-1, 2), curved.cells[:, 4:].ravel()
+    along = middle[np.isin(ends, mesh.rim).all(axis=1)]
+    on_edge = np.abs(np.hypot(*local[along, :2].T) - 4e-3) < 1e-12
+    assert len(np.unique(along[on_edge])) == len(mesh.rim)
+    skin = a_scene.body.surfaces()["skin"][0]
+    assert skin.distance(curved.points[along[on_edge]]).max() < 1e-12
+    inner = np.unique(mesh.facets["probe"])
+    assert np.hypot(*local[inner, :2].T).max() < 4e-3 * (1 + 1e-12)
+    assert skin.distance(mesh.points[inner]).max() < 1e-12
+    projected = mesh.points[mesh.facets["probe"]][:, :, :2]
+    double = np.cross(projected[:, 1] - projected[:, 0], projected[:, 2] - projected[:, 0])
+    assert np.abs(double.sum() / 2) == pytest.approx(pi * 16e-6, rel=0.01)
+
+
+def test_elements_are_as_asked_however_the_file_is(tmp_path, meshed):
+    """Files of 1,280, 5,120 and 46,080 facets make much the same mesh."""
+    counts = []
+    for frequency in (8, 48):
+        path = write_stl(tmp_path / f"{frequency}.stl", *ellipsoid(frequency))
+        a_scene = scene(path)
+        counts.append(len(mesh_organ(a_scene, SIZES, far_surface(a_scene.body)).cells))
+    assert counts == pytest.approx([len(meshed[1].cells)] * 2, rel=0.15)
+
+
+class Ellipsoid(Surface):
+    """The true ellipsoid."""
+
+    is_curved = True
+
+    def distance(self, points):
+        return np.linalg.norm(self.project(points) - points, axis=1)
+
+    def project(self, points):
+        square, t = AXES**2, np.zeros(len(points))
+        for _ in range(60):
+            value = ((AXES * points / (square + t[:, None])) ** 2).sum(axis=1) - 1
+            slope = -2 * (square * points**2 / (square + t[:, None]) ** 3).sum(axis=1)
+            t = np.maximum(t - value / slope, -0.9 * square.min())
+        return square * points / (square + t[:, None])
+
+
+def test_points_are_on_the_file_not_on_what_was_remeshed(meshed):
+    """An ellipsoid's facets are within half a millimetre of it, and elements of 15 mm would be far from both."""
+    a_scene, mesh = meshed
+    outer = mesh.points[np.unique(np.concatenate([*mesh.facets.values()]))]
+    assert a_scene.body.surfaces()["skin"][0].distance(outer).max() < 1e-9
+    assert Ellipsoid().distance(outer).max() < 0.2e-3
+
+
+def test_what_is_sharp_stays_sharp(tmp_path):
+    path = write_stl(tmp_path / "box.stl", *box(40e-3, 40e-3, 20e-3))
+    a_scene = scene(path)
+    mesh = mesh_organ(a_scene, SIZES, far_surface(a_scene.body))
+    assert volume(mesh) == pytest.approx(32e-6, rel=1e-9)
+    assert area(mesh, "fixed") == pytest.approx(1600e-6 + 4 * 400e-6, rel=1e-9)
+
+
+def test_a_footprint_over_the_edge_is_refused(file):
+    a_scene = scene(file)
+
+    class Aside(Scene):
+        frame = a_scene.body.frame((57e-3, 0.0), (0.0, 0.0, -1.0))
+
+    aside = Aside(a_scene.body, probe(), rim_segments=a_scene.rim_segments)
+    with pytest.raises(MeshError, match="no tissue below it"):
+        mesh_organ(aside, SIZES, far_surface(a_scene.body))
+
+
+def test_a_column_is_refused(file):
+    a_scene = replace(scene(file), column=10e-3)
+    with pytest.raises(MeshError, match="no column"):
+        mesh_organ(a_scene, SIZES, far_surface(a_scene.body))

@@ -1,0 +1,153 @@
+"""Bodies of triangles: where probes touch them, how large they are, and what they are known by."""
+
+import shutil
+from math import hypot, pi
+
+import numpy as np
+import pytest
+
+from pipeline.plan.key import case_key, mesh_key
+from pipeline.shapes.bodies.surface import FromSurface
+from pipeline.shapes.frame import PlaceError
+from pipeline.shapes.skin import Skin
+from pipeline.study.problems import StudyError
+from tests.cases import study
+from tests.organs import AXES, box, ellipsoid, sphere, write_stl
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("scanned")
+    write_stl(folder / "ellipsoid.stl", *ellipsoid(24))
+    write_stl(folder / "box.stl", *box(40e-3, 40e-3, 20e-3))
+    return folder
+
+
+def case(path, **changes):
+    return study(
+        body={"shape": "surface", "file": str(path), "unit": "mm", "fixed": {"below": "-10 mm"}} | changes
+    ).case(())
+
+
+@pytest.fixture(scope="module")
+def a_body(folder) -> FromSurface:
+    return case(folder / "ellipsoid.stl").body
+
+
+def outward(point):
+    normal = np.array(point) / AXES**2
+    return normal / np.linalg.norm(normal)
+
+
+def test_sizes_are_those_of_the_file(a_body):
+    assert a_body.volume == pytest.approx(4 / 3 * pi * AXES.prod(), rel=5e-3)
+    assert a_body.extent == pytest.approx(120e-3, rel=2e-3)
+    assert a_body.heights == pytest.approx((-30e-3, 30e-3), rel=2e-3)
+
+
+@pytest.mark.parametrize("at", [(10e-3, -8e-3), (-20e-3, 5e-3), (30e-3, 20e-3)])
+def test_two_coordinates_name_the_highest_point_and_its_normal(a_body, at):
+    frame = a_body.frame(at)
+    z = AXES[2] * (1 - (at[0] / AXES[0]) ** 2 - (at[1] / AXES[1]) ** 2) ** 0.5
+    assert frame.point == pytest.approx((*at, z), abs=0.05e-3)
+    assert frame.axis == frame.normal
+    assert np.dot(frame.outward, outward((*at, z))) > 1 - 1e-4
+    assert a_body.frame(at, (0.0, 0.0, -1.0)).axis == (0.0, 0.0, -1.0)
+
+
+def test_three_coordinates_name_the_nearest_point(a_body):
+    true = AXES * np.array([0.6, 0.0, -0.8])
+    frame = a_body.frame(tuple(true + 5e-3 * outward(true)))
+    np.testing.assert_allclose(frame.point, true, atol=0.1e-3)
+    assert np.dot(frame.outward, outward(true)) > 1 - 1e-4
+
+
+def test_lines_along_the_axis_enter_the_near_side(a_body):
+    frame = a_body.frame((15e-3, 10e-3))
+    local = 6e-3 * np.random.default_rng(1).uniform(-1, 1, (200, 2))
+    points, normals = a_body.lift(frame, local)
+    np.testing.assert_allclose(frame.local(points)[:, :2], local, atol=1e-15)
+    assert np.abs(((points / AXES) ** 2).sum(axis=1) - 1).max() < 4e-3
+    assert Skin(a_body.triangles).distance(points).max() < 1e-15
+    expected = points / AXES**2
+    expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+    assert (normals * expected).sum(axis=1).min() > 0.997
+    assert np.isnan(a_body.lift(frame, np.array([[0.2, 0.0]]))[0]).all()
+
+
+def test_distances_hold_the_body(a_body):
+    frame = a_body.frame((0.0, 0.0), (0.0, 0.0, -1.0))
+    assert a_body.thickness(frame) == pytest.approx(60e-3, rel=2e-3)
+    assert a_body.reach(frame) == pytest.approx(60e-3, rel=2e-3)
+    assert a_body.farthest(frame) == pytest.approx(hypot(60e-3, 30e-3), rel=0.05)
+    inside = np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 25e-3), (0.0, 0.0, 40e-3)])
+    assert a_body.inside(inside) == pytest.approx([30e-3, 5e-3, -10e-3], abs=0.1e-3)
+
+
+def test_the_normal_is_not_one_facets(tmp_path):
+    """Noise of a tenth of the facets' size turns facets by up to 20 degrees, their mean by less than one."""
+    points, facets = sphere(30)
+    noise = np.random.default_rng(2).normal(size=len(points))
+    path = write_stl(tmp_path / "noisy.stl", 30e-3 * points * (1 + 3e-3 * noise[:, None]), facets)
+    body = case(path).body
+    frame = body.frame((5e-3, 5e-3), around=6e-3)
+    assert np.dot(frame.outward, np.array(frame.point) / 30e-3) > 0.9998
+
+
+def test_a_place_beside_the_body_is_refused(a_body):
+    with pytest.raises(PlaceError, match="reaches from"):
+        a_body.frame((70e-3, 0.0))
+
+
+def test_keys_are_those_of_the_content(folder, tmp_path):
+    here = case(folder / "ellipsoid.stl")
+    there = case(shutil.copy(folder / "ellipsoid.stl", tmp_path / "other name.stl"))
+    assert case_key(here) == case_key(there) and mesh_key(here) == mesh_key(there)
+    points, facets = ellipsoid(24)
+    moved = case(write_stl(tmp_path / "moved.stl", points * 1.001, facets))
+    assert case_key(moved) != case_key(here)
+    assert case_key(case(folder / "ellipsoid.stl", fixed={"below": "-11 mm"})) != case_key(here)
+
+
+def test_a_file_that_changes_is_another_body(tmp_path):
+    path = write_stl(tmp_path / "body.stl", *ellipsoid(8))
+    before = case(path)
+    write_stl(path, *ellipsoid(9))
+    after = case(path)
+    assert before.body != after.body and case_key(before) != case_key(after)
+
+
+TUMOUR = {"name": "tumour", "at": ["0 mm"] * 3, "radius": "3 mm", "young": "1 kPa", "poisson": 0.3}
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"fixed": "bottom"}, "below"),
+        ({"file": "none.stl"}, "cannot be read"),
+        ({"unit": "inch"}, "unit"),
+        ({"unit": None}, "unit"),
+({"inclusion": [TUMOUR]}, "inclusions in a surface"),
+        ({"fixed": {"below": "-70 mm"}}, "inside the body"),
+    ],
+)  # fmt: skip
+def test_what_makes_no_sense_is_refused(folder, changes, words):
+    body = {
+        "shape": "surface",
+        "file": str(folder / "ellipsoid.stl"),
+        "unit": "mm",
+        "fixed": {"below": "-10 mm"},
+    } | changes
+    with pytest.raises(StudyError, match=words):
+        study(body={key: value for key, value in body.items() if value is not None})
+
+
+def test_a_file_is_sought_beside_the_study(folder):
+    from pipeline.study.load import load
+
+    (folder / "s.toml").write_text(
+        '[body]\nshape = "surface"\nfile = "ellipsoid.stl"\nunit = "mm"\nfixed = {below = "-10 mm"}\n'
+        '[material]\nyoung = "1 kPa"\npoisson = 0.3\n[probe]\nshape = "disc"\nradius = "3 mm"\ndepth = "0.1 mm"\n'
+        '[mesh]\naccuracy = "2 %"\n'
+    )
+    assert load(folder / "s.toml").case(()).body.extent == pytest.approx(120e-3, rel=2e-3)
