@@ -47,7 +47,7 @@ def _facets(lines: list[bytes], is_facet: np.ndarray, before: IntArray) -> tuple
     if any(b"/" in row for row in rows):
         rows = [b" ".join([corner.partition(b"/")[0] for corner in row.split()]) for row in rows]
     read = table(rows, _MARK)
-    if read is None or (read[0] != np.floor(read[0])).any() or (read[0] == 0).any():
+    if read is None or not np.isfinite(read[0]).all() or (read[0] != np.floor(read[0])).any() or (read[0] == 0).any():
         raise SurfaceError(_fault(lines, "f"))
     values, counts = read
     corners = values.astype(np.int64)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from pipeline.shapes.arrays import FloatArray, IntArray, np
-from pipeline.shapes.files.raw import Raw, limit, numbers, triangulate
+from pipeline.shapes.files.raw import Raw, limit, numbers, triangulate, whole
 from pipeline.shapes.triangles import SurfaceError
 
 _TYPES = {
@@ -64,7 +64,8 @@ def parse(data: bytes) -> Raw:
 def _coordinates(values: dict[str, FloatArray]) -> FloatArray:
     if not {"x", "y", "z"} <= set(values):
         raise SurfaceError(f"its points have {', '.join(values)}, wanted are x, y and z")
-    return np.column_stack([values[name] for name in "xyz"]).astype(np.float64)
+    with np.errstate(invalid="ignore"):  # what is not finite is told of later
+        return np.column_stack([values[name] for name in "xyz"]).astype(np.float64)
 
 
 def _header(data: bytes) -> tuple[str, list[_Element], int]:
@@ -164,11 +165,11 @@ def _read(source: _Text | _Binary, element: _Element) -> _Values:
         if not p.count:
             values[p.name] = next(left)[:, 0]
             continue
-        counts, entries = next(left)[:, 0].astype(np.int64), next(left)
+        counts, entries = whole(next(left)[:, 0]), next(left)
         if (counts != entries.shape[1]).any():
             source.position = start
             return _walk(source, element, element.rows)
-        lists[p.name] = entries.ravel().astype(np.int64), counts
+        lists[p.name] = whole(entries.ravel()), counts
     return values, lists
 
 
@@ -180,12 +181,12 @@ def _walk(source: _Text | _Binary, element: _Element, rows: int) -> _Values:
         for p in element.properties:
             (head,) = _taken(source, p.count or p.kind, 1, element)
             if p.count:
-                lists[p.name].append(_taken(source, p.kind, int(head), element))
+                lists[p.name].append(_taken(source, p.kind, int(whole(np.array([head]))[0]), element))
             else:
                 values[p.name].append(head)
     none = np.empty(0)
     return {name: np.array(column) for name, column in values.items()}, {
-        name: (np.concatenate([none, *column]).astype(np.int64), np.array([len(c) for c in column], dtype=np.int64))
+        name: (whole(np.concatenate([none, *column])), np.array([len(c) for c in column], dtype=np.int64))
         for name, column in lists.items()
     }
 

@@ -53,6 +53,18 @@ def table(rows: list[bytes], mark: float) -> tuple[FloatArray, IntArray] | None:
     return np.delete(values, ends), counts
 
 
+def whole(values: FloatArray) -> IntArray:
+    """Return numbers of points.
+
+    Raises:
+        SurfaceError: if one of them is not a whole number.
+    """
+    wrong = ~np.isfinite(values) | (values != np.floor(values))
+    if wrong.any():
+        raise SurfaceError(f"a facet has point {values[wrong][0]:g}, which is no number of a point: export it again")
+    return values.astype(np.int64)
+
+
 def is_number(word: bytes) -> bool:
     """Tell whether a word is a number."""
     try:
@@ -82,7 +94,8 @@ def triangulate(points: FloatArray, corners: IntArray, counts: IntArray) -> IntA
     for count in np.unique(counts):
         (which,) = np.nonzero(counts == count)
         polygons = corners[starts[which][:, None] + np.arange(count)]
-        groups.append(_fans(points, polygons).reshape(-1, 3))
+        with np.errstate(all="ignore"):  # what is not finite is told of later
+            groups.append(_fans(points, polygons).reshape(-1, 3))
         order.append(np.repeat(which, count - 2))
     return np.concatenate(groups)[np.argsort(np.concatenate(order), kind="stable")]
 

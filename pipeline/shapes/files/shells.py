@@ -17,7 +17,7 @@ def largest_shell(points: FloatArray, facets: IntArray, unit: float, most: float
         return facets, []
     volumes = np.abs(shell_volumes(points, facets, shell, count))
     largest = int(volumes.argmax())
-    share = float(volumes.sum() / volumes[largest]) - 1
+    share = float(volumes.sum() / volumes[largest]) - 1 if volumes[largest] else np.inf
     if share > most:
         check_shells(points, edges, unit)
     kept = facets[shell == largest]

@@ -32,7 +32,8 @@ def _binary(data: bytes, count: int) -> FloatArray:
     limit(count)
     facet = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
     facets = np.frombuffer(data, facet, count, _HEADER)
-    return facets["corners"].reshape(-1, 3).astype(np.float64)
+    with np.errstate(invalid="ignore"):  # what is not finite is told of later
+        return facets["corners"].reshape(-1, 3).astype(np.float64)
 
 
 def _binary_of_another_length(data: bytes, promised: int) -> tuple[FloatArray, tuple[str, ...]]:

@@ -164,6 +164,7 @@ def corpus() -> list[Broken]:
         Broken(
             "cloud.ply", _changed(ply(good, "ascii"), b"element face", b"element edge"), ("no surface", "vertex, edge")
         ),
+        Broken("fraction.ply", _changed(ply(good, "ascii"), b"\n3 ", b"\n3.5 "), ("no number of a point",)),
         Broken("format.ply", _changed(ply(good, "ascii"), b"ascii", b"morse"), ("`format morse 1.0`",)),
         Broken("flat.ply", _changed(ply(good, "ascii"), b"float z", b"float w"), ("x, y, w", "wanted are x, y and z")),
         Broken("words.ply", ply(good, "ascii").replace(b".", b","), ("no number",)),
