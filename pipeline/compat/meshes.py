@@ -35,7 +35,17 @@ def _coordinate_element(cell: str, order: int, dim: int) -> Any:
         # ffcx 0.5 writes this variant into the element when it first compiles a form on the mesh, which changes the
         # name under which every later form on it is looked up in the cache.
         return ufl.VectorElement("Lagrange", cell, order, dim=dim, variant="equispaced")
-    return basix.ufl.element("Lagrange", cell, order, shape=(dim,))
+    # Up to order 2 all variants are the same, and have one name.
+    variant = {"lagrange_variant": basix.LagrangeVariant.equispaced} if order > 2 else {}
+    return basix.ufl.element("Lagrange", cell, order, shape=(dim,), **variant)
+
+
+def triangle_nodes(order: int) -> np.ndarray:
+    """Return where the nodes of a triangle of a mesh of ``order`` are on the reference triangle, (k, 2)."""
+    element = basix.create_element(
+        basix.ElementFamily.P, basix.CellType.triangle, order, basix.LagrangeVariant.equispaced
+    )
+    return np.asarray(element.points)
 
 
 def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray, order: int) -> Any:

@@ -10,9 +10,10 @@ of ten metres give the same mesh.
 """
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import hypot, inf
+from math import hypot, inf, isqrt
 from typing import Any, Literal
 
 import dolfinx
@@ -24,6 +25,8 @@ from pipeline.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pipeline.mesh.boxes import halve_boxes, triangulate
 from pipeline.scene.model import CUT, FIXED, FREE, PROBE
 
+Corner = tuple[float, float]
+
 AXIS = "axis"
 JOINT = "joint"
 
@@ -31,6 +34,39 @@ JOINT = "joint"
 _MOST_SLENDER = 1000
 # Where two held faces meet the displacement goes like r to a power between 1 (ν = 0.5) and 1.7, and not 1/2.
 _MILD = 1e3
+
+
+@dataclass(frozen=True)
+class Grading:
+    """Element size: ``floor`` at the probe's edge, growing by ``growth`` per unit of distance, at most ``cap``.
+
+    ``floor`` is in units of a, ``cap`` in units of the smaller of the body's height and radius, or of a thousandth
+    of the larger. At an edge of the support at distance D the floor is larger by (D/a)², as the square of the strain
+    there is smaller.
+    """
+
+    floor: float = 1e-6
+    growth: float = 1.0
+    cap: float = 4.0
+
+
+@dataclass(frozen=True)
+class MeridianArrays:
+    """A mesh of the meridian, in units of ``unit`` metres.
+
+    ``points`` (n, 2) holds (r, z), ``cells`` (m, 3) the triangles, ``regions`` (m,) what each is made of; ``facets``
+    maps the name of a group of the boundary to its edges (k, 2); ``singular`` (s, 2) are the points to which the mesh
+    is graded. Of a higher ``order`` cells have more nodes, the corners first, in the order of the elements' own.
+    """
+
+    points: FloatArray
+    cells: IntArray
+    regions: IntArray
+    facets: dict[str, IntArray]
+    singular: FloatArray
+    unit: float
+    seconds: float
+    order: int = 1
 
 
 @dataclass(frozen=True)
@@ -81,37 +117,9 @@ class Meridian:
         """Whether the bottom face is held."""
         return "bottom" in self.fixed if isinstance(self.fixed, str) else self.fixed >= -self.height
 
-
-@dataclass(frozen=True)
-class Grading:
-    """Element size: ``floor`` at the probe's edge, growing by ``growth`` per unit of distance, at most ``cap``.
-
-    ``floor`` is in units of a, ``cap`` in units of the smaller of the body's height and radius, or of a thousandth
-    of the larger. At an edge of the support at distance D the floor is larger by (D/a)², as the square of the strain
-    there is smaller.
-    """
-
-    floor: float = 1e-6
-    growth: float = 1.0
-    cap: float = 4.0
-
-
-@dataclass(frozen=True)
-class MeridianArrays:
-    """A mesh of the meridian, in units of ``unit`` metres.
-
-    ``points`` (n, 2) holds (r, z), ``cells`` (m, 3) the triangles, ``regions`` (m,) what each is made of; ``facets``
-    maps the name of a group of the boundary to its edges (k, 2); ``singular`` (s, 2) are the points to which the mesh
-    is graded.
-    """
-
-    points: FloatArray
-    cells: IntArray
-    regions: IntArray
-    facets: dict[str, IntArray]
-    singular: FloatArray
-    unit: float
-    seconds: float
+    def mesh(self, grading: Grading) -> MeridianArrays:
+        """Mesh the half plane."""
+        return generate_meridian(self, grading)
 
 
 def generate_meridian(meridian: Meridian, grading: Grading) -> MeridianArrays:
@@ -122,7 +130,8 @@ def generate_meridian(meridian: Meridian, grading: Grading) -> MeridianArrays:
     points, cells, box = triangulate(boxes)
     layer = np.sum(boxes[box, 2, None] < np.array(_interfaces(meridian)), axis=1)  # as many interfaces are above it
     regions = np.where((layer < len(meridian.interfaces)) | meridian.is_filled, layer + 1, 0)
-    facets = _name_edges(meridian, points)
+    corners, groups = _outline(meridian)
+    facets = name_edges(list(zip(corners, [*corners[1:], corners[0]], groups, strict=True)), points)
     places = np.array([(r, z) for r, z, _ in singular]).reshape(-1, 2)
     return MeridianArrays(points, cells, regions, facets, places, meridian.unit, time.perf_counter() - start)
 
@@ -153,13 +162,13 @@ def meridian_mesh(arrays: MeridianArrays) -> tuple[Any, dict[str, Int32Array]]:
 
     What of its boundary is in no group of the body's is where it is joined to other regions.
     """
-    mesh = compat.create_mesh(MPI.COMM_SELF, arrays.cells, arrays.points, order=1)
+    mesh = compat.create_mesh(MPI.COMM_SELF, arrays.cells, arrays.points, arrays.order)
     topology = mesh.topology
     for dims in ((1, 2), (1, 0), (2, 0)):
         topology.create_connectivity(*dims)
     exterior = np.asarray(dolfinx.mesh.exterior_facet_indices(topology), dtype=np.int32)
     node_of_vertex = np.empty(topology.index_map(0).size_local, dtype=np.int64)
-    node_of_vertex[topology.connectivity(2, 0).array] = compat.geometry_dofs(mesh).reshape(-1)
+    node_of_vertex[topology.connectivity(2, 0).array] = compat.geometry_dofs(mesh)[:, :3].reshape(-1)
     number = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)[node_of_vertex]
     ends = number[topology.connectivity(1, 0).array.reshape(-1, 2)[exterior]]
 
@@ -170,15 +179,34 @@ def meridian_mesh(arrays: MeridianArrays) -> tuple[Any, dict[str, Int32Array]]:
     return mesh, facets | {JOINT: np.setdiff1d(exterior, np.concatenate([*facets.values()]))}
 
 
-def _ratio(length: float, unit: float) -> float:
+def name_edges(sides: Sequence[tuple[Corner, Corner, str]], points: FloatArray) -> dict[str, IntArray]:
+    """Return the edges along ``sides``, each from one corner to another and of a group, by group."""
+    facets: dict[str, list[IntArray]] = {}
+    for start, end, name in sides:
+        fixed = 0 if start[0] == end[0] else 1
+        low, high = sorted((start[1 - fixed], end[1 - fixed]))
+        along = points[:, 1 - fixed]
+        (chosen,) = np.nonzero((points[:, fixed] == start[fixed]) & (along >= low) & (along <= high))
+        chosen = chosen[np.argsort(along[chosen])]
+        facets.setdefault(name, []).append(np.column_stack([chosen[:-1], chosen[1:]]))
+    return {name: np.vstack(edges) for name, edges in facets.items()}
+
+
+def mesh_order(mesh: Any) -> int:
+    """Return the order of the triangles of a mesh, which have (n + 1)(n + 2)/2 nodes."""
+    return (isqrt(8 * compat.geometry_dofs(mesh).shape[1] + 1) - 3) // 2
+
+
+def ratio(length: float, unit: float) -> float:
+    """Return ``length`` in units of ``unit``, rounded to 12 digits."""
     return float(f"{length / unit:.12g}")
 
 
 def _outline(meridian: Meridian) -> tuple[list[tuple[float, float]], list[str]]:
     """Corners of the meridian in units of a, counter-clockwise, and the group of the edge that starts at each."""
     a = meridian.unit
-    radius, height = _ratio(meridian.kept_radius, a), _ratio(meridian.height, a)
-    level = _ratio(meridian.held_below, a)
+    radius, height = ratio(meridian.kept_radius, a), ratio(meridian.height, a)
+    level = ratio(meridian.held_below, a)
     corners, groups = [(0.0, -height)], [FIXED if meridian.bottom_held else FREE]
     outer = CUT if meridian.is_cut else FREE
     if level > -height:
@@ -201,7 +229,7 @@ def _outline(meridian: Meridian) -> tuple[list[tuple[float, float]], list[str]]:
 
 def _interfaces(meridian: Meridian) -> list[float]:
     """Heights at which one layer ends and the next begins, in units of a, from the top."""
-    return [_ratio(height, meridian.unit) for height in meridian.interfaces]
+    return [ratio(height, meridian.unit) for height in meridian.interfaces]
 
 
 def _singular_points(meridian: Meridian) -> list[tuple[float, float, float]]:
@@ -246,17 +274,3 @@ def _boxes(meridian: Meridian, singular: list[tuple[float, float, float]], gradi
 
     layers = [(0.0, r_end, low, high) for high, low in pairwise(ends)]
     return halve_boxes(np.array(layers), marks, judge)
-
-
-def _name_edges(meridian: Meridian, points: FloatArray) -> dict[str, IntArray]:
-    """Return the edges along the outline, by group."""
-    corners, groups = _outline(meridian)
-    facets: dict[str, list[IntArray]] = {}
-    for start, end, name in zip(corners, [*corners[1:], corners[0]], groups, strict=True):
-        fixed = 0 if start[0] == end[0] else 1
-        low, high = sorted((start[1 - fixed], end[1 - fixed]))
-        along = points[:, 1 - fixed]
-        (chosen,) = np.nonzero((points[:, fixed] == start[fixed]) & (along >= low) & (along <= high))
-        chosen = chosen[np.argsort(along[chosen])]
-        facets.setdefault(name, []).append(np.column_stack([chosen[:-1], chosen[1:]]))
-    return {name: np.vstack(edges) for name, edges in facets.items()}

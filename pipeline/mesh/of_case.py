@@ -5,6 +5,7 @@ from math import inf
 from time import perf_counter
 
 from pipeline.mesh.curve import curve
+from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.generate import MeshArrays, MeshError, generate
 from pipeline.mesh.meridian import Meridian
 from pipeline.mesh.organ.base import Kept, far_surface
@@ -13,6 +14,7 @@ from pipeline.mesh.reflect import reflect
 from pipeline.mesh.size import Sizes
 from pipeline.plan.symmetry import mirror_planes
 from pipeline.scene.model import Scene
+from pipeline.shapes.half_plane import HalfEllipse, Rectangle
 from pipeline.shapes.scanned import Scanned
 from pipeline.study.sweep import Case
 
@@ -51,16 +53,17 @@ def sizes_of(case: Case) -> Sizes:
     return Sizes(epsilon, mesh.fine, mesh.coarse, mesh.rim_size(case.probe.half_width), mesh.growth, side)
 
 
-def meridian_of(case: Case) -> Meridian:
+def meridian_of(case: Case) -> Meridian | EllipticMeridian:
     """Return the half plane of a round case.
 
     Raises:
         ValueError: if its body is not round.
     """
-    body = case.body.half_plane()
-    if body is None:
-        raise ValueError(f"a {case.body.shape} has no half plane")
-    fixed = case.body.support.on_half_plane()
+    body, fixed = case.body.half_plane(), case.body.support.on_half_plane()
+    if isinstance(body, HalfEllipse) and isinstance(fixed, float) and not case.is_truncated:
+        return EllipticMeridian(body.radius, body.semi_height, case.probe.circumradius, fixed)
+    if not isinstance(body, Rectangle):
+        raise ValueError(f"this {case.body.shape} has no half plane")
     held = case.is_truncated and case.mesh.outside == "fixed"
     return Meridian(
         body.radius, body.height, case.probe.circumradius, fixed, case.column, held, body.interfaces, body.is_filled

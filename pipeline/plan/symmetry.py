@@ -7,6 +7,7 @@ from functools import lru_cache
 from itertools import pairwise
 
 from pipeline.shapes.body import Body
+from pipeline.shapes.half_plane import HalfEllipse
 from pipeline.shapes.probe import PLANES, Probe
 from pipeline.study.sweep import Case
 
@@ -33,7 +34,8 @@ def is_round(case: Case) -> bool:
         return False
     upright = frame.point[:2] == _ON_AXIS and frame.axis[:2] == _ON_AXIS and case.travel[:2] == _ON_AXIS
     is_same = probe.is_round and body.half_plane() is not None and body.support.is_round()
-    return upright and is_same and not _is_held_below_stiffer(case)
+    is_whole = not case.is_truncated or not isinstance(body.half_plane(), HalfEllipse)
+    return upright and is_same and is_whole and not _is_held_below_stiffer(case)
 
 
 def _is_held_below_stiffer(case: Case) -> bool:

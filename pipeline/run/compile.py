@@ -5,6 +5,7 @@ from collections.abc import Collection
 from mpi4py import MPI
 
 from pipeline.plan.steps import Solve
+from pipeline.shapes.half_plane import HalfEllipse
 from pipeline.solve.axisymmetric import compile_axisymmetric
 from pipeline.solve.cache import compiling
 from pipeline.solve.forms import compile_elastic
@@ -21,12 +22,7 @@ _compiled: set[tuple[str, int, bool]] = set()
 def prepare(comm: MPI.Comm, solves: Collection[Solve]) -> None:
     """Compile what ``solves`` need and the cache does not have; collective."""
     if comm.rank == 0:
-        needed = {
-            ("axisymmetric", 0, False)
-            if s.axisymmetric
-            else (s.case.element, s.case.mesh.degree, bool(s.case.body.regions))
-            for s in solves
-        }
+        needed = {_forms(solve) for solve in solves}
         if missing := needed - _compiled:
             with compiling():
                 for element, degree, of_regions in sorted(missing):
@@ -35,9 +31,17 @@ def prepare(comm: MPI.Comm, solves: Collection[Solve]) -> None:
     comm.barrier()
 
 
+def _forms(solve: Solve) -> tuple[str, int, bool]:
+    """Return what tells the forms of a solve from others: element, degree, and whether there are regions."""
+    body, mesh = solve.case.body, solve.case.mesh
+    if solve.axisymmetric:
+        return "elliptic" if isinstance(body.half_plane(), HalfEllipse) else "axisymmetric", 0, False
+    return solve.case.element, mesh.degree, bool(body.regions)
+
+
 def _compile(element: str, degree: int, *, of_regions: bool) -> None:
-    if element == "axisymmetric":
-        compile_axisymmetric()
+    if element in ("axisymmetric", "elliptic"):
+        compile_axisymmetric(curved=element == "elliptic")
         return
     library()
     compiles()

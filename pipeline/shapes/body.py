@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from pipeline.shapes.arrays import FloatArray
 from pipeline.shapes.frame import Frame, Units, Vector
-from pipeline.shapes.half_plane import Rectangle
+from pipeline.shapes.half_plane import HalfPlane
 from pipeline.shapes.regions import Inclusion, Layer, Region
 from pipeline.shapes.section import Section, Words
 from pipeline.shapes.support import Fixed, Support, support_of
@@ -121,7 +121,7 @@ class Body(Section, ABC):
         """Return the planes, of x = 0 ("x") and y = 0 ("y"), in which its shape is its own image."""
 
     @abstractmethod
-    def half_plane(self) -> Rectangle | None:
+    def half_plane(self) -> HalfPlane | None:
         """Return its half plane if it and its regions are the same all round the z axis, None if they are not."""
 
     # ---- geometry -------------------------------------------------------------------------------------

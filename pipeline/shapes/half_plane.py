@@ -15,3 +15,14 @@ class Rectangle:
     height: float
     interfaces: tuple[float, ...] = ()
     is_filled: bool = False
+
+
+@dataclass(frozen=True)
+class HalfEllipse:
+    """Of an ellipsoid about the origin: semi-axes ``radius`` across the z axis and ``semi_height`` along it (m)."""
+
+    radius: float
+    semi_height: float
+
+
+HalfPlane = Rectangle | HalfEllipse

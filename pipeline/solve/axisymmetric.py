@@ -18,12 +18,12 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray, Int32Array
+from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import (
     AXIS,
     Grading,
     Meridian,
     MeridianArrays,
-    generate_meridian,
     meridian_mesh,
     split_regions,
 )
@@ -54,6 +54,8 @@ _MOST_REFINEMENTS, _BALANCED = 20, 1e-9
 _STRAIN_DISTANCE = 0.1
 
 
+# The half planes that are solved on.
+HalfPlane = Meridian | EllipticMeridian
 # Of each region of a body, by its number: its mesh and the facets of each group.
 Meshes = dict[int, tuple[Any, dict[str, Int32Array]]]
 
@@ -64,7 +66,7 @@ class MeridianProblem:
     A context manager, like other problems; it holds nothing between solves, each of which makes meshes of its own.
     """
 
-    def __init__(self, meridian: Meridian, conditions: Conditions, *, accuracy: float = 1e-5, degree: int = DEGREE):
+    def __init__(self, meridian: HalfPlane, conditions: Conditions, *, accuracy: float = 1e-5, degree: int = DEGREE):
         """Prepare to refine until the error bar is at most ``accuracy``; ``degree`` is 3 at least."""
         self._meridian, self._bonded = meridian, conditions.bonded
         self._accuracy, self._degree = accuracy, degree
@@ -103,7 +105,7 @@ class MeridianProblem:
         clock, best, failure = _Clock(), None, SolveError("no mesh was tried")
         for grading in _GRADINGS:
             try:
-                arrays = generate_meridian(self._meridian, grading)
+                arrays = self._meridian.mesh(grading)
                 found = _solve_on(arrays, law, self._bonded, self._degree, clock)
             except _Unbalanced as error:
                 # Round-off grows with refinement: a finer mesh would do no better.
@@ -130,9 +132,10 @@ class MeridianProblem:
         )  # fmt: skip
 
 
-def compile_axisymmetric(degree: int = DEGREE) -> None:
+def compile_axisymmetric(degree: int = DEGREE, *, curved: bool = False) -> None:
     """Compile every form that a :class:`MeridianProblem` needs, on this process; call it within ``compiling()``."""
-    mesh, facets = meridian_mesh(generate_meridian(Meridian(2.0, 1.0, 1.0), Grading(1.0)))
+    example: HalfPlane = EllipticMeridian(2.0, 2.0, 1.0, 0.0) if curved else Meridian(2.0, 1.0, 1.0)
+    mesh, facets = meridian_mesh(example.mesh(Grading(1.0)))
     for mixed in (False, True):
         for p in (degree - 1, degree):
             MeridianForms(mesh, facets, p, mixed)

@@ -23,7 +23,7 @@ from scipy.spatial import cKDTree
 
 from pipeline import compat
 from pipeline.arrays import FloatArray, Int32Array, IntArray
-from pipeline.mesh.meridian import JOINT
+from pipeline.mesh.meridian import JOINT, mesh_order
 from pipeline.solve.compiled import cellwise_space, form, taylor_hood_space, vector_space
 from pipeline.solve.linear import SolveError
 
@@ -41,8 +41,9 @@ class MeridianForms:
         self._compressibility = fem.Constant(mesh, 1.0)  # λ/μ, or μ/λ if mixed
         self.dofs = len(self._solution.x.array)
         r = ufl.SpatialCoordinate(mesh)[0]
-        # Of the integrands only u_r v_r/r is no polynomial; the others have degree 2p at most.
-        dx = ufl.dx(metadata={"quadrature_degree": 2 * degree + 1})
+        # Of the integrands only u_r v_r/r is no polynomial on straight cells; the others have degree 2p at most.
+        order = mesh_order(mesh)
+        dx = ufl.dx(metadata={"quadrature_degree": 2 * degree + order})
         trial, test = ufl.TrialFunction(self._space), ufl.TestFunction(self._space)
 
         def virtual_work(solution: Any) -> Any:
@@ -60,6 +61,7 @@ class MeridianForms:
         displacement = ufl.split(self._solution)[0] if mixed else self._solution
         cellwise = ufl.TestFunction(cellwise_space(mesh, (4,)))
         self._strains = form(ufl.inner(ufl.as_vector(_strain(displacement, r)), cellwise) * dx)
+        self._areas = form(ufl.TestFunction(cellwise_space(mesh, ())) * dx) if order > 1 else None
 
     def set_ratio(self, ratio: float) -> None:
         """Set λ/μ, which may be infinite if mixed, or there its inverse."""
@@ -100,8 +102,10 @@ class MeridianForms:
 
         They are those of the solution last given to ``residual``.
         """
-        corners = self._mesh.geometry.x[compat.geometry_dofs(self._mesh), :2]
+        corners = self._mesh.geometry.x[compat.geometry_dofs(self._mesh)[:, :3], :2]
         area = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 2
+        if self._areas is not None:
+            area = np.array(fem.assemble_vector(self._areas).array)
         rr, zz, tt, rz = (np.asarray(fem.assemble_vector(self._strains).array).reshape(-1, 4) / area[:, None]).T
         in_plane = np.abs(rr + zz) / 2 + np.hypot((rr - zz) / 2, rz)
         return np.maximum(in_plane, np.abs(tt)), corners
