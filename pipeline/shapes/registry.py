@@ -2,6 +2,7 @@
 
 from pipeline.shapes.bodies.box import Box
 from pipeline.shapes.bodies.cylinder import Cylinder
+from pipeline.shapes.bodies.image import FromImage
 from pipeline.shapes.bodies.surface import FromSurface
 from pipeline.shapes.body import Body
 from pipeline.shapes.probe import Probe
@@ -13,6 +14,7 @@ BODIES: dict[str, type[Body]] = {
     "box": Box,
     "cylinder": Cylinder,
     "surface": FromSurface,
+    "image": FromImage,
 }
 PROBES: dict[str, type[Probe]] = {
     "disc": Disc,
@@ -20,4 +22,4 @@ PROBES: dict[str, type[Probe]] = {
     "ellipse": Ellipse,
 }
 # Shapes of the format that this version does not compute: named as such, not as typing errors.
-LATER = {"body": ("ellipsoid", "cad", "image"), "probe": ("sphere", "cone", "wedge")}
+LATER = {"body": ("ellipsoid", "cad"), "probe": ("sphere", "cone", "wedge")}

@@ -9,6 +9,7 @@ from math import hypot, inf, isfinite
 from typing import cast
 
 from pipeline.shapes.body import Body
+from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section, in_mm
 from pipeline.study.problems import Problems
@@ -32,6 +33,10 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     """Check single sections, then those that must fit each other."""
     bodies, probes = cast(Sequence[Body], sections["body"]), cast(Sequence[Probe], sections["probe"])
     materials, meshes = cast(Sequence[Material], sections["material"]), cast(Sequence[Mesh], sections["mesh"])
+    for body in bodies:
+        if isinstance(body, FromFile):
+            for notice in body.notices:
+                problems.warn("body.file", body.file, notice)
     for probe in probes:
         _check_depth(probe, problems)
         _check_motion(probe, problems)

@@ -16,7 +16,7 @@ scenes = importlib.util.module_from_spec(_SPEC)
 _SPEC.loader.exec_module(scenes)
 
 # Bodies whose surface is a file's have studies of their own.
-OF_A_FILE = {"surface"}
+OF_A_FILE = {"surface", "image"}
 
 
 def test_page_is_what_the_studies_make_of_it():

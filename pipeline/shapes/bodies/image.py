@@ -1,0 +1,43 @@
+"""A body that is a label of a segmented image."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import Field
+
+from pipeline.shapes.files.image import load_image
+from pipeline.shapes.files.read import Loaded
+from pipeline.shapes.from_file import UNITS, FromFile
+from pipeline.shapes.section import Words
+from pipeline.units import Travel
+
+
+class FromImage(FromFile):
+    """The voxels of one label, in the patient's frame: x to the right, y to the front, z to the head."""
+
+    READ_BY: ClassVar[frozenset[str]] = frozenset({"label", "unit", "smooth"})
+
+    shape: Literal["image"]
+    label: Annotated[int, Field(gt=0, exclude=True), Words("Number of the voxels that are the body.", "1")]
+    unit: Annotated[
+        Literal["m", "cm", "mm", "um", "µm"] | None,
+        Field(exclude=True),
+        Words("Unit of the image's frame, where its header names none.", '"mm"', "the header's"),
+    ] = None
+    smooth: Annotated[
+        Travel | None,
+        Field(exclude=True),
+        Words(
+            "Standard deviation of the filter that takes the steps of the voxels off; its level keeps the volume.",
+            '"2 mm"',
+            "one and a half voxels, or the distance of thick slices",
+        ),
+    ] = None
+    file: Annotated[str, Words("Label map, NIfTI or NRRD: its path from the folder of the study.", '"liver.nii.gz"')]
+
+    @classmethod
+    def load(cls, file: str, given: Mapping[str, Any]) -> Loaded:
+        """Return the surface round the label."""
+        unit = UNITS[given["unit"]] if given["unit"] else None
+        return load_image(Path(file), given["label"], unit, given["smooth"])
