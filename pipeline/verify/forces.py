@@ -27,7 +27,7 @@ _NEAR_HALF = (0.49, 0.499, 0.4999, 0.5)
 
 def scene_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
     """Yield the rows of all scenes, as they are solved; ``quick`` leaves a few of each kind; collective."""
-    for compare in (_half_space, _rectangles, _ellipses, _cylinders, _layers, _incompressible):
+    for compare in (_half_space, _rectangles, _ellipses, _cylinders, _layers, _incompressible, _layered):
         yield from compare(comm, quick)
 
 
@@ -104,6 +104,21 @@ def _incompressible(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
             flat, bar, message = _force(comm, "2D", scene)
             yield _row(
                 comm, f"cylinder R = H = 20 mm, a = 2 mm, {contact}, ν = {nu:g}", "3D", flat,
+                f"axisymmetric, bar {bar:.0e} {message}".strip(), bar, **scene,
+            )  # fmt: skip
+
+
+def _layered(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
+    """Cylinders of several materials, both paths against each other: two dimensions are the reference."""
+    bone = {"name": "bone", "thickness": "4 mm", "young": "1 MPa", "poisson": 0.3}
+    soft = {"name": "soft", "thickness": "2 mm", "young": "1 kPa", "poisson": 0.3}
+    kinds = {"soft on firm": [soft], "soft on bone": [soft, bone]}
+    for name, layers in [*kinds.items()][: 1 if quick else None]:
+        for contact in ("bonded", "frictionless"):
+            scene = {"body": _cylinder(20, 20) | {"layers": layers}, "poisson": 0.45, "probe": _disc(2, contact)}
+            flat, bar, message = _force(comm, "2D", scene)
+            yield _row(
+                comm, f"cylinder of layers, {name}, a = 2 mm, {contact}", "3D", flat,
                 f"axisymmetric, bar {bar:.0e} {message}".strip(), bar, **scene,
             )  # fmt: skip
 
