@@ -28,7 +28,7 @@ _LONGEST = 240
 def checkout(tmp_path_factory):
     """A folder like a checkout after ``make setup`` and a run of the quick study; nothing in it is the real one."""
     root = tmp_path_factory.mktemp("checkout")
-    for name in ("studies", "notebooks"):
+    for name in ("studies", "notebooks", "meshes"):
         shutil.copytree(ROOT / name, root / name)
     (root / "Makefile").symlink_to(ROOT / "Makefile")
     commands = {

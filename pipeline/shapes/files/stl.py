@@ -59,6 +59,8 @@ def _text(data: bytes) -> FloatArray:
     """Return the corners (3m, 3) of facets written as text, one ``solid`` after another."""
     content = data.lower()
     count = content.count(b"endfacet")
+    if not count and b"facet" not in content and b"endsolid" in content:
+        raise SurfaceError("has no facets: export the surface, not an empty scene")
     limit(count)
     bare = _without_names(content)
     if content.rfind(b"endsolid") <= content.rfind(b"endfacet"):

@@ -170,6 +170,7 @@ def corpus() -> list[Broken]:
         Broken("words.ply", ply(good, "ascii").replace(b".", b","), ("no number",)),
         Broken("wrong-point.ply", ply((good[0], good[1] + 1)), ("a facet has point 642", "0 to 641")),
         Broken("line.ply", ply((good[0], good[1][:, :2])), ("2 corners",)),
+        Broken("none-text.stl", b"solid organ\nendsolid organ\n", ("has no facets",)),
         Broken("none.stl", stl((good[0], good[1][:0])), ("no facets",)),
         Broken("none.ply", ply((good[0], good[1][:0])), ("no facets",)),
         Broken("huge.ply", _changed(ply(good), b"face 1280", b"face 4000000"), ("4,000,000 facets", "Decimation")),
