@@ -4,7 +4,7 @@ The long names and units of a dataset, the labels of the command line, the words
 them are from here. Values are SI; people read mm, kPa, mN and per cent.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isnan, pi
 from typing import Literal
 
@@ -104,6 +104,15 @@ _RESULTS = (
     Quantity("origin", "", "how the force was obtained", "origin"),
     Quantity("force_exact_message", "", "why there is no force_exact"),
 )  # fmt: skip
+# Those of a layer or an inclusion, whose name comes before: skin_young.
+_OF_PIECES = (
+    Quantity("young", "Pa", "Young's modulus", "E", "Young's modulus E"),
+    Quantity("poisson", "1", "Poisson's ratio", "ν", "Poisson's ratio ν"),
+    Quantity("thickness", "m", "thickness"),
+    Quantity("radius", "m", "radius"),
+    Quantity("at", "", "centre"),
+    Quantity("axes", "", "semi-axes"),
+)
 QUANTITIES = {quantity.name: quantity for quantity in (*_MESH, *_SCENE, *_RESULTS)}
 MESH_DIMENSIONS = tuple(quantity.name for quantity in _MESH)
 
@@ -112,6 +121,18 @@ _READ = {
     "m": (1e3, "mm"), "Pa": (1e-3, "kPa"), "N": (1e3, "mN"), "J": (1e6, "µJ"), "bytes": (1e-6, "MB"),
     "rad": (180 / pi, "°"), "1": (1.0, ""),
 }  # fmt: skip
+
+
+def quantity_of(name: str) -> Quantity | None:
+    """Return the quantity of that name, those of layers and inclusions, too; None if there is none."""
+    owner, _, key = name.rpartition("_")
+    if name in QUANTITIES or not owner:
+        return QUANTITIES.get(name)
+    found = next((quantity for quantity in _OF_PIECES if quantity.name == key), None)
+    if found is None:
+        return None
+    symbol, axis = (f"{text} of {owner}" if text else "" for text in (found.symbol or key, found.axis))
+    return replace(found, name=name, meaning=f"{found.meaning} of {owner}", symbol=symbol, axis=axis)
 
 
 def attributes(name: str) -> dict[str, str]:
@@ -126,7 +147,7 @@ def readable(name: str, unit: str | None = None) -> tuple[float, str]:
 
     ``unit`` is for a quantity that the table may not hold; without either, a value is written as it is.
     """
-    quantity = QUANTITIES.get(name)
+    quantity = quantity_of(name)
     if quantity and quantity.in_per_cent:
         return 100.0, "%"
     if unit is None:
@@ -146,5 +167,5 @@ def write(name: str, value: Value, unit: str | None = None) -> str:
 
 def symbol(name: str) -> str:
     """Return the letter or the word for a quantity."""
-    quantity = QUANTITIES.get(name)
+    quantity = quantity_of(name)
     return (quantity.symbol if quantity else "") or name.replace("_", " ")

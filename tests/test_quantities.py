@@ -4,7 +4,7 @@ from math import inf, nan, pi
 
 import pytest
 
-from pipeline.quantities import MESH_DIMENSIONS, QUANTITIES, symbol, write
+from pipeline.quantities import MESH_DIMENSIONS, QUANTITIES, quantity_of, symbol, write
 from pipeline.study.schema import Mesh
 from tests.cases import study
 
@@ -49,3 +49,14 @@ def test_cases_are_named_in_the_units_of_their_axes():
     case = study(probe={"radius": ["2 mm", "3 mm"]}, material={"young": ["10 kPa", "20 kPa"]}).case((0, 1))
     assert case.words == {"young": "10 kPa", "probe_radius": "3 mm"}
     assert str(case) == "young = 10 kPa, probe_radius = 3 mm"
+
+
+def test_keys_of_layers_and_inclusions_are_read_like_others():
+    assert write("skin_young", 60e3) == "60 kPa"
+    assert write("tumour_radius", 4e-3) == "4 mm"
+    assert (symbol("skin_young"), symbol("skin_thickness")) == ("E of skin", "thickness of skin")
+    found = quantity_of("inner_skin_poisson")
+    assert found is not None
+    assert (found.unit, found.meaning) == ("1", "Poisson's ratio of inner_skin")
+    assert quantity_of("body_radius").meaning == "radius of the body"
+    assert quantity_of("young_man") is None

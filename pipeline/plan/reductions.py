@@ -6,10 +6,11 @@ from dataclasses import replace
 from pipeline.plan.key import case_key, digest
 from pipeline.plan.steps import OperatorStep, Solve, mesh_steps
 from pipeline.plan.symmetry import is_round, model_planes
-from pipeline.plan.work import Plan
+from pipeline.plan.work import Plan, Struck
 
 # Fewer Poisson's ratios than this are solved one by one: a basis needs about five solutions itself.
 _FEWEST_RATIOS = 8
+_SEVERAL_MATERIALS = "No reduced basis: a body of several materials has more parameters than one, and each is solved."
 
 
 def strike_past_body(plan: Plan) -> Plan:
@@ -70,6 +71,9 @@ def use_reduced_basis(plan: Plan) -> Plan:
     }  # fmt: skip
     solves = tuple(replace(s, key=many[s.key], reduced=True) if s.key in many else s for s in plan.solves)
     plan = replace(plan, solves=solves, keys=tuple(many.get(key, key) for key in plan.keys))
+    left = sum(len(o.solves) for step in plan.meshes for o in step.operators if _suits_a_basis(o, of_regions=True))
+    if left and not many:
+        return replace(plan, struck=(*plan.struck, Struck("reduced", 0, _SEVERAL_MATERIALS)))
     return plan.struck_by("reduced", len(many), _reason(use_reduced_basis))
 
 
@@ -124,16 +128,16 @@ def _mirrored(solve: Solve) -> Solve:
     return replace(solve, mirrors=model_planes(solve.case)) if use else solve
 
 
-def _suits_a_basis(operator: OperatorStep) -> bool:
+def _suits_a_basis(operator: OperatorStep, *, of_regions: bool = False) -> bool:
     """Displacement elements depend on one parameter; and the bound is on the work of one movement, not on forces that
-    several take.
+    several take. ``of_regions`` asks of bodies of several materials, whose parameters are too many.
     """
     first = operator.solves[0]
-    ratios = {solve.case.material.poisson for solve in operator.solves}
-    if first.case.body.regions:  # several materials are several parameters
+    if bool(first.case.body.regions) != of_regions:
         return False
+    values = {solve.key if of_regions else solve.case.material.poisson for solve in operator.solves}
     plain = first.goal is None and not first.axisymmetric and first.case.element == "displacement"
-    return plain and len(ratios) >= _FEWEST_RATIOS and first.case.movements == 1
+    return plain and len(values) >= _FEWEST_RATIOS and first.case.movements == 1
 
 
 def _asks_for_accuracy_or_truncation(plan: Plan) -> bool:

@@ -14,7 +14,7 @@ from pipeline import __version__
 from pipeline.files import atomic
 from pipeline.plan.key import digest
 from pipeline.plan.plan import Plan
-from pipeline.quantities import QUANTITIES, attributes
+from pipeline.quantities import attributes, quantity_of
 from pipeline.run.record import Record
 from pipeline.study.sweep import Axis, Case
 
@@ -120,7 +120,7 @@ def _origin(plan: Plan, key: str, record: Record | None) -> str:
 
 
 def _coordinate(axis: Axis) -> Any:
-    known = QUANTITIES.get(axis.name)
+    known = quantity_of(axis.name)
     texts = {"long_name": known.meaning if known else f"{axis.path} of the study file"}
     if axis.unit:
         texts["units"] = axis.unit

@@ -39,7 +39,7 @@ def symbol(coordinate: xr.DataArray) -> str:
 def heading(array: xr.DataArray) -> str:
     """Return what an axis of a figure says: name and unit."""
     name = str(array.name)
-    known = quantities.QUANTITIES.get(name)
+    known = quantities.quantity_of(name)
     text = (known.axis if known else "") or str(array.attrs.get("long_name", name))
     unit = scale(array)[1]
     return f"{text} ({unit})" if unit else text

@@ -14,6 +14,7 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     from pipeline.solve.cache import compiling  # noqa: PLC0415 (the folder's face loads no solver)
     from pipeline.verify.elements import element_rows  # noqa: PLC0415
     from pipeline.verify.forces import scene_rows  # noqa: PLC0415
+    from pipeline.verify.regions import region_rows  # noqa: PLC0415
 
     found: list[Row] = []
     if comm.rank == 0:
@@ -21,3 +22,4 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
             found = list(element_rows(quick=quick))
     yield from comm.bcast(found)
     yield from scene_rows(comm, quick=quick)
+    yield from region_rows(comm, quick=quick)

@@ -64,6 +64,18 @@ def _name(scene: Section, mesh: Section) -> str:
     )
     sizes = f"rim {mesh['rim']} growth {mesh['growth']} fine {mesh['fine']}" if "rim" in mesh else "truth"
     return (
-        f"{body['shape']} {size} on its {body['fixed']}, {tool} {probe['contact']}, ν {scene['material']['poisson']:g},"
+        f"{body['shape']} {size} on its {body['fixed']}{_regions(body)}, {tool} {probe['contact']},"
+        f" ν {scene['material']['poisson']:g},"
         f" degree {mesh.get('degree', '-')} {sizes} ε {mesh.get('epsilon', '-')} {mesh.get('outside', '')}"
+    )
+
+
+def _regions(body: Section) -> str:
+    """Write what a body is made of besides its material."""
+    layers, inclusions = body.get("layers", ()), body.get("inclusion", ())
+    sizes = [piece["thickness"] for piece in layers]
+    sizes += [f"{p.get('radius') or ' × '.join(p['axes'])} at {' '.join(p['at'])}" for p in inclusions]
+    return "".join(
+        f", {piece['name']} {size} E {piece['young']} ν {piece['poisson']:g}"
+        for piece, size in zip((*layers, *inclusions), sizes, strict=True)
     )

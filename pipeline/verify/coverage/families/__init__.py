@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.verify.coverage.families import design, ellipses, proportions
+from pipeline.verify.coverage.families import design, ellipses, proportions, regions
 from pipeline.verify.coverage.families.dice import Section
 
 
@@ -25,4 +25,5 @@ FAMILIES: dict[str, Family] = {
     "design": Family(design.throw, design.TRUTH),
     "proportions": Family(proportions.throw, proportions.TRUTH),
     "ellipses": Family(ellipses.throw, ellipses.TRUTH),
+    "regions": Family(regions.throw, regions.TRUTH),
 }
