@@ -23,7 +23,8 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
     if solve.goal is not None and not solve.axisymmetric:
         half_width = case.probe.half_width
         graded = is_graded(case.mesh.rim_size(half_width) / half_width, case.mesh.growth)
-        solution = solution.extrapolated(case.mesh.degree, case.element, graded=graded)
+        of_regions = bool(case.body.regions)
+        solution = solution.extrapolated(case.mesh.degree, case.element, graded=graded, of_regions=of_regions)
     axis = case.frame.axis
     force = -sum(f * a for f, a in zip(solution.reaction, axis, strict=True))
     # The axis of a flat probe is z: other components of the force, whose bars may be unknown, are across it.

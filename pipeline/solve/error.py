@@ -31,6 +31,8 @@ _MOST = 0.9
 # F is at F_{p+1} - (centre ± spread) θ s on meshes graded to the edge, on others, and without quarter points.
 _LIMITS = {"displacement": (0.4, 0.25), "mixed": (0.5, 0.35)}
 _LIMITS_COARSE, _LIMITS_PLAIN = (0.4, 1.0), (0.85, 0.85)
+# Of several materials part of the error is from where they meet, of which the next degree takes another share.
+_LIMITS_REGIONS = {"displacement": (0.4, 0.4), "mixed": (0.5, 0.9)}
 # Graded to the edge: the coarsest that was measured, relative to the probe's half width, and the growth from there.
 _GRADED = (0.4, 0.7)
 
@@ -64,14 +66,16 @@ def stiffness_bars(stiffness: FloatArray, relative: FloatArray, *, apart: bool =
 
 def extrapolate(
     stiffness: FloatArray, decrements: FloatArray, bars: FloatArray, degree: int, element: str, *,
-    plain: float = 0.0, graded: bool = True,
+    plain: float = 0.0, graded: bool = True, of_regions: bool = False,
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Return the stiffness (n, n) that the degrees tend to, and the bars on its entries.
 
-    ``decrements`` is K_p - K_{p+1}, ``bars`` those on K_p: of each, the same share of F_p is left.
+    ``decrements`` is K_p - K_{p+1}, ``bars`` those on K_p: of each, the same share of F_p is left. ``of_regions``: the
+    body is of several materials.
     """
     theta = _theta(degree)
-    centre, spread = _LIMITS[element] if graded else _LIMITS_COARSE
+    limits = _LIMITS_REGIONS if of_regions else _LIMITS
+    centre, spread = limits[element] if graded else _LIMITS_COARSE
     if plain >= _PLAIN:
         centre, spread = _LIMITS_PLAIN
     relative = np.diag(bars) / np.abs(np.diag(stiffness))

@@ -1,7 +1,7 @@
 """Pressures that are continuous within each region of a body and jump from one to the next.
 
 The pressure of a mixed element is λ₁ div u: where λ jumps, so does it, and a continuous one would smear the jump over
-the cells on either side (measured: docs/accuracy.md).
+the cells on either side. Masses and Schur complements then weigh the dofs of each region, and nothing couples two.
 """
 
 from typing import Any

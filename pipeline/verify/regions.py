@@ -17,8 +17,8 @@ _ACCURACY = {"2D": "0.1 %", "3D": "0.3 %"}
 # Thickness (mm), Young's modulus (kPa) and Poisson's ratio, from the top down.
 _STACK = ((1.0, 60.0, 0.3), (2.0, 5.0, 0.4), (1.0, 20.0, 0.2))
 _INCOMPRESSIBLE_SKIN = ((1.0, 60.0, 0.49), (9.0, 5.0, 0.3))
-# Radii of a wide punch in units of the stack's height; what is left of the edge's part of F then is below 1 %.
-_WIDE, _LEFT = (2.5, 5.0, 10.0), 0.01
+# Radii of a wide punch in units of the stack's height; what is left of the edge's part of F then is below 0.2 %.
+_WIDE, _LEFT = (2.5, 5.0, 10.0), 0.002
 _DEPTH = 1e-5
 
 
