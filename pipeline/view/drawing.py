@@ -23,12 +23,16 @@ MM = 1e3
 _HALVINGS = 3
 # Half the height of the close-up, in radii of the footprint.
 _CLOSE = 2.2
+# The picture of the whole is so much larger than what is seen.
+_MARGIN = 1.05
 # Degrees between the faces at an edge of the body.
 _SHARP = 40
 # Length of what is drawn of the tool, in radii of the footprint, and how much of what is behind it is seen.
 _TOOL, _GLASS = 2.5, 0.35
 # What is nearer to 1 is one, of a unit vector's parts.
 _ALIGNED = 1 - 1e-9
+# Light that reaches every face alike, and where the rest comes from: of the cut the colours are those of the scale.
+_AMBIENT, _ABOVE, _BESIDE = 0.65, 0.6, 0.25
 _HELD = 0.45  # of the colour of what is held
 
 
@@ -56,6 +60,7 @@ class Drawing:
         self._fields, self._colouring = fields, colouring
         self._view = Viewpoint.of(fields.case.frame, fields.planes)
         self._contact = MM * fields.contact
+        self._outline = [MM * line for line in fields.outline]
         grid = self._opened(self._grid())
         # A clipped body's faces turn either way: the angle between two of them would not tell an edge.
         surface = grid.extract_surface(algorithm="dataset_surface").compute_normals(
@@ -77,25 +82,29 @@ class Drawing:
 
     def render(self, size: tuple[int, int], *, close: bool) -> npt.NDArray[np.uint8]:
         """Return a picture of ``size`` pixels (width, height), of the whole or ``close`` to the probe."""
-        plotter = pv.Plotter(off_screen=True, window_size=size)
+        plotter = pv.Plotter(off_screen=True, window_size=size, lighting="none")
+        view = self._view
+        light = view.front + _ABOVE * view.outward + _BESIDE * view.side
+        plotter.add_light(pv.Light(position=light, focal_point=(0, 0, 0), intensity=np.linalg.norm(light)))
         plotter.background_color = "white"
         plotter.enable_anti_aliasing("ssaa")
         colours = self._colouring
         plotter.add_mesh(
             self._surface, scalars="value", cmap=colours.cmap, clim=colours.limits, log_scale=colours.logarithmic,
-            lighting=False, show_scalar_bar=False, show_edges=True, edge_color=INK, edge_opacity=0.5 if close else 0.3,
-            line_width=1.2,
+            ambient=_AMBIENT, diffuse=1 - _AMBIENT, show_scalar_bar=False, show_edges=True, edge_color=INK,
+            edge_opacity=0.5 if close else 0.3, line_width=1.2,
         )  # fmt: skip
         if self._held.n_points:
             held = self._held.translate(1e-3 * self._surface.length * self._view.eye)
             plotter.add_mesh(held, color=HELD, opacity=_HELD, lighting=False)
         if not close:
             plotter.add_mesh(self._tool, color=TOOL, opacity=_GLASS)
-        plotter.add_mesh(_outline(self._fields), color=OUTLINE, line_width=1.5, lighting=False)
+        for line in self._outline:
+            plotter.add_mesh(pv.lines_from_points(line), color=OUTLINE, line_width=1.5, lighting=False)
         self._add_lines(plotter, self._sharp, INK, 2)
         self._add_lines(plotter, self._ring, INK, 5)
         self._add_lines(plotter, self._edge, FOOTPRINT, 5 if close else 3)
-        self._aim(plotter, close=close)
+        self._aim(plotter, size[0] / size[1], close=close)
         image = np.asarray(plotter.screenshot(return_img=True))
         plotter.close()
         return image
@@ -145,28 +154,29 @@ class Drawing:
             lines = lines.translate(2e-3 * self._surface.length * self._view.eye)
             plotter.add_mesh(lines, color=colour, line_width=width, lighting=False)
 
-    def _aim(self, plotter: Any, *, close: bool) -> None:
-        centre = self._contact if close else np.array(self._surface.center)
+    def _aim(self, plotter: Any, shape: float, *, close: bool) -> None:
+        """Look at the middle of what is seen, ``shape`` times as wide as it is high."""
+        centre, half = self._contact, _CLOSE * MM * self._fields.case.probe.circumradius
+        if not close:
+            right = np.cross((0.0, 0.0, 1.0), self._view.eye)
+            right /= np.linalg.norm(right)
+            seen = np.array([right, np.cross(self._view.eye, right)])
+            # Of a column, the whole body would be larger than the picture.
+            lines = [] if self._fields.case.is_truncated else self._outline
+            places = np.vstack([self._surface.points, self._tool.points, *lines]) @ seen.T
+            low, high = places.min(axis=0), places.max(axis=0)
+            middle = np.array(self._surface.center)
+            centre = middle + ((low + high) / 2 - seen @ middle) @ seen
+            half = _MARGIN * max((high - low) / 2 / (shape, 1.0))
         plotter.camera.focal_point = centre
         plotter.camera.position = centre + 2 * self._surface.length * self._view.eye
         plotter.camera.up = (0, 0, 1)
         plotter.enable_parallel_projection()
-        if close:
-            plotter.camera.parallel_scale = _CLOSE * MM * self._fields.case.probe.circumradius
-            plotter.camera.clipping_range = (0.01, 10 * self._surface.length)
-        else:
-            # A column would be small in the picture of the whole body.
-            column = self._fields.case.is_truncated
-            plotter.reset_camera(bounds=self._surface.bounds if column else None)
-            plotter.camera.zoom(1.0 if column else 1.3)
+        plotter.camera.parallel_scale = half
+        plotter.camera.clipping_range = (0.01, 10 * self._surface.length)
 
 
 def _moved(part: Any, factor: float) -> Any:
     if factor and part.n_points:
         part.points = part.points + factor * part.point_data["shift"]
     return part
-
-
-def _outline(fields: Fields) -> Any:
-    """Return the edges of the whole body, of which a column or the part behind the cut is shown."""
-    return pv.merge([pv.lines_from_points(MM * line) for line in fields.case.body.outline()])

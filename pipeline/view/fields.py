@@ -6,6 +6,7 @@ from math import floor, inf, log10, nan
 import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray, IntArray
+from pipeline.shapes.body import Drawn
 from pipeline.study.sweep import Case
 
 # Displacements are drawn so large that the largest is about this share of the body's smallest extent.
@@ -51,6 +52,11 @@ class Fields:
     def centres(self) -> FloatArray:
         """Centroid (m) of each cell's corners, shape (m, 3)."""
         return np.asarray(self.points[self.cells[:, :4]].mean(axis=1))
+
+    @property
+    def outline(self) -> list[FloatArray]:
+        """Edges of the whole body as lines of points (k, 3), in m; none where it is bounded by triangles."""
+        return self.case.body.outline() if isinstance(self.case.body, Drawn) else []
 
     @property
     def sizes(self) -> FloatArray:

@@ -128,7 +128,7 @@ def test_the_cut_holds_the_axis_and_the_eye_is_before_it_and_out_of_the_tissue(a
     np.testing.assert_allclose(triad @ triad.T, np.eye(3), atol=1e-12)
     assert view.eye @ view.front > 0.5
     assert view.eye @ view.outward > 0.3
-    assert view.front[2] == 0
+    assert view.eye[2] > 0 or axis[2] > 0
 
 
 def test_a_plane_of_symmetry_is_cut_along():

@@ -58,7 +58,7 @@ def _told(fields: Fields, numbers: Numbers) -> dict[str, Any]:
     """Return what the script is told besides the arrays; lengths in mm, places relative to the contact."""
     view = Viewpoint.of(fields.case.frame, fields.planes)
     low, high = fields.points.min(axis=0), fields.points.max(axis=0)
-    outline = [_MM * (line - fields.contact) for line in fields.case.body.outline()]
+    outline = [_MM * (line - fields.contact) for line in fields.outline]
     return {
         "arrays": numbers.layout,
         "colours": numbers.colours,

@@ -4,7 +4,7 @@ const VERTEX = `#version 300 es
   layout(location = 0) in vec3 place; layout(location = 1) in vec3 moved;
   layout(location = 2) in vec2 tag; layout(location = 3) in vec3 edge;
   uniform mat3 turn; uniform vec3 target; uniform vec3 scale; uniform float factor;
-  out vec3 at; out vec3 seen; out vec2 what; out vec3 far;
+  centroid out vec3 at; out vec3 seen; out vec2 what; out vec3 far;
   void main() {
     at = place; what = tag; far = edge;
     seen = (place + factor * moved - target) * turn;
@@ -12,7 +12,7 @@ const VERTEX = `#version 300 es
   }`;
 const FRAGMENT = `#version 300 es
   precision highp float;
-  in vec3 at; in vec3 seen; in vec2 what; in vec3 far;
+  centroid in vec3 at; in vec3 seen; in vec2 what; in vec3 far;
   uniform vec4 plane; uniform vec3 stops[32]; uniform int count; uniform float epsilon, pixel;
   uniform bool byName, cut, edges, marks;
   uniform vec3 footprint, held, probe;
