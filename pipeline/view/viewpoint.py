@@ -9,8 +9,8 @@ from pipeline.arrays import FloatArray
 from pipeline.shapes.frame import Frame
 
 _UP = np.array((0.0, 0.0, 1.0))
-# Of a probe's direction, the vertical part below which the cut is upright; above it, the cut is nearest to y = 0.
-_STEEP = 0.7
+# The cut is y = 0 or x = 0, turned so that it holds the axis, unless that turns it by more; it is then vertical.
+_NEARLY = 0.35
 # From where the picture is taken: in front of the cut, beside it, out of the tissue.
 _FROM = (1.0, 0.45, 0.6)
 # Where the side would be seen from below by more than 30 degrees, the eye goes to the other one.
@@ -33,10 +33,13 @@ class Viewpoint:
     def of(cls, frame: Frame, planes: tuple[str, ...]) -> Self:
         """Return how a probe's place is looked at; a plane of symmetry ("x": x = 0) is the cut where there is one."""
         outward = np.array(frame.outward)
-        front = np.array((1.0, 0.0, 0.0) if planes == ("x",) else (0.0, -1.0, 0.0))
-        if not planes and abs(outward[2]) < _STEEP:
+        if planes != ("x",) and (planes or abs(outward[1]) < _NEARLY):
+            front = np.array((0.0, -1.0, 0.0))
+        elif planes or abs(outward[0]) < _NEARLY:
+            front = np.array((1.0, 0.0, 0.0))
+        else:
             front = np.cross(outward, _UP)
-            front *= -1.0 if front[1] > 0 or (front[1] == 0 and front[0] < 0) else 1.0
+            front *= 1.0 if front[1] < 0 else -1.0
         front = front - (front @ outward) * outward
         front /= np.linalg.norm(front)
         side = np.cross(outward, front)

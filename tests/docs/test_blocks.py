@@ -85,7 +85,11 @@ def test_blocks_of_a_page_run(page, checkout):
         assert not absent, f"{block}: no line {absent!r} in\n{done.stdout}\n{done.stderr}"
 
 
-@pytest.mark.parametrize("block", [b for page in pages() for b in blocks(page, ("toml",))], ids=str)
+# What stands on the page of scenes are whole studies: test_scenes.py reads them.
+_PIECES = [b for page in pages() if page.name != "scenes.md" for b in blocks(page, ("toml",))]
+
+
+@pytest.mark.parametrize("block", _PIECES, ids=str)
 def test_pieces_of_studies_are_valid(block):
     """Each, put into the study that ``epsmesh new`` writes, makes a study."""
     study = tomllib.loads(starter("mine"))
