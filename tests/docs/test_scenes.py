@@ -15,9 +15,6 @@ _SPEC = importlib.util.spec_from_file_location("draw_scenes", ROOT / "docs" / "d
 scenes = importlib.util.module_from_spec(_SPEC)
 _SPEC.loader.exec_module(scenes)
 
-# Bodies whose surface is a file's have studies of their own.
-OF_A_FILE = {"surface", "image"}
-
 
 def test_page_is_what_the_studies_make_of_it():
     assert scenes.PAGE.read_text(encoding="utf-8") == scenes.page(), "run: python docs/draw_scenes.py"
@@ -32,5 +29,5 @@ def test_every_scene_is_one_case_with_a_small_picture(path):
 
 def test_every_body_and_every_probe_is_shown():
     cases = [case for path in scenes.studies() for case in load(path).cases()]
-    assert {case.body.shape for case in cases} == {*BODIES} - OF_A_FILE
+    assert {case.body.shape for case in cases} == {*BODIES}
     assert {case.probe.shape for case in cases} == {*PROBES}
