@@ -66,7 +66,8 @@ def surface_of(labels: LabelMap, label: int, smooth: float | None = None) -> Loa
     if enclosed(points, facets) < 0:  # a mirrored frame
         facets = np.ascontiguousarray(facets[:, ::-1])
     facets, apart = largest_shell(points, facets, 1.0, MOST_APART)
-    triangles, more = made_whole(Raw(points, facets), 1.0)
+    # Each facet lies within a cube of voxels of its own: none can cross another.
+    triangles, more = made_whole(Raw(points, facets), 1.0, may_cross=False)
     return Loaded(triangles, (*labels.notices, *notices, *apart, *more))
 
 

@@ -22,7 +22,7 @@ _SHOWN = 20
 
 @dataclass(frozen=True)
 class LabelMap:
-    """``values`` (nx, ny, nz), integers, and the ``affine`` (3, 4) that takes indices of voxels to places.
+    """``values`` (nx, ny, nz), whole numbers, and the ``affine`` (3, 4) that takes indices of voxels to places.
 
     Places are in m, in the patient's frame: x to the right, y to the front (anterior), z to the head (superior).
     """
@@ -132,7 +132,7 @@ def _unit(named: str | None, given: float | None) -> float:
 
 
 def _whole(values: Any) -> Any:
-    """Return labels as integers."""
+    """Return labels, once they are known to be whole numbers."""
     if values.dtype.kind in "uib":
         return values
     if values.dtype.kind != "f":
@@ -143,7 +143,7 @@ def _whole(values: Any) -> Any:
             f"holds values between {low:g} and {high:g} that are no whole numbers: it is an image, or a probability; "
             "export the segmentation as a label map"
         )
-    return values.astype(np.int64)
+    return values
 
 
 def of_label(found: LabelMap, label: int) -> Any:

@@ -12,9 +12,11 @@ from pipeline.shapes.triangles import Triangles, enclosed
 
 
 def made_whole(
-    raw: Raw, unit: float, repair: bool = False, smooth: float | None = None
+    raw: Raw, unit: float, repair: bool = False, smooth: float | None = None, may_cross: bool = True
 ) -> tuple[Triangles, tuple[str, ...]]:
-    """Return the surface in metres, welded and turned outwards, and what was done to it; ``smooth`` is a length (m).
+    """Return the surface in metres, welded and turned outwards, and what was done to it.
+
+    ``smooth`` is a length (m); facets are searched for crossings if they ``may_cross``.
 
     Raises:
         SurfaceError: if it does not bound one piece of tissue; says what was found, and what mends it.
@@ -27,7 +29,7 @@ def made_whole(
     if repair:
         points, facets, more = repaired(points, edges.facets, unit)
         edges, notices = Edges(facets), notices + more
-    check.check_whole(points, edges, unit)
+    check.check_whole(points, edges, unit, may_cross)
     if smooth:
         points, facets, more = smoothed(points, edges.facets, smooth / unit)
         edges, notices = Edges(facets), notices + more

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.arrays import FloatArray
+from pipeline.shapes.files.crossings import crossings
 from pipeline.shapes.files.image import default_smooth, load_image
 from pipeline.shapes.triangles import SurfaceError, Triangles, doubled_normals
 
@@ -99,6 +100,17 @@ def test_the_same_place_from_both_formats(scan: Path, tmp_path: Path):
     }
     nrrd.write(str(tmp_path / "scan.nrrd"), values, header)
     assert load_image(tmp_path / "scan.nrrd", 2).triangles.hash == load_image(scan, 2).triangles.hash
+
+
+@pytest.mark.parametrize("smooth", [0.0, 2e-3, None])
+def test_no_facets_cross_however_ragged_the_label_is(smooth: float | None, tmp_path: Path):
+    affine = _affine(2.0)
+    values = _ellipsoid(affine, (51, 51, 51))
+    random = np.random.Generator(np.random.PCG64(4)).random(values.shape)
+    values[random < 0.03] = 0
+    values[(np.roll(values, 1, axis=0) > 0) & (random > 0.5)] = 2
+    triangles = load_image(_nifti(tmp_path / "ragged.nii", values, affine), 2, smooth=smooth).triangles
+    assert not len(crossings(triangles.points, triangles.facets))
 
 
 def test_units_of_the_header(tmp_path: Path):
