@@ -75,6 +75,10 @@ _RESULTS = (
              "force (x, y, z: N) and torque about the point of contact (rx, ry, rz: N m) on the tissue for a unit of "
              "each rigid motion of the probe (m, rad): N/m, N/rad = N m/m, N m/rad"),
     Quantity("stiffness_error", "1", "error bar (95 %) on stiffness, in its units"),
+    Quantity("at_x", "m", "x of the point where the probe's axis meets the body"),
+    Quantity("at_y", "m", "y of the point where the probe's axis meets the body"),
+    Quantity("at_z", "m", "z of the point where the probe's axis meets the body"),
+    Quantity("axis", "1", "unit vector along which the probe advances"),
     Quantity("force_error", "1", "relative error bar (95 %) on force, against the exact solution of the case's scene",
              "± F", in_per_cent=True),
     Quantity("force_max", "N", "force of the full-order mesh of the same study (F_max)", "F_max"),

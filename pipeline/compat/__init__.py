@@ -10,12 +10,21 @@ from petsc4py import PETSc
 from pipeline.compat.code import EVERYWHERE, Code, compile_code, function_space, make_form, renumbered_space
 from pipeline.compat.elements import cell_dofs, degree, element, mixed_element, reference_element
 from pipeline.compat.matrices import add_matrix, assemble_matrix, dirichletbc
-from pipeline.compat.meshes import cell_tags, create_mesh, geometry_dofs, gmsh_session, original_cells, triangle_nodes
+from pipeline.compat.meshes import (
+    cell_tags,
+    create_mesh,
+    geometry_dofs,
+    gmsh_session,
+    inside_face,
+    original_cells,
+    triangle_nodes,
+)
 
 __all__ = [
     "EVERYWHERE", "Code", "add_matrix", "assemble_matrix", "cell_dofs", "cell_tags", "compile_code", "create_mesh",
-    "degree", "dirichletbc", "element", "function_space", "geometry_dofs", "gmsh_session", "make_form",
-    "mixed_element", "original_cells", "reference_element", "renumbered_space", "triangle_nodes", "versions",
+    "degree", "dirichletbc", "element", "function_space", "geometry_dofs", "gmsh_session", "inside_face",
+    "make_form", "mixed_element", "original_cells", "reference_element", "renumbered_space", "triangle_nodes",
+    "versions",
 ]  # fmt: skip
 
 

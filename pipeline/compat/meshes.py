@@ -30,6 +30,12 @@ def gmsh_session() -> Iterator[None]:
         signal.signal(signal.SIGINT, handler)
 
 
+def inside_face(face: int, parameters: np.ndarray) -> np.ndarray:
+    """Tell which points, parameters (n, 2) of the surface that carries it, are on a trimmed face of gmsh's model."""
+    keywords = {"parametric": True} if "parametric" in inspect.signature(gmsh.model.isInside).parameters else {}
+    return np.array([bool(gmsh.model.isInside(2, face, list(point), **keywords)) for point in parameters])
+
+
 def _coordinate_element(cell: str, order: int, dim: int) -> Any:
     if hasattr(ufl, "VectorElement"):
         # ffcx 0.5 writes this variant into the element when it first compiles a form on the mesh, which changes the

@@ -11,8 +11,9 @@ from itertools import combinations
 import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
-from pipeline.mesh.generate import MeshArrays
-from pipeline.scene.model import Scene
+from pipeline.mesh.generate import MeshArrays, MeshError
+from pipeline.scene.model import MIRROR, PROBE, Scene
+from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.surface import Surface
 from pipeline.stages import stage
@@ -21,6 +22,8 @@ from pipeline.stages import stage
 EDGES = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
 # A point this near to a surface, in units of its size, is on it.
 _CLOSE = 1e-6
+# Straight edges are never this far from a rim that they follow, in units of the footprint's half width.
+_OFF_RIM = 0.2
 # A cell is straightened where its Jacobian falls below this share of the straight cell's.
 _LEAST_JACOBIAN = 1e-3
 # Projections onto two surfaces in turn, until a point is on both.
@@ -30,6 +33,7 @@ _ALTERNATIONS = 30
 @stage("curved rim and sides")
 def curve(mesh: MeshArrays, scene: Scene) -> MeshArrays:
     """Return ``mesh`` with ten nodes a cell, on the true rim and sides, with quarter-point nodes at the rim."""
+    mesh = _on_rim_nodes(mesh, scene)
     corners = mesh.cells
     pairs = np.sort(corners[:, EDGES].reshape(-1, 2), axis=1)
     keys, first, inverse = np.unique(
@@ -50,6 +54,8 @@ def curve(mesh: MeshArrays, scene: Scene) -> MeshArrays:
 
 def _on_rim(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray) -> FloatArray:
     """Move the mid nodes of edges along a curved rim onto it, or onto the column where that cuts the footprint."""
+    if _is_lifted(scene):
+        return _on_lifted_rim(mesh, scene, edges, middle)
     both = np.isin(edges, mesh.rim).all(axis=1) & np.isin(_key(mesh, edges), _facet_edges(mesh, ["probe"]))
     if not (scene.probe.is_curved or isinstance(scene.body, Scanned)):
         return middle
@@ -69,6 +75,44 @@ def _on_rim(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray)
     return middle
 
 
+def _is_lifted(scene: Scene) -> bool:
+    """Tell whether a CAD kernel cut the footprint out of a surface; on triangles its edge was lifted to begin with."""
+    return not (isinstance(scene.body, Scanned) or scene.is_flat)
+
+
+def _on_lifted_rim(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray) -> FloatArray:
+    """Move the mid nodes of edges along a rim onto it where the footprint's edge meets the surface along the axis."""
+    keys, beside = _key(mesh, edges), [name for name in mesh.facets if name != PROBE and name not in MIRROR.values()]
+    chosen = np.isin(edges, mesh.rim).all(axis=1) & np.isin(keys, _facet_edges(mesh, [PROBE]))
+    chosen &= np.isin(keys, _facet_edges(mesh, beside))
+    middle = middle.copy()
+    middle[chosen] = _lifted(scene, middle[chosen])
+    return middle
+
+
+def _lifted(scene: Scene, points: FloatArray) -> FloatArray:
+    """Return the points of the footprint's edge on the surface, nearest in the probe's plane to points near the rim."""
+    flat = scene.probe.to_edge(scene.frame.local(points)[:, :2])
+    found, _ = scene.body.lift(scene.frame, flat)
+    if not np.all(np.linalg.norm(found - points, axis=1) < _OFF_RIM * scene.probe.half_width):
+        raise MeshError("the mesh does not follow the footprint's edge: use a smaller rim")
+    return found
+
+
+def _on_rim_nodes(mesh: MeshArrays, scene: Scene) -> MeshArrays:
+    """Move the corners of elements on a rim that is not plane, which the kernel knows to its tolerance, onto it."""
+    if not (_is_lifted(scene) and scene.probe.is_curved):
+        return mesh
+    points = mesh.points.copy()
+    moved = _lifted(scene, points[mesh.rim])
+    for plane in scene.mirrors:
+        axis = "xy".index(plane)
+        on_plane = np.abs(points[mesh.rim, axis]) < _CLOSE * scene.body.extent
+        moved[on_plane, axis] = points[mesh.rim, axis][on_plane]
+    points[mesh.rim] = moved
+    return replace(mesh, points=points)
+
+
 def _on_sides(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray, keys: IntArray) -> FloatArray:
     """Move the mid nodes of edges in a curved surface of the body, or of the column, onto that surface."""
     surfaces = [surface for group in scene.body.surfaces().values() for surface in group]
@@ -77,6 +121,9 @@ def _on_sides(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArra
     for surface in (surface for surface in surfaces if surface.is_curved):
         on_side = np.abs(surface.distance(mesh.points)) < _CLOSE * scene.body.extent
         chosen = outer & on_side[edges].all(axis=1)
+        if isinstance(surface, Ovoid):
+            # It is all of the boundary: two of its points may be joined across a plane of symmetry, too.
+            chosen &= np.isin(keys, _facet_edges(mesh, [name for name in mesh.facets if name not in MIRROR.values()]))
         middle[chosen] = surface.project(middle[chosen])
     return middle
 

@@ -75,11 +75,12 @@ def _generate(scene: Scene, sizes: Sizes, start: float) -> MeshArrays:
     with _model():
         rim_curves = _built(scene)
         try:
-            if scene.rim_segments and len(rim_curves) == 1:
+            if scene.rim_segments and len(rim_curves) == 1 and scene.is_flat:
                 edges = scene.rim_segments // 2 ** len(scene.mirrors)
                 gmsh.model.mesh.setTransfiniteCurve(rim_curves[0], edges + 1)
             more = region_sizes(scene, sizes.growth)
-            set_size_field(sizes, scene.probe, scene.frame, scene.scale, more)
+            lifted = [] if scene.is_flat else rim_curves
+            set_size_field(sizes, scene.probe, scene.frame, scene.scale, more, lifted)
             gmsh.model.mesh.generate(3)
         except Exception as error:  # gmsh raises bare Exception
             raise MeshError(f"gmsh: {error or gmsh.logger.getLastError()}") from error

@@ -6,7 +6,7 @@ from time import perf_counter
 
 from pipeline.mesh.curve import curve
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
-from pipeline.mesh.generate import MeshArrays, MeshError, generate
+from pipeline.mesh.generate import MeshArrays, generate
 from pipeline.mesh.meridian import Meridian
 from pipeline.mesh.organ.base import Kept, far_surface
 from pipeline.mesh.organ.make import mesh_organ
@@ -29,7 +29,6 @@ def mesh_arrays(case: Case, mirrors: tuple[str, ...], kept: Kept | None = None) 
     segments = sizes.rim_segments(case.probe)
     scene = Scene(case.body, case.probe, case.column, case.mesh.outside == "fixed", segments, straight, planes)
     if isinstance(case.body, Scanned):
-        _check_upright(case)
         arrays = mesh_organ(scene, sizes, far_surface(case.body, kept))
     else:
         arrays = generate(scene, sizes)
@@ -38,10 +37,10 @@ def mesh_arrays(case: Case, mirrors: tuple[str, ...], kept: Kept | None = None) 
     return replace(whole, seconds=perf_counter() - start)
 
 
-def _check_upright(case: Case) -> None:
-    """Refuse what the solver would take for pressed along z."""
-    if case.frame.axis != (0.0, 0.0, -1.0):
-        raise MeshError("a probe that is inclined to the z axis is not supported by this version")
+def upright(case: Case, arrays: MeshArrays) -> MeshArrays:
+    """Return the mesh of a case turned as it is solved: the probe presses along -z."""
+    turn = case.frame.turn
+    return arrays if turn is None else replace(arrays, points=arrays.points @ turn.T)
 
 
 def sizes_of(case: Case) -> Sizes:

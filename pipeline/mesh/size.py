@@ -1,6 +1,6 @@
 """The size field: fine within ε of the contact, growing to coarse, and refined to the probe's edge."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import ceil, inf
 
@@ -15,6 +15,8 @@ _FEWEST_SEGMENTS = 8
 _SEGMENT_MULTIPLE = 4
 # A column is a dozen edges round at least.
 _EDGES_PER_RADIUS = 2
+# The distance to a rim that is not plane is that to points on it, so many for each of the elements along it.
+_POINTS_PER_EDGE = 6
 
 
 @dataclass(frozen=True)
@@ -40,13 +42,22 @@ class Sizes:
         return max(_FEWEST_SEGMENTS, _SEGMENT_MULTIPLE * quarters)
 
 
-def set_size_field(sizes: Sizes, probe: Probe, frame: Frame, scale: float, more: Iterable[str] = ()) -> None:
+def set_size_field(
+    sizes: Sizes, probe: Probe, frame: Frame, scale: float, more: Iterable[str] = (), rim: Sequence[int] = ()
+) -> None:
     """Make ``sizes`` the background field of gmsh's current model, whose unit is ``scale`` metres.
 
-    ``more`` are sizes that elements must not be above either, written in that unit.
+    ``more`` are sizes that elements must not be above either, written in that unit; ``rim`` are the curves of the
+    probe's edge where that is not plane.
     """
-    unit = 1 / scale
-    to_rim = probe.edge_distance(*frame.expressions(unit), unit)
+    unit, field = 1 / scale, gmsh.model.mesh.field
+    if rim:
+        distance = field.add("Distance")
+        field.setNumbers(distance, "CurvesList", rim)
+        field.setNumber(distance, "NumPointsPerCurve", ceil(_POINTS_PER_EDGE * probe.perimeter / sizes.rim))
+        to_rim = f"F{distance}"
+    else:
+        to_rim = probe.edge_distance(*frame.expressions(unit), unit)
     terms = [f"{unit * sizes.rim:.12g}+{sizes.growth:.12g}*{to_rim}"]
     if sizes.epsilon == inf:
         terms.append(f"{unit * sizes.fine:.12g}")
@@ -58,7 +69,6 @@ def set_size_field(sizes: Sizes, probe: Probe, frame: Frame, scale: float, more:
     if sizes.column < inf:
         terms.append(f"{unit * sizes.column / _EDGES_PER_RADIUS:.12g}")
     terms += more
-    field = gmsh.model.mesh.field
     tags = []
     for term in terms:
         tags.append(field.add("MathEval"))

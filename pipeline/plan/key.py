@@ -20,7 +20,7 @@ PHYSICS_VERSION = 5
 
 _MANY = 200_000  # sections of a large study
 # Keys that came later, with the value that stands for what was before: records of then stay valid.
-_LATER: dict[str, Any] = {"motion": "press", "layers": (), "inclusion": ()}
+_LATER: dict[str, Any] = {"motion": "press", "layers": (), "inclusion": (), "axis": None}
 # What a body may hold of other materials.
 _PIECES = ("layers", "inclusion")
 

@@ -32,7 +32,7 @@ def is_round(case: Case) -> bool:
     body, probe, frame = case.body, case.probe, case.frame
     if probe.motion == "all":
         return False
-    upright = frame.point[:2] == _ON_AXIS and frame.axis[:2] == _ON_AXIS and case.travel[:2] == _ON_AXIS
+    upright = frame.is_upright and frame.point[:2] == _ON_AXIS and case.travel[:2] == _ON_AXIS
     is_same = probe.is_round and body.half_plane() is not None and body.support.is_round()
     is_whole = not case.is_truncated or not isinstance(body.half_plane(), HalfEllipse)
     return upright and is_same and is_whole and not _is_held_below_stiffer(case)

@@ -16,6 +16,7 @@ from pipeline.plan.key import digest
 from pipeline.plan.plan import Plan
 from pipeline.quantities import attributes, quantity_of
 from pipeline.run.record import Record
+from pipeline.shapes.frame import Frame, PlaceError
 from pipeline.study.sweep import Axis, Case
 
 # The variables that are taken as they are from the records of the cases, and from those of F_exact.
@@ -28,6 +29,8 @@ _EXACT = ("force_exact", "force_exact_error")
 # Translations, and rotations about the axes of the point of contact.
 _MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _NO_STIFFNESS = ((nan,) * 6,) * 6
+# Where the probe touches, and along which unit vector it advances.
+_PLACE = ("at_x", "at_y", "at_z")
 _MISSING = -1  # of counts, which have no NaN
 
 
@@ -62,6 +65,12 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
             matrices = np.array([getattr(r, name) if r and getattr(r, name) else _NO_STIFFNESS for r in flat])
             dimensions = (*dims, "movement", "conjugate")
             variables[name] = (dimensions, matrices.reshape(*study.shape, 6, 6), attributes(name))
+    frames = [_frame(case) for case in study.cases()]
+    for number, name in enumerate(_PLACE):
+        places = [frame.point[number] if frame else nan for frame in frames]
+        variables[name] = (dims, array(places, float), attributes(name))
+    axes = np.array([frame.axis if frame else (nan,) * 3 for frame in frames]).reshape(*study.shape, 3)
+    variables["axis"] = ((*dims, "component"), axes, attributes("axis"))
     texts = {
         "status": [r.status if r else "pending" for r in flat],
         "message": [r.message if r else "" for r in flat],
@@ -111,6 +120,14 @@ def _scaled(record: Record | None, case: Case) -> Record | None:
     if record is None or record.is_ok:
         return record.scaled(case.scale) if record else None
     return replace(record, force=nan, force_vector=(nan, nan, nan), energy=nan, max_strain=nan, balance=nan)
+
+
+def _frame(case: Case) -> Frame | None:
+    """Return where the probe touches, or None where a body without a description of its surface cannot tell."""
+    try:
+        return case.frame
+    except PlaceError:
+        return None
 
 
 def _origin(plan: Plan, key: str, record: Record | None) -> str:

@@ -5,6 +5,7 @@ from dataclasses import replace
 from math import inf, isnan, nan
 
 from pipeline.plan.steps import Solve
+from pipeline.run.measure import turned_back
 from pipeline.run.problem import loads_of
 from pipeline.run.record import Record
 from pipeline.solve.displacement import DisplacementProblem
@@ -67,9 +68,9 @@ def _record(
     """Return the record of an evaluation, which is for μ = 1."""
     scale, (_, mu) = solve.case.scale, solve.case.material.lame
     x, y, z = (mu * component for component in reduced.response.force)
-    force = -sum(f * a for f, a in zip((x, y, z), solve.case.frame.axis, strict=True))
     return replace(
-        source, key=solve.key, origin="reduced", young=scale.stress, depth=scale.length, force=force,
-        force_vector=(x, y, z), force_error=source.force_error + reduced.bound, energy=mu * reduced.response.energy,
+        source, key=solve.key, origin="reduced", young=scale.stress, depth=scale.length, force=z,
+        force_vector=turned_back(solve.case.frame.turn, (x, y, z)),
+        force_error=source.force_error + reduced.bound, energy=mu * reduced.response.energy,
         max_strain=problem.largest_strain(basis.displacement(reduced)), balance=reduced.bound, iterations=0,
     )  # fmt: skip

@@ -2,10 +2,13 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from pipeline.arrays import FloatArray
 from pipeline.plan.cost import features
 from pipeline.plan.steps import Solve
 from pipeline.run.record import Record
+from pipeline.shapes.frame import Vector
 from pipeline.solve.error import is_graded
 from pipeline.solve.solution import Solution
 
@@ -25,10 +28,8 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         graded = is_graded(case.mesh.rim_size(half_width) / half_width, case.mesh.growth)
         of_regions = bool(case.body.regions)
         solution = solution.extrapolated(case.mesh.degree, case.element, graded=graded, of_regions=of_regions)
-    axis = case.frame.axis
-    force = -sum(f * a for f, a in zip(solution.reaction, axis, strict=True))
-    # The axis of a flat probe is z: other components of the force, whose bars may be unknown, are across it.
-    bar = sum(b * abs(a) for b, a in zip(solution.reaction_bars, axis, strict=True) if a)
+    # It was solved with the probe pressing along -z; the record is in the coordinates of the body.
+    turn, force, bar = case.frame.turn, solution.reaction[2], solution.reaction_bars[2]
     return Record(
         key=solve.key,
         status="ok",
@@ -37,10 +38,10 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         depth=case.scale.length,
         force=force,
         force_error=bar / abs(force),
-        force_vector=solution.reaction,
-        force_vector_error=_vector_bars(solution),
-        stiffness=_rows(solution.stiffness) if case.probe.motion == "all" else (),
-        stiffness_error=_rows(solution.bars) if case.probe.motion == "all" else (),
+        force_vector=turned_back(turn, solution.reaction),
+        force_vector_error=_vector_bars(solution, turn),
+        stiffness=_rows(solution.stiffness, turn) if case.probe.motion == "all" else (),
+        stiffness_error=_rows(solution.bars, turn, bars=True) if case.probe.motion == "all" else (),
         energy=solution.energy,
         max_strain=solution.max_strain,
         balance=solution.balance,
@@ -58,14 +59,34 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
     )
 
 
-def _vector_bars(solution: Solution) -> tuple[float, float, float]:
-    """Return the bars (N) on the components of the force; what symmetry makes zero is known to be."""
-    x, y, z = (0.0 if f == 0 else bar for f, bar in zip(solution.reaction, solution.reaction_bars, strict=True))
+def turned_back(turn: FloatArray | None, vector: Vector) -> Vector:
+    """Return a vector of the turned mesh in the body's coordinates: the rows of ``turn`` are the axes it was put on."""
+    if turn is None:
+        return vector
+    x, y, z = map(float, np.array(vector) @ turn)
     return x, y, z
 
 
-def _rows(matrix: FloatArray | None) -> tuple[tuple[float, ...], ...]:
-    return () if matrix is None else tuple(tuple(map(float, row)) for row in matrix)
+def _vector_bars(solution: Solution, turn: FloatArray | None) -> Vector:
+    """Return the bars (N) on the components of the force; what symmetry makes zero is known to be.
+
+    Turned, those of a component are the sum of what all that it is made of may be off by.
+    """
+    bars = [0.0 if f == 0 else bar for f, bar in zip(solution.reaction, solution.reaction_bars, strict=True)]
+    if turn is None:
+        return bars[0], bars[1], bars[2]
+    x, y, z = (sum(abs(t) * bar for t, bar in zip(column, bars, strict=True) if t) for column in turn.T)
+    return float(x), float(y), float(z)
+
+
+def _rows(matrix: FloatArray | None, turn: FloatArray | None, *, bars: bool = False) -> tuple[tuple[float, ...], ...]:
+    """Return a matrix (6, 6) of forces and torques for all motions, or the bars on it, in the body's coordinates."""
+    if matrix is None:
+        return ()
+    if turn is not None:
+        both = np.kron(np.eye(2), np.abs(turn) if bars else turn)
+        matrix = both.T @ matrix @ both
+    return tuple(tuple(map(float, row)) for row in matrix)
 
 
 def add_times(record: Record, earlier: list[Record]) -> Record:

@@ -7,7 +7,7 @@ from mpi4py import MPI
 
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.mesh.generate import MeshArrays, MeshError
-from pipeline.mesh.of_case import mesh_arrays
+from pipeline.mesh.of_case import mesh_arrays, upright
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.solve.linear import SolveError
 from pipeline.study.sweep import Case
@@ -20,6 +20,8 @@ def mesh_case(
 ) -> tuple[BodyMesh, float]:
     """Return the mesh of a case, of the part that ``mirrors`` leave of it, and the seconds it takes; collective.
 
+    It is turned so that the probe presses along -z: that is how it is solved.
+
     A mesh from the ``cache`` counts with the seconds that it took to make.
 
     Raises:
@@ -27,7 +29,7 @@ def mesh_case(
     """
     arrays = on_first_rank(comm, lambda: cached_arrays(case, mirrors, cache))
     start = MPI.Wtime()
-    mesh = distribute(comm, arrays)
+    mesh = distribute(comm, arrays and upright(case, arrays))
     making = comm.bcast(arrays.seconds if arrays is not None else 0.0)
     return mesh, making + comm.allreduce(MPI.Wtime() - start, op=MPI.MAX)
 

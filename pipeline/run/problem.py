@@ -35,11 +35,13 @@ def conditions_of(case: Case) -> Conditions:
 
 
 def loads_of(case: Case) -> Loads:
-    """Return how the probe of ``case`` moves."""
+    """Return how the probe of ``case`` moves, on the mesh that is turned so that it presses along -z."""
+    frame = case.frame.upright
+    travel = case.probe.travel(frame)
     if case.probe.motion == "all":
-        return Loads.all(case.travel, case.frame.point)
+        return Loads.all(travel, frame.point)
     # Across a plane of symmetry a probe slides without force along its axis, and presses without force along itself.
-    return Loads.along(case.travel, apart=mirror_planes(case) != model_planes(case))
+    return Loads.along(travel, apart=mirror_planes(case) != model_planes(case))
 
 
 def law_of(case: Case) -> MaterialLaw:

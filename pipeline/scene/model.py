@@ -13,8 +13,11 @@ from typing import Any
 import gmsh
 import numpy as np
 
+from pipeline import compat
+from pipeline.scene.imprint import cut_out
 from pipeline.scene.regions import draw_inclusions, regions_of, remove_beyond
 from pipeline.shapes.body import Body, Drawn
+from pipeline.shapes.contact import is_flat
 from pipeline.shapes.frame import Frame
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.surface import Surface, Tube
@@ -25,6 +28,8 @@ MIRROR = {"x": "mirror_x", "y": "mirror_y"}
 
 _BODY_SIZE = 100.0  # extent of the body in the model: OpenCASCADE's tolerance of 1e-7 is then 1e-9 of it
 _CLOSE = 1e-6 * _BODY_SIZE  # in the model's unit
+# Surfaces whose points are all in one group, however their faces are trimmed; points a side on faces of others.
+_FILLED, _TRIMMED = ("Plane", "Cylinder"), 12
 
 
 @dataclass(frozen=True)
@@ -69,6 +74,11 @@ class Scene:
         return self.probe.inscribed(self.rim_segments) if self.straight and self.rim_segments else self.probe
 
     @cached_property
+    def is_flat(self) -> bool:
+        """Whether the footprint is plane, and the probe at right angles to it."""
+        return is_flat(self.body, self.probe, self.frame)
+
+    @cached_property
     def cut_face(self) -> Surface:
         """The side of the column."""
         return Tube(self.frame.point, self.frame.axis, self.column)
@@ -87,14 +97,14 @@ def build(scene: Scene) -> list[int]:
     occ = gmsh.model.occ
     if not isinstance(scene.body, Drawn):
         raise SceneError(f"a {scene.body.shape} is not drawn")
-    volumes = [(3, scene.body.draw(occ, scene.units))]
+    volumes = [(3, scene.body.draw(occ, scene.units, scene.frame))]
     if scene.is_cut:
         volumes, _ = occ.intersect(volumes, [(3, _add_column(scene))])
     if scene.mirrors:
         volumes, _ = occ.intersect(volumes, [(3, _add_positive_side(scene))])
-    tools = [(2, scene.footprint.draw(occ, scene.frame, scene.units))]
+    printed = _add_footprint(scene, volumes)
     heights = (*scene.body.support.edges(), *scene.body.interfaces)
-    tools += [(2, _add_level(scene.units(height))) for height in heights]
+    tools = [*printed, *((2, _add_level(scene.units(height))) for height in heights)]
     tools += draw_inclusions(scene.body.inclusion, scene.units)
     _, children = occ.fragment(volumes, tools)
     occ.synchronize()
@@ -108,13 +118,27 @@ def build(scene: Scene) -> list[int]:
     if stray:
         occ.remove(stray, recursive=True)
         occ.synchronize()
-    footprint = [tag for _, tag in children[len(volumes)] if tag in inside]
+    parts = children[len(volumes) : len(volumes) + len(printed)]
+    footprint = [tag for part in parts for _, tag in part if tag in inside]
     if not footprint:
         raise SceneError("no part of the probe's footprint lies on the body")
-    inclusions = children[len(volumes) + 1 + len(heights) :]
+    inclusions = children[len(volumes) + len(printed) + len(heights) :]
     _name_groups(scene, footprint, regions_of(scene.body, inclusions, scene.scale))
     edge = gmsh.model.getBoundary([(2, tag) for tag in footprint], oriented=False)
     return [abs(tag) for _, tag in edge if not _is_on_mirror(scene, abs(tag))]
+
+
+def _add_footprint(scene: Scene, volumes: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Add the faces that the probe touches: as it is drawn where the surface is plane, else cut out of the surface."""
+    occ, frame = gmsh.model.occ, scene.frame
+    if scene.is_flat:
+        return [(2, scene.footprint.draw(occ, frame, scene.units))]
+
+    def is_mirror(face: int) -> bool:
+        points = _sample(face)
+        return any(bool(np.all(np.abs(points[:, "xy".index(plane)]) < _CLOSE)) for plane in scene.mirrors)
+
+    return cut_out(scene.body, scene.footprint, frame, scene.units, volumes, is_mirror)
 
 
 def _is_on_mirror(scene: Scene, curve: int) -> bool:
@@ -166,11 +190,16 @@ def _name_groups(scene: Scene, footprint: list[int], regions: dict[int, list[int
 
 
 def _sample(face: int) -> Any:
-    """Points, shape (9, 3), on the surface that carries a face."""
+    """Points, shape (n, 3), on a face, or, of one that fills the range of its parameters, on what carries it."""
     (u0, v0), (u1, v1) = gmsh.model.getParametrizationBounds(2, face)
     steps = (0.25, 0.5, 0.75)
-    parameters = [p for s in steps for t in steps for p in (u0 + s * (u1 - u0), v0 + t * (v1 - v0))]
-    return np.array(gmsh.model.getValue(2, face, parameters)).reshape(-1, 3)
+    parameters = np.array([(u0 + s * (u1 - u0), v0 + t * (v1 - v0)) for s in steps for t in steps])
+    if gmsh.model.getType(2, face) not in _FILLED:
+        fine = np.linspace(0.02, 0.98, _TRIMMED)
+        grid = np.array([(u0 + s * (u1 - u0), v0 + t * (v1 - v0)) for s in fine for t in fine])
+        inside = grid[compat.inside_face(face, grid)]
+        parameters = inside if len(inside) else parameters
+    return np.array(gmsh.model.getValue(2, face, parameters.ravel().tolist())).reshape(-1, 3)
 
 
 def _face_tests(scene: Scene) -> list[tuple[str, Callable[[Any], bool]]]:

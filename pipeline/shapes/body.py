@@ -91,7 +91,7 @@ class Body(Section, ABC):
 
     @abstractmethod
     def thickness(self, frame: Frame) -> float:
-        """Return how far (m) the tissue reaches along a probe's axis."""
+        """Return how far (m) the body reaches along a probe's axis, below the point of contact."""
 
     @abstractmethod
     def reach(self, frame: Frame) -> float:
@@ -107,7 +107,7 @@ class Body(Section, ABC):
 
     @abstractmethod
     def gap(self, point: Vector) -> float:
-        """Return the distance (m) from a point of the face that is touched to the face's edge, negative outside."""
+        """Return the distance (m) from a point of a face to its edge, negative outside; infinite if it has none."""
 
     @property
     @abstractmethod
@@ -144,8 +144,11 @@ class Drawn(Body):
     """A body that a CAD kernel draws."""
 
     @abstractmethod
-    def draw(self, kernel: Any, units: Units) -> int:
-        """Add it to a CAD ``kernel`` (gmsh's ``occ``), in the model's ``units``; return the tag of the volume."""
+    def draw(self, kernel: Any, units: Units, frame: Frame | None = None) -> int:
+        """Add it to a CAD ``kernel`` (gmsh's ``occ``), in the model's ``units``; return the tag of the volume.
+
+        Where a curved surface must have a seam, it is far from the ``frame`` at which a footprint will be imprinted.
+        """
 
 
 class Layered(Drawn):

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import acos, atan2, hypot, sqrt
-from typing import Any
+from math import acos, atan2, degrees, hypot, sqrt
+from typing import Any, NoReturn
 
 from pipeline.shapes.arrays import FloatArray, np
 
@@ -13,12 +13,32 @@ Vector = tuple[float, float, float]
 Units = Callable[[float], float]
 
 
-class PlaceError(ValueError):
-    """A probe cannot touch a body where it was told to; says why, and what is allowed."""
-
-
+# A probe's axis may lie at most this far (degrees) from the inward normal where it touches.
+MOST_INCLINED = 60.0
+# A length nearer to a probe's axis than this (degrees) says nothing of how the probe is turned about it.
+LEAST_ASIDE = 10.0
 # A unit vector nearer to another than this is the same.
 _SAME = 1e-12
+
+
+class PlaceError(ValueError):
+    """A probe cannot touch a body where it was told to; says why, and what is allowed, of the probe's key ``key``."""
+
+    def __init__(self, message: str, key: str = "at"):
+        super().__init__(message)
+        self.key = key
+
+
+def unit(vector: Vector) -> Vector:
+    """Return a vector's direction; to the last digit what it was if it is one along an axis of coordinates."""
+    x, y, z = vector
+    length = hypot(x, y, z)
+    return x / length, y / length, z / length
+
+
+def angle_between(first: Vector, second: Vector) -> float:
+    """Return the angle (degrees) between two unit vectors."""
+    return degrees(acos(max(-1.0, min(1.0, sum(a * b for a, b in zip(first, second, strict=True))))))
 
 
 @dataclass(frozen=True)
@@ -34,6 +54,29 @@ class Frame:
     normal: Vector = (0.0, 0.0, -1.0)
     axis: Vector = (0.0, 0.0, -1.0)
     along: Vector = (1.0, 0.0, 0.0)
+
+    @staticmethod
+    def touching(point: Vector, normal: Vector, axis: Vector | None = None) -> "Frame":
+        """Return the frame at a ``point`` of a surface with the inward unit ``normal``, for an ``axis`` of any length.
+
+        Raises:
+            PlaceError: if the axis is inclined too far from the normal.
+        """
+        if axis is None:
+            return Frame(point, normal, normal)
+        axis = unit(axis)
+        if (angle := angle_between(axis, normal)) > MOST_INCLINED:
+            raise PlaceError(
+                f"is inclined by {angle:.3g}° to the inward normal {_written(normal)} where the probe touches: "
+                f"at most {MOST_INCLINED:g}° are allowed",
+                "axis",
+            )
+        return Frame(point, normal, axis)
+
+    @property
+    def is_upright(self) -> bool:
+        """Whether the probe presses straight down on what lies level."""
+        return self.axis == self.normal == (0.0, 0.0, -1.0)
 
     @property
     def outward(self) -> Vector:
@@ -54,6 +97,58 @@ class Frame:
         # In a plane, `hypot` is what rounds least.
         length = hypot(x, y) if z == 0 else sqrt(x * x + y * y + z * z)
         return replace(self, along=(x / length, y / length, z / length))
+
+    def facing(self, direction: Vector) -> "Frame":
+        """Return the frame whose probe's length lies along ``direction``, as far as it is normal to the axis.
+
+        The direction x stands for that of y where the probe advances along x itself.
+
+        Raises:
+            PlaceError: if the direction is that of the axis.
+        """
+        if self._is_aside(direction):
+            return self.turned(direction)
+        if direction == (1.0, 0.0, 0.0):
+            return self.turned((0.0, 1.0, 0.0))
+        self.refuse_direction()
+
+    def refuse_direction(self) -> NoReturn:
+        """Say that a direction is too near to the axis."""
+        raise PlaceError(
+            f"must not be that of the probe's axis {_written(self.axis)}: it has to lie {LEAST_ASIDE:g}° aside at "
+            "least",
+            "direction",
+        )
+
+    def is_replaced(self, direction: Vector) -> bool:
+        """Tell whether :meth:`facing` takes another direction for this one."""
+        return not self._is_aside(direction)
+
+    def _is_aside(self, direction: Vector) -> bool:
+        angle = angle_between(unit(direction), self.axis)
+        return LEAST_ASIDE <= angle <= 180 - LEAST_ASIDE
+
+    @cached_property
+    def turn(self) -> FloatArray | None:
+        """The matrix (3, 3) of the shortest turn after which the probe presses along -z; None if it does already."""
+        x, y, z = self.outward
+        if (square := x * x + y * y) < _SAME**2:
+            # Half a turn about x.
+            return None if z > 0 else np.diag([1.0, -1.0, -1.0])
+        # 1 / (1 + z), without cancellation where the probe comes from below.
+        c = 1 / (1 + z) if z > 0 else (1 - z) / square
+        return np.array([[1 - c * x * x, -c * x * y, -x], [-c * x * y, 1 - c * y * y, -y], [x, y, z]])
+
+    @cached_property
+    def upright(self) -> "Frame":
+        """The same place on the body once that has been turned about the origin by :attr:`turn`."""
+        if self.turn is None:
+            return self
+        (px, py, pz), (nx, ny, nz), (ax, ay, _) = (
+            map(float, self.turn @ np.array(vector)) for vector in (self.point, self.normal, self.along)
+        )
+        # Down to the last digit: what is left of rounding across the axis would be a movement of its own.
+        return Frame((px, py, pz), (nx, ny, nz), (0.0, 0.0, -1.0), (ax, ay, 0.0))
 
     def at(self, along: float, across: float) -> Vector:
         """Return the point (m) of the probe's own plane with these coordinates."""
@@ -105,6 +200,10 @@ class Frame:
         k, v = np.array((kx, ky, kz)), np.array(self.along)
         back = v * np.cos(angle) - np.cross(k, v) * np.sin(angle) + k * (k @ v) * (1 - np.cos(angle))
         return float(back[0]), float(back[1]), float(back[2])
+
+
+def _written(vector: Vector) -> str:
+    return f"[{', '.join(f'{c + 0.0:.3g}' for c in vector)}]"
 
 
 def _weighted(terms: list[str], weights: Vector) -> str:

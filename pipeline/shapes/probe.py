@@ -2,8 +2,11 @@
 
 from abc import ABC, abstractmethod
 from functools import lru_cache
-from math import hypot, isfinite
+from math import hypot, inf
 from typing import Annotated, Any, ClassVar, Literal, Self
+
+from pydantic import AfterValidator
+from pydantic_core import PydanticCustomError
 
 from pipeline.shapes.arrays import FloatArray
 from pipeline.shapes.body import Body
@@ -17,6 +20,12 @@ _ALIGNED = 1e-12
 _MANY = 200_000  # pairs of body and probe of a large study
 
 Contact = Annotated[Literal["bonded", "frictionless"], refuse("contact", ("unilateral",), ("bonded", "frictionless"))]
+
+
+def _two_or_three(at: tuple[float, ...]) -> tuple[float, ...]:
+    if len(at) not in (2, 3):
+        raise PydanticCustomError("not_supported", "must be a list of 2 or 3 values")
+    return at
 
 
 class Probe(Section, ABC):
@@ -33,8 +42,22 @@ class Probe(Section, ABC):
     ] = "pierce"
     depth: Annotated[Length, Words("How far the tool is pushed in. F is proportional to it.", '"0.2 mm"', is_used=True)]
     at: Annotated[
-        tuple[Coordinate, Coordinate], Words("Where its axis meets the top face: x and y.", '["0 mm", "0 mm"]')
+        tuple[Coordinate, ...],
+        AfterValidator(_two_or_three),
+        Words(
+            "Where its axis meets the body: x and y of the highest point there, or three coordinates, from which the "
+            "nearest point of the surface is taken.",
+            '["0 mm", "0 mm"]',
+        ),
     ] = (0.0, 0.0)
+    axis: Annotated[
+        tuple[float, float, float] | None,
+        Words(
+            "Direction in which it advances, of any length; at most 60° from the inward normal.",
+            "[0.0, 0.0, -1.0]",
+            default="the inward normal where it touches",
+        ),
+    ] = None
     contact: Annotated[
         Contact, Words("Tissue sticks to the footprint (bonded), or slides along it (frictionless).", '"bonded"')
     ] = "bonded"
@@ -55,7 +78,11 @@ class Probe(Section, ABC):
     # ---- place and movement ---------------------------------------------------------------------------
 
     def frame_on(self, body: Body) -> Frame:
-        """Return its place on ``body``."""
+        """Return its place on ``body``.
+
+        Raises:
+            PlaceError: if it cannot touch the body there.
+        """
         return _frame_on(self, body)
 
     @property
@@ -159,12 +186,9 @@ class Straight(Probe):
 
 @lru_cache(_MANY)
 def _frame_on(probe: Probe, body: Body) -> Frame:
-    return body.frame(probe.at).turned(probe.lies_along)
+    return body.frame(probe.at, probe.axis).facing(probe.lies_along)
 
 
-def check_direction(direction: Vector, problems: Problems) -> bool:
-    """Report a direction that is not horizontal, and tell whether it is."""
-    sane = direction[2] == 0 and hypot(*direction) > 0 and all(map(isfinite, direction))
-    if not sane:
-        problems.error("probe.direction", list(direction), "must be a horizontal vector: [x, y, 0], not all zero")
-    return sane
+def is_direction(vector: Vector) -> bool:
+    """Tell whether a vector has a direction."""
+    return 0 < hypot(*vector) < inf

@@ -2,6 +2,7 @@
 
 from pipeline.shapes.bodies.box import Box
 from pipeline.shapes.bodies.cylinder import Cylinder
+from pipeline.shapes.bodies.ellipsoid import Ellipsoid
 from pipeline.shapes.bodies.image import FromImage
 from pipeline.shapes.bodies.surface import FromSurface
 from pipeline.shapes.body import Body
@@ -13,6 +14,7 @@ from pipeline.shapes.probes.ellipse import Ellipse
 BODIES: dict[str, type[Body]] = {
     "box": Box,
     "cylinder": Cylinder,
+    "ellipsoid": Ellipsoid,
     "surface": FromSurface,
     "image": FromImage,
 }
@@ -22,4 +24,4 @@ PROBES: dict[str, type[Probe]] = {
     "ellipse": Ellipse,
 }
 # Shapes of the format that this version does not compute: named as such, not as typing errors.
-LATER = {"body": ("ellipsoid", "cad"), "probe": ("sphere", "cone", "wedge")}
+LATER = {"body": ("cad",), "probe": ("sphere", "cone", "wedge")}

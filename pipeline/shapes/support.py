@@ -46,6 +46,10 @@ class Support(ABC):
         """Return the distance (m) to what is held beside a footprint ``to_edge`` from the edge of its face, if any."""
 
     @abstractmethod
+    def distance(self, surfaces: Surfaces, points: FloatArray) -> FloatArray | None:
+        """Return the distance (m) of points (n, 3) of the body to what is held, at least so much; None if infinite."""
+
+    @abstractmethod
     def holds_column(self) -> bool:
         """Tell whether a column that is cut out of the middle of the body is still held."""
 
@@ -92,6 +96,11 @@ class Faces(Support):
         """Return the distance to the sides, if they are held."""
         return to_edge if "sides" in self.names else None
 
+    def distance(self, surfaces: Surfaces, points: FloatArray) -> FloatArray | None:
+        """Return the distance to the nearest of the surfaces."""
+        held = [np.abs(surface.distance(points)) for name in self.names for surface in surfaces[name]]
+        return np.min(held, axis=0) if held else None
+
     def holds_column(self) -> bool:
         """Tell whether the bottom is held."""
         return "bottom" in self.names
@@ -109,6 +118,13 @@ class Below(BaseModel, Support):
 
     model_config = ConfigDict(strict=True, frozen=True, extra="forbid")
     below: Coordinate
+
+    @staticmethod
+    def read(value: Any) -> "Below":
+        """Return what a table of a study file says."""
+        if not isinstance(value, dict) or set(value) != {"below"}:
+            raise PydanticCustomError("not_supported", 'a table here has the one key `below`: {below = "-15 mm"}')
+        return Below(below=value["below"])
 
     def holds(self, surfaces: Surfaces, points: FloatArray, tolerance: float) -> bool:
         """Tell whether all of the face is below the height."""
@@ -129,6 +145,10 @@ class Below(BaseModel, Support):
     def gap(self, to_edge: float) -> float | None:
         """Return the distance to where the side is held."""
         return hypot(to_edge, self.below)
+
+    def distance(self, surfaces: Surfaces, points: FloatArray) -> FloatArray | None:
+        """Return the height above the level."""
+        return np.maximum(points[:, 2] - self.below, 0.0)
 
     def holds_column(self) -> bool:
         """Tell that the bottom is held."""
@@ -157,9 +177,7 @@ class Below(BaseModel, Support):
 
 def _fixed(value: Any) -> Any:
     if isinstance(value, dict):
-        if set(value) != {"below"}:
-            raise PydanticCustomError("not_supported", 'a table here has the one key `below`: {below = "-15 mm"}')
-        return Below(below=value["below"])
+        return Below.read(value)
     if value not in ("bottom", "sides", "bottom+sides"):
         raise PydanticCustomError("not_supported", "must be 'bottom', 'sides', 'bottom+sides' or {below = \"-15 mm\"}")
     return value

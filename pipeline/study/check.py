@@ -5,12 +5,14 @@ What makes no sense in a shape by itself, the shape reports; here is what must f
 
 import itertools
 from collections.abc import Sequence
-from math import hypot, inf, isfinite
+from math import dist, inf, isfinite
 from typing import cast
 
 from pipeline.shapes.body import Body
+from pipeline.shapes.contact import check_contact, edge_gap, is_level, lifted_edge
+from pipeline.shapes.frame import Frame, PlaceError
 from pipeline.shapes.from_file import FromFile
-from pipeline.shapes.probe import Probe
+from pipeline.shapes.probe import Probe, is_direction
 from pipeline.shapes.section import Section, in_mm
 from pipeline.study.problems import Problems
 from pipeline.study.regions import tissues_of
@@ -27,6 +29,8 @@ _LOCKING = {1: (0.45, 0.45), 2: (0.49, 0.495), 3: (0.49, 0.495)}
 _LEAST_MIXED = 0.25
 # A footprint this near the edge, in units of the body, touches it: the rest is rounding.
 _TOUCHING = 1e-9
+# A place this far off the surface, in units of the body, is not projected to it: it is a slip of sign or unit.
+_FARTHEST_OFF = 0.1
 
 
 def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
@@ -48,10 +52,10 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     for body, mesh in itertools.product(bodies, meshes):
         body.support.check(body.heights, mesh.fine, problems)
         _check_outside(body, mesh, problems)
-    placed = [probe for probe in probes if _has_place(probe)]
-    for body, probe in itertools.product(bodies, placed):
-        _check_fit(body, probe, problems)
-    for body, probe, mesh in itertools.product(bodies, placed, meshes):
+    sane = [probe for probe in probes if _has_place(probe, problems)]
+    placed = [pair for pair in itertools.product(bodies, sane) if _check_place(*pair, problems)]
+    for (body, probe), mesh in itertools.product(placed, meshes):
+        _check_column(body, probe, mesh, problems)
         _check_gap(body, probe, mesh, problems)
     for body, material, mesh in itertools.product(bodies, materials, meshes):
         _check_locking(dict(tissues_of(body, material)), mesh, problems)
@@ -79,10 +83,15 @@ def _check_motion(probe: Probe, problems: Problems) -> None:
         )  # fmt: skip
 
 
-def _has_place(probe: Probe) -> bool:
-    """Tell whether the probe lies along something: what does not has no frame, and an error of its own."""
-    x, y, _ = probe.lies_along
-    return 0 < hypot(x, y) < inf
+def _has_place(probe: Probe, problems: Problems) -> bool:
+    """Report directions that are none; what has one has no place."""
+    sane = True
+    for key in ("axis", "direction"):
+        vector = getattr(probe, key, None)
+        if vector is not None and not is_direction(vector):
+            problems.error(f"probe.{key}", list(vector), "must be a vector of three finite numbers, not all zero")
+            sane = False
+    return sane
 
 
 def _check_mesh(mesh: Mesh, problems: Problems) -> None:
@@ -92,8 +101,32 @@ def _check_mesh(mesh: Mesh, problems: Problems) -> None:
         problems.error("mesh.rim", in_mm(mesh.rim), f"must be at most fine = {in_mm(mesh.fine)}")
 
 
-def _check_fit(body: Body, probe: Probe, problems: Problems) -> None:
-    if probe.gap(body, probe.frame_on(body)) <= _TOUCHING * body.extent:
+def _check_place(body: Body, probe: Probe, problems: Problems) -> bool:
+    """Report a place at which the probe cannot touch the body, and tell whether it has one."""
+    try:
+        frame = probe.frame_on(body)
+        _check_directions(probe, frame)
+        if is_level(body, frame):
+            _check_fit(body, probe, frame, problems)
+        else:
+            _check_contact(body, probe, frame)
+    except PlaceError as error:
+        found = getattr(probe, error.key)
+        problems.error(
+            f"probe.{error.key}", [in_mm(x) for x in found] if error.key == "at" else found and list(found), str(error)
+        )
+        return False
+    return True
+
+
+def _check_directions(probe: Probe, frame: Frame) -> None:
+    """Refuse a direction that was given and says nothing: left out, it is y where the probe advances along x."""
+    if "direction" in probe.model_fields_set and frame.is_replaced(probe.lies_along):
+        frame.refuse_direction()
+
+
+def _check_fit(body: Body, probe: Probe, frame: Frame, problems: Problems) -> None:
+    if probe.gap(body, frame) <= _TOUCHING * body.extent:
         problems.error(
             "probe.at",
             [in_mm(x) for x in probe.at],
@@ -101,14 +134,46 @@ def _check_fit(body: Body, probe: Probe, problems: Problems) -> None:
         )
 
 
+def _check_contact(body: Body, probe: Probe, frame: Frame) -> None:
+    """Check a place where the face is not level, not plane, or the probe not at right angles to it."""
+    if len(probe.at) == 3 and (off := dist(probe.at, frame.point)) > _FARTHEST_OFF * body.extent:
+        raise PlaceError(
+            f"lies {in_mm(off)} off the body's surface: at most {_FARTHEST_OFF:.0%} of its extent, "
+            f"{in_mm(_FARTHEST_OFF * body.extent)}, is taken for a place on it"
+        )
+    check_contact(body, probe, frame)
+    if edge_gap(body, probe, frame) <= _TOUCHING * body.extent:
+        raise PlaceError(f"the footprint of the {probe.shape} must lie inside one face, not on or over its edge")
+    if _held_gap(body, probe, frame) <= _TOUCHING * body.extent:
+        raise PlaceError(f"the footprint of the {probe.shape} must not reach what is held of the body")
+
+
+def _held_gap(body: Body, probe: Probe, frame: Frame) -> float:
+    """Return the distance (m) from the footprint to what is held, of any place."""
+    distance = body.support.distance(body.surfaces(), lifted_edge(body, probe, frame))
+    return inf if distance is None else float(distance.min())
+
+
 def held_gaps(body: Body, probe: Probe, mesh: Mesh) -> dict[str, float]:
     """Return the distances (m) between the probe's edge and the faces held beside it, by the key that sets them."""
     frame, gaps = probe.frame_on(body), {}
+    if not is_level(body, frame):
+        return {"body.fixed": gap} if isfinite(gap := _held_gap(body, probe, frame)) else {}
     if (beside := body.support.gap(probe.gap(body, frame))) is not None:
         gaps["body.fixed"] = beside
     if mesh.outside == "fixed" and isfinite(column := mesh.column(body.reach(frame))):
         gaps["mesh.epsilon"] = column - probe.circumradius
     return {key: gap for key, gap in gaps.items() if gap > 0}
+
+
+def _check_column(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
+    frame = probe.frame_on(body)
+    if isfinite(mesh.column(body.reach(frame))) and not is_level(body, frame):
+        problems.error(
+            "mesh.outside", mesh.outside,
+            "a column is kept below a level face that the probe presses straight down on only: "
+            'use outside = "coarse" here',
+        )  # fmt: skip
 
 
 def _check_gap(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:

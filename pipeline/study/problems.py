@@ -101,15 +101,20 @@ def _allowed(item: Any, model: type[BaseModel]) -> str:
         case "quantity":
             return f"must be {context['allowed']}"
         case "missing" | "too_short" | "too_long" | "tuple_type":
-            values = getattr(model.model_fields[str(item["loc"][0])].annotation, "__args__", ())
-            values = next((kind.__args__ for kind in values if getattr(kind, "__origin__", None) is tuple), values)
-            return f"must be a list of {len(values)} values"
+            return f"must be a list of {_values(model.model_fields[str(item['loc'][0])].annotation)} values"
         case "string_pattern_mismatch":
             return "must begin with a letter, and have letters, digits, _ and - only"
         case "not_supported":
             return item["msg"]
         case _:
             return item["msg"].replace("Input should be", "must be").replace("Value error, ", "")
+
+
+def _values(annotation: Any) -> str:
+    """Say how many values a list holds, by its type: a tuple, or a choice of things that one is among."""
+    parts = (annotation, *getattr(annotation, "__args__", ()))
+    items = next((part.__args__ for part in parts if getattr(part, "__origin__", None) is tuple), ())
+    return "2 or 3" if ... in items else str(len(items))
 
 
 class _Raw(str):

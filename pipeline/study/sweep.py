@@ -16,7 +16,7 @@ from pipeline.shapes.tissue import Tissue
 from pipeline.study.schema import Material, Mesh, Planning, Solving, material_of
 
 # Keys that both body and probe have, or a variable of the dataset: their dimension says whose it is.
-_AMBIGUOUS = ("radius", "shape", "accuracy")
+_AMBIGUOUS = ("radius", "shape", "accuracy", "axis")
 
 _PARTS = ("body", "material", "probe", "mesh", "solve")
 
@@ -39,7 +39,8 @@ class Axis:
             return self.section
         if self.owner:
             return f"{self.owner}_{self.key}"
-        return f"{self.section}_{self.key}" if self.key in _AMBIGUOUS else self.key
+        is_ambiguous = self.key in _AMBIGUOUS or (self.section, self.key) == ("body", "axes")
+        return f"{self.section}_{self.key}" if is_ambiguous else self.key
 
     @property
     def path(self) -> str:

@@ -13,6 +13,7 @@ from pipeline import compat
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.mesh.generate import MeshArrays
+from pipeline.mesh.of_case import upright
 from pipeline.mesh.reflect import reflect, reflect_vectors
 from pipeline.plan import estimate
 from pipeline.plan.plan import declare, first_attempts
@@ -73,7 +74,7 @@ def _attempt(
     case, degree = solve.case, solve.case.mesh.degree
     arrays = _arrays(solve, comm, cache, note)
     prepare(comm, [solve])
-    mesh = distribute(comm, arrays)
+    mesh = distribute(comm, arrays and upright(case, arrays))
     with Spaces(mesh) as spaces, problem_of(spaces, case, shared=False) as problem:
         direct = is_direct(case.solve.method, problem.dofs, degree)
         check_memory(FreeMemory(comm), estimate.solving_memory(problem.dofs, degree, direct=direct), "solving")
@@ -82,6 +83,8 @@ def _attempt(
         solution = solve_problem(case, problem, estimate=room or solve.goal is not None)
         points = comm.bcast(len(arrays.points) if arrays is not None else 0)
         displacement, strain = _gathered(mesh, problem, points)
+        if case.frame.turn is not None:
+            displacement = displacement @ case.frame.turn  # back to the body's coordinates
     if arrays is None:
         return None, solution.bar
     record = record_of(solve, solution)

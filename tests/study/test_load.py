@@ -13,6 +13,8 @@ STUDIES = sorted(Path("studies").glob("*.toml"))
 
 ELLIPSE = {"shape": "ellipse", "axes": ["3 mm", "1 mm"], "depth": "0.1 mm"}
 
+ELLIPSOID = {"shape": "ellipsoid", "axes": ["40 mm", "35 mm", "25 mm"], "fixed": {"below": "-6 mm"}}
+
 # section changes -> what the message must hold: the key, what was found, what is allowed
 MISTAKES = {
     "bare number": ({"probe": {"radius": 2}}, ["probe.radius = 2", 'such as "10 mm"']),
@@ -46,7 +48,7 @@ MISTAKES = {
     "missing key": ({"material": {"young": None}}, ["material.young", "required"]),
     "unknown shape": ({"probe": {"shape": "disk"}}, ['probe.shape = "disk"', "did you mean `disc`?"]),
     "later probe": ({"probe": {"shape": "sphere"}}, ['probe.shape = "sphere"', "not supported", "disc, blade"]),
-    "later body": ({"body": {"shape": "ellipsoid"}}, ["not supported", "box, cylinder"]),
+    "later body": ({"body": {"shape": "cad"}}, ["not supported", "box, cylinder"]),
     "later contact": ({"probe": {"contact": "unilateral"}}, ["not supported", "bonded, frictionless"]),
     "unknown element": ({"mesh": {"element": "hybrid"}}, ["mesh.element", "'mixed'"]),
     "later section": ({"load": {"gravity": 1}}, ["load", "not supported"]),
@@ -60,9 +62,9 @@ MISTAKES = {
     "blade outside": ({"probe": BLADE | {"length": "41 mm"}}, ["probe.at", "blade"]),
     "fine above coarse": ({"mesh": {"fine": "9 mm"}}, ['mesh.fine = "9 mm"', "at most coarse = 8 mm"]),
     "rim above fine": ({"mesh": {"rim": "6 mm"}}, ['mesh.rim = "6 mm"', "at most fine"]),
-    "direction": ({"probe": BLADE | {"direction": [0.0, 0.0, 1.0]}}, ["probe.direction", "horizontal"]),
+    "direction": ({"probe": BLADE | {"direction": [0.0, 0.0, 1.0]}}, ["probe.direction", "10° aside"]),
     "direction of an ellipse": (
-        {"probe": ELLIPSE | {"direction": [0.0, 0.0, 0.0]}}, ["probe.direction", "horizontal"],
+        {"probe": ELLIPSE | {"direction": [0.0, 0.0, 0.0]}}, ["probe.direction", "not all zero"],
     ),
     "one axis": ({"probe": ELLIPSE | {"axes": ["3 mm"]}}, ["probe.axes", "2 values"]),
     "ellipse outside": (
@@ -80,6 +82,41 @@ MISTAKES = {
         {"body": {"fixed": "sides"}, "mesh": {"outside": "free", "epsilon": "8 mm"}}, ["mesh.outside", "float"],
     ),
     "footprint touching": ({"probe": {"at": ["17 mm", "0 mm"]}}, ["probe.at", "inside the body's top"]),
+    "one coordinate": ({"probe": {"at": ["1 mm"]}}, ["probe.at", "2 or 3 values"]),
+    "place off the body": ({"probe": {"at": ["30 mm", "0 mm", "-9 mm"]}}, ["probe.at", "10 mm off", "10%"]),
+    "place over an edge": ({"probe": {"at": ["20 mm", "0 mm", "-2 mm"]}}, ["probe.at", "misses the body", "edge"]),
+    "place over an edge of the bottom": (
+        {"probe": {"at": ["18 mm", "0 mm", "-20 mm"]}, "body": {"fixed": "sides"}}, ["probe.at", "misses the body"],
+    ),
+    "place on what is held": ({"probe": {"at": ["0 mm", "0 mm", "-20 mm"]}}, ["probe.at", "held"]),
+    "place below the level that is held": (
+        {"probe": {"at": ["20 mm", "0 mm", "-10 mm"]}, "body": {"fixed": {"below": "-12 mm"}}}, ["probe.at", "held"],
+    ),
+    "axis of no length": ({"probe": {"axis": [0, 0, 0]}}, ["probe.axis", "not all zero"]),
+    "axis out of the body": ({"probe": {"axis": [0, 0, 1]}}, ["probe.axis", "180°", "at most 60°"]),
+    "inclined axis": ({"probe": {"axis": [2, 0, -1]}}, ["probe.axis", "63.4°", "at most 60°"]),
+    "inclined axis near an edge": (
+        {"probe": {"axis": [1, 0, -1], "at": ["16 mm", "0 mm"]}}, ["probe.at", "edge"],
+    ),
+    "direction along the axis": (
+        {"probe": BLADE | {"axis": [1, 0, -1], "direction": [-1, 0, 1.1]}}, ["probe.direction", "10° aside"],
+    ),
+    "direction along the normal": (
+        {"probe": BLADE | {"at": ["20 mm", "0 mm", "-9 mm"], "direction": [1, 0, 0]}}, ["probe.direction", "10° aside"],
+    ),
+    "column aside": (
+        {"probe": {"axis": [0.5, 0, -1]}, "mesh": {"outside": "free", "epsilon": "8 mm"}}, ["mesh.outside", "coarse"],
+    ),
+    "ellipsoid with faces": ({"body": ELLIPSOID | {"fixed": "bottom"}}, ["body.fixed", "below"]),
+    "ellipsoid without support": (
+        {"body": {"shape": "ellipsoid", "axes": ["9 mm"] * 3}}, ["body.fixed", "is required"],
+    ),
+    "place beside an ellipsoid": ({"body": ELLIPSOID, "probe": {"at": ["41 mm", "0 mm"]}}, ["probe.at", "beside"]),
+    "footprint beside an ellipsoid": (
+        {"body": ELLIPSOID, "probe": {"at": ["32 mm", "0 mm"], "axis": [0, 0, -1], "radius": "9 mm"}},
+        ["probe.at", "misses the body"],
+    ),
+    "footprint round an ellipsoid": ({"body": ELLIPSOID, "probe": {"radius": "29 mm"}}, ["probe.at", "turns by"]),
     "no room beside the probe": (
         {"body": {"shape": "cylinder", "radius": "3.5 mm", "height": "9 mm", "fixed": "sides"}},
         ["body.fixed", "leaves 0.5 mm", "rim below 0.5 mm"],
@@ -107,8 +144,8 @@ def test_a_mistake_of_one_probe_hides_none_of_another():
     with pytest.raises(StudyError) as caught:
         parse(raw() | {"probe": probes})
     assert [problem.key for problem in caught.value.problems] == [
-        "probe.direction",
         "probe.slice",
+        "probe.direction",
         "probe.at",
         "probe.at",
     ]

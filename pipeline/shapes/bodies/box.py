@@ -1,15 +1,19 @@
 """A box."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 from math import hypot, inf
 from typing import Annotated, Any, Literal
 
 from pipeline.shapes.arrays import FloatArray, np
 from pipeline.shapes.body import Layered
-from pipeline.shapes.frame import Frame, PlaceError, Units, Vector
+from pipeline.shapes.convex import farthest_of, reach_of, slab
+from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.section import Words, in_mm
 from pipeline.shapes.surface import Plane, Surface
 from pipeline.units import Length
+
+# Of coordinates, in units of the body.
+_ROUNDING = 1e-12
 
 
 class Box(Layered):
@@ -41,27 +45,50 @@ class Box(Layered):
         return self.size[0] * self.size[1] * self.size[2]
 
     def frame(self, at: tuple[float, ...], axis: Vector | None = None) -> Frame:
-        """Return the place at x and y on the top."""
-        if len(at) != 2 or axis is not None:
-            raise PlaceError("give two coordinates: the top is what a probe touches, upright")
-        return Frame((at[0], at[1], 0.0))
+        """Return the place at x and y on the top, or at the point of the surface that is nearest to three coordinates.
+
+        Raises:
+            PlaceError: if the axis is inclined too far.
+        """
+        if len(at) == 2:
+            return Frame.touching((at[0], at[1], 0.0), (0.0, 0.0, -1.0), axis)
+        x, y, z = (max(low, min(high, c)) for c, (low, high) in zip(at, self._sides, strict=True))
+        number, is_high = self._nearest_face((x, y, z))
+        point, normal = [x, y, z], [0.0, 0.0, 0.0]
+        point[number] = self._sides[number][is_high]
+        normal[number] = -1.0 if is_high else 1.0
+        return Frame.touching((point[0], point[1], point[2]), (normal[0], normal[1], normal[2]), axis)
 
     def lift(self, frame: Frame, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the points themselves: the top is flat."""
-        flat = np.column_stack([points, np.zeros(len(points))])
-        return frame.world(flat), np.tile(np.array(frame.outward), (len(points), 1))
+        """Return where lines along the axis enter the first face."""
+        origins = frame.world(np.column_stack([points, np.zeros(len(points))]))
+        units = np.eye(3)
+        spans = [slab(origins, frame.axis, tuple(unit), *sides) for unit, sides in zip(units, self._sides, strict=True)]
+        enter, leave = (np.array(ends) for ends in zip(*spans, strict=True))
+        first = enter.argmax(axis=0)
+        distance = enter.max(axis=0)
+        # Rounding of the place of an edge is none of a miss.
+        hit = distance <= leave.min(axis=0) + _ROUNDING * self.extent
+        found = origins + np.where(hit, distance, np.nan)[:, None] * np.array(frame.axis)
+        return found, -np.sign(np.array(frame.axis))[first][:, None] * units[first]
 
     def thickness(self, frame: Frame) -> float:
-        """Return the height (m)."""
-        return self.size[2]
+        """Return the height (m), or how far the farthest corner lies along the axis."""
+        if frame.is_upright and frame.point[2] == 0:
+            return self.size[2]
+        return float(-frame.local(self._corners)[:, 2].min())
 
     def reach(self, frame: Frame) -> float:
-        """Return the distance (m) of the farthest vertical edge from the axis."""
+        """Return the distance (m) of the farthest corner, or vertical edge, from the axis."""
+        if not frame.is_upright:
+            return reach_of(frame, self._corners)
         x, y, _ = frame.point
         return hypot(self.size[0] / 2 + abs(x), self.size[1] / 2 + abs(y))
 
     def farthest(self, frame: Frame) -> float:
         """Return the distance (m) of the farthest corner."""
+        if not frame.is_upright:
+            return farthest_of(frame, self._corners)
         return float((self.reach(frame) ** 2 + self.size[2] ** 2) ** 0.5)
 
     def inside(self, points: FloatArray) -> FloatArray:
@@ -72,8 +99,26 @@ class Box(Layered):
         )  # fmt: skip
 
     def gap(self, point: Vector) -> float:
-        """Return the distance (m) to the edge of the top, negative outside."""
-        return min(self.size[0] / 2 - abs(point[0]), self.size[1] / 2 - abs(point[1]))
+        """Return the distance (m) to the edge of the face in whose plane the point lies, negative outside."""
+        number, is_high = self._nearest_face(point)
+        if number == 2 and is_high:
+            return min(self.size[0] / 2 - abs(point[0]), self.size[1] / 2 - abs(point[1]))
+        beside = [(c, sides) for n, (c, sides) in enumerate(zip(point, self._sides, strict=True)) if n != number]
+        return min(min(c - low, high - c) for c, (low, high) in beside)
+
+    @property
+    def _sides(self) -> tuple[tuple[float, float], ...]:
+        x, y, z = self.size
+        return (-x / 2, x / 2), (-y / 2, y / 2), (-z, 0.0)
+
+    @property
+    def _corners(self) -> FloatArray:
+        return np.array(list(product(*self._sides)))
+
+    def _nearest_face(self, point: Vector) -> tuple[int, int]:
+        """Return the face whose plane is nearest: its axis, and 1 if it is the upper one; of several, the top first."""
+        faces = [(2, 1), (2, 0), (0, 0), (0, 1), (1, 0), (1, 1)]
+        return min(faces, key=lambda face: abs(point[face[0]] - self._sides[face[0]][face[1]]))
 
     @property
     def face(self) -> str:
@@ -87,7 +132,7 @@ class Box(Layered):
     def half_plane(self) -> None:
         """Return none: it has corners."""
 
-    def draw(self, kernel: Any, units: Units) -> int:
+    def draw(self, kernel: Any, units: Units, frame: Frame | None = None) -> int:
         """Add the box."""
         a, b, c = map(units, self.size)
         return int(kernel.addBox(-a / 2, -b / 2, -c, a, b, c))

@@ -1,10 +1,11 @@
 """An upright cylinder."""
 
-from math import hypot, pi
+from math import atan2, hypot, pi
 from typing import Annotated, Any, Literal
 
 from pipeline.shapes.arrays import FloatArray, np
 from pipeline.shapes.body import Layered
+from pipeline.shapes.convex import ball, farthest_of, reach_of, slab
 from pipeline.shapes.frame import Frame, PlaceError, Units, Vector
 from pipeline.shapes.half_plane import Rectangle
 from pipeline.shapes.section import Words, in_mm
@@ -13,6 +14,8 @@ from pipeline.units import Length
 
 # Edges of each circle in pictures.
 _ROUND = 200
+# Of coordinates, in units of the body.
+_ROUNDING = 1e-12
 
 
 class Cylinder(Layered):
@@ -38,26 +41,58 @@ class Cylinder(Layered):
         return pi * self.radius**2 * self.height
 
     def frame(self, at: tuple[float, ...], axis: Vector | None = None) -> Frame:
-        """Return the place at x and y on the top."""
-        if len(at) != 2 or axis is not None:
-            raise PlaceError("give two coordinates: the top is what a probe touches, upright")
-        return Frame((at[0], at[1], 0.0))
+        """Return the place at x and y on the top, or at the point of the surface that is nearest to three coordinates.
+
+        Raises:
+            PlaceError: if the axis is inclined too far, or all of the side is equally near.
+        """
+        if len(at) == 2:
+            return Frame.touching((at[0], at[1], 0.0), (0.0, 0.0, -1.0), axis)
+        (x, y), r = at[:2], hypot(at[0], at[1])
+        z = max(-self.height, min(0.0, at[2]))
+        if r > self.radius:
+            x, y, r = x * self.radius / r, y * self.radius / r, self.radius
+        if self._is_side((x, y, z)):
+            if r == 0:
+                raise PlaceError("lies on the cylinder's axis, as near to one side as to the other: move it aside")
+            return Frame.touching((x * self.radius / r, y * self.radius / r, z), (-x / r, -y / r, 0.0), axis)
+        if z > -self.height / 2:
+            return Frame.touching((x, y, 0.0), (0.0, 0.0, -1.0), axis)
+        return Frame.touching((x, y, -self.height), (0.0, 0.0, 1.0), axis)
 
     def lift(self, frame: Frame, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the points themselves: the top is flat."""
-        flat = np.column_stack([points, np.zeros(len(points))])
-        return frame.world(flat), np.tile(np.array(frame.outward), (len(points), 1))
+        """Return where lines along the axis enter top, bottom or side."""
+        origins, axis = frame.world(np.column_stack([points, np.zeros(len(points))])), np.array(frame.axis)
+        end_in, end_out = slab(origins, frame.axis, (0.0, 0.0, 1.0), -self.height, 0.0)
+        if np.hypot(axis[0], axis[1]) > 0:
+            side_in, side_out = ball(origins[:, :2] / self.radius, axis[:2] / self.radius)
+        else:
+            inside = np.linalg.norm(origins[:, :2], axis=1) <= self.radius
+            side_in, side_out = np.where(inside, -np.inf, np.nan), np.where(inside, np.inf, np.nan)
+        distance = np.maximum(end_in, side_in)
+        hit = distance <= np.minimum(end_out, side_out) + _ROUNDING * self.extent
+        found = origins + np.where(hit, distance, np.nan)[:, None] * axis
+        radial = np.column_stack([found[:, :2] / self.radius, np.zeros(len(found))])
+        upward = np.array([0.0, 0.0, -float(np.sign(axis[2]))])
+        return found, np.where((side_in > end_in)[:, None], radial, upward)
 
     def thickness(self, frame: Frame) -> float:
-        """Return the height (m)."""
-        return self.height
+        """Return the height (m), or how far the farthest point of a rim lies along the axis."""
+        if frame.is_upright and frame.point[2] == 0:
+            return self.height
+        (x, y, z), (a, b, c) = frame.point, frame.axis
+        return self.radius * hypot(a, b) + self.height * (abs(c) - c) / 2 - (a * x + b * y + c * z)
 
     def reach(self, frame: Frame) -> float:
         """Return the distance (m) of the far side from the axis."""
+        if not frame.is_upright:
+            return reach_of(frame, self._rims)
         return self.radius + hypot(frame.point[0], frame.point[1])
 
     def farthest(self, frame: Frame) -> float:
-        """Return the distance (m) of the farthest point of the bottom's edge."""
+        """Return the distance (m) of the farthest point of the edges of top and bottom."""
+        if not frame.is_upright:
+            return farthest_of(frame, self._rims)
         return float((self.reach(frame) ** 2 + self.height**2) ** 0.5)
 
     def inside(self, points: FloatArray) -> FloatArray:
@@ -66,8 +101,23 @@ class Cylinder(Layered):
         return np.minimum.reduce([self.radius - np.hypot(x, y), -z, z + self.height])
 
     def gap(self, point: Vector) -> float:
-        """Return the distance (m) to the edge of the top, negative outside."""
+        """Return the distance (m) to the edge of the face on which the point lies, negative outside."""
+        if self._is_side(point):
+            return min(-point[2], point[2] + self.height)
         return self.radius - hypot(point[0], point[1])
+
+    @property
+    def _rims(self) -> FloatArray:
+        """Points (n, 3) in m on circles about the edges of top and bottom, by so little larger as to hold them."""
+        angle = np.linspace(0.0, 2 * pi, _ROUND + 1)[1:]
+        radius = self.radius / np.cos(pi / _ROUND)
+        x, y = radius * np.cos(angle), radius * np.sin(angle)
+        return np.vstack([np.column_stack([x, y, np.full(len(angle), z)]) for z in (0.0, -self.height)])
+
+    def _is_side(self, point: Vector) -> bool:
+        """Tell whether the side is nearer than top and bottom."""
+        to_side = abs(self.radius - hypot(point[0], point[1]))
+        return to_side < min(abs(point[2]), abs(point[2] + self.height))
 
     @property
     def face(self) -> str:
@@ -82,10 +132,14 @@ class Cylinder(Layered):
         """Return radius, height and layers; inclusions have none."""
         return None if self.inclusion else Rectangle(self.radius, self.height, self.interfaces, self.is_filled)
 
-    def draw(self, kernel: Any, units: Units) -> int:
-        """Add the cylinder."""
+    def draw(self, kernel: Any, units: Units, frame: Frame | None = None) -> int:
+        """Add the cylinder, the seam of its side away from the frame."""
         height = units(self.height)
-        return int(kernel.addCylinder(0, 0, -height, 0, 0, height, units(self.radius)))
+        tag = int(kernel.addCylinder(0, 0, -height, 0, 0, height, units(self.radius)))
+        if frame is not None and self._is_side(frame.point):
+            x, y, _ = frame.point
+            kernel.rotate([(3, tag)], 0, 0, 0, 0, 0, 1, atan2(-y, -x))
+        return tag
 
     def surfaces(self) -> dict[str, tuple[Surface, ...]]:
         """Return top, bottom and side."""

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 from pipeline.shapes.arrays import FloatArray, np
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
-from pipeline.shapes.probe import Probe, check_direction
+from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Problems, Words, in_mm
 from pipeline.units import Length, Travel
 
@@ -24,7 +24,8 @@ class Blade(Probe):
     length: Annotated[Length, Words("Length of the edge.", '"6 mm"')]
     width: Annotated[Length, Words("Width of the edge.", '"1 mm"')]
     direction: Annotated[
-        tuple[float, float, float], Words("Along which the edge lies: x, y and 0.", "[1.0, 0.0, 0.0]")
+        tuple[float, float, float],
+        Words("Along which the edge lies, as far as it is normal to the probe's axis.", "[1.0, 0.0, 0.0]"),
     ] = (1.0, 0.0, 0.0)
     slice: Annotated[Travel, Words("How far it is drawn along its edge as it cuts.", '"0.05 mm"')] = 0.0
 
@@ -100,8 +101,7 @@ class Blade(Probe):
         return np.array([(i * self.length / 2, j * self.width / 2) for i, j in (*_CORNERS, _CORNERS[0])])
 
     def check(self, problems: Problems) -> None:
-        """Report a direction that is not horizontal, and a slice that makes no sense."""
-        check_direction(self.direction, problems)
+        """Report a slice that makes no sense."""
         if self.slice > 0 and self.action != "cut":
             problems.error("probe.slice", in_mm(self.slice), 'only a cut slices: set action = "cut"')
         if self.slice > 0 and self.contact == "frictionless":

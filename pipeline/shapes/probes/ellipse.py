@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 from pipeline.shapes.arrays import FloatArray, np
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
-from pipeline.shapes.probe import Straight, check_direction
+from pipeline.shapes.probe import Straight
 from pipeline.shapes.round import closed_ellipse, draw_ellipse, points_of_ellipse
 from pipeline.shapes.section import Problems, Words
 from pipeline.units import Length
@@ -28,7 +28,8 @@ class Ellipse(Straight):
     shape: Literal["ellipse"]
     axes: Annotated[tuple[Length, Length], Words("Two semi-axes: along and across.", '["3 mm", "1.5 mm"]')]
     direction: Annotated[
-        tuple[float, float, float], Words("Along which the first axis lies: x, y and 0.", "[1.0, 0.0, 0.0]")
+        tuple[float, float, float],
+        Words("Along which the first axis lies, as far as it is normal to the probe's axis.", "[1.0, 0.0, 0.0]"),
     ] = (1.0, 0.0, 0.0)
 
     @property
@@ -120,5 +121,4 @@ class Ellipse(Straight):
         return closed_ellipse(self.axes, _ROUND)
 
     def check(self, problems: Problems) -> None:
-        """Report a direction that is not horizontal."""
-        check_direction(self.direction, problems)
+        """Find nothing: each key says what it takes."""

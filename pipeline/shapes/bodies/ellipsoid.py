@@ -1,0 +1,180 @@
+"""An ellipsoid."""
+
+from math import atan2, hypot, inf, pi, sqrt
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator
+from pydantic_core import PydanticCustomError
+
+from pipeline.shapes.arrays import FloatArray, np
+from pipeline.shapes.body import Drawn
+from pipeline.shapes.convex import ball
+from pipeline.shapes.frame import Frame, PlaceError, Units, Vector, unit
+from pipeline.shapes.half_plane import HalfEllipse
+from pipeline.shapes.ovoid import Ovoid
+from pipeline.shapes.section import Words, in_mm
+from pipeline.shapes.support import Below
+from pipeline.shapes.surface import Surface
+from pipeline.units import Length
+
+# Edges of each ellipse in pictures, and of the one that is looked at for the reach.
+_ROUND = 200
+_BISECTIONS = 80
+# By which (rad) the poles of the ball that it is made of are turned about the point of contact: at the ends of the
+# axes, where the surface bends most, gmsh's surface mesher gives up now and then.
+_ASIDE = 0.7
+
+
+def _below(value: Any) -> Any:
+    if isinstance(value, str):
+        raise PydanticCustomError(
+            "not_supported", 'an ellipsoid has no faces to be held on: give a height, {below = "-15 mm"}'
+        )
+    return value if isinstance(value, Below) else Below.read(value)
+
+
+class Ellipsoid(Drawn):
+    """An ellipsoid about the origin, its semi-axes along x, y and z."""
+
+    shape: Literal["ellipsoid"]
+    axes: Annotated[
+        tuple[Length, Length, Length],
+        Words("Three semi-axes, along x, y and z; the centre is the origin.", '["40 mm", "35 mm", "25 mm"]'),
+    ]
+    fixed: Annotated[
+        Below, BeforeValidator(_below),
+        Words("Where the body is held: everywhere below a height.", '{below = "-6 mm"}'),
+    ]  # fmt: skip
+
+    @property
+    def extent(self) -> float:
+        """Longest axis (m)."""
+        return 2 * max(self.axes)
+
+    @property
+    def heights(self) -> tuple[float, float]:
+        """Heights (m) of the lowest and of the highest point."""
+        return -self.axes[2], self.axes[2]
+
+    @property
+    def volume(self) -> float:
+        """Volume (m³)."""
+        a, b, c = self.axes
+        return 4 / 3 * pi * a * b * c
+
+    def frame(self, at: tuple[float, ...], axis: Vector | None = None) -> Frame:
+        """Return the place above x and y, or at the point of the surface that is nearest to three coordinates.
+
+        Raises:
+            PlaceError: if there is none, or the axis is inclined too far.
+        """
+        a, b, c = self.axes
+        if len(at) == 2:
+            x, y = at
+            if (square := (x / a) ** 2 + (y / b) ** 2) > 1:
+                raise PlaceError(f"lies beside the body ({self.face}): there is no surface above it")
+            z = c * sqrt(1 - square)
+        else:
+            if not any(at):
+                raise PlaceError("is the ellipsoid's centre, as near to one side as to the other: move it aside")
+            x, y, z = map(float, self._surface.project(np.array([at]))[0])
+        steepest = unit((x / a**2, y / b**2, z / c**2))
+        return Frame.touching((x, y, z), (0.0 - steepest[0], 0.0 - steepest[1], 0.0 - steepest[2]), axis)
+
+    def lift(self, frame: Frame, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return where lines along the axis enter the ellipsoid."""
+        origins = frame.world(np.column_stack([points, np.zeros(len(points))]))
+        axis, axes = np.array(frame.axis), np.array(self.axes)
+        found = origins + ball(origins / axes, axis / axes)[0][:, None] * axis
+        steepest = found / axes**2
+        return found, steepest / np.linalg.norm(steepest, axis=1, keepdims=True)
+
+    def thickness(self, frame: Frame) -> float:
+        """Return how far (m) the farthest point lies along the axis."""
+        farthest = hypot(*(semi * c for semi, c in zip(self.axes, frame.axis, strict=True)))
+        return farthest - sum(p * c for p, c in zip(frame.point, frame.axis, strict=True))
+
+    def reach(self, frame: Frame) -> float:
+        """Return the largest distance (m) of a point of the silhouette from the axis, to 1e-4 from above."""
+        semi = np.array([frame.along, frame.across]) * np.array(self.axes)
+        turned, lengths, _ = np.linalg.svd(semi)
+        angle = np.linspace(0.0, 2 * pi, _ROUND + 1)
+        ellipse = (turned * lengths) @ np.array([np.cos(angle), np.sin(angle)]) / np.cos(pi / _ROUND)
+        centre = frame.local(np.zeros((1, 3)))[0, :2]
+        return float(np.linalg.norm(ellipse.T + centre, axis=1).max())
+
+    def farthest(self, frame: Frame) -> float:
+        """Return the distance (m) of the farthest point: the normal there points away from the point of contact.
+
+        Of all x with x - p = t x / a² it is the one with the largest t, at least the square of the longest semi-axis.
+        """
+        longest = max(range(3), key=lambda n: self.axes[n])
+        pairs = [(semi**2, p) for semi, p in zip(self.axes, frame.point, strict=True)]
+        low = self.axes[longest] ** 2
+        high = low + sqrt(sum(square * p * p for square, p in pairs))
+        for _ in range(_BISECTIONS):
+            t = (low + high) / 2
+            too_low = sum(square * (p / (t - square)) ** 2 for square, p in pairs) > 1 if t > low else True
+            low, high = (t, high) if too_low else (low, t)
+        found = [square * p / (square - high) if square < high else 0.0 for square, p in pairs]
+        others = sum(
+            x * x / square for n, (x, (square, _)) in enumerate(zip(found, pairs, strict=True)) if n != longest
+        )
+        rest = self.axes[longest] * sqrt(max(0.0, 1 - others))
+        found[longest] = -rest if frame.point[longest] > 0 else rest
+        return hypot(*(x - p for x, p in zip(found, frame.point, strict=True)))
+
+    def inside(self, points: FloatArray) -> FloatArray:
+        """Return the distance (m) of points inside to the surface, negative outside."""
+        return -self._surface.distance(points)
+
+    def gap(self, point: Vector) -> float:
+        """Return infinity: its surface has no edge."""
+        return inf
+
+    @property
+    def face(self) -> str:
+        """Its semi-axes."""
+        return "semi-axes " + " × ".join(map(in_mm, self.axes))
+
+    def mirror_planes(self) -> tuple[str, ...]:
+        """Return both planes."""
+        return "x", "y"
+
+    def half_plane(self) -> HalfEllipse | None:
+        """Return half of its ellipse if it is one of revolution; inclusions have none."""
+        a, b, c = self.axes
+        return HalfEllipse(a, c) if a == b and not self.inclusion else None
+
+    def draw(self, kernel: Any, units: Units, frame: Frame | None = None) -> int:
+        """Add a ball whose seam lies opposite to the point of contact, and its poles aside, and stretch it."""
+        tag = int(kernel.addSphere(0, 0, 0, 1))
+        px, py, pz = frame.point if frame else (0.0, 0.0, self.axes[2])
+        a, b, c = self.axes
+        # On the ball, the seam is at +x and the poles at ±z: -x is turned to the point of contact.
+        x, y, z = unit((px / a, py / b, pz / c))
+        kernel.rotate([(3, tag)], 0, 0, 0, 1, 0, 0, _ASIDE)
+        kernel.rotate([(3, tag)], 0, 0, 0, 0, 1, 0, atan2(z, hypot(x, y)))
+        kernel.rotate([(3, tag)], 0, 0, 0, 0, 0, 1, atan2(-y, -x) if hypot(x, y) else 0.0)
+        kernel.dilate([(3, tag)], 0, 0, 0, *map(units, self.axes))
+        return tag
+
+    def surfaces(self) -> dict[str, tuple[Surface, ...]]:
+        """Return the one surface."""
+        return {"surface": (self._surface,)}
+
+    @property
+    def _surface(self) -> Ovoid:
+        return Ovoid((0.0, 0.0, 0.0), self.axes)
+
+    @property
+    def bend(self) -> float:
+        """Smallest radius of curvature (m), at the ends of the longest axis."""
+        return min(self.axes) ** 2 / max(self.axes)
+
+    def outline(self) -> list[FloatArray]:
+        """Return the three ellipses in which the planes of coordinates cut it."""
+        angle = np.linspace(0.0, 2 * pi, _ROUND + 1)
+        zero = np.zeros(len(angle))
+        circles = [np.roll(np.column_stack([np.cos(angle), np.sin(angle), zero]), turn, axis=1) for turn in range(3)]
+        return [circle * np.array(self.axes) for circle in circles]

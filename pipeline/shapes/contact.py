@@ -1,0 +1,116 @@
+"""What a footprint needs of the surface below it, told from where lines along the probe's axis meet that surface.
+
+The footprint is what projects along the axis into the probe's outline. It must be one smooth piece of the surface.
+"""
+
+from math import isfinite, radians, tan
+
+from pipeline.shapes.arrays import FloatArray, np
+from pipeline.shapes.body import Body
+from pipeline.shapes.frame import MOST_INCLINED, Frame, PlaceError
+from pipeline.shapes.probe import Probe
+from pipeline.shapes.section import in_mm
+
+# The normals under a footprint may be turned at most this far (degrees) from the one where the axis meets the surface:
+# a probe that bends tissue round more of a body than that touches it along its side, too.
+MOST_TURNED = 45.0
+# Points along the outline, and the smaller outlines within it that are looked at.
+_ALONG = 240
+_WITHIN = (0.0, 0.25, 0.5, 0.75, 0.9)
+# Neighbours differ in height by less than this, in units of what the steepest slope that is allowed makes of their
+# distance: more is a fold.
+_FOLD = 2.0
+# A surface this near to a plane, in units of the footprint, is one.
+_FLAT = 1e-9
+
+
+def outline_points(probe: Probe, count: int = _ALONG) -> FloatArray:
+    """Return about ``count`` points (n, 2), in m, along a footprint's outline, its corners among them; not closed."""
+    line = probe.outline()
+    lengths = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    if len(line) > count:
+        along = np.concatenate([[0.0], np.cumsum(lengths)])
+        at = np.linspace(0.0, along[-1], count + 1)[:-1]
+        return np.column_stack([np.interp(at, along, line[:, axis]) for axis in (0, 1)])
+    pieces = np.maximum(1, np.rint(count * lengths / lengths.sum())).astype(int)
+    parts = [
+        start + np.linspace(0, 1, n, endpoint=False)[:, None] * (end - start)
+        for start, end, n in zip(line[:-1], line[1:], pieces, strict=True)
+    ]
+    return np.vstack(parts)
+
+
+def lifted_edge(body: Body, probe: Probe, frame: Frame) -> FloatArray:
+    """Return points (n, 3), in m, of the edge of a footprint on the body; not a number where it is not there."""
+    return body.lift(frame, outline_points(probe))[0]
+
+
+def edge_gap(body: Body, probe: Probe, frame: Frame) -> float:
+    """Return the distance (m) from a footprint to the edge of the face that it lies on, negative outside."""
+    return min(body.gap((float(x), float(y), float(z))) for x, y, z in lifted_edge(body, probe, frame))
+
+
+def is_level(body: Body, frame: Frame) -> bool:
+    """Tell whether the probe presses straight down on a plane face with edges."""
+    return frame.is_upright and isfinite(body.gap(frame.point))
+
+
+def is_flat(body: Body, probe: Probe, frame: Frame) -> bool:
+    """Tell whether the probe is set at right angles on a plane piece of the surface."""
+    if is_level(body, frame):
+        return True
+    if frame.axis != frame.normal:
+        return False
+    points, _ = body.lift(frame, outline_points(probe))
+    heights = frame.local(points)[:, 2]
+    return bool(np.all(np.abs(heights) < _FLAT * probe.circumradius))
+
+
+def check_contact(body: Body, probe: Probe, frame: Frame) -> None:
+    """Check that a footprint lies on one smooth piece of a body's surface, and nowhere too steep.
+
+    Raises:
+        PlaceError: with what was found.
+    """
+    rim = outline_points(probe)
+    rings = np.concatenate([share * rim for share in _WITHIN] + [rim])
+    points, normals = body.lift(frame, rings)
+    if (missed := np.isnan(points).any(axis=1)).any():
+        raise PlaceError(
+            f"{missed.mean():.0%} of the footprint of the {probe.shape} misses the body: all of it must lie on the "
+            "surface, not over its edge"
+        )
+    inclined = _angles(normals, np.array(frame.outward))
+    if inclined > MOST_INCLINED:
+        raise PlaceError(
+            f"under the footprint the surface is inclined by up to {inclined:.3g}° to the probe's axis: at most "
+            f"{MOST_INCLINED:g}° are allowed; use another place or axis, or a smaller probe"
+        )
+    turned = _angles(normals, -np.array(frame.normal))
+    if turned > MOST_TURNED:
+        raise PlaceError(
+            f"the surface turns by up to {turned:.3g}° under the footprint, as over an edge: at most "
+            f"{MOST_TURNED:g}° are allowed; use another place or a smaller probe"
+        )
+    heights = frame.local(points)[:, 2].reshape(-1, len(rim))
+    step = _largest_step(rim, heights)
+    if step > _FOLD * tan(radians(MOST_INCLINED)):
+        height = float(np.abs(np.diff(heights, axis=0)).max(initial=np.abs(np.diff(heights, axis=1)).max()))
+        raise PlaceError(
+            f"the surface under the footprint leaps by {in_mm(height)}, as over a fold: it must be one piece; use "
+            "another place, another axis or a smaller probe"
+        )
+
+
+def _angles(normals: FloatArray, direction: FloatArray) -> float:
+    """Return the largest angle (degrees) of unit vectors (n, 3) to a direction."""
+    return float(np.degrees(np.arccos(np.clip(normals @ direction, -1, 1))).max())
+
+
+def _largest_step(rim: FloatArray, heights: FloatArray) -> float:
+    """Return the largest slope between neighbours: along each of the outlines, and from one to the next."""
+    shares = np.array([*_WITHIN, 1.0])
+    sides = np.linalg.norm(np.roll(rim, -1, axis=0) - rim, axis=1)
+    along = np.abs(np.roll(heights, -1, axis=1) - heights)[1:] / (shares[1:, None] * sides)
+    outward = np.abs(np.diff(heights, axis=0)) / (np.diff(shares)[:, None] * np.linalg.norm(rim, axis=1))
+    return float(max(along.max(), outward.max()))

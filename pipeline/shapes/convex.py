@@ -1,0 +1,41 @@
+"""Convex bodies: how far they reach from a probe, and where lines enter what bounds them."""
+
+from pipeline.shapes.arrays import FloatArray, np
+from pipeline.shapes.frame import Frame, Vector
+
+
+def reach_of(frame: Frame, points: FloatArray) -> float:
+    """Return the largest distance (m) of ``points`` (n, 3) from a probe's axis."""
+    local = frame.local(points)
+    return float(np.hypot(local[:, 0], local[:, 1]).max())
+
+
+def farthest_of(frame: Frame, points: FloatArray) -> float:
+    """Return the largest distance (m) of ``points`` (n, 3) from the point of contact."""
+    return float(np.linalg.norm(points - np.array(frame.point), axis=1).max())
+
+
+def slab(origins: FloatArray, direction: Vector, normal: Vector, low: float, high: float) -> tuple[FloatArray, ...]:
+    """Return where lines enter and leave what lies between two planes: ``low`` <= x · ``normal`` <= ``high`` (m).
+
+    Lines start at ``origins`` (n, 3); both results are (n), in m along the unit vector ``direction``, infinite where a
+    line never does, not a number where it lies outside altogether.
+    """
+    height, slope = origins @ np.array(normal), float(np.dot(direction, normal))
+    if slope == 0:
+        inside = (low <= height) & (height <= high)
+        return np.where(inside, -np.inf, np.nan), np.where(inside, np.inf, np.nan)
+    ends = (low - height) / slope, (high - height) / slope
+    return np.minimum(*ends), np.maximum(*ends)
+
+
+def ball(origins: FloatArray, direction: FloatArray) -> tuple[FloatArray, ...]:
+    """Return where lines enter and leave the unit ball, or in the plane the unit disc.
+
+    Lines start at ``origins`` (n, d); both results are (n), in units of ``direction`` (d), of any length but nought,
+    not a number where a line misses.
+    """
+    square, along = float(direction @ direction), origins @ direction
+    with np.errstate(invalid="ignore"):
+        root = np.sqrt(along**2 - square * (np.sum(origins**2, axis=1) - 1))
+    return (-along - root) / square, (-along + root) / square
