@@ -117,9 +117,8 @@ class Case:
     @property
     def proportional_to(self) -> tuple[str, ...]:
         """The keys that F is proportional to, those of one section, or of all materials, changing together."""
-        pieces = tuple(f"{region.name}.young" for region in self.body.regions)
-        first = () if self.body.is_filled else self.material.PROPORTIONAL_TO
-        return *first, *pieces, *self.probe.PROPORTIONAL_TO
+        first = ("young of all materials together",) if self.body.regions else self.material.PROPORTIONAL_TO
+        return *first, *self.probe.PROPORTIONAL_TO
 
     @property
     def scale(self) -> Scale:
