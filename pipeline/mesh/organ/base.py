@@ -11,6 +11,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.generate import GeometryError
+from pipeline.mesh.organ.even import evened
 from pipeline.mesh.organ.field import PER_RADIUS
 from pipeline.mesh.organ.level import cut, level_line, on_segments
 from pipeline.mesh.organ.remesh import release, remesh
@@ -21,7 +22,7 @@ from pipeline.shapes.surface import Surface
 from pipeline.stages import stage
 
 # Raise by hand when the same file gives another surface.
-_VERSION = 1
+_VERSION = 2
 # How far, in units of the largest elements, the surface between two meshings may be from the file's: points are put
 # back onto the file's after each.
 DEVIATION = 0.02
@@ -85,6 +86,7 @@ def base(points: FloatArray, facets: IntArray, skin: Surface, below: float, larg
         raise GeometryError(f"a level of {below:g} m does not cut a surface between {low:g} and {high:g} m")
     level = level_line(points, facets, below)
     sheet = Sheet(sheet.points, sheet.facets, sheet.group, sharp_edges(sheet, largest))
+    sheet = evened(sheet)
     coarse = remesh(sheet, np.full(len(sheet.points), largest), DEVIATION * largest)
     return Base(put_back(coarse, skin, level), level)
 

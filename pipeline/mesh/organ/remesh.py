@@ -14,6 +14,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.generate import MeshError
+from pipeline.mesh.organ.even import closed
 from pipeline.mesh.organ.sheet import Sheet, edges_of
 from pipeline.stages import stage
 
@@ -70,7 +71,7 @@ def remesh(sheet: Sheet, size: FloatArray, deviation: float, kept: IntArray | No
         if done.returncode or not result.exists():
             said = " ".join((done.stderr + done.stdout).split())[-300:]
             raise MeshError(f"the remesher of surfaces failed ({done.returncode}): {said}")
-        return _read(result.read_text())
+        return closed(_read(result.read_text()))
 
 
 def _mesh_text(sheet: Sheet, kept: IntArray) -> str:

@@ -27,10 +27,10 @@ def sharp_edges(sheet: Sheet, largest: float) -> IntArray:
         inward = centre[side] - middle
         inward -= along * ((inward * along).sum(axis=1) / (along**2).sum(axis=1))[:, None]
         inward /= np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), np.finfo(float).tiny)
-        total = normals[side].copy()
-        for share in (0.15, 0.3, 0.45):
+        total = np.zeros_like(inward)
+        for share in (0.1, 0.2, 0.3, 0.4, 0.5, 0.6):
             place = np.ascontiguousarray(middle + share * largest * inward)
             _, facet, _ = igl.point_mesh_squared_distance(place, sheet.points, sheet.facets)
             total += normals[facet]
-        mean.append(total / np.linalg.norm(total, axis=1, keepdims=True))
+        mean.append(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), np.finfo(float).tiny))
     return edges[(mean[0] * mean[1]).sum(axis=1) < _SHARP]
