@@ -170,3 +170,18 @@ def test_a_column_is_refused(file):
     a_scene = replace(scene(file), column=10e-3)
     with pytest.raises(MeshError, match="no column"):
         mesh_organ(a_scene, SIZES, far_surface(a_scene.body))
+
+
+def test_specks_and_needles_of_the_file_do_not_matter(tmp_path):
+    """Marching cubes leaves edges of micrometres, whose facets look any way."""
+    points, facets = ellipsoid(24)
+    taken = np.zeros(len(points), dtype=bool)
+    for one, other, _ in facets[::40]:
+        if not taken[facets[(facets == one).any(axis=1)]].any():
+            points[one] += 0.999 * (points[other] - points[one])
+            taken[facets[(facets == one).any(axis=1)]] = True
+    a_scene = scene(write_stl(tmp_path / "specks.stl", points, facets))
+    mesh = mesh_organ(a_scene, SIZES, far_surface(a_scene.body))
+    assert taken.sum() > 100
+    assert volume(mesh) == pytest.approx(a_scene.body.volume, rel=0.01)
+    assert qualities(mesh).min() > 0.02

@@ -11,7 +11,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.generate import GeometryError
-from pipeline.mesh.organ.even import evened
+from pipeline.mesh.organ.even import merged
 from pipeline.mesh.organ.field import PER_RADIUS
 from pipeline.mesh.organ.level import cut, level_line, on_segments
 from pipeline.mesh.organ.remesh import release, remesh
@@ -22,7 +22,7 @@ from pipeline.shapes.surface import Surface
 from pipeline.stages import stage
 
 # Raise by hand when the same file gives another surface.
-_VERSION = 2
+_VERSION = 4
 # How far, in units of the largest elements, the surface between two meshings may be from the file's: points are put
 # back onto the file's after each.
 DEVIATION = 0.02
@@ -80,13 +80,12 @@ def base(points: FloatArray, facets: IntArray, skin: Surface, below: float, larg
         GeometryError: if nothing, or all, is held.
         MeshError: if the remesher fails.
     """
-    sheet = cut(points, facets, below)
+    sheet = cut(*merged(points, facets), below)
     if len(np.unique(sheet.group)) < 2:
         low, high = points[:, 2].min(), points[:, 2].max()
         raise GeometryError(f"a level of {below:g} m does not cut a surface between {low:g} and {high:g} m")
     level = level_line(points, facets, below)
     sheet = Sheet(sheet.points, sheet.facets, sheet.group, sharp_edges(sheet, largest))
-    sheet = evened(sheet)
     coarse = remesh(sheet, np.full(len(sheet.points), largest), DEVIATION * largest)
     return Base(put_back(coarse, skin, level), level)
 

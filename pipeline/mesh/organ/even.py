@@ -1,41 +1,39 @@
-"""Surfaces without needles and specks, which remeshers drop: those of marching cubes are full of them."""
+"""Surfaces without specks, which remeshers drop: those of marching cubes are full of them."""
 
 import numpy as np
 from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from pipeline.arrays import FloatArray, IntArray
-from pipeline.mesh.organ.sheet import FIXED, FREE, Sheet
+from pipeline.mesh.organ.sheet import Sheet, edges_of
 
-# A facet is a speck or a needle whose area is less than this, for its longest edge, or whose edges are this short, for
-# those of the surface.
-_FLAT, _SHORT = 0.02, 0.1
-_ROUNDS = 8
+# Points nearer than this to each other, for the edges of the surface, are one.
+_SAME = 0.05
 
 
-def evened(sheet: Sheet) -> Sheet:
-    """Return the sheet with the points of its specks and needles moved towards the middle of their neighbours.
-
-    Those on the support's edge and on sharp edges stay. What moves is put back onto the true surface later.
-    """
-    stay = np.union1d(sheet.border(FIXED, FREE), sheet.sharp)
-    ends = np.concatenate([sheet.facets[:, [0, 1]], sheet.facets[:, [1, 2]], sheet.facets[:, [2, 0]]])
-    count = len(sheet.points)
-    beside = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count)).tocsr()
-    number = np.asarray(beside.sum(axis=1)).ravel()
-    points = sheet.points.copy()
-    for _ in range(_ROUNDS):
-        moving = np.setdiff1d(np.unique(sheet.facets[_is_speck(points, sheet.facets)]), stay)
-        if not len(moving):
-            break
-        points[moving] = (beside[moving] @ points) / number[moving, None]
-    return Sheet(points, sheet.facets, sheet.group, sheet.sharp)
-
-
-def _is_speck(points: FloatArray, facets: IntArray) -> np.ndarray:
-    a, b, c = (points[facets[:, k]] for k in range(3))
-    edges = np.stack([np.linalg.norm(x, axis=1) for x in (b - a, c - b, a - c)])
-    double = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    return (double < _FLAT * edges.max(axis=0) ** 2) | (edges.min(axis=0) < _SHORT * np.median(edges))
+def merged(points: FloatArray, facets: IntArray) -> tuple[FloatArray, IntArray]:
+    """Return a closed surface with points that are next to each other made one, itself where that would open it."""
+    edges, _ = edges_of(facets)
+    length = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
+    near = edges[length < _SAME * np.median(length)]
+    count = len(points)
+    groups, label = connected_components(coo_array((np.ones(len(near)), tuple(near.T)), shape=(count, count)), False)
+    if groups == count:
+        return points, facets
+    share = np.bincount(label, minlength=groups)
+    middles = np.column_stack([np.bincount(label, points[:, k], minlength=groups) / share for k in range(3)])
+    corners = label[facets].astype(np.int64)
+    corners = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
+    # Two facets with the same corners, once a speck between them is gone, lie upon each other.
+    _, first, number = np.unique(np.sort(corners, axis=1), axis=0, return_inverse=True, return_counts=True)
+    corners = corners[number[first.ravel()] == 1]
+    try:
+        edges_of(corners)
+    except ValueError:
+        return points, facets
+    used = np.zeros(groups, dtype=bool)
+    used[corners] = True
+    return middles[used], (np.cumsum(used) - 1)[corners]
 
 
 def closed(sheet: Sheet) -> Sheet:

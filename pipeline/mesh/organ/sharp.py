@@ -2,6 +2,8 @@
 
 import igl
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from pipeline.arrays import IntArray
 from pipeline.mesh.organ.sheet import Sheet, edges_of
@@ -33,4 +35,14 @@ def sharp_edges(sheet: Sheet, largest: float) -> IntArray:
             _, facet, _ = igl.point_mesh_squared_distance(place, sheet.points, sheet.facets)
             total += normals[facet]
         mean.append(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), np.finfo(float).tiny))
-    return edges[(mean[0] * mean[1]).sum(axis=1) < _SHARP]
+    return _long_lines(sheet, edges[(mean[0] * mean[1]).sum(axis=1) < _SHARP], largest)
+
+
+def _long_lines(sheet: Sheet, edges: IntArray, largest: float) -> IntArray:
+    """Return those of the edges that make lines as long as an element: a speck is no edge of a body."""
+    count = len(sheet.points)
+    joined = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
+    _, line = connected_components(joined, directed=False)
+    length = np.linalg.norm(sheet.points[edges[:, 1]] - sheet.points[edges[:, 0]], axis=1)
+    of_line = line[edges[:, 0]]
+    return edges[np.bincount(of_line, length, minlength=1)[of_line] > largest] if len(edges) else edges

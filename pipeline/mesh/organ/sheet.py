@@ -50,6 +50,8 @@ def edges_of(facets: IntArray) -> tuple[IntArray, IntArray]:
     pairs = np.sort(np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]]), axis=1)
     owner = np.tile(np.arange(len(facets)), 3)
     order = np.lexsort((pairs[:, 1], pairs[:, 0]))
+    if len(pairs) % 2:
+        raise ValueError("the surface is not closed")
     edges = pairs[order].reshape(-1, 2, 2)
     if not np.array_equal(edges[:, 0], edges[:, 1]):
         raise ValueError("the surface is not closed")
