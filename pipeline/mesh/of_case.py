@@ -3,13 +3,12 @@
 from dataclasses import replace
 from math import inf
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 from pipeline.mesh.curve import curve
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.generate import MeshArrays, generate
 from pipeline.mesh.meridian import Meridian
-from pipeline.mesh.organ.base import Kept, far_surface
-from pipeline.mesh.organ.make import mesh_organ
 from pipeline.mesh.reflect import reflect
 from pipeline.mesh.size import Sizes
 from pipeline.plan.symmetry import mirror_planes
@@ -18,8 +17,11 @@ from pipeline.shapes.half_plane import HalfEllipse, Rectangle
 from pipeline.shapes.scanned import Scanned
 from pipeline.study.sweep import Case
 
+if TYPE_CHECKING:
+    from pipeline.mesh.organ.base import Kept
 
-def mesh_arrays(case: Case, mirrors: tuple[str, ...], kept: Kept | None = None) -> MeshArrays:
+
+def mesh_arrays(case: Case, mirrors: tuple[str, ...], kept: "Kept | None" = None) -> MeshArrays:
     """Return the mesh of a case as arrays, of the part that ``mirrors`` leave of it.
 
     ``kept`` holds what the meshes of one scanned body share.
@@ -28,13 +30,19 @@ def mesh_arrays(case: Case, mirrors: tuple[str, ...], kept: Kept | None = None) 
     straight, planes, sizes = case.mesh.degree == 1, mirror_planes(case), sizes_of(case)
     segments = sizes.rim_segments(case.probe)
     scene = Scene(case.body, case.probe, case.column, case.mesh.outside == "fixed", segments, straight, planes)
-    if isinstance(case.body, Scanned):
-        arrays = mesh_organ(scene, sizes, far_surface(case.body, kept))
-    else:
-        arrays = generate(scene, sizes)
+    arrays = _of_triangles(scene, case.body, sizes, kept) if isinstance(case.body, Scanned) else generate(scene, sizes)
     arrays = arrays if straight else curve(arrays, scene)
     whole = reflect(arrays, tuple(plane for plane in planes if plane not in mirrors))
     return replace(whole, seconds=perf_counter() - start)
+
+
+def _of_triangles(scene: Scene, body: Scanned, sizes: Sizes, kept: "Kept | None") -> MeshArrays:
+    """Return the mesh of a scene on a scanned ``body``."""
+    # Here, since libigl and what else it needs take 80 ms to load, which other bodies do without.
+    from pipeline.mesh.organ.base import far_surface  # noqa: PLC0415
+    from pipeline.mesh.organ.make import mesh_organ  # noqa: PLC0415
+
+    return mesh_organ(scene, sizes, far_surface(body, kept))
 
 
 def upright(case: Case, arrays: MeshArrays) -> MeshArrays:

@@ -82,6 +82,13 @@ class Body(Section, ABC):
             PlaceError: if a probe cannot touch the body there.
         """
 
+    def frame_below(self, at: tuple[float, ...], axis: Vector | None, around: float) -> Frame:
+        """Return the place as a footprint of radius ``around`` (m) has it, as :meth:`frame` does.
+
+        A smooth surface has one normal at a point, whatever covers it. One of triangles has that of what is covered.
+        """
+        return self.frame(at, axis)
+
     @abstractmethod
     def lift(self, frame: Frame, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return where lines along a probe's axis through ``points`` (n, 2), in its own plane, enter the body nearby.

@@ -186,7 +186,7 @@ class Straight(Probe):
 
 @lru_cache(_MANY)
 def _frame_on(probe: Probe, body: Body) -> Frame:
-    return body.frame(probe.at, probe.axis).facing(probe.lies_along)
+    return body.frame_below(probe.at, probe.axis, probe.circumradius).facing(probe.lies_along)
 
 
 def is_direction(vector: Vector) -> bool:

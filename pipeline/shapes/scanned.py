@@ -67,6 +67,10 @@ class Scanned(Body):
             frame = _frame(point, inward, inward if axis is None else axis)
         return frame
 
+    def frame_below(self, at: tuple[float, ...], axis: Vector | None, around: float) -> Frame:
+        """Return the place, with the mean normal of what a disc of radius ``around`` (m) covers."""
+        return self.frame(at, axis, around)
+
     def _touched(self, at: tuple[float, ...]) -> tuple[FloatArray, int]:
         """Return the point of the surface that coordinates name, and its facet."""
         points, facets = self.triangles.points, self.triangles.facets

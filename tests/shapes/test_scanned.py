@@ -94,6 +94,22 @@ def test_the_normal_is_not_one_facets(tmp_path):
     assert np.dot(frame.outward, np.array(frame.point) / 30e-3) > 0.9998
 
 
+def test_the_place_of_a_probe_is_that_of_what_it_covers(tmp_path):
+    """A bump under a small footprint tilts it, under a large one it does not."""
+    points, facets = sphere(40)
+    away = np.linalg.norm(points - np.array([0.1, 0.0, 0.995]), axis=1)
+    points = 30e-3 * points * (1 + 0.02 * np.exp(-((away / 0.08) ** 2)))[:, None]
+    path = str(write_stl(tmp_path / "bump.stl", points, facets))
+    body = {"shape": "surface", "file": path, "unit": "mm", "fixed": {"below": "-10 mm"}}
+    tilts = []
+    for radius in (1, 8):
+        a_case = study(body=body, probe={"shape": "disc", "radius": f"{radius} mm", "depth": "0.1 mm"}).case(())
+        frame = a_case.frame
+        assert frame.normal == a_case.body.frame(a_case.probe.at, around=1e-3 * radius).normal
+        tilts.append(np.hypot(*frame.normal[:2]))
+    assert tilts[0] > 0.1 and tilts[1] < 0.05
+
+
 def test_a_place_beside_the_body_is_refused(a_body):
     with pytest.raises(PlaceError, match="reaches from"):
         a_body.frame((70e-3, 0.0))

@@ -2,11 +2,12 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
 from tests.cases import solve
-from tests.organs import box, write_stl
+from tests.organs import box, ellipsoid, write_stl
 
 MESH = {"accuracy": "0.5 %", "epsilon": None, "fine": None, "coarse": None, "rim": None, "growth": None, "degree": None}
 NATIVE = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": {"below": "-15 mm"}}
@@ -30,3 +31,26 @@ def test_a_box_given_as_triangles_is_a_box(tmp_path_factory, contact):
     assert one.force_error < 0.005
     assert abs(one.force / other.force - 1) < one.force_error + other.force_error
     assert abs(one.force / other.force - 1) < 0.002
+
+
+@pytest.mark.parametrize("contact", ["bonded", "frictionless"])
+@pytest.mark.parametrize("axis", [None, [-0.3, 0.1, -1.0]], ids=["normal", "inclined"])
+def test_an_ellipsoid_given_as_triangles_is_an_ellipsoid_wherever_it_is_touched(tmp_path, contact, axis):
+    """Pressed on its flank: force, its direction and what is in balance are those of the exact surface."""
+    path = write_stl(tmp_path / "ellipsoid.stl", *ellipsoid(24))
+    given = {"shape": "surface", "file": str(path), "unit": "mm", "fixed": {"below": "-10 mm"}}
+    native = {"shape": "ellipsoid", "axes": ["60 mm", "45 mm", "30 mm"], "fixed": {"below": "-10 mm"}}
+    probe = {"shape": "disc", "radius": "4 mm", "depth": "0.2 mm", "at": ["-36 mm", "0 mm", "24 mm"]}
+    probe |= {"contact": contact} | ({"axis": axis} if axis else {})
+    mesh = {"epsilon": "full", "fine": "15 mm", "coarse": "60 mm", "rim": "0.4 mm", "growth": 0.5}
+    found = []
+    for body in (given, native):
+        (record,) = solve(body=body, probe=probe, mesh=mesh).values()
+        assert record.status == "ok", record.message
+        found.append(record)
+    one, other = found
+    assert one.force == pytest.approx(other.force, rel=0.01)
+    assert 0.005 < one.force_error < 0.03
+    assert abs(one.force / other.force - 1) < max(one.force_error, other.force_error)
+    np.testing.assert_allclose(one.force_vector, other.force_vector, atol=0.01 * other.force)
+    assert one.balance < 1e-5 and one.energy == pytest.approx(one.force * 0.2e-3 / 2, rel=1e-5)
