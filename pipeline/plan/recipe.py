@@ -44,8 +44,8 @@ LADDER = (
 _THICKNESS, _THINNEST = 10.0, 0.15
 # Those of the mixed element are larger than those of the displacement element at ν = 0.3, by degree.
 _MIXED = {2: 1.2, 3: 1.05}
-# And those of bodies of several materials, by element (pipeline/solve/error.py).
-_REGIONS = {"displacement": 1.6, "mixed": 2.6}
+# And those of bodies of several materials, or with a curved surface, by element (pipeline/solve/error.py).
+_ELSEWHERE = {"displacement": 1.6, "mixed": 2.6}
 # Bars of displacement elements grow like (1 - 2 ν)^-0.35 on the way to locking; measured from ν = 0.3 to 0.49.
 _LOCKING = 0.35
 # The bar on the force along the axis grows by this share of the slide over the depth, where both movements mix.
@@ -74,8 +74,8 @@ def _expected(case: Case, recipe: Recipe) -> float:
     shape = case.probe.EXPECTED_ERROR
     if mirror_planes(case) == model_planes(case):
         shape *= 1 + _SLIDE * _slide(case)
-    if case.body.regions:
-        shape *= _REGIONS[case.element]
+    if not case.is_plain:
+        shape *= _ELSEWHERE[case.element]
     thickness = 1 + _THICKNESS * min(case.probe.half_width / case.body.thickness(case.frame), _THINNEST)
     if case.element == "mixed":
         return recipe.bar * shape * thickness * _MIXED[recipe.degree]

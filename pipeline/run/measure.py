@@ -26,8 +26,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
     if solve.goal is not None and not solve.axisymmetric:
         half_width = case.probe.half_width
         graded = is_graded(case.mesh.rim_size(half_width) / half_width, case.mesh.growth)
-        of_regions = bool(case.body.regions)
-        solution = solution.extrapolated(case.mesh.degree, case.element, graded=graded, of_regions=of_regions)
+        solution = solution.extrapolated(case.mesh.degree, case.element, graded=graded, elsewhere=not case.is_plain)
     # It was solved with the probe pressing along -z; the record is in the coordinates of the body.
     turn, force, bar = case.frame.turn, solution.reaction[2], solution.reaction_bars[2]
     return Record(

@@ -31,8 +31,8 @@ _MOST = 0.9
 # F is at F_{p+1} - (centre ± spread) θ s on meshes graded to the edge, on others, and without quarter points.
 _LIMITS = {"displacement": (0.4, 0.25), "mixed": (0.5, 0.35)}
 _LIMITS_COARSE, _LIMITS_PLAIN = (0.4, 1.0), (0.85, 0.85)
-# Of several materials part of the error is from where they meet, of which the next degree takes another share.
-_LIMITS_REGIONS = {"displacement": (0.4, 0.4), "mixed": (0.5, 0.9)}
+# Where materials meet, or a surface is curved, part of the error is from there: the next degree takes another share.
+_LIMITS_ELSEWHERE = {"displacement": (0.4, 0.4), "mixed": (0.5, 0.9)}
 # Graded to the edge: the coarsest that was measured, relative to the probe's half width, and the growth from there.
 _GRADED = (0.4, 0.7)
 
@@ -66,15 +66,15 @@ def stiffness_bars(stiffness: FloatArray, relative: FloatArray, *, apart: bool =
 
 def extrapolate(
     stiffness: FloatArray, decrements: FloatArray, bars: FloatArray, degree: int, element: str, *,
-    plain: float = 0.0, graded: bool = True, of_regions: bool = False,
+    plain: float = 0.0, graded: bool = True, elsewhere: bool = False,
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Return the stiffness (n, n) that the degrees tend to, and the bars on its entries.
 
-    ``decrements`` is K_p - K_{p+1}, ``bars`` those on K_p: of each, the same share of F_p is left. ``of_regions``: the
-    body is of several materials.
+    ``decrements`` is K_p - K_{p+1}, ``bars`` those on K_p: of each, the same share of F_p is left. ``elsewhere``
+    tells that the probe's edge may not be all that F errs by.
     """
     theta = _theta(degree)
-    limits = _LIMITS_REGIONS if of_regions else _LIMITS
+    limits = _LIMITS_ELSEWHERE if elsewhere else _LIMITS
     centre, spread = limits[element] if graded else _LIMITS_COARSE
     if plain >= _PLAIN:
         centre, spread = _LIMITS_PLAIN

@@ -108,16 +108,16 @@ class Solution:
         x, y, z = map(float, np.where(spanned > 1 - 1e-9, bars, nan))
         return x, y, z
 
-    def extrapolated(self, degree: int, element: str, *, graded: bool = True, of_regions: bool = False) -> "Solution":
+    def extrapolated(self, degree: int, element: str, *, graded: bool = True, elsewhere: bool = False) -> "Solution":
         """Return what the sequence of degrees tends to, ``graded`` to the edge or not; itself if it has no bars.
 
-        ``of_regions``: the body is of several materials.
+        ``elsewhere`` tells that the probe's edge may not be all that F errs by.
         """
         if self.decrements is None or self.bars is None:
             return self
         stiffness, bars = extrapolate(
             self.stiffness, self.decrements, self.bars, degree, element, plain=self.plain, graded=graded,
-            of_regions=of_regions,
+            elsewhere=elsewhere,
         )  # fmt: skip
         return replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
 

@@ -9,7 +9,7 @@ from math import dist, inf, isfinite
 from typing import cast
 
 from pipeline.shapes.body import Body
-from pipeline.shapes.contact import check_contact, edge_gap, is_level, lifted_edge
+from pipeline.shapes.contact import check_contact, edge_gap, is_flat, is_level, lifted_edge
 from pipeline.shapes.frame import Frame, PlaceError
 from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.probe import Probe, is_direction
@@ -57,6 +57,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     for (body, probe), mesh in itertools.product(placed, meshes):
         _check_column(body, probe, mesh, problems)
         _check_gap(body, probe, mesh, problems)
+        _check_straight(body, probe, mesh, problems)
     for body, material, mesh in itertools.product(bodies, materials, meshes):
         _check_locking(dict(tissues_of(body, material)), mesh, problems)
     _check_reference(meshes, axes, problems)
@@ -212,6 +213,16 @@ def _check_outside(body: Body, mesh: Mesh, problems: Problems) -> None:
             "the column round the probe does not touch the fixed sides and would float: "
             'use `outside = "coarse"` or "fixed", or fix the bottom',
         )
+
+
+def _check_straight(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
+    """Refuse what straight elements cannot follow: no error bar tells how much tissue they leave out."""
+    if mesh.degree > 1:
+        return
+    if body.inclusion:
+        problems.error("mesh.degree", mesh.degree, "is too low for inclusions, which straight elements cut: use 2 or 3")
+    elif not is_flat(body, probe, probe.frame_on(body)):
+        problems.error("mesh.degree", mesh.degree, "is too low for a curved surface, or a tilted probe: use 2 or 3")
 
 
 def _check_locking(poissons: dict[str, float], mesh: Mesh, problems: Problems) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 from pipeline.quantities import write
 from pipeline.shapes.body import Body
+from pipeline.shapes.contact import is_level
 from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
@@ -124,6 +125,11 @@ class Case:
     def scale(self) -> Scale:
         """The units in which its results do not depend on what they are proportional to."""
         return Scale(self.material.young, self.probe.scale)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the probe's edge rules the error of F: one material, pressed straight down on a plane face."""
+        return not self.body.regions and is_level(self.body, self.frame)
 
     @property
     def is_full(self) -> bool:

@@ -57,17 +57,22 @@ def _solve(comm: MPI.Comm, scene: Section, mesh: Section, without: tuple[str, ..
 
 def _name(scene: Section, mesh: Section) -> str:
     body, probe = scene["body"], scene["probe"]
-    size = f"{body['radius']} × {body['height']}" if body["shape"] == "cylinder" else " × ".join(body["size"])
-    at = f" at {probe['at'][0]}" if "at" in probe else ""
-    tool = {"disc": f"disc{at}", "blade": f"blade {probe.get('length')}"}.get(probe["shape"]) or (
-        f"ellipse {probe['axes'][0]} along {probe['direction'][0]:.2f} {probe['direction'][1]:.2f}"
-    )
+    at = f" at {' '.join(probe['at'])}" if "at" in probe else ""
+    along = f" along {probe['direction'][0]:.2f} {probe['direction'][1]:.2f}" if "direction" in probe else ""
+    tool = f"{probe['shape']} {probe.get('length') or probe.get('axes', probe.get('radius'))}{along}{at}"
     sizes = f"rim {mesh['rim']} growth {mesh['growth']} fine {mesh['fine']}" if "rim" in mesh else "truth"
     return (
-        f"{body['shape']} {size} on its {body['fixed']}{_regions(body)}, {tool} {probe['contact']},"
+        f"{body['shape']} {_size(body)} on its {body['fixed']}{_regions(body)}, {tool} {probe['contact']},"
         f" ν {scene['material']['poisson']:g},"
         f" degree {mesh.get('degree', '-')} {sizes} ε {mesh.get('epsilon', '-')} {mesh.get('outside', '')}"
     )
+
+
+def _size(body: Section) -> str:
+    """Write how large a body is."""
+    if body["shape"] == "surface":
+        return str(body["file"])
+    return f"{body['radius']} × {body['height']}" if body["shape"] == "cylinder" else " × ".join(body["size"])
 
 
 def _regions(body: Section) -> str:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.verify.coverage.families import design, ellipses, proportions, regions
+from pipeline.verify.coverage.families import design, ellipses, organs, proportions, regions
 from pipeline.verify.coverage.families.dice import Section
 
 
@@ -25,5 +25,6 @@ FAMILIES: dict[str, Family] = {
     "design": Family(design.throw, design.TRUTH),
     "proportions": Family(proportions.throw, proportions.TRUTH),
     "ellipses": Family(ellipses.throw, ellipses.TRUTH),
+    "organs": Family(organs.throw, organs.TRUTH),
     "regions": Family(regions.throw, regions.TRUTH),
 }
