@@ -10,6 +10,7 @@ import pytest
 
 from pipeline.mesh.curve import curve
 from pipeline.mesh.generate import MeshError
+from pipeline.mesh.organ import make
 from pipeline.mesh.organ.base import far_surface
 from pipeline.mesh.organ.make import mesh_organ
 from pipeline.mesh.size import Sizes
@@ -185,3 +186,21 @@ def test_specks_and_needles_of_the_file_do_not_matter(tmp_path):
     assert taken.sum() > 100
     assert volume(mesh) == pytest.approx(a_scene.body.volume, rel=0.01)
     assert qualities(mesh).min() > 0.02
+
+
+def test_a_surface_that_is_not_the_files_is_never_filled(file, monkeypatch):
+    """Too small a one, and an open one, are failures that are told."""
+    a_scene = scene(file)
+    far = far_surface(a_scene.body)
+    to_sizes = make._to_sizes
+
+    def shrunk(*given):
+        sheet = to_sizes(*given)
+        return replace(sheet, points=0.98 * sheet.points)
+
+    monkeypatch.setattr(make, "_to_sizes", shrunk)
+    with pytest.raises(MeshError, match=r"0\.06\d times the body's volume too little"):
+        mesh_organ(a_scene, SIZES, far)
+    monkeypatch.setattr(make, "_to_sizes", lambda *given: replace(far.sheet, facets=far.sheet.facets[1:]))
+    with pytest.raises(MeshError, match="not closed"):
+        mesh_organ(a_scene, SIZES, far)

@@ -5,6 +5,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.plan.key import case_key
+from pipeline.shapes.contact import lifted_edge
+from pipeline.study.check import held_gaps
 from pipeline.study.problems import StudyError
 from tests.cases import study
 from tests.shapes.files.solids import ball, both, stl
@@ -71,3 +73,18 @@ def test_the_filter_is_swept_like_any_other_value():
     bodies = [of_filters.case((index,)).body for index in range(2)]
     assert bodies[0].triangles.hash != bodies[1].triangles.hash
     assert bodies[0].volume == pytest.approx(bodies[1].volume, rel=2e-3)
+
+
+def test_elements_fit_between_a_footprint_and_what_is_held():
+    """The gap is at least the height of the footprint's edge above the level."""
+    (case,) = surface(MESHES / "liver.stl").cases()
+    lowest = float(lifted_edge(case.body, case.probe, case.frame)[:, 2].min())
+    near = {"below": f"{1e3 * lowest - 0.3:.6f} mm"}
+    body = {"shape": "surface", "file": str(MESHES / "liver.stl"), "unit": "mm", "fixed": near}
+    probe = {"at": ["-25 mm", "0 mm"]}
+    with pytest.raises(StudyError, match=r"leaves 0\.3 mm between the probe's edge and a held face"):
+        study(body=body, probe=probe, mesh={"rim": "0.5 mm"})
+    (fits,) = study(body=body, probe=probe, mesh={"rim": "0.2 mm"}).cases()
+    assert held_gaps(fits.body, fits.probe, fits.mesh)["body.fixed"] == pytest.approx(0.3e-3, rel=1e-3)
+    with pytest.raises(StudyError, match="must not reach what is held"):
+        study(body=body | {"fixed": {"below": f"{1e3 * lowest + 0.3:.6f} mm"}}, probe=probe)

@@ -5,6 +5,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from pipeline.arrays import FloatArray, IntArray
+from pipeline.mesh.generate import MeshError
 from pipeline.mesh.organ.sheet import Sheet, edges_of
 
 # Points nearer than this to each other, for the edges of the surface, are one.
@@ -29,7 +30,7 @@ def merged(points: FloatArray, facets: IntArray) -> tuple[FloatArray, IntArray]:
     corners = corners[number[first.ravel()] == 1]
     try:
         edges_of(corners)
-    except ValueError:
+    except MeshError:
         return points, facets
     used = np.zeros(groups, dtype=bool)
     used[corners] = True

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
+from pipeline.mesh.generate import MeshError
 from pipeline.scene import model
+from pipeline.shapes.triangles import enclosed
 
 # Numbers of the groups, which the remesher keeps apart.
 FREE, FIXED, PROBE = 1, 2, 3
@@ -36,6 +38,11 @@ class Sheet:
         length = np.linalg.norm(normal, axis=1, keepdims=True)
         return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
 
+    @property
+    def volume(self) -> float:
+        """Volume (m³) within."""
+        return enclosed(self.points, self.facets)
+
     def border(self, one: int, other: int | None = None) -> IntArray:
         """Return the edges (k, 2), lower number first, between facets of group ``one`` and of the ``other``, or all."""
         edges, facets = edges_of(self.facets)
@@ -46,15 +53,19 @@ class Sheet:
 
 
 def edges_of(facets: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the edges (k, 2) of a closed surface, lower number first, and the two facets (k, 2) of each."""
+    """Return the edges (k, 2) of a closed surface, lower number first, and the two facets (k, 2) of each.
+
+    Raises:
+        MeshError: if it is not closed.
+    """
     pairs = np.sort(np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]]), axis=1)
     owner = np.tile(np.arange(len(facets)), 3)
     order = np.lexsort((pairs[:, 1], pairs[:, 0]))
     if len(pairs) % 2:
-        raise ValueError("the surface is not closed")
+        raise MeshError("the surface, meshed anew, is not closed")
     edges = pairs[order].reshape(-1, 2, 2)
     if not np.array_equal(edges[:, 0], edges[:, 1]):
-        raise ValueError("the surface is not closed")
+        raise MeshError("the surface, meshed anew, is not closed")
     return edges[:, 0], owner[order].reshape(-1, 2)
 
 
