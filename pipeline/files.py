@@ -7,6 +7,12 @@ from pathlib import Path
 from secrets import token_hex
 
 
+def cache_folder() -> Path:
+    """Return the folder of what can be made again: $EPSMESH_CACHE, or one in the user's cache."""
+    given = os.environ.get("EPSMESH_CACHE")
+    return Path(given or Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "epsmesh")
+
+
 @contextmanager
 def atomic(path: Path) -> Iterator[Path]:
     """Yield a file beside ``path`` to be written: once it is on disk, it takes the place of an earlier one.

@@ -24,6 +24,7 @@ _SAME = 1e-12
 # Normals are means over this share of a footprint's radius, to each side.
 _OF_FOOTPRINT, _MOST_CELLS = 0.1, 400
 _FEW = 8  # surfaces whose trees are kept
+_MANY = 10_000  # places of a large study
 
 
 class Scanned(Body):
@@ -118,9 +119,7 @@ class Scanned(Body):
 
     def thickness(self, frame: Frame) -> float:
         """Return the distance (m) along the axis to where it leaves the tissue again, over hollows and all."""
-        points, facets = self.triangles.points, self.triangles.facets
-        _, height = pierce(-frame.local(points), facets, np.zeros((1, 2)))
-        return max(float(height[0]), 0.0) if np.isfinite(height[0]) else 0.0
+        return _thickness(self.triangles, frame)
 
     def reach(self, frame: Frame) -> float:
         """Return the largest distance (m) of a point from the axis."""
@@ -203,6 +202,12 @@ def _smoothed(
             at = np.clip(own + np.array((i, j)), 0, np.array(total.shape[:2]) - 1)
             result += total[at[:, 0], at[:, 1]]
     return result / np.linalg.norm(result, axis=1, keepdims=True)
+
+
+@lru_cache(_MANY)
+def _thickness(triangles: Triangles, frame: Frame) -> float:
+    _, height = pierce(-frame.local(triangles.points), triangles.facets, np.zeros((1, 2)))
+    return max(float(height[0]), 0.0) if np.isfinite(height[0]) else 0.0
 
 
 @lru_cache(_FEW)

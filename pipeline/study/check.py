@@ -5,6 +5,7 @@ What makes no sense in a shape by itself, the shape reports; here is what must f
 
 import itertools
 from collections.abc import Sequence
+from functools import lru_cache
 from math import dist, inf, isfinite
 from typing import cast
 
@@ -27,6 +28,7 @@ _LOCKING = {1: (0.45, 0.45), 2: (0.49, 0.495), 3: (0.49, 0.495)}
 
 # Mixed elements keep λ = μ, which is ν = 0.25, with the displacement and give the rest to the pressure.
 _LEAST_MIXED = 0.25
+_MANY = 10_000  # places of a large study
 # A footprint this near the edge, in units of the body, touches it: the rest is rounding.
 _TOUCHING = 1e-9
 # A place this far off the surface, in units of the body, is not projected to it: it is a slip of sign or unit.
@@ -149,6 +151,7 @@ def _check_contact(body: Body, probe: Probe, frame: Frame) -> None:
         raise PlaceError(f"the footprint of the {probe.shape} must not reach what is held of the body")
 
 
+@lru_cache(_MANY)
 def _held_gap(body: Body, probe: Probe, frame: Frame) -> float:
     """Return the distance (m) from the footprint to what is held, of any place."""
     distance = body.support.distance(body.surfaces(), lifted_edge(body, probe, frame))

@@ -6,6 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from pipeline.shapes.files import obj, ply, stl
+from pipeline.shapes.files.checked import kept_whole
 from pipeline.shapes.files.raw import Raw
 from pipeline.shapes.files.whole import made_whole
 from pipeline.shapes.triangles import SurfaceError, Triangles
@@ -67,9 +68,9 @@ def _load(path: Path, _changed: int, size: int, unit: float, repair: bool, smoot
         data = path.read_bytes()
     except OSError as error:
         raise SurfaceError(f"cannot be read: {error.strerror or error}") from None
-    raw = _parsed(data, path.suffix.lower())
-    triangles, notices = made_whole(raw, unit, repair, smooth)
-    return Loaded(triangles, notices)
+    ending = path.suffix.lower()
+    given = f"{ending} {unit!r} {repair} {smooth!r}"
+    return Loaded(*kept_whole(data, given, lambda: made_whole(_parsed(data, ending), unit, repair, smooth)))
 
 
 def _parsed(data: bytes, ending: str) -> Raw:
