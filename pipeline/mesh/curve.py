@@ -42,19 +42,34 @@ def curve(mesh: MeshArrays, scene: Scene) -> MeshArrays:
     edges = pairs[first]
     straight = mesh.points[edges].mean(axis=1)
     of_cell = inverse.reshape(-1, len(EDGES))
-    curved = _on_inclusions(mesh, scene, edges, _on_sides(mesh, scene, edges, straight, keys))
+    curved = straight if mesh.bent is None else _on_faces(mesh.bent, edges, straight)
+    curved = _on_inclusions(mesh, scene, edges, _on_sides(mesh, scene, edges, curved, keys))
     curved = _on_rim(mesh, scene, edges, curved)
     middle = _quarter_points(mesh, edges, curved.copy())
     # A folded cell gives up its quarter points first: without its arcs the footprint would be a smaller one.
     for milder in (curved, straight):
         _unfold(mesh.points[corners], middle, of_cell, milder)
     nodes = np.hstack([corners, len(mesh.points) + of_cell])
-    return replace(mesh, points=np.vstack([mesh.points, middle]), cells=nodes)
+    return replace(mesh, points=np.vstack([mesh.points, middle]), cells=nodes, bent=None)
+
+
+def _on_faces(bent: tuple[IntArray, FloatArray], edges: IntArray, middle: FloatArray) -> FloatArray:
+    """Move the mid nodes of edges to where the geometry kernel has them: rims that are not plane are such, too."""
+    among, points = np.sort(bent[0], axis=1), bent[1]
+    count = int(edges.max()) + 1
+    keys, wanted = edges @ np.array([count, 1]), among @ np.array([count, 1])
+    order = np.argsort(keys)
+    at = np.searchsorted(keys, wanted, sorter=order)
+    middle = middle.copy()
+    middle[order[at]] = points
+    return middle
 
 
 def _on_rim(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray) -> FloatArray:
     """Move the mid nodes of edges along a curved rim onto it, or onto the column where that cuts the footprint."""
     if _is_lifted(scene):
+        if mesh.bent is not None:
+            return middle
         return _on_lifted_rim(mesh, scene, edges, middle)
     both = np.isin(edges, mesh.rim).all(axis=1) & np.isin(_key(mesh, edges), _facet_edges(mesh, ["probe"]))
     if not (scene.probe.is_curved or isinstance(scene.body, Scanned)):
@@ -101,7 +116,7 @@ def _lifted(scene: Scene, points: FloatArray) -> FloatArray:
 
 def _on_rim_nodes(mesh: MeshArrays, scene: Scene) -> MeshArrays:
     """Move the corners of elements on a rim that is not plane, which the kernel knows to its tolerance, onto it."""
-    if not (_is_lifted(scene) and scene.probe.is_curved):
+    if mesh.bent is not None or not (_is_lifted(scene) and scene.probe.is_curved):
         return mesh
     points = mesh.points.copy()
     moved = _lifted(scene, points[mesh.rim])

@@ -10,9 +10,11 @@ import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.compat import gmsh_session
+from pipeline.mesh.follow import middle_nodes, rounded_sizes
 from pipeline.mesh.regions import region_sizes
 from pipeline.mesh.size import Sizes, set_size_field
 from pipeline.scene.model import CUT, FIXED, FREE, MIRROR, PROBE, TISSUE, Scene, SceneError, build
+from pipeline.shapes.bodies.cad import FromCad
 from pipeline.stages import stage
 
 # gmsh's HXT is 3 to 6 times faster, but numbers its points by memory address: no two runs give the same mesh,
@@ -39,7 +41,8 @@ class MeshArrays:
 
     ``points`` (n, 3) in metres; ``cells`` (m, 4), or (m, 10) once curved; ``facets`` maps the name of a group
     to its boundary triangles (k, 3); ``rim`` holds the points on the probe's edge; ``seconds`` is what it took.
-    ``regions`` (m) numbers the material of each cell, None where there is one only.
+    ``regions`` (m) numbers the material of each cell, None where there is one only. ``bent``, until cells are curved,
+    holds edges (k, 2) on faces that only the geometry kernel knows, and the mid nodes (k, 3) that it gave them, in m.
     """
 
     points: FloatArray
@@ -48,6 +51,7 @@ class MeshArrays:
     rim: IntArray
     seconds: float
     regions: IntArray | None = None
+    bent: tuple[IntArray, FloatArray] | None = None
 
 
 @stage("gmsh")
@@ -78,13 +82,13 @@ def _generate(scene: Scene, sizes: Sizes, start: float) -> MeshArrays:
             if scene.rim_segments and len(rim_curves) == 1 and scene.is_flat:
                 edges = scene.rim_segments // 2 ** len(scene.mirrors)
                 gmsh.model.mesh.setTransfiniteCurve(rim_curves[0], edges + 1)
-            more = region_sizes(scene, sizes.growth)
+            more = [*region_sizes(scene, sizes.growth), *rounded_sizes(scene, sizes.growth)]
             lifted = [] if scene.is_flat else rim_curves
             set_size_field(sizes, scene.probe, scene.frame, scene.scale, more, lifted)
             gmsh.model.mesh.generate(3)
         except Exception as error:  # gmsh raises bare Exception
             raise MeshError(f"gmsh: {error or gmsh.logger.getLastError()}") from error
-        return _collect(scene.scale, rim_curves, start)
+        return _collect(scene, rim_curves, start)
 
 
 def _built(scene: Scene) -> list[int]:
@@ -118,8 +122,8 @@ def model_options() -> None:
         gmsh.option.setNumber(name, value)
 
 
-def _collect(scale: float, rim_curves: list[int], start: float) -> MeshArrays:
-    mesh = gmsh.model.mesh
+def _collect(scene: Scene, rim_curves: list[int], start: float) -> MeshArrays:
+    mesh, scale = gmsh.model.mesh, scene.scale
     tags, coordinates, _ = mesh.getNodes()
     position = np.full(int(tags.max()) + 1, -1, dtype=np.int64)
     order = np.argsort(tags)
@@ -135,8 +139,11 @@ def _collect(scale: float, rim_curves: list[int], start: float) -> MeshArrays:
         facets[name] = _elements(2, gmsh.model.getEntitiesForPhysicalGroup(dim, group), 3, position)
     assert set(facets) <= {PROBE, FIXED, FREE, CUT, *MIRROR.values()}
     rim = [position[mesh.getNodes(1, curve, includeBoundary=True)[0]] for curve in rim_curves]
+    bent = middle_nodes(position, scale) if isinstance(scene.body, FromCad) and not scene.straight else None
+    if bent:
+        bent = (_numbers(len(points), cells)[bent[0]], bent[1])
     points, cells, facets, rim_points = _drop_unused(points, cells, facets, np.unique(np.concatenate(rim)))
-    return MeshArrays(points, orient(points, cells), facets, rim_points, time.perf_counter() - start, regions)
+    return MeshArrays(points, orient(points, cells), facets, rim_points, time.perf_counter() - start, regions, bent)
 
 
 def _regions() -> IntArray | None:
@@ -167,6 +174,14 @@ def _drop_unused(
     used[cells] = True
     number = np.cumsum(used) - 1
     return points[used], number[cells], {name: number[f] for name, f in facets.items()}, number[rim[used[rim]]]
+
+
+def _numbers(count: int, cells: IntArray) -> IntArray:
+    """Return the numbers of ``count`` points once those without cells are dropped."""
+    used = np.zeros(count, dtype=bool)
+    used[cells] = True
+    numbers: IntArray = np.cumsum(used) - 1
+    return numbers
 
 
 def orient(points: FloatArray, cells: IntArray) -> IntArray:

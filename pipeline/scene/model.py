@@ -16,6 +16,8 @@ import numpy as np
 from pipeline import compat
 from pipeline.scene.imprint import cut_out
 from pipeline.scene.regions import draw_inclusions, regions_of, remove_beyond
+from pipeline.scene.tessellate import NotASolid, read_solid
+from pipeline.shapes.bodies.cad import SIZES, FromCad
 from pipeline.shapes.body import Body, Drawn
 from pipeline.shapes.contact import is_flat
 from pipeline.shapes.frame import Frame
@@ -95,9 +97,7 @@ def build(scene: Scene) -> list[int]:
         SceneError: if the kernel fails, or no footprint or no support is left.
     """
     occ = gmsh.model.occ
-    if not isinstance(scene.body, Drawn):
-        raise SceneError(f"a {scene.body.shape} is not drawn")
-    volumes = [(3, scene.body.draw(occ, scene.units, scene.frame))]
+    volumes = [(3, _add_body(scene))]
     if scene.is_cut:
         volumes, _ = occ.intersect(volumes, [(3, _add_column(scene))])
     if scene.mirrors:
@@ -126,6 +126,19 @@ def build(scene: Scene) -> list[int]:
     _name_groups(scene, footprint, regions_of(scene.body, inclusions, scene.scale))
     edge = gmsh.model.getBoundary([(2, tag) for tag in footprint], oriented=False)
     return [abs(tag) for _, tag in edge if not _is_on_mirror(scene, abs(tag))]
+
+
+def _add_body(scene: Scene) -> int:
+    """Add the body as it is drawn, or read from its file."""
+    body = scene.body
+    if isinstance(body, Drawn):
+        return body.draw(gmsh.model.occ, scene.units, scene.frame)
+    if isinstance(body, FromCad):
+        try:
+            return read_solid(body.file, body.unit, scene.units(SIZES[body.unit]))
+        except NotASolid as error:
+            raise SceneError(str(error)) from None
+    raise SceneError(f"a {body.shape} is not drawn")
 
 
 def _add_footprint(scene: Scene, volumes: list[tuple[int, int]]) -> list[tuple[int, int]]:
@@ -177,7 +190,7 @@ def _name_groups(scene: Scene, footprint: list[int], regions: dict[int, list[int
     for _, tag in model.getBoundary(volumes, combined=True, oriented=False):
         if tag in footprint:
             continue
-        points = _sample(tag) * scene.scale
+        points = _sample(tag, isinstance(scene.body, FromCad)) * scene.scale
         name = next((name for name, test in tests if test(points)), FREE)
         groups[FIXED if name == CUT and scene.column_fixed else name].append(tag)
     if not groups[FIXED]:
@@ -189,16 +202,19 @@ def _name_groups(scene: Scene, footprint: list[int], regions: dict[int, list[int
         model.setPhysicalName(3, model.addPhysicalGroup(3, tags), f"{TISSUE} {number}" if number else TISSUE)
 
 
-def _sample(face: int) -> Any:
-    """Points, shape (n, 3), on a face, or, of one that fills the range of its parameters, on what carries it."""
+def _sample(face: int, is_trimmed: bool = False) -> Any:
+    """Points, shape (n, 3), on a face, or, of one that is not known to be trimmed at random, on what carries it."""
     (u0, v0), (u1, v1) = gmsh.model.getParametrizationBounds(2, face)
     steps = (0.25, 0.5, 0.75)
     parameters = np.array([(u0 + s * (u1 - u0), v0 + t * (v1 - v0)) for s in steps for t in steps])
-    if gmsh.model.getType(2, face) not in _FILLED:
-        fine = np.linspace(0.02, 0.98, _TRIMMED)
-        grid = np.array([(u0 + s * (u1 - u0), v0 + t * (v1 - v0)) for s in fine for t in fine])
-        inside = grid[compat.inside_face(face, grid)]
-        parameters = inside if len(inside) else parameters
+    if is_trimmed or gmsh.model.getType(2, face) not in _FILLED:
+        for count in (_TRIMMED, 5 * _TRIMMED) if is_trimmed else (_TRIMMED,):
+            fine = np.linspace(0.02, 0.98, count)
+            grid = np.array([(u0 + s * (u1 - u0), v0 + t * (v1 - v0)) for s in fine for t in fine])
+            inside = grid[compat.inside_face(face, grid)]
+            if len(inside):
+                parameters = inside
+                break
     return np.array(gmsh.model.getValue(2, face, parameters.ravel().tolist())).reshape(-1, 3)
 
 

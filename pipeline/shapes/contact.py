@@ -61,7 +61,8 @@ def is_flat(body: Body, probe: Probe, frame: Frame) -> bool:
         return True
     if frame.axis != frame.normal:
         return False
-    points, _ = body.lift(frame, outline_points(probe))
+    rim = outline_points(probe)
+    points, _ = body.lift(frame, np.concatenate([rim, *(share * rim for share in _WITHIN)]))
     heights = frame.local(points)[:, 2]
     return bool(np.all(np.abs(heights) < _FLAT * probe.circumradius))
 

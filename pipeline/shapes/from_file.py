@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from pydantic import PrivateAttr, ValidationInfo, field_serializer, field_validator
 from pydantic_core import PydanticCustomError
 
+from pipeline.shapes.facetted import Facetted
 from pipeline.shapes.files.read import Loaded
-from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.section import Words
 from pipeline.shapes.support import Below, Fixed
 from pipeline.shapes.triangles import SurfaceError, Triangles
@@ -18,7 +18,7 @@ _VERSION = 2
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
 
 
-class FromFile(Scanned):
+class FromFile(Facetted):
     """A body bounded by triangles that a ``file`` holds, or its content is made into.
 
     A class that derives from it declares ``file`` after the fields that say how it is read, those of ``READ_BY``, and
@@ -26,6 +26,7 @@ class FromFile(Scanned):
     """
 
     READ_BY: ClassVar[frozenset[str]]
+    HAS_NAMES: ClassVar[bool] = False  # whether its faces may have names
 
     if TYPE_CHECKING:
         file: str  # not here, or it were checked before the fields that say how it is read
@@ -58,7 +59,7 @@ class FromFile(Scanned):
     @field_validator("fixed")
     @classmethod
     def _below_a_height(cls, fixed: Any) -> Any:
-        if not isinstance(fixed, Below):
+        if not isinstance(fixed, Below) and not cls.HAS_NAMES:
             raise PydanticCustomError(
                 "not_supported",
                 'must be {below = "-40 mm"}, a height in the frame of the file: its faces have no names',
@@ -79,6 +80,11 @@ class FromFile(Scanned):
     @field_serializer("file", check_fields=False)
     def _content(self, file: str) -> str:
         """What results depend on is the content of the file, in metres, not where it lies."""
+        return self.content
+
+    @property
+    def content(self) -> str:
+        """Hash of the content of the file, and of how places on it are found."""
         return f"{_VERSION} {self.triangles.hash}"
 
     @property

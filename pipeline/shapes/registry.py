@@ -1,6 +1,7 @@
 """The shapes that there are: one line each. What is not here is refused."""
 
 from pipeline.shapes.bodies.box import Box
+from pipeline.shapes.bodies.cad import FromCad
 from pipeline.shapes.bodies.cylinder import Cylinder
 from pipeline.shapes.bodies.ellipsoid import Ellipsoid
 from pipeline.shapes.bodies.image import FromImage
@@ -15,6 +16,7 @@ BODIES: dict[str, type[Body]] = {
     "box": Box,
     "cylinder": Cylinder,
     "ellipsoid": Ellipsoid,
+    "cad": FromCad,
     "surface": FromSurface,
     "image": FromImage,
 }
@@ -24,4 +26,4 @@ PROBES: dict[str, type[Probe]] = {
     "ellipse": Ellipse,
 }
 # Shapes of the format that this version does not compute: named as such, not as typing errors.
-LATER = {"body": ("cad",), "probe": ("sphere", "cone", "wedge")}
+LATER = {"body": (), "probe": ("sphere", "cone", "wedge")}

@@ -1,15 +1,11 @@
 """Bodies whose surface is a file's triangles: where a probe meets them, and how large they are."""
 
-from abc import abstractmethod
-from functools import lru_cache
 from math import inf
 
 from pipeline.shapes.arrays import FloatArray, IntArray, np
-from pipeline.shapes.body import Body
-from pipeline.shapes.frame import Frame, PlaceError, Vector
-from pipeline.shapes.rays import facing, nearest_point, pierce
-from pipeline.shapes.section import in_mm
-from pipeline.shapes.skin import Skin
+from pipeline.shapes.facetted import Facetted, skin_of
+from pipeline.shapes.frame import Frame, Vector
+from pipeline.shapes.rays import facing, pierce
 from pipeline.shapes.surface import Surface
 from pipeline.shapes.triangles import Triangles, doubled_normals
 
@@ -23,35 +19,10 @@ _STEEP = 1e-9
 _SAME = 1e-12
 # Normals are means over this share of a footprint's radius, to each side.
 _OF_FOOTPRINT, _MOST_CELLS = 0.1, 400
-_FEW = 8  # surfaces whose trees are kept
-_MANY = 10_000  # places of a large study
 
 
-class Scanned(Body):
+class Scanned(Facetted):
     """A body bounded by triangles."""
-
-    @property
-    @abstractmethod
-    def triangles(self) -> Triangles:
-        """Its surface, in m."""
-
-    # ---- size -----------------------------------------------------------------------------------------
-
-    @property
-    def extent(self) -> float:
-        """Largest extent (m) along x, y or z."""
-        return self.triangles.extent
-
-    @property
-    def heights(self) -> tuple[float, float]:
-        """Lowest and highest z (m)."""
-        low, high = self.triangles.bounds
-        return low[2], high[2]
-
-    @property
-    def volume(self) -> float:
-        """Volume (m³) within the triangles."""
-        return self.triangles.volume
 
     # ---- under a probe --------------------------------------------------------------------------------
 
@@ -60,7 +31,7 @@ class Scanned(Body):
 
         The normal is the mean one, by area, of what a disc of radius ``around`` (m) covers, not that of one facet.
         """
-        point, facet = self._touched(at)
+        point, facet = self.touched(at)
         inward = -doubled_normals(self.triangles.points, self.triangles.facets[facet : facet + 1])[0]
         frame = _frame(point, inward, inward if axis is None else axis)
         for _ in range(_TURNS):
@@ -71,21 +42,6 @@ class Scanned(Body):
     def frame_below(self, at: tuple[float, ...], axis: Vector | None, around: float) -> Frame:
         """Return the place, with the mean normal of what a disc of radius ``around`` (m) covers."""
         return self.frame(at, axis, around)
-
-    def _touched(self, at: tuple[float, ...]) -> tuple[FloatArray, int]:
-        """Return the point of the surface that coordinates name, and its facet."""
-        points, facets = self.triangles.points, self.triangles.facets
-        if len(at) == 3:
-            facet, point = nearest_point(points, facets, np.array(at))
-            return point, facet
-        hit, height = pierce(points, facets, np.array([at]))
-        if hit[0] < 0:
-            low, high = self.triangles.bounds
-            raise PlaceError(
-                f"no part of the surface lies above or below x = {in_mm(at[0])}, y = {in_mm(at[1])}: it reaches from "
-                f"{in_mm(low[0])} to {in_mm(high[0])} in x and from {in_mm(low[1])} to {in_mm(high[1])} in y"
-            )
-        return np.array([*at, height[0]]), int(hit[0])
 
     def _mean_normal(self, frame: Frame, radius: float) -> FloatArray:
         """Return the mean inward normal, by area, of the tissue that a disc covers."""
@@ -117,47 +73,15 @@ class Scanned(Body):
             normals[found] = _smoothed(self.triangles.points, local, patch, hit[found], points[found], around)
         return result, normals
 
-    def thickness(self, frame: Frame) -> float:
-        """Return the distance (m) along the axis to where it leaves the tissue again, over hollows and all."""
-        return _thickness(self.triangles, frame)
-
-    def reach(self, frame: Frame) -> float:
-        """Return the largest distance (m) of a point from the axis."""
-        local = frame.local(self.triangles.points)
-        return float(np.hypot(local[:, 0], local[:, 1]).max())
-
-    def farthest(self, frame: Frame) -> float:
-        """Return the largest distance (m) of a point from the contact."""
-        return float(np.linalg.norm(self.triangles.points - np.array(frame.point), axis=1).max())
-
-    def inside(self, points: FloatArray) -> FloatArray:
-        """Return the distance (m) of points (n, 3) of the body to its surface, negative outside."""
-        return _skin(self.triangles).depth(points)
-
     def gap(self, point: Vector) -> float:
         """Return that there is no edge: how far a footprint reaches is told by where its edge can be lifted."""
         return inf
-
-    @property
-    def face(self) -> str:
-        """The extents."""
-        low, high = self.triangles.bounds
-        return " × ".join(in_mm(top - bottom) for bottom, top in zip(low, high, strict=True))
-
-    # ---- symmetry -------------------------------------------------------------------------------------
-
-    def mirror_planes(self) -> tuple[str, ...]:
-        """Return none: no organ is its own image."""
-        return ()
-
-    def half_plane(self) -> None:
-        """Return none: no organ is round."""
 
     # ---- geometry -------------------------------------------------------------------------------------
 
     def surfaces(self) -> dict[str, tuple[Surface, ...]]:
         """Return the one surface."""
-        return {"skin": (_skin(self.triangles),)}
+        return {"skin": (skin_of(self.triangles),)}
 
     @property
     def bend(self) -> float:
@@ -202,17 +126,6 @@ def _smoothed(
             at = np.clip(own + np.array((i, j)), 0, np.array(total.shape[:2]) - 1)
             result += total[at[:, 0], at[:, 1]]
     return result / np.linalg.norm(result, axis=1, keepdims=True)
-
-
-@lru_cache(_MANY)
-def _thickness(triangles: Triangles, frame: Frame) -> float:
-    _, height = pierce(-frame.local(triangles.points), triangles.facets, np.zeros((1, 2)))
-    return max(float(height[0]), 0.0) if np.isfinite(height[0]) else 0.0
-
-
-@lru_cache(_FEW)
-def _skin(triangles: Triangles) -> Skin:
-    return Skin(triangles)
 
 
 def _silhouettes(triangles: Triangles) -> list[FloatArray]:

@@ -4,7 +4,7 @@ from functools import cached_property
 from importlib import import_module
 from typing import Any
 
-from pipeline.shapes.arrays import FloatArray, np
+from pipeline.shapes.arrays import FloatArray, IntArray, np
 from pipeline.shapes.surface import Surface
 from pipeline.shapes.triangles import Triangles
 
@@ -20,8 +20,12 @@ class Skin(Surface):
     @cached_property
     def _tree(self) -> Any:
         tree = import_module("igl").AABB()
-        tree.init(np.array(self._triangles.points), np.array(self._triangles.facets))
+        tree.init(*self._arrays)
         return tree
+
+    @cached_property
+    def _arrays(self) -> tuple[FloatArray, IntArray]:
+        return np.array(self._triangles.points), np.array(self._triangles.facets)
 
     def distance(self, points: FloatArray) -> FloatArray:
         """Return the distance (m) of each point, never negative."""
@@ -29,6 +33,10 @@ class Skin(Surface):
 
     def project(self, points: FloatArray) -> FloatArray:
         """Return the nearest points."""
+        return self._nearest(points)[2]
+
+    def facets(self, points: FloatArray) -> IntArray:
+        """Return the number of the facet that is next to each point."""
         return self._nearest(points)[1]
 
     def depth(self, points: FloatArray) -> FloatArray:
@@ -39,11 +47,8 @@ class Skin(Surface):
         )
         return -np.asarray(signed).ravel()
 
-    def _nearest(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _nearest(self, points: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
         if not len(points):
-            return np.zeros(0), np.zeros((0, 3))
-        triangles = self._triangles
-        square, _, nearest = self._tree.squared_distance(
-            np.array(triangles.points), np.array(triangles.facets), np.ascontiguousarray(points)
-        )
-        return square, nearest
+            return np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+        square, facet, nearest = self._tree.squared_distance(*self._arrays, np.ascontiguousarray(points))
+        return square, np.asarray(facet, dtype=np.int64), nearest

@@ -175,6 +175,49 @@ class Below(BaseModel, Support):
             )
 
 
+class NamedFace(BaseModel, Support):
+    """Held on the faces that a CAD file gives a name: ``fixed = {face = "base"}``."""
+
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid")
+    face: str
+
+    def holds(self, surfaces: Surfaces, points: FloatArray, tolerance: float) -> bool:
+        """Tell whether the face, or what is left of it, is one of those: most points tell, at its edge any may err."""
+        return any(bool(np.median(surface.distance(points)) < tolerance) for surface in surfaces[self.face])
+
+    def mirror_planes(self) -> tuple[str, ...]:
+        """Return none."""
+        return ()
+
+    def is_round(self) -> bool:
+        """Tell that it is not known to be."""
+        return False
+
+    def on_half_plane(self) -> HeldOnHalfPlane:
+        """Refuse: no body with such names has a half plane."""
+        raise ValueError("a named face has no half plane")
+
+    def gap(self, to_edge: float) -> float | None:
+        """Return none: :meth:`distance` tells."""
+        return None
+
+    def distance(self, surfaces: Surfaces, points: FloatArray) -> FloatArray | None:
+        """Return the distance to the nearest of the faces."""
+        held: FloatArray = np.min([surface.distance(points) for surface in surfaces[self.face]], axis=0)
+        return held
+
+    def holds_column(self) -> bool:
+        """Tell that it is not known: the face may lie anywhere."""
+        return False
+
+    def edges(self) -> tuple[float, ...]:
+        """Return none: it ends where faces do."""
+        return ()
+
+    def check(self, heights: tuple[float, float], fine: float, problems: Problems) -> None:
+        """Find nothing: the name is looked for as the file is read."""
+
+
 def _fixed(value: Any) -> Any:
     if isinstance(value, dict):
         return Below.read(value)
@@ -186,6 +229,6 @@ def _fixed(value: Any) -> Any:
 Fixed = Annotated[FaceNames | Below, BeforeValidator(_fixed)]
 
 
-def support_of(fixed: FaceNames | Below) -> Support:
+def support_of(fixed: FaceNames | Below | NamedFace) -> Support:
     """Return what the key ``fixed`` of a body says."""
     return Faces(fixed) if isinstance(fixed, str) else fixed

@@ -2,21 +2,21 @@
 
 import fcntl
 import hashlib
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from pipeline.files import cache_folder
+
 
 def form_cache() -> Path:
     """Return the folder of compiled forms: one for each kind of processor, since code is made for the machine."""
-    root = os.environ.get("EPSMESH_CACHE") or Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "epsmesh"
     try:
         text = Path("/proc/cpuinfo").read_text()
         features = next(line for line in text.splitlines() if line.startswith(("flags", "Features")))
     except (OSError, StopIteration):
         features = ""
-    return Path(root) / "forms" / hashlib.sha256(features.encode()).hexdigest()[:12]
+    return cache_folder() / "forms" / hashlib.sha256(features.encode()).hexdigest()[:12]
 
 
 @contextmanager

@@ -111,7 +111,7 @@ def _check_place(body: Body, probe: Probe, problems: Problems) -> bool:
         _check_directions(probe, frame)
         if is_level(body, frame):
             _check_fit(body, probe, frame, problems)
-        else:
+        if not is_level(body, frame) or isinstance(body, FromFile):
             _check_contact(body, probe, frame)
     except PlaceError as error:
         found = getattr(probe, error.key)
@@ -161,9 +161,11 @@ def _held_gap(body: Body, probe: Probe, frame: Frame) -> float:
 def held_gaps(body: Body, probe: Probe, mesh: Mesh) -> dict[str, float]:
     """Return the distances (m) between the probe's edge and the faces held beside it, by the key that sets them."""
     frame, gaps = probe.frame_on(body), {}
+    if isinstance(body, FromFile) and isfinite(gap := _held_gap(body, probe, frame)):
+        gaps["body.fixed"] = gap
     if not is_level(body, frame):
         return {"body.fixed": gap} if isfinite(gap := _held_gap(body, probe, frame)) else {}
-    if (beside := body.support.gap(probe.gap(body, frame))) is not None:
+    if not gaps and (beside := body.support.gap(probe.gap(body, frame))) is not None:
         gaps["body.fixed"] = beside
     if mesh.outside == "fixed" and isfinite(column := mesh.column(body.reach(frame))):
         gaps["mesh.epsilon"] = column - probe.circumradius

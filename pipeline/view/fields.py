@@ -6,6 +6,7 @@ from math import floor, inf, log10, nan
 import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray, IntArray
+from pipeline.shapes.bodies.cad import FromCad
 from pipeline.shapes.body import Drawn
 from pipeline.study.sweep import Case
 
@@ -56,7 +57,7 @@ class Fields:
     @property
     def outline(self) -> list[FloatArray]:
         """Edges of the whole body as lines of points (k, 3), in m; none where it is bounded by triangles."""
-        return self.case.body.outline() if isinstance(self.case.body, Drawn) else []
+        return self.case.body.outline() if isinstance(self.case.body, Drawn | FromCad) else []
 
     @property
     def sizes(self) -> FloatArray:

@@ -48,7 +48,6 @@ MISTAKES = {
     "missing key": ({"material": {"young": None}}, ["material.young", "required"]),
     "unknown shape": ({"probe": {"shape": "disk"}}, ['probe.shape = "disk"', "did you mean `disc`?"]),
     "later probe": ({"probe": {"shape": "sphere"}}, ['probe.shape = "sphere"', "not supported", "disc, blade"]),
-    "later body": ({"body": {"shape": "cad"}}, ["not supported", "box, cylinder"]),
     "later contact": ({"probe": {"contact": "unilateral"}}, ["not supported", "bonded, frictionless"]),
     "unknown element": ({"mesh": {"element": "hybrid"}}, ["mesh.element", "'mixed'"]),
     "later section": ({"load": {"gravity": 1}}, ["load", "not supported"]),

@@ -9,11 +9,12 @@ from pydantic import Field
 from pipeline.shapes.files.image import load_image
 from pipeline.shapes.files.read import Loaded
 from pipeline.shapes.from_file import UNITS, FromFile
+from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.section import Words
 from pipeline.units import Travel
 
 
-class FromImage(FromFile):
+class FromImage(FromFile, Scanned):
     """The voxels of one label, in the patient's frame: x to the right, y to the front, z to the head."""
 
     READ_BY: ClassVar[frozenset[str]] = frozenset({"label", "unit", "smooth"})

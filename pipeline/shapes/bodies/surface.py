@@ -8,11 +8,12 @@ from pydantic import Field
 
 from pipeline.shapes.files.read import Loaded, load_surface
 from pipeline.shapes.from_file import UNITS, FromFile
+from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.section import Words
 from pipeline.units import Travel
 
 
-class FromSurface(FromFile):
+class FromSurface(FromFile, Scanned):
     """A body bounded by the triangles of a file, in the file's own frame."""
 
     READ_BY: ClassVar[frozenset[str]] = frozenset({"unit", "repair", "smooth"})

@@ -1,0 +1,99 @@
+"""Elements of a solid from a CAD file: how small they are along its rounded edges, and mid nodes on its true faces.
+
+Both ask the geometry kernel while its model is open.
+"""
+
+from collections.abc import Iterator
+from itertools import combinations
+from math import ceil
+
+import gmsh
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
+from pipeline.scene.model import Scene
+from pipeline.shapes.bodies.cad import FromCad
+
+# Elements along a rounded edge, in units of its radius, but at least this share of the body, are so large.
+_PER_RADIUS, _LEAST = 0.5, 1 / 100
+# Edges of the model of which the distance is taken by points: so many an element, and at most.
+_POINTS, _MOST = 2, 4000
+# Faces and curves on which straight elements lie.
+_STRAIGHT = {1: "Line", 2: "Plane"}
+
+
+def rounded_sizes(scene: Scene, growth: float) -> Iterator[str]:
+    """Yield the sizes, as text for gmsh, that rounded edges ask for; they grow by ``growth`` for a unit of distance."""
+    body = scene.body
+    if not isinstance(body, FromCad):
+        return
+    solid = body.solid
+    for radius in np.unique(solid.radius[solid.radius < body.bend]):
+        size = scene.units(max(_PER_RADIUS * float(radius), _LEAST * body.extent))
+        curves = _curves_of(scene.units(float(radius)))
+        if not curves:
+            continue
+        longest = max(gmsh.model.occ.getMass(1, curve) for curve in curves)
+        distance = gmsh.model.mesh.field.add("Distance")
+        gmsh.model.mesh.field.setNumbers(distance, "CurvesList", curves)
+        points = min(_MOST, ceil(_POINTS * longest / size))
+        gmsh.model.mesh.field.setNumber(distance, "NumPointsPerCurve", points)
+        yield f"{size:.12g}+{growth:.12g}*F{distance}"
+
+
+def _curves_of(radius: float) -> list[int]:
+    """Return the curves round the faces of the model that are about as round as ``radius``, in its unit."""
+    found: set[int] = set()
+    for dim, face in gmsh.model.getEntities(2):
+        if gmsh.model.getType(dim, face) == _STRAIGHT[dim]:
+            continue
+        low, high = gmsh.model.getParametrizationBounds(dim, face)
+        middle = [(a + b) / 2 for a, b in zip(low, high, strict=True)]
+        most = abs(float(gmsh.model.getCurvature(dim, face, middle)[0]))
+        if most * radius > 0.5:
+            found |= {abs(tag) for _, tag in gmsh.model.getBoundary([(dim, face)], oriented=False)}
+    return sorted(found)
+
+
+def middle_nodes(position: IntArray, scale: float) -> tuple[IntArray, FloatArray]:
+    """Return the edges (k, 2) of elements on curved faces and curves of the body, and their mid nodes (k, 3), in m.
+
+    ``position`` gives the number of a point by its tag in the model, whose unit is ``scale`` metres. Mid nodes are the
+    points of the face, or of the curve between faces, that are next to the middle of the straight edge.
+    """
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    at = np.zeros((int(tags.max()) + 1, 3))
+    at[tags] = coordinates.reshape(-1, 3)
+    faces = gmsh.model.getBoundary(gmsh.model.getEntities(3), combined=True, oriented=False)
+    middle: dict[tuple[int, int], FloatArray] = {}
+    curves: set[int] = set()
+    for dim, face in faces:
+        curves |= {abs(tag) for _, tag in gmsh.model.getBoundary([(dim, face)], oriented=False)}
+        if gmsh.model.getType(dim, face) != _STRAIGHT[dim]:
+            corners = np.concatenate(gmsh.model.mesh.getElements(dim, face)[2]).reshape(-1, 3)
+            pairs = np.concatenate([corners[:, pair] for pair in combinations(range(3), 2)])
+            _put(middle, dim, face, pairs, at)
+    for curve in sorted(curves):
+        pairs = np.concatenate(gmsh.model.mesh.getElements(1, curve)[2] or [np.empty(0, dtype=int)]).reshape(-1, 2)
+        if gmsh.model.getType(1, curve) == _STRAIGHT[1]:
+            for edge in np.sort(pairs, axis=1).tolist():
+                middle.pop(tuple(edge), None)
+        else:
+            _put(middle, 1, curve, pairs, at)
+    edges = np.array(list(middle), dtype=np.int64).reshape(-1, 2)
+    return position[edges], scale * np.array(list(middle.values())).reshape(-1, 3)
+
+
+def _put(middle: dict[tuple[int, int], FloatArray], dim: int, tag: int, pairs: IntArray, at: FloatArray) -> None:
+    """Add the mid nodes of edges (k, 2) of elements on a face or a curve."""
+    edges = np.unique(np.sort(pairs, axis=1), axis=0).astype(np.int64)
+    if not len(edges):
+        return
+    halves = at[edges].mean(axis=1)
+    found, _ = gmsh.model.getClosestPoint(dim, tag, halves.ravel().tolist())
+    points = np.array(found).reshape(-1, 3)
+    # A point that is off by half an edge is on another sheet of the surface: a straight element is the better one.
+    lengths = np.linalg.norm(at[edges[:, 0]] - at[edges[:, 1]], axis=1)
+    near = np.linalg.norm(points - halves, axis=1) < 0.5 * lengths
+    for edge, point in zip(edges[near].tolist(), points[near], strict=True):
+        middle[(edge[0], edge[1])] = point

@@ -1,0 +1,224 @@
+"""A body that is a solid of a CAD file."""
+
+from collections.abc import Mapping
+from functools import lru_cache
+from math import inf
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import BeforeValidator, Field, PrivateAttr, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
+
+from pipeline.shapes.arrays import FloatArray, IntArray, np
+from pipeline.shapes.cad_face import CadFace, plane_piece, raised
+from pipeline.shapes.facetted import skin_of
+from pipeline.shapes.files.cad import Solid, load_solid
+from pipeline.shapes.frame import Frame, Vector, unit
+from pipeline.shapes.from_file import UNITS, FromFile
+from pipeline.shapes.rays import facing, pierce
+from pipeline.shapes.section import Words
+from pipeline.shapes.support import Below, NamedFace
+from pipeline.shapes.surface import Surface
+from pipeline.shapes.triangles import doubled_normals
+
+SIZES = UNITS | {"in": 0.0254}
+# A face rounder than this share of the extent is an edge rounded off: elements are small along it alone.
+_ROUNDED = 0.1
+_LEVEL = 1e-12
+# Normals of curved faces are known to this (rad): they are those between corners of facets.
+_KNOWN = 5e-4
+_NEAR = 1e-9
+_TURNS = 4
+
+
+def _held(value: Any) -> Any:
+    if isinstance(value, Below | NamedFace):
+        return value
+    if isinstance(value, dict) and set(value) == {"face"} and isinstance(value["face"], str):
+        return NamedFace(face=value["face"])
+    if isinstance(value, dict) and set(value) == {"below"}:
+        return Below.read(value)
+    raise PydanticCustomError(
+        "not_supported",
+        'must be {below = "-15 mm"}, a height in the frame of the file, or {face = "base"}, a name in it',
+    )
+
+
+class FromCad(FromFile):
+    """The solid of a STEP or BREP file, in the file's own frame; elements are bent to its true faces."""
+
+    READ_BY: ClassVar[frozenset[str]] = frozenset({"unit"})
+    HAS_NAMES: ClassVar[bool] = True
+
+    shape: Literal["cad"]
+    unit: Annotated[
+        Literal["m", "cm", "mm", "um", "µm", "in"],
+        Field(exclude=True),
+        Words("Unit of the file's lengths; that which a STEP file says itself.", '"mm"'),
+    ]
+    file: Annotated[str, Words("Solid, STEP or BREP: its path from the folder of the study.", '"phantom.step"')]
+    fixed: Annotated[
+        Below | NamedFace,
+        BeforeValidator(_held),
+        Words("Where it is held: everywhere below a height of the file, or on faces by a name.", '{face = "base"}'),
+    ]  # type: ignore[assignment]
+
+    _loaded: Solid = PrivateAttr()
+
+    @classmethod
+    def load(cls, file: str, given: Mapping[str, Any]) -> Solid:
+        """Return the solid in a file."""
+        return load_solid(Path(file), given["unit"], SIZES[given["unit"]])
+
+    @field_validator("file")
+    @classmethod
+    def _has_the_face(cls, file: str, info: ValidationInfo) -> str:
+        fixed = info.data.get("fixed")
+        if isinstance(fixed, NamedFace) and info.data.keys() >= cls.READ_BY:
+            names = cls.load(file, info.data).names
+            if fixed.face not in names:
+                listed = "it has " + ", ".join(sorted(names)) if names else "none of its faces has a name that is known"
+                message = f"no face of it has the name {fixed.face}, by which it is to be held: {listed}"
+                raise PydanticCustomError("no_face", "{what}", {"what": message})
+        return file
+
+    @property
+    def solid(self) -> Solid:
+        """What the file holds."""
+        return self._loaded
+
+    @property
+    def content(self) -> str:
+        """Hash of the file and of its unit."""
+        return self.solid.content
+
+    # ---- size -----------------------------------------------------------------------------------------
+
+    @property
+    def extent(self) -> float:
+        """Largest extent (m) along x, y or z."""
+        return float(np.ptp(self.solid.box, axis=0).max())
+
+    @property
+    def heights(self) -> tuple[float, float]:
+        """Lowest and highest z (m)."""
+        low, high = self.solid.box[:, 2].tolist()
+        return low, high
+
+    @property
+    def volume(self) -> float:
+        """Volume (m³), as the geometry kernel has it."""
+        return self.solid.volume
+
+    # ---- under a probe --------------------------------------------------------------------------------
+
+    def frame(self, at: tuple[float, ...], axis: Vector | None = None) -> Frame:
+        """Return the place above x and y, or at the point of the surface that is nearest to three coordinates.
+
+        Raises:
+            PlaceError: if there is none, or the axis is inclined too far.
+        """
+        point, facet = self.touched(at)
+        if self._is_plane(facet):
+            normal = np.array(_axial(self._normal(facet), _LEVEL))
+        else:
+            (offset,), (normal,) = self._raised(point[None], np.array([facet]))
+            for _ in range(_TURNS if len(at) == 3 else 0):
+                # From afar, the nearest point of the facets is to one side of that of the surface.
+                point, facet = self.touched(tuple(np.array(at) + ((point + offset - at) @ normal) * normal))
+                (offset,), (normal,) = self._raised(point[None], np.array([facet]))
+            # Symmetric to the last digit where it nearly is: rims are to meet seams of faces, or be clear of them.
+            normal = np.array(_axial(normal, _KNOWN))
+            if len(at) == 2 and abs(normal[2]) > _LEVEL:
+                point = point + np.array([0.0, 0.0, (offset @ normal) / normal[2]])
+            else:
+                point = np.array(at) + ((point + offset - at) @ normal) * normal
+        x, y, z = map(float, point)
+        a, b, c = (0.0 - float(n) for n in normal)
+        return Frame.touching((x, y, z), (a, b, c), axis)
+
+    def lift(self, frame: Frame, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return where lines along a probe's axis enter the part of the surface that is joined to the contact."""
+        local, facets = frame.local(self.triangles.points), self.triangles.facets
+        patch = facing(local, facets, float(np.abs(points).max(initial=0.0)))
+        hit, height = pierce(local, facets[patch], points)
+        (found,) = np.nonzero(hit >= 0)
+        result, normals = np.full((len(points), 3), np.nan), np.full((len(points), 3), np.nan)
+        numbers, outward = patch[hit[found]], np.array(frame.outward)
+        on_facets = frame.world(np.column_stack([points[found], height[found]]))
+        offset, normal = self._raised(on_facets, numbers)
+        along = (offset * normal).sum(axis=1) / np.maximum(normal @ outward, _LEVEL)
+        result[found], normals[found] = on_facets + along[:, None] * outward, normal
+        return result, normals
+
+    def _raised(self, points: FloatArray, numbers: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return how far points of facets, by their ``numbers``, are off the true surface, and its unit normals."""
+        solid, triangles = self.solid, self.triangles
+        offset, normal = raised(points, triangles.points[triangles.facets[numbers]], solid.normals[numbers])
+        return np.where(solid.planes[solid.face[numbers]][:, None], 0.0, offset), normal
+
+    def _is_plane(self, facet: int) -> bool:
+        return bool(self.solid.planes[self.solid.face[facet]])
+
+    def _normal(self, facet: int) -> FloatArray:
+        (vector,) = doubled_normals(self.triangles.points, self.triangles.facets[facet : facet + 1])
+        return vector / np.linalg.norm(vector)
+
+    def gap(self, point: Vector) -> float:
+        """Return the distance (m) from a point of a plane face to its edge, negative beside it; infinite on others."""
+        at = np.array([point])
+        skin = skin_of(self.triangles)
+        facet = int(skin.facets(at)[0])
+        if not self._is_plane(facet):
+            return inf
+        off = float(skin.distance(at)[0])
+        return -off if off > _NEAR * self.extent else _to_edge(self, facet, at[0])
+
+    # ---- geometry -------------------------------------------------------------------------------------
+
+    def surfaces(self) -> dict[str, tuple[Surface, ...]]:
+        """Return the faces that have names."""
+        return _surfaces(self.solid)
+
+    @property
+    def bend(self) -> float:
+        """Radius (m) of the roundest of its sides but for edges that are rounded off."""
+        radius = self.solid.radius
+        return float(radius[radius >= _ROUNDED * self.extent].min(initial=inf))
+
+    def outline(self) -> list[FloatArray]:
+        """Return the edges between faces."""
+        triangles, face = self.triangles, self.solid.face
+        half = np.stack([triangles.facets, np.roll(triangles.facets, -1, axis=1)], axis=2).reshape(-1, 2)
+        owner = np.repeat(face, 3)
+        order = np.lexsort(np.sort(half, axis=1).T)
+        pairs = order.reshape(-1, 2)
+        between = owner[pairs[:, 0]] != owner[pairs[:, 1]]
+        return list(triangles.points[half[pairs[between, 0]]])
+
+
+def _axial(normal: FloatArray, least: float) -> Vector:
+    """Return a unit vector without components that are smaller than ``least``."""
+    x, y, z = (0.0 if abs(c) < least else float(c) for c in normal)
+    return unit((x, y, z))
+
+
+@lru_cache(64)
+def _edge(solid: Solid, facet: int) -> FloatArray:
+    """Return the edges (k, 2, 3), in m, round the plane piece of the surface to which a facet belongs."""
+    return solid.triangles.points[plane_piece(solid.triangles, facet)]
+
+
+def _to_edge(body: FromCad, facet: int, point: FloatArray) -> float:
+    edges = _edge(body.solid, facet)
+    start, along = edges[:, 0], edges[:, 1] - edges[:, 0]
+    share = np.clip(((point - start) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
+    return float(np.linalg.norm(start + share[:, None] * along - point, axis=1).min())
+
+
+@lru_cache(8)
+def _surfaces(solid: Solid) -> dict[str, tuple[Surface, ...]]:
+    whole = skin_of(solid.triangles)
+    return {
+        name: (CadFace(whole, solid.triangles, np.isin(solid.face, numbers)),) for name, numbers in solid.names.items()
+    }

@@ -1,0 +1,66 @@
+"""Faces of a solid that is known by triangles, and points of its true surface between their corners."""
+
+from pipeline.shapes.arrays import BoolArray, FloatArray, IntArray, np
+from pipeline.shapes.skin import Skin
+from pipeline.shapes.surface import Surface
+from pipeline.shapes.triangles import Triangles
+
+
+class CadFace(Surface):
+    """The facets of a solid that are ``chosen`` (m): those of the faces of one name.
+
+    A point next to one of them counts as on it: triangles are a little off the faces. Elements are bent to faces by the
+    geometry kernel while it meshes, not by this.
+    """
+
+    is_curved = False
+
+    def __init__(self, whole: Skin, triangles: Triangles, chosen: BoolArray):
+        self._whole, self._chosen = whole, chosen
+        self._own = Skin(Triangles(triangles.points, triangles.facets[chosen]))
+
+    def distance(self, points: FloatArray) -> FloatArray:
+        """Return the distance (m) of each point; 0 if no other face is nearer."""
+        return np.where(self._chosen[self._whole.facets(points)], 0.0, self._own.distance(points))
+
+    def project(self, points: FloatArray) -> FloatArray:
+        """Return the nearest points of the facets."""
+        return self._own.project(points)
+
+
+def raised(points: FloatArray, corners: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return how far points (n, 3) of facets with ``corners`` (n, 3, 3) are off the true surface, and unit normals.
+
+    ``normals`` (n, 3, 3) are those of the surface at the corners. Half of the mean of the projections to the tangent
+    planes there is exact for surfaces of second order (T. Boubekeur, M. Alexa, ACM Trans. Graph. 27, 141, 2008).
+    """
+    weights = _weights(points, corners)
+    heights = ((corners - points[:, None]) * normals).sum(axis=2)
+    offset = ((weights * heights)[:, :, None] * normals).sum(axis=1) / 2
+    normal = (weights[:, :, None] * normals).sum(axis=1)
+    return offset, normal / np.linalg.norm(normal, axis=1, keepdims=True)
+
+
+def _weights(points: FloatArray, corners: FloatArray) -> FloatArray:
+    """Return the barycentric coordinates (n, 3) of points of triangles."""
+    a, b, c = (corners[:, k] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    square = (normal**2).sum(axis=1)
+    first = (np.cross(c - b, points - b) * normal).sum(axis=1) / square
+    second = (np.cross(a - c, points - c) * normal).sum(axis=1) / square
+    return np.stack([first, second, 1 - first - second], axis=1)
+
+
+def plane_piece(triangles: Triangles, start: int, same: float = 1e-9) -> IntArray:
+    """Return the ends (k, 2) of the edges round the plane piece of the surface to which the facet ``start`` belongs."""
+    points, facets = triangles.points, triangles.facets
+    a, b, c = (points[facets[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    off = np.abs((points[facets] - a[start]) @ normals[start]).max(axis=1)
+    (flat,) = np.nonzero((off < same * triangles.extent) & (normals @ normals[start] > 0))
+    half = np.stack([facets[flat], np.roll(facets[flat], -1, axis=1)], axis=2).reshape(-1, 2)
+    key = np.sort(half, axis=1) @ np.array([len(points), 1])
+    _, first, count = np.unique(key, return_index=True, return_counts=True)
+    ends: IntArray = half[first[count == 1]]
+    return ends

@@ -1,0 +1,103 @@
+"""Bodies whose surface is known by triangles: how large they are, and where lines meet them."""
+
+from abc import abstractmethod
+from functools import lru_cache
+
+from pipeline.shapes.arrays import FloatArray, np
+from pipeline.shapes.body import Body
+from pipeline.shapes.frame import Frame, PlaceError
+from pipeline.shapes.rays import nearest_point, pierce
+from pipeline.shapes.section import in_mm
+from pipeline.shapes.skin import Skin
+from pipeline.shapes.triangles import Triangles
+
+_FEW = 8  # surfaces whose trees are kept
+_MANY = 10_000  # places of a large study
+
+
+class Facetted(Body):
+    """A body that triangles bound, or nearly so."""
+
+    @property
+    @abstractmethod
+    def triangles(self) -> Triangles:
+        """Its surface, in m."""
+
+    # ---- size -----------------------------------------------------------------------------------------
+
+    @property
+    def extent(self) -> float:
+        """Largest extent (m) along x, y or z."""
+        return self.triangles.extent
+
+    @property
+    def heights(self) -> tuple[float, float]:
+        """Lowest and highest z (m)."""
+        low, high = self.triangles.bounds
+        return low[2], high[2]
+
+    @property
+    def volume(self) -> float:
+        """Volume (m³) within the triangles."""
+        return self.triangles.volume
+
+    # ---- under a probe --------------------------------------------------------------------------------
+
+    def touched(self, at: tuple[float, ...]) -> tuple[FloatArray, int]:
+        """Return the point of the surface that coordinates name, and its facet."""
+        points, facets = self.triangles.points, self.triangles.facets
+        if len(at) == 3:
+            facet, point = nearest_point(points, facets, np.array(at))
+            return point, facet
+        hit, height = pierce(points, facets, np.array([at]))
+        if hit[0] < 0:
+            low, high = self.triangles.bounds
+            raise PlaceError(
+                f"no part of the surface lies above or below x = {in_mm(at[0])}, y = {in_mm(at[1])}: it reaches from "
+                f"{in_mm(low[0])} to {in_mm(high[0])} in x and from {in_mm(low[1])} to {in_mm(high[1])} in y"
+            )
+        return np.array([*at, height[0]]), int(hit[0])
+
+    def thickness(self, frame: Frame) -> float:
+        """Return the distance (m) along the axis to where it leaves the tissue again, over hollows and all."""
+        return _thickness(self.triangles, frame)
+
+    def reach(self, frame: Frame) -> float:
+        """Return the largest distance (m) of a point from the axis."""
+        local = frame.local(self.triangles.points)
+        return float(np.hypot(local[:, 0], local[:, 1]).max())
+
+    def farthest(self, frame: Frame) -> float:
+        """Return the largest distance (m) of a point from the contact."""
+        return float(np.linalg.norm(self.triangles.points - np.array(frame.point), axis=1).max())
+
+    def inside(self, points: FloatArray) -> FloatArray:
+        """Return the distance (m) of points (n, 3) of the body to its surface, negative outside."""
+        return skin_of(self.triangles).depth(points)
+
+    @property
+    def face(self) -> str:
+        """The extents."""
+        low, high = self.triangles.bounds
+        return " × ".join(in_mm(top - bottom) for bottom, top in zip(low, high, strict=True))
+
+    # ---- symmetry -------------------------------------------------------------------------------------
+
+    def mirror_planes(self) -> tuple[str, ...]:
+        """Return none: what was measured or modelled is not looked at for symmetry."""
+        return ()
+
+    def half_plane(self) -> None:
+        """Return none: see there."""
+
+
+@lru_cache(_FEW)
+def skin_of(triangles: Triangles) -> Skin:
+    """Return the surface with its tree."""
+    return Skin(triangles)
+
+
+@lru_cache(_MANY)
+def _thickness(triangles: Triangles, frame: Frame) -> float:
+    _, height = pierce(-frame.local(triangles.points), triangles.facets, np.zeros((1, 2)))
+    return max(float(height[0]), 0.0) if np.isfinite(height[0]) else 0.0

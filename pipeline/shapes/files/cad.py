@@ -1,0 +1,193 @@
+"""The solid in a STEP or BREP file, as triangles that a geometry kernel made once, in a process of its own."""
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from functools import lru_cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+from pipeline.files import atomic, cache_folder
+from pipeline.shapes.arrays import BoolArray, FloatArray, IntArray, np
+from pipeline.shapes.files import check
+from pipeline.shapes.files.edges import Edges, oriented
+from pipeline.shapes.files.read import LARGEST_FILE, Loaded, state_of
+from pipeline.shapes.files.step import entities_of, named_faces, unit_of
+from pipeline.shapes.triangles import SurfaceError, Triangles, doubled_normals, enclosed
+
+STEP, BREP = (".step", ".stp"), (".brep",)
+# Raise by hand when the same file gives other triangles.
+_VERSION = 4
+_PROGRAM = "pipeline.scene.tessellate"
+_LONGEST = 600  # s
+# Of the solid's volume, triangles may miss this much; of its extent, vertices in the file may be off by that.
+_MISSED, _OFF = 0.03, 1e-5
+# What would make the program a part of this run under MPI.
+_OF_MPI = ("OMPI_", "PMIX_", "PMI_", "MPI_", "PRTE_")
+
+
+@dataclass(frozen=True, eq=False)
+class Solid(Loaded):
+    """A solid's ``triangles``, and what is known of its faces.
+
+    ``normals`` (m, 3, 3) are the outward ones of the true surface at the corners of the facets; ``face`` (m) is the
+    number of the face that each facet is on; ``planes`` tells of faces whether they are plane, ``radius`` (m) how
+    round, ``names`` which numbers a name stands for. ``box`` (2, 3) and ``volume`` are in m and m³, ``content`` is the
+    hash of the file.
+    """
+
+    normals: FloatArray
+    face: IntArray
+    planes: BoolArray
+    radius: FloatArray
+    names: dict[str, tuple[int, ...]]
+    box: FloatArray
+    volume: float
+    content: str
+
+
+def load_solid(path: Path, unit: str, size: float) -> Solid:
+    """Return the solid in a file whose numbers are in a ``unit`` of ``size`` (m).
+
+    Raises:
+        SurfaceError: if there is not one solid in it; says what was found, and what mends it.
+    """
+    return _load(path, *state_of(path), unit, size)
+
+
+@lru_cache(maxsize=8)
+def _load(path: Path, _changed: int, length: int, unit: str, size: float) -> Solid:
+    ending = path.suffix.lower()
+    if ending not in STEP + BREP:
+        raise SurfaceError(f"its name ends in `{path.suffix}`; read are {', '.join(STEP + BREP)}")
+    if not 0 < length <= LARGEST_FILE:
+        raise SurfaceError("is empty: copy or export it again" if length == 0 else f"has {length / 1e9:.2g} GB")
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise SurfaceError(f"cannot be read: {error.strerror or error}") from None
+    entities = entities_of(data) if ending in STEP else {}
+    if ending in STEP:
+        _check_unit(unit_of(entities), unit)
+    elif b"CASCADE Topology" not in data[:4000] and b"DBRep_DrawableShape" not in data[:4000]:
+        raise SurfaceError("is no BREP file as OpenCASCADE writes them: export it again, or as STEP")
+    content = sha256(data).hexdigest()
+    return _solid(_tessellated(path, unit, content), size, entities, f"{content} {unit}")
+
+
+def _check_unit(found: str | None, unit: str) -> None:
+    same = {"µm": "um"}.get(unit, unit)
+    if found is None:
+        raise SurfaceError("does not say in which one unit its lengths are: export it again, in mm")
+    if found != same:
+        raise SurfaceError(f'says itself that its lengths are in {found}: unit = "{found}"')
+
+
+def _tessellated(path: Path, unit: str, content: str) -> dict[str, Any]:
+    """Return what the program writes, which is kept by the content of the file."""
+    name = "um" if unit == "µm" else unit
+    kept = cache_folder() / "cad" / f"{content[:32]}-{name}-{_VERSION}.npz"
+    try:
+        return _read(kept)
+    except (OSError, ValueError, KeyError, BadZipFile, EOFError):
+        pass
+    try:
+        with atomic(kept) as target:
+            _run(path, name, target)
+            return _read(target)
+    except OSError as error:
+        raise SurfaceError(f"{kept.parent}, for what is made of it, cannot be written: set EPSMESH_CACHE") from error
+
+
+def _read(path: Path) -> dict[str, Any]:
+    with np.load(path) as arrays:
+        return {name: arrays[name] for name in arrays.files}
+
+
+def _run(path: Path, unit: str, target: Path) -> None:
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(_OF_MPI)}
+    root = str(Path(__file__).resolve().parents[3])
+    environment["PYTHONPATH"] = os.pathsep.join(filter(None, [root, environment.get("PYTHONPATH")]))
+    command = [sys.executable, "-m", _PROGRAM, str(path), unit, str(target)]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST, env=environment, check=False)
+    except subprocess.TimeoutExpired:
+        raise SurfaceError(f"could not be covered by triangles within {_LONGEST} s: simplify the solid") from None
+    if done.returncode:
+        last = (done.stdout.strip() or done.stderr.strip()).splitlines()
+        raise SurfaceError(last[-1] if last else f"the geometry kernel ended with status {done.returncode} on it")
+
+
+def _solid(arrays: dict[str, Any], size: float, entities: dict[int, str], content: str) -> Solid:
+    points, facets, volume = arrays["points"], arrays["facets"], float(arrays["volume"])
+    check.check_size(points, facets, size)
+    edges = Edges(facets)
+    if len(edges.open) or len(edges.fins):
+        raise SurfaceError(
+            f"its faces are not closed: {len(edges.open) + len(edges.fins):,} edges of their triangles do not belong "
+            "to two faces; sew the faces to one closed shell, make a solid of it, and export that"
+        )
+    facets, flipped = oriented(edges)
+    if flipped is None:
+        raise SurfaceError("its faces have but one side: they bound nothing")
+    facets = _outside_out(points, facets, edges)
+    if abs(enclosed(points, facets) - volume) > _MISSED * abs(volume):
+        raise SurfaceError(
+            f"its faces enclose {enclosed(points, facets) * size**3 * 1e6:.3g} cm³, and its solid "
+            f"{volume * size**3 * 1e6:.3g} cm³: heal the solid in the CAD program, and export it again"
+        )
+    moved = facets[:, 0] != arrays["facets"][:, 0]
+    normals = np.where(moved[:, None, None], arrays["normals"][:, ::-1], arrays["normals"])
+    corners = points[facets]
+    used, number = np.unique(facets, return_inverse=True)
+    return Solid(
+        Triangles(points[used] * size, number.reshape(facets.shape)),
+        (),
+        _outward(normals, doubled_normals(corners.reshape(-1, 3), np.arange(3 * len(facets)).reshape(-1, 3))),
+        arrays["face"],
+        arrays["is_plane"],
+        np.array([float(f"{radius * size:.9g}") for radius in arrays["radius"]]),
+        _names(named_faces(entities), arrays) if entities else {},
+        arrays["box"] * size,
+        volume * size**3,
+        content,
+    )
+
+
+def _outside_out(points: FloatArray, facets: IntArray, edges: Edges) -> IntArray:
+    """Return facets seen counter-clockwise from outside the largest shell, and from inside those of its hollows."""
+    count, shell = edges.shells
+    volumes = check.shell_volumes(points, facets, shell, count)
+    wanted = np.where(np.arange(count) == np.argmax(np.abs(volumes)), 1, -1)
+    return np.where((volumes * wanted < 0)[shell][:, None], facets[:, ::-1], facets)
+
+
+def _outward(normals: FloatArray, of_facets: FloatArray) -> FloatArray:
+    """Return unit normals to the side of the facets' own, which stand in where a surface has none, as at a tip."""
+    unit = (of_facets / np.linalg.norm(of_facets, axis=1, keepdims=True))[:, None]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        normals = normals / np.linalg.norm(normals, axis=2, keepdims=True)
+    cosine = (normals * unit).sum(axis=2, keepdims=True)
+    return np.where(np.abs(cosine) > 0.5, np.sign(cosine) * normals, unit)
+
+
+def _names(faces: list[tuple[str, FloatArray]], arrays: dict[str, Any]) -> dict[str, tuple[int, ...]]:
+    """Return the numbers of the faces of each name: the kernel has the order of the file, and the vertices tell.
+
+    None are returned where the two do not agree.
+    """
+    if not any(name for name, _ in faces) or len(faces) != len(arrays["is_plane"]):
+        return {}
+    names: dict[str, tuple[int, ...]] = {}
+    extent = float(np.ptp(arrays["points"], axis=0).max())
+    for number, (name, vertices) in enumerate(faces):
+        of_face = arrays["points"][np.unique(arrays["facets"][arrays["face"] == number])]
+        off = np.linalg.norm(of_face[None] - vertices[:, None], axis=2).min(axis=1)
+        if (off > _OFF * extent).any():
+            return {}
+        if name:
+            names[name] = (*names.get(name, ()), number)
+    return names
