@@ -39,10 +39,9 @@ def mesh_arrays(case: Case, mirrors: tuple[str, ...], kept: "Kept | None" = None
 def _of_triangles(scene: Scene, body: Scanned, sizes: Sizes, kept: "Kept | None") -> MeshArrays:
     """Return the mesh of a scene on a scanned ``body``."""
     # Here, since libigl and what else it needs take 80 ms to load, which other bodies do without.
-    from pipeline.mesh.organ.base import far_surface  # noqa: PLC0415
-    from pipeline.mesh.organ.make import mesh_organ  # noqa: PLC0415
+    from pipeline.mesh.organ.make import mesh_scanned  # noqa: PLC0415
 
-    return mesh_organ(scene, sizes, far_surface(body, kept))
+    return mesh_scanned(scene, body, sizes, kept)
 
 
 def upright(case: Case, arrays: MeshArrays) -> MeshArrays:

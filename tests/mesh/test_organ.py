@@ -12,7 +12,7 @@ from pipeline.mesh.curve import curve
 from pipeline.mesh.generate import MeshError
 from pipeline.mesh.organ import make
 from pipeline.mesh.organ.base import far_surface
-from pipeline.mesh.organ.make import mesh_organ
+from pipeline.mesh.organ.make import mesh_organ, mesh_scanned
 from pipeline.mesh.size import Sizes
 from pipeline.scene.model import Scene
 from pipeline.shapes.bodies.surface import FromSurface
@@ -20,7 +20,7 @@ from pipeline.shapes.frame import Frame
 from pipeline.shapes.surface import Surface
 from tests.cases import study
 from tests.mesh.test_mesh import area, volume
-from tests.organs import AXES, box, ellipsoid, write_stl
+from tests.organs import AXES, box, ellipsoid, sphere, write_stl
 
 BELOW = -10e-3
 SIZES = Sizes(epsilon=inf, fine=15e-3, coarse=60e-3, rim=0.4e-3, growth=0.5, column=30e-3)
@@ -204,3 +204,16 @@ def test_a_surface_that_is_not_the_files_is_never_filled(file, monkeypatch):
     monkeypatch.setattr(make, "_to_sizes", lambda *given: replace(far.sheet, facets=far.sheet.facets[1:]))
     with pytest.raises(MeshError, match="not closed"):
         mesh_organ(a_scene, SIZES, far)
+
+
+def test_thin_parts_are_meshed_with_smaller_elements_where_large_ones_would_meet_across_them(tmp_path):
+    """A ball with a brim: elements as large as the ball allows cross in the brim."""
+    directions, facets = sphere(24)
+    brim = ((directions / np.array([60e-3, 60e-3, 4e-3])) ** 2).sum(axis=1) ** -0.5
+    points = directions * ((35e-3**12 + brim**12) ** (1 / 12))[:, None]
+    a_scene = scene(write_stl(tmp_path / "brim.stl", points, facets))
+    sizes = replace(SIZES, fine=60e-3, column=a_scene.body.bend)
+    with pytest.raises(MeshError):
+        mesh_organ(a_scene, sizes, far_surface(a_scene.body))
+    mesh = mesh_scanned(a_scene, a_scene.body, sizes)
+    assert volume(mesh) == pytest.approx(a_scene.body.volume, rel=0.01)

@@ -49,15 +49,17 @@ class Kept(Protocol):
         """Return what is kept under ``key``, or what ``make`` returns, which is then kept."""
 
 
-def far_surface(body: Scanned, kept: Kept | None = None) -> Base:
+def far_surface(body: Scanned, kept: Kept | None = None, finer: float = 1) -> Base:
     """Return the surface of ``body`` away from any contact, out of what is ``kept`` if it is there.
+
+    Its elements are ``finer`` by this factor than the body's bend asks for.
 
     Raises:
         GeometryError: if nothing, or all, of it is held.
         MeshError: if the remesher fails.
     """
     (below,), (skin,), triangles = body.support.edges(), body.surfaces()["skin"], body.triangles
-    largest = body.bend / PER_RADIUS
+    largest = body.bend / PER_RADIUS / finer
 
     def make() -> Arrays:
         made = base(triangles.points, triangles.facets, skin, below, largest)

@@ -1,7 +1,7 @@
 """The mesh of a scene on a body of triangles: coarse surface, contact, surface to the size field, volume, groups."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.generate import GeometryError, MeshArrays, MeshError, orient
-from pipeline.mesh.organ.base import DEVIATION, Base, put_back
+from pipeline.mesh.organ.base import DEVIATION, Base, Kept, far_surface, put_back
 from pipeline.mesh.organ.contact import Contact, set_in
 from pipeline.mesh.organ.field import Field
 from pipeline.mesh.organ.remesh import remesh
@@ -17,9 +17,13 @@ from pipeline.mesh.organ.sheet import PROBE, Sheet, edges_of, group_names
 from pipeline.mesh.organ.volume import fill
 from pipeline.mesh.size import Sizes
 from pipeline.scene.model import Scene
+from pipeline.shapes.scanned import Scanned
 
 # The surface is meshed twice: only the second time its points are dense where sizes change fast.
 _PASSES = 2
+# Where elements far from the contact are so large that the surface meets itself across a thin part, they are to be this
+# many times smaller.
+_FINER = (1, 2, 4, 8)
 # The remesher turns lengths into units of its own and back, which moves points by rounding.
 _SAME = 1e-6
 # A share of the body's volume: chords of elements leave half a per cent of an organ out, which their curved edges bring
@@ -27,6 +31,24 @@ _SAME = 1e-6
 MOST_EXCESS = 0.03
 
 Lift = Callable[[FloatArray], FloatArray]
+
+
+def mesh_scanned(scene: Scene, body: Scanned, sizes: Sizes, kept: Kept | None = None) -> MeshArrays:
+    """Mesh a ``scene`` of a ``body`` of triangles; ``kept`` holds what its meshes share.
+
+    Raises:
+        GeometryError: at once, if the footprint does not fit there, or the scene has what such a body cannot.
+        MeshError: if a mesh generator fails with smaller elements, too.
+    """
+    for finer in _FINER[:-1]:
+        try:
+            return mesh_organ(scene, replace(sizes, column=sizes.column / finer), far_surface(body, kept, finer))
+        except GeometryError:
+            raise
+        except MeshError:
+            continue
+    finer = _FINER[-1]
+    return mesh_organ(scene, replace(sizes, column=sizes.column / finer), far_surface(body, kept, finer))
 
 
 def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
