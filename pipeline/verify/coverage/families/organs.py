@@ -3,6 +3,7 @@
 Their files are written into a folder that lives as long as the process.
 """
 
+import hashlib
 import struct
 from functools import cache
 from pathlib import Path
@@ -78,8 +79,9 @@ def _written(points: FloatArray) -> Path:
     facets[inward] = facets[inward][:, ::-1]
     records = np.zeros(len(facets), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
     records["corners"] = points[facets]
-    path = Path(_folder().name) / f"{len(list(Path(_folder().name).iterdir()))}.stl"
-    path.write_bytes(b"\0" * 80 + struct.pack("<I", len(facets)) + records.tobytes())
+    content = b"\0" * 80 + struct.pack("<I", len(facets)) + records.tobytes()
+    path = Path(_folder().name) / f"{hashlib.sha256(content).hexdigest()[:8]}.stl"
+    path.write_bytes(content)
     return path
 
 
