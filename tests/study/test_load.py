@@ -33,6 +33,21 @@ MISTAKES = {
     ),
     "locking of degree 1": ({"material": {"poisson": 0.46}, "mesh": {"degree": 1}}, ["at most 0.45", "degree 2"]),
     "mixed of degree 1": ({"mesh": {"element": "mixed", "degree": 1}}, ["mesh.element", "no stable mixed element"]),
+    "straight elements on a curved surface": (
+        {
+            "body": {"shape": "ellipsoid", "size": None, "axes": ["20 mm"] * 3, "fixed": {"below": "-5 mm"}},
+            "mesh": {"degree": 1, "outside": "coarse"},
+        },
+        ["mesh.degree = 1", "curved", "use 2 or 3"],
+    ),
+    "straight elements on an inclusion": (
+        {
+            "body": {"inclusion": [{"name": "a", "radius": "2 mm", "at": ["0 mm", "0 mm", "-9 mm"], "young": "9 kPa",
+                                    "poisson": 0.3}]},
+            "mesh": {"degree": 1},
+        },
+        ["mesh.degree = 1", "inclusions", "use 2 or 3"],
+    ),
     "mixed for low ratios": (
         {"mesh": {"element": "mixed"}, "material": {"poisson": 0.2}}, ["mesh.element", "above 0.25"],
     ),
