@@ -40,15 +40,19 @@ def mesh_scanned(scene: Scene, body: Scanned, sizes: Sizes, kept: Kept | None = 
         GeometryError: at once, if the footprint does not fit there, or the scene has what such a body cannot.
         MeshError: if a mesh generator fails with smaller elements, too.
     """
+
+    def mesh(finer: int) -> MeshArrays:
+        smaller = replace(sizes, column=sizes.column / finer)
+        return mesh_organ(scene, smaller, far_surface(body, kept, finer))
+
     for finer in _FINER[:-1]:
         try:
-            return mesh_organ(scene, replace(sizes, column=sizes.column / finer), far_surface(body, kept, finer))
+            return mesh(finer)
         except GeometryError:
             raise
         except MeshError:
             continue
-    finer = _FINER[-1]
-    return mesh_organ(scene, replace(sizes, column=sizes.column / finer), far_surface(body, kept, finer))
+    return mesh(_FINER[-1])
 
 
 def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
