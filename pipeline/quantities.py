@@ -89,6 +89,10 @@ _RESULTS = (
     Quantity("accuracy", "1", "F / F_exact", "F/F_exact"),
     Quantity("speedup", "1", "time of the full-order case over time of this case", "speed-up",
              "speed-up $t_{full}/t$"),
+    Quantity("contact_area", "m2", "area in contact, of unilateral contact, projected along the probe's axis", "area",
+             "area in contact"),
+    Quantity("contact_radius", "m", "radius in contact, of unilateral contact; if it is not round, of the circle of "
+             "that area", "a", "radius in contact a"),
     Quantity("energy", "J", "strain energy", "energy"),
     Quantity("max_strain", "1", "largest principal strain of a cell's mean strain; grows as the rim is refined",
              "largest strain", in_per_cent=True),
@@ -102,7 +106,8 @@ _RESULTS = (
     Quantity("memory", "bytes", "peak memory of all ranks", "memory"),
     Quantity("dofs", "1", "unknowns of the whole body", "unknowns"),
     Quantity("cells", "1", "elements of the whole body", "cells"),
-    Quantity("iterations", "1", "iterations of the linear solver", "iterations"),
+    Quantity("iterations", "1", "iterations of the linear solver; of unilateral contact, linear solves until the "
+             "area in contact was found", "iterations"),
     Quantity("status", "", "ok, failed, skipped, or pending where not yet run", "status"),
     Quantity("message", "", "why a case failed or was skipped", "message"),
     Quantity("origin", "", "how the force was obtained", "origin"),
@@ -123,7 +128,7 @@ MESH_DIMENSIONS = tuple(quantity.name for quantity in _MESH)
 # Factor and unit of what people do not read in SI.
 _READ = {
     "m": (1e3, "mm"), "Pa": (1e-3, "kPa"), "N": (1e3, "mN"), "J": (1e6, "µJ"), "bytes": (1e-6, "MB"),
-    "rad": (180 / pi, "°"), "1": (1.0, ""),
+    "m2": (1e6, "mm²"), "rad": (180 / pi, "°"), "1": (1.0, ""),
 }  # fmt: skip
 
 

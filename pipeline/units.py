@@ -1,6 +1,7 @@
 """Quantities written with their unit, as text, and read into SI numbers."""
 
 from functools import cache
+from math import pi
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BeforeValidator, Field
@@ -26,6 +27,8 @@ newton = kilogram * meter / second ** 2 = N
 pascal = newton / meter ** 2 = Pa
 bar = 1e5 * pascal
 percent = 0.01 = %
+radian = [] = rad
+degree = 3.14159265358979323846 / 180 * radian = deg = °
 """.strip().splitlines()
 
 # Twelve digits: "3 mm" and "0.3 cm" must be one number wherever two cases are compared.
@@ -49,14 +52,14 @@ def canonical(value: float) -> float:
 
 def parse_quantity(text: Any, unit: str) -> float:
     """Read ``"10 mm"`` into a number in the SI ``unit``; a bare number is refused, never guessed."""
-    example = {"m": "10 mm", "Pa": "10 kPa", "s": "10 ms", "": "1 %"}[unit]
+    example = {"m": "10 mm", "Pa": "10 kPa", "s": "10 ms", "": "1 %", "rad": "60 deg"}[unit]
     allowed = f'a number with a unit as text, such as "{example}"'
     if not isinstance(text, str):
         raise PydanticCustomError("quantity", "{allowed}", {"allowed": allowed})
     try:
         quantity = _registry().Quantity(text)
         if not quantity.is_compatible_with(unit):
-            kind = {"m": "a length", "Pa": "a pressure", "s": "a time", "": "a share"}[unit]
+            kind = {"m": "a length", "Pa": "a pressure", "s": "a time", "": "a share", "rad": "an angle"}[unit]
             raise PydanticCustomError("quantity", "{allowed}", {"allowed": f'{kind}, such as "{example}"'})
         magnitude = float(quantity.to(unit).magnitude)
     except PydanticCustomError:
@@ -76,12 +79,22 @@ def _pressure(text: Any) -> float:
     return parse_quantity(text, "Pa")
 
 
+def _angle(text: Any) -> float:
+    angle = parse_quantity(text, "rad")
+    if not 0 < angle < canonical(pi / 2):
+        allowed = 'an angle between 0 and 90 deg, such as "60 deg"'
+        raise PydanticCustomError("quantity", "{allowed}", {"allowed": allowed})
+    return angle
+
+
 def _share(text: Any) -> float:
     return parse_quantity(text, "")
 
 
 Coordinate = Annotated[float, BeforeValidator(_length), Field(json_schema_extra={"unit": "m"})]
 Length = Annotated[Coordinate, Field(gt=0)]
+Angle = Annotated[float, BeforeValidator(_angle), Field(json_schema_extra={"unit": "rad"})]
+Rounding = Annotated[Coordinate, Field(ge=0)]
 Travel = Annotated[Coordinate, Field(ge=0)]
 Share = Annotated[float, BeforeValidator(_share), Field(json_schema_extra={"unit": "1"})]
 Pressure = Annotated[float, BeforeValidator(_pressure), Field(gt=0, json_schema_extra={"unit": "Pa"})]

@@ -32,7 +32,7 @@ _ALTERNATIONS = 30
 
 @stage("curved rim and sides")
 def curve(mesh: MeshArrays, scene: Scene) -> MeshArrays:
-    """Return ``mesh`` with ten nodes a cell, on the true rim and sides, with quarter-point nodes at the rim."""
+    """Return ``mesh`` with ten nodes a cell, on the true rim and sides, and with quarter points at a singular rim."""
     mesh = _on_rim_nodes(mesh, scene)
     corners = mesh.cells
     pairs = np.sort(corners[:, EDGES].reshape(-1, 2), axis=1)
@@ -45,7 +45,9 @@ def curve(mesh: MeshArrays, scene: Scene) -> MeshArrays:
     curved = straight if mesh.bent is None else _on_faces(mesh.bent, edges, straight)
     curved = _on_inclusions(mesh, scene, edges, _on_sides(mesh, scene, edges, curved, keys))
     curved = _on_rim(mesh, scene, edges, curved)
-    middle = _quarter_points(mesh, edges, curved.copy())
+    middle = curved.copy()
+    if scene.probe.has_singular_edge:
+        middle = _quarter_points(mesh, edges, middle)
     # A folded cell gives up its quarter points first: without its arcs the footprint would be a smaller one.
     for milder in (curved, straight):
         _unfold(mesh.points[corners], middle, of_cell, milder)

@@ -38,7 +38,9 @@ class Sizes:
         """Return the number of edges along a curved rim, 0 where it is straight."""
         if not probe.is_curved:
             return 0
-        quarters = ceil(probe.perimeter / self.rim / _SEGMENT_MULTIPLE)
+        # The footprint's edge may lie beyond where contact is expected to end, and elements are small.
+        size = min(self.rim + self.growth * probe.rim_offset, max(self.rim, self.fine))
+        quarters = ceil(probe.perimeter / size / _SEGMENT_MULTIPLE)
         return max(_FEWEST_SEGMENTS, _SEGMENT_MULTIPLE * quarters)
 
 
@@ -48,16 +50,16 @@ def set_size_field(
     """Make ``sizes`` the background field of gmsh's current model, whose unit is ``scale`` metres.
 
     ``more`` are sizes that elements must not be above either, written in that unit; ``rim`` are the curves of the
-    probe's edge where that is not plane.
+    probe's edge where that is not plane. Where contact ends elsewhere, elements are small there.
     """
     unit, field = 1 / scale, gmsh.model.mesh.field
-    if rim:
+    if rim and probe.has_singular_edge:
         distance = field.add("Distance")
         field.setNumbers(distance, "CurvesList", rim)
         field.setNumber(distance, "NumPointsPerCurve", ceil(_POINTS_PER_EDGE * probe.perimeter / sizes.rim))
         to_rim = f"F{distance}"
     else:
-        to_rim = probe.edge_distance(*frame.expressions(unit), unit)
+        to_rim = probe.rim_distance(*frame.expressions(unit), unit)
     terms = [f"{unit * sizes.rim:.12g}+{sizes.growth:.12g}*{to_rim}"]
     if sizes.epsilon == inf:
         terms.append(f"{unit * sizes.fine:.12g}")

@@ -71,10 +71,15 @@ def _changes(plan: Plan, case: Case, solve: Solve | None) -> dict[str, str]:
     all_of_it = "mesh, assembly and solve"
     shares = plan.shared and not (solve and solve.axisymmetric)
     material = "one solve, on the same mesh and assembly" if shares else all_of_it
+    contact = "one assembly and one solve, on the same mesh" if shares else all_of_it
+    # What is known of contact: where none of it is, it cannot be another, and each depth has a mesh of its own.
+    is_found = not case.probe.has_singular_edge
+    deeper = {"depth": all_of_it if is_found else contact} if case.probe.is_unilateral else {}
     return {
         ", ".join(case.proportional_to): "nothing: F is proportional" if "scaling" in plan.used else material,
+        **deeper,
         "poisson": material,
-        "contact": "one assembly and one solve, on the same mesh" if shares else all_of_it,
+        **({} if is_found else {"contact": contact}),
         "body, probe, epsilon, fine, coarse, rim, growth, outside": all_of_it,
     }
 

@@ -21,8 +21,11 @@ def cells(case: Case) -> float:
     """Estimate the tetrahedra of the case's mesh, within about a factor of two."""
     mesh, probe, body = case.mesh, case.probe, case.body
     rim, growth, thickness = mesh.rim_size(probe.half_width), mesh.growth, body.thickness(case.frame)
+    length, area = probe.rim_size
     # Half discs round the rim: ∫ π s / (rim + growth s)³ ds up to the distance where the size is fine.
-    total = probe.perimeter * pi * (1 / rim - 1 / mesh.fine) ** 2 * rim / (2 * growth**2) if rim < mesh.fine else 0.0
+    total = length * pi * (1 / rim - 1 / mesh.fine) ** 2 * rim / (2 * growth**2) if rim < mesh.fine else 0.0
+    # Below an area in which contact may end: ∫ 1 / (rim + growth s)³ ds.
+    total += area / (2 * growth * rim**2)
     epsilon = min(mesh.epsilon, (3 * body.volume / (2 * pi)) ** (1 / 3))
     if case.is_full or mesh.epsilon == inf:
         return (total + body.volume / mesh.fine**3) / _TETRAHEDRON

@@ -35,7 +35,7 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
         str(PHYSICS_VERSION),
         _body_text(case.body, case.scale.stress if scaled else 1.0),
         text_of(case.material, case.material.PROPORTIONAL_TO if scaled else ()),
-        text_of(case.probe, case.probe.PROPORTIONAL_TO if scaled else ()),
+        text_of(case.probe, case.probe.proportional_to if scaled else ()),
         _ratios_text(case.probe) if scaled else "",
         _mesh_text(case.mesh, folded and case.is_full, case.probe.half_width, case.element),
         text_of(case.solve, ("timing", "repeats", "exact")),
@@ -51,7 +51,7 @@ def reference_key(case: Case, accuracy: float) -> str:
     ratios = "0.0" if _slides_across_a_mirror(case) else _ratios_text(probe)
     parts = [
         f"{PHYSICS_VERSION} exact {accuracy!r}", _body_text(case.body, case.scale.stress),
-        text_of(case.material, case.material.PROPORTIONAL_TO), text_of(probe, probe.PROPORTIONAL_TO), ratios,
+        text_of(case.material, case.material.PROPORTIONAL_TO), text_of(probe, probe.proportional_to), ratios,
     ]  # fmt: skip
     return digest("\n".join(parts))
 
@@ -59,7 +59,7 @@ def reference_key(case: Case, accuracy: float) -> str:
 def mesh_key(case: Case) -> str:
     """Key of the case's mesh: body, footprint, sizes, and whether elements are straight or curved."""
     sizes = _mesh_text(case.mesh, case.is_full, case.probe.half_width, "")
-    footprint = text_of(case.probe, ("action", "depth", "contact", "slice", "motion"))
+    footprint = text_of(case.probe, case.probe.NOT_DRAWN)
     return digest("\n".join([_body_text(case.body), footprint, sizes, str(case.mesh.degree > 1)]))
 
 
@@ -82,8 +82,8 @@ def normalised(case: Case) -> Case:
 @lru_cache(_MANY)
 def _ratios(probe: Probe) -> dict[str, float]:
     """Return all that F is proportional to, for a unit of the first of them: how far a blade slices for each depth."""
-    values = {key: getattr(probe, key) for key in probe.PROPORTIONAL_TO}
-    return {key: canonical(value / values[probe.PROPORTIONAL_TO[0]]) for key, value in values.items()}
+    values = {key: getattr(probe, key) for key in probe.proportional_to}
+    return {key: canonical(value / values[probe.proportional_to[0]]) for key, value in values.items()}
 
 
 @lru_cache(_MANY)

@@ -10,6 +10,11 @@ from pipeline.plan.work import Plan, Struck
 
 # Fewer Poisson's ratios than this are solved one by one: a basis needs about five solutions itself.
 _FEWEST_RATIOS = 8
+_OF_STRESS_ALONE = (
+    "F is proportional to Young's modulus, and to the depth unless contact is unilateral: cases that differ in them "
+    "only are solved once."
+)
+_FOUND_CONTACT = "No reduced basis: the area of contact changes with Poisson's ratio, and each is solved."
 _SEVERAL_MATERIALS = "No reduced basis: a body of several materials has more parameters than one, and each is solved."
 
 
@@ -20,12 +25,13 @@ def strike_past_body(plan: Plan) -> Plan:
 
 def strike_duplicates(plan: Plan) -> Plan:
     """The same case twice is solved once."""
-    return _merged(plan, "duplicates", strike_duplicates)
+    return _merged(plan, "duplicates", _reason(strike_duplicates))
 
 
 def strike_scaled(plan: Plan) -> Plan:
     """F is proportional to Young's modulus and to the depth: cases that differ in them only are solved once."""
-    return _rekeyed(plan, "scaling", strike_scaled, lambda case: case_key(case, folded=True, scaled=True))
+    reason = _OF_STRESS_ALONE if any(solve.case.probe.is_unilateral for solve in plan.solves) else ""
+    return _rekeyed(plan, "scaling", strike_scaled, lambda case: case_key(case, folded=True, scaled=True), reason)
 
 
 def use_axisymmetry(plan: Plan) -> Plan:
@@ -71,9 +77,11 @@ def use_reduced_basis(plan: Plan) -> Plan:
     }  # fmt: skip
     solves = tuple(replace(s, key=many[s.key], reduced=True) if s.key in many else s for s in plan.solves)
     plan = replace(plan, solves=solves, keys=tuple(many.get(key, key) for key in plan.keys))
-    left = sum(len(o.solves) for step in plan.meshes for o in step.operators if _suits_a_basis(o, of_regions=True))
-    if left and not many:
+    operators = [operator for step in plan.meshes for operator in step.operators]
+    if not many and any(_suits_a_basis(operator, of_regions=True) for operator in operators):
         return replace(plan, struck=(*plan.struck, Struck("reduced", 0, _SEVERAL_MATERIALS)))
+    if not many and any(_suits_a_basis(operator, found=True) for operator in operators):
+        return replace(plan, struck=(*plan.struck, Struck("reduced", 0, _FOUND_CONTACT)))
     return plan.struck_by("reduced", len(many), _reason(use_reduced_basis))
 
 
@@ -104,19 +112,22 @@ def _reason(reduction: Callable[..., Plan]) -> str:
     return (reduction.__doc__ or "").strip()
 
 
-def _rekeyed(plan: Plan, name: str, reduction: Callable[[Plan], Plan], key: Callable[..., str]) -> Plan:
+def _rekeyed(
+    plan: Plan, name: str, reduction: Callable[[Plan], Plan], key: Callable[..., str], reason: str = ""
+) -> Plan:
     """Give every solve the key that ``key`` makes of its case, and merge those that then agree."""
     solves = tuple(replace(solve, key=key(solve.case)) for solve in plan.solves)
     new = dict(zip((solve.key for solve in plan.solves), (solve.key for solve in solves), strict=True))
-    return _merged(replace(plan, solves=solves, keys=tuple(new[k] for k in plan.keys)), name, reduction)
+    plan = replace(plan, solves=solves, keys=tuple(new[k] for k in plan.keys))
+    return _merged(plan, name, reason or _reason(reduction))
 
 
-def _merged(plan: Plan, name: str, reduction: Callable[[Plan], Plan]) -> Plan:
+def _merged(plan: Plan, name: str, reason: str) -> Plan:
     unique: dict[str, list[Solve]] = {}
     for solve in plan.solves:
         unique.setdefault(solve.key, []).append(solve)
     merged = tuple(replace(same[0], serves=_joined(same)) if len(same) > 1 else same[0] for same in unique.values())
-    return replace(plan, solves=merged).struck_by(name, len(plan.solves) - len(merged), _reason(reduction))
+    return replace(plan, solves=merged).struck_by(name, len(plan.solves) - len(merged), reason)
 
 
 def _joined(solves: Iterable[Solve]) -> tuple[tuple[int, ...], ...]:
@@ -128,12 +139,13 @@ def _mirrored(solve: Solve) -> Solve:
     return replace(solve, mirrors=model_planes(solve.case)) if use else solve
 
 
-def _suits_a_basis(operator: OperatorStep, *, of_regions: bool = False) -> bool:
+def _suits_a_basis(operator: OperatorStep, *, of_regions: bool = False, found: bool = False) -> bool:
     """Displacement elements depend on one parameter; and the bound is on the work of one movement, not on forces that
-    several take. ``of_regions`` asks of bodies of several materials, whose parameters are too many.
+    several take. ``of_regions`` asks of bodies of several materials, whose parameters are too many, ``found`` of
+    contact whose area changes with that parameter.
     """
     first = operator.solves[0]
-    if bool(first.case.body.regions) != of_regions:
+    if bool(first.case.body.regions) != of_regions or first.case.probe.is_unilateral != found:
         return False
     values = {solve.key if of_regions else solve.case.material.poisson for solve in operator.solves}
     plain = first.goal is None and not first.axisymmetric and first.case.element == "displacement"

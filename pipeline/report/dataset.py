@@ -24,6 +24,8 @@ _FLOATS = (
     "force", "force_error", "energy", "max_strain", "balance", "time_mesh", "time_assemble", "time_setup", "time_solve",
     "time_error", "time_total", "memory",
 )  # fmt: skip
+# Those of contact that is found, if any of the study's is.
+_FOUND = ("contact_area", "contact_radius")
 _COUNTS = ("dofs", "cells", "iterations")
 _EXACT = ("force_exact", "force_exact_error")
 # Translations, and rotations about the axes of the point of contact.
@@ -46,7 +48,8 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     keys = plan.reference_keys or [""] * len(flat)
     exact = [_scaled(records.get(key), case) for key, case in zip(keys, study.cases(), strict=True)]
     variables: dict[str, Any] = {}
-    for name in _FLOATS:
+    found = _FOUND if any(case.probe.is_unilateral for case in study.cases()) else ()
+    for name in (*_FLOATS, *found):
         values = [getattr(r, name) if r else nan for r in flat]
         variables[name] = (dims, array(values, float), attributes(name))
     for name in _COUNTS:
@@ -119,7 +122,10 @@ def _scaled(record: Record | None, case: Case) -> Record | None:
     """
     if record is None or record.is_ok:
         return record.scaled(case.scale) if record else None
-    return replace(record, force=nan, force_vector=(nan, nan, nan), energy=nan, max_strain=nan, balance=nan)
+    return replace(
+        record, force=nan, force_vector=(nan, nan, nan), energy=nan, max_strain=nan, balance=nan, contact_area=nan,
+        contact_radius=nan,
+    )  # fmt: skip
 
 
 def _frame(case: Case) -> Frame | None:

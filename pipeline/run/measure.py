@@ -43,6 +43,8 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         stiffness_error=_rows(solution.bars, turn, bars=True) if case.probe.motion == "all" else (),
         energy=solution.energy,
         max_strain=solution.max_strain,
+        contact_area=solution.contact_area,
+        contact_radius=solution.contact_radius,
         balance=solution.balance,
         dofs=solution.dofs,
         cells=solution.cells * 2 ** len(solve.mirrors),

@@ -30,7 +30,13 @@ def problem_of(spaces: Spaces, case: Case, *, shared: bool, reuse: bool = False)
 
 
 def conditions_of(case: Case) -> Conditions:
-    """Return what the probe of ``case`` prescribes."""
+    """Return what the probe of ``case`` prescribes.
+
+    Raises:
+        CaseFailure: if that is not known beforehand.
+    """
+    if case.probe.is_unilateral:
+        raise CaseFailure("unilateral contact is not solved yet in three dimensions")
     return Conditions(bonded=case.probe.contact == "bonded")
 
 

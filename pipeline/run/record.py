@@ -16,7 +16,8 @@ class Record:
     force of the tissue on the probe; ``force`` its part against the probe's advance, and ``force_error`` the relative
     95 % error bar on that, on which ``time_error`` seconds were spent. ``force_vector_error`` (N) are the bars on the
     vector's components, where they are known; ``stiffness`` is that of all six rigid motions, if it was asked for, and
-    ``stiffness_error`` has the bars on its entries. ``kind``, ``planned_cells`` and ``poisson`` are what its cost was
+    ``stiffness_error`` has the bars on its entries. ``contact_area`` (m²) and ``contact_radius`` (m) are those of
+    unilateral contact. ``kind``, ``planned_cells`` and ``poisson`` are what its cost was
     estimated from (:mod:`pipeline.plan.cost`), ``group`` the ranks that computed it.
     """
 
@@ -34,6 +35,8 @@ class Record:
     stiffness_error: tuple[tuple[float, ...], ...] = ()
     energy: float = nan
     max_strain: float = nan
+    contact_area: float = nan
+    contact_radius: float = nan
     balance: float = nan
     dofs: int = 0
     cells: int = 0

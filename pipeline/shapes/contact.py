@@ -20,6 +20,8 @@ _WITHIN = (0.0, 0.25, 0.5, 0.75, 0.9)
 # Neighbours differ in height by less than this, in units of what the steepest slope that is allowed makes of their
 # distance: more is a fold.
 _FOLD = 2.0
+# A tool may touch beside its axis first by this share of its depth: noise of a surface does no harm.
+_SOONER = 0.1
 # A surface this near to a plane, in units of the footprint, is one.
 _FLAT = 1e-9
 
@@ -100,6 +102,25 @@ def check_contact(body: Body, probe: Probe, frame: Frame) -> None:
         raise PlaceError(
             f"the surface under the footprint leaps by {in_mm(height)}, as over a fold: it must be one piece; use "
             "another place, another axis or a smaller probe"
+        )
+
+
+def check_first_touch(body: Body, probe: Probe, frame: Frame) -> None:
+    """Check that a tool whose contact is unilateral touches a body on its axis, or hardly sooner elsewhere.
+
+    Raises:
+        PlaceError: with where it would touch.
+    """
+    rim = outline_points(probe)
+    points = np.concatenate([share * rim for share in _WITHIN] + [rim])
+    lifted, _ = body.lift(frame, points)
+    gap = probe.profile(points) - frame.local(lifted)[:, 2]
+    first = int(np.nanargmin(gap))
+    if gap[first] < -_SOONER * probe.depth:
+        raise PlaceError(
+            f"the {probe.shape} would touch the body {in_mm(float(np.linalg.norm(points[first])))} beside its axis, "
+            f"{in_mm(-float(gap[first]))} before it does there, and its depth is counted from its axis: use another "
+            "place, another axis or a smaller probe"
         )
 
 

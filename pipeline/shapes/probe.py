@@ -3,15 +3,15 @@
 from abc import ABC, abstractmethod
 from functools import lru_cache
 from math import hypot, inf
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator
 from pydantic_core import PydanticCustomError
 
-from pipeline.shapes.arrays import FloatArray
+from pipeline.shapes.arrays import BoolArray, FloatArray, np
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
-from pipeline.shapes.section import Problems, Section, Words, refuse
+from pipeline.shapes.section import Problems, Section, Words
 from pipeline.units import Coordinate, Length
 
 # The candidates for mirror planes, by the coordinate that is zero on them, and their normals.
@@ -19,7 +19,8 @@ PLANES: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)}
 _ALIGNED = 1e-12
 _MANY = 200_000  # pairs of body and probe of a large study
 
-Contact = Annotated[Literal["bonded", "frictionless"], refuse("contact", ("unilateral",), ("bonded", "frictionless"))]
+Contact = Literal["bonded", "frictionless", "unilateral"]
+ON_EDGE = 1e-6  # of a footprint: a point this near to its edge is on it
 
 
 def _two_or_three(at: tuple[float, ...]) -> tuple[float, ...]:
@@ -29,9 +30,10 @@ def _two_or_three(at: tuple[float, ...]) -> tuple[float, ...]:
 
 
 class Probe(Section, ABC):
-    """A tool whose flat footprint moves with it: where it touches, how it moves, and its shape.
+    """A tool: where it touches, how it moves, and its shape.
 
-    A footprint is described in the probe's own coordinates, along and across it: see :class:`Frame`.
+    Its footprint is what of the surface moves with it, or what of it may come into contact where that is to be found
+    (``is_unilateral``). It is described in the probe's own coordinates, along and across it: see :class:`Frame`.
     """
 
     shape: Annotated[
@@ -40,7 +42,14 @@ class Probe(Section, ABC):
     action: Annotated[
         Literal["pierce", "cut"], Words("What the tool does; only a blade cuts.", '"pierce"', is_used=True)
     ] = "pierce"
-    depth: Annotated[Length, Words("How far the tool is pushed in. F is proportional to it.", '"0.2 mm"', is_used=True)]
+    depth: Annotated[
+        Length,
+        Words(
+            "How far the tool is pushed in. F is proportional to it unless contact is unilateral.",
+            '"0.2 mm"',
+            is_used=True,
+        ),
+    ]
     at: Annotated[
         tuple[Coordinate, ...],
         AfterValidator(_two_or_three),
@@ -59,7 +68,12 @@ class Probe(Section, ABC):
         ),
     ] = None
     contact: Annotated[
-        Contact, Words("Tissue sticks to the footprint (bonded), or slides along it (frictionless).", '"bonded"')
+        Contact,
+        Words(
+            "Tissue sticks to the footprint (bonded), slides along it (frictionless), or slides and may lift off where "
+            "it would be pulled (unilateral).",
+            '"bonded"',
+        ),
     ] = "bonded"
     motion: Annotated[
         Literal["press", "all"],
@@ -70,8 +84,11 @@ class Probe(Section, ABC):
         ),
     ] = "press"
 
-    # Keys that F is proportional to, if all of them change together; the first one is the unit of the others.
+    # Keys that F is proportional to where contact is known, if all of them change together; the first one is the unit
+    # of the others.
     PROPORTIONAL_TO: ClassVar[tuple[str, ...]]
+    # Keys on which its footprint, and so the mesh, does not depend.
+    NOT_DRAWN: ClassVar[tuple[str, ...]]
     # Error of F on a mesh that is graded to the footprint's edge, in units of that of a disc: docs/accuracy.md.
     EXPECTED_ERROR: ClassVar[float]
 
@@ -95,9 +112,19 @@ class Probe(Section, ABC):
         """Return the prescribed displacement (m) of the footprint."""
 
     @property
+    def is_unilateral(self) -> bool:
+        """Whether which part of the footprint is in contact is to be found."""
+        return self.contact == "unilateral"
+
+    @property
+    def proportional_to(self) -> tuple[str, ...]:
+        """Keys that F is proportional to: none where more of the tool touches the deeper it is."""
+        return () if self.is_unilateral else self.PROPORTIONAL_TO
+
+    @property
     def scale(self) -> float:
         """The length (m) that F is proportional to; 1 if there is none."""
-        return float(getattr(self, self.PROPORTIONAL_TO[0])) if self.PROPORTIONAL_TO else 1.0
+        return float(getattr(self, self.proportional_to[0])) if self.proportional_to else 1.0
 
     # ---- size -----------------------------------------------------------------------------------------
 
@@ -143,8 +170,8 @@ class Probe(Section, ABC):
         """Whether a part of the footprint's edge is curved, which elements must be bent to follow."""
 
     @abstractmethod
-    def inscribed(self, edges: int) -> Self:
-        """Return the probe, of the same form, in which the polygon of ``edges`` equal edges has this one's area."""
+    def inscribed(self, edges: int) -> "Probe":
+        """Return a probe of the same form in which the polygon of ``edges`` equal edges has this one's area."""
 
     @abstractmethod
     def edge_distance(self, along: str, across: str, height: str, unit: float) -> str:
@@ -164,6 +191,43 @@ class Probe(Section, ABC):
     def outline(self) -> FloatArray:
         """Return the edge as a closed line of points (n, 2), in m, counterclockwise: what the rest is held against."""
 
+    # ---- contact --------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def profile(self, points: FloatArray) -> FloatArray:
+        """Return the height (n,), in m, of the tool above its lowest point at ``points`` (n, 2) of its own coordinates.
+
+        It is measured against the axis, and infinite where there is no tool. At a node of the surface, at a height h
+        in own coordinates, contact is unilateral if the displacement w along the axis is at least depth - (profile - h)
+        and the pressure is not negative, one of them nought.
+        """
+
+    @abstractmethod
+    def ends_at(self, points: FloatArray) -> BoolArray:
+        """Tell of ``points`` (n, 2) on the footprint's edge whether the tool itself ends there (n,).
+
+        Contact that is found to reach the edge elsewhere is cut off by what was taken for a candidate.
+        """
+
+    @property
+    @abstractmethod
+    def has_singular_edge(self) -> bool:
+        """Whether the displacement goes like r^½ at the footprint's edge, which is then the edge of contact."""
+
+    @property
+    @abstractmethod
+    def rim_size(self) -> tuple[float, float]:
+        """Length (m) of where contact is expected to end, and its area (m²) if that is not known to the point."""
+
+    @property
+    @abstractmethod
+    def rim_offset(self) -> float:
+        """Distance (m) of the footprint's edge from where contact is expected to end."""
+
+    @abstractmethod
+    def rim_distance(self, along: str, across: str, height: str, unit: float) -> str:
+        """Write the distance to where contact is expected to end, as :meth:`edge_distance` does."""
+
     # ---- sense ----------------------------------------------------------------------------------------
 
     @abstractmethod
@@ -171,8 +235,45 @@ class Probe(Section, ABC):
         """Report what makes no sense in its keys."""
 
 
-class Straight(Probe):
-    """A probe that is only pushed in, along its axis."""
+class Punch(Probe):
+    """A tool with a flat face, whose edge is where contact ends, unless it lifts off."""
+
+    NOT_DRAWN = ("action", "depth", "contact", "slice", "motion")
+
+    @abstractmethod
+    def covers(self, points: FloatArray) -> BoolArray:
+        """Tell which ``points`` (n, 2) of its own coordinates (m) are below its face, edge and all."""
+
+    def profile(self, points: FloatArray) -> FloatArray:
+        """Return nought below the face."""
+        return np.where(self.covers(points), 0.0, inf)
+
+    def ends_at(self, points: FloatArray) -> BoolArray:
+        """Tell that the tool ends wherever the footprint does."""
+        return np.ones(len(points), dtype=bool)
+
+    @property
+    def has_singular_edge(self) -> bool:
+        """It has one."""
+        return True
+
+    @property
+    def rim_size(self) -> tuple[float, float]:
+        """Length (m) of the edge, and no area."""
+        return self.perimeter, 0.0
+
+    @property
+    def rim_offset(self) -> float:
+        """None (m): contact is expected to end at the edge of the face."""
+        return 0.0
+
+    def rim_distance(self, along: str, across: str, height: str, unit: float) -> str:
+        """Write the distance to the edge of the face."""
+        return self.edge_distance(along, across, height, unit)
+
+
+class Straight(Punch):
+    """A punch that is only pushed in, along its axis."""
 
     PROPORTIONAL_TO = ("depth",)
 

@@ -41,7 +41,8 @@ class Solution:
     ``max_strain`` is the largest principal strain of a cell's mean strain; ``dofs`` and ``cells`` are those of the
     whole body, ``iterations`` the sum over the motions. ``decrements`` (n, n) is what one degree more takes away from
     the probe's stiffness, and ``bars`` (n, n) the 95 % error bars on its entries, made with ``plain``, the share of
-    edges at the rim without quarter points (see :mod:`pipeline.solve.error`).
+    edges at the rim without quarter points (see :mod:`pipeline.solve.error`). Of unilateral contact, ``contact_area``
+    (m²) and ``contact_radius`` (m) are those found, and ``iterations`` the linear solves that it took.
     """
 
     response: Response
@@ -58,6 +59,8 @@ class Solution:
     plain: float = nan
     estimate_iterations: int = 0
     time_estimate: float = 0.0
+    contact_area: float = nan
+    contact_radius: float = nan
 
     @property
     def reaction(self) -> Vector:

@@ -10,9 +10,10 @@ from math import dist, inf, isfinite
 from typing import cast
 
 from pipeline.shapes.body import Body
-from pipeline.shapes.contact import check_contact, edge_gap, is_flat, is_level, lifted_edge
+from pipeline.shapes.contact import check_contact, check_first_touch, edge_gap, is_flat, is_level, lifted_edge
 from pipeline.shapes.frame import Frame, PlaceError
 from pipeline.shapes.from_file import FromFile
+from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe, is_direction
 from pipeline.shapes.section import Section, in_mm
 from pipeline.study.problems import Problems
@@ -69,12 +70,16 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
 
 
 def _check_depth(probe: Probe, problems: Problems) -> None:
+    """Warn of depths at which strains are large; a tool that is not flat tells of its own."""
+    if isinstance(probe, Indenter):
+        return
+    proportional = "F stays proportional to depth" if probe.proportional_to else "strains are taken to be small"
     if probe.depth > _LINEAR * probe.half_width:
         problems.warn(
             "probe.depth",
             in_mm(probe.depth),
             f"is more than {_LINEAR:.0%} of the probe's half width {in_mm(probe.half_width)}: linear elasticity is "
-            "then an extrapolation (F stays proportional to depth)",
+            f"then an extrapolation ({proportional})",
         )
 
 
@@ -133,8 +138,15 @@ def _check_fit(body: Body, probe: Probe, frame: Frame, problems: Problems) -> No
         problems.error(
             "probe.at",
             [in_mm(x) for x in probe.at],
-            f"the footprint of the {probe.shape} must lie inside the body's top ({body.face}), not on or over its edge",
+            f"{_footprint(probe)} must lie inside the body's top ({body.face}), not on or over its edge",
         )
+
+
+def _footprint(probe: Probe) -> str:
+    """Return what must lie on one face, in words."""
+    if isinstance(probe, Indenter):
+        return f"all that the {probe.shape} may touch, up to {in_mm(probe.circumradius)} from its axis,"
+    return f"the footprint of the {probe.shape}"
 
 
 def _check_contact(body: Body, probe: Probe, frame: Frame) -> None:
@@ -145,10 +157,12 @@ def _check_contact(body: Body, probe: Probe, frame: Frame) -> None:
             f"{in_mm(_FARTHEST_OFF * body.extent)}, is taken for a place on it"
         )
     check_contact(body, probe, frame)
+    if probe.is_unilateral:
+        check_first_touch(body, probe, frame)
     if edge_gap(body, probe, frame) <= _TOUCHING * body.extent:
-        raise PlaceError(f"the footprint of the {probe.shape} must lie inside one face, not on or over its edge")
+        raise PlaceError(f"{_footprint(probe)} must lie inside one face, not on or over its edge")
     if _held_gap(body, probe, frame) <= _TOUCHING * body.extent:
-        raise PlaceError(f"the footprint of the {probe.shape} must not reach what is held of the body")
+        raise PlaceError(f"{_footprint(probe)} must not reach what is held of the body")
 
 
 @lru_cache(_MANY)
@@ -224,6 +238,11 @@ def _check_straight(body: Body, probe: Probe, mesh: Mesh, problems: Problems) ->
     """Refuse what straight elements cannot follow: no error bar tells how much tissue they leave out."""
     if mesh.degree > 1:
         return
+    if probe.is_unilateral:
+        problems.error(
+            "mesh.degree", mesh.degree, "is too low for unilateral contact, whose edge falls between elements: use 2 "
+            "or 3",
+        )  # fmt: skip
     if body.inclusion:
         problems.error("mesh.degree", mesh.degree, "is too low for inclusions, which straight elements cut: use 2 or 3")
     elif not is_flat(body, probe, probe.frame_on(body)):

@@ -42,6 +42,7 @@ _QUANTITIES = {
     "m": ("length", "lengths"),
     "Pa": ("pressure", "pressures"),
     "1": ("per cent", "per cent"),
+    "rad": ("angle", "angles"),
     "": ("number", "numbers"),
 }
 _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}

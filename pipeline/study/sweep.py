@@ -119,7 +119,7 @@ class Case:
     def proportional_to(self) -> tuple[str, ...]:
         """The keys that F is proportional to, those of one section, or of all materials, changing together."""
         first = ("young of all materials together",) if self.body.regions else self.material.PROPORTIONAL_TO
-        return *first, *self.probe.PROPORTIONAL_TO
+        return *first, *self.probe.proportional_to
 
     @property
     def scale(self) -> Scale:

@@ -3,10 +3,10 @@
 from math import hypot
 from typing import Annotated, Any, Literal, Self
 
-from pipeline.shapes.arrays import FloatArray, np
+from pipeline.shapes.arrays import BoolArray, FloatArray, np
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
-from pipeline.shapes.probe import Probe
+from pipeline.shapes.probe import ON_EDGE, Punch
 from pipeline.shapes.section import Problems, Words, in_mm
 from pipeline.units import Length, Travel
 
@@ -14,7 +14,7 @@ _ALIGNED = 1e-12
 _CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 
 
-class Blade(Probe):
+class Blade(Punch):
     """A flat rectangular punch; its length lies along ``direction``."""
 
     PROPORTIONAL_TO = ("depth", "slice")
@@ -100,8 +100,19 @@ class Blade(Probe):
         """Return the rectangle."""
         return np.array([(i * self.length / 2, j * self.width / 2) for i, j in (*_CORNERS, _CORNERS[0])])
 
+    def covers(self, points: FloatArray) -> BoolArray:
+        """Tell which points are within the rectangle."""
+        half = np.array([self.length, self.width]) / 2
+        within: BoolArray = np.all(np.abs(points) <= (1 + ON_EDGE) * half, axis=1)
+        return within
+
     def check(self, problems: Problems) -> None:
-        """Report a slice that makes no sense."""
+        """Report a slice that makes no sense, and a cut that tissue lifts off."""
+        if self.action == "cut" and self.is_unilateral:
+            problems.error(
+                "probe.contact", self.contact, "tissue does not lift off a blade that cuts: use contact = 'bonded' or "
+                "'frictionless'",
+            )  # fmt: skip
         if self.slice > 0 and self.action != "cut":
             problems.error("probe.slice", in_mm(self.slice), 'only a cut slices: set action = "cut"')
         if self.slice > 0 and self.contact == "frictionless":

@@ -3,10 +3,10 @@
 from math import pi, sin, sqrt
 from typing import Annotated, Any, Literal, Self
 
-from pipeline.shapes.arrays import FloatArray, np
+from pipeline.shapes.arrays import BoolArray, FloatArray, np
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
-from pipeline.shapes.probe import Straight
+from pipeline.shapes.probe import ON_EDGE, Straight
 from pipeline.shapes.round import closed_ellipse, draw_ellipse
 from pipeline.shapes.section import Problems, Words
 from pipeline.units import Length
@@ -81,6 +81,11 @@ class Disc(Straight):
     def outline(self) -> FloatArray:
         """Return the circle."""
         return closed_ellipse((self.radius, self.radius), _ROUND)
+
+    def covers(self, points: FloatArray) -> BoolArray:
+        """Tell which points are within the circle."""
+        within: BoolArray = np.linalg.norm(points, axis=1) <= (1 + ON_EDGE) * self.radius
+        return within
 
     def check(self, problems: Problems) -> None:
         """Find nothing: each key says what it takes."""

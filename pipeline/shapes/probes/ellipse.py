@@ -3,10 +3,10 @@
 from math import pi, sqrt
 from typing import Annotated, Any, Literal, Self
 
-from pipeline.shapes.arrays import FloatArray, np
+from pipeline.shapes.arrays import BoolArray, FloatArray, np
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
-from pipeline.shapes.probe import Straight
+from pipeline.shapes.probe import ON_EDGE, Straight
 from pipeline.shapes.round import closed_ellipse, draw_ellipse, points_of_ellipse
 from pipeline.shapes.section import Problems, Words
 from pipeline.units import Length
@@ -119,6 +119,11 @@ class Ellipse(Straight):
     def outline(self) -> FloatArray:
         """Return the ellipse."""
         return closed_ellipse(self.axes, _ROUND)
+
+    def covers(self, points: FloatArray) -> BoolArray:
+        """Tell which points are within the ellipse."""
+        within: BoolArray = np.linalg.norm(points / np.array(self.axes), axis=1) <= 1 + ON_EDGE
+        return within
 
     def check(self, problems: Problems) -> None:
         """Find nothing: each key says what it takes."""

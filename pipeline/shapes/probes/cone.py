@@ -1,0 +1,42 @@
+"""A cone, sharp or rounded."""
+
+from typing import Annotated, Literal
+
+from pipeline.shapes.probes.round_indenter import RoundIndenter
+from pipeline.shapes.rounded import Rounded
+from pipeline.shapes.section import Problems, Words, in_mm
+from pipeline.units import Angle, Length, Rounding
+
+
+class Cone(RoundIndenter):
+    """A needle's tip: a cone, which may be rounded, on a shaft. Friction along the shaft is not computed."""
+
+    shape: Literal["cone"]
+    angle: Annotated[Angle, Words("Half angle to the axis: the larger, the blunter.", '"70 deg"', is_used=True)]
+    radius: Annotated[Length, Words("Radius of the shaft, where the cone ends.", '"3 mm"', is_used=True)]
+    tip: Annotated[Rounding, Words("Radius of the rounding at the tip; 0 is sharp.", '"0.2 mm"')] = 0.0
+
+    @property
+    def section(self) -> Rounded:
+        """A straight flank, rounded at the tip."""
+        return Rounded(self.angle, self.tip)
+
+    @property
+    def limit(self) -> float:
+        """Radius (m) of the shaft."""
+        return self.radius
+
+    def check(self, problems: Problems) -> None:
+        """Report a rounding that leaves no cone, and a cone that is pushed in as a whole."""
+        if self.section.tangent >= self.radius:
+            problems.error(
+                "probe.tip", in_mm(self.tip), f"leaves no cone: the rounding would reach {in_mm(self.section.tangent)} "
+                f"from the axis, and the shaft has radius {in_mm(self.radius)}; use a smaller tip, or a sphere",
+            )  # fmt: skip
+        elif self.section.reach(self.depth) >= self.radius:
+            problems.error(
+                "probe.depth", in_mm(self.depth), f"pushes the cone in up to its shaft of radius {in_mm(self.radius)}: "
+                "use a smaller depth, or a larger radius",
+            )  # fmt: skip
+        else:
+            super().check(problems)

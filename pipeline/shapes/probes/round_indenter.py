@@ -1,0 +1,52 @@
+"""What sphere and cone share: tools that are the same all round, of which no one knows how much will touch."""
+
+from abc import abstractmethod
+from math import pi
+
+from pipeline.shapes.arrays import BoolArray, FloatArray, np
+from pipeline.shapes.indenter import CANDIDATES, Indenter
+from pipeline.shapes.probe import ON_EDGE, Probe
+from pipeline.shapes.probes.disc import Disc
+
+
+class RoundIndenter(Indenter):
+    """An indenter that is the same all round its axis."""
+
+    @property
+    @abstractmethod
+    def limit(self) -> float:
+        """Radius (m) at which the tool ends."""
+
+    @property
+    def footprint(self) -> Probe:
+        """The disc that holds all that it may touch."""
+        radius = min(CANDIDATES * self.section.reach(self.depth), self.limit)
+        return Disc.model_construct(shape="disc", radius=radius, depth=self.depth, at=self.at, axis=self.axis)
+
+    @property
+    def contact_width(self) -> float:
+        """Radius (m) of contact on an elastic half-space."""
+        return min(self.section.contact_radius(self.depth), self.limit)
+
+    def profile(self, points: FloatArray) -> FloatArray:
+        """Return the heights (m) of the tool, infinite beyond where it ends."""
+        distance = np.hypot(points[:, 0], points[:, 1])
+        height = self.section.height(np.minimum(distance, self.limit))
+        return np.where(distance <= (1 + ON_EDGE) * self.limit, height, np.inf)
+
+    def ends_at(self, points: FloatArray) -> BoolArray:
+        """Tell that the tool ends at the footprint's edge if that is as large as the tool."""
+        return np.full(len(points), self.footprint.half_width >= (1 - ON_EDGE) * self.limit)
+
+    @property
+    def rim_size(self) -> tuple[float, float]:
+        """Length (m) and area (m²) of where contact is expected to end."""
+        inner, outer = self.edge_band
+        return pi * (inner + outer), pi * (outer**2 - inner**2)
+
+    def rim_distance(self, along: str, across: str, height: str, unit: float) -> str:
+        """Write the distance to the ring in which contact is expected to end, and to what it is pressed down from."""
+        inner, outer = (unit * radius for radius in self.edge_band)
+        radius = f"Sqrt({along}^2+{across}^2)"
+        aside = f"Max(Max({inner:.12g}-{radius},{radius}-{outer:.12g}),0)"
+        return f"Sqrt({aside}^2+Max(Fabs({height})-{unit * self.depth:.12g},0)^2)"

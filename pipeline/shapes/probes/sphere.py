@@ -1,0 +1,35 @@
+"""A sphere."""
+
+from typing import Annotated, Literal
+
+from pipeline.shapes.probes.round_indenter import RoundIndenter
+from pipeline.shapes.rounded import Rounded
+from pipeline.shapes.section import Problems, Words, in_mm
+from pipeline.units import Length
+
+
+class Sphere(RoundIndenter):
+    """A ball, such as the tip of a palpating probe."""
+
+    shape: Literal["sphere"]
+    radius: Annotated[Length, Words("Radius of the ball.", '"6 mm"', is_used=True)]
+
+    @property
+    def section(self) -> Rounded:
+        """A circle: it has no flank."""
+        return Rounded(0.0, self.radius)
+
+    @property
+    def limit(self) -> float:
+        """The radius (m): tissue does not reach round the equator."""
+        return self.radius
+
+    def check(self, problems: Problems) -> None:
+        """Report a ball that would be pushed in past its equator."""
+        if self.depth >= self.radius:
+            problems.error(
+                "probe.depth", in_mm(self.depth), f"must be less than the sphere's radius {in_mm(self.radius)}: past "
+                "its equator it does not press any more",
+            )  # fmt: skip
+            return
+        super().check(problems)

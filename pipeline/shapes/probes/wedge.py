@@ -1,0 +1,84 @@
+"""A wedge, sharp or rounded."""
+
+from typing import Annotated, Literal
+
+from pipeline.shapes.arrays import BoolArray, FloatArray, np
+from pipeline.shapes.indenter import CANDIDATES, Indenter
+from pipeline.shapes.probe import ON_EDGE, Probe
+from pipeline.shapes.probes.blade import Blade
+from pipeline.shapes.rounded import Rounded
+from pipeline.shapes.section import Problems, Words, in_mm
+from pipeline.units import Angle, Length, Rounding
+
+
+class Wedge(Indenter):
+    """The edge of a scalpel or a chisel: two flanks that meet in a line, which may be rounded; its ends are flat."""
+
+    shape: Literal["wedge"]
+    angle: Annotated[Angle, Words("Half angle to the axis: the larger, the blunter.", '"70 deg"', is_used=True)]
+    length: Annotated[Length, Words("Length of the edge.", '"6 mm"', is_used=True)]
+    tip: Annotated[Rounding, Words("Radius of the rounding along the edge; 0 is sharp.", '"0.2 mm"')] = 0.0
+    direction: Annotated[
+        tuple[float, float, float],
+        Words("Along which the edge lies, as far as it is normal to the probe's axis.", "[1.0, 0.0, 0.0]"),
+    ] = (1.0, 0.0, 0.0)
+
+    @property
+    def section(self) -> Rounded:
+        """A straight flank, rounded at the edge."""
+        return Rounded(self.angle, self.tip)
+
+    @property
+    def footprint(self) -> Probe:
+        """The rectangle, as long as the edge, that holds all that it may touch."""
+        width = 2 * CANDIDATES * self.section.reach(self.depth)
+        return Blade.model_construct(
+            shape="blade", length=self.length, width=width, direction=self.direction, depth=self.depth, at=self.at,
+            axis=self.axis,
+        )  # fmt: skip
+
+    @property
+    def contact_width(self) -> float:
+        """Half the width (m) of contact in the middle of the edge, on an elastic half-space."""
+        return self.section.contact_width(self.depth, self.length)
+
+    @property
+    def edge_band(self) -> tuple[float, float]:
+        """The least and the largest distance (m) from the edge at which contact is expected to end, off its ends."""
+        inner, _ = super().edge_band
+        return inner, min(1.3 * inner, self.section.reach(self.depth))
+
+    def profile(self, points: FloatArray) -> FloatArray:
+        """Return the heights (m) of the tool, infinite beyond its ends."""
+        height = self.section.height(np.abs(points[:, 1]))
+        return np.where(np.abs(points[:, 0]) <= (1 + ON_EDGE) * self.length / 2, height, np.inf)
+
+    def ends_at(self, points: FloatArray) -> BoolArray:
+        """Tell which points are at its two ends."""
+        at_end: BoolArray = np.abs(points[:, 0]) >= (1 - ON_EDGE) * self.length / 2
+        return at_end
+
+    @property
+    def rim_size(self) -> tuple[float, float]:
+        """Length (m) and area (m²) of where contact is expected to end: two strips, and the two ends."""
+        inner, outer = self.edge_band
+        return 2 * self.length + 4 * outer, 2 * self.length * (outer - inner)
+
+    def rim_distance(self, along: str, across: str, height: str, unit: float) -> str:
+        """Write the distance to the strips in which contact is expected to end, to its ends, and to the depth."""
+        inner, outer = (unit * width for width in self.edge_band)
+        beyond = f"(Fabs({along})-{unit * self.length / 2:.12g})"
+        aside = f"Max(Max({inner:.12g}-Fabs({across}),Fabs({across})-{outer:.12g}),0)"
+        to_strips = f"Sqrt({aside}^2+Max({beyond},0)^2)"
+        to_ends = f"Sqrt({beyond}^2+Max(Fabs({across})-{outer:.12g},0)^2)"
+        return f"Sqrt(Min({to_strips},{to_ends})^2+Max(Fabs({height})-{unit * self.depth:.12g},0)^2)"
+
+    def check(self, problems: Problems) -> None:
+        """Report a rounding wider than the edge is long."""
+        if self.section.tangent >= self.length / 2:
+            problems.error(
+                "probe.tip", in_mm(self.tip), f"is too large for an edge of {in_mm(self.length)}: the rounding would "
+                "be wider than the edge is long",
+            )  # fmt: skip
+            return
+        super().check(problems)

@@ -1,0 +1,132 @@
+"""Tools whose area of contact is found: their section, what they may touch, and what of them makes no sense."""
+
+from math import asin, cos, inf, log, pi, sqrt, tan
+
+import numpy as np
+import pytest
+
+from pipeline.plan.key import case_key, mesh_key
+from pipeline.plan.plan import make_plan
+from pipeline.shapes.rounded import Rounded
+from pipeline.study.problems import StudyError
+from tests.cases import study
+
+SPHERE = {"shape": "sphere", "radius": "3 mm", "depth": "0.1 mm", "contact": "unilateral"}
+CONE = {"shape": "cone", "angle": "80 deg", "radius": "3 mm", "depth": "0.1 mm", "contact": "unilateral"}
+WEDGE = {"shape": "wedge", "angle": "80 deg", "length": "6 mm", "depth": "0.1 mm", "contact": "unilateral"}
+TOOLS = {"sphere": SPHERE, "cone": CONE, "wedge": WEDGE}
+
+
+def test_a_section_is_smooth_where_its_rounding_ends():
+    section = Rounded(pi / 3, 2e-3)
+    near = section.tangent + np.array([-1e-9, 1e-9])
+    assert np.ptp(section.height(near)) < 3e-9
+    assert section.slope(near) == pytest.approx(1 / tan(pi / 3), rel=1e-5)
+    distance = np.linspace(1e-5, 5e-3, 40)
+    slopes = (section.height(distance + 1e-8) - section.height(distance - 1e-8)) / 2e-8
+    np.testing.assert_allclose(slopes, section.slope(distance), rtol=1e-6)
+    for depth in (1e-6, 1e-4, 2e-3):
+        assert section.height(np.array([section.reach(depth)]))[0] == pytest.approx(depth)
+
+
+def test_a_ball_ends_at_its_equator_and_is_a_paraboloid_at_its_pole():
+    ball = Rounded(0.0, 3e-3)
+    assert ball.height(np.array([0.0, 3e-6, 3e-3, 3.001e-3])) == pytest.approx([0, 1.5e-9, 3e-3, inf])
+    assert ball.reach(1e-3) == pytest.approx(sqrt(2 * 3e-3 * 1e-3 - 1e-6))
+    assert ball.reach(4e-3) == 3e-3
+
+
+def test_the_contact_on_a_half_space_is_that_of_closed_forms():
+    """I. N. Sneddon (1965): cone, ball, and the ball that a cone ends in."""
+    assert Rounded(pi / 3).contact_radius(1e-3) == pytest.approx(2 / pi * tan(pi / 3) * 1e-3)
+    a = Rounded(0.0, 3e-3).contact_radius(0.5e-3)
+    assert a / 2 * log((3e-3 + a) / (3e-3 - a)) == pytest.approx(0.5e-3)
+    rounded = Rounded(pi / 3, 1e-4)
+    a, b, radius = rounded.contact_radius(1e-3), rounded.tangent, 1e-4
+    ball = a * log((radius + a) / (sqrt(radius**2 - b**2) + sqrt(a**2 - b**2)))
+    assert ball + a / tan(pi / 3) * (pi / 2 - asin(b / a)) == pytest.approx(1e-3, rel=1e-3)
+    assert b == pytest.approx(radius * cos(pi / 3))
+
+
+def test_a_sharp_edge_touches_less_than_a_cone():
+    wedge = Rounded(pi / 3)
+    assert 0.2 < wedge.contact_width(1e-4, 6e-3) / wedge.reach(1e-4) < 0.64
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"contact": "bonded"}, ["probe.contact", "unilateral"]),
+        ({"contact": "frictionless"}, ["probe.contact", "is found"]),
+        ({"motion": "all"}, ["probe.motion", "bonded"]),
+        ({"action": "cut"}, ["probe.action"]),
+        ({"at": ["19.9 mm", "0 mm"]}, ["probe.at", "may touch", "top"]),
+    ],
+    ids=str,
+)
+def test_what_such_a_tool_cannot_do_is_refused(tool, change, words):
+    with pytest.raises(StudyError) as refused:
+        study(probe=TOOLS[tool] | change)
+    assert all(word in str(refused.value) for word in words)
+
+
+@pytest.mark.parametrize(
+    ("probe", "words"),
+    [
+        *((tool | {"angle": angle}, ["probe.angle", "60 deg"])
+          for tool in (CONE, WEDGE) for angle in ("0 deg", "90 deg", "120 deg", "-10 deg", 60, "3 mm")),
+        (CONE | {"angle": "10 deg", "radius": "0.4 mm", "tip": "0.5 mm"}, ["probe.tip", "leaves no cone"]),
+        (CONE | {"radius": "50 mm", "tip": "40 mm", "angle": "70 deg", "depth": "9 mm"}, ["probe.at", "may touch"]),
+        (CONE | {"depth": "0.6 mm"}, ["probe.depth", "shaft"]),
+        (SPHERE | {"depth": "3 mm"}, ["probe.depth", "radius 3 mm"]),
+        (SPHERE | {"radius": "400 mm", "depth": "1 mm"}, ["probe.at", "may touch"]),
+        (WEDGE | {"tip": "30 mm"}, ["probe.tip", "wider"]),
+        ({"shape": "disc", "radius": "2 mm", "depth": "1 mm", "contact": "unilateral", "axis": [0.5, 0.0, -1.0]},
+         ["probe.at", "beside its axis"]),
+        ({"shape": "blade", "action": "cut", "length": "4 mm", "width": "1 mm", "depth": "0.1 mm",
+          "contact": "unilateral"}, ["probe.contact", "lift off"]),
+    ],
+    ids=str,
+)  # fmt: skip
+def test_tools_that_make_no_sense_are_refused(probe, words):
+    with pytest.raises(StudyError) as refused:
+        study(probe=probe)
+    assert all(word in str(refused.value) for word in words), str(refused.value)
+
+
+def test_straight_elements_are_refused():
+    with pytest.raises(StudyError, match="unilateral"):
+        study(probe=SPHERE, mesh={"degree": 1})
+
+
+@pytest.mark.parametrize(("probe", "warned"), [(SPHERE, False), (SPHERE | {"depth": "1 mm"}, True), (CONE, False),
+                                               (CONE | {"angle": "60 deg"}, True)], ids=str)  # fmt: skip
+def test_steep_tools_are_warned_of(probe, warned):
+    assert any("slope" in warning for warning in study(probe=probe).warnings) == warned
+
+
+@pytest.mark.parametrize("tool", [*TOOLS, "disc"])
+def test_f_is_proportional_to_stress_alone(tool):
+    """Each depth is a record of its own, each modulus is not; no basis is made of Poisson's ratios, and it says why."""
+    probe = TOOLS.get(tool, {"shape": "disc", "radius": "2 mm", "depth": "0.1 mm", "contact": "unilateral"})
+    ratios = [round(0.30 + 0.01 * n, 2) for n in range(9)]
+    materials = {"young": ["10 kPa", "20 kPa"], "poisson": ratios}
+    found = study(probe=probe | {"depth": ["0.1 mm", "0.2 mm"]}, material=materials)
+    plan = make_plan(found)
+    assert len(set(plan.keys)) == 2 * len(ratios)
+    assert not any(solve.reduced for solve in plan.solves)
+    reasons = {struck.name: struck.reason for struck in plan.struck}
+    assert "unless contact is unilateral" in reasons["scaling"]
+    assert "area of contact changes" in reasons["reduced"]
+    shallow, deep = (found.case((0, 0, depth)) for depth in (0, 1))
+    assert shallow.proportional_to == ("young",)
+    assert case_key(shallow, scaled=True) != case_key(deep, scaled=True)
+    # What a flat tool may touch is its face; another depth of a ball has small elements elsewhere.
+    assert (mesh_key(shallow) == mesh_key(deep)) == (tool == "disc")
+
+
+def test_contact_of_a_flat_tool_is_on_the_mesh_of_any_other():
+    disc = {"shape": "disc", "radius": "2 mm", "depth": "0.1 mm"}
+    keys = {mesh_key(*study(probe=disc | {"contact": c}).cases()) for c in ("bonded", "frictionless", "unilateral")}
+    assert len(keys) == 1
