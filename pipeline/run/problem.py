@@ -1,8 +1,11 @@
 """What solves a case on its mesh, if the memory is there for it."""
 
+from pipeline.arrays import FloatArray
 from pipeline.plan.symmetry import mirror_planes, model_planes
 from pipeline.run.memory import FreeMemory
 from pipeline.solve.conditions import Conditions
+from pipeline.solve.contact.problem import DEGREE, ContactProblem, Tool
+from pipeline.solve.contact.sets import ContactError
 from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads
@@ -24,20 +27,30 @@ class CaseFailure(Exception):
 
 def problem_of(spaces: Spaces, case: Case, *, shared: bool, reuse: bool = False) -> FieldProblem:
     """Return what solves ``case`` in the spaces of its mesh, by the elements that suit it; collective."""
+    if case.probe.is_unilateral:
+        if case.mesh.degree != DEGREE:
+            raise CaseFailure(f"unilateral contact is found by elements of degree {DEGREE}, not {case.mesh.degree}")
+        return ContactProblem(spaces, tool_of(case), case.element)
     if case.element == "mixed":
         return MixedProblem(spaces, case.mesh.degree, conditions_of(case))
     return DisplacementProblem(spaces, case.mesh.degree, conditions_of(case), shared=shared, reuse=reuse)
 
 
 def conditions_of(case: Case) -> Conditions:
-    """Return what the probe of ``case`` prescribes.
+    """Return what the probe of ``case`` prescribes."""
+    return Conditions(bonded=case.probe.contact == "bonded", unilateral=case.probe.is_unilateral)
 
-    Raises:
-        CaseFailure: if that is not known beforehand.
-    """
-    if case.probe.is_unilateral:
-        raise CaseFailure("unilateral contact is not solved yet in three dimensions")
-    return Conditions(bonded=case.probe.contact == "bonded")
+
+def tool_of(case: Case) -> Tool:
+    """Return the surface of the probe of ``case``, on the mesh that is turned so that it presses along -z."""
+    probe, frame = case.probe, case.frame.upright
+
+    def height(points: FloatArray) -> FloatArray:
+        local = frame.local(points)
+        # All of a flat tool's footprint is below its face, whatever rounding has made of the nodes on the edge.
+        return (0.0 if probe.has_singular_edge else probe.profile(local[:, :2])) - local[:, 2]
+
+    return Tool(probe.depth, height, lambda points: probe.ends_at(frame.local(points)[:, :2]))
 
 
 def loads_of(case: Case) -> Loads:
@@ -62,6 +75,8 @@ def solve_problem(case: Case, problem: Problem, *, estimate: bool) -> Solution:
     method, tolerance = case.solve.method, case.solve.tolerance
     try:
         return problem.solve(law, loads, method=method, tolerance=tolerance, estimate=estimate)
+    except ContactError:
+        raise
     except SolveError:
         if method != "auto" or not 0 < problem.dofs <= _MOST_DIRECT:
             raise

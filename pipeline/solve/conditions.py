@@ -22,14 +22,18 @@ from pipeline.stages import stage
 class Conditions:
     """What is prescribed, whatever its value: on the footprint all components (``bonded``) or that along z alone.
 
-    The support is held, and on planes of symmetry that bound the mesh so is the displacement across them.
+    Nothing is where contact is ``unilateral``: what touches is found, and held by those who find it. The support is
+    held, and on planes of symmetry that bound the mesh so is the displacement across them.
     """
 
     bonded: bool = True
+    unilateral: bool = False
 
     @property
     def components(self) -> tuple[int, ...]:
         """Components of the displacement that the probe prescribes."""
+        if self.unilateral:
+            return ()
         return (0, 1, 2) if self.bonded else (2,)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline import compat
-from pipeline.solve.single.cycle import SingleCycle, SmoothedLevel, SymmetricProduct, interpolation, suits
+from pipeline.solve.single.cycle import SingleCycle, SmoothedLevel, SymmetricProduct, interpolation, masks, suits
 from pipeline.solve.transfer import transfer
 from pipeline.stages import stage
 
@@ -36,6 +36,7 @@ _BOOMERAMG = {
 }  # fmt: skip
 
 _prefixes = itertools.count()
+_NONE = np.empty(0, dtype=np.int32)
 
 
 class SolveError(Exception):
@@ -46,7 +47,8 @@ class SolveError(Exception):
 class Level:
     """One level of a hierarchy: its space, its operator and the local dofs (unrolled) that are prescribed.
 
-    ``jumps`` says that the material does, from one region to the next.
+    ``jumps`` says that the material does, from one region to the next. ``held`` are those of the prescribed dofs that
+    the operator knows nothing of: cycles in single precision alone can take them into account.
     """
 
     space: Any
@@ -59,6 +61,7 @@ class Level:
         return compat.degree(self.space)
 
     jumps: bool = False
+    held: np.ndarray | None = None
 
 
 def is_direct(method: str, dofs: int, degree: int) -> bool:
@@ -111,16 +114,21 @@ class LinearSolver:
         self.setup_seconds = time.perf_counter() - start
 
     @stage("iterations")
-    def solve(self, rhs: PETSc.Vec, solution: PETSc.Vec, tolerance: float | None = None) -> int:
+    def solve(
+        self, rhs: PETSc.Vec, solution: PETSc.Vec, tolerance: float | None = None, target: float | None = None
+    ) -> int:
         """Improve ``solution`` and return the iterations; collective. A direct solve does not look at what it holds.
 
-        ``tolerance`` is another one than the solver was made with.
+        ``tolerance`` is another one than the solver was made with; a ``target`` is for the energy norm of the error
+        itself, not relative to anything.
 
         Raises:
             SolveError: if PETSc reports anything but convergence.
         """
         if tolerance is not None:
             self.ksp.setTolerances(rtol=tolerance)
+        if target is not None:
+            self.ksp.setTolerances(rtol=0.0, atol=target)
         try:
             self.ksp.setInitialGuessNonzero(self.ksp.getType() != "preonly")
             self.ksp.solve(rhs, solution)
@@ -132,6 +140,28 @@ class LinearSolver:
                 f"the linear solver did not converge: {reason_name(reason)} after {self.ksp.its} iterations"
             )
         return self.ksp.its
+
+    @property
+    def can_hold(self) -> bool:
+        """Whether it may serve on with other dofs held."""
+        return self._is_single
+
+    @stage("set-up")
+    def hold(self, levels: list[Level]) -> None:
+        """Hold other dofs from now on: those of ``levels``, whose operators are the same but for degree 1; collective.
+
+        Raises:
+            SolveError: if PETSc fails.
+        """
+        start = time.perf_counter()
+        self._levels = levels
+        try:
+            self._hold(self._coarse())
+        except PETSc.Error as error:
+            raise SolveError(explain(error)) from error
+        finally:
+            self._clear_options()
+        self.setup_seconds += time.perf_counter() - start
 
     @property
     def levels(self) -> list[Level]:
@@ -198,16 +228,28 @@ class LinearSolver:
         return self._own(product)
 
     def _single_precision(self, pc: PETSc.PC) -> None:
+        levels, coarse = self._levels, self._coarse()
+        smoothed = [SmoothedLevel(level.matrix, jumps=level.jumps) for level in levels[1:]]
+        self._cycle = SingleCycle(smoothed, list(map(interpolation, levels, levels[1:])), coarse)
+        if any(level.held is not None for level in levels):
+            self._hold(coarse)
+        pc.setType("python")
+        pc.setPythonContext(self._cycle)
+
+    def _coarse(self) -> PETSc.PC:
+        """Return the solver of degree 1."""
         prefix = self._prefix + "mg_coarse_"
-        coarse = self._own(PETSc.PC().create(pc.comm))
+        coarse = self._own(PETSc.PC().create(self.ksp.comm))
         coarse.setOptionsPrefix(prefix)
         coarse.setOperators(self._levels[0].matrix)
         self._algebraic(coarse, prefix)
         coarse.setFromOptions()
         coarse.setUp()
-        smoothed = [SmoothedLevel(level.matrix, jumps=level.jumps) for level in self._levels[1:]]
-        pc.setType("python")
-        pc.setPythonContext(SingleCycle(smoothed, list(map(interpolation, self._levels, self._levels[1:])), coarse))
+        return coarse
+
+    def _hold(self, coarse: PETSc.PC) -> None:
+        held = [_NONE if level.held is None else level.held for level in self._levels[1:]]
+        self._cycle.hold(held, list(map(masks, self._levels, self._levels[1:])), coarse)
 
     def _double_precision(self, pc: PETSc.PC) -> None:
         levels = self._levels

@@ -81,10 +81,13 @@ class SaddleSolver:
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
-    def solve(self, c: Weight, rhs: Sequence[Pair], unknowns: Sequence[Pair], tolerance: float) -> int:
+    def solve(
+        self, c: Weight, rhs: Sequence[Pair], unknowns: Sequence[Pair], tolerance: float, target: float | None = None
+    ) -> int:
         """Improve each of ``unknowns``, (u, p), until the energy norm of its error has fallen by ``tolerance``.
 
-        Returns the iterations of all; collective. A direct solve is exact and does not look at what they hold.
+        A ``target`` is for that norm itself, and not relative to anything. Returns the iterations of all; collective.
+        A direct solve is exact and does not look at what they hold.
 
         Raises:
             SolveError: if PETSc reports anything but convergence.
@@ -95,7 +98,8 @@ class SaddleSolver:
                 matrix = self._matrix(c, stack)
                 b, x = (_keep(stack, vector) for vector in matrix.createVecs())
                 block = None if self._direct else self._preconditioner(c, stack)
-                solver = self._factors(matrix, stack) if block is None else _iteration(matrix, block, tolerance, stack)
+                aim = tolerance, target
+                solver = self._factors(matrix, stack) if block is None else _iteration(matrix, block, aim, stack)
                 for load, unknown in zip(rhs, unknowns, strict=True):
                     split = load[0].getLocalSize()
                     for whole, (first, second) in ((b, load), (x, unknown)):
@@ -191,10 +195,10 @@ class _BlockTriangular:
 
 
 class _EnergyTest:
-    """Stops GCR when the energy of the error has fallen to the square of the tolerance."""
+    """Stops GCR when the energy of the error has fallen to the square of the tolerance, or of the target if any."""
 
-    def __init__(self, block: _BlockTriangular, tolerance: float):
-        self._block, self._share = block, tolerance**2
+    def __init__(self, block: _BlockTriangular, tolerance: float, target: float | None):
+        self._block, self._share, self._target = block, tolerance**2, target
         self._previous = 0.0
 
     def __call__(self, ksp: PETSc.KSP, iteration: int, norm: float) -> int:
@@ -209,12 +213,15 @@ class _EnergyTest:
         if iteration == 1:
             self._block.first_energy = self._block.energy
         # The preconditioner has seen the residual of one iteration ago; what was gained since, the plain norm tells.
-        if self._block.energy * (norm / previous) ** 2 <= self._share * self._block.first_energy:
+        enough = self._share * self._block.first_energy if self._target is None else self._target**2
+        if self._block.energy * (norm / previous) ** 2 <= enough:
             return int(reasons.CONVERGED_RTOL)
         return int(reasons.DIVERGED_MAX_IT) if iteration >= _MOST_ITERATIONS else 0
 
 
-def _iteration(matrix: PETSc.Mat, block: _BlockTriangular, tolerance: float, stack: ExitStack) -> PETSc.KSP:
+def _iteration(
+    matrix: PETSc.Mat, block: _BlockTriangular, aim: tuple[float, float | None], stack: ExitStack
+) -> PETSc.KSP:
     ksp = _krylov(matrix, stack)
     ksp.setType("gcr")
     with _options(ksp, {"ksp_gcr_restart": _RESTART}):
@@ -223,7 +230,7 @@ def _iteration(matrix: PETSc.Mat, block: _BlockTriangular, tolerance: float, sta
     ksp.pc.setType("python")
     ksp.pc.setPythonContext(block)
     ksp.setTolerances(max_it=_MOST_ITERATIONS)
-    ksp.setConvergenceTest(_EnergyTest(block, tolerance))
+    ksp.setConvergenceTest(_EnergyTest(block, *aim))
     ksp.setUp()
     return ksp
 

@@ -42,7 +42,8 @@ class Solution:
     whole body, ``iterations`` the sum over the motions. ``decrements`` (n, n) is what one degree more takes away from
     the probe's stiffness, and ``bars`` (n, n) the 95 % error bars on its entries, made with ``plain``, the share of
     edges at the rim without quarter points (see :mod:`pipeline.solve.error`). Of unilateral contact, ``contact_area``
-    (m²) and ``contact_radius`` (m) are those found, and ``iterations`` the linear solves that it took.
+    (m²) and ``contact_radius`` (m) are those found, ``iterations`` the linear solves that it took, and ``stored`` (J)
+    is its strain energy, which is not half of F d.
     """
 
     response: Response
@@ -61,6 +62,7 @@ class Solution:
     time_estimate: float = 0.0
     contact_area: float = nan
     contact_radius: float = nan
+    stored: float | None = None
 
     @property
     def reaction(self) -> Vector:
@@ -70,7 +72,7 @@ class Solution:
     @property
     def energy(self) -> float:
         """Strain energy (J)."""
-        return self.response.energy
+        return self.response.energy if self.stored is None else self.stored
 
     @property
     def balance(self) -> float:
@@ -116,7 +118,7 @@ class Solution:
 
         ``elsewhere`` tells that the probe's edge may not be all that F errs by.
         """
-        if self.decrements is None or self.bars is None:
+        if self.decrements is None or self.bars is None or self.stored is not None:
             return self
         stiffness, bars = extrapolate(
             self.stiffness, self.decrements, self.bars, degree, element, plain=self.plain, graded=graded,

@@ -30,6 +30,7 @@ _LOCKING = {1: (0.45, 0.45), 2: (0.49, 0.495), 3: (0.49, 0.495)}
 # Mixed elements keep λ = μ, which is ν = 0.25, with the displacement and give the rest to the pressure.
 _LEAST_MIXED = 0.25
 _MANY = 10_000  # places of a large study
+_FINDS_CONTACT = 2  # the degree of elements that find where a tool touches
 # A footprint this near the edge, in units of the body, touches it: the rest is rounding.
 _TOUCHING = 1e-9
 # A place this far off the surface, in units of the body, is not projected to it: it is a slip of sign or unit.
@@ -235,14 +236,14 @@ def _check_outside(body: Body, mesh: Mesh, problems: Problems) -> None:
 
 
 def _check_straight(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
-    """Refuse what straight elements cannot follow: no error bar tells how much tissue they leave out."""
+    """Refuse what elements of a degree cannot follow: no error bar tells how much tissue straight ones leave out."""
+    if probe.is_unilateral and mesh.degree != _FINDS_CONTACT:
+        problems.error(
+            "mesh.degree", mesh.degree, f"must be {_FINDS_CONTACT} where contact is unilateral: its edge falls between "
+            "elements of degree 1, and on those of degree 3 forces at nodes do not tell pressure from tension",
+        )  # fmt: skip
     if mesh.degree > 1:
         return
-    if probe.is_unilateral:
-        problems.error(
-            "mesh.degree", mesh.degree, "is too low for unilateral contact, whose edge falls between elements: use 2 "
-            "or 3",
-        )  # fmt: skip
     if body.inclusion:
         problems.error("mesh.degree", mesh.degree, "is too low for inclusions, which straight elements cut: use 2 or 3")
     elif not is_flat(body, probe, probe.frame_on(body)):

@@ -5,7 +5,7 @@ the time to read its matrices: in single precision, and of a symmetric matrix th
 quarter as long. The residual is brought to magnitude 1 first, so that nothing runs out of the exponents of a float.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -97,8 +97,12 @@ class Interpolation:
 def interpolation(coarse: Side, fine: Side) -> Interpolation:
     """Return the interpolation between two spaces of one process."""
     offsets, points, weights = point_weights(coarse.space, fine.space)
-    masks = (free(side).astype(np.float32) for side in (coarse, fine))
-    return Interpolation(offsets.astype(np.int32), points, weights.astype(np.float32), *masks)
+    return Interpolation(offsets.astype(np.int32), points, weights.astype(np.float32), *masks(coarse, fine))
+
+
+def masks(coarse: Side, fine: Side) -> tuple[Single, Single]:
+    """Return 0 for each number of the two spaces that is prescribed, else 1."""
+    return free(coarse).astype(np.float32), free(fine).astype(np.float32)
 
 
 class SmoothedLevel:
@@ -121,9 +125,27 @@ class SmoothedLevel:
         self._inverse = np.empty((rows, 9), dtype=np.float32)
         if library()("invert_diagonal", rows, self._offsets, self._values, self._inverse):
             raise ArithmeticError("the operator is not positive definite")
-        self.size = 3 * rows
+        self.size, self._held = 3 * rows, np.empty(0, dtype=np.int32)
         self._product, self._direction, self.scratch = (np.zeros(self.size, dtype=np.float32) for _ in range(3))
         self._most = _RAISED * self._largest_eigenvalue(_LANCZOS_JUMPS if jumps else _LANCZOS)
+
+    def hold(self, dofs: Int32Array) -> None:
+        """Let the smoother alone hold ``dofs`` from now on, which the matrix knows nothing of, and no others.
+
+        Where it neither reads nor writes, it smooths for the matrix without those rows and columns.
+        """
+        self._invert(np.unique(self._held // 3), np.zeros(0, dtype=np.int32))
+        self._held = dofs
+        self._invert(np.unique(dofs // 3), dofs)
+
+    def _invert(self, rows: Int32Array, held: Int32Array) -> None:
+        """Invert blocks of the diagonal without the rows and columns of ``held`` dofs, where the inverse is nought."""
+        free = np.ones((len(rows), 3), dtype=bool)
+        free[np.searchsorted(rows, held // 3), held % 3] = False
+        both = free[:, :, None] & free[:, None, :]
+        blocks = self._values[self._offsets[rows]].reshape(-1, 3, 3).astype(np.float64)
+        inverse = np.linalg.inv(np.where(both, blocks, np.eye(3)))
+        self._inverse[rows] = np.where(both, inverse, 0.0).reshape(-1, 9)
 
     def subtract_product(self, x: Single, r: Single) -> None:
         """Take A x away from ``r``."""
@@ -200,6 +222,16 @@ class SingleCycle:
         sizes = [bottom.getLocalSize()[0], *(level.size for level in levels)]
         self._x, self._r = ([np.zeros(size, dtype=np.float32) for size in sizes] for _ in range(2))
         self._bottom = bottom.createVecs()
+
+    def hold(self, held: list[Int32Array], masks: list[tuple[Single, Single]], coarse: PETSc.PC) -> None:
+        """Hold other dofs of each level than the operators say, with the masks of each interpolation."""
+        for level, dofs in zip(self._levels, held, strict=True):
+            level.hold(dofs)
+        self._interpolations = [
+            replace(between, coarse_free=below, fine_free=above)
+            for between, (below, above) in zip(self._interpolations, masks, strict=True)
+        ]
+        self._coarse = coarse
 
     def apply(self, _: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Write one cycle's correction for ``residual`` into ``result``."""

@@ -1,0 +1,123 @@
+"""Displacement elements whose nodes below the probe are held where they touch it."""
+
+import time
+from contextlib import ExitStack
+
+import numpy as np
+
+from pipeline.arrays import BoolArray, FloatArray, Int32Array
+from pipeline.solve.contact.levels import CONDITIONS, Hierarchy
+from pipeline.solve.contact.sets import State
+from pipeline.solve.contact.surface import Candidates, Numbering
+from pipeline.solve.linear import Level, LinearSolver, is_direct
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.spaces import ElasticSpace, Spaces
+from pipeline.solve.vectors import vector
+
+
+class DisplacementElements:
+    """Displacements of degree 1 or 2, with one operator for every set.
+
+    What they make is freed with the stack.
+    """
+
+    def __init__(
+        self, spaces: Spaces, degree: int, law: MaterialLaw, candidates: Candidates, method: str, stack: ExitStack
+    ):
+        """Assemble; collective.
+
+        Raises:
+            SolveError: if candidates and support share a point.
+        """
+        self.space: ElasticSpace = spaces.get(degree, CONDITIONS)
+        self._spaces, self._law, self._candidates = spaces, law, candidates
+        self._direct = is_direct(method, self.space.dofs.dofs, degree)
+        self.hierarchy = Hierarchy(spaces, degree, law, candidates, stack, direct=self._direct)
+        self.nodes = candidates.corners >= 0 if degree == 1 else np.ones(len(candidates), dtype=bool)
+        self.numbering: Numbering = self.hierarchy.numbering
+        self.displacement = stack.enter_context(vector(self.space.dofs.space))
+        self._held: Int32Array = np.empty(0, dtype=np.int32)
+        self._solver: LinearSolver | None = None
+        self.setup_seconds = 0.0
+        stack.callback(self.close)
+
+    @property
+    def assembly_seconds(self) -> float:
+        """What one assembly of all levels takes."""
+        return self.hierarchy.seconds
+
+    def close(self) -> None:
+        """Free the solver."""
+        if self._solver is not None:
+            self._solver.close()
+            self._solver = None
+
+    def hold(self, active: BoolArray) -> None:
+        """Hold the ``active`` candidates (n) from now on; collective.
+
+        Raises:
+            SolveError: if the solver cannot be set up.
+        """
+        self._active, self._held = active, self.numbering.normal_dofs(active, owned=True)
+        start = time.perf_counter()
+        levels = self.hierarchy.hold(active)
+        if self._solver is not None and self._solver.can_hold:
+            self._solver.hold(levels)
+        else:
+            self.close()
+            self._solver = LinearSolver(levels, direct=self._direct, tolerance=_ANY)
+        self.setup_seconds += time.perf_counter() - start
+
+    def improve(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
+        """Move what is held to ``bounds`` (n, m), and then the rest; return the iterations: see ``Elements``.
+
+        Raises:
+            SolveError: if the solver does not converge.
+        """
+        assert self._solver is not None
+        space = self.space.dofs
+        self.numbering.put(self.displacement.array, bounds, self._active)
+        with vector(space.space) as residual, vector(space.space) as correction:
+            self.hierarchy.finest.mult(self.displacement, residual)
+            residual.scale(-1.0)
+            residual.array[space.prescribed_owned] = 0.0
+            residual.array[self._held] = 0.0
+            target = None if energy is None else tolerance * energy**0.5
+            iterations = self._solver.solve(residual, correction, tolerance, target)
+            self.displacement.axpy(1.0, correction)
+        return iterations
+
+    def state(self) -> State:
+        """Return what the candidates do; collective."""
+        with vector(self.space.dofs.space) as forces:
+            self.hierarchy.finest.mult(self.displacement, forces)
+            energy = float(self.displacement.dot(forces))
+            gather = self.numbering.gather
+            return State(gather(self.displacement.array), gather(forces.array), energy)
+
+    def held_levels(self, facets: Int32Array, stack: ExitStack) -> list[Level]:
+        """Return the levels of multigrid with the local ``facets`` held, in the place of any set; collective."""
+        self.close()
+        if self._direct:
+            hierarchy = Hierarchy(self._spaces, self.space.degree, self._law, self._candidates, stack, direct=False)
+            return hierarchy.hold_facets(facets)
+        return self.hierarchy.hold_facets(facets)
+
+    def show(self) -> None:
+        """Make the displacement that of the space's forms; collective."""
+        self.space.set_displacement(self.displacement)
+
+    def residual(self) -> FloatArray:
+        """Return K u (N) with the unmodified operator, owned dofs, for the forms' displacement; collective."""
+        with vector(self.space.dofs.space) as forces:
+            self.space.apply(forces, self._law)
+            return np.array(forces.array)
+
+    def start_from(self, coarse: ElasticSpace) -> None:
+        """Take over the displacement of the forms of another space; collective."""
+        self.space.forms.displacement.interpolate(coarse.forms.displacement)
+        self.displacement.array[:] = self.space.forms.displacement.x.array[: self.space.dofs.owned]
+
+
+# The solver is made for any tolerance: each solve has its own.
+_ANY = 0.5

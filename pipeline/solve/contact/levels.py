@@ -1,0 +1,113 @@
+"""Operators of multigrid with candidates held along the probe's axis, other ones for each contact set."""
+
+from contextlib import ExitStack
+
+import numpy as np
+from dolfinx import fem
+from petsc4py import PETSc
+
+from pipeline.arrays import BoolArray, Int32Array
+from pipeline.solve.conditions import Conditions
+from pipeline.solve.contact.surface import Candidates, Numbering
+from pipeline.solve.linear import Level
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.single.cycle import suits
+from pipeline.solve.spaces import ElasticSpace, Spaces
+
+# What is held is the contact set's alone; of the footprint as such nothing is.
+CONDITIONS = Conditions(bonded=False, unilateral=True)
+_SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
+
+
+class Hierarchy:
+    """The operators of degrees 1 … p, or of p alone for a direct solve; on lower levels the set is what most say.
+
+    Where cycles in single precision serve, what is held changes their smoothers alone: but for degree 1, operators
+    are never changed. ``masks`` says that their user can do with that.
+    """
+
+    def __init__(
+        self, spaces: Spaces, degree: int, law: MaterialLaw, candidates: Candidates, stack: ExitStack, *, direct: bool,
+        masks: bool = True,
+    ):  # fmt: skip
+        """Assemble; collective. What is made is given back with the ``stack``."""
+        self._candidates = candidates
+        degrees = [degree] if direct else range(1, degree + 1)
+        found = [spaces.get(d, CONDITIONS) for d in degrees]
+        matrices = [stack.enter_context(s.operators.lend(law, blocked=s.degree > 1 and not direct)) for s in found]
+        is_masked = masks and not direct and suits([matrix for matrix, _ in matrices])
+        self.seconds = sum(seconds for _, seconds in matrices)
+        self._operators = [
+            HeldOperator(space, matrix, law, stack, masked=is_masked and space.degree > 1)
+            for space, (matrix, _) in zip(found, matrices, strict=True)
+        ]
+        self._numberings = [Numbering(s.dofs.space, candidates.numbers(s.degree)) for s in found]
+
+    @property
+    def finest(self) -> PETSc.Mat:
+        """The operator without a contact set."""
+        return self._operators[-1].free
+
+    @property
+    def numbering(self) -> Numbering:
+        """Where the candidates are in the finest space."""
+        return self._numberings[-1]
+
+    def hold(self, active: BoolArray) -> list[Level]:
+        """Return the levels with the ``active`` candidates (n) held, good until the next call; collective."""
+        sets = [self._candidates.majority(active)] * (len(self._operators) - 1) + [active]
+        return [
+            operator.hold(numbering.normal_dofs(chosen))
+            for operator, numbering, chosen in zip(self._operators, self._numberings, sets, strict=True)
+        ]
+
+    def hold_facets(self, facets: Int32Array) -> list[Level]:
+        """Return the levels with all of the local ``facets`` held, good until the next call; collective."""
+        return [operator.hold(normal_dofs(operator.space, facets)) for operator in self._operators]
+
+
+class HeldOperator:
+    """The operator of one space, of which more dofs are held than its conditions say, and others each time.
+
+    ``free`` has the conditions of the space alone. ``masked`` leaves the holding to who smooths.
+    """
+
+    def __init__(self, space: ElasticSpace, matrix: PETSc.Mat, law: MaterialLaw, stack: ExitStack, *, masked: bool):
+        """Take over a ``matrix``, which is changed; collective. What is made is freed with the ``stack``."""
+        self.space, self._matrix, self._law, self._is_masked = space, matrix, law, masked
+        self.free, self._is_held = matrix, False
+        if not masked:
+            # A matrix of PETSc multiplies faster than its copy: the copy is what others are made from.
+            self.free = matrix.copy()
+            stack.callback(self.free.destroy)
+
+    def hold(self, dofs: Int32Array) -> Level:
+        """Return the level in which the local ``dofs`` (unrolled, owned and ghosts), too, are held; collective.
+
+        It is good until the next call.
+        """
+        if self._is_masked:
+            return mask(self.space, self._matrix, self._law, dofs)
+        if self._is_held:
+            self.free.copy(self._matrix, structure=_SAME)
+        self._is_held = True
+        return hold(self.space, self._matrix, self._law, dofs)
+
+
+def mask(space: ElasticSpace, matrix: PETSc.Mat, law: MaterialLaw, dofs: Int32Array) -> Level:
+    """Return the level of a ``matrix`` of one process that stays as it is; ``dofs`` (unrolled) are held by its user."""
+    return Level(space.dofs.space, matrix, np.union1d(space.dofs.prescribed, dofs), not law.is_uniform, dofs)
+
+
+def hold(space: ElasticSpace, matrix: PETSc.Mat, law: MaterialLaw, dofs: Int32Array) -> Level:
+    """Return the level of a ``matrix`` after zeroing rows and columns of ``dofs`` (local, unrolled); collective."""
+    first, _ = matrix.getOwnershipRange()
+    matrix.zeroRowsColumns((first + dofs[dofs < space.dofs.owned]).astype(PETSc.IntType), diag=law.lame_mu[0])
+    return Level(space.dofs.space, matrix, np.union1d(space.dofs.prescribed, dofs), not law.is_uniform)
+
+
+def normal_dofs(space: ElasticSpace, facets: Int32Array) -> Int32Array:
+    """Return the local dofs (unrolled, owned and ghosts) along z in the local ``facets``; collective."""
+    dofs = space.dofs
+    found = fem.locate_dofs_topological(dofs.space, dofs.body.mesh.topology.dim - 1, facets)
+    return np.asarray(3 * found + 2, dtype=np.int32)

@@ -1,0 +1,174 @@
+"""Taylor–Hood elements whose nodes below the probe are held where they touch it: up to ν = ½.
+
+Equations and solver are those of :mod:`pipeline.solve.mixed`; reactions are those of K₀ u + Bᵀ p.
+"""
+
+import time
+from contextlib import ExitStack
+
+import numpy as np
+from petsc4py import PETSc
+
+from pipeline.arrays import BoolArray, FloatArray, Int32Array
+from pipeline.solve.contact.levels import CONDITIONS, Hierarchy, normal_dofs
+from pipeline.solve.contact.sets import State
+from pipeline.solve.contact.surface import Candidates
+from pipeline.solve.linear import Level
+from pipeline.solve.material import MaterialLaw, SplitLaw
+from pipeline.solve.mixed import DIRECT_LIMIT
+from pipeline.solve.mixed_space import MixedSpace
+from pipeline.solve.saddle import Pair, Saddle, SaddleSolver
+from pipeline.solve.spaces import ElasticSpace, Spaces
+
+
+class MixedElements:
+    """Displacements of degree 2 or 3 and pressures of one less, with one operator for every set.
+
+    What they make is freed with the stack. Moduli are in the law's unit, energies and forces in J and N.
+    """
+
+    def __init__(
+        self, spaces: Spaces, degree: int, law: MaterialLaw, candidates: Candidates, method: str, stack: ExitStack
+    ):
+        """Assemble; collective.
+
+        Raises:
+            SolveError: if candidates and support share a point.
+        """
+        self.space: ElasticSpace = spaces.get(degree, CONDITIONS)
+        self.mixed = MixedSpace(spaces.body, self.space)
+        stack.callback(self.mixed.close)
+        self._split = SplitLaw.of(law)
+        self._direct = method == "direct" or (method == "auto" and self.mixed.dofs <= DIRECT_LIMIT)
+        # The residual of held displacements must vanish: it is part of the norm that is made small.
+        self.hierarchy = Hierarchy(
+            spaces, degree, self._split.elastic, candidates, stack, direct=self._direct, masks=False
+        )
+        self.nodes = np.ones(len(candidates), dtype=bool)
+        self.numbering = self.hierarchy.numbering
+        self.unknown: Pair = stack.enter_context(self.mixed.pair())
+        self.compliance = self.mixed.by_region(self._split.compliance)
+        self._held: Int32Array = np.empty(0, dtype=np.int32)
+        self._solving: ExitStack | None = None
+        self.setup_seconds = 0.0
+        self.first_energy = 0.0
+        stack.callback(self.close)
+
+    @property
+    def assembly_seconds(self) -> float:
+        """What one assembly of all blocks takes."""
+        return self.hierarchy.seconds + self.mixed.assembly_seconds
+
+    def close(self) -> None:
+        """Free the solver."""
+        if self._solving is not None:
+            self._solving.close()
+            self._solving = None
+
+    def hold(self, active: BoolArray) -> None:
+        """Hold the ``active`` candidates (n) from now on; collective.
+
+        Raises:
+            SolveError: if the solver cannot be set up.
+        """
+        self._active = active
+        self._set_up(self.hierarchy.hold(active), self.numbering.normal_dofs(active, owned=True))
+
+    def hold_facets(self, facets: Int32Array) -> None:
+        """Hold all of the local ``facets`` where they are, in the place of any set; collective.
+
+        Raises:
+            SolveError: if the solver cannot be set up.
+        """
+        dofs = normal_dofs(self.space, facets)
+        self._active = np.zeros_like(self.nodes)
+        self._set_up(self.hierarchy.hold_facets(facets), dofs[dofs < self.space.dofs.owned])
+
+    def _set_up(self, levels: list[Level], held: Int32Array) -> None:
+        self.close()
+        start = time.perf_counter()
+        with ExitStack() as stack:
+            self._held = held
+            coupling = self._coupling(stack)
+            moduli = zip(self._split.elastic.lame_lambda, self._split.elastic.lame_mu, strict=True)
+            stiffness = self.mixed.by_region(tuple(lame + 2 * mu for lame, mu in moduli))
+            saddle = Saddle(levels, coupling, self.mixed.mass, stiffness, self.space.degree - 1)
+            self._solver = stack.enter_context(SaddleSolver(saddle, direct=self._direct))
+            self._solving = stack.pop_all()
+        self.setup_seconds += time.perf_counter() - start
+
+    def _coupling(self, stack: ExitStack) -> PETSc.Mat:
+        """Return B with columns of zeros for what is held."""
+        coupling = self.mixed.coupling.copy()
+        stack.callback(coupling.destroy)
+        free = coupling.createVecRight()
+        free.set(1.0)
+        free.array[self._held] = 0.0
+        coupling.diagonalScale(None, free)
+        free.destroy()
+        return coupling
+
+    def improve(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
+        """Move what is held to ``bounds`` (n, m), and then the rest; return the iterations: see ``Elements``.
+
+        Raises:
+            SolveError: if the solver does not converge.
+        """
+        displacement, pressure = self.unknown
+        self.numbering.put(displacement.array, bounds, self._active)
+        with self.mixed.pair() as rest, self.mixed.pair() as correction:
+            self._product(rest)
+            for part in rest:
+                part.scale(-1.0)
+            rest[0].array[self.space.dofs.prescribed_owned] = 0.0
+            rest[0].array[self._held] = 0.0
+            target = None if energy is None else tolerance * (energy / self._split.unit) ** 0.5
+            iterations = self._solver.solve(self.compliance, [rest], [correction], tolerance, target)
+            self.first_energy = self._split.unit * self._solver.first_energies[0]
+            displacement.axpy(1.0, correction[0])
+            pressure.axpy(1.0, correction[1])
+        return iterations
+
+    def state(self) -> State:
+        """Return what the candidates do; collective."""
+        displacement, _ = self.unknown
+        with self.mixed.pair() as forces:
+            self._product(forces)
+            moved, reactions = (self.numbering.gather(v.array) for v in (displacement, forces[0]))
+        return State(moved, self._split.unit * reactions, self.energy())
+
+    def energy(self) -> float:
+        """Return twice the energy (J) of the part that is modelled, stationary at the solution; collective."""
+        displacement, pressure = self.unknown
+        with self.mixed.pair() as result:
+            self._product(result)
+            return self._split.unit * float(displacement.dot(result[0]) + pressure.dot(result[1]))
+
+    def _product(self, result: Pair) -> None:
+        """Write K₀ u + Bᵀ p and B u − c M p into the two vectors; collective."""
+        displacement, pressure = self.unknown
+        self.hierarchy.finest.mult(displacement, result[0])
+        self.mixed.coupling.multTransposeAdd(pressure, result[0], result[0])
+        self.mixed.mass.mult(pressure, result[1])
+        result[1].array[:] *= -self.compliance
+        self.mixed.coupling.multAdd(displacement, result[1], result[1])
+
+    def show(self) -> None:
+        """Make displacement and pressure those of the forms; collective."""
+        self.mixed.set_fields(self.unknown)
+
+    def residual(self) -> FloatArray:
+        """Return K₀ u + Bᵀ p (N) with the unmodified operator, owned dofs, for the forms' fields; collective."""
+        with self.mixed.pair() as (residual, dilation), self.mixed.pair() as (pull, _):
+            self.mixed.apply(residual, pull, dilation, self._split.elastic)
+            return np.asarray(self._split.unit * (residual.array + pull.array))
+
+    def start_from(self, coarse: ElasticSpace) -> None:
+        """Take over the displacement of the forms of another space; collective. There is no pressure yet."""
+        self.space.forms.displacement.interpolate(coarse.forms.displacement)
+        self.unknown[0].array[:] = self.space.forms.displacement.x.array[: self.space.dofs.owned]
+
+    def continue_from(self, coarse: "MixedElements") -> None:
+        """Take over displacement and pressure of the forms of elements of a lower degree; collective."""
+        nothing = np.zeros_like(self.space.forms.displacement.x.array)
+        self.mixed.start_from(coarse.mixed, self.unknown, nothing)

@@ -1,0 +1,200 @@
+"""A probe pressed onto a body that finds where it touches: frictionless, without tension or penetration.
+
+The set of nodes that touch is found on elements of degree 1, which costs little, and from there on those of degree 2:
+their reactions are forces of K u on single nodes, mid nodes and corners alike. F is their sum. As a function of the
+mesh it is no bound: a coarse contact area may be too large or too small.
+"""
+
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pipeline.arrays import BoolArray, FloatArray
+from pipeline.solve.contact.area import contact_area
+from pipeline.solve.contact.displacement import DisplacementElements
+from pipeline.solve.contact.error import displacement_decrement, mixed_decrement
+from pipeline.solve.contact.levels import CONDITIONS
+from pipeline.solve.contact.mixed import MixedElements
+from pipeline.solve.contact.sets import ContactError, Found, Obstacle, find_set
+from pipeline.solve.contact.surface import find_candidates
+from pipeline.solve.error import error_bar
+from pipeline.solve.forms import mean_strain_form
+from pipeline.solve.linear import SolveError
+from pipeline.solve.loads import Loads
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.reaction import Response
+from pipeline.solve.rim import plain_share
+from pipeline.solve.solution import BALANCE_LIMIT, TOLERANCE, Solution
+from pipeline.solve.spaces import Spaces
+from pipeline.solve.strain import largest_strain, principal_strains
+from pipeline.solve.vectors import global_sum
+
+Kind = DisplacementElements | MixedElements
+
+DEGREE = 2
+# Energy norm of the error to which each set but the last one is solved, relative to that of the solution.
+_LOOSE = 1e-3
+# Stricter than what serves a prescribed displacement: F is linear in the solver's error here.
+_STRICTER = 0.01
+# The error bar in units of what the next degree takes of the energy: measured, docs/accuracy.md.
+_BAR = 1.25
+# And the share of N, the energy norm squared of the first correction, of mixed elements, whose s may vanish by chance.
+_UNSEEN = 0.3
+# The first set is looked for in a material that elements of degree 1 do not lock in: λ/μ at most (ν = 0.3).
+_FIRST_RATIO = 1.5
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A probe's surface, pushed in by ``depth`` (m) along -z.
+
+    ``height`` gives, at points (n, 3) of the undeformed surface (m), how far above each the probe's surface is before
+    it moves, infinite where there is no probe. ``ends_at`` tells of points (n, 3) on the candidates' edge whether the
+    probe itself ends there: elsewhere contact must not reach that edge.
+    """
+
+    depth: float
+    height: Callable[[FloatArray], FloatArray]
+    ends_at: Callable[[FloatArray], BoolArray]
+
+
+class ContactProblem:
+    """The spaces of a mesh and a probe: solves for any material. A context manager.
+
+    How far the probe goes it knows itself: of the loads it takes that they are along the axis. ``found`` is what was
+    found last of the ``obstacle``, None before.
+    """
+
+    def __init__(self, spaces: Spaces, tool: Tool, element: str = "displacement"):
+        """Prepare for elements of a kind; collective.
+
+        Raises:
+            SolveError: if candidates and support share a point.
+        """
+        self._spaces, self._tool, self._body = spaces, tool, spaces.body
+        self._is_mixed = element == "mixed"
+        self._fine, coarse = (spaces.get(degree, CONDITIONS) for degree in (DEGREE, 1))
+        self._candidates = find_candidates(self._body, self._fine.dofs.space, coarse.dofs.space)
+        self.obstacle = Obstacle(self._candidates, tool.height(self._candidates.points) - tool.depth, tool.depth)
+        self.found: Found | None = None
+        self._strain = mean_strain_form(self._fine.dofs.space, self._fine.forms.displacement)
+
+    def __enter__(self) -> "ContactProblem":
+        return self
+
+    def __exit__(self, *_: object) -> None: ...
+
+    @property
+    def dofs(self) -> int:
+        """Unknowns of the modelled part."""
+        return self._fine.dofs.dofs
+
+    def solve(
+        self, law: MaterialLaw, loads: Loads, *, method: str = "auto", tolerance: float = TOLERANCE,
+        estimate: bool = False,
+    ) -> Solution:  # fmt: skip
+        """Find the contact, and return the force and checks; collective.
+
+        ``tolerance`` is that of the energy norm of the solver's error, relative. ``estimate`` goes on in degree 3, for
+        the error bar.
+
+        Raises:
+            SolveError: if a linear solver fails, or the solution a check.
+            ContactError: if the contact does not settle, or reaches the candidates' edge where the probe does not end.
+        """
+        start = time.perf_counter()
+        with ExitStack() as stack:
+            elements, first = self._start(law, method, stack)
+            tolerances = _LOOSE, _STRICTER * tolerance
+            active = self._candidates.spread(first.active)
+            found = find_set(elements, self.obstacle, active, tolerances, first.state.energy)
+            elements.show()
+            self._check_edge(found.active)
+            self.found = found
+            response = self._response(elements, found, loads)
+            if response.balance > BALANCE_LIMIT:
+                raise SolveError(
+                    f"forces do not balance: relative error {response.balance:.1e}, allowed {BALANCE_LIMIT:.0e}"
+                )
+            area = self._whole * contact_area(self.obstacle, found.active, found.state)
+            assembly, setup = elements.assembly_seconds, elements.setup_seconds
+            solution = Solution(
+                response, largest_strain(self._strain, self._body), self._fine.dofs.whole_dofs, self._body.cells,
+                first.sets + found.sets, assembly, setup, time.perf_counter() - start - assembly - setup,
+                contact_area=area, contact_radius=(area / np.pi) ** 0.5, stored=self._whole * found.state.energy / 2,
+            )  # fmt: skip
+            if not estimate:
+                return solution
+            start = time.perf_counter()
+            taken, share, more = self._estimate(elements, law, found)
+        return replace(
+            solution, decrements=taken * response.stiffness, bars=share * response.stiffness,
+            estimate_iterations=more, time_estimate=time.perf_counter() - start,
+        )  # fmt: skip
+
+    def _estimate(self, elements: Kind, law: MaterialLaw, found: Found) -> tuple[float, float, int]:
+        """Return the share of the energy that degree 3 takes away, that of the force's bar, and the iterations."""
+        facets = self._candidates.closed_facets(found.active)
+        if isinstance(elements, MixedElements):
+            taken, unseen, more = mixed_decrement(self._spaces, elements, law, self._candidates, facets)
+        else:
+            taken, more = displacement_decrement(self._spaces, elements, law, facets)
+            unseen = 0.0
+        share, unseen = taken / found.state.energy, unseen / found.state.energy
+        if (found.active & self._candidates.is_edge).any():  # the probe ends there, and the pressure is singular
+            element = "mixed" if self._is_mixed else "displacement"
+            return share, error_bar(share, DEGREE, element, plain=plain_share(self._body), unseen=unseen), more
+        return share, _BAR * max(abs(share), _UNSEEN * unseen), more
+
+    def fields(self) -> tuple[Any, FloatArray]:
+        """Return the last solution's displacement (m) and the principal strains of each owned cell; collective."""
+        return self._fine.forms.displacement, principal_strains(self._strain, self._body)
+
+    @property
+    def _whole(self) -> float:
+        """How many times what is modelled makes the body."""
+        return 2.0 ** len(self._body.mirrored)
+
+    def _start(self, law: MaterialLaw, method: str, stack: ExitStack) -> tuple[Kind, Found]:
+        """Return the elements, with a displacement to start from, and the set found on elements of degree 1."""
+        with ExitStack() as inner:
+            coarse = DisplacementElements(self._spaces, 1, _softer(law), self._candidates, method, inner)
+            below = (self.obstacle.bounds < 0) & coarse.nodes
+            if not below.any():
+                raise ContactError("the probe reaches no corner of an element: use smaller elements below it")
+            first = find_set(coarse, self.obstacle, below, (_LOOSE,))
+            coarse.show()
+            kind = MixedElements if self._is_mixed else DisplacementElements
+            elements = kind(self._spaces, DEGREE, law, self._candidates, method, stack)
+            elements.start_from(coarse.space)
+        return elements, first
+
+    def _check_edge(self, active: BoolArray) -> None:
+        points = self._candidates.points[active & self._candidates.is_edge]
+        if not np.all(self._tool.ends_at(points)):
+            raise ContactError(
+                "the contact reaches the edge of the part of the surface where it is looked for: "
+                "press the probe in less far"
+            )
+
+    def _response(self, elements: Kind, found: Found, loads: Loads) -> Response:
+        """Return the force for the depth, as if it were proportional to it; its balance is that of all checks."""
+        space, state = self._fine.dofs, found.state
+        force = float(-state.reactions[found.active].sum())
+        points = elements.residual().reshape(-1, 3)
+        support = float(global_sum(space.comm, np.array([points[space.fixed_owned, 2].sum()]))[0])
+        work = float(state.reactions[found.active] @ state.moved[found.active])
+        balance = max(abs(support / force - 1), abs(work / state.energy - 1))
+        if not (np.isfinite(balance) and force > 0):
+            raise SolveError(f"the solution is not a number or has no force ({force:g} N)")
+        stiffness = self._whole * force / self._tool.depth
+        return Response(loads, np.array([[stiffness]]), np.array([[0.0, 0.0, stiffness]]), balance)
+
+
+def _softer(law: MaterialLaw) -> MaterialLaw:
+    pairs = zip(law.lame_lambda, law.lame_mu, strict=True)
+    return MaterialLaw(tuple(min(lame, _FIRST_RATIO * mu) for lame, mu in pairs), law.lame_mu)

@@ -1,0 +1,128 @@
+"""Which nodes touch: the primal-dual active set method.
+
+    u_z <= b,    r <= 0,    r (u_z - b) = 0    at each candidate,
+
+with b the height above the node of the probe's surface, pushed in, and r the reaction, K u along z: what holds the
+tissue down. Nodes that touch are held at b; those that are pulled are let go, those that have come through the probe's
+surface are held, until nothing changes (M. Hintermüller, K. Ito and K. Kunisch, SIAM J. Optim. 13, 865, 2002).
+
+What an even pressure does on quadratic facets it does at their mid nodes. A corner takes nothing of it, and what its
+reaction is, of either sign, comes of the pressure's slope: within the contact, where all of a corner's mid nodes are
+held, it is held with them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from pipeline.arrays import BoolArray, FloatArray
+from pipeline.solve.contact.surface import Candidates
+from pipeline.solve.linear import SolveError
+from pipeline.stages import stage
+
+# A pull below this share of the mean reaction, and a way through below this share of the depth, are the solver's error.
+SLACK = 1e-6
+# The most that was seen is 14, and no set came back but by the error of a solver that was stopped early.
+_MOST_SETS = 60
+
+
+class ContactError(SolveError):
+    """Contact that was not found, or is not one: no other linear solver mends that."""
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Of one solution: the candidates' displacement along z (n, m), the reactions there (n, N), both 0 off its nodes.
+
+    ``energy`` (J) is twice that of the part that is modelled.
+    """
+
+    moved: FloatArray
+    reactions: FloatArray
+    energy: float
+
+
+class Elements(Protocol):
+    """Elements whose nodes may be held where they touch; they keep the solution found last."""
+
+    @property
+    def nodes(self) -> BoolArray:
+        """Which candidates are nodes of these elements (n)."""
+
+    def hold(self, active: BoolArray) -> None:
+        """Hold the ``active`` candidates (n) from now on; collective."""
+
+    def improve(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
+        """Move what is held to ``bounds`` (n, m), and then the rest; return the iterations. Collective.
+
+        They end when the energy norm of the error is ``tolerance`` times the root of ``energy`` (J), or without one
+        times that of the error in the beginning.
+        """
+
+    def state(self) -> State:
+        """Return what the candidates do; collective."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A set that stays as it is, and its solution; ``sets`` were solved for it, with all their ``iterations``."""
+
+    active: BoolArray
+    state: State
+    sets: int
+    iterations: int
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacle:
+    """What is in the way of the ``candidates``: their ``bounds`` (n, m) with the probe pushed in by ``depth`` (m)."""
+
+    candidates: Candidates
+    bounds: FloatArray
+    depth: float
+
+
+@stage("contact sets")
+def find_set(
+    elements: Elements, obstacle: Obstacle, active: BoolArray, tolerances: Sequence[float], energy: float | None = None
+) -> Found:
+    """Return the set that ``active`` (n) leads to, solved to the last of the ``tolerances``; collective.
+
+    Each of them is of the energy norm, relative to the root of an ``energy`` (J), known roughly.
+
+    Raises:
+        SolveError: if the linear solver fails.
+        ContactError: if sets come back, or become empty.
+    """
+    count = iterations = 0
+    elements.hold(active)
+    for number, tolerance in enumerate(tolerances, start=1):
+        seen = set[bytes]()
+        while True:
+            iterations += elements.improve(obstacle.bounds, tolerance, energy)
+            count += 1
+            state = elements.state()
+            energy = state.energy
+            following = next_set(obstacle, active, state) & elements.nodes
+            following |= obstacle.candidates.enclosed(following)
+            if np.array_equal(following, active):
+                break
+            seen.add(active.tobytes())
+            if count >= _MOST_SETS or following.tobytes() in seen:
+                if number < len(tolerances):
+                    break
+                raise ContactError(f"the contact area does not settle: {count} sets of nodes were tried")
+            if not following.any():
+                raise ContactError("the probe does not touch a single node: use smaller elements below it")
+            active = following
+            elements.hold(active)
+    return Found(active, state, count, iterations)
+
+
+def next_set(obstacle: Obstacle, active: BoolArray, state: State) -> BoolArray:
+    """Return the nodes to hold next: the active ones that are pressed, the others that came through."""
+    pull = SLACK * float(np.abs(state.reactions[active]).mean())
+    through = SLACK * obstacle.depth
+    return np.where(active, state.reactions < pull, state.moved - obstacle.bounds > through)

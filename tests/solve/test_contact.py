@@ -1,0 +1,164 @@
+"""Contact that finds its own area: known forces, no tension, no penetration, the same however it is solved."""
+
+import json
+from contextlib import contextmanager
+from math import pi, sqrt, tan
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from pipeline.run.meshing import mesh_case
+from pipeline.run.problem import law_of, loads_of, tool_of
+from pipeline.solve.contact.problem import ContactProblem, Tool
+from pipeline.solve.contact.sets import ContactError
+from pipeline.solve.spaces import Spaces
+from pipeline.study.problems import StudyError
+from tests.cases import solve, study
+
+SMALL = {"shape": "cylinder", "radius": "6 mm", "height": "5 mm"}
+LARGE = {"shape": "cylinder", "radius": "60 mm", "height": "60 mm"}
+SPHERE = {"shape": "sphere", "radius": "10 mm", "depth": "0.1 mm"}
+CONE = {"shape": "cone", "angle": "86 deg", "radius": "4 mm", "depth": "0.1 mm"}
+DISC = {"shape": "disc", "radius": "1 mm", "depth": "0.1 mm", "contact": "unilateral"}
+COARSE = {"fine": "2 mm", "coarse": "2 mm", "rim": "0.3 mm", "growth": 0.5}
+MODULUS = 10e3 / (1 - 0.3**2)
+
+
+KNOWN = {}
+
+
+def record(comm=MPI.COMM_SELF, mesh=None, **changes):
+    """Solve a scene, once in all tests."""
+    scene = {"body": SMALL, "probe": SPHERE, "mesh": {**COARSE, **(mesh or {})}} | changes
+    key = comm.size, json.dumps(scene, sort_keys=True)
+    if key not in KNOWN:
+        (found,) = solve(comm, **scene).values()
+        assert found.status == "ok", found.message
+        KNOWN[key] = found
+    return KNOWN[key]
+
+
+@contextmanager
+def pressed(tool=None, **changes):
+    """Lend the problem of a scene, with another tool, perhaps, on its candidates; and its material and loads."""
+    (case,) = study(**{"body": SMALL, "probe": SPHERE, "mesh": COARSE} | changes).cases()
+    body, _ = mesh_case(case, ("y",) if tool else ("x", "y"), MPI.COMM_SELF)
+    with Spaces(body) as spaces:
+        yield ContactProblem(spaces, tool or tool_of(case), case.element), law_of(case), loads_of(case)
+
+
+def test_hertz():
+    """F = 4/3 E* √R d^1.5 and a² = R d; a body of 60 a is stiffer than a half-space by about a / H."""
+    far = {"fine": "20 mm", "coarse": "20 mm", "rim": "0.15 mm"}
+    found = record(body=LARGE, mesh=far)
+    assert 1 - found.force_error < found.force / (4 / 3 * MODULUS * sqrt(10e-3) * 0.1e-3**1.5) < 1.025
+    assert found.contact_radius == pytest.approx(1e-3, rel=0.02)
+    assert found.contact_area == pytest.approx(pi * found.contact_radius**2)
+    assert found.energy == pytest.approx(2 / 5 * found.force * 0.1e-3, rel=0.01)
+
+
+def test_cone():
+    """Sneddon: F = 2/π E* tan α d², a = 2/π tan α d."""
+    found = record(body=LARGE, probe=CONE, mesh={"fine": "20 mm", "coarse": "20 mm", "rim": "0.15 mm"})
+    slope = tan(86 * pi / 180)
+    assert 1 - found.force_error < found.force / (2 / pi * MODULUS * slope * 0.1e-3**2) < 1.025
+    assert found.contact_radius == pytest.approx(2 / pi * slope * 0.1e-3, rel=0.03)
+
+
+@pytest.mark.parametrize("element", ["displacement", "mixed"])
+def test_nothing_pulls_and_nothing_comes_through(element):
+    with pressed(material={"poisson": 0.45}, mesh=COARSE | {"element": element}) as (problem, law, loads):
+        solution = problem.solve(law, loads)
+    state, active, obstacle = problem.found.state, problem.found.active, problem.obstacle
+    apart = obstacle.bounds - state.moved
+    assert (state.reactions[active & (obstacle.candidates.corners < 0)] < 0).all()
+    assert np.abs(state.reactions[~active]).max() < 1e-6 * solution.reaction[2]
+    assert apart.min() > -1e-9 * obstacle.depth
+    assert np.abs(apart[active]).max() < 1e-9 * obstacle.depth
+    assert solution.balance < 1e-6
+
+
+def test_flat_probe_that_does_not_lift_off_is_the_frictionless_one():
+    assert record(probe=DISC).force == pytest.approx(record(probe=DISC | {"contact": "frictionless"}).force, rel=1e-8)
+
+
+def test_face_that_is_inclined_lifts_off_on_one_side():
+    """If it stuck to the surface, tilting would add no force: pull on one side what it presses on the other."""
+    inclined = Tool(0.1e-3, lambda points: 0.15 * points[:, 0], lambda points: np.ones(len(points), dtype=bool))
+    with pressed(inclined, probe=DISC) as (problem, law, loads):
+        force = problem.solve(law, loads).reaction[2]
+    touching = problem.obstacle.candidates.points[problem.found.active, 0]
+    assert touching.min() < -0.95e-3
+    assert 0.0 < touching.max() < 0.9e-3
+    assert force > record(probe=DISC).force
+
+
+@pytest.mark.parametrize("changes", [{}, {"probe": SPHERE | {"at": ["1 mm", "0 mm"]}}], ids=["quarter", "half"])
+def test_symmetric_part_gives_the_force_of_the_whole(changes):
+    part, whole = (record(mesh=mesh, **changes) for mesh in ({}, {"model": "3d"}))
+    assert (part.origin, whole.origin) == ("symmetric", "solved")
+    assert part.force == pytest.approx(whole.force, rel=3e-8)
+    assert part.contact_area == pytest.approx(whole.contact_area, rel=1e-6)
+    assert part.energy == pytest.approx(whole.energy, rel=3e-8)
+    assert part.force_error == pytest.approx(whole.force_error, rel=0.05)
+
+
+def test_direct_and_iterative_agree():
+    direct, iterative = (record(solve={"method": method}).force for method in ("direct", "iterative"))
+    assert iterative == pytest.approx(direct, rel=3e-8)
+
+
+def test_force_is_proportional_to_the_modulus_and_not_to_the_depth():
+    softer, stiffer = (record(material={"young": young}).force for young in ("10 kPa", "23 kPa"))
+    assert stiffer == pytest.approx(2.3 * softer, rel=1e-9)
+    deeper = record(probe=SPHERE | {"depth": "0.2 mm"})
+    assert deeper.force > 2.5 * softer
+
+
+def test_mixed_elements_agree_and_take_incompressible_tissue():
+    mixed, plain = (
+        record(material={"poisson": 0.45}, mesh={"element": element}) for element in ("mixed", "displacement")
+    )
+    assert mixed.force == pytest.approx(plain.force, rel=mixed.force_error + plain.force_error)
+    assert mixed.force < record(material={"poisson": 0.5}).force < 1.5 * mixed.force
+
+
+@pytest.mark.parametrize(
+    "scene",
+    {
+        "tilted on an ellipsoid": {
+            "body": {"shape": "ellipsoid", "axes": ["8 mm", "7 mm", "6 mm"], "fixed": {"below": "-2 mm"}},
+            "probe": {"shape": "sphere", "radius": "3 mm", "depth": "0.1 mm", "axis": [0.08, 0.0, -1.0]},
+        },
+        "layers": {"body": SMALL | {"layers": [
+            {"name": "skin", "thickness": "0.6 mm", "young": "40 kPa", "poisson": 0.3},
+        ]}},
+    }.values(),
+)  # fmt: skip
+def test_error_bar_holds_a_finer_mesh(scene):
+    coarse, fine = (record(mesh={"rim": rim}, **scene) for rim in ("0.3 mm", "0.15 mm"))
+    assert coarse.force == pytest.approx(fine.force, rel=coarse.force_error + fine.force_error)
+    assert fine.force_error < coarse.force_error < 0.05
+
+
+def test_contact_that_is_cut_off_is_refused():
+    ball = Tool(0.1e-3, lambda x: (x[:, :2] ** 2).sum(axis=1) / 40e-3, lambda x: np.zeros(len(x), dtype=bool))
+    with pressed(ball, probe=DISC) as (problem, law, loads), pytest.raises(ContactError, match="reaches the edge"):
+        problem.solve(law, loads)
+
+
+def test_other_degrees_are_refused():
+    with pytest.raises(StudyError, match="must be 2 where contact is unilateral"):
+        study(body=SMALL, probe=SPHERE, mesh=COARSE | {"degree": 3})
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("poisson", [0.3, 0.49])
+def test_ranks_agree(poisson):
+    material = {"poisson": poisson}
+    together, alone = (record(comm, material=material) for comm in (MPI.COMM_WORLD, MPI.COMM_SELF))
+    together = MPI.COMM_WORLD.bcast(together)
+    assert together.force == pytest.approx(alone.force, rel=3e-8)
+    assert together.contact_area == pytest.approx(alone.contact_area, rel=1e-6)
+    assert together.force_error == pytest.approx(alone.force_error, rel=0.05)
