@@ -13,7 +13,7 @@ from pipeline.compat import gmsh_session
 from pipeline.mesh.follow import middle_nodes, rounded_sizes
 from pipeline.mesh.regions import region_sizes
 from pipeline.mesh.size import Sizes, set_size_field
-from pipeline.scene.model import CUT, FIXED, FREE, MIRROR, PROBE, TISSUE, Scene, SceneError, build
+from pipeline.scene.model import CUT, FIXED, FREE, MIRROR, PROBE, SLIT, TISSUE, Scene, SceneError, build
 from pipeline.shapes.bodies.cad import FromCad
 from pipeline.stages import stage
 
@@ -137,7 +137,7 @@ def _collect(scene: Scene, rim_curves: list[int], start: float) -> MeshArrays:
     for dim, group in gmsh.model.getPhysicalGroups(2):
         name = gmsh.model.getPhysicalName(dim, group)
         facets[name] = _elements(2, gmsh.model.getEntitiesForPhysicalGroup(dim, group), 3, position)
-    assert set(facets) <= {PROBE, FIXED, FREE, CUT, *MIRROR.values()}
+    assert set(facets) <= {PROBE, FIXED, FREE, CUT, SLIT, *MIRROR.values()}
     rim = [position[mesh.getNodes(1, curve, includeBoundary=True)[0]] for curve in rim_curves]
     bent = middle_nodes(position, scale) if isinstance(scene.body, FromCad) and not scene.straight else None
     if bent:

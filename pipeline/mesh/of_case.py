@@ -11,6 +11,7 @@ from pipeline.mesh.generate import MeshArrays, generate
 from pipeline.mesh.meridian import Meridian
 from pipeline.mesh.reflect import reflect
 from pipeline.mesh.size import Sizes
+from pipeline.mesh.slit import open_slit
 from pipeline.plan.symmetry import mirror_planes
 from pipeline.scene.model import Scene
 from pipeline.shapes.half_plane import HalfEllipse, Rectangle
@@ -31,6 +32,7 @@ def mesh_arrays(case: Case, mirrors: tuple[str, ...], kept: "Kept | None" = None
     segments = sizes.rim_segments(case.probe)
     scene = Scene(case.body, case.probe, case.column, case.mesh.outside == "fixed", segments, straight, planes)
     arrays = _of_triangles(scene, case.body, sizes, kept) if isinstance(case.body, Scanned) else generate(scene, sizes)
+    arrays = open_slit(arrays, scene) if scene.has_inner_slit else arrays
     arrays = arrays if straight else curve(arrays, scene)
     whole = reflect(arrays, tuple(plane for plane in planes if plane not in mirrors))
     return replace(whole, seconds=perf_counter() - start)

@@ -20,7 +20,15 @@ PHYSICS_VERSION = 5
 
 _MANY = 200_000  # sections of a large study
 # Keys that came later, with the value that stands for what was before: records of then stay valid.
-_LATER: dict[str, Any] = {"motion": "press", "layers": (), "inclusion": (), "axis": None}
+_LATER: dict[str, Any] = {
+    "motion": "press",
+    "layers": (),
+    "inclusion": (),
+    "axis": None,
+    "incision": 0.0,
+    "ahead": None,
+    "ends": "blade",
+}
 # What a body may hold of other materials.
 _PIECES = ("layers", "inclusion")
 

@@ -28,6 +28,8 @@ _FLOATS = (
 _FOUND = ("contact_area", "contact_radius")
 _COUNTS = ("dofs", "cells", "iterations")
 _EXACT = ("force_exact", "force_exact_error")
+# Of blades that stand in a slit.
+_OF_SLITS = ("energy_release", "energy_release_error", "energy_release_exact")
 # Translations, and rotations about the axes of the point of contact.
 _MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _NO_STIFFNESS = ((nan,) * 6,) * 6
@@ -68,6 +70,11 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
             matrices = np.array([getattr(r, name) if r and getattr(r, name) else _NO_STIFFNESS for r in flat])
             dimensions = (*dims, "movement", "conjugate")
             variables[name] = (dimensions, matrices.reshape(*study.shape, 6, 6), attributes(name))
+    if any(case.probe.slit for case in study.cases()):
+        for name in _OF_SLITS:
+            source = exact if name.endswith("_exact") else flat
+            values = [getattr(r, name.removesuffix("_exact")) if r else nan for r in source]
+            variables[name] = (dims, array(values, float), attributes(name))
     frames = [_frame(case) for case in study.cases()]
     for number, name in enumerate(_PLACE):
         places = [frame.point[number] if frame else nan for frame in frames]
@@ -110,9 +117,19 @@ def _add_ratios(dataset: xr.Dataset) -> xr.Dataset:
         "accuracy": force / dataset["force_exact"], "force_max": full_force, "force_ratio": force / full_force,
         "speedup": full_seconds / seconds,
     }  # fmt: skip
+    if "energy_release" in dataset:
+        ratios["energy_release_ratio"] = _over_full_order(dataset["energy_release"], dataset)
     return dataset.assign(
         {name: values.transpose(*order).assign_attrs(attributes(name)) for name, values in ratios.items()}
     )
+
+
+def _over_full_order(values: xr.DataArray, dataset: xr.Dataset) -> xr.DataArray:
+    """Return ``values`` over those of the full-order case of the same scene and mesh settings."""
+    if "epsilon" not in dataset.dims:
+        return values / values.where(bool(dataset.attrs["epsilon_is_full"]))
+    full = values.where(np.isinf(dataset["epsilon"])).max("epsilon")
+    return values / full
 
 
 def _scaled(record: Record | None, case: Case) -> Record | None:
@@ -123,8 +140,8 @@ def _scaled(record: Record | None, case: Case) -> Record | None:
     if record is None or record.is_ok:
         return record.scaled(case.scale) if record else None
     return replace(
-        record, force=nan, force_vector=(nan, nan, nan), energy=nan, max_strain=nan, balance=nan, contact_area=nan,
-        contact_radius=nan,
+        record, force=nan, force_vector=(nan, nan, nan), energy=nan, energy_release=nan, max_strain=nan, balance=nan,
+        contact_area=nan, contact_radius=nan,
     )  # fmt: skip
 
 

@@ -10,12 +10,13 @@ from pipeline.solve.axisymmetric import compile_axisymmetric
 from pipeline.solve.cache import compiling
 from pipeline.solve.forms import compile_elastic
 from pipeline.solve.mixed_forms import compile_mixed
+from pipeline.solve.release import compile_release
 from pipeline.solve.single.cycle import compiles
 from pipeline.solve.straight.pattern import library
 from pipeline.stages import stage
 
 # What this process has seen to.
-_compiled: set[tuple[str, int, bool]] = set()
+_compiled: set[tuple[str, int, bool, bool]] = set()
 
 
 @stage("compiler")
@@ -25,21 +26,21 @@ def prepare(comm: MPI.Comm, solves: Collection[Solve]) -> None:
         needed = {_forms(solve) for solve in solves}
         if missing := needed - _compiled:
             with compiling():
-                for element, degree, of_regions in sorted(missing):
-                    _compile(element, degree, of_regions=of_regions)
+                for element, degree, of_regions, of_slit in sorted(missing):
+                    _compile(element, degree, of_regions=of_regions, of_slit=of_slit)
             _compiled.update(missing)
     comm.barrier()
 
 
-def _forms(solve: Solve) -> tuple[str, int, bool]:
-    """Return what tells the forms of a solve from others: element, degree, and whether there are regions."""
+def _forms(solve: Solve) -> tuple[str, int, bool, bool]:
+    """Return what tells the forms of a solve from others: element, degree, whether there are regions, and a slit."""
     body, mesh = solve.case.body, solve.case.mesh
     if solve.axisymmetric:
-        return "elliptic" if isinstance(body.half_plane(), HalfEllipse) else "axisymmetric", 0, False
-    return solve.case.element, mesh.degree, bool(body.regions)
+        return "elliptic" if isinstance(body.half_plane(), HalfEllipse) else "axisymmetric", 0, False, False
+    return solve.case.element, mesh.degree, bool(body.regions), solve.case.probe.slit is not None
 
 
-def _compile(element: str, degree: int, *, of_regions: bool) -> None:
+def _compile(element: str, degree: int, *, of_regions: bool, of_slit: bool) -> None:
     if element in ("axisymmetric", "elliptic"):
         compile_axisymmetric(curved=element == "elliptic")
         return
@@ -48,3 +49,5 @@ def _compile(element: str, degree: int, *, of_regions: bool) -> None:
     compile_elastic(degree, straight=degree == 1, of_regions=of_regions)
     if element == "mixed":
         compile_mixed(degree)
+    if of_slit:
+        compile_release(degree, mixed=element == "mixed", of_regions=of_regions)

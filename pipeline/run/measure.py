@@ -1,6 +1,7 @@
 """From solutions to records: the force along the probe's axis, its error bar, and what it cost."""
 
 from dataclasses import replace
+from math import nan
 
 import numpy as np
 
@@ -8,9 +9,11 @@ from pipeline.arrays import FloatArray
 from pipeline.plan.cost import features
 from pipeline.plan.steps import Solve
 from pipeline.run.record import Record
+from pipeline.shapes.body import Layered
 from pipeline.shapes.frame import Vector
 from pipeline.solve.error import is_graded
 from pipeline.solve.solution import Solution
+from pipeline.study.sweep import Case
 
 TIMES = ("time_mesh", "time_assemble", "time_setup", "time_solve")
 
@@ -42,6 +45,8 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         stiffness=_rows(solution.stiffness, turn) if case.probe.motion == "all" else (),
         stiffness_error=_rows(solution.bars, turn, bars=True) if case.probe.motion == "all" else (),
         energy=solution.energy,
+        energy_release=solution.release / _front_length(case) if case.probe.slit else nan,
+        energy_release_error=solution.release_bar,
         max_strain=solution.max_strain,
         contact_area=solution.contact_area,
         contact_radius=solution.contact_radius,
@@ -58,6 +63,17 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         planned_cells=planned_cells,
         poisson=poisson,
     )
+
+
+def _front_length(case: Case) -> float:
+    """Return the length (m) of the front of the slit that the probe stands in."""
+    slit = case.probe.slit
+    assert slit is not None
+    if not slit.is_open:
+        return 2 * slit.reach
+    assert isinstance(case.body, Layered)
+    (x, y, _), along = case.frame.point, case.frame.along
+    return sum(min(case.column, case.body.to_side((x, y), (i * along[0], i * along[1]))) for i in (-1, 1))
 
 
 def turned_back(turn: FloatArray | None, vector: Vector) -> Vector:

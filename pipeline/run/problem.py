@@ -11,12 +11,15 @@ from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.mixed import MixedProblem
+from pipeline.solve.release import Front
 from pipeline.solve.solution import FieldProblem, Problem, Solution
 from pipeline.solve.spaces import Spaces
 from pipeline.study.sweep import Case
 
 # Unknowns up to which a direct solve is a way out where iterations do not converge.
 _MOST_DIRECT = 60_000
+# What is virtually moved round a slit's front is this near to it, in units of the distance to anything else.
+_CLEAR = 0.7
 # A case may take this share of the memory that is free when it begins.
 _MEMORY_SHARE = 0.9
 
@@ -38,7 +41,8 @@ def problem_of(spaces: Spaces, case: Case, *, shared: bool, reuse: bool = False)
 
 def conditions_of(case: Case) -> Conditions:
     """Return what the probe of ``case`` prescribes."""
-    return Conditions(bonded=case.probe.contact == "bonded", unilateral=case.probe.is_unilateral)
+    bonded, unilateral = case.probe.contact == "bonded", case.probe.is_unilateral
+    return Conditions(bonded=bonded, unilateral=unilateral, front=_front_of(case))
 
 
 def tool_of(case: Case) -> Tool:
@@ -53,12 +57,23 @@ def tool_of(case: Case) -> Tool:
     return Tool(probe.depth, height, lambda points: probe.ends_at(frame.local(points)[:, :2]))
 
 
+def _front_of(case: Case) -> Front | None:
+    """Return the front of the slit that the probe of ``case`` stands in, if it does."""
+    slit, frame = case.probe.slit, case.frame.upright
+    if slit is None:
+        return None
+    radius = _CLEAR * slit.room(case.body)
+    return Front(frame.point, frame.along, slit.depth, slit.reach, radius)
+
+
 def loads_of(case: Case) -> Loads:
     """Return how the probe of ``case`` moves, on the mesh that is turned so that it presses along -z."""
     frame = case.frame.upright
     travel = case.probe.travel(frame)
     if case.probe.motion == "all":
         return Loads.all(travel, frame.point)
+    if slit := case.probe.slit:
+        return Loads.along(travel).opened(case.frame.upright.across, slit.width / 2)
     # Across a plane of symmetry a probe slides without force along its axis, and presses without force along itself.
     return Loads.along(travel, apart=mirror_planes(case) != model_planes(case))
 
@@ -70,17 +85,24 @@ def law_of(case: Case) -> MaterialLaw:
 
 
 def solve_problem(case: Case, problem: Problem, *, estimate: bool) -> Solution:
-    """Solve a case; where iterations do not converge and the system is small, directly. Collective."""
+    """Solve a case; where iterations do not converge and the system is small, directly. Collective.
+
+    Raises:
+        SolveError: if that fails, too, or what is found cannot be.
+    """
     law, loads = law_of(case), loads_of(case)
     method, tolerance = case.solve.method, case.solve.tolerance
     try:
-        return problem.solve(law, loads, method=method, tolerance=tolerance, estimate=estimate)
+        solution = problem.solve(law, loads, method=method, tolerance=tolerance, estimate=estimate)
     except ContactError:
         raise
     except SolveError:
         if method != "auto" or not 0 < problem.dofs <= _MOST_DIRECT:
             raise
-        return problem.solve(law, loads, method="direct", tolerance=tolerance, estimate=estimate)
+        solution = problem.solve(law, loads, method="direct", tolerance=tolerance, estimate=estimate)
+    if solution.is_shut:
+        raise SolveError("the blade's travel presses the slit shut at its front, where its faces would pass each other")
+    return solution
 
 
 def check_memory(free: FreeMemory, needed: float, what: str) -> None:

@@ -17,7 +17,8 @@ class Record:
     95 % error bar on that, on which ``time_error`` seconds were spent. ``force_vector_error`` (N) are the bars on the
     vector's components, where they are known; ``stiffness`` is that of all six rigid motions, if it was asked for, and
     ``stiffness_error`` has the bars on its entries. ``contact_area`` (m²) and ``contact_radius`` (m) are those of
-    unilateral contact. ``kind``, ``planned_cells`` and ``poisson`` are what its cost was
+    unilateral contact. ``energy_release`` (J/m²) is the mean along a slit's front, its relative 95 % bar
+    ``energy_release_error``. ``kind``, ``planned_cells`` and ``poisson`` are what its cost was
     estimated from (:mod:`pipeline.plan.cost`), ``group`` the ranks that computed it.
     """
 
@@ -34,6 +35,8 @@ class Record:
     stiffness: tuple[tuple[float, ...], ...] = ()
     stiffness_error: tuple[tuple[float, ...], ...] = ()
     energy: float = nan
+    energy_release: float = nan
+    energy_release_error: float = nan
     max_strain: float = nan
     contact_area: float = nan
     contact_radius: float = nan
@@ -94,7 +97,8 @@ class Record:
         return replace(
             self, origin="scaled", young=young, depth=depth, force=stiffer * deeper * self.force,
             force_vector=(x, y, z), force_vector_error=(bx, by, bz), stiffness=stiffness, stiffness_error=bars,
-            energy=stiffer * deeper**2 * self.energy, max_strain=deeper * self.max_strain,
+            energy=stiffer * deeper**2 * self.energy, energy_release=stiffer * deeper**2 * self.energy_release,
+            max_strain=deeper * self.max_strain,
         )  # fmt: skip
 
     def to_json(self) -> str:

@@ -4,7 +4,7 @@ Lengths in the model are in units of ``scale`` metres, chosen from the body's si
 millimetre and one of ten metres give OpenCASCADE the same numbers, and the same mesh.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from math import inf
@@ -16,6 +16,7 @@ import numpy as np
 from pipeline import compat
 from pipeline.scene.imprint import cut_out
 from pipeline.scene.regions import draw_inclusions, regions_of, remove_beyond
+from pipeline.scene.slit import draw_plane, draw_slit, mirror_of, singular_curves
 from pipeline.scene.tessellate import NotASolid, read_solid
 from pipeline.shapes.bodies.cad import SIZES, FromCad
 from pipeline.shapes.body import Body, Drawn
@@ -26,6 +27,7 @@ from pipeline.shapes.surface import Surface, Tube
 
 # Names of the physical groups. Every boundary face is in exactly one of them.
 TISSUE, PROBE, FIXED, FREE, CUT = "tissue", "probe", "fixed", "free", "cut"
+SLIT = "slit"  # what of a slit's faces the blade does not touch
 MIRROR = {"x": "mirror_x", "y": "mirror_y"}
 
 _BODY_SIZE = 100.0  # extent of the body in the model: OpenCASCADE's tolerance of 1e-7 is then 1e-9 of it
@@ -80,6 +82,11 @@ class Scene:
         """Whether the footprint is plane, and the probe at right angles to it."""
         return is_flat(self.body, self.probe, self.frame)
 
+    @property
+    def has_inner_slit(self) -> bool:
+        """Whether there is a slit inside the model, and not in a plane of symmetry that bounds it."""
+        return self.probe.slit is not None and mirror_of(self.frame, self.mirrors) is None
+
     @cached_property
     def cut_face(self) -> Surface:
         """The side of the column."""
@@ -102,10 +109,12 @@ def build(scene: Scene) -> list[int]:
         volumes, _ = occ.intersect(volumes, [(3, _add_column(scene))])
     if scene.mirrors:
         volumes, _ = occ.intersect(volumes, [(3, _add_positive_side(scene))])
-    printed = _add_footprint(scene, volumes)
+    printed, beside = _add_contact(scene, volumes)
     heights = (*scene.body.support.edges(), *scene.body.interfaces)
     tools = [*printed, *((2, _add_level(scene.units(height))) for height in heights)]
     tools += draw_inclusions(scene.body.inclusion, scene.units)
+    first = len(volumes) + len(tools)
+    tools += beside
     _, children = occ.fragment(volumes, tools)
     occ.synchronize()
     if scene.body.inclusion:
@@ -122,8 +131,14 @@ def build(scene: Scene) -> list[int]:
     footprint = [tag for part in parts for _, tag in part if tag in inside]
     if not footprint:
         raise SceneError("no part of the probe's footprint lies on the body")
-    inclusions = children[len(volumes) + len(printed) + len(heights) :]
-    _name_groups(scene, footprint, regions_of(scene.body, inclusions, scene.scale))
+    inclusions = children[len(volumes) + len(printed) + len(heights) : first]
+    regions = regions_of(scene.body, inclusions, scene.scale)
+    if slit := scene.probe.slit:
+        count = len(slit.free(0.0))
+        free = [tag for part in children[first : first + count] for _, tag in part if tag in inside]
+        _name_groups(scene, footprint, regions, free)
+        return singular_curves(slit, scene.frame, footprint + free, scene.scale)
+    _name_groups(scene, footprint, regions)
     edge = gmsh.model.getBoundary([(2, tag) for tag in footprint], oriented=False)
     return [abs(tag) for _, tag in edge if not _is_on_mirror(scene, abs(tag))]
 
@@ -139,6 +154,15 @@ def _add_body(scene: Scene) -> int:
         except NotASolid as error:
             raise SceneError(str(error)) from None
     raise SceneError(f"a {body.shape} is not drawn")
+
+
+def _add_contact(scene: Scene, volumes: list[tuple[int, int]]) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+    """Add the faces that the probe touches and, of a slit, the rest of its faces, and its plane inside the body."""
+    if scene.probe.slit is None:
+        return _add_footprint(scene, volumes), []
+    far = 3 * scene.body.extent
+    touched, free = draw_slit(scene.probe.slit, scene.frame, scene.units, far)
+    return touched, free + ([draw_plane(scene.frame, scene.units, far)] if scene.has_inner_slit else [])
 
 
 def _add_footprint(scene: Scene, volumes: list[tuple[int, int]]) -> list[tuple[int, int]]:
@@ -180,15 +204,15 @@ def _add_level(height: float) -> int:
     return int(gmsh.model.occ.addRectangle(-size / 2, -size / 2, height, size, size))
 
 
-def _name_groups(scene: Scene, footprint: list[int], regions: dict[int, list[int]]) -> None:
-    """Put every volume and every boundary face into its physical group."""
+def _name_groups(scene: Scene, footprint: list[int], regions: dict[int, list[int]], slit: Sequence[int] = ()) -> None:
+    """Put every volume, every boundary face, and every face of a slit into its physical group."""
     model = gmsh.model
     volumes = model.getEntities(3)
-    groups: dict[str, list[int]] = {PROBE: list(footprint), FIXED: [], FREE: [], CUT: []}
+    groups: dict[str, list[int]] = {PROBE: list(footprint), FIXED: [], FREE: [], CUT: [], SLIT: list(slit)}
     groups |= {MIRROR[plane]: [] for plane in scene.mirrors}
     tests = _face_tests(scene)
     for _, tag in model.getBoundary(volumes, combined=True, oriented=False):
-        if tag in footprint:
+        if tag in footprint or tag in slit:
             continue
         points = _sample(tag, isinstance(scene.body, FromCad)) * scene.scale
         name = next((name for name, test in tests if test(points)), FREE)

@@ -177,6 +177,10 @@ class Layered(Drawn):
         ends = (high - total for total in accumulate(layer.thickness or inf for layer in self.layers))
         return tuple(end for end in ends if end - low > _SAME * (high - low))
 
+    @abstractmethod
+    def to_side(self, point: tuple[float, float], direction: tuple[float, float]) -> float:
+        """Return how far (m) it is from x and y of a point of the top, along a unit vector in it, to the side."""
+
     @property
     def is_filled(self) -> bool:
         """Whether its layers reach the bottom."""

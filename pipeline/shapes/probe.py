@@ -12,6 +12,7 @@ from pipeline.shapes.arrays import BoolArray, FloatArray, np
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.section import Problems, Section, Words
+from pipeline.shapes.slit import Slit
 from pipeline.units import Coordinate, Length
 
 # The candidates for mirror planes, by the coordinate that is zero on them, and their normals.
@@ -117,9 +118,17 @@ class Probe(Section, ABC):
         return self.contact == "unilateral"
 
     @property
+    def slit(self) -> Slit | None:
+        """The slit that it stands in, and whose faces are then all that it touches; None if it is on the surface."""
+        return None
+
+    @property
     def proportional_to(self) -> tuple[str, ...]:
-        """Keys that F is proportional to: none where more of the tool touches the deeper it is."""
-        return () if self.is_unilateral else self.PROPORTIONAL_TO
+        """Keys that F is proportional to: none where more of the tool touches the deeper it is.
+
+        Nor does what holds a slit's faces apart grow with the depth.
+        """
+        return () if self.is_unilateral or self.slit else self.PROPORTIONAL_TO
 
     @property
     def scale(self) -> float:

@@ -15,6 +15,7 @@ from pipeline.scene.model import FIXED, MIRROR, PROBE
 from pipeline.solve.compiled import vector_space
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Motion
+from pipeline.solve.release import Front
 from pipeline.stages import stage
 
 
@@ -23,18 +24,31 @@ class Conditions:
     """What is prescribed, whatever its value: on the footprint all components (``bonded``) or that along z alone.
 
     Nothing is where contact is ``unilateral``: what touches is found, and held by those who find it. The support is
-    held, and on planes of symmetry that bound the mesh so is the displacement across them.
+    held, and on planes of symmetry that bound the mesh so is the displacement across them. A probe that stands in a
+    slit, with that ``front``, touches both of its faces, and without bond holds them apart only.
     """
 
     bonded: bool = True
     unilateral: bool = False
+    front: Front | None = None
 
     @property
     def components(self) -> tuple[int, ...]:
-        """Components of the displacement that the probe prescribes."""
+        """Components of the displacement that the probe prescribes.
+
+        Raises:
+            SolveError: if that would be none of them alone.
+        """
         if self.unilateral:
             return ()
-        return (0, 1, 2) if self.bonded else (2,)
+        if self.bonded:
+            return (0, 1, 2)
+        if self.front is None:
+            return (2,)
+        normal = [axis for axis, part in enumerate(self.front.normal) if abs(part) > 1 - _SAME]
+        if not normal:
+            raise SolveError("tissue slides along the faces of a slit that lies along x or y only")
+        return tuple(normal)
 
 
 class ConstrainedSpace:
@@ -65,7 +79,7 @@ class ConstrainedSpace:
         zero = np.zeros((), dtype=PETSc.ScalarType)
         self.dirichlet = [compat.dirichletbc(np.zeros(3, dtype=PETSc.ScalarType), fixed, space)]
         self.dirichlet += [compat.dirichletbc(zero, dofs, space.sub(axis)) for dofs, axis in single]
-        self._probe = probe
+        self._probe, self._sides = probe, self._sides_of(probe)
         self.prescribed = np.unique(np.concatenate([*(d for d, _ in single), *(3 * fixed + c for c in range(3))]))
         self.prescribed_owned = self.prescribed[self.prescribed < self.owned]
         self.probe_owned, self.fixed_owned = (dofs[dofs < index_map.size_local] for dofs in (probe, fixed))
@@ -85,13 +99,23 @@ class ConstrainedSpace:
         index_map = self.space.dofmap.index_map
         values = np.zeros(3 * (index_map.size_local + index_map.num_ghosts))
         points = np.asarray(self.space.tabulate_dof_coordinates())[self._probe] if motion.is_rotation else _ORIGIN
-        displacement = np.broadcast_to(motion.at(points), (len(self._probe), 3))
+        displacement = np.broadcast_to(motion.at(points, self._sides), (len(self._probe), 3))
         for component in self.conditions.components:
             values[3 * self._probe + component] = displacement[:, component]
         return values
 
+    def _sides_of(self, probe: Int32Array) -> FloatArray | None:
+        """Return of each point of the footprint on which side of a slit its face is, 1 or -1; collective."""
+        if self.conditions.front is None:
+            return None
+        sides = np.full(len(probe), -1.0)
+        sides[np.isin(probe, _points_beyond(self.space, self._body, self.conditions.front))] = 1.0
+        return sides
+
 
 _ORIGIN = np.zeros((1, 3))
+# A direction this near to an axis of coordinates is it.
+_SAME = 1e-9
 
 
 def whole_points(space: Any, body: BodyMesh) -> int:
@@ -106,6 +130,17 @@ def _planes(space: Any, body: BodyMesh) -> list[Int32Array]:
     """Local points of ``space`` in each of the planes of symmetry that bound the mesh."""
     names = [MIRROR["xy"[axis]] for axis in body.mirrored]
     return [_points(space, body, name) for name in names]
+
+
+def _points_beyond(space: Any, body: BodyMesh, front: Front) -> Int32Array:
+    """Return the points of the footprint's facets whose cells are on the positive side of a slit; collective."""
+    mesh, facets = body.mesh, body.facets[PROBE]
+    tdim = mesh.topology.dim
+    of_facet = mesh.topology.connectivity(tdim - 1, tdim)
+    cells = np.array([of_facet.links(facet)[0] for facet in facets], dtype=np.int64)
+    corners = mesh.geometry.x[compat.geometry_dofs(mesh)[cells, : tdim + 1]].reshape(-1, tdim + 1, 3)
+    beyond = (corners.mean(axis=1) - np.array(front.point)) @ np.array(front.normal) > 0
+    return np.asarray(fem.locate_dofs_topological(space, tdim - 1, facets[beyond]))
 
 
 def _points(space: Any, body: BodyMesh, group: str) -> Int32Array:

@@ -8,7 +8,7 @@ cent on the same solution.
 """
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from typing import Any
@@ -25,6 +25,7 @@ from pipeline.solve.linear import Level, LinearSolver, SolveError, is_direct
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.reaction import Response, reaction, sums
+from pipeline.solve.release import Release
 from pipeline.solve.rim import plain_share
 from pipeline.solve.solution import BALANCE_LIMIT, MOST_ROUNDS, TOLERANCE, Solution, rest
 from pipeline.solve.spaces import ElasticSpace, Spaces
@@ -81,7 +82,7 @@ class DisplacementProblem:
         Raises:
             SolveError: if the solver did not converge, or the solution fails a check.
         """
-        fine, asked = self._fine, tolerance
+        fine, asked, released_finer = self._fine, tolerance, None
         direct = is_direct(method, self.dofs, fine.degree)
         held = [fine.dofs.held(motion) for motion in loads.motions]
         with ExitStack() as stack:
@@ -114,21 +115,21 @@ class DisplacementProblem:
             seconds = time.perf_counter() - start
             solution = Solution(
                 response, largest_strain(self._strain, self._body), fine.dofs.whole_dofs, self._body.cells,
-                iterations, assemble, solver.setup_seconds, seconds,
+                iterations, assemble, solver.setup_seconds, seconds, released=self._released(law, held, loads),
             )  # fmt: skip
             if not estimate:
                 return solution
             solver.close()  # what the next degree takes is the most memory of all
             start = time.perf_counter()
-            found, more = self._decrements(law, levels, held, loads, stack)
+            found, released_finer, more = self._decrements(law, levels, held, loads, stack)
             plain = plain_share(self._body)
         shares = np.diag(found) / np.diag(response.stiffness)
         relative = np.array([error_bar(share, fine.degree, plain=plain) for share in shares])
         bars = stiffness_bars(response.stiffness, relative, apart=loads.apart)
         return replace(
             solution, decrements=found, plain=plain, bars=bars, estimate_iterations=more,
-            time_estimate=time.perf_counter() - start,
-        )  # fmt: skip
+            released_finer=released_finer, time_estimate=time.perf_counter() - start,
+        ).with_release_bar(fine.degree)  # fmt: skip
 
     @contextmanager
     def solver(self, law: MaterialLaw, method: str = "auto") -> Iterator[LinearSolver]:
@@ -185,8 +186,11 @@ class DisplacementProblem:
     @stage("error bar")
     def _decrements(
         self, law: MaterialLaw, levels: list[Level], held: list[FloatArray], loads: Loads, stack: ExitStack
-    ) -> tuple[FloatArray, int]:
-        """Return what one degree more takes away from the last stiffness of the whole body, and the iterations."""
+    ) -> tuple[FloatArray, FloatArray | None, int]:
+        """Return what one degree more takes away from the last stiffness of the whole body, and the iterations.
+
+        Between them is what it makes of the energy that a slit's front releases.
+        """
         fine = self._fine
         finer = self._spaces.get(fine.degree + 1, self._conditions)
         if len(levels) == 1:
@@ -202,11 +206,44 @@ class DisplacementProblem:
             finer.apply(residual, law)
             residual.scale(-1.0)
             residual.array[finer.dofs.prescribed_owned] = 0.0
+        decrements, corrections, iterations = energy_decrements(solver, residuals, keep=self._has_slit)
+        released = self._released(law, held, loads, finer, corrections)
         fine.forms.displacement.x.array[:] = moved
-        decrements, iterations = energy_decrements(solver, residuals)
         if loads.apart:
             decrements = np.diag(np.diag(decrements))
-        return 2.0 ** len(self._body.mirrored) * decrements, iterations
+        return 2.0 ** len(self._body.mirrored) * decrements, released, iterations
+
+    @property
+    def _has_slit(self) -> bool:
+        return self._conditions.front is not None
+
+    @stage("energy release")
+    def _released(
+        self, law: MaterialLaw, held: list[FloatArray], loads: Loads, finer: ElasticSpace | None = None,
+        corrections: Sequence[FloatArray] = (),
+    ) -> FloatArray | None:  # fmt: skip
+        """Return what a slit's front in the whole body releases (J/m), by pairs of motions; collective.
+
+        It is that of the last solution, or of its ``corrections`` in a ``finer`` space.
+        """
+        if self._conditions.front is None:
+            return None
+        space = finer or self._fine
+        space.forms.set_law(law)
+        release = Release(self._body, self._conditions.front, space.forms.displacement, space.forms.lame)
+
+        def put(amounts: FloatArray) -> None:
+            self._move(held, Loads(loads.motions, tuple(amounts)))
+            if finer is None:
+                return
+            with vector(space.dofs.space) as displacement:
+                space.forms.displacement.interpolate(self._fine.forms.displacement)
+                displacement.array[:] = space.forms.displacement.x.array[: space.dofs.owned] + amounts @ corrections
+                space.set_displacement(displacement)
+
+        found = release.matrix(len(held), put)
+        self._move(held, loads)
+        return 2.0 ** len(self._body.mirrored) * found
 
     def _response(self, unknowns: list[PETSc.Vec], held: list[FloatArray], law: MaterialLaw, loads: Loads) -> Response:
         """Return the response to the motions whose solutions, less the prescribed displacements, are ``unknowns``."""

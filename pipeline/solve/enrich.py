@@ -26,11 +26,13 @@ _FEWEST, _MOST = 3, 60
 _ROUNDING = 1e-6
 
 
-def energy_decrements(solver: LinearSolver, residuals: Sequence[PETSc.Vec]) -> tuple[FloatArray, int]:
-    """Return r_i·A⁻¹·r_j (J) of n ``residuals``, (n, n), and the iterations; collective.
+def energy_decrements(
+    solver: LinearSolver, residuals: Sequence[PETSc.Vec], *, keep: bool = False
+) -> tuple[FloatArray, list[FloatArray], int]:
+    """Return r_i·A⁻¹·r_j (J) of n ``residuals``, (n, n), each A⁻¹·r_i (owned dofs), and the iterations; collective.
 
     On the diagonal it is from below; the error of any entry is at most the root of the two on the diagonal. The
-    residuals are overwritten.
+    residuals are overwritten. A single solution is empty unless it is to be kept.
 
     Raises:
         SolveError: if the increments do not get small.
@@ -38,12 +40,12 @@ def energy_decrements(solver: LinearSolver, residuals: Sequence[PETSc.Vec]) -> t
     first = [np.array(residual.array) for residual in residuals]
     corrections, totals, iterations = [], [], 0
     for residual in residuals:
-        total, correction, count = _correct(solver, residual, keep=len(residuals) > 1)
+        total, correction, count = _correct(solver, residual, keep=keep or len(residuals) > 1)
         totals.append(total)
         corrections.append(correction)
         iterations += count
     if len(totals) == 1:
-        return np.array([totals]), iterations
+        return np.array([totals]), corrections, iterations
     # With x_i for A⁻¹ r_i and ρ_i for what is left of r_i: x_i·r_j + x_j·r_i - x_i·A·x_j, and A x_j = r_j - ρ_j.
     left = [np.array(residual.array) for residual in residuals]
     local = np.array([[x @ rho + y @ r for y, rho in zip(corrections, left, strict=True)]
@@ -51,7 +53,7 @@ def energy_decrements(solver: LinearSolver, residuals: Sequence[PETSc.Vec]) -> t
     found = global_sum(residuals[0].comm.tompi4py(), local)
     found = (found + found.T) / 2
     np.fill_diagonal(found, totals)
-    return found, iterations
+    return found, corrections, iterations
 
 
 def _correct(solver: LinearSolver, residual: PETSc.Vec, *, keep: bool) -> tuple[float, FloatArray, int]:

@@ -33,6 +33,8 @@ _LIMITS = {"displacement": (0.4, 0.25), "mixed": (0.5, 0.35)}
 _LIMITS_COARSE, _LIMITS_PLAIN = (0.4, 1.0), (0.85, 0.85)
 # Where materials meet, or a surface is curved, part of the error is from there: the next degree takes another share.
 _LIMITS_ELSEWHERE = {"displacement": (0.4, 0.4), "mixed": (0.5, 0.9)}
+# The energy that a slit's front releases is at that of degree p + 1, less (centre ± spread) θ times what that changed.
+_RELEASE = (0.45, 0.9)
 # Graded to the edge: the coarsest that was measured, relative to the probe's half width, and the growth from there.
 _GRADED = (0.4, 0.7)
 
@@ -82,6 +84,20 @@ def extrapolate(
     share = 1 / np.sqrt(1 + relative)
     left = bars * np.outer(share, share) * spread * theta / (1 + _left(degree, element, plain) * theta)
     return stiffness - (1 + centre * theta) * decrements, left
+
+
+def release_bar(released: float, finer: float, degree: int, bar: float, *, extrapolated: bool = False) -> float:
+    """Return the 95 % bar on what a slit's front releases, relative to it, or on what the degrees tend to.
+
+    ``finer`` is what one degree more makes of it, ``bar`` that on the energy, of which it is a derivative.
+    """
+    share = abs(released - finer) / abs(released)
+    return share * (_RELEASE[1] * _theta(degree) if extrapolated else 1 + _theta(degree)) + bar
+
+
+def extrapolate_release(released: FloatArray, finer: FloatArray, degree: int) -> FloatArray:
+    """Return what the degrees tend to of what a slit's front releases."""
+    return released - (1 + _RELEASE[0] * _theta(degree)) * (released - finer)
 
 
 def _theta(degree: int) -> float:

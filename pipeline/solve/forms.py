@@ -54,6 +54,14 @@ class ElasticForms:
             else:
                 place.x.array[self._cells] = np.array(values)[self._regions if len(values) > 1 else 0]
 
+    def by_region(self, values: tuple[float, ...]) -> Any:
+        """Return a constant of forms, or a function, that has one of ``values`` in each region."""
+        if self._regions is None:
+            return fem.Constant(self._space.mesh, values[0])
+        result = fem.Function(cellwise_space(self._space.mesh, ()))
+        result.x.array[self._cells] = np.array(values)[self._regions if len(values) > 1 else 0]
+        return result
+
     @cached_property
     def stiffness(self) -> Any:
         """K."""

@@ -14,22 +14,36 @@ _ZERO: Vector = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Motion:
-    """A unit of one rigid movement: along the unit vector ``direction``, or about the axis ``rotation`` of a point.
+    """A unit of one movement: along the unit vector ``direction``, or about the axis ``rotation`` of a point.
 
-    A unit is a metre, or, for the small rotation ω × (x − ``centre``), a radian.
+    A unit is a metre, or, for the small rotation ω × (x − ``centre``), a radian. ``opening`` moves what the probe
+    touches of a slit's faces apart, each by a metre: the face on the side of that unit vector along it, the other back.
     """
 
     direction: Vector = _ZERO
     rotation: Vector = _ZERO
     centre: Vector = _ZERO
+    opening: Vector = _ZERO
 
     @property
     def is_rotation(self) -> bool:
         """Whether it turns the probe."""
         return any(self.rotation)
 
-    def at(self, points: FloatArray) -> FloatArray:
-        """Return the displacement of a unit (m), at ``points`` (m), shape (points, 3)."""
+    @property
+    def is_translation(self) -> bool:
+        """Whether it moves the probe along a direction."""
+        return any(self.direction)
+
+    def at(self, points: FloatArray, sides: FloatArray | None = None) -> FloatArray:
+        """Return the displacement of a unit (m), at ``points`` (m), shape (points, 3).
+
+        ``sides`` (points) are 1 or -1, for the faces of a slit on either side of its plane.
+        """
+        if any(self.opening):
+            if sides is None:
+                raise ValueError("there is no slit to be opened")
+            return np.asarray(np.outer(sides, np.array(self.opening)))
         turned = np.cross(np.array(self.rotation), points - np.array(self.centre))
         return np.asarray(np.array(self.direction) + turned)
 
@@ -61,6 +75,10 @@ class Loads:
         axes: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         motions = [Motion(axis) for axis in axes] + [Motion(rotation=axis, centre=centre) for axis in axes]
         return Loads(tuple(motions), (*travel, 0.0, 0.0, 0.0))
+
+    def opened(self, normal: Vector, amount: float) -> "Loads":
+        """Return the loads of a probe that also holds each face of a slit ``amount`` (m) off its plane."""
+        return Loads((*self.motions, Motion(opening=normal)), (*self.amounts, amount))
 
     def times(self, factor: float) -> "Loads":
         """Return ``factor`` times the movement."""

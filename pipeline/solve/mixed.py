@@ -34,6 +34,7 @@ from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw, SplitLaw
 from pipeline.solve.mixed_space import MixedSpace
 from pipeline.solve.reaction import Response, reaction, sums
+from pipeline.solve.release import Release
 from pipeline.solve.rim import plain_share
 from pipeline.solve.saddle import Pair, Saddle, SaddleSolver
 from pipeline.solve.solution import BALANCE_LIMIT, TOLERANCE, Solution, rest
@@ -121,11 +122,12 @@ class MixedProblem:
                 raise SolveError(
                     f"forces do not balance: relative error {response.balance:.1e}, allowed {BALANCE_LIMIT:.0e}"
                 )
+            released = self._released(fine, split, unknowns, held)
             self._move(unknowns, held, loads.amounts)
             strain = largest_strain(self._strain, self._body)
             solution = Solution(
                 _times(response, split.unit), strain, fine.whole_dofs, self._body.cells, iterations,
-                assemble, solver.setup_seconds, seconds,
+                assemble, solver.setup_seconds, seconds, released=released,
             )  # fmt: skip
             if not estimate:
                 return solution
@@ -137,14 +139,31 @@ class MixedProblem:
         """Return the last solution's displacement (m) and the principal strains of each owned cell; collective."""
         return self._fine.displacements.forms.displacement, principal_strains(self._strain, self._body)
 
-    def _move(self, unknowns: list[Pair], held: list[FloatArray], amounts: Sequence[float]) -> None:
-        """Make the sum of the motions the displacement and the pressure of the forms; collective."""
-        owned = self._fine.displacements.dofs.owned
-        with self._fine.pair() as (displacement, pressure):
+    def _move(
+        self, unknowns: list[Pair], held: list[FloatArray], amounts: Sequence[float], space: MixedSpace | None = None
+    ) -> None:
+        """Make the sum of the motions the displacement and the pressure of the forms of a space; collective."""
+        space = space or self._fine
+        owned = space.displacements.dofs.owned
+        with space.pair() as (displacement, pressure):
             for (u, p), values, amount in zip(unknowns, held, amounts, strict=True):
                 displacement.array[:] += amount * (u.array + values[:owned])
                 pressure.axpy(amount, p)
-            self._fine.set_fields((displacement, pressure))
+            space.set_fields((displacement, pressure))
+
+    @stage("energy release")
+    def _released(
+        self, space: MixedSpace, split: SplitLaw, unknowns: list[Pair], held: list[FloatArray]
+    ) -> FloatArray | None:
+        """Return what a slit's front in the whole body releases (J/m), by pairs of motions; collective."""
+        if self._conditions.front is None:
+            return None
+        forms = space.displacements.forms
+        forms.set_law(split.elastic)
+        pressure = (space.forms.pressure, forms.by_region(split.compliance))
+        release = Release(self._body, self._conditions.front, forms.displacement, forms.lame, pressure)
+        found = release.matrix(len(held), lambda amounts: self._move(unknowns, held, list(amounts), space))
+        return 2.0 ** len(self._body.mirrored) * split.unit * found
 
     @stage("error bar")
     def _estimate(
@@ -162,6 +181,7 @@ class MixedProblem:
                 finer.start_from(self._fine, pair, fine_values)
             iterations = self._correct(finer, solver, split, found, finer_held, _ESTIMATE_TOLERANCE)
             fine = self._response(finer, split, found, finer_held, loads)
+            released = self._released(finer, split, found, finer_held)
         decrements, energies = coarse.stiffness - fine.stiffness, np.diag(coarse.stiffness)
         unseen = 2.0 ** len(self._body.mirrored) * np.array(solver.first_energies) / energies
         plain = plain_share(self._body)
@@ -170,10 +190,10 @@ class MixedProblem:
             for d, n in zip(np.diag(decrements) / energies, unseen, strict=True)
         ]
         return replace(
-            solution, decrements=split.unit * decrements, plain=plain,
+            solution, decrements=split.unit * decrements, plain=plain, released_finer=released,
             bars=stiffness_bars(solution.stiffness, np.array(relative), apart=loads.apart),
             estimate_iterations=iterations, time_estimate=time.perf_counter() - start,
-        )  # fmt: skip
+        ).with_release_bar(self._degree)  # fmt: skip
 
     @stage("iterations")
     def _correct(

@@ -45,7 +45,7 @@ class Response:
         force, along = self.amounts @ self.forces, self.stiffness @ self.amounts
         for motion, conjugate in zip(self.loads.motions, along, strict=True):
             direction = np.array(motion.direction)
-            if not motion.is_rotation:
+            if motion.is_translation:
                 force = force - (conjugate + force @ direction) * direction
         x, y, z = map(float, force)
         return x, y, z
@@ -90,14 +90,15 @@ class Sums:
     def imbalance(self, twice_energies: FloatArray, loads: Loads, mirrored: Sequence[int]) -> float:
         """Return the largest relative error of F·d = 2U (``twice_energies``, n) and of F_probe + F_support = 0.
 
-        A rotation may take no force at all: its forces are measured by what its energy is worth in a translation.
+        A rotation, or a slit that is opened, may take no force at all: its forces are measured by what its energy is
+        worth in a translation.
         """
         on_probe, on_support = (_whole(part, mirrored) for part in (self.on_probe, self.on_support))
         size = np.linalg.norm(on_probe, axis=1)
-        if straight := [j for j, motion in enumerate(loads.motions) if not motion.is_rotation]:
-            stiffest = max(twice_energies[j] for j in straight)
-            worth = 2.0 ** len(mirrored) * np.sqrt(np.abs(twice_energies * stiffest))
-            size = np.where([motion.is_rotation for motion in loads.motions], np.maximum(size, worth), size)
+        straight = np.array([motion.is_translation for motion in loads.motions])
+        stiffest = twice_energies[straight].max() if straight.any() else twice_energies.max()
+        worth = 2.0 ** len(mirrored) * np.sqrt(np.abs(twice_energies * stiffest))
+        size = np.where(straight, size, np.maximum(size, worth))
         forces = np.linalg.norm(on_probe + on_support, axis=1) / np.where(size > 0, size, np.inf)
         return float(max((np.abs(self.works - twice_energies) / twice_energies).max(), forces.max()))
 

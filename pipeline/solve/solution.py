@@ -7,7 +7,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.error import extrapolate
+from pipeline.solve.error import extrapolate, extrapolate_release, release_bar
 from pipeline.solve.loads import Loads, Vector
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.reaction import Response
@@ -43,7 +43,9 @@ class Solution:
     the probe's stiffness, and ``bars`` (n, n) the 95 % error bars on its entries, made with ``plain``, the share of
     edges at the rim without quarter points (see :mod:`pipeline.solve.error`). Of unilateral contact, ``contact_area``
     (m²) and ``contact_radius`` (m) are those found, ``iterations`` the linear solves that it took, and ``stored`` (J)
-    is its strain energy, which is not half of F d.
+    is its strain energy, which is not half of F d. ``released`` (n, n) is the energy (J) that a metre of advance of a
+    slit's front releases, a form of the amounts of the motions (:mod:`pipeline.solve.release`), ``released_finer`` what
+    one degree more makes of it, and ``release_bar`` the relative 95 % bar on what they release.
     """
 
     response: Response
@@ -63,6 +65,9 @@ class Solution:
     contact_area: float = nan
     contact_radius: float = nan
     stored: float | None = None
+    released: FloatArray | None = None
+    released_finer: FloatArray | None = None
+    release_bar: float = nan
 
     @property
     def reaction(self) -> Vector:
@@ -107,11 +112,31 @@ class Solution:
         if self.bars is not None:
             conjugate = self.bars @ np.abs(self.response.amounts)
             for motion, bar in zip(self.response.loads.motions, conjugate, strict=True):
-                if not motion.is_rotation:
+                if motion.is_translation:
                     spanned += np.square(motion.direction)
                     bars += bar * np.abs(motion.direction)
         x, y, z = map(float, np.where(spanned > 1 - 1e-9, bars, nan))
         return x, y, z
+
+    @property
+    def release(self) -> float:
+        """Energy (J) that a metre of advance of the slit's front releases; not a number if there is no slit."""
+        return _form(self.released, self.response.amounts)
+
+    def with_release_bar(self, degree: int) -> "Solution":
+        """Return the solution with the bar on what a slit's front releases, for elements of ``degree``."""
+        if self.released is None:
+            return self
+        finer = _form(self.released_finer, self.response.amounts)
+        return replace(self, release_bar=release_bar(self.release, finer, degree, self.bar))
+
+    @property
+    def is_shut(self) -> bool:
+        """Whether to open a slit further would release less: its faces are pressed together at the front."""
+        if self.released is None:
+            return False
+        gained = self.released @ self.response.amounts
+        return any(g < 0 for g, motion in zip(gained, self.response.loads.motions, strict=True) if any(motion.opening))
 
     def extrapolated(self, degree: int, element: str, *, graded: bool = True, elsewhere: bool = False) -> "Solution":
         """Return what the sequence of degrees tends to, ``graded`` to the edge or not; itself if it has no bars.
@@ -124,7 +149,18 @@ class Solution:
             self.stiffness, self.decrements, self.bars, degree, element, plain=self.plain, graded=graded,
             elsewhere=elsewhere,
         )  # fmt: skip
-        return replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
+        best = replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
+        if self.released is None or self.released_finer is None:
+            return best
+        finer = _form(self.released_finer, self.response.amounts)
+        return replace(
+            best, released=extrapolate_release(self.released, self.released_finer, degree),
+            release_bar=release_bar(self.release, finer, degree, best.bar, extrapolated=True),
+        )  # fmt: skip
+
+
+def _form(matrix: FloatArray | None, amounts: FloatArray) -> float:
+    return nan if matrix is None else float(amounts @ matrix @ amounts)
 
 
 class Problem(Protocol):

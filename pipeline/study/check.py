@@ -19,6 +19,7 @@ from pipeline.shapes.section import Section, in_mm
 from pipeline.study.problems import Problems
 from pipeline.study.regions import tissues_of
 from pipeline.study.schema import Material, Mesh, Solving
+from pipeline.study.slit import check_slit, check_slit_in
 from pipeline.study.sweep import Axis
 
 # Linear elasticity: strain under the probe is of order depth / radius.
@@ -58,10 +59,12 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         _check_outside(body, mesh, problems)
     sane = [probe for probe in probes if _has_place(probe, problems)]
     placed = [pair for pair in itertools.product(bodies, sane) if _check_place(*pair, problems)]
+    placed = [pair for pair in placed if check_slit(*pair, problems)]
     for (body, probe), mesh in itertools.product(placed, meshes):
         _check_column(body, probe, mesh, problems)
         _check_gap(body, probe, mesh, problems)
         _check_straight(body, probe, mesh, problems)
+        check_slit_in(body, probe, mesh, problems)
     for body, material, mesh in itertools.product(bodies, materials, meshes):
         _check_locking(dict(tissues_of(body, material)), mesh, problems)
     _check_reference(meshes, axes, problems)
@@ -147,6 +150,8 @@ def _footprint(probe: Probe) -> str:
     """Return what must lie on one face, in words."""
     if isinstance(probe, Indenter):
         return f"all that the {probe.shape} may touch, up to {in_mm(probe.circumradius)} from its axis,"
+    if probe.slit and not probe.slit.is_open:
+        return "the slit"
     return f"the footprint of the {probe.shape}"
 
 

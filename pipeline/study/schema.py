@@ -209,6 +209,6 @@ NESTED: dict[str, dict[str, type[Section]]] = {"body": {"layers": Layer, "inclus
 SINGLE = ("solve", "plan")
 # Keys of the format that this version does not compute: named as such, not as typing errors.
 LATER_KEYS = {
-    "probe": ("incision", "path"),
+    "probe": ("path",),
 }
 LATER_SECTIONS = ("load",)

@@ -98,9 +98,9 @@ class Case:
 
     @property
     def movements(self) -> int:
-        """How many rigid motions of the probe are solved for: the press, the slide if there is one, or all six."""
+        """How many motions of the probe are solved for: press, slide, opening of a slit; or all six."""
         slides = self.travel != tuple(self.probe.depth * a for a in self.frame.axis)
-        return 6 if self.probe.motion == "all" else 1 + slides
+        return 6 if self.probe.motion == "all" else 1 + slides + (self.probe.slit is not None)
 
     @property
     def tissues(self) -> tuple[Tissue, ...]:
@@ -129,7 +129,7 @@ class Case:
     @property
     def is_plain(self) -> bool:
         """Whether the probe's edge rules the error of F: one material, pressed straight down on a plane face."""
-        return not self.body.regions and is_level(self.body, self.frame)
+        return not self.body.regions and self.probe.slit is None and is_level(self.body, self.frame)
 
     @property
     def is_full(self) -> bool:

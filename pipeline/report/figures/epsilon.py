@@ -18,8 +18,9 @@ CLAIM_EPSILON, CLAIM_RATIO, CLAIM_SPEEDUP = 10e-3, 0.8, 50.0
 
 
 def epsilon(dataset: xr.Dataset, title: str, warning: str) -> Figure:
-    """F/F_max, and below it the speed-up, against ε."""
-    return _against_epsilon(dataset, ("force_ratio", "speedup"), title, warning)
+    """F/F_max, the same of what a slit's front releases, and below it the speed-up, against ε."""
+    released = [name for name in ("energy_release_ratio",) if name in dataset]
+    return _against_epsilon(dataset, ("force_ratio", *released, "speedup"), title, warning)
 
 
 def ratio(dataset: xr.Dataset, title: str, warning: str) -> Figure:
@@ -39,11 +40,13 @@ def _against_epsilon(dataset: xr.Dataset, quantities: Sequence[str], title: str,
         x = draw_curves(panel, layout).positions
         if panel.quantity == "force_ratio":
             _mark_ratio(panel.ax, x)
-        else:
+        elif panel.quantity == "speedup":
             _mark_speedup(panel.ax, first=panel.is_first)
+        else:
+            panel.ax.axhline(1.0, color=LINE, linewidth=0.7)
         if panel.is_first:
-            is_ratio = panel.quantity == "force_ratio"
-            panel.ax.set_ylabel(formula("force_ratio") if is_ratio else heading(dataset["speedup"]))
+            is_speedup = panel.quantity == "speedup"
+            panel.ax.set_ylabel(heading(dataset["speedup"]) if is_speedup else formula(panel.quantity))
     finish(figure, title, layout.note, warning)
     return figure
 

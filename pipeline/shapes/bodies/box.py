@@ -1,7 +1,7 @@
 """A box."""
 
 from itertools import pairwise, product
-from math import hypot, inf
+from math import copysign, hypot, inf
 from typing import Annotated, Any, Literal
 
 from pipeline.shapes.arrays import FloatArray, np
@@ -105,6 +105,11 @@ class Box(Layered):
             return min(self.size[0] / 2 - abs(point[0]), self.size[1] / 2 - abs(point[1]))
         beside = [(c, sides) for n, (c, sides) in enumerate(zip(point, self._sides, strict=True)) if n != number]
         return min(min(c - low, high - c) for c, (low, high) in beside)
+
+    def to_side(self, point: tuple[float, float], direction: tuple[float, float]) -> float:
+        """Return the distance (m) to the first of the four sides."""
+        sizes = zip(point, direction, self.size, strict=False)
+        return min((copysign(size / 2, d) - p) / d for p, d, size in sizes if d != 0)
 
     @property
     def _sides(self) -> tuple[tuple[float, float], ...]:

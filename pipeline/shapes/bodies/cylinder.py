@@ -1,6 +1,6 @@
 """An upright cylinder."""
 
-from math import atan2, hypot, pi
+from math import atan2, hypot, pi, sqrt
 from typing import Annotated, Any, Literal
 
 from pipeline.shapes.arrays import FloatArray, np
@@ -105,6 +105,12 @@ class Cylinder(Layered):
         if self._is_side(point):
             return min(-point[2], point[2] + self.height)
         return self.radius - hypot(point[0], point[1])
+
+    def to_side(self, point: tuple[float, float], direction: tuple[float, float]) -> float:
+        """Return the distance (m) to the circle."""
+        (x, y), (a, b) = point, direction
+        inward = a * x + b * y
+        return sqrt(inward**2 + self.radius**2 - x**2 - y**2) - inward
 
     @property
     def _rims(self) -> FloatArray:

@@ -1,13 +1,17 @@
 """A blade."""
 
+from functools import cached_property
 from math import hypot
 from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field
 
 from pipeline.shapes.arrays import BoolArray, FloatArray, np
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.probe import ON_EDGE, Punch
 from pipeline.shapes.section import Problems, Words, in_mm
+from pipeline.shapes.slit import Slit
 from pipeline.units import Length, Travel
 
 _ALIGNED = 1e-12
@@ -15,7 +19,7 @@ _CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 
 
 class Blade(Punch):
-    """A flat rectangular punch; its length lies along ``direction``."""
+    """A flat rectangular punch; its length lies along ``direction``. With an ``incision`` it stands in a slit."""
 
     PROPORTIONAL_TO = ("depth", "slice")
     EXPECTED_ERROR = 0.75
@@ -28,6 +32,27 @@ class Blade(Punch):
         Words("Along which the edge lies, as far as it is normal to the probe's axis.", "[1.0, 0.0, 0.0]"),
     ] = (1.0, 0.0, 0.0)
     slice: Annotated[Travel, Words("How far it is drawn along its edge as it cuts.", '"0.05 mm"')] = 0.0
+    incision: Annotated[
+        Travel,
+        Words(
+            "Depth of the slit that it stands in. Its flanks then hold the slit's faces apart by its width, and take "
+            "them along; 0 presses its edge on the whole surface.",
+            '"4 mm"',
+        ),
+    ] = 0.0
+    ahead: Annotated[
+        Length | None,
+        Field(json_schema_extra={"unit": "m"}),
+        Words(
+            "How far the slit runs ahead of the blade: of its tip, and of its ends.",
+            '"1 mm"',
+            default="the blade's width",
+        ),
+    ] = None
+    ends: Annotated[
+        Literal["blade", "open"],
+        Words("Where the slit ends: with the blade, or, open, at the sides of the body.", '"blade"'),
+    ] = "blade"
 
     @property
     def lies_along(self) -> Vector:
@@ -39,24 +64,34 @@ class Blade(Punch):
         x, y, z = (self.slice * t + self.depth * a for t, a in zip(frame.along, frame.axis, strict=True))
         return x, y, z
 
+    @cached_property
+    def slit(self) -> Slit | None:
+        """The slit that it stands in, if there is an incision."""
+        if not self.incision:
+            return None
+        ahead = self.width if self.ahead is None else self.ahead
+        return Slit(self.incision, self.length, self.width, ahead, self.ends == "open")
+
     @property
     def circumradius(self) -> float:
-        """Half of the diagonal (m)."""
-        return hypot(self.length, self.width) / 2
+        """Half of the diagonal, or, in a slit, of that one's length within the body (m)."""
+        return self.slit.on_surface if self.slit else hypot(self.length, self.width) / 2
 
     @property
     def half_width(self) -> float:
-        """Half of the shorter side (m)."""
-        return min(self.length, self.width) / 2
+        """Half of the shorter side, or, in a slit, of the smallest distance between its lines (m)."""
+        return self.slit.half_width if self.slit else min(self.length, self.width) / 2
 
     @property
     def perimeter(self) -> float:
-        """Length of the four sides (m)."""
-        return 2 * (self.length + self.width)
+        """Length of the four sides, or of the lines of the slit (m)."""
+        return self.slit.edges if self.slit else 2 * (self.length + self.width)
 
     def gap(self, body: Body, frame: Frame) -> float:
-        """Return the distance (m) from the nearest corner to the edge of the face, which is convex."""
+        """Return the distance (m) from the nearest corner, or end of the slit, to the edge of the convex face."""
         corners = [(i * self.length / 2, j * self.width / 2) for i, j in _CORNERS]
+        if self.slit:
+            corners = [(side * self.slit.on_surface, 0.0) for side in (-1, 1)]
         return min(body.gap(frame.at(*corner)) for corner in corners)
 
     @property
@@ -85,7 +120,9 @@ class Blade(Punch):
         return self
 
     def edge_distance(self, along: str, across: str, height: str, unit: float) -> str:
-        """Write the distance to the four sides."""
+        """Write the distance to the four sides, or to the lines of the slit."""
+        if self.slit:
+            return self.slit.edge_distance(along, across, height, unit)
         p = f"(Fabs({along})-{unit * self.length / 2:.12g})"
         q = f"(Fabs({across})-{unit * self.width / 2:.12g})"
         # Signed distance to a rectangle in its plane; its magnitude is the distance to the edge line.
@@ -107,12 +144,18 @@ class Blade(Punch):
         return within
 
     def check(self, problems: Problems) -> None:
-        """Report a slice that makes no sense, and a cut that tissue lifts off."""
+        """Report a slice, or an incision, that makes no sense, and a cut that tissue lifts off."""
         if self.action == "cut" and self.is_unilateral:
             problems.error(
                 "probe.contact", self.contact, "tissue does not lift off a blade that cuts: use contact = 'bonded' or "
                 "'frictionless'",
             )  # fmt: skip
+        if self.slit:
+            self._check_slit(self.slit, problems)
+        else:
+            for key in ("ahead", "ends"):
+                if key in self.model_fields_set:
+                    problems.error(f"probe.{key}", getattr(self, key), "is of a slit: there is no incision")
         if self.slice > 0 and self.action != "cut":
             problems.error("probe.slice", in_mm(self.slice), 'only a cut slices: set action = "cut"')
         if self.slice > 0 and self.contact == "frictionless":
@@ -120,3 +163,26 @@ class Blade(Punch):
                 "probe.slice", in_mm(self.slice), "a frictionless blade slides along without force: use "
                 "contact = 'bonded'",
             )  # fmt: skip
+
+    def _check_slit(self, slit: Slit, problems: Problems) -> None:
+        if self.action != "cut":
+            problems.error("probe.incision", in_mm(self.incision), 'only a cut has an incision: set action = "cut"')
+        if slit.tip <= 0:
+            problems.error(
+                "probe.ahead", in_mm(slit.ahead),
+                f"leaves nothing of the blade in the slit, which is {in_mm(self.incision)} deep: must be below that "
+                "(left out, it is the blade's width)",
+            )  # fmt: skip
+        elif slit.ahead < self.width:
+            problems.warn(
+                "probe.ahead", in_mm(slit.ahead),
+                f"is less than the blade's width {in_mm(self.width)}: linear elasticity is then an extrapolation at "
+                "the slit's front",
+            )  # fmt: skip
+        if self.contact == "frictionless":
+            problems.error(
+                "probe.contact", self.contact, "the flanks of a blade that stands in a slit slide along it without "
+                "force: use contact = 'bonded'",
+            )  # fmt: skip
+        if self.motion == "all":
+            problems.error("probe.motion", self.motion, "a blade in a slit is pressed and drawn only: leave it out")

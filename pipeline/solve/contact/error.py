@@ -49,7 +49,7 @@ def displacement_decrement(
         residual.scale(-1.0)
         held = levels[-1].prescribed
         residual.array[held[held < finer.dofs.owned]] = 0.0
-        decrements, iterations = energy_decrements(solver, [residual])
+        decrements, _, iterations = energy_decrements(solver, [residual])
     return float(decrements[0, 0]), iterations
 
 

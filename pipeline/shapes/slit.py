@@ -1,0 +1,117 @@
+"""A slit that a blade stands in: a plane crack below the surface, whose faces the blade holds apart by its width.
+
+In the probe's own coordinates it is the plane across = 0 down to its front at height -depth. The blade touches both
+faces, along its length and from the surface down to its tip; beyond that, by ``ahead``, the slit runs on to its front.
+"""
+
+from dataclasses import dataclass
+from math import inf, isfinite
+
+from pipeline.shapes.arrays import FloatArray, np
+from pipeline.shapes.body import Body
+
+# A point is on a line of the slit if it is this near, in units of its depth.
+_ON = 1e-6
+
+
+@dataclass(frozen=True)
+class Slit:
+    """Sizes in metres: ``depth`` of its front, ``length`` and ``width`` of the blade, ``ahead`` of which it runs.
+
+    An ``is_open`` one runs on to the sides of the body; otherwise it ends ``ahead`` of the blade's ends, too.
+    """
+
+    depth: float
+    length: float
+    width: float
+    ahead: float
+    is_open: bool
+
+    @property
+    def tip(self) -> float:
+        """How deep (m) the blade reaches."""
+        return self.depth - self.ahead
+
+    @property
+    def reach(self) -> float:
+        """Half of the slit's length (m), infinite if it is open."""
+        return inf if self.is_open else self.length / 2 + self.ahead
+
+    @property
+    def on_surface(self) -> float:
+        """Half of the length (m) that must lie within the body: of the slit, or of the blade in an open one."""
+        return self.length / 2 if self.is_open else self.reach
+
+    @property
+    def half_width(self) -> float:
+        """Half of the smallest distance (m) between lines at which the displacement is singular."""
+        return min(self.ahead, self.tip, self.length) / 2
+
+    @property
+    def edges(self) -> float:
+        """Length (m) of the lines at which the displacement is singular, in an open slit that near the blade."""
+        front = self.length + 4 * self.depth if self.is_open else 2 * (self.reach + self.depth)
+        return 2 * (self.length + self.tip) + front
+
+    def touched(self) -> FloatArray:
+        """Return the corners (4, 3), in own coordinates (m), of what the blade touches of a face."""
+        a, t = self.length / 2, self.tip
+        return _polygon([(-a, -t), (a, -t), (a, 0.0), (-a, 0.0)])
+
+    def free(self, far: float) -> list[FloatArray]:
+        """Return the corners of the pieces that the rest of a face is made of; an open slit is drawn ``far`` (m) out.
+
+        Two of them meet at every corner of the front, so that no triangle has all of its corners on it: the nodes
+        there, which both faces share, would hold such a triangle shut.
+        """
+        a, t, c = self.length / 2, self.tip, self.depth
+        if self.is_open:
+            return [
+                _polygon([(-a, -c), (a, -c), (a, -t), (-a, -t)]),
+                _polygon([(-far, -c), (-a, -c), (-a, -t), (-a, 0.0), (-far, 0.0)]),
+                _polygon([(far, 0.0), (a, 0.0), (a, -t), (a, -c), (far, -c)]),
+            ]
+        b = self.reach
+        return [
+            _polygon([(-a, -t), (-b, -c), (b, -c), (a, -t)]),
+            _polygon([(-a, 0.0), (-b, 0.0), (-b, -c), (-a, -t)]),
+            _polygon([(b, 0.0), (a, 0.0), (a, -t), (b, -c)]),
+        ]
+
+    def is_singular(self, points: FloatArray) -> bool:
+        """Tell whether ``points`` (n, 3), in own coordinates, of a line are on the front or the contact's edge."""
+        along, down, close = np.abs(points[:, 0]), -points[:, 2], _ON * self.depth
+        within, sunk = along < self.length / 2 + close, down < self.tip + close
+        lines = [
+            within & (np.abs(down) < close), within & (np.abs(down - self.tip) < close),
+            sunk & (np.abs(along - self.length / 2) < close), np.abs(down - self.depth) < close,
+        ]  # fmt: skip
+        if isfinite(self.reach):
+            lines.append(np.abs(along - self.reach) < close)
+        return any(bool(line.all()) for line in lines)
+
+    def edge_distance(self, along: str, across: str, height: str, unit: float) -> str:
+        """Write the distance to the front and to the edge of the contact, in units of 1/``unit`` m."""
+        half = self.tip / 2
+        touched = _to_rectangle(f"(Fabs({along})-{unit * self.length / 2:.12g})",
+                                f"(Fabs({height}+{unit * half:.12g})-{unit * half:.12g})")  # fmt: skip
+        front = f"(Fabs({height})-{unit * self.depth:.12g})"
+        if isfinite(self.reach):
+            # Mirrored in the surface: a slit has no edge at its mouth.
+            front = _to_rectangle(f"(Fabs({along})-{unit * self.reach:.12g})", front)
+        return f"Sqrt(Min({touched}^2,{front}^2)+{across}^2)"
+
+    def room(self, body: Body) -> float:
+        """Return the distance (m) from the front to the nearest of the blade, a layer's end, the bottom or support."""
+        top = body.heights[1]
+        ends = (*body.interfaces, *body.support.edges(), body.heights[0])
+        return min(self.ahead, *(abs(end - top + self.depth) for end in ends))
+
+
+def _polygon(points: list[tuple[float, float]]) -> FloatArray:
+    return np.array([(along, 0.0, height) for along, height in points])
+
+
+def _to_rectangle(p: str, q: str) -> str:
+    """Write the distance to the sides of a rectangle in its plane, negative inside; p and q are beyond its sides."""
+    return f"(Sqrt(Max({p},0)^2+Max({q},0)^2)+Min(Max({p},{q}),0))"

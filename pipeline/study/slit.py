@@ -1,0 +1,107 @@
+"""Whether a slit that a blade stands in fits into the body: within it, clear of the support and of other materials."""
+
+from math import isfinite
+
+import numpy as np
+
+from pipeline.shapes.body import Body, Layered
+from pipeline.shapes.contact import is_level
+from pipeline.shapes.frame import Frame
+from pipeline.shapes.probe import Probe
+from pipeline.shapes.section import in_mm
+from pipeline.shapes.slit import Slit
+from pipeline.shapes.support import Below, Faces
+from pipeline.study.problems import Problems
+from pipeline.study.schema import Mesh
+
+# Between a slit's front and what ends below or above it there must be this share of what it runs ahead of the blade.
+_LEAST_ROOM = 0.25
+# Points of a slit, along it and down, whose distance to inclusions is looked at.
+_POINTS = (81, 41)
+
+
+def check_slit(body: Body, probe: Probe, problems: Problems) -> bool:
+    """Report a slit that the body has no room for, and tell whether there is none, or one that fits."""
+    slit, before = probe.slit, len(problems.errors)
+    if slit is None:
+        return True
+    frame = probe.frame_on(body)
+    if not isinstance(body, Layered) or not is_level(body, frame):
+        problems.error(
+            "probe.incision", in_mm(slit.depth),
+            "a slit goes straight down from the flat top of a box or a cylinder only",
+        )  # fmt: skip
+        return False
+    _check_depth(body, slit, problems)
+    if len(problems.errors) == before:
+        _check_support(body, slit, problems)
+        _check_room(body, slit, problems)
+        _check_inclusions(body, slit, frame, problems)
+    return len(problems.errors) == before
+
+
+def check_slit_in(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
+    """Report a mesh that a slit does not fit into."""
+    slit = probe.slit
+    if slit is None:
+        return
+    if mesh.degree == 1:
+        problems.error(
+            "mesh.degree", mesh.degree, "is too low for a slit, whose front needs quarter points: use 2 or 3"
+        )
+    column = mesh.column(body.reach(probe.frame_on(body)))
+    if not isfinite(column):
+        return
+    if mesh.outside == "fixed" and slit.is_open:
+        problems.error("mesh.outside", mesh.outside, 'is what an open slit would run into: use ends = "blade"')
+    elif column <= slit.on_surface:
+        problems.error(
+            "mesh.epsilon", in_mm(mesh.epsilon),
+            f"keeps a column that the slit reaches out of: must be above {in_mm(slit.on_surface)}, or use "
+            'outside = "coarse"',
+        )  # fmt: skip
+
+
+def _check_depth(body: Body, slit: Slit, problems: Problems) -> None:
+    low, high = body.heights
+    if slit.depth >= high - low:
+        problems.error(
+            "probe.incision", in_mm(slit.depth),
+            f"goes through the whole body: must be below its height {in_mm(high - low)}",
+        )  # fmt: skip
+
+
+def _check_support(body: Body, slit: Slit, problems: Problems) -> None:
+    support, (_, high) = body.support, body.heights
+    if isinstance(support, Below) and slit.depth >= high - support.below:
+        problems.error(
+            "probe.incision", in_mm(slit.depth),
+            f"goes through what is held of the body: must be below {in_mm(high - support.below)}",
+        )  # fmt: skip
+    if slit.is_open and isinstance(support, Faces) and "sides" in support.names:
+        problems.error("probe.ends", "open", 'the slit would go through the sides, which are held: use ends = "blade"')
+
+
+def _check_room(body: Body, slit: Slit, problems: Problems) -> None:
+    least = _LEAST_ROOM * slit.ahead
+    if (room := slit.room(body)) < least:
+        problems.error(
+            "probe.incision", in_mm(slit.depth),
+            f"puts the slit's front {in_mm(room)} from where a layer ends, or from the bottom or what is held: at "
+            f"least {in_mm(least)}, a quarter of how far it runs ahead of the blade, must be left",
+        )  # fmt: skip
+
+
+def _check_inclusions(body: Body, slit: Slit, frame: Frame, problems: Problems) -> None:
+    """Report inclusions that a slit cuts, or that are nearer to it than it runs ahead of the blade."""
+    half = slit.reach if isfinite(slit.reach) else body.extent
+    along, down = (grid.ravel() for grid in np.meshgrid(
+        np.linspace(-half, half, _POINTS[0]), np.linspace(0.0, slit.depth, _POINTS[1])))  # fmt: skip
+    points = frame.world(np.column_stack([along, np.zeros(len(along)), -down]))
+    for number, inclusion in enumerate(body.inclusion, start=1):
+        if (room := float(inclusion.surface.distance(points).min())) < slit.ahead:
+            problems.error(
+                f"body.inclusion[{number}].at", [in_mm(x) for x in inclusion.at],
+                f"{inclusion.name} must keep {in_mm(slit.ahead)} (how far the slit runs ahead of the blade) from the "
+                f"slit; it is {f'{in_mm(room)} from it' if room > 0 else 'cut by it'}",
+            )  # fmt: skip

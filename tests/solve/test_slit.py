@@ -1,0 +1,146 @@
+"""A blade that stands in a slit: what the slit's front releases, against closed forms and the change of energy."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from pipeline.mesh.distribute import distribute
+from pipeline.mesh.of_case import mesh_arrays
+from pipeline.run.meshing import mesh_case
+from pipeline.run.problem import conditions_of, loads_of
+from pipeline.scene.model import FIXED, FREE, PROBE, SLIT
+from pipeline.solve.conditions import Conditions
+from pipeline.solve.displacement import DisplacementProblem
+from pipeline.solve.loads import Loads
+from pipeline.solve.mixed import MixedProblem
+from pipeline.solve.spaces import Spaces
+from tests.cases import BLADE, solve, study
+from tests.solve.test_mixed import YOUNG, law
+
+QUARTER = ("x", "y")
+BODY = {"shape": "box", "size": ["20 mm", "16 mm", "12 mm"], "fixed": "bottom"}
+SLIT_BLADE = {**BLADE, "length": "6 mm", "width": "1 mm", "incision": "4 mm"}
+COARSE = {"rim": "0.3 mm", "growth": 0.7, "fine": "3 mm"}
+
+
+def case_of(mesh=COARSE, body=BODY, **probe):
+    return study(body=body, probe={**SLIT_BLADE, **probe}, mesh=mesh).case(())
+
+
+def run(case, mirrors=QUARTER, kind=DisplacementProblem, poisson=0.3, comm=MPI.COMM_SELF, **options):
+    mesh, _ = mesh_case(case, mirrors, comm)
+    with Spaces(mesh) as spaces, kind(spaces, case.mesh.degree, conditions_of(case)) as problem:
+        return problem.solve(law(poisson), loads_of(case), **options)
+
+
+def finer(solution):
+    """Return energy (J) and release (J/m) as elements of one degree more have them."""
+    amounts = solution.response.amounts
+    energy = solution.energy - float(amounts @ solution.decrements @ amounts) / 2
+    return energy, float(amounts @ solution.released_finer @ amounts)
+
+
+@cache
+def quarter():
+    return run(case_of(), estimate=True)
+
+
+def test_strip():
+    """A long crack in a strip of half height h, whose edges are moved by ± δ, releases E δ²/h at ν = 0 (J. R. Rice,
+    J. Appl. Mech. 35, 379, 1968).
+    """
+    half, width, opening = 5e-3, 4e-3, 0.1e-3
+    case = case_of(
+        {"rim": "0.5 mm", "growth": 0.7, "fine": "2.5 mm"}, {"shape": "box", "size": ["4 mm", "10 mm", "30 mm"]},
+        length="2 mm", incision="15 mm", ahead="4 mm", ends="open",
+    )  # fmt: skip
+    arrays = mesh_arrays(case, QUARTER)
+    free = arrays.facets[FREE]
+    on_edge = (np.abs(arrays.points[free][:, :, 1] - half) < 1e-9).all(axis=1)
+    faces = np.vstack([arrays.facets[SLIT], arrays.facets[PROBE]])
+    rest = np.vstack([free[~on_edge], arrays.facets[FIXED]])
+    facets = {PROBE: free[on_edge], SLIT: faces, FREE: rest, FIXED: np.empty((0, 3), dtype=np.int64)}
+    mesh = distribute(MPI.COMM_SELF, replace(arrays, facets={**arrays.facets, **facets}))
+    front = conditions_of(case).front
+    with Spaces(mesh) as spaces, DisplacementProblem(spaces, 2, Conditions(front=front)) as problem:
+        found = problem.solve(law(0.0), Loads((), ()).opened(front.normal, opening), estimate=True)
+    assert found.release / width == pytest.approx(YOUNG * opening**2 / half, rel=0.01)
+    assert finer(found)[1] / width == pytest.approx(YOUNG * opening**2 / half, rel=0.003)
+    assert found.release_bar > abs(found.release / width / (YOUNG * opening**2 / half) - 1)
+
+
+def test_change_of_energy():
+    """A front that is deeper, below the same blade, releases what the energy loses: within 2 %."""
+    step = 0.15e-3
+    found = [
+        finer(run(case_of(ends="open", incision=f"{4 + 1e3 * s} mm", ahead=f"{1 + 1e3 * s} mm"), estimate=True))
+        for s in (-step, 0.0, step)
+    ]
+    (before, _), (_, release), (after, _) = found
+    assert release == pytest.approx((before - after) / (2 * step), rel=0.02)
+
+
+def test_symmetry():
+    """A quarter of the body gives what the whole does, whose slit is made by reflection."""
+    whole = run(case_of(), ())
+    assert whole.release == pytest.approx(quarter().release, rel=1e-5)
+    assert whole.reaction[2] == pytest.approx(quarter().reaction[2], rel=1e-6)
+    assert whole.energy == pytest.approx(quarter().energy, rel=1e-8)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(
+    ("mirrors", "place"), [(("x",), {"at": ["0 mm", "0.01 mm"]}), ((), {"direction": [1.0, 0.01, 0.0]})]
+)
+def test_doubled_nodes(mirrors, place):
+    """A slit inside the mesh, a little off the plane of symmetry or turned a little, opens as the one in it does."""
+    inside = run(case_of(**place), mirrors, comm=MPI.COMM_WORLD)
+    assert inside.release == pytest.approx(quarter().release, rel=quarter().release_bar)
+    assert inside.reaction[2] == pytest.approx(quarter().reaction[2], rel=0.01)
+    assert inside.energy == pytest.approx(quarter().energy, rel=0.005)
+    assert inside.balance < 1e-6
+
+
+def test_mixed_elements():
+    """Both kinds of elements agree within their bars where both serve."""
+    one, other = (
+        run(case_of(), QUARTER, kind, 0.4, estimate=True) for kind in (DisplacementProblem, MixedProblem)
+    )  # fmt: skip
+    for name, bar in (("release", "release_bar"), ("energy", "bar")):
+        apart = abs(getattr(one, name) - getattr(other, name)) / getattr(one, name)
+        assert apart < getattr(one, bar) + getattr(other, bar)
+    assert finer(one) == pytest.approx(finer(other), rel=0.01)
+
+
+def test_bar_of_release():
+    """The bars hold the truth, from elements of degree 3 on a finer mesh, and are of its order."""
+    fine = run(case_of({"rim": "0.2 mm", "growth": 0.6, "fine": "3 mm", "degree": 3}), estimate=True)
+    truth = fine.extrapolated(3, "displacement")
+    found = quarter()
+    best = found.extrapolated(2, "displacement", elsewhere=True)
+    for solution in (found, best):
+        error = abs(solution.release / truth.release - 1)
+        assert error < solution.release_bar < 0.15
+
+
+def test_study_of_incisions():
+    """Deeper blades take more force; F is proportional to Young's modulus, not to depth; the slit's faces slide
+    with the blade, and its front does not tell.
+    """
+    probe = {**SLIT_BLADE, "incision": ["3 mm", "4 mm"]}
+    material = {"young": ["10 kPa", "20 kPa"], "poisson": 0.3}
+    records = solve(body=BODY, probe=probe, mesh=COARSE, material=material)
+    assert all(record.status == "ok" for record in records.values())
+    force, release = (np.array([[getattr(records[i, j], name) for j in (0, 1)] for i in (0, 1)])
+                      for name in ("force", "energy_release"))  # fmt: skip
+    assert (force[:, 1] > 1.1 * force[:, 0]).all()
+    assert force[1] == pytest.approx(2 * force[0], rel=1e-12)
+    assert release[1] == pytest.approx(2 * release[0], rel=1e-12)
+    slid = solve(body=BODY, probe={**SLIT_BLADE, "slice": "0.2 mm"}, mesh=COARSE)[()]
+    pressed = records[0, 1]
+    assert slid.energy_release == pytest.approx(pressed.energy_release, rel=1e-3)
+    assert slid.force == pytest.approx(pressed.force, rel=1e-5)
+    assert slid.energy > pressed.energy

@@ -1,0 +1,59 @@
+"""Slits that make no sense, or have no room in the body, are refused with a sentence."""
+
+import pytest
+
+from pipeline.study.load import parse
+from pipeline.study.problems import StudyError
+from tests.cases import BLADE, raw
+
+BOX = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "bottom"}
+SLIT = {**BLADE, "width": "1 mm", "incision": "4 mm"}
+LAYERED = {**BOX, "layers": [{"name": "skin", "thickness": "4.1 mm", "young": "20 kPa", "poisson": 0.4}]}
+TUMOUR = {"name": "tumour", "at": ["0 mm", "2 mm", "-3 mm"], "radius": "1.5 mm", "young": "20 kPa", "poisson": 0.4}
+ORGAN = {"shape": "ellipsoid", "axes": ["30 mm", "30 mm", "30 mm"], "fixed": {"below": "-10 mm"}}
+
+
+def problems(**changes):
+    with pytest.raises(StudyError) as caught:
+        parse(raw(**changes))
+    return [(problem.key, problem.allowed) for problem in caught.value.problems]
+
+
+@pytest.mark.parametrize(
+    ("key", "said", "changes"),
+    [
+        ("probe.incision", "only a cut has an incision", {"probe": {**SLIT, "action": "pierce"}}),
+        ("probe.contact", "slide along it without force", {"probe": {**SLIT, "contact": "frictionless"}}),
+        ("probe.motion", "pressed and drawn only", {"probe": {**SLIT, "motion": "all"}}),
+        ("probe.ahead", "leaves nothing of the blade in the slit", {"probe": {**SLIT, "incision": "1 mm"}}),
+        ("probe.ahead", "there is no incision", {"probe": {**BLADE, "ahead": "1 mm"}}),
+        ("probe.ends", "there is no incision", {"probe": {**BLADE, "ends": "open"}}),
+        ("probe.incision", "through the whole body", {"probe": {**SLIT, "incision": "20 mm"}}),
+        ("probe.incision", "through what is held", {"probe": {**SLIT, "incision": "16 mm"},
+                                                   "body": {**BOX, "fixed": {"below": "-15 mm"}}}),
+        ("probe.incision", "at least 0.25 mm", {"probe": {**SLIT, "incision": "19.9 mm"}}),
+        ("probe.incision", "where a layer ends", {"probe": SLIT, "body": LAYERED}),
+        ("probe.at", "the slit must lie inside", {"probe": {**SLIT, "at": ["14.5 mm", "0 mm"]}}),
+        ("probe.at", "the footprint of the blade", {"probe": {**SLIT, "ends": "open", "at": ["16 mm", "0 mm"]}}),
+        ("probe.ends", "the sides, which are held", {"probe": {**SLIT, "ends": "open"},
+                                                    "body": {**BOX, "fixed": "sides"}}),
+        ("body.inclusion[1].at", "must keep 1 mm", {"probe": SLIT, "body": {**BOX, "inclusion": [TUMOUR]}}),
+        ("probe.incision", "flat top of a box or a cylinder", {"probe": SLIT, "body": ORGAN}),
+        ("probe.incision", "flat top of a box or a cylinder", {"probe": {**SLIT, "axis": [0.1, 0.0, -1.0]}}),
+        ("mesh.degree", "needs quarter points", {"probe": SLIT, "mesh": {"degree": 1}}),
+        ("mesh.epsilon", "the slit reaches out of", {"probe": SLIT, "mesh": {"epsilon": "5 mm", "outside": "free"}}),
+        ("mesh.outside", "an open slit would run into", {"probe": {**SLIT, "ends": "open"},
+                                                        "mesh": {"epsilon": "10 mm", "outside": "fixed"}}),
+    ],
+)  # fmt: skip
+def test_refused(key, said, changes):
+    """Once each, by key."""
+    assert [(name, said in text) for name, text in problems(**changes)] == [(key, True)]
+
+
+def test_no_incision():
+    """An incision of nothing is a blade on the surface, whose F is proportional to depth; in a slit it is not."""
+    flat, deep = (parse(raw(probe={**BLADE, "incision": d})).case(()).probe for d in ("0 mm", "4 mm"))
+    assert flat.slit is None
+    assert flat.proportional_to == ("depth", "slice")
+    assert deep.proportional_to == ()
