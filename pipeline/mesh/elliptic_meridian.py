@@ -16,7 +16,7 @@ import numpy as np
 from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.boxes import halve_boxes, triangulate
-from pipeline.mesh.meridian import AXIS, Grading, MeridianArrays, name_edges, ratio
+from pipeline.mesh.meridian import AXIS, KINK, Grading, MeridianArrays, name_edges, ratio
 from pipeline.scene.model import FIXED, FREE, PROBE
 
 # Degree of the sides on the surface.
@@ -30,7 +30,8 @@ class EllipticMeridian:
     """An ellipsoid about the z axis, centred on the origin, under a disc on its upper pole; lengths in metres.
 
     ``radius`` is its semi-axis across z, ``semi_height`` that along z. Its surface is held below the level
-    z = ``fixed``. The footprint is what projects along z into the disc of ``probe_radius``.
+    z = ``fixed``. The footprint is what projects along z into the disc of ``probe_radius``; ``kinks`` are radii (m)
+    within it at which the displacement that it prescribes is not smooth.
 
     Raises:
         ValueError: if that disc is as wide as the body.
@@ -40,6 +41,7 @@ class EllipticMeridian:
     semi_height: float
     probe_radius: float
     fixed: float
+    kinks: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse a footprint without an edge."""
@@ -69,7 +71,7 @@ class EllipticMeridian:
         number = np.empty(len(points), dtype=np.int64)
         number[cells] = bent[:, :3]
         facets = {name: number[one[edges]] for name, edges in groups.items()}
-        regions, places = np.zeros(len(cells), dtype=np.int64), np.array([place for place, _ in outline.singular])
+        regions, places = np.zeros(len(cells), dtype=np.int64), np.array([place for _, place, _ in outline.singular])
         return MeridianArrays(nodes, bent, regions, facets, places, self.unit, time.perf_counter() - start, ORDER)
 
 
@@ -81,12 +83,14 @@ class _Outline:
     height: float
     probe: float
     support: float
+    kinks: tuple[float, ...] = ()
 
     @staticmethod
     def of(meridian: EllipticMeridian) -> "_Outline":
         radius, height = (ratio(length, meridian.unit) for length in (meridian.radius, meridian.semi_height))
         level = ratio(meridian.fixed, meridian.unit) / height
-        return _Outline(radius, height, asin(1 / radius), acos(min(max(level, -1.0), 1.0)))
+        kinks = tuple(asin(ratio(kink, meridian.unit) / radius) for kink in meridian.kinks)
+        return _Outline(radius, height, asin(1 / radius), acos(min(max(level, -1.0), 1.0)), kinks)
 
     @property
     def sides(self) -> list[tuple[tuple[float, float], tuple[float, float], str]]:
@@ -98,16 +102,16 @@ class _Outline:
         return [*surface, ((0.0, -1.0), (0.0, 0.0), AXIS), ((pi, -1.0), (pi, 0.0), AXIS)]
 
     @property
-    def singular(self) -> list[tuple[FloatArray, float]]:
-        """Points (r, z) of singular displacement, and how much larger than at the rim an element may be there."""
+    def singular(self) -> list[tuple[float, FloatArray, float]]:
+        """Angles and points (r, z) of singular displacement, and how much larger than at the rim elements may be."""
         smallest = min(self.radius, self.height)
         rim = self.place(np.array([[self.probe, 0.0]]))[0]
-        points = [(rim, 1.0)]
+        points = [(self.probe, rim, 1.0)]
         if self.probe < self.support < pi:
             edge = self.place(np.array([[self.support, 0.0]]))[0]
             distance = min(hypot(*(edge - rim)), self.radius)
-            points.append((edge, min(max(1.0, distance**2), max(1.0, 100 * smallest))))
-        return points
+            points.append((self.support, edge, min(max(1.0, distance**2), max(1.0, 100 * smallest))))
+        return points + [(kink, self.place(np.array([[kink, 0.0]]))[0], KINK) for kink in self.kinks]
 
     def place(self, points: FloatArray) -> FloatArray:
         """Return r and z of points (..., 2) given by φ and ρ - 1, as exact as they are far from the pole."""
@@ -120,16 +124,15 @@ class _Outline:
 def _boxes(outline: _Outline, grading: Grading) -> FloatArray:
     """Halve the half plane along the side of each box that is longer in space, until all are small enough."""
     most = grading.cap * min(outline.radius, outline.height)
-    marks = [np.unique([0.0, outline.probe, outline.support, pi]), np.array([-1.0, 0.0])]
+    marks = [np.unique([0.0, outline.probe, outline.support, pi, *outline.kinks]), np.array([-1.0, 0.0])]
     ends = outline.place(np.column_stack([marks[0], np.zeros(len(marks[0]))]))
     least = float(np.linalg.norm(np.diff(ends, axis=0), axis=1).min()) / 4
-    angles = {0: outline.probe, 1: outline.support}
 
     def judge(boxes: FloatArray) -> tuple[BoolArray, BoolArray]:
         low, high, inner, outer = boxes.T
         size = np.full(len(boxes), most)
-        for number, (place, factor) in enumerate(outline.singular):
-            nearest = np.column_stack([np.clip(angles[number], low, high), outer])
+        for angle, place, factor in outline.singular:
+            nearest = np.column_stack([np.clip(angle, low, high), outer])
             distance = np.linalg.norm(outline.place(nearest) - place, axis=1)
             size = np.minimum(size, min(grading.floor * factor, least) + grading.growth * distance)
         sine, cosine = np.sin((low + high) / 2), np.cos((low + high) / 2)

@@ -34,6 +34,8 @@ JOINT = "joint"
 _MOST_SLENDER = 1000
 # Where two held faces meet the displacement goes like r to a power between 1 (ν = 0.5) and 1.7, and not 1/2.
 _MILD = 1e3
+# Below a kink of what presses, pressures have a logarithm at most.
+KINK = 1e3
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,8 @@ class Meridian:
     ``fixed`` says what is held: the bottom, the side, both, or all of the boundary below the level z = ``fixed`` < 0.
     Of the body, only r < ``column`` is kept; the face of that cut is free, or held if ``column_fixed``.
     ``interfaces`` are the heights z (m), from the top down, at which one layer ends and the next begins: regions 1, 2,
-    ... of the mesh. What lies below them all is another layer if ``is_filled``, else region 0.
+    ... of the mesh. What lies below them all is another layer if ``is_filled``, else region 0. ``kinks`` are radii (m)
+    within the disc at which the displacement that it prescribes is not smooth.
     """
 
     radius: float
@@ -87,6 +90,7 @@ class Meridian:
     column_fixed: bool = False
     interfaces: tuple[float, ...] = ()
     is_filled: bool = False
+    kinks: tuple[float, ...] = ()
 
     @property
     def is_cut(self) -> bool:
@@ -245,6 +249,7 @@ def _singular_points(meridian: Meridian) -> list[tuple[float, float, float]]:
         distance = hypot(r - 1, z)
         factor = min(max(1.0, min(distance, radius) ** 2), max(1.0, 100 * smallest))
         points.append((r, z, factor if held.get(before) != held.get(after) else _MILD * factor))
+    points += [(ratio(radius, meridian.unit), 0.0, KINK) for radius in meridian.kinks]
     for z in _interfaces(meridian):
         factor = min(max(1.0, min(hypot(radius - 1, z), radius) ** 2), max(1.0, 100 * smallest))
         points.append((radius, z, _MILD * factor))
@@ -260,7 +265,8 @@ def _boxes(meridian: Meridian, singular: list[tuple[float, float, float]], gradi
     (r_end, _), (_, z_end) = corners.max(axis=0), corners.min(axis=0)
     most = grading.cap * max(min(r_end, -z_end), max(r_end, -z_end) / _MOST_SLENDER)
     ends = [0.0, *_interfaces(meridian), float(z_end)]
-    marks = [np.unique(corners[:, 0]), np.unique([*corners[:, 1], *ends])]
+    kinks = [ratio(radius, meridian.unit) for radius in meridian.kinks]
+    marks = [np.unique([*corners[:, 0], *kinks]), np.unique([*corners[:, 1], *ends])]
     # Boxes smaller than any distance between marks have all of them among their corners.
     least = min(np.diff(m).min() for m in marks) / 4
 

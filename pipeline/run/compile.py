@@ -9,6 +9,7 @@ from pipeline.shapes.half_plane import HalfEllipse
 from pipeline.solve.axisymmetric import compile_axisymmetric
 from pipeline.solve.cache import compiling
 from pipeline.solve.forms import compile_elastic
+from pipeline.solve.meridian_contact import TRIAL_DEGREE
 from pipeline.solve.mixed_forms import compile_mixed
 from pipeline.solve.release import compile_release
 from pipeline.solve.single.cycle import compiles
@@ -36,13 +37,14 @@ def _forms(solve: Solve) -> tuple[str, int, bool, bool]:
     """Return what tells the forms of a solve from others: element, degree, whether there are regions, and a slit."""
     body, mesh = solve.case.body, solve.case.mesh
     if solve.axisymmetric:
-        return "elliptic" if isinstance(body.half_plane(), HalfEllipse) else "axisymmetric", 0, False, False
+        kind = "elliptic" if isinstance(body.half_plane(), HalfEllipse) else "axisymmetric"
+        return kind, TRIAL_DEGREE if solve.case.probe.is_unilateral else 0, False, False
     return solve.case.element, mesh.degree, bool(body.regions), solve.case.probe.slit is not None
 
 
 def _compile(element: str, degree: int, *, of_regions: bool, of_slit: bool) -> None:
     if element in ("axisymmetric", "elliptic"):
-        compile_axisymmetric(curved=element == "elliptic")
+        compile_axisymmetric(curved=element == "elliptic", lowest=degree)
         return
     library()
     compiles()

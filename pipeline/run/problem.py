@@ -1,8 +1,14 @@
 """What solves a case on its mesh, if the memory is there for it."""
 
+import numpy as np
+
 from pipeline.arrays import FloatArray
+from pipeline.mesh.of_case import meridian_of
 from pipeline.plan.symmetry import mirror_planes, model_planes
 from pipeline.run.memory import FreeMemory
+from pipeline.shapes.half_plane import HalfEllipse
+from pipeline.shapes.probes.round_indenter import RoundIndenter
+from pipeline.solve.axisymmetric import MeridianProblem
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.contact.problem import DEGREE, ContactProblem, Tool
 from pipeline.solve.contact.sets import ContactError
@@ -10,6 +16,7 @@ from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
+from pipeline.solve.meridian_contact import MeridianContact, RoundTool
 from pipeline.solve.mixed import MixedProblem
 from pipeline.solve.release import Front
 from pipeline.solve.solution import FieldProblem, Problem, Solution
@@ -39,6 +46,13 @@ def problem_of(spaces: Spaces, case: Case, *, shared: bool, reuse: bool = False)
     return DisplacementProblem(spaces, case.mesh.degree, conditions_of(case), shared=shared, reuse=reuse)
 
 
+def meridian_problem(case: Case) -> Problem:
+    """Return what solves a round ``case`` on its meridian."""
+    if case.probe.is_unilateral:
+        return MeridianContact(meridian_of(case), round_tool_of(case))
+    return MeridianProblem(meridian_of(case), conditions_of(case))
+
+
 def conditions_of(case: Case) -> Conditions:
     """Return what the probe of ``case`` prescribes."""
     bonded, unilateral = case.probe.contact == "bonded", case.probe.is_unilateral
@@ -64,6 +78,28 @@ def _front_of(case: Case) -> Front | None:
         return None
     radius = _CLEAR * slit.room(case.body)
     return Front(frame.point, frame.along, slit.depth, slit.reach, radius)
+
+
+def round_tool_of(case: Case) -> RoundTool:
+    """Return the round tool of ``case`` above the body that it touches: where contact is unilateral on a meridian.
+
+    Raises:
+        CaseFailure: if the scene is not round.
+    """
+    probe, body = case.probe, case.body.half_plane()
+    if body is None or not probe.is_round:
+        raise CaseFailure("only round scenes have a meridian")
+
+    def gap(radii: FloatArray) -> FloatArray:
+        heights = probe.profile(np.column_stack([radii, np.zeros_like(radii)]))
+        if isinstance(body, HalfEllipse):
+            square = np.minimum(radii / body.radius, 1.0) ** 2
+            heights = heights + body.semi_height * square / (1 + np.sqrt(1 - square))
+        return np.asarray(heights)
+
+    if isinstance(probe, RoundIndenter):
+        return RoundTool(gap, probe.limit, probe.kinks)
+    return RoundTool(gap, probe.circumradius)
 
 
 def loads_of(case: Case) -> Loads:

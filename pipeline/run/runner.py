@@ -13,7 +13,6 @@ from mpi4py import MPI
 
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.mesh.generate import MeshError
-from pipeline.mesh.of_case import meridian_of
 from pipeline.plan import estimate
 from pipeline.plan.plan import Plan
 from pipeline.plan.steps import MeshStep, OperatorStep, Solve, mesh_steps
@@ -25,11 +24,10 @@ from pipeline.run.measure import TIMES, record_of
 from pipeline.run.memory import FreeMemory, PeakMemory, give_back
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import mesh_case, on_first_rank
-from pipeline.run.problem import CaseFailure, check_memory, conditions_of, lacks_memory, problem_of, solve_problem
+from pipeline.run.problem import CaseFailure, check_memory, lacks_memory, meridian_problem, problem_of, solve_problem
 from pipeline.run.progress import Progress
 from pipeline.run.provenance import provenance
 from pipeline.run.record import Record
-from pipeline.solve.axisymmetric import MeridianProblem
 from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.linear import SolveError, is_direct
 from pipeline.solve.solution import FieldProblem
@@ -194,7 +192,7 @@ class StepRunner:
         return lacks_memory(self._free, needed, "the error bar")
 
     def _solve_meridian(self, solve: Solve, memory: PeakMemory) -> Record:
-        problem = MeridianProblem(meridian_of(solve.case), conditions_of(solve.case))
+        problem = meridian_problem(solve.case)
         record = on_first_rank(self._comm, lambda: record_of(solve, solve_problem(solve.case, problem, estimate=True)))
         return self._stamp(self._comm.bcast(record), memory)
 

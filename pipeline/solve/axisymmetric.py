@@ -5,19 +5,11 @@ nothing depends on the unit of anything. The force is the reaction: the residual
 probe's dofs, times 2π.
 """
 
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import inf, pi
-from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
-from mpi4py import MPI
-from petsc4py import PETSc
 
-from pipeline.arrays import FloatArray, Int32Array
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import (
     AXIS,
@@ -33,31 +25,27 @@ from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
+from pipeline.solve.meridian_system import (
+    Clock,
+    HalfPlane,
+    Meshes,
+    Unbalanced,
+    factorised,
+    forms_of,
+    max_strain,
+    poisson_of,
+)
 from pipeline.solve.reaction import reaction
 from pipeline.solve.solution import BALANCE_LIMIT, Solution
 from pipeline.stages import stage
 
 DEGREE = 5
-# Later than in three dimensions (Mesh.MIXED_FROM, 0.45), since elements of degree 5 lock later than those of degree 2:
-# on three scenes displacement elements differ from mixed ones by 5e-9 to 1e-8 at ν = 0.45 and by 2e-8 at 0.49, take
-# half the time (0.3 s, not 0.65), and have bars of 3e-6 at most, where 1e-5 is asked for.
-MIXED_FROM = 0.49
 # Meshes in the order in which they are tried, until the error bar is below the accuracy asked for.
 _GRADINGS = (Grading(1e-6, 1.0, 4.0), Grading(1e-7, 0.7, 2.0), Grading(1e-8, 0.5, 1.0))
 # An error bar above this is no answer.
 _WORST_ERROR = 1e-3
-# Per cent of memory beyond MUMPS's estimate, which pivoting exceeds.
-_SPARE_MEMORY = 100
 # Each refinement gains the digits that the factors hold; a balance below the second number has nothing to gain.
 _MOST_REFINEMENTS, _BALANCED = 20, 1e-9
-# Strain is not read nearer to a singular point than this (in units of a).
-_STRAIN_DISTANCE = 0.1
-
-
-# The half planes that are solved on.
-HalfPlane = Meridian | EllipticMeridian
-# Of each region of a body, by its number: its mesh and the facets of each group.
-Meshes = dict[int, tuple[Any, dict[str, Int32Array]]]
 
 
 class MeridianProblem:
@@ -99,15 +87,15 @@ class MeridianProblem:
         """
         if len(loads.motions) > 1 or loads.motions[0].is_rotation or any(loads.motions[0].direction[:2]):
             raise SolveError("the meridian serves movements along its axis only")
-        for nu in map(_poisson, law.lame_lambda, law.lame_mu):
+        for nu in map(poisson_of, law.lame_lambda, law.lame_mu):
             if not 0 <= nu <= 0.5:
                 raise SolveError(f"Poisson's ratio is {nu:g}, must be between 0 and 0.5")
-        clock, best, failure = _Clock(), None, SolveError("no mesh was tried")
+        clock, best, failure = Clock(), None, SolveError("no mesh was tried")
         for grading in _GRADINGS:
             try:
                 arrays = self._meridian.mesh(grading)
                 found = _solve_on(arrays, law, self._bonded, self._degree, clock)
-            except _Unbalanced as error:
+            except Unbalanced as error:
                 # Round-off grows with refinement: a finer mesh would do no better.
                 failure = error
                 break
@@ -132,32 +120,16 @@ class MeridianProblem:
         )  # fmt: skip
 
 
-def compile_axisymmetric(degree: int = DEGREE, *, curved: bool = False) -> None:
-    """Compile every form that a :class:`MeridianProblem` needs, on this process; call it within ``compiling()``."""
+def compile_axisymmetric(degree: int = DEGREE, *, curved: bool = False, lowest: int = 0) -> None:
+    """Compile every form that a :class:`MeridianProblem` needs, on this process; call it within ``compiling()``.
+
+    Those from the degree ``lowest`` on, if it is given.
+    """
     example: HalfPlane = EllipticMeridian(2.0, 2.0, 1.0, 0.0) if curved else Meridian(2.0, 1.0, 1.0)
     mesh, facets = meridian_mesh(example.mesh(Grading(1.0)))
     for mixed in (False, True):
-        for p in (degree - 1, degree):
+        for p in range(lowest or degree - 1, degree + 1):
             MeridianForms(mesh, facets, p, mixed)
-
-
-class _Unbalanced(SolveError):
-    """Round-off has spoilt the solution."""
-
-
-class _Clock:
-    """Seconds spent, by kind of work."""
-
-    def __init__(self) -> None:
-        self.seconds = dict.fromkeys(("mesh", "assemble", "setup", "solve"), 0.0)
-
-    @contextmanager
-    def __call__(self, kind: str) -> Iterator[None]:
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[kind] += time.perf_counter() - start
 
 
 @dataclass(frozen=True)
@@ -176,7 +148,7 @@ class _Scaled:
     max_strain: float = 0.0
 
 
-def _solve_on(arrays: MeridianArrays, law: MaterialLaw, bonded: bool, degree: int, clock: _Clock) -> _Scaled:
+def _solve_on(arrays: MeridianArrays, law: MaterialLaw, bonded: bool, degree: int, clock: Clock) -> _Scaled:
     """Solve with degrees p - 1 and p on one mesh: the answer is that of p, its error bar comes from the difference.
 
     At an edge where the displacement goes like r^½, the error falls like p⁻² if nothing else is left (the mesh's
@@ -196,16 +168,13 @@ def _solve_on(arrays: MeridianArrays, law: MaterialLaw, bonded: bool, degree: in
     step = abs(coarse.on_probe / fine.on_probe - 1)
     error = 1.25 * theta * step + 3 * max(coarse.balance, fine.balance)
     with clock("solve"):
-        strain, corners = fine.forms.mean_strains()
-        distance = np.linalg.norm(corners[:, :, None] - arrays.singular, axis=-1).min(axis=(1, 2))
-        max_strain = float(strain[distance >= _STRAIN_DISTANCE].max(initial=0.0))
-    return replace(fine, error=error, max_strain=max_strain)
+        return replace(fine, error=error, max_strain=max_strain(fine.forms, arrays))
 
 
-def _solve_degree(meshes: Meshes, degree: int, law: MaterialLaw, bonded: bool, clock: _Clock) -> _Scaled:
+def _solve_degree(meshes: Meshes, degree: int, law: MaterialLaw, bonded: bool, clock: Clock) -> _Scaled:
     """Solve with one degree; refine the solution until round-off stops it."""
     with clock("assemble"):
-        forms, definite = _forms(meshes, degree, law)
+        forms, definite = forms_of(meshes, degree, law)
         stiffness = forms.stiffness()
         probe, support = forms.locate(PROBE, 1), forms.locate(FIXED, 1)
         zero = [support, forms.locate(FIXED, 0), forms.locate(AXIS, 0)]
@@ -215,7 +184,7 @@ def _solve_degree(meshes: Meshes, degree: int, law: MaterialLaw, bonded: bool, c
         solution = np.zeros(forms.dofs)
         solution[probe] = -1.0
         unknown = stiffness[free][:, free]
-    with _factorised(unknown, definite=definite, clock=clock) as solve, clock("solve"):
+    with factorised(unknown, definite=definite, clock=clock) as solve, clock("solve"):
         residual, balance = forms.residual(solution), np.inf
         for iteration in range(1, _MOST_REFINEMENTS + 1):  # noqa: B007
             solution[free] -= solve(residual[free])
@@ -229,64 +198,8 @@ def _solve_degree(meshes: Meshes, degree: int, law: MaterialLaw, bonded: bool, c
             if balance < _BALANCED or balance > before / 2:
                 break
     if balance > BALANCE_LIMIT:
-        raise _Unbalanced(
+        raise Unbalanced(
             f"forces do not balance: relative error {balance:.1e}, allowed {BALANCE_LIMIT:.0e}; "
             "the body is so slender that its stiffness drowns in round-off"
         )
     return _Scaled(on_probe, twice_energy, balance, forms, iteration)
-
-
-def _forms(meshes: Meshes, degree: int, law: MaterialLaw) -> tuple[MeridianForms | JoinedForms, bool]:
-    """Return the forms of all materials, in units of the μ of region 0, and whether their operator is definite."""
-    parts, weights, definite = [], [], True
-    for region, (mesh, facets) in meshes.items():
-        lame_lambda, lame_mu = law.lame_lambda[region], law.lame_mu[region]
-        mixed = _poisson(lame_lambda, lame_mu) >= MIXED_FROM
-        part = MeridianForms(mesh, facets, degree, mixed)
-        part.set_ratio(lame_lambda / lame_mu)
-        parts.append(part)
-        weights.append(lame_mu / law.lame_mu[0])
-        definite = definite and not mixed
-    return parts[0] if len(parts) == 1 and weights == [1.0] else JoinedForms(parts, weights), definite
-
-
-def _poisson(lame_lambda: float, lame_mu: float) -> float:
-    return MaterialLaw.of(lame_lambda, lame_mu).poisson
-
-
-@contextmanager
-def _factorised(
-    matrix: sp.csr_matrix, *, definite: bool, clock: _Clock
-) -> Iterator[Callable[[FloatArray], FloatArray]]:
-    """Factorise by MUMPS, Cholesky if ``definite``, else LDLᵀ with pivoting; lend the function that solves."""
-    matrix.sort_indices()
-    csr = matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), matrix.data
-    operator = PETSc.Mat().createAIJ(matrix.shape, csr=csr, comm=MPI.COMM_SELF)
-    ksp = PETSc.KSP().create(MPI.COMM_SELF)
-    right, left = operator.createVecs()
-
-    def solve(load: FloatArray) -> FloatArray:
-        left.array[:] = load
-        ksp.solve(left, right)
-        if ksp.getConvergedReason() <= 0:
-            raise SolveError("the factorisation failed (out of memory, or the operator is singular)")
-        return np.array(right.array)
-
-    try:
-        with clock("setup"):
-            operator.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-            if definite:
-                operator.setOption(PETSc.Mat.Option.SPD, True)
-            ksp.setOperators(operator)
-            ksp.setType("preonly")
-            ksp.pc.setType("cholesky")
-            ksp.pc.setFactorSolverType("mumps")
-            ksp.pc.setFactorSetUpSolverType()
-            ksp.pc.getFactorMatrix().setMumpsIcntl(14, _SPARE_MEMORY)
-            ksp.setUp()
-        yield solve
-    except PETSc.Error as error:
-        raise SolveError(f"the factorisation failed (PETSc error {error.ierr})") from error
-    finally:
-        for item in (left, right, ksp, operator):
-            item.destroy()

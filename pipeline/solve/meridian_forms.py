@@ -74,10 +74,12 @@ class MeridianForms:
         space = (self._space.sub(0) if self._mixed else self._space).sub(component)
         return np.asarray(fem.locate_dofs_topological(space, 1, self._facets[name]), dtype=np.int64)
 
-    def joints(self) -> tuple[IntArray, FloatArray]:
-        """Return the dofs (n, 2) of u_r and u_z where other materials are joined, and where they are (n, 2)."""
+    def on(self, name: str) -> tuple[IntArray, FloatArray]:
+        """Return the dofs (n, 2) of u_r and u_z on a group of facets, and where they are (n, 2)."""
+        if name not in self._facets:
+            return np.empty((0, 2), dtype=np.int64), np.empty((0, 2))
         space, dofs = self._space.sub(0).collapse() if self._mixed else (self._space, np.arange(self.dofs))
-        blocks = np.asarray(fem.locate_dofs_topological(space, 1, self._facets[JOINT]), dtype=np.int64)
+        blocks = np.asarray(fem.locate_dofs_topological(space, 1, self._facets[name]), dtype=np.int64)
         places: FloatArray = space.tabulate_dof_coordinates()[blocks, :2]
         return np.asarray(dofs, dtype=np.int64).reshape(-1, 2)[blocks], places
 
@@ -123,7 +125,7 @@ class JoinedForms:
         self.dofs, joined = 0, 0
         dofs, places = np.empty((0, 2), dtype=np.int64), np.empty((0, 2))
         for part in parts:
-            own, where = part.joints()
+            own, where = part.on(JOINT)
             number = np.full(part.dofs, -1)
             if len(places):
                 distance, nearest = cKDTree(places).query(where)
@@ -137,6 +139,12 @@ class JoinedForms:
             dofs, places = np.vstack([dofs, number[own]]), np.vstack([places, where])
         if joined != len(places):
             raise SolveError(f"{len(places) - joined} places where materials meet have none on the other side")
+
+    def on(self, name: str) -> tuple[IntArray, FloatArray]:
+        """Return the dofs (n, 2) of u_r and u_z on a group of facets, and where they are (n, 2)."""
+        found = [(number[dofs], places) for part, _, number in self._each for dofs, places in (part.on(name),)]
+        dofs, first = np.unique(np.vstack([dofs for dofs, _ in found]), axis=0, return_index=True)
+        return dofs, np.vstack([places for _, places in found])[first]
 
     def locate(self, name: str, component: int) -> IntArray:
         """Return the dofs of u_r (0) or u_z (1) on a group of facets."""

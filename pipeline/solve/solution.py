@@ -95,7 +95,7 @@ class Solution:
         if self.decrements is None:
             return nan
         amounts = self.response.amounts
-        return float(amounts @ self.decrements @ amounts) / (2 * self.energy)
+        return float(amounts @ self.decrements @ amounts) / (2 * self.response.energy)
 
     @property
     def bar(self) -> float:
@@ -103,7 +103,7 @@ class Solution:
         if self.bars is None:
             return nan
         amounts = np.abs(self.response.amounts)
-        return float(amounts @ self.bars @ amounts) / (2 * self.energy)
+        return float(amounts @ self.bars @ amounts) / (2 * self.response.energy)
 
     @property
     def reaction_bars(self) -> Vector:

@@ -68,7 +68,7 @@ def test_arcs_are_followed_closely_enough(monkeypatch):
 def test_displacement_and_mixed_elements_agree(monkeypatch):
     forces = []
     for threshold in (0.3, 0.5):
-        monkeypatch.setattr("pipeline.solve.axisymmetric.MIXED_FROM", threshold)
+        monkeypatch.setattr("pipeline.solve.meridian_system.MIXED_FROM", threshold)
         forces.append(solve(SCENES["flat"], 0.4, True).reaction[2])
     assert forces[0] == pytest.approx(forces[1], rel=3e-7)
 

@@ -18,6 +18,12 @@ class RoundIndenter(Indenter):
         """Radius (m) at which the tool ends."""
 
     @property
+    def kinks(self) -> tuple[float, ...]:
+        """Radii (m) at which its section is not smooth: a sharp tip, or where a rounding ends."""
+        section = self.section
+        return (section.tangent,) if section.angle else ()
+
+    @property
     def footprint(self) -> Probe:
         """The disc that holds all that it may touch."""
         radius = min(CANDIDATES * self.section.reach(self.depth), self.limit)

@@ -1,0 +1,72 @@
+"""Whether a round patch of contact on the meridian is one: pressed everywhere within, clear of the tool beyond."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
+from pipeline.mesh.meridian import MeridianArrays
+from pipeline.scene.model import FREE, PROBE
+from pipeline.solve.linear import SolveError
+from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
+
+# Tension below this share of the mean pressure, penetration below this share of the depth: what a radius that is off
+# by 1e-4 leaves.
+_TENSION, _PENETRATION = 1e-2, 1e-4
+# Pressures are not read nearer to the edge than this, in units of its radius: there they are the radius' error.
+_BESIDE_EDGE = 1e-3
+# A height this near to the top, in units of the radius of contact, is the top's.
+_LEVEL = 1e-9
+
+
+def check_signs(
+    forms: MeridianForms | JoinedForms, arrays: MeridianArrays, solution: FloatArray, residual: FloatArray,
+    depth: float, gap: Callable[[FloatArray], FloatArray], limit: float,
+) -> None:  # fmt: skip
+    """Check a ``solution`` (displacements in m, lengths of the mesh in units of ``arrays.unit``) and its ``residual``.
+
+    ``gap`` is that between tool and surface at radii up to ``limit`` (m) when its lowest point touches.
+
+    Raises:
+        SolveError: if the tool pulls somewhere, or goes through the surface beside the contact.
+    """
+    dofs, places = forms.on(PROBE)
+    order = np.argsort(places[:, 0])
+    radii, reactions = places[order, 0], residual[dofs[order, 1]]
+    ends = np.unique(arrays.points[arrays.facets[PROBE], 0])
+    pressure = -np.linalg.solve(_mass(radii, ends), reactions)
+    mean = -2 * reactions.sum()
+    within = radii < 1 - _BESIDE_EDGE
+    if (tension := -pressure[within].min() / mean) > _TENSION:
+        at = radii[within][np.argmin(pressure[within])] * arrays.unit
+        raise SolveError(
+            f"contact is not one round patch: {1e3 * at:.3g} mm from the axis the tool would pull with {tension:.1%} "
+            'of the mean pressure; use model = "3d"'
+        )
+    dofs, places = forms.on(FREE)
+    # What can be seen along the axis: of a cylinder its top, of an ellipsoid its upper half.
+    top = -_LEVEL if arrays.order == 1 else arrays.points[:, 1].min() / 2
+    beside = (places[:, 1] > top) & (places[:, 0] * arrays.unit < limit)
+    clear = gap(places[beside, 0] * arrays.unit) - depth - solution[dofs[beside, 1]]
+    if (through := -clear.min(initial=0.0) / depth) > _PENETRATION:
+        at = places[beside, 0][np.argmin(clear)] * arrays.unit
+        raise SolveError(
+            f"contact is not one round patch: {1e3 * at:.3g} mm from the axis the tool would go through the surface "
+            f'by {through:.1%} of its depth; use model = "3d"'
+        )
+
+
+def _mass(radii: FloatArray, ends: FloatArray) -> FloatArray:
+    """Return ∫ φᵢ φⱼ r dr of the polynomials between ``ends`` of elements with nodes at ``radii``, both sorted."""
+    starts: IntArray = np.searchsorted(radii, ends - 1e-14)
+    degree = int(starts[1] - starts[0])
+    points, weights = np.polynomial.legendre.leggauss(degree + 2)
+    mass = np.zeros((len(radii), len(radii)))
+    for first, low, high in zip(starts[:-1], ends[:-1], ends[1:], strict=True):
+        nodes = slice(int(first), int(first) + degree + 1)
+        local = (2 * radii[nodes] - low - high) / (high - low)
+        vander = np.polynomial.legendre.legvander
+        values = vander(points, degree) @ np.linalg.inv(vander(local, degree))
+        r = (low + high) / 2 + (high - low) / 2 * points
+        mass[nodes, nodes] += (values.T * (weights * r * (high - low) / 2)) @ values
+    return mass

@@ -1,0 +1,124 @@
+"""Contact whose area is found, where force, depth and radius are known: half-spaces, finite bodies, thin layers."""
+
+from collections.abc import Iterator
+from math import pi, radians, tan
+from typing import Any
+
+from mpi4py import MPI
+
+from pipeline.plan.plan import make_plan
+from pipeline.run.execute import compute
+from pipeline.run.record import Record
+from pipeline.shapes.rounded import Rounded
+from pipeline.study.load import parse
+from pipeline.verify import known
+from pipeline.verify.layer_contact import layer_contact
+from pipeline.verify.row import Row
+
+_YOUNG, _POISSON = 10e3, 0.3
+_ACCURACY = {"2D": "0.1 %"}
+# A body this many times the radius of contact is a half-space but for a few 1e-5 of F.
+_FAR = 20_000
+# By this much F of the depth is above Hertz's on a cylinder whose radius and height are 200 radii of contact: found
+# with elements of degree 5 by hand, before there was this program's solver.
+_FINITE, _FINITE_ERROR = 3.97e-3, 3e-5
+_BALL, _ANGLE = 50.0, 60.0  # mm, degrees
+_LAYERS = (3.0, 1.0, 1 / 3)  # thickness over the radius of contact
+_LAYER_SOURCE = "integral equation (N. N. Lebedev, Ya. S. Ufliand 1958)"
+
+
+def contact_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
+    """Yield the rows of unilateral contact, as they are solved; ``quick`` leaves a layer; collective."""
+    if not quick:
+        yield from _half_space(comm)
+        yield from _finite(comm)
+        yield from _flat(comm)
+    yield from _layers(comm, quick)
+
+
+def _half_space(comm: MPI.Comm) -> Iterator[Row]:
+    """F of the depth, and of the radius found, of tools of about 1 mm of contact."""
+    plane = _YOUNG / (1 - _POISSON**2)
+    ball, cone = Rounded(0.0, _BALL * 1e-3), Rounded(radians(_ANGLE))
+    shallow, deep = 1e-6 / ball.tip, 1e-3
+    a = ball.contact_radius(shallow)
+    tools = (
+        ("sphere", {"shape": "sphere", "radius": f"{_BALL} mm"}, shallow, plane * _ball_force(ball.tip, a), ball),
+        ("cone", {"shape": "cone", "angle": f"{_ANGLE} deg", "radius": "8 mm"}, deep,
+         2 / pi * plane * tan(cone.angle) * deep**2, cone),
+    )  # fmt: skip
+    for name, tool, depth, force, section in tools:
+        for path in _ACCURACY:
+            record = _solved(comm, path, _cylinder(_FAR, _FAR), tool, depth)
+            yield _row(f"half-space, {name}, F of depth", path, force, known.SNEDDON, record, 1e-4)
+            radius = record.contact_radius
+            by_radius = _ball_force(section.tip, radius) if section.tip else pi / 2 * radius**2 / tan(section.angle)
+            if path == "2D":
+                yield _row(f"half-space, {name}, F of radius", path, plane * by_radius, known.SNEDDON, record, 1e-6)
+
+
+def _finite(comm: MPI.Comm) -> Iterator[Row]:
+    """A body of 200 radii of contact is not a half-space: its surface sinks less."""
+    ball, plane = Rounded(0.0, 1.0), _YOUNG / (1 - _POISSON**2)
+    depth = 1e-6 / ball.tip
+    for path in _ACCURACY:
+        record = _solved(comm, path, _cylinder(200, 200), {"shape": "sphere", "radius": f"{1e3 * ball.tip} mm"}, depth)
+        force = (1 + _FINITE) * plane * _ball_force(ball.tip, ball.contact_radius(depth))
+        yield _row("body of 200 radii of contact, sphere", path, force, "meridian, by hand", record, _FINITE_ERROR)
+
+
+def _flat(comm: MPI.Comm) -> Iterator[Row]:
+    """Nothing lifts off a flat disc on a flat top: F is that of the known footprint."""
+    tool = {"shape": "disc", "radius": "3 mm"}
+    for nu in (0.3, 0.5):
+        for path in _ACCURACY:
+            record = _solved(comm, path, known.CYLINDER_BODY, tool, 1e-5, nu)
+            force = known.CYLINDER["frictionless", nu] * _YOUNG * 1e-5 * 1e-3
+            name = f"cylinder R = H = 50 mm, a = 3 mm, unilateral, ν = {nu:g}"
+            yield _row(name, path, force, known.CYLINDER_SOURCE, record, known.CYLINDER_ERROR)
+
+
+def _layers(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
+    """Layers on a rigid base, from three times as thick as contact is in radius to a third of that."""
+    ball = Rounded(0.0, _BALL * 1e-3)
+    for nu in (_POISSON,) if quick else (_POISSON, 0.45, 0.5):
+        for thick in _LAYERS[-1:] if quick else _LAYERS:
+            depth, force = layer_contact(ball.slope, 1e-3, thick * 1e-3, nu)
+            for path in _ACCURACY:
+                body = _cylinder(1 + 20 * max(thick, 0.5), thick)
+                record = _solved(comm, path, body, {"shape": "sphere", "radius": f"{_BALL} mm"}, depth, nu)
+                name = f"layer on a rigid base, sphere, a/h = {1 / thick:.2g}, ν = {nu:g}"
+                yield _row(name, path, force * _YOUNG / (1 - nu**2), _LAYER_SOURCE, record, 1e-6)
+
+
+def _ball_force(radius: float, contact: float) -> float:
+    """Return F / E* (m²) of a ball, not a paraboloid, whose contact on a half-space has a small radius (m).
+
+    The series of (a² + R²)/2 ln((R + a)/(R - a)) - a R, without its cancellation.
+    """
+    square = (contact / radius) ** 2
+    return 4 / 3 * contact**3 / radius * (1 + square * (2 / 5 + square * (9 / 35 + square * 4 / 21)))
+
+
+def _row(name: str, path: str, force: float, source: str, record: Record, reference_bar: float) -> Row:
+    return Row(name, path, force, source, record.force, record.force_error, reference_bar, record.message)
+
+
+def _solved(
+    comm: MPI.Comm, path: str, body: dict[str, Any], tool: dict[str, Any], depth: float, poisson: float = _POISSON
+) -> Record:
+    """Solve a scene to the accuracy of its path."""
+    study = parse({
+        "body": {"fixed": "bottom"} | body,
+        "material": {"young": f"{_YOUNG} Pa", "poisson": poisson},
+        "probe": tool | {"depth": f"{depth!r} m", "contact": "unilateral"},
+        "mesh": {"accuracy": _ACCURACY[path]},
+        "solve": {"exact": False},
+    })  # fmt: skip
+    plan = make_plan(study, without=("axisymmetric",) if path == "3D" else ())
+    (record,) = compute(plan, comm).values()
+    return record
+
+
+def _cylinder(radius: float, height: float) -> dict[str, Any]:
+    return {"shape": "cylinder", "radius": f"{radius!r} mm", "height": f"{height!r} mm"}

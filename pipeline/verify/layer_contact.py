@@ -1,0 +1,48 @@
+"""A frictionless round tool on an elastic layer that is bonded to a rigid base, by an integral equation of its own.
+
+With the pressure p(r) = (E*/2) ∫ ξ A(ξ) J₀(ξ r) dξ, A(ξ) = ∫ φ(t) cos(ξ t) dt for 0 < t < a, the surface sinks by
+∫ A(ξ) L(ξ h) J₀(ξ r) dξ, and below the tool by d - f(r):
+
+    φ(x) - (2/π) ∫ φ(t) K(x, t) dt = (2/π) (d - x ∫ f'(x sin s) ds),    K = ∫ (1 - L(ξ h)) cos(ξ x) cos(ξ t) dξ,
+
+with s over a quarter of a turn. The force is π E* ∫ φ dt; where contact ends by itself φ(a) = 0. (N. N. Lebedev and
+Ya. S. Ufliand, J. Appl. Math. Mech. 22, 442, 1958, with L of I. I. Vorovich et al., 1974.)
+"""
+
+from collections.abc import Callable
+from math import pi
+
+import numpy as np
+
+from pipeline.arrays import FloatArray
+
+# Gauss points along the radius, over a quarter of a turn, and along ξ h up to where 1 - L is below 1e-16.
+_RADIAL, _TURN, _WAVES, _LAST = 64, 64, 400, 24.0
+
+
+def layer_contact(
+    slope: Callable[[FloatArray], FloatArray], radius: float, thickness: float, poisson: float
+) -> tuple[float, float]:
+    """Return depth (m) and F / E* (m²) at which contact of a tool with that ``slope`` has a ``radius`` (m)."""
+    nodes, weights = np.polynomial.legendre.leggauss(_RADIAL)
+    x, w = radius * (nodes + 1) / 2, radius * weights / 2
+    at = np.append(x, radius)
+    turn, turned = np.polynomial.legendre.leggauss(_TURN)
+    sine = np.sin(pi / 4 * (turn + 1))
+    shape = at * (slope(at[:, None] * sine) @ (pi / 4 * turned))
+    kernel = 2 / pi * _kernel(at, x, thickness, poisson)
+    matrix = np.eye(_RADIAL) - kernel[:-1] * w
+    # Of a flat punch pushed in by 1, and of the tool's shape alone: φ = d φ₁ - φ₂.
+    punch, shaped = np.linalg.solve(matrix, 2 / pi * np.column_stack([np.ones(_RADIAL), shape[:-1]])).T
+    last = kernel[-1] * w
+    depth = (2 / pi * shape[-1] + last @ shaped) / (2 / pi + last @ punch)
+    return float(depth), pi * float(w @ (depth * punch - shaped))
+
+
+def _kernel(x: FloatArray, t: FloatArray, thickness: float, poisson: float) -> FloatArray:
+    nodes, weights = np.polynomial.legendre.leggauss(_WAVES)
+    s, w = _LAST * (nodes + 1) / 2, _LAST * weights / 2
+    kappa = 3 - 4 * poisson
+    layer = (2 * kappa * np.sinh(2 * s) - 4 * s) / (2 * kappa * np.cosh(2 * s) + 1 + kappa**2 + 4 * s**2)
+    waves = (1 - layer) * w / thickness
+    return np.asarray((np.cos(np.outer(x, s / thickness)) * waves) @ np.cos(np.outer(s / thickness, t)))

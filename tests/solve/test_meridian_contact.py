@@ -1,0 +1,134 @@
+"""Contact whose area is found, on the meridian of round scenes: closed forms, work, and what is no round patch."""
+
+from math import log, pi, sqrt, tan
+
+import numpy as np
+import pytest
+
+from pipeline.mesh.elliptic_meridian import EllipticMeridian
+from pipeline.mesh.meridian import Meridian
+from pipeline.plan.plan import make_plan
+from pipeline.report.dataset import build
+from pipeline.run.execute import compute
+from pipeline.shapes.rounded import Rounded
+from pipeline.solve.axisymmetric import MeridianProblem, compile_axisymmetric
+from pipeline.solve.cache import compiling
+from pipeline.solve.conditions import Conditions
+from pipeline.solve.linear import SolveError
+from pipeline.solve.loads import Loads
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.meridian_contact import DEGREE, TRIAL_DEGREE, MeridianContact, RoundTool
+from tests.cases import study
+
+LAW = MaterialLaw.of(0.3 / 1.3 / 0.4, 0.5 / 1.3)  # E = 1, ν = 0.3
+PLANE = 1 / (1 - 0.3**2)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _compiled():
+    with compiling():
+        compile_axisymmetric(lowest=TRIAL_DEGREE)
+        compile_axisymmetric(4, curved=True)
+
+
+def pressed(tool, depth, meridian, law=LAW, degree=DEGREE):
+    return MeridianContact(meridian, tool, degree=degree).solve(law, Loads.along((0.0, 0.0, -depth)))
+
+
+def flat(radius):
+    return RoundTool(np.zeros_like, radius)
+
+
+def sneddon(section, radius):
+    """Return F / E* of contact of a ``radius`` on a half-space: 2 ∫ f' r² / (a² - r²)^½ dr."""
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    sine = np.sin(pi / 4 * (nodes + 1))
+    return 2 * radius**2 * float(pi / 4 * weights @ (sine**2 * section.slope(radius * sine)))
+
+
+@pytest.mark.parametrize(
+    ("section", "kinks", "depth"),
+    [(Rounded(0.0, 8.0), (), 1 / 8), (Rounded(pi / 3), (0.0,), 0.9)],
+    ids=["ball", "cone"],
+)
+def test_force_and_depth_on_a_deep_body_are_those_of_the_half_space(section, kinks, depth):
+    """F of the radius hardly feels that the body ends, since the singular stresses at the edge decide; the depth does:
+    the surface of a body of 200 radii sinks less by c F, c of about 0.4 % of 1 / (2 E* a).
+    """
+    found = pressed(RoundTool(section.height, 20.0 if kinks else 8.0, kinks), depth, Meridian(200.0, 200.0, 1.0))
+    exact = PLANE * sneddon(section, found.contact_radius)
+    assert found.reaction[2] == pytest.approx(exact, rel=1e-6)
+    assert found.bar < 1e-5
+    assert found.contact_area == pytest.approx(pi * found.contact_radius**2)
+    assert found.contact_radius == pytest.approx(section.contact_radius(depth), rel=5e-3)
+    closed = 2 / pi * tan(pi / 3) * depth**2 if kinks else sneddon(section, section.contact_radius(depth))
+    assert found.reaction[2] / (PLANE * closed) - 1 == pytest.approx(3.97e-3, rel=0.02)
+    assert found.iterations <= 6
+
+
+def test_a_flat_disc_touches_with_all_of_its_face():
+    """As the prescribed footprint does, and to the same bar: nothing lifts off."""
+    meridian, depth = Meridian(50.0, 50.0, 3.0), 0.5
+    found = pressed(flat(3.0), depth, meridian)
+    known = MeridianProblem(meridian, Conditions(bonded=False)).solve(LAW, Loads.along((0.0, 0.0, -depth)))
+    assert found.reaction[2] == pytest.approx(known.reaction[2], rel=1e-9)
+    assert found.energy == pytest.approx(known.energy, rel=1e-9)
+    assert found.contact_radius == 3.0
+
+
+def test_a_thin_layer_is_touched_as_far_as_it_is_pressed_down():
+    """On a layer much thinner than contact is wide a ball touches up to where it and the surface intersect."""
+    ball, depth = Rounded(0.0, 200.0), 0.005
+    found = pressed(RoundTool(ball.height, 200.0), depth, Meridian(20.0, 0.04, 1.0), MaterialLaw.of(0.0, 0.5))
+    assert found.contact_radius == pytest.approx(sqrt(2 * 200.0 * depth), rel=0.01)
+    assert found.reaction[2] == pytest.approx(pi * 200.0 * depth**2 / 0.04, rel=0.03)  # springs of E / H, ν = 0
+
+
+def test_the_work_of_the_force_is_the_energy():
+    """Between depths dU = F dd, on a body that is round itself: force, radius and energy belong together."""
+    section, semi_height, radius = Rounded(pi / 2.4, 0.5), 25.0, 40.0
+
+    def gap(r):
+        return section.height(r) + semi_height * (1 - np.sqrt(1 - (r / radius) ** 2))
+
+    tool, body = RoundTool(gap, 20.0, (section.tangent,)), EllipticMeridian(radius, semi_height, 1.0, -5.0)
+    first, middle, last = (pressed(tool, depth, body, degree=4) for depth in (0.4, 0.5, 0.6))
+    work = 0.2 / 6 * sum(w * s.reaction[2] for w, s in zip((1, 4, 1), (first, middle, last), strict=True))
+    assert last.energy - first.energy == pytest.approx(work, rel=1e-4)
+    power = log(last.reaction[2] / first.reaction[2]) / log(1.5)
+    assert 1.4 < power < 2.1
+    assert middle.energy < middle.reaction[2] * 0.5 / 2
+
+
+def test_what_is_no_round_patch_is_not_taken_for_one():
+    """A disc on a stiff skin over soft tissue is carried by its edge: the middle would have to be pulled down."""
+    skin = Meridian(30.0, 20.0, 5.0, interfaces=(-1.0,))
+    stiff, soft = MaterialLaw.of(0.3 / 1.3 / 0.4 * 100, 0.5 / 1.3 * 100), LAW
+    law = MaterialLaw(soft.lame_lambda + stiff.lame_lambda, soft.lame_mu + stiff.lame_mu)
+    with pytest.raises(SolveError, match=r"not one round patch.*pull"):
+        pressed(flat(5.0), 0.1, skin, law)
+
+
+def test_contact_as_wide_as_the_body_is_refused():
+    with pytest.raises(SolveError, match="edge of what is kept"):
+        pressed(RoundTool(Rounded(0.0, 500.0).height, 500.0), 0.5, Meridian(5.0, 5.0, 1.0))
+
+
+def test_a_round_study_has_area_and_radius_of_contact():
+    """By two moduli and two depths: F is proportional to the modulus, the radius does not know of it."""
+    found = study(
+        body={"shape": "cylinder", "radius": "30 mm", "height": "20 mm", "size": None},
+        material={"young": ["10 kPa", "20 kPa"]}, solve={"exact": False}, plan={"without": []},
+        probe={"shape": "sphere", "radius": "8 mm", "depth": "0.2 mm", "contact": "unilateral"},
+        mesh={"accuracy": "1 %", "epsilon": None, "fine": None, "coarse": None, "rim": None, "growth": None,
+              "degree": None},
+    )  # fmt: skip
+    plan = make_plan(found)
+    from mpi4py import MPI
+
+    dataset = build(plan, compute(plan, MPI.COMM_SELF))
+    assert list(dataset["status"].values) == ["ok", "ok"]
+    assert set(dataset["origin"].values) == {"axisymmetric", "scaled"}
+    assert dataset["force"].values[1] == pytest.approx(2 * dataset["force"].values[0])
+    assert dataset["contact_radius"].values == pytest.approx(1.28e-3, rel=0.05)
+    assert dataset["contact_area"].values == pytest.approx(pi * dataset["contact_radius"].values ** 2)
