@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.arrays import FloatArray
+from pipeline.mesh.organ.narrow import NOWHERE, Narrow
 from pipeline.mesh.size import Sizes
 from pipeline.shapes.frame import Frame
 
@@ -17,11 +18,15 @@ PER_RADIUS = 2
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """``sizes`` round a ``frame``; ``edge`` (n, 3), in m, are points close to each other along the footprint's edge."""
+    """``sizes`` round a ``frame``; ``edge`` (n, 3), in m, are points close to each other along the footprint's edge.
+
+    Elements of the surface are smaller where it is ``narrow``, and those within next to them.
+    """
 
     sizes: Sizes
     frame: Frame
     edge: FloatArray
+    narrow: Narrow = NOWHERE
 
     @cached_property
     def _tree(self) -> cKDTree:
@@ -34,14 +39,14 @@ class Field:
         return min(far, self.sizes.fine if self.sizes.epsilon == inf else self.sizes.coarse)
 
     def at(self, points: FloatArray) -> FloatArray:
-        """Return the size (m) at points (n, 3)."""
+        """Return the size (m) at points (n, 3) of the surface."""
         sizes = self.sizes
         distance, _ = self._tree.query(points)
         size = np.minimum(sizes.rim + sizes.growth * distance, self.largest)
         if sizes.epsilon < inf:
             beyond = np.linalg.norm(points - np.array(self.frame.point), axis=1) - sizes.epsilon
             size = np.minimum(size, sizes.fine + sizes.growth * np.maximum(beyond, 0.0))
-        return size
+        return np.minimum(size, self.narrow.at(points))
 
     def terms(self, distance: str, scale: float) -> list[str]:
         """Write what the size is the least of, in units of ``scale`` m, from text of the distance to the edge."""

@@ -21,9 +21,9 @@ from pipeline.shapes.scanned import Scanned
 
 # The surface is meshed twice: only the second time its points are dense where sizes change fast.
 _PASSES = 2
-# Where elements far from the contact are so large that the surface meets itself across a thin part, they are to be this
-# many times smaller.
-_FINER = (1, 2, 4, 8)
+# Where elements far from the contact are so large that the surface meets itself across a thin part or a gap, they are
+# to be no larger than these are wide; if that is not enough, this many times smaller everywhere.
+_ATTEMPTS = ((1, False), (1, True), (2, False), (4, False), (8, False))
 # The remesher turns lengths into units of its own and back, which moves points by rounding.
 _SAME = 1e-6
 # A share of the body's volume: chords of elements leave half a per cent of an organ out, which their curved edges bring
@@ -41,18 +41,18 @@ def mesh_scanned(scene: Scene, body: Scanned, sizes: Sizes, kept: Kept | None = 
         MeshError: if a mesh generator fails with smaller elements, too.
     """
 
-    def mesh(finer: int) -> MeshArrays:
+    def mesh(finer: int, adapted: bool) -> MeshArrays:
         smaller = replace(sizes, column=sizes.column / finer)
-        return mesh_organ(scene, smaller, far_surface(body, kept, finer))
+        return mesh_organ(scene, smaller, far_surface(body, kept, finer, adapted))
 
-    for finer in _FINER[:-1]:
+    for attempt in _ATTEMPTS[:-1]:
         try:
-            return mesh(finer)
+            return mesh(*attempt)
         except GeometryError:
             raise
         except MeshError:
             continue
-    return mesh(_FINER[-1])
+    return mesh(*_ATTEMPTS[-1])
 
 
 def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
@@ -71,7 +71,7 @@ def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
         return scene.body.lift(scene.frame, points)[0]
 
     contact = set_in(far.sheet, scene.frame, scene.footprint, sizes, lift)
-    field = Field(sizes, scene.frame, contact.edge)
+    field = Field(sizes, scene.frame, contact.edge, far.narrow)
     sheet = _to_sizes(contact, field, _Truth(scene, far, lift))
     _check_whole(sheet, scene.body.volume)
     points, cells = fill(sheet.points, sheet.facets, field)

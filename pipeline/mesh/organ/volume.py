@@ -36,6 +36,7 @@ def fill(points: FloatArray, facets: IntArray, field: Field) -> tuple[FloatArray
         model.geo.synchronize()
         _set_field(field, scale)
         gmsh.option.setNumber("Mesh.OptimizeThreshold", _OPTIMISED)
+        gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", bool(field.narrow))
         try:
             model.mesh.generate(3)
         except Exception as error:  # gmsh raises bare Exception
