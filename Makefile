@@ -11,6 +11,9 @@ LOOP_ARGS ?=
 # A selection of tests may hold none for 2 ranks (pytest's status 5); the whole suite may not.
 NONE_OK = $(if $(PYTEST_ARGS),|| [ $$? -eq 5 ])
 
+# A process of tests a core, each with whole files of them: what a file's tests share is made once.
+SIDE_BY_SIDE := -n logical --maxprocesses 8 --dist loadfile
+
 # Large arrays on huge pages, where the C library is asked for them: a tenth of a run's time (docs/performance.md).
 export GLIBC_TUNABLES ?= glibc.malloc.hugetlb=1
 
@@ -45,9 +48,9 @@ docs: setup ## build the documentation; a warning is an error
 	@echo $(DOCS)/index.html
 
 # The browser is for the tests of the report alone, which are left out where there is none.
-test: ## run the tests, serial and on 2 ranks
+test: ## run the tests, by themselves and on 2 ranks
 	@scripts/setup.sh chromium
-	$(PYTHON) -m pytest $(PYTEST_ARGS) </dev/null
+	$(PYTHON) -m pytest $(SIDE_BY_SIDE) $(PYTEST_ARGS) </dev/null
 	$(MPIRUN) 2 scripts/one-voice.sh $(PYTHON) -m mpi4py -m pytest -m mpi -p no:cacheprovider $(PYTEST_ARGS) </dev/null $(NONE_OK)
 
 test-debian13: ## run the tests on Debian 13, in a root of its own (needs root)
