@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.verify.coverage.families import design, ellipses, organs, proportions, regions
-from pipeline.verify.coverage.families.dice import Section
+from pipeline.verify.sections import Section
 
 
 @dataclass(frozen=True)

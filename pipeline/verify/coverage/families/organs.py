@@ -14,7 +14,8 @@ from scipy.spatial import ConvexHull
 
 from pipeline.arrays import FloatArray
 from pipeline.verify.coverage.families.design import throw_mesh
-from pipeline.verify.coverage.families.dice import Section, log_uniform
+from pipeline.verify.coverage.families.dice import log_uniform
+from pipeline.verify.sections import Section
 
 TRUTH = "0.2 %"
 # Points of a surface: facets about as long as a tenth of the radius, or less.

@@ -3,7 +3,8 @@
 import numpy as np
 
 from pipeline.verify.coverage.families.design import throw_mesh
-from pipeline.verify.coverage.families.dice import MOST_STRAIGHT, Section, log_uniform
+from pipeline.verify.coverage.families.dice import MOST_STRAIGHT, log_uniform
+from pipeline.verify.sections import Section
 
 TRUTH = "0.1 %"
 _POISSON = (0.0, 0.2, 0.3, 0.4, 0.45, 0.48, 0.495, 0.5)
