@@ -2,10 +2,12 @@
 
 from abc import abstractmethod
 from functools import lru_cache
+from math import inf
 
 from pipeline.shapes.arrays import FloatArray, np
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, PlaceError
+from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.rays import nearest_point, pierce
 from pipeline.shapes.section import in_mm
 from pipeline.shapes.skin import Skin
@@ -75,6 +77,10 @@ class Facetted(Body):
         """Return the distance (m) of points (n, 3) of the body to its surface, negative outside."""
         return skin_of(self.triangles).depth(points)
 
+    def room(self, surface: Ovoid) -> float:
+        """Return the distance (m) to a surface within: hollows and spikes of the body that it holds stick out, too."""
+        return _room(self.model_copy(update={"inclusion": ()}), surface)
+
     @property
     def face(self) -> str:
         """The extents."""
@@ -89,6 +95,13 @@ class Facetted(Body):
 
     def half_plane(self) -> None:
         """Return none: see there."""
+
+
+@lru_cache(_MANY)
+def _room(body: Facetted, surface: Ovoid) -> float:
+    points = body.triangles.points
+    held = points[surface.level(points) < 1]
+    return min(Body.room(body, surface), float(surface.distance(held).min(initial=inf)))
 
 
 @lru_cache(_FEW)

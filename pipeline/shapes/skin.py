@@ -39,10 +39,10 @@ class Skin(Surface):
 
     def depth(self, points: FloatArray) -> FloatArray:
         """Return the distance (m) of each point, negative outside."""
-        triangles = self._triangles
-        signed, *_ = import_module("igl").signed_distance(
-            np.ascontiguousarray(points), np.array(triangles.points), np.array(triangles.facets)
-        )
+        igl = import_module("igl")
+        # Signs by winding numbers: the normals that libigl else tells them by take it five times as long to set up.
+        sign = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
+        signed, *_ = igl.signed_distance(np.ascontiguousarray(points), *self._arrays, sign)
         return -np.asarray(signed).ravel()
 
     def _nearest(self, points: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:

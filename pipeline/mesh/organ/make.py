@@ -12,9 +12,11 @@ from pipeline.mesh.generate import GeometryError, MeshArrays, MeshError, orient
 from pipeline.mesh.organ.base import DEVIATION, Base, Kept, far_surface, put_back
 from pipeline.mesh.organ.contact import Contact, set_in
 from pipeline.mesh.organ.field import Field
+from pipeline.mesh.organ.inclusions import inclusion_surfaces
 from pipeline.mesh.organ.remesh import remesh
 from pipeline.mesh.organ.sheet import PROBE, Sheet, edges_of, group_names
 from pipeline.mesh.organ.volume import fill
+from pipeline.mesh.regions import inclusion_sizes
 from pipeline.mesh.size import Sizes
 from pipeline.scene.model import Scene
 from pipeline.shapes.scanned import Scanned
@@ -71,19 +73,17 @@ def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
         return scene.body.lift(scene.frame, points)[0]
 
     contact = set_in(far.sheet, scene.frame, scene.footprint, sizes, lift)
-    field = Field(sizes, scene.frame, contact.edge, far.narrow)
+    field = Field(sizes, scene.frame, contact.edge, far.narrow, inclusion_sizes(scene.body, sizes.growth))
     sheet = _to_sizes(contact, field, _Truth(scene, far, lift))
     _check_whole(sheet, scene.body.volume)
-    points, cells = fill(sheet.points, sheet.facets, field)
+    points, cells, regions = fill(sheet.points, sheet.facets, field, inclusion_surfaces(scene.body.inclusion, field))
     facets = {name: sheet.facets[sheet.group == number] for number, name in group_names().items()}
     rim = np.unique(sheet.border(PROBE))
-    return MeshArrays(points, orient(points, cells), facets, rim, perf_counter() - start)
+    return MeshArrays(points, orient(points, cells), facets, rim, perf_counter() - start, regions)
 
 
 def _check(scene: Scene) -> None:
     """Refuse what is not meshed here."""
-    if scene.body.regions:
-        raise GeometryError(f"inclusions in a {scene.body.shape} are not supported by this version")
     if scene.is_cut:
         raise GeometryError(f'no column is cut out of a {scene.body.shape}: use outside = "coarse"')
     if scene.mirrors:
