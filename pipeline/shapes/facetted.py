@@ -66,8 +66,7 @@ class Facetted(Body):
 
     def reach(self, frame: Frame) -> float:
         """Return the largest distance (m) of a point from the axis."""
-        local = frame.local(self.triangles.points)
-        return float(np.hypot(local[:, 0], local[:, 1]).max())
+        return _reach(self.triangles, frame)
 
     def farthest(self, frame: Frame) -> float:
         """Return the largest distance (m) of a point from the contact."""
@@ -114,3 +113,9 @@ def skin_of(triangles: Triangles) -> Skin:
 def _thickness(triangles: Triangles, frame: Frame) -> float:
     _, height = pierce(-frame.local(triangles.points), triangles.facets, np.zeros((1, 2)))
     return max(float(height[0]), 0.0) if np.isfinite(height[0]) else 0.0
+
+
+@lru_cache(_MANY)
+def _reach(triangles: Triangles, frame: Frame) -> float:
+    local = frame.local(triangles.points)
+    return float(np.hypot(local[:, 0], local[:, 1]).max())
