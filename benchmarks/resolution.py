@@ -21,7 +21,7 @@ import numpy as np
 from pipeline.api import RunnableStudy
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.report.figures import STYLE, save
-from pipeline.report.figures.style import look, new_figure
+from pipeline.report.figures.style import WIDTH, finish, look, new_figure
 from pipeline.shapes.files.image import march
 from pipeline.shapes.files.shells import largest_shell
 from pipeline.shapes.triangles import enclosed
@@ -166,7 +166,7 @@ def draw(found: dict[str, dict[str, Any]], path: Path) -> Path:
     reference = found[REFERENCE.name]
     names = [name for name in found if name != REFERENCE.name]
     with mpl.rc_context(STYLE):
-        figure = new_figure(7.1, 3.4)
+        figure = new_figure(WIDTH, 1.7 + 0.22 * len(names))
         axes = figure.subplots()
         for number, place in enumerate(reference):
             off = [relative(found[name], reference)[place][0] for name in names]
@@ -177,8 +177,7 @@ def draw(found: dict[str, dict[str, Any]], path: Path) -> Path:
         axes.set_yticks(range(len(names)), names)
         axes.invert_yaxis()
         axes.set_xlabel("F off that of the exact surface (%)")
-        axes.set_title("What a file leaves open of F: disc of 4 mm, liver-like body", fontweight="bold")
-        figure.legend(loc="outside lower center", ncols=2, frameon=False)
+        finish(figure, "What a file leaves open of F: disc of 4 mm, liver-like body")
         return save(figure, path)
 
 
