@@ -11,7 +11,20 @@ from pathlib import Path
 DOCS = Path(__file__).parent
 PAGE, STUDIES, PICTURES = DOCS / "scenes.md", DOCS / "scenes", DOCS / "figures" / "scenes"
 # In the order of the page; studies that are not named here follow by their names.
-ORDER = ("box", "blade", "cylinder", "column", "layers", "tumour", "ellipsoid", "tilted", "cad", "organ", "image")
+ORDER = (
+    "box",
+    "blade",
+    "cylinder",
+    "column",
+    "layers",
+    "tumour",
+    "ellipsoid",
+    "tilted",
+    "cad",
+    "organ",
+    "organ-tumour",
+    "image",
+)
 # Bytes of a picture.
 MOST = 150_000
 
