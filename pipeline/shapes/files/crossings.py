@@ -25,4 +25,5 @@ def _search(points: FloatArray, facets: IntArray) -> IntArray:
     from igl.predicates import find_self_intersections  # noqa: PLC0415 (studies without files do without)
 
     _, pairs, _ = find_self_intersections(np.ascontiguousarray(points), np.ascontiguousarray(facets))
-    return pairs.reshape(-1, 2)
+    pairs = pairs.reshape(-1, 2)
+    return pairs[np.lexsort(pairs.T[::-1])]  # threads find them in any order
