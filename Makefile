@@ -11,6 +11,9 @@ LOOP_ARGS ?=
 # A selection of tests may hold none for 2 ranks (pytest's status 5); the whole suite may not.
 NONE_OK = $(if $(PYTEST_ARGS),|| [ $$? -eq 5 ])
 
+# A process of tests a core, each with whole files of them: what a file's tests share is made once.
+SIDE_BY_SIDE := -n logical --maxprocesses 8 --dist loadfile
+
 # Large arrays on huge pages, where the C library is asked for them: a tenth of a run's time (docs/performance.md).
 export GLIBC_TUNABLES ?= glibc.malloc.hugetlb=1
 
@@ -22,7 +25,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's own mpirun: another one on PATH would not fit Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies docs test test-debian13 slurm-test verify benchmark peers plain-loop stress soak lint format clean
+.PHONY: help setup study studies docs test test-debian13 slurm-test verify benchmark peers plain-loop resolution stress soak lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -45,9 +48,9 @@ docs: setup ## build the documentation; a warning is an error
 	@echo $(DOCS)/index.html
 
 # The browser is for the tests of the report alone, which are left out where there is none.
-test: ## run the tests, serial and on 2 ranks
+test: ## run the tests, by themselves and on 2 ranks
 	@scripts/setup.sh chromium
-	$(PYTHON) -m pytest $(PYTEST_ARGS) </dev/null
+	$(PYTHON) -m pytest $(SIDE_BY_SIDE) $(PYTEST_ARGS) </dev/null
 	$(MPIRUN) 2 scripts/one-voice.sh $(PYTHON) -m mpi4py -m pytest -m mpi -p no:cacheprovider $(PYTEST_ARGS) </dev/null $(NONE_OK)
 
 test-debian13: ## run the tests on Debian 13, in a root of its own (needs root)
@@ -76,6 +79,9 @@ peers: setup ## NGSolve and scikit-fem against this program, time to a true erro
 
 plain-loop: setup ## a study as a plain FEniCSx script runs it, against this program (idle, an hour or two)
 	$(PYTHON) -m benchmarks.plain_loop $(STUDY) $(LOOP_ARGS)
+
+resolution: setup ## what a file's resolution, noise and voxels change of F (a quarter of an hour): results/resolution.png
+	$(MPI_ENV) $(PYTHON) -m benchmarks.resolution
 
 stress: setup ## numerical stability: a matrix of extremes (10 minutes)
 	$(EPSMESH) stress

@@ -13,7 +13,7 @@ PAGE, STUDIES, PICTURES = DOCS / "scenes.md", DOCS / "scenes", DOCS / "figures" 
 # In the order of the page; studies that are not named here follow by their names.
 ORDER = (
     "box", "blade", "cylinder", "column", "layers", "tumour", "ellipsoid", "sphere", "cone", "wedge", "tilted", "cad",
-    "organ", "image",
+    "organ", "organ-tumour", "image",
 )  # fmt: skip
 # Bytes of a picture.
 MOST = 150_000

@@ -121,6 +121,7 @@ _RESULTS = (
     Quantity("message", "", "why a case failed or was skipped", "message"),
     Quantity("origin", "", "how the force was obtained", "origin"),
     Quantity("force_exact_message", "", "why there is no force_exact"),
+    Quantity("body_message", "", "what was done to the file of the body: repaired, smoothed, left out"),
 )  # fmt: skip
 # Those of a layer or an inclusion, whose name comes before: skin_young.
 _OF_PIECES = (

@@ -18,6 +18,7 @@ from pipeline.arrays import FloatArray, IntArray
 from pipeline.files import atomic
 from pipeline.shapes.files.image import surface_of
 from pipeline.shapes.files.labels import LabelMap
+from pipeline.shapes.files.stl import written
 from pipeline.shapes.triangles import Triangles
 
 MESHES = Path(__file__).resolve().parents[1] / "meshes"
@@ -119,13 +120,7 @@ def surface(organ: Organ) -> tuple[FloatArray, IntArray]:
 
 def stl(points: FloatArray, facets: IntArray) -> bytes:
     """A binary STL file."""
-    rows = np.zeros(len(facets), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-    rows["corners"] = points[facets]
-    return (
-        b"Like an organ; made by scripts/make_organs.py, mm".ljust(80)
-        + len(facets).to_bytes(4, "little")
-        + rows.tobytes()
-    )
+    return written(points, facets, b"Like an organ; made by scripts/make_organs.py, mm".ljust(80))
 
 
 def obj(points: FloatArray, facets: IntArray) -> bytes:

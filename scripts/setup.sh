@@ -14,9 +14,9 @@ packages=(
 python=/usr/bin/python3
 venv=.venv
 # EXTRAS=view adds what draws pictures of a case. A venv that has it keeps it.
-extras=dev,docs
+extras=dev,docs,repair
 if [[ ${EXTRAS:-} == view ]] || compgen -G "$venv/lib/python*/site-packages/pyvista" >/dev/null; then
-    extras=dev,docs,view
+    extras=dev,docs,repair,view
     packages+=(libegl1)
 fi
 stamp=$venv/.epsmesh-setup

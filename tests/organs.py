@@ -1,9 +1,10 @@
 """Bodies of triangles for the tests, made by formulas."""
 
-import struct
 from pathlib import Path
 
 import numpy as np
+
+from pipeline.shapes.files import stl
 
 AXES = np.array([60e-3, 45e-3, 30e-3])
 
@@ -47,7 +48,5 @@ def box(x: float, y: float, z: float) -> tuple[np.ndarray, np.ndarray]:
 
 def write_stl(path: Path, points: np.ndarray, facets: np.ndarray) -> Path:
     """Write facets (m) as a binary STL file in mm."""
-    records = np.zeros(len(facets), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
-    records["corners"] = 1e3 * points[facets]
-    path.write_bytes(b"\0" * 80 + struct.pack("<I", len(facets)) + records.tobytes())
+    path.write_bytes(stl.written(1e3 * points, facets))
     return path

@@ -23,7 +23,9 @@ def verify(
     family: Annotated[
         str,
         typer.Option(
-            metavar="NAME", help="Random scenes: design (any body and tool), proportions (cylinders) or ellipses."
+            metavar="NAME",
+            help="Random scenes: design (any body and tool), proportions (cylinders), ellipses, regions (layers, "
+            "inclusions), organs, or tumours in them.",
         ),
     ] = "design",
     quick: Quick = False,

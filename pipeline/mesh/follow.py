@@ -41,10 +41,15 @@ def rounded_sizes(scene: Scene, growth: float) -> Iterator[str]:
         yield f"{size:.12g}+{growth:.12g}*F{distance}"
 
 
+def _boundary() -> list[tuple[int, int]]:
+    """Return the faces of the model but those of inclusions."""
+    return list(gmsh.model.getBoundary(gmsh.model.getEntities(3), combined=True, oriented=False))
+
+
 def _curves_of(radius: float) -> list[int]:
     """Return the curves round the faces of the model that are about as round as ``radius``, in its unit."""
     found: set[int] = set()
-    for dim, face in gmsh.model.getEntities(2):
+    for dim, face in sorted(_boundary()):
         if gmsh.model.getType(dim, face) == _STRAIGHT[dim]:
             continue
         low, high = gmsh.model.getParametrizationBounds(dim, face)
@@ -64,10 +69,9 @@ def middle_nodes(position: IntArray, scale: float) -> tuple[IntArray, FloatArray
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
     at = np.zeros((int(tags.max()) + 1, 3))
     at[tags] = coordinates.reshape(-1, 3)
-    faces = gmsh.model.getBoundary(gmsh.model.getEntities(3), combined=True, oriented=False)
     middle: dict[tuple[int, int], FloatArray] = {}
     curves: set[int] = set()
-    for dim, face in faces:
+    for dim, face in _boundary():
         curves |= {abs(tag) for _, tag in gmsh.model.getBoundary([(dim, face)], oriented=False)}
         if gmsh.model.getType(dim, face) != _STRAIGHT[dim]:
             corners = np.concatenate(gmsh.model.mesh.getElements(dim, face)[2]).reshape(-1, 3)

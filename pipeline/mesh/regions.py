@@ -1,6 +1,7 @@
-"""Sizes that layers and inclusions ask for, besides those of the study: as text for gmsh, in units of the model."""
+"""Sizes that layers and inclusions ask for, besides those of the study."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -8,6 +9,7 @@ from pipeline.arrays import FloatArray
 from pipeline.scene.model import Scene
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Vector
+from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.regions import Inclusion
 
 # Elements on an inclusion in units of its smallest semi-axis, and in a layer below the probe in units of its
@@ -20,15 +22,52 @@ _POINTS = 2000
 
 
 def region_sizes(scene: Scene, growth: float) -> Iterator[str]:
-    """Yield the sizes that the regions of a body ask for; they grow by ``growth`` for each unit of distance."""
+    """Yield the sizes that the regions of a body ask for, as text for gmsh in units of the model.
+
+    They grow by ``growth`` for each unit of distance.
+    """
     body, unit = scene.body, 1 / scene.scale
     tops = (body.heights[1], *body.interfaces)
     for top, bottom in zip(tops, body.interfaces, strict=False):
         yield _in_layer(scene, (unit * bottom, unit * top), growth)
-    for inclusion in body.inclusion:
-        yield _on_inclusion(inclusion, growth, unit)
-        point, room = _nearest(body, inclusion)
-        yield f"{unit * room:.12g}+{growth:.12g}*{_distance(point, unit)}"
+    for inclusion in inclusion_sizes(body, growth):
+        yield from inclusion.terms(unit)
+
+
+@dataclass(frozen=True)
+class InclusionSizes:
+    """Sizes (m) that an inclusion asks for: on its ``surface``, and where it is ``nearest`` to anything else.
+
+    There they are at most the ``room`` (m) between the two. They grow by ``growth`` for each unit of distance.
+    """
+
+    surface: Ovoid
+    nearest: Vector
+    room: float
+    growth: float
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return the size (m) at points (n, 3)."""
+        on_it = min(self.surface.axes) * (_ON_INCLUSION + self.growth * np.abs(self.surface.level(points) - 1))
+        return np.minimum(on_it, self.room + self.growth * np.linalg.norm(points - np.array(self.nearest), axis=1))
+
+    def terms(self, unit: float) -> tuple[str, str]:
+        """Write the two sizes, of which the smaller one counts, as text for gmsh, with ``unit`` units in a metre."""
+        surface = self.surface
+        least = unit * min(surface.axes)
+        level = "+".join(
+            f"((({name})-({unit * c:.12g}))/{unit * a:.12g})^2"
+            for name, c, a in zip("xyz", surface.centre, surface.axes, strict=True)
+        )
+        return (
+            f"{least:.12g}*({_ON_INCLUSION}+{self.growth:.12g}*Abs(Sqrt({level})-1))",
+            f"{unit * self.room:.12g}+{self.growth:.12g}*{_distance(self.nearest, unit)}",
+        )
+
+
+def inclusion_sizes(body: Body, growth: float) -> tuple[InclusionSizes, ...]:
+    """Return the sizes that the inclusions of a body ask for."""
+    return tuple(InclusionSizes(one.surface, *_nearest(body, one), growth) for one in body.inclusion)
 
 
 def _in_layer(scene: Scene, heights: tuple[float, float], growth: float) -> str:
@@ -39,17 +78,6 @@ def _in_layer(scene: Scene, heights: tuple[float, float], growth: float) -> str:
     away = f"Max({_distance(scene.frame.point, unit)}-({beyond:.12g}),0)"
     off = f"Max(Max({bottom:.12g}-z,z-({top:.12g})),0)"
     return f"{_IN_LAYER * (top - bottom):.12g}+{growth:.12g}*({off}+{away})"
-
-
-def _on_inclusion(inclusion: Inclusion, growth: float, unit: float) -> str:
-    """Write the size near an inclusion: fine at its surface, less so inside and outside."""
-    surface = inclusion.surface
-    least = unit * min(surface.axes)
-    level = "+".join(
-        f"((({name})-({unit * c:.12g}))/{unit * a:.12g})^2"
-        for name, c, a in zip("xyz", surface.centre, surface.axes, strict=True)
-    )
-    return f"{least:.12g}*({_ON_INCLUSION}+{growth:.12g}*Abs(Sqrt({level})-1))"
 
 
 def _distance(point: Vector, unit: float) -> str:

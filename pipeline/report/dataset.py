@@ -17,6 +17,7 @@ from pipeline.plan.plan import Plan
 from pipeline.quantities import attributes, quantity_of
 from pipeline.run.record import Record
 from pipeline.shapes.frame import Frame, PlaceError
+from pipeline.shapes.from_file import FromFile
 from pipeline.study.sweep import Axis, Case
 
 # The variables that are taken as they are from the records of the cases, and from those of F_exact.
@@ -81,12 +82,13 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
         variables[name] = (dims, array(places, float), attributes(name))
     axes = np.array([frame.axis if frame else (nan,) * 3 for frame in frames]).reshape(*study.shape, 3)
     variables["axis"] = ((*dims, "component"), axes, attributes("axis"))
+    notices = ["; ".join(case.body.notices) if isinstance(case.body, FromFile) else "" for case in study.cases()]
     texts = {
         "status": [r.status if r else "pending" for r in flat],
         "message": [r.message if r else "" for r in flat],
         "origin": [_origin(plan, key, record) for key, record in zip(plan.keys, flat, strict=True)],
         "force_exact_message": [r.message if r else "" for r in exact],
-    }
+    } | ({"body_message": notices} if any(notices) else {})
     for name, words in texts.items():
         variables[name] = (dims, array(words, object), attributes(name))
     coordinates = {axis.name: _coordinate(axis) for axis in study.axes} | {"component": ["x", "y", "z"]}

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 from pipeline.shapes.arrays import FloatArray
 from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.half_plane import HalfPlane
+from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.regions import Inclusion, Layer, Region
 from pipeline.shapes.section import Section, Words
 from pipeline.shapes.support import Fixed, Support, support_of
@@ -16,6 +17,8 @@ from pipeline.shapes.surface import Surface
 
 # Layers that miss the height by this share of it fill the body.
 _SAME = 1e-9
+# Points on an inclusion, besides the ends of its axes, that are looked at.
+_POINTS = 2000
 
 
 class Body(Section, ABC):
@@ -111,6 +114,10 @@ class Body(Section, ABC):
     @abstractmethod
     def inside(self, points: FloatArray) -> FloatArray:
         """Return the distance (m) of points (n, 3) of the body to its surface, negative outside."""
+
+    def room(self, surface: Ovoid) -> float:
+        """Return the distance (m) between the body's surface and another one within, negative if that sticks out."""
+        return float(self.inside(surface.sample(_POINTS)).min())
 
     @abstractmethod
     def gap(self, point: Vector) -> float:

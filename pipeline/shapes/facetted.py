@@ -2,10 +2,12 @@
 
 from abc import abstractmethod
 from functools import lru_cache
+from math import inf
 
 from pipeline.shapes.arrays import FloatArray, np
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, PlaceError
+from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.rays import nearest_point, pierce
 from pipeline.shapes.section import in_mm
 from pipeline.shapes.skin import Skin
@@ -64,8 +66,7 @@ class Facetted(Body):
 
     def reach(self, frame: Frame) -> float:
         """Return the largest distance (m) of a point from the axis."""
-        local = frame.local(self.triangles.points)
-        return float(np.hypot(local[:, 0], local[:, 1]).max())
+        return _reach(self.triangles, frame)
 
     def farthest(self, frame: Frame) -> float:
         """Return the largest distance (m) of a point from the contact."""
@@ -74,6 +75,10 @@ class Facetted(Body):
     def inside(self, points: FloatArray) -> FloatArray:
         """Return the distance (m) of points (n, 3) of the body to its surface, negative outside."""
         return skin_of(self.triangles).depth(points)
+
+    def room(self, surface: Ovoid) -> float:
+        """Return the distance (m) to a surface within: hollows and spikes of the body that it holds stick out, too."""
+        return _room(self.model_copy(update={"inclusion": ()}), surface)
 
     @property
     def face(self) -> str:
@@ -91,6 +96,13 @@ class Facetted(Body):
         """Return none: see there."""
 
 
+@lru_cache(_MANY)
+def _room(body: Facetted, surface: Ovoid) -> float:
+    points = body.triangles.points
+    held = points[surface.level(points) < 1]
+    return min(Body.room(body, surface), float(surface.distance(held).min(initial=inf)))
+
+
 @lru_cache(_FEW)
 def skin_of(triangles: Triangles) -> Skin:
     """Return the surface with its tree."""
@@ -101,3 +113,9 @@ def skin_of(triangles: Triangles) -> Skin:
 def _thickness(triangles: Triangles, frame: Frame) -> float:
     _, height = pierce(-frame.local(triangles.points), triangles.facets, np.zeros((1, 2)))
     return max(float(height[0]), 0.0) if np.isfinite(height[0]) else 0.0
+
+
+@lru_cache(_MANY)
+def _reach(triangles: Triangles, frame: Frame) -> float:
+    local = frame.local(triangles.points)
+    return float(np.hypot(local[:, 0], local[:, 1]).max())

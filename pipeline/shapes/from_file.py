@@ -66,13 +66,6 @@ class FromFile(Facetted):
             )
         return fixed
 
-    @field_validator("inclusion")
-    @classmethod
-    def _of_one_material(cls, inclusion: Any) -> Any:
-        if inclusion:
-            raise PydanticCustomError("not_supported", "inclusions in a surface are not supported by this version")
-        return inclusion
-
     def model_post_init(self, context: Any, /) -> None:
         """Keep the surface, which is read once for all bodies of one file."""
         self._loaded = self.load(self.file, dict(self))

@@ -19,9 +19,7 @@ class Skin(Surface):
 
     @cached_property
     def _tree(self) -> Any:
-        tree = import_module("igl").AABB()
-        tree.init(*self._arrays)
-        return tree
+        return tree_of(*self._arrays)
 
     @cached_property
     def _arrays(self) -> tuple[FloatArray, IntArray]:
@@ -41,10 +39,10 @@ class Skin(Surface):
 
     def depth(self, points: FloatArray) -> FloatArray:
         """Return the distance (m) of each point, negative outside."""
-        triangles = self._triangles
-        signed, *_ = import_module("igl").signed_distance(
-            np.ascontiguousarray(points), np.array(triangles.points), np.array(triangles.facets)
-        )
+        igl = import_module("igl")
+        # Signs by winding numbers: the normals that libigl else tells them by take it five times as long to set up.
+        sign = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
+        signed, *_ = igl.signed_distance(np.ascontiguousarray(points), *self._arrays, sign)
         return -np.asarray(signed).ravel()
 
     def _nearest(self, points: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
@@ -52,3 +50,10 @@ class Skin(Surface):
             return np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((0, 3))
         square, facet, nearest = self._tree.squared_distance(*self._arrays, np.ascontiguousarray(points))
         return square, np.asarray(facet, dtype=np.int64), nearest
+
+
+def tree_of(points: FloatArray, facets: IntArray) -> Any:
+    """Return libigl's tree of the facets (m, 3) of a surface."""
+    tree = import_module("igl").AABB()
+    tree.init(points, facets)
+    return tree

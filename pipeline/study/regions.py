@@ -81,11 +81,12 @@ def _check_inclusions(body: Body, problems: Problems) -> None:
     """Between an inclusion and all else there must be room for an element."""
     for number, inclusion in enumerate(body.inclusion, start=1):
         surface, key = inclusion.surface, f"body.inclusion[{number}].at"
-        gap, points, found = GAP * min(surface.axes), surface.sample(_POINTS), [in_mm(x) for x in inclusion.at]
-        if (room := float(body.inside(points).min())) < gap:
+        gap, found = GAP * min(surface.axes), [in_mm(x) for x in inclusion.at]
+        if (room := body.room(surface)) < gap:
             problems.error(
                 key, found, f"{inclusion.name} must lie inside the {body.shape}, {in_mm(gap)} (a tenth of its smallest "
-                f"semi-axis) or more from its surface; it is {_distance(room)}",
+                f"semi-axis) or more from its surface; "
+                + (f"it is {in_mm(room)} from it" if room > 0 else f"it reaches {in_mm(-room)} out of it"),
             )  # fmt: skip
         low, high = surface.centre[2] - surface.axes[2], surface.centre[2] + surface.axes[2]
         for height in body.interfaces:

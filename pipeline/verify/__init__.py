@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     """Yield every comparison as it is made, the same on every rank; ``quick`` leaves a few of each kind; collective."""
     from pipeline.solve.cache import compiling  # noqa: PLC0415 (the folder's face loads no solver)
+    from pipeline.verify.bodies import body_rows  # noqa: PLC0415
     from pipeline.verify.contact import contact_rows  # noqa: PLC0415
     from pipeline.verify.elements import element_rows  # noqa: PLC0415
     from pipeline.verify.forces import scene_rows  # noqa: PLC0415
@@ -24,4 +25,5 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     yield from comm.bcast(found)
     yield from scene_rows(comm, quick=quick)
     yield from region_rows(comm, quick=quick)
+    yield from body_rows(comm, quick=quick)
     yield from contact_rows(comm, quick=quick)

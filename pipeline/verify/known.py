@@ -54,6 +54,17 @@ def half_space_disc(young: float, poisson: float, radius: float, depth: float, c
     return 4 * mu * radius * depth * (log(1 + 2 * x) / x if x else 2.0), SPENCE
 
 
+def in_cylinder(force: float, young: float, poisson: float, size: float, depth: float) -> float:
+    """Return what the ``force`` (N) of a frictionless tool on a half-space is on a cylinder R = H = ``size`` (m).
+
+    Compliances add: what a distant support takes from d / F is c / (E R), the same for every tool that is small beside
+    R, and ``CYLINDER`` has c, good to a few (a/R)². E and ν are those far from the tool, ν one of the table's.
+    """
+    radius, far = 3.0, 50.0  # mm, of the table
+    c = far * (1 / CYLINDER["frictionless", poisson] - (1 - poisson**2) / (2 * radius))
+    return 1 / (1 / force + c / (young * size * depth))
+
+
 def half_space_ellipse(young: float, poisson: float, axes: tuple[float, float], depth: float) -> tuple[float, str]:
     """Return F of a frictionless flat ellipse with these semi-axes on a half-space, and who found it.
 

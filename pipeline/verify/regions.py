@@ -1,32 +1,55 @@
-"""Bodies of several materials whose force is known: in a limit, of one material, or on the meridian."""
+"""Bodies of several materials whose force is known: in a limit, of one material, or by another way to it."""
 
 from collections.abc import Iterator, Sequence
 from math import pi
-from typing import Any
 
 from mpi4py import MPI
 
-from pipeline.plan.plan import make_plan
-from pipeline.run.execute import compute
-from pipeline.study.load import parse
+from pipeline.verify import known
+from pipeline.verify.compare import against, against_meridian, solve
+from pipeline.verify.forces import FAR
+from pipeline.verify.layered import SOURCE, Solid, layered_disc
 from pipeline.verify.row import Row
+from pipeline.verify.sections import Section, cylinder, disc, layers, tissue
 
-Section = dict[str, Any]
-
-_ACCURACY = {"2D": "0.1 %", "3D": "0.3 %"}
 # Thickness (mm), Young's modulus (kPa) and Poisson's ratio, from the top down.
+_Stack = Sequence[tuple[float, float, float]]
 _STACK = ((1.0, 60.0, 0.3), (2.0, 5.0, 0.4), (1.0, 20.0, 0.2))
 _INCOMPRESSIBLE_SKIN = ((1.0, 60.0, 0.49), (9.0, 5.0, 0.3))
 # Radii of a wide punch in units of the stack's height; what is left of the edge's part of F then is below 0.2 %.
 _WIDE, _LEFT = (2.5, 5.0, 10.0), 0.002
 _DEPTH = 1e-5
+# A layer, and what is far below it: in units of the disc's radius, kPa and 1.
+_HALF_SPACES = {
+    "stiff on soft, h = a": ((1.0, 100.0, 0.3), (10.0, 0.3)),
+    "soft on stiff, h = a": ((1.0, 1.0, 0.3), (10.0, 0.3)),
+    "skin on fat, h = a / 2": ((0.5, 60.0, 0.48), (2.0, 0.49)),
+}
+# What is left of F where the size of a body FAR wide is allowed for, as measured.
+_SIZE = 1e-6
 
 
 def region_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
     """Yield the rows of layers and inclusions, as they are solved; ``quick`` leaves a few of each kind; collective."""
-    yield from _springs(comm, quick)
-    yield from _meridians(comm, quick)
-    yield from _of_one_material(comm, quick)
+    for compare in (_half_spaces, _springs, _meridians, _layered, _of_one_material):
+        yield from compare(comm, quick)
+
+
+def _half_spaces(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
+    """A layer on a half-space, by an integral equation."""
+    for name, (layer, below) in [*_HALF_SPACES.items()][: 1 if quick else None]:
+        (thickness, young, nu), (young_below, nu_below) = layer, below
+        solids = Solid(1e3 * young, nu), Solid(1e3 * young_below, nu_below)
+        force = layered_disc(solids[0], 1e-3 * thickness, solids[1], 1e-3, _DEPTH)
+        force = known.in_cylinder(force, solids[1].young, nu_below, 1e-3 * FAR, _DEPTH)
+        scene = {
+            "body": cylinder(FAR, FAR) | {"layers": layers([layer])}, "material": tissue(nu_below, young_below),
+            "probe": disc(1, contact="frictionless"),
+        }  # fmt: skip
+        for path in ("2D", "3D"):
+            yield against(
+                comm, f"layer on a half-space, {name}, frictionless", path, (force, SOURCE, _SIZE), scene
+            )  # fmt: skip
 
 
 def _springs(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
@@ -37,7 +60,8 @@ def _springs(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
         ratios = []
         for wide in _WIDE:
             a = wide * height
-            force, _, message = _force(comm, "2D", _cylinder(a + 5 * height, _STACK), _disc(a, contact))
+            scene = {"body": _layers(a + 5 * height, _STACK), "probe": disc(a, contact=contact)}
+            force, _, message = solve(comm, "2D", scene)
             ratios.append(force * compliance / (pi * (1e-3 * a) ** 2 * _DEPTH))
         # The edge adds a share that falls like height / a, and its square: extrapolated to none.
         first, second, third = ratios
@@ -48,56 +72,35 @@ def _springs(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
 
 
 def _meridians(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
-    """Layered cylinders in three dimensions against the same in two, which is the reference."""
+    """Cylinders that layers fill in three dimensions against the same in two, which is the reference."""
     for name, stack in (("three layers", _STACK), ("ν = 0.49 above 0.3", _INCOMPRESSIBLE_SKIN)):
         for contact in ("frictionless",) if quick else ("frictionless", "bonded"):
-            scene = _cylinder(12.0, stack), _disc(2.0, contact)
-            flat, flat_bar, flat_message = _force(comm, "2D", *scene)
-            force, bar, message = _force(comm, "3D", *scene)
-            yield Row(
-                f"layered cylinder, {name}, {contact}", "3D", flat, f"axisymmetric, bar {flat_bar:.0e} {flat_message}",
-                force, bar, flat_bar, message,
-            )  # fmt: skip
+            scene = {"body": _layers(12.0, stack), "probe": disc(2.0, contact=contact)}
+            yield against_meridian(comm, f"layered cylinder, {name}, {contact}", scene)
+
+
+def _layered(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
+    """Layers on tissue, both paths against each other: two dimensions are the reference."""
+    soft, bone, skin, fat = (2.0, 1.0, 0.3), (4.0, 1000.0, 0.3), (1.0, 60.0, 0.48), (3.0, 2.0, 0.49)
+    kinds = {"soft on firm": [soft], "soft on bone": [soft, bone], "skin and fat": [skin, fat]}
+    for name, stack in [*kinds.items()][: 1 if quick else None]:
+        for contact in ("bonded", "frictionless"):
+            body = cylinder(20, 20) | {"layers": layers(stack)}
+            scene = {"body": body, "material": tissue(0.45), "probe": disc(2, contact=contact)}
+            yield against_meridian(comm, f"cylinder of layers, {name}, a = 2 mm, {contact}", scene)
 
 
 def _of_one_material(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
     """Pieces that are as stiff as what is round them are not felt."""
-    inclusion = {"name": "ball", "at": ["1 mm", "0 mm", "-5 mm"], "radius": "3 mm"}
     for nu in (0.3,) if quick else (0.3, 0.49):
-        tissue = {"young": "10 kPa", "poisson": nu}
-        body: Section = _cylinder(12.0, ()) | {"height": "10 mm"}
-        flat, flat_bar, flat_message = _force(comm, "2D", body, _disc(2.0, "bonded"), tissue)
-        pieces = body | {
-            "layers": [{"name": "top", "thickness": "1 mm", **tissue}],
-            "inclusion": [{**inclusion, **tissue}],
-        }
-        force, bar, message = _force(comm, "3D", pieces, _disc(2.0, "bonded"), tissue)
-        yield Row(
-            f"layer and inclusion of the same tissue, ν = {nu:g}", "3D", flat,
-            f"axisymmetric, bar {flat_bar:.0e} {flat_message}".strip(), force, bar, flat_bar, message,
-        )  # fmt: skip
+        same: Section = {"material": tissue(nu), "probe": disc(2.0)}
+        ball = {"name": "ball", "at": ["1 mm", "0 mm", "-5 mm"], "radius": "3 mm", **tissue(nu)}
+        body = cylinder(12, 10)
+        pieces = body | {"layers": layers([(1.0, 10.0, nu)]), "inclusion": [ball]}
+        name = f"layer and inclusion of the same tissue, ν = {nu:g}"
+        yield against_meridian(comm, name, same | {"body": pieces}, same | {"body": body})
 
 
-def _force(
-    comm: MPI.Comm, path: str, body: Section, probe: Section, material: Section | None = None
-) -> tuple[float, float, str]:
-    """Solve a scene to the accuracy of its path; return force, error bar and message."""
-    sections = {"body": body, "probe": probe, "mesh": {"accuracy": _ACCURACY[path]}, "solve": {"exact": False}}
-    study = parse(sections | ({"material": material} if material else {}))
-    plan = make_plan(study, without=("axisymmetric",) if path == "3D" else ())
-    (record,) = compute(plan, comm).values()
-    return record.force, record.force_error, record.message
-
-
-def _cylinder(radius: float, stack: Sequence[tuple[float, float, float]]) -> Section:
-    layers = [
-        {"name": f"layer{number}", "thickness": f"{h} mm", "young": f"{young} kPa", "poisson": nu}
-        for number, (h, young, nu) in enumerate(stack)
-    ]
-    height = sum(thickness for thickness, _, _ in stack)
-    return {"shape": "cylinder", "radius": f"{radius} mm", "height": f"{height} mm", "fixed": "bottom",
-            "layers": layers}  # fmt: skip
-
-
-def _disc(radius: float, contact: str) -> Section:
-    return {"shape": "disc", "radius": f"{radius} mm", "depth": f"{1e3 * _DEPTH} mm", "contact": contact}
+def _layers(radius: float, stack: _Stack) -> Section:
+    """Return a cylinder that layers fill."""
+    return cylinder(radius, sum(thickness for thickness, _, _ in stack)) | {"layers": layers(stack)}

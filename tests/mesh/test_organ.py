@@ -13,6 +13,7 @@ from pipeline.mesh.generate import MeshError
 from pipeline.mesh.organ import make
 from pipeline.mesh.organ.base import far_surface
 from pipeline.mesh.organ.make import mesh_organ, mesh_scanned
+from pipeline.mesh.organ.narrow import across, narrow_places
 from pipeline.mesh.size import Sizes
 from pipeline.scene.model import Scene
 from pipeline.shapes.bodies.surface import FromSurface
@@ -207,7 +208,7 @@ def test_a_surface_that_is_not_the_files_is_never_filled(file, monkeypatch):
 
 
 def test_thin_parts_are_meshed_with_smaller_elements_where_large_ones_would_meet_across_them(tmp_path):
-    """A ball with a brim: elements as large as the ball allows cross in the brim."""
+    """A ball with a brim: elements as large as the ball allows cross in the brim, and only there are they smaller."""
     directions, facets = sphere(24)
     brim = ((directions / np.array([60e-3, 60e-3, 4e-3])) ** 2).sum(axis=1) ** -0.5
     points = directions * ((35e-3**12 + brim**12) ** (1 / 12))[:, None]
@@ -217,3 +218,20 @@ def test_thin_parts_are_meshed_with_smaller_elements_where_large_ones_would_meet
         mesh_organ(a_scene, sizes, far_surface(a_scene.body))
     mesh = mesh_scanned(a_scene, a_scene.body, sizes)
     assert volume(mesh) == pytest.approx(a_scene.body.volume, rel=0.01)
+    assert qualities(mesh).min() > 0.05
+
+
+def test_how_far_it_is_across_thin_parts_and_gaps():
+    """Two lenses 5 mm thick, 2 mm from each other: in the middle it is 2 mm across on the sides that face."""
+    directions, facets = sphere(24)
+    lens = directions * np.array([30e-3, 30e-3, 2.5e-3])
+    points = np.vstack([lens, lens - np.array([0, 0, 7e-3])])
+    found = across(points, np.vstack([facets, facets + len(lens)]), slice(None), 1e-6)
+    in_the_middle = np.hypot(*lens[:, :2].T) < 3e-3
+    above = directions[:, 2] > 0
+    np.testing.assert_allclose(found[: len(lens)][in_the_middle & above], 5e-3, rtol=0.03)
+    np.testing.assert_allclose(found[: len(lens)][in_the_middle & ~above], 2e-3, rtol=0.1)
+    narrow = narrow_places(lens, facets, 8e-3)
+    assert narrow.at(np.array([[0, 0, 2.5e-3]])) == pytest.approx(5e-3, rel=0.1)
+    assert narrow.at(np.array([[0, 0, 50e-3]])) > 40e-3
+    assert not narrow_places(directions * 30e-3, facets, 30e-3)

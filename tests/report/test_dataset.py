@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 from pipeline.report.dataset import write
+from tests.organs import ellipsoid, write_stl
 from tests.report.synthetic import FIGURE, dataset
 
 
@@ -77,3 +78,15 @@ def test_earlier_result_survives_a_failed_write(tmp_path):
         write(dataset().assign_attrs(bad={"not": "allowed"}), path)
     assert path.read_bytes() == before
     assert [p.name for p in tmp_path.iterdir()] == ["a.nc"]
+
+
+def test_what_was_done_to_a_bodys_file_is_told_beside_its_forces(tmp_path):
+    points, facets = ellipsoid()
+    body = {"shape": "surface", "unit": "mm", "fixed": {"below": "-10 mm"}, "repair": True}
+    whole = body | {"file": str(write_stl(tmp_path / "whole.stl", points, facets))}
+    facets[0] = facets[0, ::-1]
+    mended = body | {"file": str(write_stl(tmp_path / "mended.stl", points, facets))}
+    probe = {"at": ["5 mm", "3 mm"], "radius": "4 mm"}
+    assert "body_message" not in dataset(body=whole, probe=probe)
+    data = dataset(body=mended, probe=probe)
+    assert data["status"] == "ok" and "repaired: 1 inverted facets turned" in str(data["body_message"].values)

@@ -12,6 +12,7 @@ from pipeline.study.load import parse
 from pipeline.verify import known
 from pipeline.verify.boundary import rectangle_stiffness
 from pipeline.verify.coverage import FAMILIES, Coverage, Trial, trials
+from pipeline.verify.layered import Solid, layered_disc, surface_compliance
 from pipeline.verify.row import Row
 
 
@@ -125,3 +126,36 @@ def test_scenes_thrown_of_several_materials_make_sense(seed):
     found = parse({**scene, "mesh": mesh, "solve": {"exact": False}}).case(())
     assert found.body.regions
     assert found.mesh.degree > 1 or found.poisson < 0.45
+
+
+def test_layers_on_half_spaces_meet_their_limits():
+    """A thick layer is a half-space, a thin one is not felt, one like its base is none; a rigid base is known."""
+
+    def force(layer, thickness, base):
+        return layered_disc(layer, thickness, base, 1e-3, 1e-5)
+
+    def alone(solid):
+        return known.half_space_disc(solid.young, solid.poisson, 1e-3, 1e-5, "frictionless")[0]
+
+    skin, fat = Solid(6e4, 0.48), Solid(2e3, 0.49)
+    assert force(skin, 1e-3, skin) == pytest.approx(alone(skin), rel=1e-12)
+    for layer, base in ((skin, fat), (fat, skin)):
+        # What is left of the base adds a compliance that falls like the inverse thickness; of the layer, it fades.
+        near, far = (1 / force(layer, thickness, base) for thickness in (0.5, 1.0))
+        assert 2 * far - near == pytest.approx(1 / alone(layer), rel=1e-7)
+        assert far != pytest.approx(1 / alone(layer), rel=1e-4)
+        thin = force(layer, 5e-5, base), force(layer, 1e-4, base)
+        assert abs(thin[0] / alone(base) - 1) < 0.6 * abs(thin[1] / alone(base) - 1)
+    for ratio, kappa in known.LAYER.items():
+        bone = Solid(float("inf"), 0.3)
+        layer = Solid(1e4, 0.3)
+        assert force(layer, 1e-3 / ratio, bone) / alone(layer) == pytest.approx(kappa, rel=known.LAYER_ERROR)
+
+
+@pytest.mark.parametrize("softer", [0.1, 1.0, 10.0])
+def test_layers_sink_like_burmister_has_it(softer):
+    """D. M. Burmister's closed form for two incompressible solids."""
+    k = np.array([0.01, 0.1, 1.0, 3.0, 10.0])
+    n, e = (1 - softer) / (1 + softer), np.exp(-2 * k)
+    closed = (1 + 4 * n * k * e - n**2 * e**2) / (1 - 2 * n * (1 + 2 * k**2) * e + n**2 * e**2)
+    assert surface_compliance(Solid(1.0, 0.5), Solid(softer, 0.5), k) == pytest.approx(closed, rel=1e-8)

@@ -14,6 +14,7 @@ from pipeline.mesh.generate import GeometryError
 from pipeline.mesh.organ.even import merged
 from pipeline.mesh.organ.field import PER_RADIUS
 from pipeline.mesh.organ.level import cut, level_line, on_segments
+from pipeline.mesh.organ.narrow import NOWHERE, Narrow, narrow_places
 from pipeline.mesh.organ.remesh import release, remesh
 from pipeline.mesh.organ.sharp import sharp_edges
 from pipeline.mesh.organ.sheet import FIXED, FREE, Sheet
@@ -32,10 +33,14 @@ _TURNED, _ROUNDS = 0.2, 10
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """The coarse ``sheet``, and the ``level`` line (n, 2, 3), in m, at which what is held of the true surface ends."""
+    """The coarse ``sheet``, and the ``level`` line (n, 2, 3), in m, at which what is held of the true surface ends.
+
+    Elements are smaller where it is ``narrow``.
+    """
 
     sheet: Sheet
     level: FloatArray
+    narrow: Narrow = NOWHERE
 
 
 # Points, and numbers of points.
@@ -49,47 +54,53 @@ class Kept(Protocol):
         """Return what is kept under ``key``, or what ``make`` returns, which is then kept."""
 
 
-def far_surface(body: Scanned, kept: Kept | None = None, finer: float = 1) -> Base:
+def far_surface(body: Scanned, kept: Kept | None = None, finer: float = 1, adapted: bool = False) -> Base:
     """Return the surface of ``body`` away from any contact, out of what is ``kept`` if it is there.
 
-    Its elements are ``finer`` by this factor than the body's bend asks for.
+    Its elements are ``finer`` by this factor than the body's bend asks for, and if ``adapted``, no larger than thin
+    parts and narrow gaps are wide.
 
     Raises:
         GeometryError: if nothing, or all, of it is held.
         MeshError: if the remesher fails.
     """
     (below,), (skin,), triangles = body.support.edges(), body.surfaces()["skin"], body.triangles
-    largest = body.bend / PER_RADIUS / finer
+    largest, how = body.bend / PER_RADIUS / finer, " adapted" if adapted else ""
 
     def make() -> Arrays:
-        made = base(triangles.points, triangles.facets, skin, below, largest)
-        sheet = made.sheet
+        made = base(triangles.points, triangles.facets, skin, below, largest, adapted)
+        sheet, narrow = made.sheet, {"narrow": made.narrow.points, "sizes": made.narrow.sizes} if adapted else {}
         return {"points": sheet.points, "facets": sheet.facets, "group": sheet.group, "sharp": sheet.sharp,
-                "level": made.level}  # fmt: skip
+                "level": made.level, **narrow}  # fmt: skip
 
     if kept is None:
         found = make()
     else:
-        found = kept.arrays(f"surface {_VERSION} {triangles.hash} {below!r} {largest!r} {release()}", make)
-    return Base(Sheet(found["points"], found["facets"], found["group"], found["sharp"]), found["level"])
+        found = kept.arrays(f"surface {_VERSION} {triangles.hash} {below!r} {largest!r} {release()}{how}", make)
+    sheet = Sheet(found["points"], found["facets"], found["group"], found["sharp"])
+    return Base(sheet, found["level"], Narrow(found["narrow"], found["sizes"]) if adapted else NOWHERE)
 
 
 @stage("far surface")
-def base(points: FloatArray, facets: IntArray, skin: Surface, below: float, largest: float) -> Base:
+def base(points: FloatArray, facets: IntArray, skin: Surface, below: float, largest: float,
+         adapted: bool = False) -> Base:  # fmt: skip
     """Return the surface in elements of at most ``largest`` (m), held below the height ``below`` (m).
+
+    They are smaller where it is narrow, if ``adapted``.
 
     Raises:
         GeometryError: if nothing, or all, is held.
         MeshError: if the remesher fails.
     """
-    sheet = cut(*merged(points, facets), below)
+    even = merged(points, facets)
+    sheet, narrow = cut(*even, below), narrow_places(*even, largest) if adapted else NOWHERE
     if len(np.unique(sheet.group)) < 2:
         low, high = points[:, 2].min(), points[:, 2].max()
         raise GeometryError(f"a level of {below:g} m does not cut a surface between {low:g} and {high:g} m")
     level = level_line(points, facets, below)
     sheet = Sheet(sheet.points, sheet.facets, sheet.group, sharp_edges(sheet, largest))
-    coarse = remesh(sheet, np.full(len(sheet.points), largest), DEVIATION * largest)
-    return Base(put_back(coarse, skin, level), level)
+    coarse = remesh(sheet, np.minimum(largest, narrow.at(sheet.points)), DEVIATION * largest)
+    return Base(put_back(coarse, skin, level), level, narrow)
 
 
 def put_back(

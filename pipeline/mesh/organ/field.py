@@ -3,11 +3,15 @@
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf
+from typing import Any
 
+import gmsh
 import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.arrays import FloatArray
+from pipeline.mesh.organ.narrow import NOWHERE, Narrow
+from pipeline.mesh.regions import InclusionSizes
 from pipeline.mesh.size import Sizes
 from pipeline.shapes.frame import Frame
 
@@ -17,11 +21,17 @@ PER_RADIUS = 2
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """``sizes`` round a ``frame``; ``edge`` (n, 3), in m, are points close to each other along the footprint's edge."""
+    """``sizes`` round a ``frame``, and those that ``inclusions`` ask for.
+
+    ``edge`` (n, 3), in m, are points close to each other along the footprint's edge. Elements of the surface are
+    smaller where it is ``narrow``, and those within next to them.
+    """
 
     sizes: Sizes
     frame: Frame
     edge: FloatArray
+    narrow: Narrow = NOWHERE
+    inclusions: tuple[InclusionSizes, ...] = ()
 
     @cached_property
     def _tree(self) -> cKDTree:
@@ -34,14 +44,16 @@ class Field:
         return min(far, self.sizes.fine if self.sizes.epsilon == inf else self.sizes.coarse)
 
     def at(self, points: FloatArray) -> FloatArray:
-        """Return the size (m) at points (n, 3)."""
+        """Return the size (m) at points (n, 3) of the surface."""
         sizes = self.sizes
         distance, _ = self._tree.query(points)
         size = np.minimum(sizes.rim + sizes.growth * distance, self.largest)
         if sizes.epsilon < inf:
             beyond = np.linalg.norm(points - np.array(self.frame.point), axis=1) - sizes.epsilon
             size = np.minimum(size, sizes.fine + sizes.growth * np.maximum(beyond, 0.0))
-        return size
+        for inclusion in self.inclusions:
+            size = np.minimum(size, inclusion.at(points))
+        return np.minimum(size, self.narrow.at(points))
 
     def terms(self, distance: str, scale: float) -> list[str]:
         """Write what the size is the least of, in units of ``scale`` m, from text of the distance to the edge."""
@@ -53,4 +65,25 @@ class Field:
             squares = "+".join(f"({n}-({c / scale:.12g}))^2" for n, c in zip("xyz", self.frame.point, strict=True))
             outside = f"Max(Sqrt({squares})-{sizes.epsilon / scale:.12g},0)"
             terms.append(f"{sizes.fine / scale:.12g}+{sizes.growth:.12g}*{outside}")
+        for inclusion in self.inclusions:
+            terms += inclusion.terms(1 / scale)
         return terms
+
+
+def set_field(field: Field, scale: float, kernel: Any) -> None:
+    """Make ``field`` the background field of gmsh's current model, whose unit is ``scale`` metres.
+
+    Distances are those from points along the footprint's edge, which are added to the model with its ``kernel``.
+    """
+    model = gmsh.model
+    points = [kernel.addPoint(*p) for p in (field.edge / scale).tolist()]
+    kernel.synchronize()
+    distance = model.mesh.field.add("Distance")
+    model.mesh.field.setNumbers(distance, "NodesList", points)
+    tags = []
+    for term in field.terms(f"F{distance}", scale):
+        tags.append(model.mesh.field.add("MathEval"))
+        model.mesh.field.setString(tags[-1], "F", term)
+    smallest = model.mesh.field.add("Min")
+    model.mesh.field.setNumbers(smallest, "FieldsList", tags)
+    model.mesh.field.setAsBackgroundMesh(smallest)

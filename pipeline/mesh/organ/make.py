@@ -12,18 +12,20 @@ from pipeline.mesh.generate import GeometryError, MeshArrays, MeshError, orient
 from pipeline.mesh.organ.base import DEVIATION, Base, Kept, far_surface, put_back
 from pipeline.mesh.organ.contact import Contact, set_in
 from pipeline.mesh.organ.field import Field
+from pipeline.mesh.organ.inclusions import inclusion_surfaces
 from pipeline.mesh.organ.remesh import remesh
 from pipeline.mesh.organ.sheet import PROBE, Sheet, edges_of, group_names
 from pipeline.mesh.organ.volume import fill
+from pipeline.mesh.regions import inclusion_sizes
 from pipeline.mesh.size import Sizes
 from pipeline.scene.model import Scene
 from pipeline.shapes.scanned import Scanned
 
 # The surface is meshed twice: only the second time its points are dense where sizes change fast.
 _PASSES = 2
-# Where elements far from the contact are so large that the surface meets itself across a thin part, they are to be this
-# many times smaller.
-_FINER = (1, 2, 4, 8)
+# Where elements far from the contact are so large that the surface meets itself across a thin part or a gap, they are
+# to be no larger than these are wide; if that is not enough, this many times smaller everywhere.
+_ATTEMPTS = ((1, False), (1, True), (2, False), (4, False), (8, False))
 # The remesher turns lengths into units of its own and back, which moves points by rounding.
 _SAME = 1e-6
 # A share of the body's volume: chords of elements leave half a per cent of an organ out, which their curved edges bring
@@ -41,18 +43,18 @@ def mesh_scanned(scene: Scene, body: Scanned, sizes: Sizes, kept: Kept | None = 
         MeshError: if a mesh generator fails with smaller elements, too.
     """
 
-    def mesh(finer: int) -> MeshArrays:
+    def mesh(finer: int, adapted: bool) -> MeshArrays:
         smaller = replace(sizes, column=sizes.column / finer)
-        return mesh_organ(scene, smaller, far_surface(body, kept, finer))
+        return mesh_organ(scene, smaller, far_surface(body, kept, finer, adapted))
 
-    for finer in _FINER[:-1]:
+    for attempt in _ATTEMPTS[:-1]:
         try:
-            return mesh(finer)
+            return mesh(*attempt)
         except GeometryError:
             raise
         except MeshError:
             continue
-    return mesh(_FINER[-1])
+    return mesh(*_ATTEMPTS[-1])
 
 
 def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
@@ -71,19 +73,17 @@ def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
         return scene.body.lift(scene.frame, points)[0]
 
     contact = set_in(far.sheet, scene.frame, scene.footprint, sizes, lift)
-    field = Field(sizes, scene.frame, contact.edge)
+    field = Field(sizes, scene.frame, contact.edge, far.narrow, inclusion_sizes(scene.body, sizes.growth))
     sheet = _to_sizes(contact, field, _Truth(scene, far, lift))
     _check_whole(sheet, scene.body.volume)
-    points, cells = fill(sheet.points, sheet.facets, field)
+    points, cells, regions = fill(sheet.points, sheet.facets, field, inclusion_surfaces(scene.body.inclusion, field))
     facets = {name: sheet.facets[sheet.group == number] for number, name in group_names().items()}
     rim = np.unique(sheet.border(PROBE))
-    return MeshArrays(points, orient(points, cells), facets, rim, perf_counter() - start)
+    return MeshArrays(points, orient(points, cells), facets, rim, perf_counter() - start, regions)
 
 
 def _check(scene: Scene) -> None:
     """Refuse what is not meshed here."""
-    if scene.body.regions:
-        raise GeometryError(f"inclusions in a {scene.body.shape} are not supported by this version")
     if scene.is_cut:
         raise GeometryError(f'no column is cut out of a {scene.body.shape}: use outside = "coarse"')
     if scene.mirrors:

@@ -1,4 +1,6 @@
-"""Tetrahedra within a closed surface of triangles, which stay as they are."""
+"""Tetrahedra within a closed surface of triangles, and on both sides of others inside it, which stay as they are."""
+
+from collections.abc import Sequence
 
 import gmsh
 import numpy as np
@@ -6,64 +8,87 @@ import numpy as np
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.compat import gmsh_session
 from pipeline.mesh.generate import MeshError, model_options
-from pipeline.mesh.organ.field import Field
+from pipeline.mesh.organ.field import Field, set_field
+from pipeline.shapes.triangles import enclosed
 from pipeline.stages import stage
 
-_SIZE = 100.0  # extent of the model, in its unit
 # Cells below this quality are mended; below gmsh's own 0.3, flat ones may stay that lie in the surface with all four
 # corners, and whose curved edges then fold them.
 _OPTIMISED = 0.5
 _TRIANGLE, _TETRAHEDRON = 2, 4
+MODEL_SIZE = 100.0  # extent of the model, in its unit
+# Tetrahedra fill a surface to rounding, or they are not those of the surface.
+_SAME = 1e-9
+
+Surface = tuple[FloatArray, IntArray]
 
 
 @stage("gmsh")
-def fill(points: FloatArray, facets: IntArray, field: Field) -> tuple[FloatArray, IntArray]:
-    """Return the points (n, 3) and cells (m, 4) of a mesh whose first points, and boundary, are those given.
+def fill(
+    points: FloatArray, facets: IntArray, field: Field, inner: Sequence[Surface] = ()
+) -> tuple[FloatArray, IntArray, IntArray | None]:
+    """Return the points (n, 3) and cells (m, 4) of a mesh, and the number (m) of the surface around each cell.
+
+    The first points, and the boundary, are those given; then come those of the ``inner`` surfaces, points and facets
+    of each, which are closed and clear of one another. The numbers count these from 1, and are 0 outside of them; they
+    are None where there are none.
 
     Raises:
         MeshError: with gmsh's own words, if it fails.
     """
-    scale = float(np.ptp(points, axis=0).max()) / _SIZE
-    scaled = points / scale
+    scale = float(np.ptp(points, axis=0).max()) / MODEL_SIZE
+    surfaces = [(points, facets), *inner]
+    given = np.vstack([corners for corners, _ in surfaces])
+    scaled = given / scale
     with gmsh_session():
         model_options()
         model = gmsh.model
-        skin = model.addDiscreteEntity(2)
-        tags = np.arange(1, len(points) + 1)
-        model.mesh.addNodes(2, skin, tags, scaled.ravel())
-        model.mesh.addElementsByType(skin, _TRIANGLE, [], (facets + 1).ravel())
-        volume = model.geo.addVolume([model.geo.addSurfaceLoop([skin])])
-        model.geo.synchronize()
-        _set_field(field, scale)
+        volumes = _add_volumes([(corners / scale, triangles) for corners, triangles in surfaces])
+        set_field(field, scale, model.geo)
         gmsh.option.setNumber("Mesh.OptimizeThreshold", _OPTIMISED)
+        gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", bool(field.narrow))
         try:
             model.mesh.generate(3)
         except Exception as error:  # gmsh raises bare Exception
             raise MeshError(f"gmsh: {error or gmsh.logger.getLastError()}") from error
         found, coordinates, _ = model.mesh.getNodes()
-        cells = model.mesh.getElementsByType(_TETRAHEDRON, volume)[1]
-        if not len(cells):
+        parts = [model.mesh.getElementsByType(_TETRAHEDRON, volume)[1] for volume in volumes]
+        if not all(map(len, parts)):
             raise MeshError("gmsh made no tetrahedra of the surface")
         order = np.argsort(found)
         place = coordinates.reshape(-1, 3)[order]
-        cells = np.searchsorted(found[order], cells).reshape(-1, 4)
-    return _first(points, scaled, place * scale, place, cells)
+        cells = np.searchsorted(found[order], np.concatenate(parts)).reshape(-1, 4)
+    points, cells = _first(given, scaled, place * scale, place, cells)
+    if not inner:
+        return points, cells, None
+    numbers = np.repeat(np.arange(len(parts)), [len(part) // 4 for part in parts])
+    _check_filled(points, cells, numbers, inner)
+    return points, cells, numbers
 
 
-def _set_field(field: Field, scale: float) -> None:
-    """Make ``field`` gmsh's background field: distances are those from points along the footprint's edge."""
-    model = gmsh.model
-    points = [model.geo.addPoint(*p) for p in (field.edge / scale).tolist()]
+def _add_volumes(surfaces: Sequence[Surface]) -> list[int]:
+    """Add the volume inside the first surface and outside the others, and that inside each of these, to the model."""
+    model, skins, first = gmsh.model, [], 1
+    for points, facets in surfaces:
+        skin = model.addDiscreteEntity(2)
+        model.mesh.addNodes(2, skin, np.arange(first, first + len(points)), points.ravel())
+        model.mesh.addElementsByType(skin, _TRIANGLE, [], (facets + first).ravel())
+        skins.append(skin)
+        first += len(points)
+    loops = [model.geo.addSurfaceLoop([skin]) for skin in skins]
+    volumes = [model.geo.addVolume(loops), *(model.geo.addVolume([loop]) for loop in loops[1:])]
     model.geo.synchronize()
-    distance = model.mesh.field.add("Distance")
-    model.mesh.field.setNumbers(distance, "NodesList", points)
-    tags = []
-    for term in field.terms(f"F{distance}", scale):
-        tags.append(model.mesh.field.add("MathEval"))
-        model.mesh.field.setString(tags[-1], "F", term)
-    smallest = model.mesh.field.add("Min")
-    model.mesh.field.setNumbers(smallest, "FieldsList", tags)
-    model.mesh.field.setAsBackgroundMesh(smallest)
+    return volumes
+
+
+def _check_filled(points: FloatArray, cells: IntArray, numbers: IntArray, inner: Sequence[Surface]) -> None:
+    """Refuse tetrahedra that fill more or less than the ``inner`` surfaces whose numbers they have."""
+    corners = points[cells]
+    volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
+    filled = np.bincount(numbers, volumes)[1:]
+    wanted = np.array([abs(enclosed(*surface)) for surface in inner])
+    if not np.allclose(filled, wanted, rtol=_SAME, atol=0):
+        raise MeshError("gmsh did not fill the surface of an inclusion: it meets another one; use a smaller `fine`")
 
 
 def _first(

@@ -157,6 +157,12 @@ class FromCad(FromFile):
         offset, normal = raised(points, triangles.points[triangles.facets[numbers]], solid.normals[numbers])
         return np.where(solid.planes[solid.face[numbers]][:, None], 0.0, offset), normal
 
+    def inside(self, points: FloatArray) -> FloatArray:
+        """Return the distance (m) of points (n, 3) of the body to its true surface, negative outside."""
+        nearest, numbers = skin_of(self.triangles).project(points), skin_of(self.triangles).facets(points)
+        offset, normal = self._raised(nearest, numbers)
+        return super().inside(points) + (offset * normal).sum(axis=1)
+
     def _is_plane(self, facet: int) -> bool:
         return bool(self.solid.planes[self.solid.face[facet]])
 

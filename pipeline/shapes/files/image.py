@@ -107,13 +107,13 @@ def _smoothed(mask: Any, sigma: FloatArray) -> tuple[FloatArray, IntArray]:
 
     values = mask.astype(np.float32)
     if not sigma.any():
-        return _march(values, 0.5)
+        return march(values, 0.5)
     volume = float(mask.sum())
     values = ndimage.gaussian_filter(values, sigma, truncate=_REACH)
     # Secants, from a half towards where the volume is that of the mask.
     level, before = 0.5, None
     for _ in range(_LEVELS):
-        points, facets = _march(values, level)
+        points, facets = march(values, level)
         excess = abs(enclosed(points, facets)) / volume - 1
         if abs(excess) < _SAME_VOLUME:
             break
@@ -123,7 +123,7 @@ def _smoothed(mask: Any, sigma: FloatArray) -> tuple[FloatArray, IntArray]:
     return points, facets
 
 
-def _march(values: Any, level: float) -> tuple[FloatArray, IntArray]:
+def march(values: Any, level: float) -> tuple[FloatArray, IntArray]:
     """Return the surface where values (nx, ny, nz) pass the level: points, in indices, and facets."""
     import igl  # noqa: PLC0415
 

@@ -42,7 +42,13 @@ def repaired(points: FloatArray, facets: IntArray, unit: float) -> tuple[FloatAr
 
 
 def _meshfix(points: FloatArray, facets: IntArray, found: str) -> tuple[FloatArray, IntArray, str]:
-    from pymeshfix._meshfix import PyTMesh  # noqa: PLC0415 (files that are right do without)
+    try:
+        from pymeshfix._meshfix import PyTMesh  # noqa: PLC0415 (files that are right do without)
+    except ImportError:
+        raise SurfaceError(
+            f"{found}; `repair` needs MeshFix for that: `pip install pymeshfix` (it is under the GPL), or mend it in "
+            "MeshLab"
+        ) from None
 
     before, used = drop_unused(points, facets)
     program = PyTMesh()

@@ -1,6 +1,6 @@
 """STL, binary and text: triangles one by one, each with its own three corners."""
 
-from pipeline.shapes.arrays import FloatArray, np
+from pipeline.shapes.arrays import FloatArray, IntArray, np
 from pipeline.shapes.files.raw import Raw, is_number, limit, numbers
 from pipeline.shapes.files.weld import weld
 from pipeline.shapes.triangles import SurfaceError
@@ -26,6 +26,13 @@ def parse(data: bytes) -> Raw:
         corners, notices = _binary_of_another_length(data, promised)
     points, number = weld(corners)
     return Raw(points, number.reshape(-1, 3), notices)
+
+
+def written(points: FloatArray, facets: IntArray, header: bytes = b"") -> bytes:
+    """Return a binary file of ``facets`` (m, 3) between ``points`` (n, 3), in whatever unit these are."""
+    rows = np.zeros(len(facets), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    rows["corners"] = points[facets]
+    return header.ljust(_HEADER - 4, b"\0") + len(facets).to_bytes(4, "little") + rows.tobytes()
 
 
 def _binary(data: bytes, count: int) -> FloatArray:

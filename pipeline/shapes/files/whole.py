@@ -8,7 +8,7 @@ from pipeline.shapes.files.raw import Raw
 from pipeline.shapes.files.repair import repaired
 from pipeline.shapes.files.smooth import smoothed
 from pipeline.shapes.files.weld import drop_unused
-from pipeline.shapes.triangles import Triangles, enclosed
+from pipeline.shapes.triangles import SurfaceError, Triangles, enclosed
 
 
 def made_whole(
@@ -33,10 +33,18 @@ def made_whole(
     if smooth:
         points, facets, more = smoothed(points, edges.facets, smooth / unit)
         edges, notices = Edges(facets), notices + more
-        check.check_whole(points, edges, unit)
+        _check_smoothed(points, edges, unit)
     facets, more = _outward(points, edges.facets)
     points, facets = drop_unused(points, facets)
     return Triangles(points * unit, np.ascontiguousarray(facets)), (*raw.notices, *notices, *more)
+
+
+def _check_smoothed(points: FloatArray, edges: Edges, unit: float) -> None:
+    try:
+        check.check_whole(points, edges, unit)
+    except SurfaceError as error:
+        found = str(error).partition(": ")[0]
+        raise SurfaceError(f"once smoothed, {found}: another length of `smooth`, or none") from error
 
 
 def _without_flats(points: FloatArray, edges: Edges) -> tuple[Edges, list[str]]:

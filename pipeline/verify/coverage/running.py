@@ -13,7 +13,7 @@ from pipeline.study.load import parse
 from pipeline.study.problems import StudyError
 from pipeline.verify.coverage.bars import Trial
 from pipeline.verify.coverage.families import FAMILIES
-from pipeline.verify.coverage.families.dice import Section
+from pipeline.verify.sections import Section
 
 SEED, COUNT = 2026, 160
 # A mesh is naive if its elements at the probe's edge are larger than this, in units of the probe's half width.

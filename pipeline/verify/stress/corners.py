@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
+from pipeline.verify.sections import Section, blade, box, cylinder, disc, mesh, study
 from pipeline.verify.stress.cell import Cell, Expect
-from pipeline.verify.stress.sections import Section, blade, box, cylinder, disc, mesh, study
 
 
 def corners() -> Iterator[Cell]:

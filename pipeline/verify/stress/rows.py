@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from math import inf
 
+from pipeline.verify.sections import blade, box, cylinder, disc, mesh, mm, study
 from pipeline.verify.stress.cell import Against, Cell, Expect
 from pipeline.verify.stress.corners import corners
-from pipeline.verify.stress.sections import blade, box, cylinder, disc, mesh, mm, study
 
 _A, _R = 2.0, 20.0  # the probe's and the body's radius
 _NU = (0, 0.2, 0.3, 0.4, 0.44, 0.45, 0.49, 0.495, 0.499, 0.4999, 0.49999, 0.5)

@@ -1,5 +1,6 @@
 """What `repair = true` and `smooth` make of files, and that they tell it."""
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -71,3 +72,14 @@ def test_too_much_smoothing_is_refused(tmp_path: Path):
     path.write_bytes(stl(ball()))
     with pytest.raises(SurfaceError, match="would change the volume"):
         load_surface(path, 1e-3, smooth=20e-3)
+
+
+def test_without_meshfix_it_is_said_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "pymeshfix._meshfix", None)
+    path = tmp_path / "open.stl"
+    points, facets = ball()
+    path.write_bytes(stl((points, facets[1:])))
+    with pytest.raises(SurfaceError, match="pip install pymeshfix"):
+        load_surface(path, 1e-3, repair=True)
+    path.write_bytes(stl((points, np.vstack([facets[:1, ::-1], facets[1:]]))))
+    assert "repaired: 1 inverted facets turned" in load_surface(path, 1e-3, repair=True).notices

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.verify.coverage.families import design, ellipses, organs, proportions, regions
-from pipeline.verify.coverage.families.dice import Section
+from pipeline.verify.coverage.families import design, ellipses, organs, proportions, regions, tumours
+from pipeline.verify.sections import Section
 
 
 @dataclass(frozen=True)
@@ -27,4 +27,5 @@ FAMILIES: dict[str, Family] = {
     "ellipses": Family(ellipses.throw, ellipses.TRUTH),
     "organs": Family(organs.throw, organs.TRUTH),
     "regions": Family(regions.throw, regions.TRUTH),
+    "tumours": Family(tumours.throw, tumours.TRUTH),
 }

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from pipeline.verify.coverage.families.dice import MOST_STRAIGHT, Section, log_uniform
+from pipeline.verify.coverage.families.dice import MOST_STRAIGHT, log_uniform
+from pipeline.verify.sections import Section
 
 TRUTH = "0.03 %"
 # Kinds of scenes, with their share of the cases.

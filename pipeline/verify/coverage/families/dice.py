@@ -1,10 +1,7 @@
 """What families of random scenes share."""
 
-from typing import Any
-
 import numpy as np
 
-Section = dict[str, Any]
 # Displacement elements of degree 1 are for Poisson's ratios less than this.
 MOST_STRAIGHT = 0.45
 

@@ -3,7 +3,8 @@
 import numpy as np
 
 from pipeline.verify.coverage.families.design import throw_mesh, throw_scene
-from pipeline.verify.coverage.families.dice import Section, log_uniform
+from pipeline.verify.coverage.families.dice import log_uniform
+from pipeline.verify.sections import Section
 
 TRUTH = "0.1 %"
 

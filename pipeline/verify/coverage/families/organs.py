@@ -4,17 +4,17 @@ Their files are written into a folder that lives as long as the process.
 """
 
 import hashlib
-import struct
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from pipeline.arrays import FloatArray
 from pipeline.verify.coverage.families.design import throw_mesh
-from pipeline.verify.coverage.families.dice import Section, log_uniform
+from pipeline.verify.coverage.families.dice import log_uniform
+from pipeline.verify.sections import Section
+from pipeline.verify.star import directions, star_file
 
 TRUTH = "0.2 %"
 # Points of a surface: facets about as long as a tenth of the radius, or less.
@@ -22,7 +22,6 @@ _POINTS = (1500, 6000)
 # Waves on a surface: how many, from how long to how short by their number round it, and their height (of the radius).
 _WAVES, _NUMBERS, _HEIGHT = 8, (1.5, 6.0), 0.08
 _POISSON = (0.2, 0.3, 0.4, 0.45, 0.47, 0.49, 0.499)
-_GOLDEN = np.pi * (3 - 5**0.5)
 
 
 def throw(random: np.random.Generator) -> tuple[Section, Section]:
@@ -61,25 +60,17 @@ def _tool(random: np.random.Generator) -> Section:
 def _lumpy(random: np.random.Generator) -> FloatArray:
     """Return points (n, 3), in mm, of a closed surface: an ellipsoid with waves on it."""
     count = int(random.integers(*_POINTS))
-    number = np.arange(count) + 0.5
-    height, angle = 1 - 2 * number / count, _GOLDEN * number
-    ring = np.sqrt(1 - height**2)
-    directions = np.column_stack([ring * np.cos(angle), ring * np.sin(angle), height])
+    towards = directions(count)
     waves = random.standard_normal((_WAVES, 3))
     waves *= random.uniform(*_NUMBERS, _WAVES)[:, None] / np.linalg.norm(waves, axis=1, keepdims=True)
-    bumps = np.cos(directions @ waves.T + random.uniform(0, 2 * np.pi, _WAVES)).sum(axis=1) / _WAVES**0.5
+    bumps = np.cos(towards @ waves.T + random.uniform(0, 2 * np.pi, _WAVES)).sum(axis=1) / _WAVES**0.5
     axes = [log_uniform(random, 10.0, 30.0) for _ in range(3)]
-    return np.asarray((1 + _HEIGHT * bumps)[:, None] * directions * axes)
+    return np.asarray((1 + _HEIGHT * bumps)[:, None] * towards * axes)
 
 
 def _written(points: FloatArray) -> Path:
-    """Return the file of the surface through ``points``, each seen from the origin, joined as on the unit sphere."""
-    facets = ConvexHull(points / np.linalg.norm(points, axis=1, keepdims=True)).simplices
-    inward = np.linalg.det(points[facets]) < 0
-    facets[inward] = facets[inward][:, ::-1]
-    records = np.zeros(len(facets), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
-    records["corners"] = points[facets]
-    content = b"\0" * 80 + struct.pack("<I", len(facets)) + records.tobytes()
+    """Return the file of the surface through ``points``, each seen from the origin."""
+    content = star_file(points)
     path = Path(_folder().name) / f"{hashlib.sha256(content).hexdigest()[:8]}.stl"
     path.write_bytes(content)
     return path

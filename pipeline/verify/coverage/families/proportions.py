@@ -5,7 +5,8 @@ Hundreds of them tell of each kind of element and mesh for itself.
 
 import numpy as np
 
-from pipeline.verify.coverage.families.dice import MOST_STRAIGHT, Section, log_uniform
+from pipeline.verify.coverage.families.dice import MOST_STRAIGHT, log_uniform
+from pipeline.verify.sections import Section
 
 TRUTH = "0.03 %"
 

@@ -3,7 +3,8 @@
 import numpy as np
 
 from pipeline.verify.coverage.families.design import throw_mesh
-from pipeline.verify.coverage.families.dice import MOST_STRAIGHT, Section, log_uniform
+from pipeline.verify.coverage.families.dice import MOST_STRAIGHT, log_uniform
+from pipeline.verify.sections import Section
 
 TRUTH = "0.1 %"
 _POISSON = (0.0, 0.2, 0.3, 0.4, 0.45, 0.48, 0.495, 0.5)
@@ -47,7 +48,7 @@ def _throw_layers(random: np.random.Generator, height: float) -> list[Section]:
         thickness = log_uniform(random, 0.2, 3.0)
         height -= thickness
         if height > 0.2:
-            layers.append({"name": f"layer{number}", "thickness": f"{thickness} mm", **_throw_tissue(random)})
+            layers.append({"name": f"layer{number}", "thickness": f"{thickness} mm", **throw_tissue(random)})
     return layers
 
 
@@ -59,9 +60,10 @@ def _throw_inclusion(random: np.random.Generator, height: float) -> Section:
     place = np.round(random.uniform(-3.0, 3.0, 2), 3) if random.random() < 0.5 else (0.0, 0.0)
     return {
         "name": "inclusion", "at": [f"{place[0]} mm", f"{place[1]} mm", f"{-depth} mm"], **shape,
-        **_throw_tissue(random),
+        **throw_tissue(random),
     }  # fmt: skip
 
 
-def _throw_tissue(random: np.random.Generator) -> Section:
+def throw_tissue(random: np.random.Generator) -> Section:
+    """Throw a material."""
     return {"young": f"{log_uniform(random, 0.33, 300.0)} kPa", "poisson": float(random.choice(_POISSON))}

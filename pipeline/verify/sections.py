@@ -1,5 +1,6 @@
 """Sections of a study, as a study file would hold them; lengths in millimetres."""
 
+from collections.abc import Iterable
 from math import inf
 from typing import Any
 
@@ -31,6 +32,24 @@ def disc(radius: float = 2, depth: float = 0.01, contact: str = "bonded", at: fl
 def blade(length: float, width: float = 2, **more: Any) -> Section:
     """Return a blade."""
     return {"shape": "blade", "length": mm(length), "width": mm(width), "depth": "0.01 mm", **more}
+
+
+def ellipse(axes: Iterable[float], **more: Any) -> Section:
+    """Return an ellipse by its semi-axes."""
+    return {"shape": "ellipse", "axes": [*map(mm, axes)], "depth": "0.01 mm", **more}
+
+
+def tissue(nu: float, young: float = 10.0) -> Section:
+    """Return a material; its modulus is in kPa."""
+    return {"young": f"{young:.12g} kPa", "poisson": nu}
+
+
+def layers(stack: Iterable[tuple[float, float, float]]) -> list[Section]:
+    """Return layers, top to bottom, of so much thickness, Young's modulus (kPa) and Poisson's ratio."""
+    return [
+        {"name": f"layer{number}", "thickness": mm(thickness), **tissue(nu, young)}
+        for number, (thickness, young, nu) in enumerate(stack)
+    ]
 
 
 def mesh(
