@@ -10,6 +10,7 @@ from math import hypot
 from typing import Any
 
 from pipeline.plan.symmetry import mirror_planes, model_planes
+from pipeline.shapes.indenter import Indenter
 from pipeline.study.check import held_gaps
 from pipeline.study.schema import Mesh
 from pipeline.study.sweep import Case
@@ -17,7 +18,7 @@ from pipeline.study.sweep import Case
 
 @dataclass(frozen=True)
 class Recipe:
-    """``rim`` is in units of the probe's half width, ``bar`` the relative error bar to expect.
+    """``rim`` is in units of the half width of contact, ``bar`` the relative error bar to expect.
 
     That is for a disc on a deep body at ν = 0.3; see :func:`_expected` for others.
     """
@@ -39,6 +40,19 @@ LADDER = (
     Recipe(3, 0.1, 0.4, 2.0e-4),
     Recipe(3, 0.05, 0.35, 1.0e-4),
     Recipe(3, 0.025, 0.3, 5.0e-5),
+)
+# Where contact is unilateral elements are of degree 2. Of tools that find where it ends (`contact_width`), the pressure
+# below them asks for small elements as much as its edge.
+_FLAT = (*LADDER[:4], Recipe(2, 0.1, 0.4, 9.0e-4), Recipe(2, 0.05, 0.35, 4.5e-4), Recipe(2, 0.025, 0.3, 2.3e-4))
+_FOUND = (
+    Recipe(2, 0.4, 0.6, 1.1e-2),
+    Recipe(2, 0.3, 0.45, 5.5e-3),
+    Recipe(2, 0.25, 0.35, 3.1e-3),
+    Recipe(2, 0.2, 0.3, 1.7e-3),
+    Recipe(2, 0.15, 0.25, 9.0e-4),
+    Recipe(2, 0.12, 0.2, 4.3e-4),
+    Recipe(2, 0.08, 0.17, 2.8e-4),
+    Recipe(2, 0.06, 0.14, 1.8e-4),
 )
 # Bars grow by 1 + 10 a/H with the half width a of the probe and the thickness H of the body, as far as was measured.
 _THICKNESS, _THINNEST = 10.0, 0.15
@@ -63,10 +77,23 @@ def meshes_for(case: Case, accuracy: float) -> tuple[Mesh, ...]:
 
     What the study file gives of rim, growth, degree and sizes is kept.
     """
-    expected = [_expected(case, recipe) for recipe in LADDER]
-    first = next((i for i, bar in enumerate(expected) if bar <= _MARGIN * accuracy), len(LADDER) - 1)
-    meshes = [_mesh(case, recipe) for recipe in LADDER[first:]]
+    ladder = _ladder(case)
+    expected = [_expected(case, recipe) for recipe in ladder]
+    first = next((i for i, bar in enumerate(expected) if bar <= _MARGIN * accuracy), len(ladder) - 1)
+    meshes = [_mesh(case, recipe) for recipe in ladder[first:]]
     return tuple(dict.fromkeys(meshes))
+
+
+def _ladder(case: Case) -> tuple[Recipe, ...]:
+    """Return the recipes for a probe, cheapest first."""
+    if isinstance(case.probe, Indenter):
+        return _FOUND
+    return _FLAT if case.probe.is_unilateral else LADDER
+
+
+def half_width_of(case: Case) -> float:
+    """Return the half width (m) of contact, as far as it is known."""
+    return case.probe.contact_width if isinstance(case.probe, Indenter) else case.probe.half_width
 
 
 def _expected(case: Case, recipe: Recipe) -> float:
@@ -76,7 +103,7 @@ def _expected(case: Case, recipe: Recipe) -> float:
         shape *= 1 + _SLIDE * _slide(case)
     if not case.is_plain:
         shape *= _ELSEWHERE[case.element]
-    thickness = 1 + _THICKNESS * min(case.probe.half_width / case.body.thickness(case.frame), _THINNEST)
+    thickness = 1 + _THICKNESS * min(half_width_of(case) / case.body.thickness(case.frame), _THINNEST)
     if case.element == "mixed":
         return recipe.bar * shape * thickness * _MIXED[recipe.degree]
     locking = ((1 - 2 * case.poisson) / 0.4) ** -_LOCKING
@@ -97,7 +124,7 @@ def _mesh(case: Case, recipe: Recipe) -> Mesh:
     sizes = {
         "fine": min(thickness / _THROUGH, reach),
         "coarse": reach,
-        "rim": min([recipe.rim * probe.half_width, *(gap / _ACROSS_GAP for gap in gaps)]),
+        "rim": min([recipe.rim * half_width_of(case), *(gap / _ACROSS_GAP for gap in gaps)]),
         "growth": recipe.growth,
         "degree": recipe.degree,
     }

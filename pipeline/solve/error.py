@@ -35,6 +35,9 @@ _LIMITS_COARSE, _LIMITS_PLAIN = (0.4, 1.0), (0.85, 0.85)
 _LIMITS_ELSEWHERE = {"displacement": (0.4, 0.4), "mixed": (0.5, 0.9)}
 # The energy that a slit's front releases is at that of degree p + 1, less (centre ± spread) θ times what that changed.
 _RELEASE = (0.45, 0.9)
+# Found contact: |F_2 - F_exact| in units of what degree 3 takes away, and of N; and what is left, in bars, once F_2 is
+# corrected by half of it: on graded meshes of plain bodies, and elsewhere.
+_FOUND, _FOUND_UNSEEN, _FOUND_SPREAD = 1.6, 1.4, (0.4, 0.6)
 # Graded to the edge: the coarsest that was measured, relative to the probe's half width, and the growth from there.
 _GRADED = (0.4, 0.7)
 
@@ -98,6 +101,26 @@ def release_bar(released: float, finer: float, degree: int, bar: float, *, extra
 def extrapolate_release(released: FloatArray, finer: FloatArray, degree: int) -> FloatArray:
     """Return what the degrees tend to of what a slit's front releases."""
     return released - (1 + _RELEASE[0] * _theta(degree)) * (released - finer)
+
+
+def found_bar(decrement: float, unseen: float = 0.0) -> float:
+    """Return the 95 % bar on F_2, relative, where contact is found, and pressure falls to nought at its edge.
+
+    ``decrement`` is the share of the energy that degree 3 takes away while that area is held, ``unseen`` N / (2 U) of
+    a mixed element.
+    """
+    share = max(_FOUND * abs(decrement), _FOUND_UNSEEN * unseen)
+    return share / (1 - min(share, _MOST))
+
+
+def extrapolate_found(
+    stiffness: FloatArray, decrements: FloatArray, bars: FloatArray, *, usual: bool = True
+) -> tuple[FloatArray, FloatArray]:
+    """Return what F / d (1, 1) of found contact tends to, and the bar on it: F_2 is too large by half a bar or so.
+
+    ``usual`` tells that the mesh is graded, and the body of one material with a plane surface.
+    """
+    return stiffness - _FOUND / 2 * decrements, _FOUND_SPREAD[0 if usual else 1] * bars
 
 
 def _theta(degree: int) -> float:

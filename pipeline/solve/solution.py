@@ -7,7 +7,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.error import extrapolate, extrapolate_release, release_bar
+from pipeline.solve.error import extrapolate, extrapolate_found, extrapolate_release, release_bar
 from pipeline.solve.loads import Loads, Vector
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.reaction import Response
@@ -143,8 +143,12 @@ class Solution:
 
         ``elsewhere`` tells that the probe's edge may not be all that F errs by.
         """
-        if self.decrements is None or self.bars is None or self.stored is not None:
+        if self.decrements is None or self.bars is None:
             return self
+        if self.stored is not None:
+            usual = graded and not elsewhere
+            stiffness, bars = extrapolate_found(self.stiffness, self.decrements, self.bars, usual=usual)
+            return replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
         stiffness, bars = extrapolate(
             self.stiffness, self.decrements, self.bars, degree, element, plain=self.plain, graded=graded,
             elsewhere=elsewhere,

@@ -162,3 +162,15 @@ def test_ranks_agree(poisson):
     assert together.force == pytest.approx(alone.force, rel=3e-8)
     assert together.contact_area == pytest.approx(alone.contact_area, rel=1e-6)
     assert together.force_error == pytest.approx(alone.force_error, rel=0.05)
+
+
+def test_accuracy_that_is_asked_for_is_met():
+    """Off the axis of its body, so that the mesh is one in three dimensions; the truth is that on the axis, about."""
+    (found,) = solve(
+        body=LARGE, probe=SPHERE | {"at": ["1 mm", "0 mm"]},
+        mesh={"accuracy": "2 %"} | dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree")),
+    ).values()  # fmt: skip
+    assert found.status == "ok", found.message
+    assert found.force_error < 0.02
+    hertz = 4 / 3 * MODULUS * sqrt(10e-3) * 0.1e-3**1.5
+    assert found.force == pytest.approx(1.013 * hertz, rel=found.force_error)

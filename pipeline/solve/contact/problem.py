@@ -21,7 +21,7 @@ from pipeline.solve.contact.levels import CONDITIONS
 from pipeline.solve.contact.mixed import MixedElements
 from pipeline.solve.contact.sets import ContactError, Found, Obstacle, find_set
 from pipeline.solve.contact.surface import find_candidates
-from pipeline.solve.error import error_bar
+from pipeline.solve.error import error_bar, found_bar
 from pipeline.solve.forms import mean_strain_form
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads
@@ -40,10 +40,8 @@ DEGREE = 2
 _LOOSE = 1e-3
 # Stricter than what serves a prescribed displacement: F is linear in the solver's error here.
 _STRICTER = 0.01
-# The error bar in units of what the next degree takes of the energy: measured, docs/accuracy.md.
-_BAR = 1.25
-# And the share of N, the energy norm squared of the first correction, of mixed elements, whose s may vanish by chance.
-_UNSEEN = 0.3
+# Bounds that differ by no more than this share of the depth are the same.
+_SAME = 1e-9
 # The first set is looked for in a material that elements of degree 1 do not lock in: λ/μ at most (ν = 0.3).
 _FIRST_RATIO = 1.5
 
@@ -120,21 +118,30 @@ class ContactProblem:
                 raise SolveError(
                     f"forces do not balance: relative error {response.balance:.1e}, allowed {BALANCE_LIMIT:.0e}"
                 )
-            area = self._whole * contact_area(self.obstacle, found.active, found.state)
-            assembly, setup = elements.assembly_seconds, elements.setup_seconds
-            solution = Solution(
-                response, largest_strain(self._strain, self._body), self._fine.dofs.whole_dofs, self._body.cells,
-                first.sets + found.sets, assembly, setup, time.perf_counter() - start - assembly - setup,
-                contact_area=area, contact_radius=(area / np.pi) ** 0.5, stored=self._whole * found.state.energy / 2,
-            )  # fmt: skip
+            solution = self._solution(elements, first, found, response, time.perf_counter() - start)
             if not estimate:
                 return solution
             start = time.perf_counter()
             taken, share, more = self._estimate(elements, law, found)
         return replace(
             solution, decrements=taken * response.stiffness, bars=share * response.stiffness,
-            estimate_iterations=more, time_estimate=time.perf_counter() - start,
+            plain=plain_share(self._body), estimate_iterations=more, time_estimate=time.perf_counter() - start,
         )  # fmt: skip
+
+    def _solution(self, elements: Kind, first: Found, found: Found, response: Response, seconds: float) -> Solution:
+        """Return the solution, which took ``seconds`` with all assembly and set-up; collective."""
+        area = self._whole * contact_area(self.obstacle, found.active, found.state)
+        assembly, setup = elements.assembly_seconds, elements.setup_seconds
+        return Solution(
+            response, largest_strain(self._strain, self._body), self._fine.dofs.whole_dofs, self._body.cells,
+            first.sets + found.sets, assembly, setup, seconds - assembly - setup,
+            contact_area=area, contact_radius=(area / np.pi) ** 0.5,
+            stored=None if self._is_as_prescribed(found) else self._whole * found.state.energy / 2,
+        )  # fmt: skip
+
+    def _is_as_prescribed(self, found: Found) -> bool:
+        """Tell whether all of a face touches and moves by the depth: the area of contact was no question."""
+        return bool(found.active.all() and np.ptp(self.obstacle.bounds) <= _SAME * self._tool.depth)
 
     def _estimate(self, elements: Kind, law: MaterialLaw, found: Found) -> tuple[float, float, int]:
         """Return the share of the energy that degree 3 takes away, that of the force's bar, and the iterations."""
@@ -148,7 +155,7 @@ class ContactProblem:
         if (found.active & self._candidates.is_edge).any():  # the probe ends there, and the pressure is singular
             element = "mixed" if self._is_mixed else "displacement"
             return share, error_bar(share, DEGREE, element, plain=plain_share(self._body), unseen=unseen), more
-        return share, _BAR * max(abs(share), _UNSEEN * unseen), more
+        return share, found_bar(share, unseen), more
 
     def fields(self) -> tuple[Any, FloatArray]:
         """Return the last solution's displacement (m) and the principal strains of each owned cell; collective."""

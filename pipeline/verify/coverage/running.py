@@ -7,6 +7,7 @@ import numpy as np
 from mpi4py import MPI
 
 from pipeline.plan.plan import make_plan
+from pipeline.plan.recipe import half_width_of
 from pipeline.run.execute import compute
 from pipeline.run.record import Record
 from pipeline.study.load import parse
@@ -16,7 +17,7 @@ from pipeline.verify.coverage.families import FAMILIES
 from pipeline.verify.sections import Section
 
 SEED, COUNT = 2026, 160
-# A mesh is naive if its elements at the probe's edge are larger than this, in units of the probe's half width.
+# A mesh is naive if its elements at the probe's edge are larger than this, in units of the half width of contact.
 _NAIVE = 0.35
 
 
@@ -41,7 +42,7 @@ def trials(comm: MPI.Comm, count: int = COUNT, seed: int = SEED, family: str = "
 def _trial(scene: Section, mesh: Section, case: Record, truth: Record) -> Trial:
     message = "; ".join(r.message for r in (case, truth) if not isfinite(r.force))
     (declared,) = parse({**scene, "mesh": mesh}).cases()
-    rim = declared.mesh.rim_size(declared.probe.half_width) / declared.probe.half_width
+    rim = declared.mesh.rim_size(declared.probe.half_width) / half_width_of(declared)
     return Trial(
         _name(scene, mesh), case.force, case.force_error, truth.force, truth.force_error, message,
         (declared.mesh.degree, declared.element), "naive" if rim > _NAIVE else "graded",

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.verify.coverage.families import design, ellipses, organs, proportions, regions, tumours
+from pipeline.verify.coverage.families import design, ellipses, organs, proportions, regions, tools, tumours
 from pipeline.verify.sections import Section
 
 
@@ -28,4 +28,5 @@ FAMILIES: dict[str, Family] = {
     "organs": Family(organs.throw, organs.TRUTH),
     "regions": Family(regions.throw, regions.TRUTH),
     "tumours": Family(tumours.throw, tumours.TRUTH),
+    "tools": Family(tools.throw, tools.TRUTH),
 }
