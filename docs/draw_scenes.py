@@ -12,8 +12,8 @@ DOCS = Path(__file__).parent
 PAGE, STUDIES, PICTURES = DOCS / "scenes.md", DOCS / "scenes", DOCS / "figures" / "scenes"
 # In the order of the page; studies that are not named here follow by their names.
 ORDER = (
-    "box", "blade", "cylinder", "column", "layers", "tumour", "ellipsoid", "sphere", "cone", "wedge", "tilted", "cad",
-    "organ", "organ-tumour", "image",
+    "box", "blade", "incision", "cylinder", "column", "layers", "tumour", "ellipsoid", "sphere", "cone", "wedge",
+    "tilted", "cad", "organ", "organ-tumour", "image",
 )  # fmt: skip
 # Bytes of a picture.
 MOST = 150_000

@@ -67,7 +67,9 @@ class Drawing:
             point_normals=False, split_vertices=False, auto_orient_normals=True
         )
         patch = self._patch(PROBE)
-        footprint = self._opened(patch).extract_surface(algorithm="dataset_surface")
+        # The faces of a slit may lie in the cut itself.
+        behind = patch if fields.case.probe.slit else self._opened(patch)
+        footprint = behind.extract_surface(algorithm="dataset_surface")
         held = self._opened(self._patch(FIXED)).extract_surface(algorithm="dataset_surface")
         edge = footprint.extract_feature_edges(
             boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False

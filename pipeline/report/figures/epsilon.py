@@ -43,7 +43,7 @@ def _against_epsilon(dataset: xr.Dataset, quantities: Sequence[str], title: str,
         elif panel.quantity == "speedup":
             _mark_speedup(panel.ax, first=panel.is_first)
         else:
-            panel.ax.axhline(1.0, color=LINE, linewidth=0.7)
+            _mark_release(panel.ax)
         if panel.is_first:
             is_speedup = panel.quantity == "speedup"
             panel.ax.set_ylabel(heading(dataset["speedup"]) if is_speedup else formula(panel.quantity))
@@ -66,6 +66,13 @@ def _mark_ratio(ax: Axes, x: np.ndarray) -> None:
         ax.plot(*point, color=CLAIM, zorder=5, **star)
         place = {"xytext": (6, -2), "textcoords": "offset points", "va": "center"}
         ax.annotate("paper: 80 %", point, color=CLAIM, fontsize=7, zorder=5, **place)
+
+
+def _mark_release(ax: Axes) -> None:
+    """Mark G = G_max, with room for 5 % at least."""
+    ax.axhline(1.0, color=LINE, linewidth=0.7)
+    low, high = ax.get_ylim()
+    ax.set_ylim(min(low, 0.95), max(high, 1.05))
 
 
 def _mark_speedup(ax: Axes, *, first: bool) -> None:
