@@ -2,10 +2,20 @@
 
 import pytest
 
+from pipeline.shapes.files import checked
 from tests import commands
 from tests.studies import small_text
 
 SMALL = small_text(material={"poisson": [0.3, 0.4]}, mesh={"outside": ["coarse", "free"]})
+
+
+@pytest.fixture(scope="session", autouse=True)
+def surfaces(tmp_path_factory):
+    """Surfaces that earlier code kept are not taken for those of this one."""
+    folder = tmp_path_factory.mktemp("cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(checked, "cache_folder", lambda: folder)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,8 @@
 """Surfaces that were found whole, kept on disk: a large file is checked once, not at every command."""
 
-from collections.abc import Callable
-from hashlib import sha256
+from collections.abc import Callable, Iterable
+from hashlib import file_digest, sha256
+from pathlib import Path
 from zipfile import BadZipFile
 
 from pipeline.files import atomic, cache_folder
@@ -22,8 +23,25 @@ def kept_whole(data: bytes, given: str, make: Callable[[], Whole]) -> Whole:
     """
     if len(data) < _SMALL:
         return make()
-    key = sha256(f"{_VERSION} {given}\n".encode() + data).hexdigest()[:32]
-    path = cache_folder() / "surfaces" / f"{key}.npz"
+    return _kept(sha256(f"{_VERSION} {given}\n".encode() + data).hexdigest(), make)
+
+
+def kept_image(files: Iterable[Path], given: str, make: Callable[[], Whole]) -> Whole:
+    """Return the surface in an image's ``files``, as :func:`kept_whole` does, however small they are packed.
+
+    Raises:
+        OSError: if one of the files cannot be read.
+    """
+    key = sha256(f"{_VERSION} image {given}\n".encode())
+    for path in files:
+        with path.open("rb") as file:
+            key.update(file_digest(file, "sha256").digest())
+    return _kept(key.hexdigest(), make)
+
+
+def _kept(key: str, make: Callable[[], Whole]) -> Whole:
+    """Return what is on disk under a key, or make it and write it there."""
+    path = cache_folder() / "surfaces" / f"{key[:32]}.npz"
     try:
         with np.load(path, allow_pickle=False) as found:
             return Triangles(found["points"], found["facets"]), tuple(found["notices"].tolist())

@@ -11,15 +11,18 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.shapes.arrays import FloatArray, IntArray, np
-from pipeline.shapes.files.labels import LabelMap, of_label, read_labels
+from pipeline.shapes.files.checked import kept_image
+from pipeline.shapes.files.labels import LabelMap, files_of, of_label, read_labels
 from pipeline.shapes.files.raw import Raw
 from pipeline.shapes.files.read import Loaded, state_of
 from pipeline.shapes.files.shells import largest_shell
 from pipeline.shapes.files.whole import made_whole
-from pipeline.shapes.triangles import SurfaceError, enclosed
+from pipeline.shapes.triangles import SurfaceError, Triangles, enclosed
 
 # Voxels apart from the largest piece, or enclosed by it, of more than this share of it are no noise.
 MOST_APART = 0.05
+# Raise by hand when the same label gives another surface.
+_METHOD = 1
 _REACH = 4.0  # of the filter, in standard deviations
 # The level is searched until the volume is kept to this share, in this many trials at most.
 _SAME_VOLUME, _LEVELS = 5e-4, 6
@@ -32,18 +35,41 @@ def load_image(path: Path, label: int, unit: float | None = None, smooth: float 
     """Return the surface round the voxels with a ``label`` in a NIfTI or NRRD file, and what was done to it.
 
     ``unit`` (m) is needed only where the header names none; ``smooth`` (m) is the standard deviation of the filter.
+    The files are read again only when they have changed, and the surface is kept on disk.
 
     Raises:
         SurfaceError: if the label does not bound one piece of tissue; says what was found, and what mends it.
     """
-    return _load(path, *state_of(path), label, unit, smooth)
+    header, *data = _files(path, state_of(path))
+    try:
+        states = (state_of(header), *map(state_of, data))
+    except SurfaceError as error:
+        raise SurfaceError(f"the file of its data, `{data[0]}`, {error}") from error
+    return _load((header, *data), states, label, unit, smooth)
 
 
 @lru_cache(maxsize=8)
-def _load(path: Path, _changed: int, size: int, label: int, unit: float | None, smooth: float | None) -> Loaded:
-    if not size:
+def _files(path: Path, _state: tuple[int, int]) -> tuple[Path, ...]:
+    return files_of(path)
+
+
+@lru_cache(maxsize=8)
+def _load(
+    files: tuple[Path, ...], states: tuple[tuple[int, int], ...], label: int, unit: float | None, smooth: float | None
+) -> Loaded:
+    path = files[0]
+    if not all(size for _, size in states):
         raise SurfaceError("is empty: copy or export it again")
-    return surface_of(read_labels(path, unit), label, smooth)
+
+    def make() -> tuple[Triangles, tuple[str, ...]]:
+        found = surface_of(read_labels(path, unit), label, smooth)
+        return found.triangles, found.notices
+
+    given = f"{_METHOD} {path.suffix.lower()} {label} {unit!r} {smooth!r}"
+    try:
+        return Loaded(*kept_image(files, given, make))
+    except OSError as error:
+        raise SurfaceError(f"cannot be read: {error.strerror or error}") from None
 
 
 def default_smooth(spacing: FloatArray) -> float:

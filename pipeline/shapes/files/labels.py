@@ -43,6 +43,20 @@ def is_image(path: Path) -> bool:
     return path.name.lower().endswith(ENDINGS)
 
 
+def files_of(path: Path) -> tuple[Path, ...]:
+    """Return the files that hold a label map: its own, and the one of the data where a NRRD header names another."""
+    if not is_image(path) or path.name.lower().endswith(ENDINGS[:2]):
+        return (path,)
+    import nrrd  # noqa: PLC0415
+
+    try:
+        header = nrrd.read_header(str(path))
+    except Exception:  # what is wrong with it is told as it is read
+        return (path,)
+    data = header.get("datafile", header.get("data file"))
+    return (path,) if data is None else (path, path.parent / str(data))
+
+
 def read_labels(path: Path, unit: float | None) -> LabelMap:
     """Return the label map in a file; ``unit`` (m) where the header does not say it.
 

@@ -1,9 +1,11 @@
 """What was checked once is not checked again, and is the same."""
 
+import nrrd
 import numpy as np
 import pytest
 
-from pipeline.shapes.files import checked, read
+from pipeline.shapes.files import checked, image, read
+from pipeline.shapes.files.image import load_image
 from pipeline.shapes.files.read import load_surface
 from pipeline.shapes.triangles import SurfaceError
 from tests.organs import ellipsoid, write_stl
@@ -11,9 +13,10 @@ from tests.organs import ellipsoid, write_stl
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("EPSMESH_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(checked, "cache_folder", lambda: tmp_path / "cache")
     monkeypatch.setattr(checked, "_SMALL", 1000)
     read._load.cache_clear()
+    image._load.cache_clear()
     return tmp_path
 
 
@@ -58,3 +61,45 @@ def test_what_is_refused_is_refused_again(folder):
         with pytest.raises(SurfaceError):
             again(path)
     assert not np.any([*(folder / "cache").glob("surfaces/*")])
+
+
+def write_ball(path, radius=9.0):
+    places = np.stack(np.meshgrid(*[np.arange(25)] * 3, indexing="ij"), -1)
+    ball = (np.linalg.norm(places - 12, axis=-1) < radius).astype(np.uint8)
+    header = {"space": "left-posterior-superior", "space directions": np.eye(3), "space origin": np.zeros(3)}
+    nrrd.write(str(path), ball + ball * (places[..., 0] > 12), header)
+    return path
+
+
+def image_again(path, label=1, **given):
+    image._load.cache_clear()
+    return load_image(path, label, **given)
+
+
+@pytest.mark.parametrize("name", ["ball.nrrd", "ball.nhdr"])
+def test_the_surface_round_a_label_is_made_once(name, folder, monkeypatch):
+    path = write_ball(folder / name)
+    first = image_again(path)
+    monkeypatch.setattr(image, "surface_of", refuse)
+    second = image_again(path)
+    assert second.triangles.hash == first.triangles.hash and second.notices == first.notices
+    for other in ({"label": 2}, {"unit": 1e-3}, {"smooth": 1e-3}):
+        with pytest.raises(AssertionError, match="checked again"):
+            image_again(path, **other)
+    monkeypatch.setattr(image, "_METHOD", image._METHOD + 1)
+    with pytest.raises(AssertionError, match="checked again"):
+        image_again(path)
+
+
+def test_the_data_that_a_header_names_count(folder):
+    """Of a header beside its data only the data change: within one process, and on disk."""
+    path = write_ball(folder / "ball.nhdr")
+    header, first = path.read_bytes(), load_image(path, 1).triangles
+    write_ball(path, radius=8.0)
+    assert path.read_bytes() == header
+    second = load_image(path, 1).triangles
+    assert second.volume < 0.8 * first.volume
+    assert image_again(path).triangles.hash == second.hash
+    (folder / "ball.raw.gz").unlink()
+    with pytest.raises(SurfaceError, match=r"file of its data, .*ball\.raw\.gz`, cannot be read: No such file"):
+        image_again(path)
