@@ -21,6 +21,8 @@ _PARALLEL = 0.8
 _MESH, _MIXED = 2e-5, 1.3
 _SOLVE = {1: 5e-6, 2: 2e-5, 3: 5e-5, 4: 1.6e-4}
 _MERIDIAN = 0.5
+# And one whose contact is to be found: so many times that.
+_FOUND, _TRIALS = "meridian contact", 2.0
 # Share of the meshes that miss the accuracy they were chosen for: 5 of 60 scenes, 9 of 48 blades that slice.
 _MISSED, _MISSED_BY_SEVERAL = 0.08, 0.19
 # How fast iterations grow on the way to incompressible.
@@ -75,7 +77,7 @@ class CostModel:
         if len(step.solves) > 1:
             title += f" and {len(step.solves) - 1} more"
         if step.axisymmetric:
-            seconds = len(step.solves) * self.seconds("solve", "meridian", 1.0, 0.0)
+            seconds = sum(self.seconds("solve", *features(solve)) for solve in step.solves)
             return StepEstimate("meridian", len(step.solves), len(step.solves), 1e3, seconds, 3e8, title)
         kind, cells, _ = features(step.solves[0])
         seconds = self.seconds("mesh", kind, cells, 0.0)
@@ -102,7 +104,7 @@ def features(solve: Solve) -> tuple[str, float, float]:
     """
     case = solve.case
     if solve.axisymmetric:
-        return "meridian", 1.0, 0.0
+        return _FOUND if case.probe.is_unilateral else "meridian", 1.0, 0.0
     movements = "" if case.movements == 1 else f" {case.movements}"
     return (
         f"{case.element} {case.mesh.degree}{movements}",
@@ -154,8 +156,8 @@ def _poisson(case: Case) -> float:
 
 
 def _prior(stage: str, kind: str) -> _Numbers:
-    if kind == "meridian":
-        return log(_MERIDIAN), 0.0, 0.0
+    if kind in ("meridian", _FOUND):
+        return log(_MERIDIAN * (_TRIALS if kind == _FOUND else 1.0)), 0.0, 0.0
     if stage == "mesh":
         return log(1e4 * _MESH), 1.0, 0.0
     element, degree, *movements = kind.split()

@@ -86,6 +86,8 @@ def _changes(plan: Plan, case: Case, solve: Solve | None) -> dict[str, str]:
 
 def _steps(solve: Solve, step: MeshStep | None) -> list[str]:
     if solve.axisymmetric:
+        if solve.case.probe.is_unilateral:
+            return ["meridian: a few meshes and direct solves in two dimensions until the area of contact is found"]
         return ["meridian: mesh, assembly and direct solve in two dimensions"]
     part = {0: "whole body", 1: "half of the body", 2: "quarter of the body"}[len(solve.mirrors)]
     shared = f", shared by {len(step.solves)} solves" if step and len(step.solves) > 1 else ""

@@ -72,7 +72,7 @@ class Record:
             return None
         faster = speed_up(self.group)
         solve = self.time_assemble + self.time_setup + self.time_solve
-        if self.kind == "meridian":
+        if self.kind.startswith("meridian"):
             seconds = {"solve": self.time_mesh + solve}
         else:
             seconds = {"mesh": self.time_mesh, "solve": solve, "bar": self.time_error}

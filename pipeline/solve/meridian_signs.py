@@ -38,7 +38,7 @@ def check_signs(
     mean = -2 * reactions.sum()
     within = radii < 1 - _BESIDE_EDGE
     if (tension := -pressure[within].min() / mean) > _TENSION:
-        at = radii[within][np.argmin(pressure[within])] * arrays.unit
+        at = max(float(radii[within][np.argmin(pressure[within])]) * arrays.unit, 0.0)
         raise SolveError(
             f"contact is not one round patch: {1e3 * at:.3g} mm from the axis the tool would pull with {tension:.1%} "
             'of the mean pressure; use model = "3d"'

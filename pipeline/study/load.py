@@ -139,8 +139,12 @@ def _read_section(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], 
 
 
 def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[Axis], tuple[Section, ...]]:
-    """Read ``[[name]]`` tables: a sweep over the section as a whole, labelled by the tables' names."""
-    variants: list[Section] = []
+    """Read ``[[name]]`` tables: a sweep over the section as a whole, labelled by the tables' names.
+
+    A list that all of them have of a key sweeps it in each of them.
+    """
+    variants: list[list[Section]] = []
+    shared = _shared_sweeps(name, tables)
     for position, table in enumerate(tables, start=1):
         where = f"{name}[{position}]"
         if not isinstance(table, dict):
@@ -152,19 +156,48 @@ def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[
         if model is None:
             continue
         for place, value in _sweeps(model, table):
-            problems.error(
-                f"{where}.{written(place)}", value, "a list inside an array of tables: write one table for each value"
-            )
+            if place not in shared:
+                problems.error(
+                    f"{where}.{written(place)}", value, "a list inside an array of tables: write one table for each "
+                    "value, or the same list in all tables",
+                )  # fmt: skip
         try:
-            variants.append(_validate(model, table))
+            combinations = itertools.islice(itertools.product(*shared.values()), _MOST_VARIANTS)
+            placed = [_placed(table, zip(shared, values, strict=True)) for values in combinations]
+            variants.append([_validate(model, variant) for variant in placed])
         except ValidationError as error:
             problems.from_pydantic(where, error, model, table)
-    names = [variant.name for variant in variants]
+    names = [first.name for first, *_ in variants]
     for label in sorted({n for n in names if names.count(n) > 1 and n}):
         problems.error(
             f"{name}.name", label, "is the name of more than one table; names label the sweep and must differ"
         )
-    return [Axis(name, "", tuple(names), "")], tuple(variants)
+    axes = [Axis(name, "", tuple(names), "")]
+    if variants and shared:
+        # What each of their values is does not depend on the table: the first one tells.
+        kind, table = type(variants[0][0]), _placed(tables[0], ((place, given[0]) for place, given in shared.items()))
+        for place, values in shared.items():
+            parsed = [_validate(kind, _placed(table, [(place, value)])) for value in values]
+            axes.append(_axis(name, place, values, parsed, problems))
+    return axes, tuple(itertools.chain.from_iterable(variants))
+
+
+def _shared_sweeps(name: str, tables: list[Any]) -> dict[Place, list[Any]]:
+    """Return the lists of values that all of an array's tables have of a key of their own, alike."""
+    found: list[dict[Place, list[Any]]] = []
+    for table in tables:
+        model = SECTIONS[name]
+        if isinstance(table, dict) and isinstance(model, Mapping):
+            model = model.get(str(table.get("shape")), model)
+        if isinstance(model, Mapping) or not isinstance(table, dict):
+            return {}
+        found.append(dict(_sweeps(model, table)))
+    first, *others = found or [{}]
+    return {
+        place: values
+        for place, values in first.items()
+        if len(place) == 1 and values and all(other.get(place) == values for other in others)
+    }
 
 
 def _model(name: str, raw: dict[str, Any], problems: Problems, where: str = "") -> type[Section] | None:

@@ -231,6 +231,25 @@ def test_array_of_tables_is_a_sweep_by_name():
     assert [case.probe.shape for case in result.cases()] == ["disc", "blade"]
 
 
+def test_a_list_that_all_tables_of_an_array_have_is_a_sweep():
+    """Each table with each value: the array's dimension first, then that of the list."""
+    content = raw()
+    depths = ["0.1 mm", "0.2 mm", "0.3 mm"]
+    content["probe"] = [
+        {"name": "needle", **raw()["probe"], "depth": depths},
+        {"name": "knife", **BLADE, "depth": depths},
+    ]
+    result = parse(content)
+    assert [axis.name for axis in result.axes[:2]] == ["probe", "depth"]
+    found = [(dict(case.labels)["probe"], case.probe.shape, case.probe.depth) for case in result.cases()]
+    expected = [("needle", "disc", d) for d in (1e-4, 2e-4, 3e-4)] + [("knife", "blade", d) for d in (1e-4, 2e-4, 3e-4)]
+    assert found == expected
+    assert all(dict(case.labels)["depth"] == case.probe.depth for case in result.cases())
+    content["probe"][1]["depth"] = depths[:2]
+    with pytest.raises(StudyError, match="the same list in all tables"):
+        parse(content)
+
+
 def test_points_and_sizes_sweep_as_lists_of_lists():
     result = study(probe={"at": [["0 mm", "0 mm"], ["5 mm", "0 mm"]]})
     assert [case.probe.at for case in result.cases()] == [(0.0, 0.0), (0.005, 0.0)]
