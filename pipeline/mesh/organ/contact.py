@@ -12,6 +12,7 @@ import numpy as np
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.compat import gmsh_session
 from pipeline.mesh.generate import GeometryError, MeshError, model_options
+from pipeline.mesh.organ.lines import cross
 from pipeline.mesh.organ.sheet import FIXED, PROBE, Sheet, compact, edges_of
 from pipeline.mesh.size import Sizes, set_size_field
 from pipeline.shapes.frame import Frame
@@ -25,6 +26,7 @@ _COLLAR = 1.25
 _CORNER = 0.9
 # A round outline is followed this many times closer than its elements.
 _FOLLOW = 8
+_FOLDED = "the surface is folded round the contact: the probe's own plane cannot hold it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +90,8 @@ def set_in(sheet: Sheet, frame: Frame, probe: Probe, sizes: Sizes, lift: Lift) -
     if (sheet.group[patch] == FIXED).any():
         raise GeometryError("the footprint lies on, or next to, what is held of the body")
     loops = _loops(sheet.facets[patch])
+    if _cross(local[:, :2], loops, rim):
+        raise GeometryError(f"{_FOLDED}; for a rough surface, `smooth` takes lengths that are taken off")
     plane = _mesh_plane(local[:, :2], loops, rim, probe, sizes)
     return _joined(sheet, patch, plane, lift, lifted, followed)
 
@@ -110,7 +114,13 @@ def _patch(sheet: Sheet, local: FloatArray, radius: float) -> IntArray:
         if np.isin(more, chosen).all():
             break
         chosen = np.union1d(chosen, more)
-    raise GeometryError("the surface is folded round the contact: the probe's own plane cannot hold it")
+    raise GeometryError(_FOLDED)
+
+
+def _cross(local: FloatArray, loops: list[list[int]], rim: FloatArray) -> bool:
+    """Tell whether lines that bound the patch, and the rim, cross in the plane: gmsh would end the process."""
+    closed = [local[loop] for loop in loops] + [rim]
+    return cross(np.vstack(closed), np.vstack([np.roll(line, -1, axis=0) for line in closed]))
 
 
 def _distance_to_origin(corners: FloatArray) -> FloatArray:

@@ -2,51 +2,50 @@
 
 from collections.abc import Sequence
 
-import gmsh
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from pipeline.arrays import FloatArray, IntArray
-from pipeline.compat import gmsh_session
-from pipeline.mesh.generate import MeshError, model_options
-from pipeline.mesh.organ.field import Field, set_field
-from pipeline.scene.regions import draw_inclusions
+from pipeline.mesh.generate import MeshError
+from pipeline.mesh.organ.field import Field
+from pipeline.mesh.organ.remesh import remesh
+from pipeline.mesh.organ.sheet import FREE, Sheet
+from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.regions import Inclusion
-from pipeline.stages import stage
 
-_SIZE = 100.0  # extent of the largest one in the model, in its unit
-_TRIANGLE = 2
+# Points that the surface has before it is meshed to sizes, and how often it is: only the second time there are points
+# enough for sizes that change fast.
+_POINTS, _PASSES = 1000, 2
+# How far chords may leave the surface, in units of the smallest semi-axis: elements have the sizes asked for.
+_DEVIATION = 0.05
 
 
-@stage("gmsh")
 def inclusion_surfaces(inclusions: Sequence[Inclusion], field: Field) -> list[tuple[FloatArray, IntArray]]:
     """Return points (n, 3), in m, and facets (m, 3) of the surface of each inclusion, its points on the true one.
 
     Raises:
-        MeshError: with gmsh's own words, if it fails.
+        MeshError: if the remesher fails.
     """
-    if not inclusions:
-        return []
-    scale = 2 * max(max(inclusion.surface.axes) for inclusion in inclusions) / _SIZE
-    with gmsh_session():
-        model_options()
-        volumes = draw_inclusions(inclusions, lambda length: length / scale)
-        set_field(field, scale, gmsh.model.occ)
-        try:
-            gmsh.model.mesh.generate(2)
-        except Exception as error:  # gmsh raises bare Exception
-            raise MeshError(f"gmsh: {error or gmsh.logger.getLastError()}") from error
-        found = [_triangles(volume) for volume in volumes]
-    return [
-        (one.surface.project(scale * points), facets) for one, (points, facets) in zip(inclusions, found, strict=True)
-    ]
+    return [_to_sizes(inclusion.surface, field) for inclusion in inclusions]
 
 
-def _triangles(volume: tuple[int, int]) -> tuple[FloatArray, IntArray]:
-    """Return points (n, 3) and facets (m, 3), numbers of points, of the faces round a volume of gmsh's model."""
-    faces = [tag for _, tag in gmsh.model.getBoundary([volume], oriented=False)]
-    corners = np.concatenate([gmsh.model.mesh.getElementsByType(_TRIANGLE, face)[1] for face in faces])
-    used, facets = np.unique(corners, return_inverse=True)
-    tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    order = np.argsort(tags)
-    points = coordinates.reshape(-1, 3)[order[np.searchsorted(tags[order], used)]]
-    return points, facets.reshape(-1, 3).astype(np.int64)
+def _to_sizes(surface: Ovoid, field: Field) -> tuple[FloatArray, IntArray]:
+    points, facets = _evenly(surface)
+    for _ in range(_PASSES):
+        sheet = Sheet(points, facets, np.full(len(facets), FREE), np.empty((0, 2), dtype=np.int64))
+        made = remesh(sheet, field.at(points), _DEVIATION * min(surface.axes))
+        points, facets = surface.project(made.points), made.facets
+    corners = points[facets] - np.array(surface.centre)
+    if not (np.linalg.det(corners) > 0).all():
+        raise MeshError("the remesher folded the surface of an inclusion")
+    return points, facets
+
+
+def _evenly(surface: Ovoid) -> tuple[FloatArray, IntArray]:
+    """Return points spread over the surface, and the facets between them, seen from outside."""
+    points = surface.sample(_POINTS)
+    on_ball = (points - np.array(surface.centre)) / np.array(surface.axes)
+    facets = ConvexHull(on_ball).simplices.astype(np.int64)
+    inward = np.linalg.det(on_ball[facets]) < 0
+    facets[inward] = facets[inward][:, ::-1]
+    return points, facets
