@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.scene.model import FIXED, PROBE
+from pipeline.shapes.indenter import Indenter
 from pipeline.view.fields import Fields
 from pipeline.view.palette import FOOTPRINT, HELD, INK, OUTLINE, TOOL
 from pipeline.view.viewpoint import Viewpoint
@@ -17,6 +18,8 @@ from pipeline.view.viewpoint import Viewpoint
 if not os.environ.get("DISPLAY"):
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 import pyvista as pv
+
+from pipeline.view.tool import tool_surface
 
 MM = 1e3
 # How often the triangles at ε are halved, so that its outline is smooth on coarse ones.
@@ -80,7 +83,16 @@ class Drawing:
         parts = surface, sharp, edge, self._at_epsilon(surface), patch, held
         self._surface, self._sharp, self._edge, self._ring, patch, self._held = (_moved(part, factor) for part in parts)
         length = _TOOL * MM * fields.case.probe.circumradius
-        self._tool = patch.extrude(length * self._view.outward, capping=True)
+        self._tool = self._indenter(factor, length) or patch.extrude(length * self._view.outward, capping=True)
+
+    def _indenter(self, factor: float, length: float) -> Any:
+        """Return a tool that is not flat, pushed in by ``factor`` times its depth, None if it is flat."""
+        case = self._fields.case
+        if not isinstance(case.probe, Indenter):
+            return None
+        tool = tool_surface(case.probe, case.frame, length / MM)
+        tool.points = MM * (tool.points - factor * case.probe.depth * self._view.outward)
+        return tool
 
     def render(self, size: tuple[int, int], *, close: bool) -> npt.NDArray[np.uint8]:
         """Return a picture of ``size`` pixels (width, height), of the whole or ``close`` to the probe."""

@@ -15,6 +15,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from pipeline.report.figures import save
+from pipeline.shapes.indenter import Indenter
 from pipeline.view.drawing import MM, Colouring, Drawing
 from pipeline.view.fields import Fields
 from pipeline.view.palette import FOOTPRINT, HELD, INK, TOOL, region_colours
@@ -102,8 +103,9 @@ def _add_scale(figure: Figure, colouring: Colouring, quantity: str) -> None:
 
 
 def _lines(fields: Fields) -> list[Artist]:
+    edge = "contact is looked for" if isinstance(fields.case.probe, Indenter) else "edge of the probe"
     lines: list[Artist] = [
-        Line2D([], [], color=FOOTPRINT, linewidth=1.6, label="edge of the probe"),
+        Line2D([], [], color=FOOTPRINT, linewidth=1.6, label=edge),
         Patch(color=TOOL, alpha=0.5, label="probe"),
         Patch(color=HELD, alpha=0.6, label="held"),
     ]
