@@ -65,7 +65,8 @@ def renumbered_space(space: Any, dofs: np.ndarray, owned: int, ghosts: np.ndarra
     rows = cpp.graph.AdjacencyList_int32(np.ascontiguousarray(dofs.reshape(-1), dtype=np.int32), offsets)
     dofmap = cpp.fem.DofMap(space.dofmap.dof_layout, index_map, 1, rows, 1)
     inner = space._cpp_object
-    made = type(inner)(inner.mesh, inner.element, dofmap)
+    shape = [inner.value_shape] if hasattr(inner, "value_shape") else []  # of dolfinx 0.8 and 0.9
+    made = type(inner)(inner.mesh, inner.element, dofmap, *shape)
     return fem.FunctionSpace(mesh, space.ufl_element(), made)
 
 

@@ -139,7 +139,7 @@ def test_mixed_elements_agree_and_take_incompressible_tissue():
 def test_error_bar_holds_a_finer_mesh(scene):
     coarse, fine = (record(mesh={"rim": rim}, **scene) for rim in ("0.3 mm", "0.15 mm"))
     assert coarse.force == pytest.approx(fine.force, rel=coarse.force_error + fine.force_error)
-    assert fine.force_error < coarse.force_error < 0.05
+    assert fine.force_error < coarse.force_error < 0.1
 
 
 def test_contact_that_is_cut_off_is_refused():

@@ -61,7 +61,8 @@ def remesh(sheet: Sheet, size: FloatArray, deviation: float, kept: IntArray | No
         source, result = Path(folder, "in.mesh"), Path(folder, "out.mesh")
         source.write_text(_mesh_text(sheet, np.empty((0, 2), np.int64) if kept is None else kept))
         source.with_suffix(".sol").write_text(_size_text(size))
-        limits = ("-hmin", f"{size.min() / _ROOM!r}", "-hmax", f"{size.max() * _ROOM!r}", "-hausd", f"{deviation!r}")
+        least, most = float(size.min()) / _ROOM, float(size.max()) * _ROOM
+        limits = ("-hmin", repr(least), "-hmax", repr(most), "-hausd", repr(float(deviation)))
         command = [str(program()), *_OPTIONS, *map(str, limits), "-sol", str(source.with_suffix(".sol")),
                    str(source), str(result)]  # fmt: skip
         try:
