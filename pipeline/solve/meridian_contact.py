@@ -14,34 +14,30 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from math import exp, inf, log, pi
-from typing import Any
 
 import numpy as np
 
-from pipeline.arrays import FloatArray, IntArray
+from pipeline.arrays import FloatArray
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
-from pipeline.mesh.meridian import AXIS, Grading, MeridianArrays, meridian_mesh, split_regions
+from pipeline.mesh.meridian import AXIS, Grading, MeridianArrays
 from pipeline.scene.model import FIXED, PROBE
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
+from pipeline.solve.meridian_refine import DirectProblem, best_answer, error_bar, meshes_of, only_along_axis, refined
 from pipeline.solve.meridian_signs import check_signs
-from pipeline.solve.meridian_system import Clock, HalfPlane, Meshes, Unbalanced, factorised, forms_of, max_strain
+from pipeline.solve.meridian_system import Clock, HalfPlane, Meshes, factorised, forms_of, max_strain
 from pipeline.solve.reaction import reaction
-from pipeline.solve.solution import BALANCE_LIMIT, Solution
+from pipeline.solve.solution import Solution
 from pipeline.stages import stage
 
 DEGREE = 5
 # Trials are on this mesh, by elements of this degree: the depth of a radius comes out to some 1e-5.
 TRIAL_DEGREE = 3
 _TRIAL = Grading(1e-4, 1.0, 4.0)
-# Then these, in turn, until the error bar is below the accuracy asked for.
-_GRADINGS = (Grading(1e-6, 1.0, 4.0), Grading(1e-7, 0.7, 2.0), Grading(1e-8, 0.5, 1.0))
-_WORST_ERROR = 1e-3
 # A depth this near to the one asked for is near enough: F errs by its square.
 _NEAR, _MOST_TRIALS = 3e-4, 12
-_MOST_REFINEMENTS, _BALANCED = 20, 1e-9
 # Powers of the radius that the depth may go like: 1 of a cone, 2 of a ball, more of flat tools with round edges.
 _POWERS = (0.5, 8.0)
 # Contact as wide as this share of what is kept of the body has no edge left.
@@ -78,27 +74,13 @@ def _quarter_turn() -> tuple[FloatArray, FloatArray]:
     return np.sin(pi / 4 * (nodes + 1)), pi / 4 * weights
 
 
-class MeridianContact:
-    """The meridian of a round scene that a tool presses along its axis, in contact as far as that is pressed.
-
-    A context manager, like other problems; on this process alone. It holds nothing between solves.
-    """
+class MeridianContact(DirectProblem):
+    """The meridian of a round scene that a tool presses along its axis, in contact as far as that is pressed."""
 
     def __init__(self, meridian: HalfPlane, tool: RoundTool, *, accuracy: float = 1e-5, degree: int = DEGREE):
         """Prepare to refine until the error bar is at most ``accuracy``."""
         self._meridian, self._tool = meridian, tool
         self._accuracy, self._degree = accuracy, degree
-
-    def __enter__(self) -> "MeridianContact":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
-
-    @property
-    def dofs(self) -> int:
-        """None: meshes are made, and their unknowns counted, in each solve, which is direct."""
-        return 0
 
     @stage("axisymmetric contact")
     def solve(
@@ -112,26 +94,11 @@ class MeridianContact:
             SolveError: if contact is not one round patch, reaches the edge of the body, or is not found; if a solve
                 fails a check, or the error bar stays above 1e-3.
         """
-        if len(loads.motions) > 1 or loads.motions[0].is_rotation or any(loads.motions[0].direction[:2]):
-            raise SolveError("the meridian serves movements along its axis only")
+        only_along_axis(loads)
         (depth,), clock = loads.amounts, Clock()
         search = _Search(self._meridian, self._tool, law, clock)
         radius, power = search.find(depth)
-        best, failure = None, SolveError("no mesh was tried")
-        for grading in _GRADINGS:
-            try:
-                found = search.settle(radius, depth, power, grading, self._degree)
-            except Unbalanced as error:
-                failure = error
-                break
-            if best is None or found.error < best.error:
-                best = found
-            if best.error <= self._accuracy:
-                break
-        if best is None:
-            raise failure
-        if best.error > _WORST_ERROR:
-            raise SolveError(f"the force is known to {best.error:.0e} only, allowed {_WORST_ERROR:.0e}")
+        best = best_answer(lambda grading: search.settle(radius, depth, power, grading, self._degree), self._accuracy)
         scale = law.lame_mu[0] * best.trial.unit
         per_depth = scale * best.force / depth
         response = reaction(
@@ -222,17 +189,15 @@ class _Search:
     def settle(self, radius: float, depth: float, power: float, grading: Grading, degree: int) -> _Found:
         """Return the contact at a depth, from solutions of two degrees with nearly the right radius.
 
-        The error bar is that of :mod:`pipeline.solve.axisymmetric`, and the square of what the radius is off by.
+        The error bar is that of :func:`error_bar`, and the square of what the radius is off by.
         """
         arrays, meshes = self._mesh(radius, grading)
         coarse = self._answer(meshes, arrays, radius, degree - 1)
         fine = self._answer(meshes, arrays, radius, degree)
-        theta = (degree - 1) ** 2 / (2 * degree - 1)
         force = fine.force(depth)
         if not force > 0:
             raise SolveError("the solution is not a number or takes no force")
-        step = abs(coarse.force(depth) / force - 1)
-        error = 1.25 * theta * step + 3 * max(coarse.balance, fine.balance)
+        error = error_bar(coarse.force(depth), force, degree, max(coarse.balance, fine.balance))
         if power < inf:
             misses = [log(trial.depth / depth) for trial in (coarse, fine)]
             error += max(np.square(misses)) * fine.stiffness * depth / force / power
@@ -266,11 +231,7 @@ class _Search:
         kinks = tuple(kink for kink in self._tool.kinks if kink < (1 - _APART) * radius)
         with self._clock("mesh"):
             arrays = replace(self._meridian, probe_radius=radius, kinks=kinks).mesh(grading)
-            if FIXED not in arrays.facets:
-                raise SolveError("nothing that is kept of the body is held: the tissue would float")
-            if len(np.intersect1d(arrays.facets[PROBE], arrays.facets[FIXED])):
-                raise SolveError("contact reaches what is held of the body")
-            return arrays, {region: meridian_mesh(part) for region, part in split_regions(arrays).items()}
+            return arrays, meshes_of(arrays)
 
     def _answer(self, meshes: Meshes, arrays: MeridianArrays, radius: float, degree: int) -> _Trial:
         """Solve for a flat punch and for the gap, with one degree."""
@@ -288,7 +249,7 @@ class _Search:
         balance, solutions, residuals = 0.0, [], []
         with factorised(unknown, definite=definite, clock=self._clock) as solve, self._clock("solve"):
             for held in (np.full(len(probe), -1.0), gap):
-                solution, residual, off = _refined(forms, solve, free, probe, support, held)
+                solution, residual, off, _ = refined(forms, solve, free, probe, support, held)
                 solutions.append(solution)
                 residuals.append(residual)
                 balance = max(balance, off)
@@ -296,31 +257,3 @@ class _Search:
         depth = -by_gap[edge] / by_punch[edge]
         stiff, preload = (2 * pi * float(punch @ residual) for residual in (by_punch, by_gap))
         return _Trial(radius, arrays.unit, depth, stiff, preload, balance, punch, pressed, forms)
-
-
-def _refined(
-    forms: MeridianForms | JoinedForms, solve: Callable[[FloatArray], FloatArray], free: IntArray, probe: IntArray,
-    support: IntArray, held: FloatArray,
-) -> tuple[FloatArray, FloatArray, float]:  # fmt: skip
-    """Return the solution with u_z ``held`` on the probe's dofs, its residual, and the relative error of balance."""
-    solution: Any = np.zeros(forms.dofs)
-    solution[probe] = held
-    residual, balance = forms.residual(solution), inf
-    if not held.any():
-        return solution, residual, 0.0
-    for _ in range(_MOST_REFINEMENTS):
-        solution[free] -= solve(residual[free])
-        residual, before = forms.residual(solution), balance
-        on_probe, on_support = (float(residual[dofs].sum()) for dofs in (probe, support))
-        twice_energy, work = float(solution @ residual), float(held @ residual[probe])
-        if not 0 < twice_energy < inf:
-            raise SolveError(f"the solution is not a number or has no energy (2U = {twice_energy:g})")
-        balance = max(abs(on_probe + on_support) / abs(on_probe), abs(work / twice_energy - 1))
-        if balance < _BALANCED or balance > before / 2:
-            break
-    if balance > BALANCE_LIMIT:
-        raise Unbalanced(
-            f"forces do not balance: relative error {balance:.1e}, allowed {BALANCE_LIMIT:.0e}; "
-            "the body is so slender that its stiffness drowns in round-off"
-        )
-    return solution, residual, balance
