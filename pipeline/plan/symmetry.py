@@ -7,7 +7,6 @@ from functools import lru_cache
 from itertools import pairwise
 
 from pipeline.shapes.body import Body
-from pipeline.shapes.half_plane import HalfEllipse
 from pipeline.shapes.probe import PLANES, Probe
 from pipeline.study.sweep import Case
 
@@ -30,11 +29,12 @@ def model_planes(case: Case) -> tuple[str, ...]:
 def is_round(case: Case) -> bool:
     """Tell whether body, support and probe are the same all round one axis, and the movement along it."""
     body, probe, frame = case.body, case.probe, case.frame
-    if probe.motion == "all":
+    half_plane = body.half_plane()
+    if probe.motion == "all" or half_plane is None:
         return False
     upright = frame.is_upright and frame.point[:2] == _ON_AXIS and case.travel[:2] == _ON_AXIS
-    is_same = probe.is_round and body.half_plane() is not None and body.support.is_round()
-    is_whole = not case.is_truncated or not isinstance(body.half_plane(), HalfEllipse)
+    is_same = probe.is_round and body.support.is_round()
+    is_whole = not case.is_truncated or not half_plane.is_curved
     return upright and is_same and is_whole and not _is_held_below_stiffer(case)
 
 

@@ -5,7 +5,6 @@ from collections.abc import Collection
 from mpi4py import MPI
 
 from pipeline.plan.steps import Solve
-from pipeline.shapes.half_plane import HalfEllipse
 from pipeline.solve.axisymmetric import compile_axisymmetric
 from pipeline.solve.cache import compiling
 from pipeline.solve.forms import compile_elastic
@@ -37,7 +36,8 @@ def _forms(solve: Solve) -> tuple[str, int, bool, bool]:
     """Return what tells the forms of a solve from others: element, degree, whether there are regions, and a slit."""
     body, mesh = solve.case.body, solve.case.mesh
     if solve.axisymmetric:
-        kind = "elliptic" if isinstance(body.half_plane(), HalfEllipse) else "axisymmetric"
+        half_plane = body.half_plane()
+        kind = "elliptic" if half_plane and half_plane.is_curved else "axisymmetric"
         return kind, TRIAL_DEGREE if solve.case.probe.is_unilateral else 0, False, False
     return solve.case.element, mesh.degree, bool(body.regions), solve.case.probe.slit is not None
 

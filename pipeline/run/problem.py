@@ -6,7 +6,6 @@ from pipeline.arrays import FloatArray
 from pipeline.mesh.of_case import meridian_of
 from pipeline.plan.symmetry import mirror_planes, model_planes
 from pipeline.run.memory import FreeMemory
-from pipeline.shapes.half_plane import HalfEllipse
 from pipeline.shapes.probes.round_indenter import RoundIndenter
 from pipeline.solve.axisymmetric import MeridianProblem
 from pipeline.solve.conditions import Conditions
@@ -91,11 +90,7 @@ def round_tool_of(case: Case) -> RoundTool:
         raise CaseFailure("only round scenes have a meridian")
 
     def gap(radii: FloatArray) -> FloatArray:
-        heights = probe.profile(np.column_stack([radii, np.zeros_like(radii)]))
-        if isinstance(body, HalfEllipse):
-            square = np.minimum(radii / body.radius, 1.0) ** 2
-            heights = heights + body.semi_height * square / (1 + np.sqrt(1 - square))
-        return np.asarray(heights)
+        return np.asarray(probe.profile(np.column_stack([radii, np.zeros_like(radii)])) + body.fall(radii))
 
     if isinstance(probe, RoundIndenter):
         return RoundTool(gap, probe.limit, probe.kinks)

@@ -157,6 +157,11 @@ class Frame:
         )  # fmt: skip
         return x, y, z
 
+    def inward(self, length: float) -> Vector:
+        """Return a vector of a ``length`` along the axis, into the tissue."""
+        x, y, z = (length * c for c in self.axis)
+        return x, y, z
+
     def local(self, points: FloatArray) -> FloatArray:
         """Return points (n, 3), in m, in the probe's own coordinates."""
         offset = points - np.array(self.point)

@@ -98,8 +98,7 @@ class Indenter(Probe):
 
     def travel(self, frame: Frame) -> Vector:
         """Return the depth along the axis."""
-        x, y, z = (self.depth * c for c in frame.axis)
-        return x, y, z
+        return frame.inward(self.depth)
 
     @property
     def circumradius(self) -> float:

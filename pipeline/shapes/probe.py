@@ -290,8 +290,7 @@ class Straight(Punch):
 
     def travel(self, frame: Frame) -> Vector:
         """Return the depth along the axis."""
-        x, y, z = (self.depth * c for c in frame.axis)
-        return x, y, z
+        return frame.inward(self.depth)
 
 
 @lru_cache(_MANY)

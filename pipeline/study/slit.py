@@ -10,7 +10,6 @@ from pipeline.shapes.frame import Frame
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import in_mm
 from pipeline.shapes.slit import Slit
-from pipeline.shapes.support import Below, Faces
 from pipeline.study.problems import Problems
 from pipeline.study.schema import Mesh
 
@@ -73,12 +72,13 @@ def _check_depth(body: Body, slit: Slit, problems: Problems) -> None:
 
 def _check_support(body: Body, slit: Slit, problems: Problems) -> None:
     support, (_, high) = body.support, body.heights
-    if isinstance(support, Below) and slit.depth >= high - support.below:
-        problems.error(
-            "probe.incision", in_mm(slit.depth),
-            f"goes through what is held of the body: must be below {in_mm(high - support.below)}",
-        )  # fmt: skip
-    if slit.is_open and isinstance(support, Faces) and "sides" in support.names:
+    for level in support.edges():
+        if slit.depth >= high - level:
+            problems.error(
+                "probe.incision", in_mm(slit.depth),
+                f"goes through what is held of the body: must be below {in_mm(high - level)}",
+            )  # fmt: skip
+    if slit.is_open and support.gap(0.0) == 0.0:
         problems.error("probe.ends", "open", 'the slit would go through the sides, which are held: use ends = "blade"')
 
 
