@@ -10,6 +10,9 @@ from typing import Literal
 
 Value = float | int | str
 
+# Strain goes like r^-½ at an edge: ``max_strain`` is read no nearer to one than this, in half widths of the probe.
+CLEAR = 0.1
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -103,7 +106,8 @@ _RESULTS = (
     Quantity("energy_release_ratio", "1", "energy_release over that of the full-order mesh of the same study",
              "G/G_max"),
     Quantity("energy_release_exact", "J/m^2", "energy_release converged as force_exact is (G_exact)", "G_exact"),
-    Quantity("max_strain", "1", "largest principal strain of a cell's mean strain; grows as the rim is refined",
+    Quantity("max_strain", "1", "largest principal strain of a cell's mean strain, a tenth of the probe's half width "
+             "or farther from its edge and from those of what is held",
              "largest strain", in_per_cent=True),
     Quantity("balance", "1", "relative error of F d = 2 U and of the balance of forces", "imbalance"),
     Quantity("time_mesh", "s", "time to generate and distribute the mesh", "mesh"),

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, field, replace
 from math import isfinite, nan
 
 from pipeline.plan.cost import Observation, speed_up
+from pipeline.quantities import CLEAR
 from pipeline.study.sweep import Scale
 
 
@@ -17,9 +18,10 @@ class Record:
     95 % error bar on that, on which ``time_error`` seconds were spent. ``force_vector_error`` (N) are the bars on the
     vector's components, where they are known; ``stiffness`` is that of all six rigid motions, if it was asked for, and
     ``stiffness_error`` has the bars on its entries. ``contact_area`` (m²) and ``contact_radius`` (m) are those of
-    unilateral contact. ``energy_release`` (J/m²) is the mean along a slit's front, its relative 95 % bar
-    ``energy_release_error``. ``kind``, ``planned_cells`` and ``poisson`` are what its cost was
-    estimated from (:mod:`pipeline.plan.cost`), ``group`` the ranks that computed it.
+    unilateral contact. ``max_strain`` is read ``strain_clearance`` half widths of the probe from its edge or farther.
+    ``energy_release`` (J/m²) is the mean along a slit's front, its relative 95 % bar ``energy_release_error``.
+    ``kind``, ``planned_cells`` and ``poisson`` are what its cost was estimated from (:mod:`pipeline.plan.cost`),
+    ``group`` the ranks that computed it.
     """
 
     key: str
@@ -38,6 +40,7 @@ class Record:
     energy_release: float = nan
     energy_release_error: float = nan
     max_strain: float = nan
+    strain_clearance: float = CLEAR
     contact_area: float = nan
     contact_radius: float = nan
     balance: float = nan
@@ -118,4 +121,6 @@ class Record:
         content |= {"force_vector": (x, y, z), "force_vector_error": (bx, by, bz)}
         for name in ("stiffness", "stiffness_error"):
             content[name] = tuple(tuple(row) for row in content.get(name, ()))
+        if "strain_clearance" not in content and content.get("origin") != "axisymmetric":
+            content["max_strain"] = nan  # it was that at the probe's edge, where it hangs on the elements' size
         return Record(**content)

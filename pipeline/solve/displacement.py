@@ -114,7 +114,7 @@ class DisplacementProblem:
             self._move(held, loads)
             seconds = time.perf_counter() - start
             solution = Solution(
-                response, largest_strain(self._strain, self._body), fine.dofs.whole_dofs, self._body.cells,
+                response, self._largest_strain(), fine.dofs.whole_dofs, self._body.cells,
                 iterations, assemble, solver.setup_seconds, seconds, released=self._released(law, held, loads),
             )  # fmt: skip
             if not estimate:
@@ -152,7 +152,10 @@ class DisplacementProblem:
     def largest_strain(self, displacement: PETSc.Vec) -> float:
         """Return the largest principal strain of ``displacement``; collective."""
         self._fine.set_displacement(displacement)
-        return largest_strain(self._strain, self._body)
+        return self._largest_strain()
+
+    def _largest_strain(self) -> float:
+        return largest_strain(self._strain, self._body, self._conditions.front)
 
     def _hierarchy(self, law: MaterialLaw, stack: ExitStack, *, direct: bool) -> tuple[list[Level], float]:
         """Return the levels of multigrid, or the one of a direct solve, and the seconds that one assembly takes.

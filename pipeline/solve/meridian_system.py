@@ -13,6 +13,7 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray, Int32Array
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Meridian, MeridianArrays
+from pipeline.quantities import CLEAR
 from pipeline.solve.linear import SolveError
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
@@ -23,8 +24,6 @@ from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
 MIXED_FROM = 0.49
 # Per cent of memory beyond MUMPS's estimate, which pivoting exceeds.
 _SPARE_MEMORY = 100
-# Strain is not read nearer to a singular point than this (in units of a).
-_STRAIN_DISTANCE = 0.1
 
 # The half planes that are solved on.
 HalfPlane = Meridian | EllipticMeridian
@@ -114,4 +113,4 @@ def max_strain(forms: MeridianForms | JoinedForms, arrays: MeridianArrays) -> fl
     """
     strain, corners = forms.mean_strains()
     distance = np.linalg.norm(corners[:, :, None] - arrays.singular, axis=-1).min(axis=(1, 2))
-    return float(strain[distance >= _STRAIN_DISTANCE].max(initial=0.0))
+    return float(strain[distance >= CLEAR].max(initial=0.0))

@@ -124,7 +124,7 @@ class MixedProblem:
                 )
             released = self._released(fine, split, unknowns, held)
             self._move(unknowns, held, loads.amounts)
-            strain = largest_strain(self._strain, self._body)
+            strain = largest_strain(self._strain, self._body, self._conditions.front)
             solution = Solution(
                 _times(response, split.unit), strain, fine.whole_dofs, self._body.cells, iterations,
                 assemble, solver.setup_seconds, seconds, released=released,

@@ -1,14 +1,19 @@
 """Strain averaged over each cell."""
 
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from pipeline.arrays import FloatArray
+from pipeline.arrays import BoolArray, FloatArray
 from pipeline.mesh.distribute import BodyMesh
+from pipeline.solve.release import Front
+from pipeline.solve.rim import clear_cells
 from pipeline.stages import stage
+
+_clear: WeakKeyDictionary[Any, BoolArray] = WeakKeyDictionary()
 
 
 @stage("strain")
@@ -22,7 +27,12 @@ def principal_strains(mean_strain: tuple[Any, Any], body: BodyMesh) -> FloatArra
     return np.asarray(np.linalg.eigvalsh(tensors[0] / tensors[1]))
 
 
-def largest_strain(mean_strain: tuple[Any, Any], body: BodyMesh) -> float:
-    """Return the largest of :func:`principal_strains`, by magnitude; collective."""
-    local = float(np.abs(principal_strains(mean_strain, body)).max(initial=0.0))
+def largest_strain(mean_strain: tuple[Any, Any], body: BodyMesh, front: Front | None = None) -> float:
+    """Return the largest of :func:`principal_strains`, by magnitude, of cells clear of singular edges; collective.
+
+    Nearer to an edge (:func:`pipeline.solve.rim.clear_cells`) it grows without end as elements there get smaller.
+    """
+    if body.mesh not in _clear:
+        _clear[body.mesh] = clear_cells(body, front)
+    local = float(np.abs(principal_strains(mean_strain, body)[_clear[body.mesh]]).max(initial=0.0))
     return float(body.comm.allreduce(local, op=MPI.MAX))

@@ -59,7 +59,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         _check_outside(body, mesh, problems)
     sane = [probe for probe in probes if _has_place(probe, problems)]
     placed = [pair for pair in itertools.product(bodies, sane) if _check_place(*pair, problems)]
-    placed = [pair for pair in placed if check_slit(*pair, problems)]
+    placed = [pair for pair in placed if _check_thickness(*pair, problems) and check_slit(*pair, problems)]
     for (body, probe), mesh in itertools.product(placed, meshes):
         _check_column(body, probe, mesh, problems)
         _check_gap(body, probe, mesh, problems)
@@ -74,7 +74,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
 
 
 def _check_depth(probe: Probe, problems: Problems) -> None:
-    """Warn of depths at which strains are large; a tool that is not flat tells of its own."""
+    """Warn of depths at which strains are large below an edge; a tool that is not flat tells of its own."""
     if isinstance(probe, Indenter):
         return
     proportional = "F stays proportional to depth" if probe.proportional_to else "strains are taken to be small"
@@ -85,6 +85,24 @@ def _check_depth(probe: Probe, problems: Problems) -> None:
             f"is more than {_LINEAR:.0%} of the probe's half width {in_mm(probe.half_width)}: linear elasticity is "
             f"then an extrapolation ({proportional})",
         )
+
+
+def _check_thickness(body: Body, probe: Probe, problems: Problems) -> bool:
+    """Report a depth that the body does not have, and warn of one that squeezes all of its thickness."""
+    thickness = body.thickness(probe.frame_on(body))
+    if probe.depth >= thickness:
+        problems.error(
+            "probe.depth", in_mm(probe.depth),
+            f"must be below the {in_mm(thickness)} that the body reaches below the probe, along its axis",
+        )  # fmt: skip
+        return False
+    if _LINEAR * thickness < probe.depth <= _LINEAR * probe.half_width:
+        problems.warn(
+            "probe.depth", in_mm(probe.depth),
+            f"is {probe.depth / thickness:.0%} of the {in_mm(thickness)} of tissue below the probe: above "
+            f"{_LINEAR:.0%} linear elasticity is an extrapolation",
+        )  # fmt: skip
+    return True
 
 
 def _check_motion(probe: Probe, problems: Problems) -> None:

@@ -209,6 +209,8 @@ def test_doubtful_input_is_a_warning():
     assert "F_max" in words
     assert "lock" in " ".join(study(material={"poisson": 0.495}, mesh={"element": "displacement"}).warnings)
     assert not study().warnings
+    thin = study(body={"size": ["40 mm", "40 mm", "1 mm"]}, probe={"depth": "0.15 mm"})
+    assert "15% of the 1 mm of tissue below the probe" in " ".join(thin.warnings)
 
 
 def test_sweeps_become_dimensions_in_the_file_s_order():

@@ -1,0 +1,47 @@
+"""The largest strain: read clear of the probe's edge, where it would grow with every smaller element."""
+
+import pytest
+
+from pipeline.run.record import Record
+from pipeline.study.problems import StudyError
+from tests.cases import solve, study
+
+ROUND = {"shape": "cylinder", "radius": "20 mm", "height": "20 mm", "fixed": "bottom"}
+MESH = {"fine": "2 mm", "growth": 0.4}
+
+
+def strain(**changes):
+    (record,) = solve(body=ROUND, **changes).values()
+    return record.max_strain
+
+
+def test_converges_as_the_edge_is_refined():
+    """It is nearly the depth over the radius, whatever the size of elements at the edge."""
+    truth = strain(plan={"without": []})
+    assert truth == pytest.approx(0.9 * 0.2 / 3, rel=0.05)
+    coarse, fine = (strain(mesh=MESH | {"rim": rim}) for rim in ("0.6 mm", "0.15 mm"))
+    assert coarse == pytest.approx(truth, rel=0.25)
+    assert fine == pytest.approx(truth, rel=0.1)
+
+
+def test_half_a_body_and_all_of_it_have_the_same():
+    quarter, whole = (strain(mesh={"model": model}, solve={"tolerance": 1e-10}) for model in ("auto", "3d"))
+    assert quarter == pytest.approx(whole, rel=1e-6)
+
+
+def test_records_of_before_say_nothing_of_it():
+    """They held the strain at the edge, which is that of an element there."""
+    now = Record("key", "ok", max_strain=0.1)
+    assert Record.from_json(now.to_json()).max_strain == 0.1
+    before = now.to_json().replace('"strain_clearance": 0.1, ', "")
+    assert Record.from_json(before).max_strain != 0.1
+    assert Record.from_json(before.replace('"solved"', '"axisymmetric"')).max_strain == 0.1
+
+
+@pytest.mark.parametrize(("depth", "allowed"), [("19.9 mm", True), ("20 mm", False), ("30 mm", False)])
+def test_a_depth_that_the_body_does_not_have_is_an_error(depth, allowed):
+    if allowed:
+        assert study(probe={"depth": depth}).shape == ()
+        return
+    with pytest.raises(StudyError, match="below the 20 mm that the body reaches below the probe"):
+        study(probe={"depth": depth})
