@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.peers.figure import draw
-from benchmarks.peers.processes import MODULES, PEERS, ask
+from benchmarks.peers.processes import MODULES, ask
 from benchmarks.peers.results import TARGETS, Run, breakdown, standings, table, to_json, truths_table
-from benchmarks.peers.settings import GRIDS, LADDERS, MERIDIAN, PROGRAM, Settings
+from benchmarks.peers.settings import CONTACT_GRID, GRIDS, LADDERS, MERIDIAN, PROGRAM, Settings
 from benchmarks.peers.tasks import TASKS
 from benchmarks.peers.truth import Truth, converge, known
 from pipeline.verify.machine import machine
@@ -66,6 +66,8 @@ def _jobs(options: argparse.Namespace) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield which program is asked for what; scenes outside, so that a scene's times are near one another."""
     for name in options.scenes:
         for program in options.programs:
+            if not _settings(program, name, 1):
+                continue
             for threads in (1, 2) if options.two and program != "scikit-fem" else (1,):
                 job = {"scene": name, "threads": threads, "repeats": options.repeats}
                 yield program, job | {"settings": _settings(program, name, threads)}
@@ -73,7 +75,7 @@ def _jobs(options: argparse.Namespace) -> Iterator[tuple[str, dict[str, Any]]]:
 
 def _settings(program: str, scene: str, threads: int) -> Settings:
     if program != "program":
-        return LADDERS[program][scene]
+        return LADDERS[program].get(scene, ())
     return PROGRAM + (MERIDIAN if TASKS[scene].body[0] == "cylinder" and threads == 1 else ())
 
 
@@ -100,14 +102,18 @@ def _line(run: Run) -> str:
 def _scan(options: argparse.Namespace, truths: dict[str, Truth]) -> None:
     """Print, for each peer and scene, the settings that reach each true error soonest, by processor time."""
     for name in options.scenes:
-        for program in (p for p in options.programs if p in PEERS):
-            job = {"scene": name, "threads": 1, "settings": GRIDS[program], "warm": False}
+        for program in (p for p in options.programs if name in LADDERS.get(p, {})):
+            job = {"scene": name, "threads": 1, "settings": _grid(program, name), "warm": False}
             answers = [answer for answer in ask(program, job) if "failed" not in answer]
             runs = sorted((_run(program, job, a, truths) for a in answers), key=lambda run: run.cpu)
             for target in TARGETS:
                 print(f"{100 * target:g} %:")
                 good = [run for run in runs if abs(run.error) <= target]
                 print(*(f"  {_line(run)}" for run in good[:4]), sep="\n", flush=True)
+
+
+def _grid(program: str, scene: str) -> Settings:
+    return CONTACT_GRID if TASKS[scene].probe[0] == "ball" else GRIDS[program]
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from typing import Any
 import ngsolve as ng
 from netgen.occ import Axes, Box, Cylinder, Glue, OCCGeometry, Pnt, WorkPlane, X, Z
 
+from benchmarks.peers.ngsolve_contact import REACH, contact_force
 from benchmarks.peers.tasks import Task
 from benchmarks.peers.worker import Answer, Parts, serve
 
@@ -18,13 +19,14 @@ _CLOSE = 1e-6
 def solve(
     scene: Task, threads: int, *, order: int, rim: float, maxh: float, grading: float, levels: int,
     factor: float = 0.15, safety: float = 2.0, corners: bool = True,
-    solver: str = "sparsecholesky",
+    solver: str = "sparsecholesky", gamma: float = 5.0, tolerance: float = 1e-3,
 ) -> Answer:  # fmt: skip
     """Return F: order p, elements of ``rim`` half widths at the probe's edge, growing by ``grading`` to ``maxh`` mm.
 
     The edge, and with ``corners`` a blade's corners, are then refined ``levels`` times towards themselves, each time by
     ``factor``. ``solver``: "sparsecholesky",
-    or "bddc" for conjugate gradients with that preconditioner.
+    or "bddc" for conjugate gradients with that preconditioner. Below a ball all elements are of that size; ``gamma``
+    and ``tolerance`` are those of :func:`contact_force`.
     """
     ng.SetNumThreads(threads)
     parts = Parts()
@@ -33,6 +35,8 @@ def solve(
         mesh.RefineHP(levels, factor)
     mesh.Curve(order)
     parts.end("mesh")
+    if scene.probe[0] == "ball":
+        return contact_force(scene, mesh, order, gamma, tolerance, parts)
     if threads == 1:
         return _force(scene, mesh, order, solver, parts)
     with ng.TaskManager():
@@ -56,13 +60,15 @@ def _shape(scene: Task, rim: float, corners: bool) -> Any:
         _, reach, height = scene.body
         body = Cylinder(Pnt(0, 0, -height), Z, reach, height)
     footprint = _footprint(scene)
-    footprint.edges.name = "rim"
+    footprint.edges.name = "rim" if scene.probe[0] != "ball" else "candidates"
     if scene.planes:
         low = [0.0 if axis in scene.planes else -2.0 * reach for axis in "xy"]
         half = Box(Pnt(*low, -2 * height), Pnt(2 * reach, 2 * reach, height))
         body, footprint = body * half, footprint * half
     for face in footprint.faces:
         face.name = "probe"
+        if scene.probe[0] == "ball":
+            face.maxh = rim
     shape = Glue([body, footprint])
     for face in shape.faces:
         if face.name != "probe":
@@ -81,6 +87,8 @@ def _footprint(scene: Task) -> Any:
     plane = WorkPlane(Axes((x, y, 0), Z, X))
     if scene.probe[0] == "disc":
         return plane.Circle(scene.probe[1]).Face()
+    if scene.probe[0] == "ball":
+        return plane.Circle(REACH * scene.half_width).Face()
     return plane.RectangleC(*scene.probe[1:]).Face()
 
 

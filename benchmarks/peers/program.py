@@ -3,6 +3,7 @@
 ``python -m benchmarks.peers.program`` answers a job (:mod:`benchmarks.peers.worker`).
 """
 
+from collections.abc import Callable
 from typing import Any
 
 from mpi4py import MPI
@@ -16,8 +17,10 @@ from pipeline.run.record import Record
 from pipeline.study.load import parse
 from pipeline.study.sweep import Study
 
-YOUNG, DEPTH = 1e4, 1e-4  # Pa, m: F is proportional to both
+YOUNG = 1e4  # Pa: F is proportional to it
 _MM = 1e-3
+# Depths in units of the task's: F is proportional to it, but for a ball.
+_SMALL = 0.1
 
 
 def solve(scene: Task, threads: int, *, accuracy: str, model: str = "3d", **mesh: Any) -> Answer:
@@ -27,7 +30,7 @@ def solve(scene: Task, threads: int, *, accuracy: str, model: str = "3d", **mesh
     """
     assert threads == MPI.COMM_WORLD.size
     record = record_of(scene, model, {"accuracy": accuracy, **mesh})
-    force = record.force / (YOUNG * DEPTH * _MM)
+    force = record.force / (YOUNG * _depth(scene) * _MM**2)
     return Answer(force, record.dofs, {name.removeprefix("time_"): getattr(record, name) for name in TIMES})
 
 
@@ -47,13 +50,18 @@ def record_of(scene: Task, model: str, mesh: dict[str, Any]) -> Record:
 def study(scene: Task, mesh: dict[str, Any]) -> Study:
     """Return the study of a scene, whose one case is solved, and nothing else."""
     body: dict[str, Any] = {"shape": scene.body[0]}
-    probe: dict[str, Any] = {"shape": scene.probe[0], "depth": f"{DEPTH * 1e3} mm", "at": _mm(*scene.at)}
+    probe: dict[str, Any] = {"shape": scene.probe[0], "depth": f"{_depth(scene)} mm", "at": _mm(*scene.at)}
     body |= {"size": _mm(*scene.body[1:])} if scene.body[0] == "box" else _named(scene.body, "radius", "height")
-    probe |= _named(scene.probe, "radius") if scene.probe[0] == "disc" else _named(scene.probe, "length", "width")
+    probe |= _PROBES[scene.probe[0]](scene.probe)
     return parse({
         "body": body, "probe": probe, "material": {"young": f"{YOUNG} Pa", "poisson": scene.poisson}, "mesh": mesh,
         "solve": {"exact": False},
     })  # fmt: skip
+
+
+def _depth(scene: Task) -> float:
+    """Return how far the probe is pushed in, in mm."""
+    return scene.depth if scene.probe[0] == "ball" else _SMALL
 
 
 def _mm(*lengths: float) -> list[str]:
@@ -62,6 +70,13 @@ def _mm(*lengths: float) -> list[str]:
 
 def _named(shape: tuple[Any, ...], *names: str) -> dict[str, str]:
     return dict(zip(names, _mm(*shape[1:]), strict=True))
+
+
+_PROBES: dict[str, Callable[[tuple[Any, ...]], dict[str, str]]] = {
+    "disc": lambda probe: _named(probe, "radius"),
+    "blade": lambda probe: _named(probe, "length", "width"),
+    "ball": lambda probe: {"shape": "sphere", "contact": "unilateral", **_named(probe[:2], "radius")},
+}
 
 
 if __name__ == "__main__":

@@ -25,12 +25,27 @@ GRIDS: dict[str, Settings] = {
         solver=("pardiso", "cholmod", "amg"),
     ),
 }  # fmt: skip
+CONTACT_GRID: Settings = _grid(
+    order=(2, 3, 4),
+    rim=(0.3, 0.4, 0.5, 0.8),
+    maxh=(15, 30),
+    grading=(0.3, 0.4, 0.5, 0.7),
+    levels=(0,),
+    safety=(1.0,),
+    gamma=(2.0, 5.0),
+    tolerance=(1e-3, 1e-2),
+)
 
 _NAMES = ("order", "rim", "maxh", "grading", "levels", "safety", "corners", "solver")
 
 
 def _ngsolve(*rows: tuple[float | str, ...]) -> Settings:
     return tuple(dict(zip(_NAMES, row, strict=False)) for row in rows)
+
+
+def _contact(*rows: tuple[float, ...]) -> Settings:
+    names = ("order", "rim", "maxh", "grading", "gamma", "tolerance")
+    return tuple(dict(zip(names, row, strict=True)) | {"levels": 0, "safety": 1.0} for row in rows)
 
 
 def _skfem(*rows: tuple[float, float]) -> Settings:
@@ -53,6 +68,11 @@ LADDERS: dict[str, dict[str, Settings]] = {
         "cylinder": _ngsolve(
             (3, 1, 25, 0.5, 2, 1.0), (3, 1, 25, 0.4, 2, 1.5), (3, 1, 25, 0.3, 2, 2.0), (4, 1, 25, 0.4, 2, 1.0),
             (4, 1, 25, 0.5, 2, 1.0), (4, 1, 25, 0.4, 2, 1.5), (4, 0.5, 50, 0.5, 3, 2.0), (4, 1, 25, 0.3, 2, 2.0),
+        ),
+        "ball": _contact(
+            (2, 0.4, 30, 0.3, 5.0, 1e-2), (3, 0.8, 30, 0.5, 5.0, 1e-2), (3, 0.5, 30, 0.5, 5.0, 1e-2),
+            (3, 0.4, 30, 0.5, 5.0, 1e-3), (3, 0.4, 30, 0.4, 2.0, 1e-3), (3, 0.4, 15, 0.4, 5.0, 1e-3),
+            (3, 0.3, 15, 0.4, 5.0, 1e-3),
         ),
     },
     "scikit-fem": {

@@ -1,16 +1,17 @@
 """What all programs are asked for, without any of their libraries. Lengths in mm, F in units of E·d·mm."""
 
 from dataclasses import dataclass
+from math import sqrt
 
 from pipeline.verify import known
 
 
 @dataclass(frozen=True)
 class Task:
-    """A body held at its bottom, and a bonded footprint on its top face z = 0 pushed down by d.
+    """A body held at its bottom, and a bonded footprint on its top face z = 0 pushed down by d, or a ball in contact.
 
     ``body`` is ("box", length, width, height), centred on the z axis, or ("cylinder", radius, height); ``probe`` is
-    ("disc", radius) or ("blade", length along x, width); ``truth`` is F, converged, and its
+    ("disc", radius), ("blade", length along x, width) or ("ball", radius, depth); ``truth`` is F, converged, and its
     relative bar.
     """
 
@@ -29,8 +30,15 @@ class Task:
 
     @property
     def half_width(self) -> float:
-        """Half of the probe's least width, to which all sizes at its edge are given."""
+        """Half of the probe's least width, to which sizes at its edge are given; of a ball, Hertz's contact radius."""
+        if self.probe[0] == "ball":
+            return sqrt(self.probe[1] * self.depth)
         return self.probe[1] if self.probe[0] == "disc" else self.probe[-1] / 2
+
+    @property
+    def depth(self) -> float:
+        """How far the probe is pushed in: 1, since F is proportional to it, unless it is a ball."""
+        return self.probe[2] if self.probe[0] == "ball" else 1.0
 
     @property
     def height(self) -> float:
@@ -45,5 +53,6 @@ TASKS = {
         Task("disc", "disc off the centre of a box", ("box", 60, 60, 20), ("disc", 2), 0.45, known.BOX_DISC, (10, 5)),
         Task("blade", "blade on a box", ("box", 60, 60, 20), ("blade", 6, 1), 0.3, known.BOX_BLADE),
         Task("cylinder", "disc on a cylinder", ("cylinder", 50, 50), ("disc", 3), 0.45, _CYLINDER),
+        Task("ball", "ball on a cylinder", ("cylinder", 30, 30), ("ball", 4, 0.3), 0.3, known.CYLINDER_BALL),
     )
 }

@@ -9,6 +9,9 @@ from benchmarks.peers.tasks import TASKS, Task
 # NGSolve: one mesh, refined to a two-thousandth of its size at the rim, ever higher orders.
 _MESH = {"rim": 0.7, "maxh": 20, "grading": 0.4, "levels": 4, "factor": 0.15}
 _ORDERS = (3, 4, 5)
+# Of a ball: smaller elements below it. Nitsche's F is no bound, and jitters.
+_CONTACT = {"order": 3, "maxh": 15, "grading": 0.3, "levels": 0, "safety": 1.0, "gamma": 5.0, "tolerance": 1e-5}
+_RIMS = (0.4, 0.3, 0.2)
 _PROGRAM = {"accuracy": "0.05 %"}
 
 
@@ -44,7 +47,14 @@ def converge(name: str) -> Truth:
 
 
 def _ngsolve(name: str) -> tuple[float, float]:
-    """Return F and its bar: F falls with the order, and its steps by a factor that they show themselves."""
+    """Return F and its bar: F falls with the order, and its steps by a factor that they show themselves.
+
+    Of a ball: the last F, and the largest step.
+    """
+    if TASKS[name].probe[0] == "ball":
+        jobs = {"scene": name, "settings": [_CONTACT | {"rim": rim} for rim in _RIMS], "warm": False}
+        found = [_done(answer) for answer in ask("NGSolve", jobs)]
+        return found[-1], (max(found) - min(found)) / found[-1]
     settings = [_MESH | {"order": p} for p in _ORDERS]
     forces = [_done(answer) for answer in ask("NGSolve", {"scene": name, "settings": settings, "warm": False})]
     before, last = forces[-3] - forces[-2], forces[-2] - forces[-1]

@@ -8,7 +8,7 @@ from mpi4py import MPI
 from benchmarks.peers import figure, program, results
 from benchmarks.peers.processes import PEERS_PYTHON, ask
 from benchmarks.peers.results import Run, standings
-from benchmarks.peers.settings import GRIDS, LADDERS
+from benchmarks.peers.settings import CONTACT_GRID, GRIDS, LADDERS
 from benchmarks.peers.tasks import TASKS
 from benchmarks.peers.truth import Truth
 from benchmarks.peers.worker import Answer, answers
@@ -94,7 +94,7 @@ def test_the_meridian_is_used_where_it_may_be():
 
 
 @NEEDS_PEERS
-@pytest.mark.parametrize("name", TASKS)
+@pytest.mark.parametrize("name", [name for name in TASKS if name != "ball"])
 @pytest.mark.parametrize(
     ("peer", "setting", "error"),
     [
@@ -109,8 +109,15 @@ def test_peers_get_the_truth_from_above(name, peer, setting, error):
     assert 0 < relative < error
 
 
+@NEEDS_PEERS
+def test_the_peer_finds_the_contact_of_a_ball():
+    setting = LADDERS["NGSolve"]["ball"][3]
+    (answer,) = ask("NGSolve", {"scene": "ball", "settings": [setting], "warm": False})
+    assert answer["force"] == pytest.approx(TASKS["ball"].truth[0], rel=3e-3)
+
+
 def test_every_ladder_is_of_settings_that_exist():
     for peer, ladders in LADDERS.items():
-        known = {key for setting in GRIDS[peer] for key in setting}
-        assert set(ladders) == set(TASKS)
+        known = {key for setting in (*GRIDS[peer], *CONTACT_GRID) for key in setting}
+        assert set(ladders) | {"ball"} == set(TASKS)
         assert all(set(setting) <= known for ladder in ladders.values() for setting in ladder)
