@@ -169,7 +169,7 @@ def status(
         print_json({"file": str(file), **counts, "failures": [{"case": c, "message": m} for c, m in failed]})
         return
     told = f"{counts['ok']} done, {counts['failed']} failed"
-    told += f", {counts['skipped']} skipped" if counts["skipped"] else ""
+    told += "".join(f", {counts[state]} {state}" for state in ("skipped", "lost") if counts.get(state))
     print(f"{file}: {told}, {counts['pending']} pending{axes_of(study)}")
     for case, message in failed:
         print(f"  failed: {case}: {message}")

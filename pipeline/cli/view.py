@@ -7,7 +7,7 @@ import typer
 
 from pipeline.cli.console import error
 from pipeline.cli.plan import find_case
-from pipeline.cli.words import DEFAULT_OUTPUT, SOME_FAILED, File, Output, load_all
+from pipeline.cli.words import DEFAULT_OUTPUT, SOME_FAILED, File, Output, fail, load_all
 from pipeline.study.sweep import Case, Study
 
 if TYPE_CHECKING:
@@ -61,6 +61,8 @@ def _fields(study: Study, case: Case, comm: "MPI.Comm", mesh_only: bool, bar: bo
     from pipeline.solve.linear import SolveError
     from pipeline.view.compute import compute_fields, solve_to_view
 
+    if case.absence:
+        fail(f"{case}: {case.absence}")
     note = error if comm.rank == 0 else _say_nothing
     note(str(case))
     try:

@@ -9,7 +9,7 @@ from pipeline.plan.reductions import REDUCTIONS, strike_stored
 from pipeline.plan.shard import Shard, take
 from pipeline.plan.steps import Solve
 from pipeline.plan.symmetry import is_round, model_planes
-from pipeline.plan.work import Plan, Struck
+from pipeline.plan.work import ABSENT, Plan, Struck
 from pipeline.study.schema import Mesh, Solving
 from pipeline.study.sweep import Case, Study
 
@@ -19,12 +19,15 @@ __all__ = ["EXACT", "Plan", "Struck", "ask_for_exact", "declare", "first_attempt
 EXACT, _EXACT_SHARE = 1e-3, 0.3
 # Three times the cells, and ten times the time, is what a thousandth takes at the many edges of a slit.
 EXACT_OF_SLIT = 3e-3
+_LOST = "Where the tool does not stand on the body, nothing is solved."
 
 
 def declare(study: Study) -> Plan:
     """Return the plan that solves every case of ``study`` for itself."""
-    solves = tuple(_declared(case) for case in study.cases())
-    return Plan(study, solves, tuple(solve.key for solve in solves))
+    found = [None if case.absence else _declared(case) for case in study.cases()]
+    keys = tuple(solve.key if solve else ABSENT for solve in found)
+    plan = Plan(study, tuple(solve for solve in found if solve), keys)
+    return plan.struck_by("lost", keys.count(ABSENT), _LOST)
 
 
 def _declared(case: Case) -> Solve:
@@ -76,6 +79,9 @@ def ask_for_exact(plan: Plan) -> Plan:
     found: dict[str, Solve] = {}
     keys = []
     for case in plan.study.cases():
+        if case.absence:
+            keys.append(ABSENT)
+            continue
         enough = max(accuracy, EXACT_OF_SLIT) if case.probe.slit else accuracy
         key = reference_key(case, enough)
         keys.append(key)

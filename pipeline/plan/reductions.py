@@ -118,7 +118,7 @@ def _rekeyed(
     """Give every solve the key that ``key`` makes of its case, and merge those that then agree."""
     solves = tuple(replace(solve, key=key(solve.case)) for solve in plan.solves)
     new = dict(zip((solve.key for solve in plan.solves), (solve.key for solve in solves), strict=True))
-    plan = replace(plan, solves=solves, keys=tuple(new[k] for k in plan.keys))
+    plan = replace(plan, solves=solves, keys=tuple(new.get(k, k) for k in plan.keys))
     return _merged(plan, name, reason or _reason(reduction))
 
 

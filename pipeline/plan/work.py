@@ -6,6 +6,9 @@ from pipeline.plan.cost import CostModel
 from pipeline.plan.steps import MeshStep, Solve, mesh_steps
 from pipeline.study.sweep import Study
 
+# The key, in place of a record's, of a case whose tool does not stand on the body.
+ABSENT = ""
+
 
 @dataclass(frozen=True)
 class Struck:
@@ -20,7 +23,8 @@ class Struck:
 class Plan:
     """What a study needs done.
 
-    ``keys`` holds, for each case in order, the key of its record, ``reference_keys`` that of its scene's F_exact.
+    ``keys`` holds, for each case in order, the key of its record, ``reference_keys`` that of its scene's F_exact; both
+    are ``ABSENT`` where the tool has left the body.
     ``used`` are the reductions that had their turn, whether they found work to strike out or not. ``stored`` are the
     keys that were on record; ``shared`` says that solves share meshes and assembly, ``reuse`` that
     they begin from their neighbours' solutions; ``cost`` estimates what steps take. Of a plan that is one shard's,

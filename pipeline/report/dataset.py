@@ -15,6 +15,7 @@ from pipeline.files import atomic
 from pipeline.plan.key import digest
 from pipeline.plan.plan import Plan
 from pipeline.quantities import attributes, quantity_of
+from pipeline.run.absent import absent
 from pipeline.run.record import Record
 from pipeline.shapes.frame import Frame, PlaceError
 from pipeline.shapes.from_file import FromFile
@@ -43,13 +44,13 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     """Arrange ``records`` (by key) as the dataset of the plan's study; ``run`` adds attributes of the run."""
     study = plan.study
     dims = tuple(axis.name for axis in study.axes)
-    flat = [_scaled(records.get(key), case) for key, case in zip(plan.keys, study.cases(), strict=True)]
+    flat = [_scaled(records.get(key), case) or absent(case) for key, case in zip(plan.keys, study.cases(), strict=True)]
 
     def array(values: Any, dtype: Any) -> np.ndarray:
         return np.array(values, dtype=dtype).reshape(study.shape)
 
     keys = plan.reference_keys or [""] * len(flat)
-    exact = [_scaled(records.get(key), case) for key, case in zip(keys, study.cases(), strict=True)]
+    exact = [_scaled(records.get(key), case) or absent(case) for key, case in zip(keys, study.cases(), strict=True)]
     variables: dict[str, Any] = {}
     found = _FOUND if any(case.probe.is_unilateral for case in study.cases()) else ()
     for name in (*_FLOATS, *found):
@@ -95,6 +96,8 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     if has_stiffness:
         coordinates |= {"movement": list(_MOTIONS), "conjugate": list(_MOTIONS)}
     dataset = xr.Dataset(variables, coordinates, _attributes(plan, flat, run or {}))
+    if any(axis.off for axis in study.axes):
+        dataset = dataset.set_coords(_PLACE)
     return _add_ratios(dataset)
 
 
@@ -148,7 +151,9 @@ def _scaled(record: Record | None, case: Case) -> Record | None:
 
 
 def _frame(case: Case) -> Frame | None:
-    """Return where the probe touches, or None where a body without a description of its surface cannot tell."""
+    """Return where the probe touches; None where it has left the body, or what describes no surface cannot tell."""
+    if case.absence:
+        return None
     try:
         return case.frame
     except PlaceError:

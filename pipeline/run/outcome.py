@@ -3,14 +3,16 @@
 from collections.abc import Iterator, Mapping
 
 from pipeline.plan.plan import Plan
+from pipeline.run.absent import LOST, absent
 from pipeline.run.record import Record
 from pipeline.study.sweep import Case
 
 
 def count_states(plan: Plan, records: Mapping[str, Record]) -> dict[str, int]:
     """Return the number of a plan's cases in each state; of a shard's plan, of its own cases."""
-    states = [records[key].status if key in records else "pending" for key, _ in _cases(plan)]
-    return {state: states.count(state) for state in ("ok", "skipped", "failed", "pending")}
+    states = [_status(records.get(key) or absent(case)) for key, case in _cases(plan)]
+    counts = {state: states.count(state) for state in ("ok", "skipped", "failed", "pending")}
+    return counts | ({LOST: states.count(LOST)} if LOST in states else {})
 
 
 def failures(plan: Plan, records: Mapping[str, Record]) -> tuple[tuple[str, str], ...]:
@@ -22,6 +24,10 @@ def failures(plan: Plan, records: Mapping[str, Record]) -> tuple[tuple[str, str]
     ]
     exact = {key: records[key].message for key in plan.reference_keys if key in records and not records[key].is_ok}
     return (*failed, *((f"F_exact ({key[:6]})", message) for key, message in exact.items()))
+
+
+def _status(record: Record | None) -> str:
+    return record.status if record else "pending"
 
 
 def _cases(plan: Plan) -> Iterator[tuple[str, Case]]:

@@ -5,17 +5,16 @@ What makes no sense in a shape by itself, the shape reports; here is what must f
 
 import itertools
 from collections.abc import Sequence
-from functools import lru_cache
-from math import dist, inf, isfinite
+from math import isfinite
 from typing import cast
 
 from pipeline.shapes.body import Body
-from pipeline.shapes.contact import check_contact, check_first_touch, edge_gap, is_flat, is_level, lifted_edge
-from pipeline.shapes.frame import Frame, PlaceError
+from pipeline.shapes.contact import is_flat, is_level
 from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe, is_direction
 from pipeline.shapes.section import Section, in_mm
+from pipeline.study.place import held_gap, place_error
 from pipeline.study.problems import Problems
 from pipeline.study.regions import tissues_of
 from pipeline.study.schema import Material, Mesh, Solving
@@ -30,12 +29,7 @@ _LOCKING = {1: (0.45, 0.45), 2: (0.49, 0.495), 3: (0.49, 0.495)}
 
 # Mixed elements keep λ = μ, which is ν = 0.25, with the displacement and give the rest to the pressure.
 _LEAST_MIXED = 0.25
-_MANY = 10_000  # places of a large study
 _FINDS_CONTACT = 2  # the degree of elements that find where a tool touches
-# A footprint this near the edge, in units of the body, touches it: the rest is rounding.
-_TOUCHING = 1e-9
-# A place this far off the surface, in units of the body, is not projected to it: it is a slip of sign or unit.
-_FARTHEST_OFF = 0.1
 
 
 def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
@@ -58,7 +52,9 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         body.support.check(body.heights, mesh.fine, problems)
         _check_outside(body, mesh, problems)
     sane = [probe for probe in probes if _has_place(probe, problems)]
-    placed = [pair for pair in itertools.product(bodies, sane) if _check_place(*pair, problems)]
+    way = next((axis for axis in axes if axis.off), None)
+    placed = [pair for pair in itertools.product(bodies, sane) if _check_place(*pair, way, problems)]
+    _check_way(way, probes, placed, problems)
     placed = [pair for pair in placed if _check_thickness(*pair, problems) and check_slit(*pair, problems)]
     for (body, probe), mesh in itertools.product(placed, meshes):
         _check_column(body, probe, mesh, problems)
@@ -131,78 +127,33 @@ def _check_mesh(mesh: Mesh, problems: Problems) -> None:
         problems.error("mesh.rim", in_mm(mesh.rim), f"must be at most fine = {in_mm(mesh.fine)}")
 
 
-def _check_place(body: Body, probe: Probe, problems: Problems) -> bool:
+def _check_place(body: Body, probe: Probe, way: Axis | None, problems: Problems) -> bool:
     """Report a place at which the probe cannot touch the body, and tell whether it has one."""
-    try:
-        frame = probe.frame_on(body)
-        _check_directions(probe, frame)
-        if is_level(body, frame):
-            _check_fit(body, probe, frame, problems)
-        if not is_level(body, frame) or isinstance(body, FromFile):
-            _check_contact(body, probe, frame)
-    except PlaceError as error:
-        found = getattr(probe, error.key)
-        problems.error(
-            f"probe.{error.key}", [in_mm(x) for x in found] if error.key == "at" else found and list(found), str(error)
-        )
-        return False
-    return True
+    error = place_error(body, probe)
+    if error is not None and not (way and way.off == "lost" and error.key == "at"):
+        found, key = getattr(probe, error.key), way.path if way and error.key == "at" else f"probe.{error.key}"
+        problems.error(key, [in_mm(x) for x in found] if error.key == "at" else found and list(found), str(error))
+    return error is None
 
 
-def _check_directions(probe: Probe, frame: Frame) -> None:
-    """Refuse a direction that was given and says nothing: left out, it is y where the probe advances along x."""
-    if "direction" in probe.model_fields_set and frame.is_replaced(probe.lies_along):
-        frame.refuse_direction()
-
-
-def _check_fit(body: Body, probe: Probe, frame: Frame, problems: Problems) -> None:
-    if probe.gap(body, frame) <= _TOUCHING * body.extent:
-        problems.error(
-            "probe.at",
-            [in_mm(x) for x in probe.at],
-            f"{_footprint(probe)} must lie inside the body's top ({body.face}), not on or over its edge",
-        )
-
-
-def _footprint(probe: Probe) -> str:
-    """Return what must lie on one face, in words."""
-    if isinstance(probe, Indenter):
-        return f"all that the {probe.shape} may touch, up to {in_mm(probe.circumradius)} from its axis,"
-    if probe.slit and not probe.slit.is_open:
-        return "the slit"
-    return f"the footprint of the {probe.shape}"
-
-
-def _check_contact(body: Body, probe: Probe, frame: Frame) -> None:
-    """Check a place where the face is not level, not plane, or the probe not at right angles to it."""
-    if len(probe.at) == 3 and (off := dist(probe.at, frame.point)) > _FARTHEST_OFF * body.extent:
-        raise PlaceError(
-            f"lies {in_mm(off)} off the body's surface: at most {_FARTHEST_OFF:.0%} of its extent, "
-            f"{in_mm(_FARTHEST_OFF * body.extent)}, is taken for a place on it"
-        )
-    check_contact(body, probe, frame)
-    if probe.is_unilateral:
-        check_first_touch(body, probe, frame)
-    if edge_gap(body, probe, frame) <= _TOUCHING * body.extent:
-        raise PlaceError(f"{_footprint(probe)} must lie inside one face, not on or over its edge")
-    if _held_gap(body, probe, frame) <= _TOUCHING * body.extent:
-        raise PlaceError(f"{_footprint(probe)} must not reach what is held of the body")
-
-
-@lru_cache(_MANY)
-def _held_gap(body: Body, probe: Probe, frame: Frame) -> float:
-    """Return the distance (m) from the footprint to what is held, of any place."""
-    distance = body.support.distance(body.surfaces(), lifted_edge(body, probe, frame))
-    return inf if distance is None else float(distance.min())
+def _check_way(way: Axis | None, probes: Sequence[Probe], placed: Sequence[tuple[Body, Probe]],
+               problems: Problems) -> None:  # fmt: skip
+    """Refuse a path that never meets a body, and the loss of a contact that cannot be lost."""
+    if way is None or way.off != "lost" or problems.errors:
+        return
+    if any(probe.slit for probe in probes):
+        problems.error("probe.path.off", way.off, "a blade that stands in a slit does not leave the body: refuse it")
+    elif not placed:
+        problems.error("probe.path", None, "meets the body nowhere: of all its places there is none to stand on")
 
 
 def held_gaps(body: Body, probe: Probe, mesh: Mesh) -> dict[str, float]:
     """Return the distances (m) between the probe's edge and the faces held beside it, by the key that sets them."""
     frame, gaps = probe.frame_on(body), {}
-    if isinstance(body, FromFile) and isfinite(gap := _held_gap(body, probe, frame)):
+    if isinstance(body, FromFile) and isfinite(gap := held_gap(body, probe, frame)):
         gaps["body.fixed"] = gap
     if not is_level(body, frame):
-        return {"body.fixed": gap} if isfinite(gap := _held_gap(body, probe, frame)) else {}
+        return {"body.fixed": gap} if isfinite(gap := held_gap(body, probe, frame)) else {}
     if not gaps and (beside := body.support.gap(probe.gap(body, frame))) is not None:
         gaps["body.fixed"] = beside
     if mesh.outside == "fixed" and isfinite(column := mesh.column(body.reach(frame))):

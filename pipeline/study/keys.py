@@ -12,7 +12,7 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from pipeline.shapes.section import Section, Words
-from pipeline.study.schema import NESTED, SECTIONS
+from pipeline.study.schema import NESTED, SECTIONS, TABLES
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,8 @@ SECTION_TEXTS = {
     "of each other and of where layers end. Optional; every value can be swept.",
     "material": "Isotropic, linear elastic tissue: what no layer or inclusion is. Left out where layers fill the body.",
     "probe": "The tool, and how it moves.",
+    "probe.path": "Places one after the other, instead of `at`: one of `line`, `circle`, `raster` and `points`. "
+    "Optional.",
     "mesh": "Element sizes, elements, and what is kept of the body.",
     "solve": "How cases are solved and timed. Optional; lists are no sweeps here.",
     "plan": "What may be left out of the work. Optional; lists are no sweeps here.",
@@ -53,7 +55,7 @@ def keys_of(section: str) -> tuple[Key, ...]:
     models = shapes_of(section)
     found: dict[str, dict[str, list[str]]] = {}
     # A section's name labels it; a piece's is a key like others.
-    hidden = {*NESTED.get(section, ()), *(() if "." in section else ("name",))}
+    hidden = {*NESTED.get(section, ()), *(() if section in _labelled() else ("name",))}
     for shape, model in models.items():
         for name in model.model_fields:
             if name not in hidden:
@@ -70,20 +72,28 @@ def keys_of(section: str) -> tuple[Key, ...]:
 
 def all_sections() -> tuple[str, ...]:
     """Return the names of all sections, those of arrays of tables within one after it."""
-    return tuple(
-        name for section in SECTIONS for name in (section, *(f"{section}.{key}" for key in NESTED.get(section, ())))
-    )
+    return tuple(name for section in SECTIONS for name in (section, *(f"{section}.{key}" for key in _inner(section))))
 
 
 def heading(section: str) -> str:
     """Return the heading of a section as it stands in a study file."""
-    return f"[[{section}]]" if "." in section else f"[{section}]"
+    return f"[[{section}]]" if section in _labelled() else f"[{section}]"
+
+
+def _inner(section: str) -> dict[str, type[Section]]:
+    """Return the models of the tables within a section."""
+    return NESTED.get(section, {}) | TABLES.get(section, {})
+
+
+def _labelled() -> set[str]:
+    """Return the arrays of tables within sections: their tables have names."""
+    return {f"{section}.{key}" for section, pieces in NESTED.items() for key in pieces}
 
 
 def shapes_of(section: str) -> dict[str, type[Section]]:
     """Return the models of a section by shape; one without shapes has the one shape ''."""
     outer, _, piece = section.partition(".")
-    model = NESTED[outer][piece] if piece else SECTIONS[section]
+    model = _inner(outer)[piece] if piece else SECTIONS[section]
     return dict(model) if isinstance(model, Mapping) else {"": model}
 
 

@@ -11,9 +11,10 @@ from pydantic import BaseModel, ValidationError
 from pipeline.shapes.registry import LATER
 from pipeline.shapes.section import Section
 from pipeline.study.check import check_sense
+from pipeline.study.path import Way, read_path
 from pipeline.study.problems import Problem, Problems, StudyError, nearest, nested_model
 from pipeline.study.regions import check_regions, material_without_section
-from pipeline.study.schema import LATER_KEYS, LATER_SECTIONS, NESTED, SECTIONS, SINGLE, Mesh
+from pipeline.study.schema import LATER_SECTIONS, NESTED, SECTIONS, SINGLE, Mesh
 from pipeline.study.sweep import Axis, Study
 
 # A label needs its section's axes only; more combinations than this in one section is a slip of the pen.
@@ -109,6 +110,44 @@ def _check_top(raw: dict[str, Any], problems: Problems) -> None:
 
 def _read_section(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], tuple[Section, ...]]:
     """Return the axes of a section and every combination of their values."""
+    if name == "probe":
+        raw, way = _walked(raw, problems)
+        axes, variants = _read_tables(name, raw, problems)
+        return (_axes_of(way, axes) if way else axes), variants
+    return _read_tables(name, raw, problems)
+
+
+def _walked(raw: Any, problems: Problems) -> tuple[Any, Way | None]:
+    """Return the probe's tables with the places of their path in its stead, and that path, if there is one."""
+    tables = raw if isinstance(raw, list) else [raw]
+    having = [table for table in tables if isinstance(table, dict) and "path" in table]
+    if not having:
+        return raw, None
+    where = "probe.path" if isinstance(raw, dict) else "probe[1].path"
+    if any("at" in table for table in having):
+        problems.error(where, None, "stands beside `at`: give one of both")
+    if len(having) < len(tables) or any(table["path"] != having[0]["path"] for table in having):
+        problems.error("probe.path", None, "must be the same in all [[probe]] tables: it is one sweep of all of them")
+    way = read_path(having[0]["path"], where, problems)
+
+    def walked(table: Any) -> Any:
+        if not isinstance(table, dict):
+            return table
+        # The sweep's place among the others is the path's.
+        return {("at" if k == "path" else k): (way.texts if k == "path" and way else v) for k, v in table.items()
+                if k != "at" and (k != "path" or way)}  # fmt: skip
+
+    return ([walked(table) for table in raw] if isinstance(raw, list) else walked(raw)), way
+
+
+def _axes_of(way: Way, axes: list[Axis]) -> list[Axis]:
+    """Return the axes with those of a path for that of its places."""
+    own = [Axis("probe", name, labels, "m", off=way.off) for name, labels in way.axes]
+    return [new for axis in axes for new in (own if axis.key == "at" else [axis])]
+
+
+def _read_tables(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], tuple[Section, ...]]:
+    """Return the axes of a section as it is written, and every combination of their values."""
     if isinstance(raw, list) and name not in SINGLE:
         return _read_array(name, raw, problems)
     if not isinstance(raw, dict):
@@ -203,9 +242,6 @@ def _shared_sweeps(name: str, tables: list[Any]) -> dict[Place, list[Any]]:
 def _model(name: str, raw: dict[str, Any], problems: Problems, where: str = "") -> type[Section] | None:
     """Return the model of a section, chosen by its shape where it has one."""
     where = where or name
-    for key in LATER_KEYS.get(name, ()):
-        if key in raw:
-            problems.error(f"{where}.{key}", raw[key], "this key is not supported by this version")
     model = SECTIONS[name]
     if not isinstance(model, Mapping):
         return model

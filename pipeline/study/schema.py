@@ -13,6 +13,7 @@ from pipeline.shapes.regions import Inclusion, Layer
 from pipeline.shapes.registry import BODIES, PROBES
 from pipeline.shapes.section import Section, Words
 from pipeline.shapes.tissue import Tissue
+from pipeline.study.path import Path
 from pipeline.units import Length, Pressure, Share, parse_quantity
 
 # ---- material ---------------------------------------------------------------------------------------
@@ -207,8 +208,7 @@ SECTIONS: dict[str, type[Section] | Mapping[str, type[Section]]] = {
 NESTED: dict[str, dict[str, type[Section]]] = {"body": {"layers": Layer, "inclusion": Inclusion}}
 # Sections that say how, not what: their lists are no sweeps.
 SINGLE = ("solve", "plan")
-# Keys of the format that this version does not compute: named as such, not as typing errors.
-LATER_KEYS = {
-    "probe": ("path",),
-}
+# Tables within a section that stand for one of its keys.
+TABLES: dict[str, dict[str, type[Section]]] = {"probe": {"path": Path}}
+# Sections of the format that this version does not compute: named as such, not as typing errors.
 LATER_SECTIONS = ("load",)

@@ -14,6 +14,7 @@ from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.shapes.tissue import Tissue
+from pipeline.study.place import CLEAR, is_clear, place_error
 from pipeline.study.schema import Material, Mesh, Planning, Solving, material_of
 
 # Keys that both body and probe have, or a variable of the dataset: their dimension says whose it is.
@@ -32,6 +33,7 @@ class Axis:
     unit: str
     piece: str = ""  # of an array of tables within the section, such as layers[2]
     owner: str = ""  # the name of that piece
+    off: str = ""  # of a path: what becomes of places off the body, "refuse" or "lost"
 
     @property
     def name(self) -> str:
@@ -46,6 +48,8 @@ class Axis:
     @property
     def path(self) -> str:
         """Where it stands in the study file."""
+        if self.off:
+            return "probe.path" if self.key == "path" else f"probe.path.raster.{self.key}"
         return ".".join(part for part in (self.section, self.piece, self.key) if part)
 
     def write(self, label: float | int | str) -> str:
@@ -90,6 +94,14 @@ class Case:
     def frame(self) -> Frame:
         """Where the probe meets the body."""
         return self.probe.frame_on(self.body)
+
+    @property
+    def absence(self) -> str:
+        """Why a tool that may leave the body does not stand at this place of its path; "" if it does."""
+        if not any(axis.off == "lost" for axis in self.axes):
+            return ""
+        error = place_error(self.body, self.probe)
+        return "" if error is None else CLEAR if is_clear(self.body, self.probe) else f"the tool cannot stand: {error}"
 
     @property
     def travel(self) -> Vector:

@@ -62,7 +62,6 @@ MISTAKES = {
     "unknown section": ({"materials": {}}, ["materials", "did you mean `material`?"]),
     "missing key": ({"material": {"young": None}}, ["material.young", "required"]),
     "unknown shape": ({"probe": {"shape": "disk"}}, ['probe.shape = "disk"', "did you mean `disc`?"]),
-    "later key": ({"probe": {"path": [1]}}, ["probe.path", "not supported"]),
     "unknown contact": ({"probe": {"contact": "glued"}}, ["probe.contact", "'bonded', 'frictionless' or 'unilateral'"]),
     "unknown element": ({"mesh": {"element": "hybrid"}}, ["mesh.element", "'mixed'"]),
     "later section": ({"load": {"gravity": 1}}, ["load", "not supported"]),

@@ -50,7 +50,7 @@ def figure(dataset: xr.Dataset, kind: str, *, titled: bool = True) -> Figure:
 
 def _missing(dataset: xr.Dataset) -> str:
     """Say which cases have no force."""
-    words = {"failed": "failed (×)", "skipped": "skipped", "pending": "not yet run"}
+    words = {"failed": "failed (×)", "skipped": "skipped", "pending": "not yet run", "lost": "contact lost"}
     counts = {word: int((dataset["status"] == state).sum()) for state, word in words.items()}
     text = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
     return f"cases: {text}" if text else ""

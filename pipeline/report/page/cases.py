@@ -13,7 +13,7 @@ from pipeline.report.words import is_numeric, number, scale, symbol
 
 # Rows in the page before anybody asks for more; the script's number, too.
 FIRST_ROWS = 200
-_STATES = ("failed", "pending", "skipped", "ok")  # the order of the rows
+_STATES = ("failed", "pending", "skipped", "lost", "ok")  # the order of the rows
 # The columns of numbers; some are shown only when asked for.
 _QUANTITIES = (
     "force", "force_error", "force_ratio", "accuracy", "force_exact_error", "speedup", "time_total", "dofs", "cells",

@@ -11,7 +11,8 @@ from pipeline.report.words import choices
 
 # Cases that a message names; the table shows all of them.
 _MOST_NAMED = 5
-_STATES = {"ok": "with a force", "failed": "failed", "skipped": "skipped", "pending": "not yet run"}
+_STATES = {"ok": "with a force", "failed": "failed", "skipped": "skipped", "lost": "without contact",
+           "pending": "not yet run"}  # fmt: skip
 
 
 def facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
