@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.generate import MeshArrays, MeshError
-from pipeline.scene.model import MIRROR, PROBE, Scene
+from pipeline.scene.model import FIXED, MIRROR, PROBE, Scene
 from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.surface import Surface
@@ -138,7 +138,10 @@ def _on_sides(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArra
     for surface in (surface for surface in surfaces if surface.is_curved):
         on_side = np.abs(surface.distance(mesh.points)) < _CLOSE * scene.body.extent
         chosen = outer & on_side[edges].all(axis=1)
-        if isinstance(surface, Ovoid):
+        if scene.is_ball and surface is scene.cut_face:
+            # Two of its points may be joined across the top, or a plane of symmetry, too.
+            chosen &= np.isin(keys, _facet_edges(mesh, [FIXED]))
+        elif isinstance(surface, Ovoid):
             # It is all of the boundary: two of its points may be joined across a plane of symmetry, too.
             chosen &= np.isin(keys, _facet_edges(mesh, [name for name in mesh.facets if name not in MIRROR.values()]))
         middle[chosen] = surface.project(middle[chosen])

@@ -30,7 +30,8 @@ def mesh_arrays(case: Case, mirrors: tuple[str, ...], kept: "Kept | None" = None
     start = perf_counter()
     straight, planes, sizes = case.mesh.degree == 1, mirror_planes(case), sizes_of(case)
     segments = sizes.rim_segments(case.probe)
-    scene = Scene(case.body, case.probe, case.column, case.mesh.outside == "fixed", segments, straight, planes)
+    held, ball = case.mesh.outside not in ("coarse", "free"), case.is_closed
+    scene = Scene(case.body, case.probe, case.column, held, segments, straight, planes, ball)
     arrays = _of_triangles(scene, case.body, sizes, kept) if isinstance(case.body, Scanned) else generate(scene, sizes)
     arrays = open_slit(arrays, scene) if scene.has_inner_slit else arrays
     arrays = arrays if straight else curve(arrays, scene)

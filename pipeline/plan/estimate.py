@@ -30,11 +30,13 @@ def cells(case: Case) -> float:
     if case.is_full or mesh.epsilon == inf:
         return (total + body.volume / mesh.fine**3) / _TETRAHEDRON
     inside = min(2 / 3 * pi * epsilon**3, body.volume)
-    if case.is_truncated:
+    if case.is_truncated and not case.is_closed:
         inside = min(inside, pi * mesh.epsilon**2 * thickness)
         # A column is resolved to half its radius all along.
         total += min(pi * mesh.epsilon**2 * thickness, body.volume) / (mesh.epsilon / 2) ** 3
     total += inside / mesh.fine**3
+    if case.is_closed:
+        return total / _TETRAHEDRON
     # Shells of size fine + growth (r - ε) round the contact, then coarse.
     total += 2 * pi * epsilon**2 / (2 * growth * mesh.fine**2) + 4 * pi * epsilon / (growth**2 * mesh.fine)
     total += 2 * pi / growth**3 * log(max(mesh.coarse / mesh.fine, 1.0))

@@ -15,6 +15,7 @@ _OF_STRESS_ALONE = (
     "only are solved once."
 )
 _FOUND_CONTACT = "No reduced basis: the area of contact changes with Poisson's ratio, and each is solved."
+_CLOSED = "No reduced basis: the far field changes with Poisson's ratio, and each is solved."
 _SEVERAL_MATERIALS = "No reduced basis: a body of several materials has more parameters than one, and each is solved."
 
 
@@ -82,6 +83,8 @@ def use_reduced_basis(plan: Plan) -> Plan:
         return replace(plan, struck=(*plan.struck, Struck("reduced", 0, _SEVERAL_MATERIALS)))
     if not many and any(_suits_a_basis(operator, found=True) for operator in operators):
         return replace(plan, struck=(*plan.struck, Struck("reduced", 0, _FOUND_CONTACT)))
+    if not many and any(_suits_a_basis(operator, closed=True) for operator in operators):
+        return replace(plan, struck=(*plan.struck, Struck("reduced", 0, _CLOSED)))
     return plan.struck_by("reduced", len(many), _reason(use_reduced_basis))
 
 
@@ -139,21 +142,33 @@ def _mirrored(solve: Solve) -> Solve:
     return replace(solve, mirrors=model_planes(solve.case)) if use else solve
 
 
-def _suits_a_basis(operator: OperatorStep, *, of_regions: bool = False, found: bool = False) -> bool:
+def _suits_a_basis(
+    operator: OperatorStep, *, of_regions: bool = False, found: bool = False, closed: bool = False
+) -> bool:
     """Displacement elements depend on one parameter; and the bound is on the work of one movement, not on forces that
     several take. ``of_regions`` asks of bodies of several materials, whose parameters are too many, ``found`` of
-    contact whose area changes with that parameter.
+    contact whose area changes with that parameter, ``closed`` of what is prescribed on a cut face and changes with it.
     """
     first = operator.solves[0]
     if bool(first.case.body.regions) != of_regions or first.case.probe.is_unilateral != found:
         return False
     values = {solve.key if of_regions else solve.case.material.poisson for solve in operator.solves}
     plain = first.goal is None and not first.axisymmetric and first.case.element == "displacement"
-    return plain and len(values) >= _FEWEST_RATIOS and first.case.movements == 1
+    return (
+        plain
+        and len(values) >= _FEWEST_RATIOS
+        and first.case.is_closed == closed
+        and first.case.movements == 1 + closed
+    )
 
 
 def _asks_for_accuracy_or_truncation(plan: Plan) -> bool:
-    """Tell whether a study varies scenes and truncation, but not the mesh: sizes, elements, or ε with all outside."""
+    """Tell whether a study varies scenes and truncation, but not the mesh: sizes, elements, or ε with all outside.
+
+    Half balls are solved in three dimensions, and what they are compared with, too.
+    """
+    if any(solve.case.is_closed for solve in plan.solves):
+        return False
     swept = {axis.key for axis in plan.study.axes if axis.section == "mesh"}
     if swept - {"epsilon", "outside", "accuracy"}:
         return False

@@ -30,7 +30,7 @@ def is_round(case: Case) -> bool:
     """Tell whether body, support and probe are the same all round one axis, and the movement along it."""
     body, probe, frame = case.body, case.probe, case.frame
     half_plane = body.half_plane()
-    if probe.motion == "all" or half_plane is None:
+    if probe.motion == "all" or half_plane is None or case.is_closed:
         return False
     upright = frame.is_upright and frame.point[:2] == _ON_AXIS and case.travel[:2] == _ON_AXIS
     is_same = probe.is_round and body.support.is_round()

@@ -12,6 +12,7 @@ from pipeline.solve.conditions import Conditions
 from pipeline.solve.contact.problem import DEGREE, ContactProblem, Tool
 from pipeline.solve.contact.sets import ContactError
 from pipeline.solve.displacement import DisplacementProblem
+from pipeline.solve.far_field import PointForce
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
@@ -105,6 +106,8 @@ def loads_of(case: Case) -> Loads:
         return Loads.all(travel, frame.point)
     if slit := case.probe.slit:
         return Loads.along(travel).opened(case.frame.upright.across, slit.width / 2)
+    if case.is_closed:
+        return Loads.along(travel).with_far(PointForce(case.material.poisson, frame.point, case.column))
     # Across a plane of symmetry a probe slides without force along its axis, and presses without force along itself.
     return Loads.along(travel, apart=mirror_planes(case) != model_planes(case))
 

@@ -22,6 +22,7 @@ from pipeline.shapes.bodies.cad import SIZES, FromCad
 from pipeline.shapes.body import Body, Drawn
 from pipeline.shapes.contact import is_flat
 from pipeline.shapes.frame import Frame
+from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.surface import Surface, Tube
 
@@ -40,7 +41,8 @@ _FILLED, _TRIMMED = ("Plane", "Cylinder"), 12
 class Scene:
     """Geometry of one scene: what is kept of the body, where the probe touches it, what is held.
 
-    ``column`` is the radius (m) of the piece that is kept round the probe's axis, or infinite;
+    ``column`` is the radius (m) of the piece that is kept round the probe's axis, or infinite; ``is_ball`` keeps what
+    is that near to the contact;
     ``rim_segments`` is the number of edges along a round rim, which ``straight`` elements cannot bend;
     ``mirrors`` are the planes of symmetry, of which only the positive side is modelled.
     """
@@ -52,6 +54,7 @@ class Scene:
     rim_segments: int = 0
     straight: bool = False
     mirrors: tuple[str, ...] = ()
+    is_ball: bool = False
 
     @property
     def frame(self) -> Frame:
@@ -89,7 +92,9 @@ class Scene:
 
     @cached_property
     def cut_face(self) -> Surface:
-        """The side of the column."""
+        """The side of the column, or of the ball."""
+        if self.is_ball:
+            return Ovoid(self.frame.point, (self.column, self.column, self.column))
         return Tube(self.frame.point, self.frame.axis, self.column)
 
 
@@ -192,7 +197,10 @@ def _add_positive_side(scene: Scene) -> int:
 
 
 def _add_column(scene: Scene) -> int:
-    """Add the cylinder round the probe's axis, through the tissue below the contact."""
+    """Add the cylinder round the probe's axis, through the tissue below the contact, or the ball round the contact."""
+    if scene.is_ball:
+        centre = (scene.units(c) for c in scene.frame.point)
+        return int(gmsh.model.occ.addSphere(*centre, scene.units(scene.column)))
     frame, depth = scene.frame, scene.units(scene.body.thickness(scene.frame))
     end = [scene.units(c) + depth * a for c, a in zip(frame.point, frame.axis, strict=True)]
     return int(gmsh.model.occ.addCylinder(*end, *(depth * o for o in frame.outward), scene.units(scene.column)))

@@ -79,7 +79,7 @@ class ConstrainedSpace:
         zero = np.zeros((), dtype=PETSc.ScalarType)
         self.dirichlet = [compat.dirichletbc(np.zeros(3, dtype=PETSc.ScalarType), fixed, space)]
         self.dirichlet += [compat.dirichletbc(zero, dofs, space.sub(axis)) for dofs, axis in single]
-        self._probe, self._sides = probe, self._sides_of(probe)
+        self._probe, self._fixed, self._sides = probe, fixed, self._sides_of(probe)
         self.prescribed = np.unique(np.concatenate([*(d for d, _ in single), *(3 * fixed + c for c in range(3))]))
         self.prescribed_owned = self.prescribed[self.prescribed < self.owned]
         self.probe_owned, self.fixed_owned = (dofs[dofs < index_map.size_local] for dofs in (probe, fixed))
@@ -102,6 +102,9 @@ class ConstrainedSpace:
         displacement = np.broadcast_to(motion.at(points, self._sides), (len(self._probe), 3))
         for component in self.conditions.components:
             values[3 * self._probe + component] = displacement[:, component]
+        if motion.far is not None:
+            places = np.asarray(self.space.tabulate_dof_coordinates())[self._fixed]
+            values.reshape(-1, 3)[self._fixed] = motion.share * motion.far.at(places)
         return values
 
     def _sides_of(self, probe: Int32Array) -> FloatArray | None:

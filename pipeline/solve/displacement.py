@@ -17,6 +17,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
+from pipeline.solve.closure import TWO_SIDED, balanced, energy_beyond, far_share
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.enrich import energy_decrements
 from pipeline.solve.error import error_bar, stiffness_bars
@@ -84,6 +85,7 @@ class DisplacementProblem:
         """
         fine, asked, released_finer = self._fine, tolerance, None
         direct = is_direct(method, self.dofs, fine.degree)
+        tolerance *= TWO_SIDED if loads.far is not None else 1.0
         held = [fine.dofs.held(motion) for motion in loads.motions]
         with ExitStack() as stack:
             start = time.perf_counter()
@@ -110,6 +112,9 @@ class DisplacementProblem:
                 raise SolveError(
                     f"forces do not balance: relative error {response.balance:.1e}, allowed {BALANCE_LIMIT:.0e}"
                 )
+            if loads.far is not None:
+                loads, held = self._close(response, unknowns, held)
+                response = balanced(self._response(unknowns, held, law, loads))
             self.corrections = {m: u.array.copy() for m, u in zip(loads.motions, unknowns, strict=True)}
             self._move(held, loads)
             seconds = time.perf_counter() - start
@@ -130,6 +135,14 @@ class DisplacementProblem:
             solution, decrements=found, plain=plain, bars=bars, estimate_iterations=more,
             released_finer=released_finer, time_estimate=time.perf_counter() - start,
         ).with_release_bar(fine.degree)  # fmt: skip
+
+    @staticmethod
+    def _close(response: Response, unknowns: list[PETSc.Vec], held: list[FloatArray]) -> tuple[Loads, list[FloatArray]]:
+        """Make one motion, with its share of the far field, of two: return it and what it prescribes."""
+        share = far_share(response)
+        unknowns[0].axpy(share, unknowns[1])
+        del unknowns[1]
+        return response.loads.closed(share), [held[0] + share * held[1]]
 
     @contextmanager
     def solver(self, law: MaterialLaw, method: str = "auto") -> Iterator[LinearSolver]:
@@ -261,5 +274,6 @@ class DisplacementProblem:
                 residuals.append(residual.array.copy())
         stationary = global_sum(fine.dofs.comm, np.array([[u @ r for r in residuals] for u in units]))
         found = sums(fine.dofs, residuals, held)
-        response = reaction(loads, stationary, found.on_probe, self._body.mirrored)
+        beyond = energy_beyond(loads, law.lame_mu[0], self._body.mirrored)
+        response = reaction(loads, stationary + beyond, found.on_probe, self._body.mirrored)
         return replace(response, balance=found.imbalance(np.diag(stationary), loads, self._body.mirrored))

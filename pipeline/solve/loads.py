@@ -1,11 +1,12 @@
 """What the probe does: a rigid movement, put together of a few that are each solved for once."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot
 
 import numpy as np
 
 from pipeline.arrays import FloatArray
+from pipeline.solve.far_field import FarField
 
 Vector = tuple[float, float, float]
 
@@ -18,12 +19,15 @@ class Motion:
 
     A unit is a metre, or, for the small rotation ω × (x − ``centre``), a radian. ``opening`` moves what the probe
     touches of a slit's faces apart, each by a metre: the face on the side of that unit vector along it, the other back.
+    ``far`` moves the cut face, by ``share`` of a unit of that field.
     """
 
     direction: Vector = _ZERO
     rotation: Vector = _ZERO
     centre: Vector = _ZERO
     opening: Vector = _ZERO
+    far: FarField | None = None
+    share: float = 0.0
 
     @property
     def is_rotation(self) -> bool:
@@ -59,6 +63,16 @@ class Loads:
     amounts: tuple[float, ...]
     apart: bool = False
 
+    @property
+    def far(self) -> FarField | None:
+        """What closes the cut face, if it is not simply held."""
+        return next((motion.far for motion in self.motions if motion.far is not None), None)
+
+    @property
+    def shares(self) -> FloatArray:
+        """How much of the far field belongs to each motion."""
+        return np.array([motion.share for motion in self.motions])
+
     @staticmethod
     def along(travel: Vector, *, apart: bool = False) -> "Loads":
         """Return the loads of a probe that presses by −z of ``travel`` (m) and slides by the rest of it."""
@@ -79,6 +93,15 @@ class Loads:
     def opened(self, normal: Vector, amount: float) -> "Loads":
         """Return the loads of a probe that also holds each face of a slit ``amount`` (m) off its plane."""
         return Loads((*self.motions, Motion(opening=normal)), (*self.amounts, amount))
+
+    def with_far(self, far: FarField) -> "Loads":
+        """Return the loads with a unit of the ``far`` field as a motion more, whose amount is to be found."""
+        return Loads((*self.motions, Motion(far=far, share=1.0)), (*self.amounts, 0.0))
+
+    def closed(self, share: float) -> "Loads":
+        """Return the loads of one motion and a far field as those of one motion, with that ``share`` of the field."""
+        press, far = self.motions
+        return Loads((replace(press, far=far.far, share=share),), self.amounts[:1])
 
     def times(self, factor: float) -> "Loads":
         """Return ``factor`` times the movement."""

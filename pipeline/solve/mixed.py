@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.arrays import FloatArray
+from pipeline.solve.closure import balanced, energy_beyond, far_share
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.error import error_bar, stiffness_bars
 from pipeline.solve.forms import mean_strain_form
@@ -117,6 +118,9 @@ class MixedProblem:
             if (share := rest(response.balance, tolerance)) < 1:
                 iterations += self._correct(fine, solver, split, unknowns, held, share)
                 response = self._response(fine, split, unknowns, held, loads)
+            if loads.far is not None:
+                loads, held = self._close(response, unknowns, held)
+                response = balanced(self._response(fine, split, unknowns, held, loads))
             seconds = time.perf_counter() - start - (solver.setup_seconds if direct else 0.0)
             if response.balance > BALANCE_LIMIT:
                 raise SolveError(
@@ -134,6 +138,15 @@ class MixedProblem:
             solution = self._estimate(solution, response, unknowns, held, split)
             self._move(unknowns, held, loads.amounts)
         return solution
+
+    @staticmethod
+    def _close(response: Response, unknowns: list[Pair], held: list[FloatArray]) -> tuple[Loads, list[FloatArray]]:
+        """Make one motion, with its share of the far field, of two: return it and what it prescribes."""
+        share = far_share(response)
+        for part, far in zip(*unknowns, strict=True):
+            part.axpy(share, far)
+        del unknowns[1]
+        return response.loads.closed(share), [held[0] + share * held[1]]
 
     def fields(self) -> tuple[Any, FloatArray]:
         """Return the last solution's displacement (m) and the principal strains of each owned cell; collective."""
@@ -233,8 +246,9 @@ class MixedProblem:
         )  # fmt: skip
         elastic_energy, coupled, compressed = np.moveaxis(products, -1, 0)
         found = sums(dofs, residuals, held)
+        beyond = energy_beyond(loads, split.elastic.lame_mu[0], self._body.mirrored)
         response = reaction(
-            loads, elastic_energy + coupled + coupled.T - compressed, found.on_probe, self._body.mirrored
+            loads, elastic_energy + coupled + coupled.T - compressed + beyond, found.on_probe, self._body.mirrored
         )
         energies = np.diag(elastic_energy + compressed)
         return replace(response, balance=found.imbalance(energies, loads, self._body.mirrored))

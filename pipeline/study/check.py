@@ -14,6 +14,7 @@ from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe, is_direction
 from pipeline.shapes.section import Section, in_mm
+from pipeline.study.closure import check_closure
 from pipeline.study.place import held_gap, place_error
 from pipeline.study.problems import Problems
 from pipeline.study.regions import tissues_of
@@ -58,6 +59,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     placed = [pair for pair in placed if _check_thickness(*pair, problems) and check_slit(*pair, problems)]
     for (body, probe), mesh in itertools.product(placed, meshes):
         _check_column(body, probe, mesh, problems)
+        check_closure(body, probe, mesh, problems)
         _check_gap(body, probe, mesh, problems)
         _check_straight(body, probe, mesh, problems)
         check_slit_in(body, probe, mesh, problems)
@@ -156,14 +158,14 @@ def held_gaps(body: Body, probe: Probe, mesh: Mesh) -> dict[str, float]:
         return {"body.fixed": gap} if isfinite(gap := held_gap(body, probe, frame)) else {}
     if not gaps and (beside := body.support.gap(probe.gap(body, frame))) is not None:
         gaps["body.fixed"] = beside
-    if mesh.outside == "fixed" and isfinite(column := mesh.column(body.reach(frame))):
+    if mesh.outside not in ("coarse", "free") and isfinite(column := mesh.column(body.reach(frame))):
         gaps["mesh.epsilon"] = column - probe.circumradius
     return {key: gap for key, gap in gaps.items() if gap > 0}
 
 
 def _check_column(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
     frame = probe.frame_on(body)
-    if isfinite(mesh.column(body.reach(frame))) and not is_level(body, frame):
+    if not mesh.is_closed and isfinite(mesh.column(body.reach(frame))) and not is_level(body, frame):
         problems.error(
             "mesh.outside", mesh.outside,
             "a column is kept below a level face that the probe presses straight down on only: "
@@ -189,7 +191,7 @@ def _check_epsilon(mesh: Mesh, probe: Probe, problems: Problems) -> None:
             "mesh.epsilon",
             in_mm(mesh.epsilon),
             f"is less than the probe's radius {in_mm(probe.circumradius)}: part of the contact lies outside the fine "
-            "mesh" + ("" if mesh.outside == "coarse" else ", and the column cuts the footprint off"),
+            "mesh" + (", and the column cuts the footprint off" if mesh.outside in ("free", "fixed") else ""),
         )
     if mesh.rim_size(probe.half_width) > probe.half_width:
         problems.warn(

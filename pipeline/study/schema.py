@@ -99,10 +99,10 @@ class Mesh(Section):
         Words("By how much an element may be larger for each unit of distance from the edge.", "0.5"),
     ] = 0.5
     outside: Annotated[
-        Literal["coarse", "free", "fixed"],
+        Literal["coarse", "free", "fixed", "halfspace"],
         Words(
             "What becomes of the body beyond epsilon: meshed coarsely; or cut away, which leaves a column whose side "
-            "is free of traction, or fixed.",
+            "is free of traction, or fixed, or a half ball that is closed by the far field of a half-space.",
             '["coarse", "free"]',
             is_used=True,
         ),
@@ -130,6 +130,11 @@ class Mesh(Section):
     def rim_size(self, half_width: float) -> float:
         """Element size at the edge of a probe of that half width (m)."""
         return self.rim if self.rim is not None else min(self.fine, self.RIM_SHARE * half_width)
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether what is kept of a body is a half ball, closed by a far field."""
+        return self.outside == "halfspace"
 
     def column(self, reach: float) -> float:
         """Return the radius (m) of what is kept of a body of that ``reach`` from the probe's axis; infinite if all."""

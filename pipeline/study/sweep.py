@@ -110,9 +110,9 @@ class Case:
 
     @property
     def movements(self) -> int:
-        """How many motions of the probe are solved for: press, slide, opening of a slit; or all six."""
+        """How many motions are solved for: press, slide, opening of a slit, the far field's; or all six."""
         slides = self.travel != tuple(self.probe.depth * a for a in self.frame.axis)
-        return 6 if self.probe.motion == "all" else 1 + slides + (self.probe.slit is not None)
+        return 6 if self.probe.motion == "all" else 1 + slides + (self.probe.slit is not None) + self.is_closed
 
     @property
     def tissues(self) -> tuple[Tissue, ...]:
@@ -150,13 +150,21 @@ class Case:
 
     @property
     def column(self) -> float:
-        """Radius (m) of the piece of the body that is kept round the probe's axis; infinite if all of it is."""
+        """Radius (m) of the piece of the body that is kept round the probe's axis or, if closed, the contact.
+
+        Infinite if all of it is kept.
+        """
         return self.mesh.column(self.body.reach(self.frame))
 
     @property
     def is_truncated(self) -> bool:
         """Whether only a column of the body is kept."""
         return self.column < inf
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether only a half ball of the body is kept, which a far field closes."""
+        return self.mesh.is_closed and not self.is_full
 
     @property
     def element(self) -> str:

@@ -13,6 +13,7 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     """Yield every comparison as it is made, the same on every rank; ``quick`` leaves a few of each kind; collective."""
     from pipeline.solve.cache import compiling  # noqa: PLC0415 (the folder's face loads no solver)
     from pipeline.verify.bodies import body_rows  # noqa: PLC0415
+    from pipeline.verify.closure import closure_rows  # noqa: PLC0415
     from pipeline.verify.contact import contact_rows  # noqa: PLC0415
     from pipeline.verify.elements import element_rows  # noqa: PLC0415
     from pipeline.verify.forces import scene_rows  # noqa: PLC0415
@@ -29,3 +30,4 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     yield from body_rows(comm, quick=quick)
     yield from contact_rows(comm, quick=quick)
     yield from slit_rows(comm, quick=quick)
+    yield from closure_rows(comm, quick=quick)

@@ -13,6 +13,7 @@ STUDIES = sorted(Path("studies").glob("*.toml"))
 
 ELLIPSE = {"shape": "ellipse", "axes": ["3 mm", "1 mm"], "depth": "0.1 mm"}
 
+CLOSED = {"outside": "halfspace", "epsilon": "9 mm"}
 ELLIPSOID = {"shape": "ellipsoid", "axes": ["40 mm", "35 mm", "25 mm"], "fixed": {"below": "-6 mm"}}
 
 # section changes -> what the message must hold: the key, what was found, what is allowed
@@ -65,7 +66,7 @@ MISTAKES = {
     "unknown contact": ({"probe": {"contact": "glued"}}, ["probe.contact", "'bonded', 'frictionless' or 'unilateral'"]),
     "unknown element": ({"mesh": {"element": "hybrid"}}, ["mesh.element", "'mixed'"]),
     "later section": ({"load": {"gravity": 1}}, ["load", "not supported"]),
-    "wrong word": ({"mesh": {"outside": "void"}}, ['mesh.outside = "void"', "'coarse', 'free' or 'fixed'"]),
+    "wrong word": ({"mesh": {"outside": "void"}}, ['mesh.outside = "void"', "'coarse', 'free', 'fixed'"]),
     "degree": ({"mesh": {"degree": 4}}, ["mesh.degree = 4", "1, 2 or 3"]),
     "vector length": ({"body": {"size": ["1 mm", "2 mm"]}}, ["body.size", "3 values"]),
     "support": ({"body": {"fixed": "top"}}, ['body.fixed = "top"', "'bottom'"]),
@@ -137,6 +138,23 @@ MISTAKES = {
     "no room in the column": (
         {"mesh": {"outside": "fixed", "epsilon": "3.2 mm"}}, ["mesh.epsilon", "leaves 0.2 mm"],
     ),
+    "half ball past the bottom": (
+        {"mesh": CLOSED | {"epsilon": "20 mm"}}, ["mesh.epsilon", "inside the body: below 20 mm"],
+    ),
+    "half ball past a side": ({"probe": {"at": ["12 mm", "0 mm"]}, "mesh": CLOSED}, ["mesh.epsilon", "below 8 mm"]),
+    "half ball within the footprint": ({"mesh": CLOSED | {"epsilon": "2.9 mm"}}, ["mesh.epsilon", "above"]),
+    "half ball of an accuracy": ({"mesh": CLOSED | {"accuracy": "1 %"}}, ["mesh.outside", "an error of its own"]),
+    "half ball of a curved body": ({"body": ELLIPSOID, "mesh": CLOSED}, ["mesh.outside", "box or a cylinder"]),
+    "half ball below a tilted probe": ({"probe": {"axis": [0.5, 0, -1]}, "mesh": CLOSED}, ["mesh.outside", "down"]),
+    "half ball of layers": (
+        {"body": {"layers": [{"name": "skin", "thickness": "2 mm", "young": "9 kPa", "poisson": 0.3}]}, "mesh": CLOSED},
+        ["mesh.outside", "one material"],
+    ),
+    "half ball where contact is found": (
+        {"probe": {"contact": "unilateral"}, "mesh": CLOSED}, ["mesh.outside", "found together"],
+    ),
+    "half ball below a blade that cuts": ({"probe": BLADE, "mesh": CLOSED}, ["mesh.outside", "presses, and neither"]),
+    "half ball of six motions": ({"probe": {"motion": "all"}, "mesh": CLOSED}, ["mesh.outside", "nor turns"]),
     "thin strip": ({"body": {"fixed": {"below": "-0.01 mm"}}}, ["body.fixed", "strip of 0.01 mm", "fine = 2 mm"]),
     "unknown reduction": ({"plan": {"without": ["magic"]}}, ["plan.without", "'duplicates'"]),
     "repeats": ({"solve": {"repeats": 3}}, ["solve.repeats", "timing"]),

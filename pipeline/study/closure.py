@@ -1,0 +1,51 @@
+"""What a half ball, closed by the far field of a point force, can be cut out of, and for which tools."""
+
+from pipeline.shapes.body import Body, Layered
+from pipeline.shapes.contact import is_level
+from pipeline.shapes.probe import Probe
+from pipeline.shapes.section import in_mm
+from pipeline.study.problems import Problems
+from pipeline.study.schema import Mesh
+
+
+def check_closure(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
+    """Report a scene or a mesh of which no far field is known."""
+    if not mesh.is_closed or mesh.epsilon >= body.farthest(probe.frame_on(body)):
+        return
+    if mesh.accuracy is not None:
+        _refuse(mesh, "has an error of its own, which is not that of the mesh: leave accuracy out", problems)
+    elif reason := _no_far_field(body, probe):
+        _refuse(mesh, f'{reason}: use outside = "coarse" here', problems)
+    elif mesh.epsilon >= (room := _room(body, probe)):
+        problems.error(
+            "mesh.epsilon", in_mm(mesh.epsilon),
+            f"a half ball must lie inside the body: below {in_mm(room)}, or past all of it, which is the full order",
+        )  # fmt: skip
+    elif mesh.epsilon <= probe.circumradius:
+        problems.error(
+            "mesh.epsilon", in_mm(mesh.epsilon),
+            f"a half ball must hold the footprint: above the probe's radius {in_mm(probe.circumradius)}",
+        )  # fmt: skip
+
+
+def _refuse(mesh: Mesh, reason: str, problems: Problems) -> None:
+    problems.error("mesh.outside", mesh.outside, reason)
+
+
+def _no_far_field(body: Body, probe: Probe) -> str:
+    """Return why the field far from the probe is not known, or nothing."""
+    if not isinstance(body, Layered) or not is_level(body, probe.frame_on(body)):
+        return "the far field is that of a probe that presses straight down on the top of a box or a cylinder"
+    if body.regions:
+        return "the far field is that of one material, without layers or inclusions"
+    if probe.is_unilateral:
+        return "the far field is found together with the force, and not where contact is found, too"
+    if probe.action != "pierce" or probe.slit is not None or probe.motion == "all":
+        return "the far field is that of a probe that presses, and neither slides nor turns nor cuts"
+    return ""
+
+
+def _room(body: Body, probe: Probe) -> float:
+    """Return the distance (m) from the contact to the nearest side of the body, or its bottom."""
+    frame = probe.frame_on(body)
+    return min(body.gap(frame.point), body.thickness(frame))

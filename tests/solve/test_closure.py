@@ -1,0 +1,76 @@
+"""A half ball, closed by the far field of a point force: closed forms, bounds, symmetry, work."""
+
+import numpy as np
+import pytest
+
+from pipeline.plan.plan import make_plan
+from pipeline.solve.far_field import PointForce
+from pipeline.verify import known
+from tests.cases import solve, study
+
+RADIUS, DEPTH, YOUNG = 2e-3, 0.2e-3, 10e3
+MESH = {"epsilon": "6 mm", "fine": "3 mm", "rim": "0.3 mm", "outside": "halfspace"}
+# Of F on a half-space, where ε = 3a: what the point force leaves out, measured on converged meshes.
+CLOSURE = {("frictionless", 0.3): 1.9e-3, ("bonded", 0.3): 3.8e-3, ("bonded", 0.45): 3.3e-3}
+
+
+def _solved(contact="bonded", poisson=0.3, **mesh):
+    return solve(
+        material={"poisson": poisson}, probe={"radius": "2 mm", "contact": contact}, mesh={**MESH, **mesh}
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.5])
+def test_energy_and_force_beyond_a_half_ball(poisson):
+    """Work on the half sphere is the energy beyond it, and traction there adds up to the force."""
+    nodes, weights = np.polynomial.legendre.leggauss(30)
+    cosine, weights = (nodes + 1) / 2, weights / 2
+    field = PointForce(poisson, (0.1, 0.0, 0.0), 2.0)
+    at = np.array(field.centre) + 2 * np.column_stack([np.sqrt(1 - cosine**2), 0 * cosine, -cosine])
+    area = 2 * np.pi * 2**2 * weights
+    work = -np.sum(area[:, None] * field.at(at) * field.traction(at))
+    assert work == pytest.approx(field.stiffness(1.0), rel=1e-12)
+    assert area @ field.traction(at)[:, 2] == pytest.approx(field.force(1.0), rel=1e-12)
+
+
+def test_traction_is_that_of_the_displacement():
+    field, step = PointForce(0.3, (0.0, 0.0, 0.0), 1.0), 1e-5
+    at = np.array([[0.3, 0.4, -0.5], [0.6, 0.0, -0.1]])
+    gradient = np.stack([(field.at(at + e) - field.at(at - e)) / (2 * step) for e in step * np.eye(3)], axis=-1)
+    strain = (gradient + gradient.transpose(0, 2, 1)) / 2
+    dilation = np.trace(strain, axis1=1, axis2=2)
+    stress = 2 * strain + 2 * 0.3 / (1 - 2 * 0.3) * dilation[:, None, None] * np.eye(3)
+    normal = at / np.linalg.norm(at, axis=1, keepdims=True)
+    assert np.einsum("nij,nj->ni", stress, normal) == pytest.approx(field.traction(at), abs=1e-8)
+
+
+@pytest.mark.parametrize(("contact", "poisson"), CLOSURE)
+def test_force_is_the_half_spaces_from_above(contact, poisson):
+    """What the mesh makes it err by is within the bar, and what the far field leaves out above F."""
+    (record,) = _solved(contact, poisson).values()
+    exact, _ = known.half_space_disc(YOUNG, poisson, RADIUS, DEPTH, contact)
+    error = record.force / exact - 1
+    assert CLOSURE[contact, poisson] <= error <= CLOSURE[contact, poisson] + record.force_error
+    assert 2 * record.energy == pytest.approx(record.force * DEPTH, rel=1e-6)
+
+
+def test_quarter_and_whole_agree_anywhere_on_the_top():
+    """The half-space is the same everywhere, and has the symmetry that the tool has."""
+    at = {"at": ["3 mm", "0 mm"], "radius": "2 mm"}
+    mesh = {**MESH, "degree": 1, "epsilon": "5 mm", "rim": "0.6 mm"}
+    quarter, whole = (solve(mesh={**mesh, "model": model})[()] for model in ("auto", "3d"))
+    assert quarter.force == pytest.approx(whole.force, rel=1e-6)
+    assert quarter.origin == "symmetric" and whole.origin == "solved"
+    (beside,) = solve(probe=at, mesh=mesh).values()
+    (middle,) = solve(probe={"radius": "2 mm"}, mesh=mesh).values()
+    assert beside.force == pytest.approx(middle.force, rel=0.02)
+
+
+def test_young_and_depth_scale_and_poisson_is_solved():
+    """Nothing but what F is proportional to is shared."""
+    ratios = [0.02 * n for n in range(10)]
+    plan = make_plan(study(material={"young": ["1 kPa", "2 kPa"], "poisson": ratios}, mesh=MESH))
+    assert len(plan.solves) == len(ratios) and not any(solve.reduced for solve in plan.solves)
+    assert any("far field changes" in struck.reason for struck in plan.struck)
+    both = make_plan(study(mesh={**MESH, "outside": ["halfspace", "fixed"]}))
+    assert len(both.solves) == len(both.meshes) == 2
