@@ -19,6 +19,7 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     from pipeline.verify.forces import scene_rows  # noqa: PLC0415
     from pipeline.verify.regions import region_rows  # noqa: PLC0415
     from pipeline.verify.slits import slit_rows  # noqa: PLC0415
+    from pipeline.verify.wedges import wedge_rows  # noqa: PLC0415
 
     found: list[Row] = []
     if comm.rank == 0:
@@ -29,5 +30,6 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     yield from region_rows(comm, quick=quick)
     yield from body_rows(comm, quick=quick)
     yield from contact_rows(comm, quick=quick)
+    yield from wedge_rows(comm, quick=quick)
     yield from slit_rows(comm, quick=quick)
     yield from closure_rows(comm, quick=quick)

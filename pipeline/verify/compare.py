@@ -12,12 +12,12 @@ from pipeline.verify.sections import Section
 _ACCURACY = {"2D": "0.1 %", "3D": "0.3 %"}
 
 
-def solve(comm: MPI.Comm, path: str, scene: Section) -> tuple[float, float, str]:
+def solve(comm: MPI.Comm, path: str, scene: Section, mesh: Section | None = None) -> tuple[float, float, str]:
     """Return force (N), relative error bar and message of a ``scene``, the sections of a study but for its mesh.
 
-    ``path`` is "2D", on the meridian if the scene is round, or "3D"; collective.
+    ``path`` is "2D", on the meridian if the scene is round, or "3D"; without a ``mesh`` to an accuracy; collective.
     """
-    study = parse({**scene, "mesh": {"accuracy": _ACCURACY[path]}, "solve": {"exact": False}})
+    study = parse({**scene, "mesh": mesh or {"accuracy": _ACCURACY[path]}, "solve": {"exact": False}})
     plan = make_plan(study, without=("axisymmetric",) if path == "3D" else ())
     (record,) = compute(plan, comm).values()
     return record.force, record.force_error, record.message

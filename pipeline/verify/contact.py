@@ -12,11 +12,13 @@ from pipeline.run.record import Record
 from pipeline.shapes.rounded import Rounded
 from pipeline.study.load import parse
 from pipeline.verify import known
+from pipeline.verify.compare import against_meridian, solve
 from pipeline.verify.layer_contact import layer_contact
 from pipeline.verify.row import Row
+from pipeline.verify.sections import Section
 
 _YOUNG, _POISSON = 10e3, 0.3
-_ACCURACY = {"2D": "0.1 %"}
+_ACCURACY = {"2D": "0.1 %", "3D": "0.3 %"}
 # A body this many times the radius of contact is a half-space but for a few 1e-5 of F.
 _FAR = 20_000
 # By this much F of the depth is above Hertz's on a cylinder whose radius and height are 200 radii of contact: found
@@ -24,6 +26,17 @@ _FAR = 20_000
 _FINITE, _FINITE_ERROR = 3.97e-3, 3e-5
 _BALL, _ANGLE = 50.0, 60.0  # mm, degrees
 _LAYERS = (3.0, 1.0, 1 / 3)  # thickness over the radius of contact
+# Tools on a body of six radii of contact, in three dimensions.
+_SMALL = {"shape": "cylinder", "radius": "6 mm", "height": "5 mm", "fixed": "bottom"}
+_TOOLS: dict[str, Section] = {
+    "sphere": {"shape": "sphere", "radius": "10 mm", "depth": "0.1 mm"},
+    "cone": {"shape": "cone", "angle": "86 deg", "radius": "4 mm", "depth": "0.1 mm"},
+    "rounded cone": {"shape": "cone", "angle": "84 deg", "tip": "5 mm", "radius": "4 mm", "depth": "0.12 mm"},
+}  # fmt: skip
+_SKIN = {"name": "skin", "thickness": "0.6 mm", "young": "40 kPa", "poisson": 0.3}
+_SIZES = {"epsilon": "full", "fine": "2 mm", "coarse": "2 mm", "rim": "0.3 mm", "growth": 0.5, "degree": 2}
+# What the solver leaves of the difference between contact that is found and the same, prescribed.
+_SAME = 1e-7
 _LAYER_SOURCE = "integral equation (N. N. Lebedev, Ya. S. Ufliand 1958)"
 
 
@@ -33,6 +46,7 @@ def contact_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
         yield from _half_space(comm)
         yield from _finite(comm)
         yield from _flat(comm)
+        yield from _solid(comm)
     yield from _layers(comm, quick)
 
 
@@ -48,23 +62,20 @@ def _half_space(comm: MPI.Comm) -> Iterator[Row]:
          2 / pi * plane * tan(cone.angle) * deep**2, cone),
     )  # fmt: skip
     for name, tool, depth, force, section in tools:
-        for path in _ACCURACY:
-            record = _solved(comm, path, _cylinder(_FAR, _FAR), tool, depth)
-            yield _row(f"half-space, {name}, F of depth", path, force, known.SNEDDON, record, 1e-4)
-            radius = record.contact_radius
-            by_radius = _ball_force(section.tip, radius) if section.tip else pi / 2 * radius**2 / tan(section.angle)
-            if path == "2D":
-                yield _row(f"half-space, {name}, F of radius", path, plane * by_radius, known.SNEDDON, record, 1e-6)
+        record = _solved(comm, "2D", _cylinder(_FAR, _FAR), tool, depth)
+        yield _row(f"half-space, {name}, F of depth", "2D", force, known.SNEDDON, record, 1e-4)
+        radius = record.contact_radius
+        by_radius = _ball_force(section.tip, radius) if section.tip else pi / 2 * radius**2 / tan(section.angle)
+        yield _row(f"half-space, {name}, F of radius", "2D", plane * by_radius, known.SNEDDON, record, 1e-6)
 
 
 def _finite(comm: MPI.Comm) -> Iterator[Row]:
     """A body of 200 radii of contact is not a half-space: its surface sinks less."""
     ball, plane = Rounded(0.0, 1.0), _YOUNG / (1 - _POISSON**2)
     depth = 1e-6 / ball.tip
-    for path in _ACCURACY:
-        record = _solved(comm, path, _cylinder(200, 200), {"shape": "sphere", "radius": f"{1e3 * ball.tip} mm"}, depth)
-        force = (1 + _FINITE) * plane * _ball_force(ball.tip, ball.contact_radius(depth))
-        yield _row("body of 200 radii of contact, sphere", path, force, "meridian, by hand", record, _FINITE_ERROR)
+    record = _solved(comm, "2D", _cylinder(200, 200), {"shape": "sphere", "radius": f"{1e3 * ball.tip} mm"}, depth)
+    force = (1 + _FINITE) * plane * _ball_force(ball.tip, ball.contact_radius(depth))
+    yield _row("body of 200 radii of contact, sphere", "2D", force, "meridian, by hand", record, _FINITE_ERROR)
 
 
 def _flat(comm: MPI.Comm) -> Iterator[Row]:
@@ -78,17 +89,45 @@ def _flat(comm: MPI.Comm) -> Iterator[Row]:
             yield _row(name, path, force, known.CYLINDER_SOURCE, record, known.CYLINDER_ERROR)
 
 
+def _solid(comm: MPI.Comm) -> Iterator[Row]:
+    """Three dimensions: round tools against the meridian; a flat disc against the one that is known to touch."""
+    for name, tool in _TOOLS.items():
+        for nu in (0.3, 0.5):
+            scene = _scene(_SMALL, tool, nu)
+            yield against_meridian(comm, f"cylinder R = 6 mm, H = 5 mm, {name}, unilateral, ν = {nu:g}", scene)
+    skin = _scene(_SMALL | {"layers": [_SKIN]}, _TOOLS["sphere"], 0.45)
+    yield against_meridian(comm, "the same, skin of 0.6 mm, sphere, unilateral", skin)
+    egg = {"shape": "ellipsoid", "axes": ["9 mm", "9 mm", "6 mm"], "fixed": {"below": "-2 mm"}}
+    yield against_meridian(comm, "ellipsoid, sphere, unilateral, ν = 0.45", _scene(egg, _TOOLS["sphere"], 0.45))
+    for nu in (0.3, 0.5):
+        disc = {"shape": "disc", "radius": "1 mm", "depth": "0.1 mm"}
+        found, known_one = (
+            solve(comm, "3D", _scene(_SMALL, disc | {"contact": contact}, nu), _SIZES)
+            for contact in ("unilateral", "frictionless")
+        )
+        yield Row(
+            f"disc that lifts off nowhere, on one mesh, ν = {nu:g}", "3D", known_one[0], "frictionless, prescribed",
+            found[0], _SAME, 0.0, found[2],
+        )  # fmt: skip
+
+
+def _scene(body: Section, tool: Section, poisson: float) -> Section:
+    return {
+        "body": body, "material": {"young": f"{_YOUNG} Pa", "poisson": poisson},
+        "probe": {"contact": "unilateral"} | tool,
+    }  # fmt: skip
+
+
 def _layers(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
     """Layers on a rigid base, from three times as thick as contact is in radius to a third of that."""
     ball = Rounded(0.0, _BALL * 1e-3)
     for nu in (_POISSON,) if quick else (_POISSON, 0.45, 0.5):
         for thick in _LAYERS[-1:] if quick else _LAYERS:
             depth, force = layer_contact(ball.slope, 1e-3, thick * 1e-3, nu)
-            for path in _ACCURACY:
-                body = _cylinder(1 + 20 * max(thick, 0.5), thick)
-                record = _solved(comm, path, body, {"shape": "sphere", "radius": f"{_BALL} mm"}, depth, nu)
-                name = f"layer on a rigid base, sphere, a/h = {1 / thick:.2g}, ν = {nu:g}"
-                yield _row(name, path, force * _YOUNG / (1 - nu**2), _LAYER_SOURCE, record, 1e-6)
+            body = _cylinder(1 + 20 * max(thick, 0.5), thick)
+            record = _solved(comm, "2D", body, {"shape": "sphere", "radius": f"{_BALL} mm"}, depth, nu)
+            name = f"layer on a rigid base, sphere, a/h = {1 / thick:.2g}, ν = {nu:g}"
+            yield _row(name, "2D", force * _YOUNG / (1 - nu**2), _LAYER_SOURCE, record, 1e-6)
 
 
 def _ball_force(radius: float, contact: float) -> float:

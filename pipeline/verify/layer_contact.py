@@ -17,7 +17,7 @@ import numpy as np
 from pipeline.arrays import FloatArray
 
 # Gauss points along the radius, over a quarter of a turn, and along ξ h up to where 1 - L is below 1e-16.
-_RADIAL, _TURN, _WAVES, _LAST = 64, 64, 400, 24.0
+_RADIAL, _TURN, _WAVES, LAST = 64, 64, 400, 24.0
 
 
 def layer_contact(
@@ -41,8 +41,12 @@ def layer_contact(
 
 def _kernel(x: FloatArray, t: FloatArray, thickness: float, poisson: float) -> FloatArray:
     nodes, weights = np.polynomial.legendre.leggauss(_WAVES)
-    s, w = _LAST * (nodes + 1) / 2, _LAST * weights / 2
-    kappa = 3 - 4 * poisson
-    layer = (2 * kappa * np.sinh(2 * s) - 4 * s) / (2 * kappa * np.cosh(2 * s) + 1 + kappa**2 + 4 * s**2)
-    waves = (1 - layer) * w / thickness
+    s, w = LAST * (nodes + 1) / 2, LAST * weights / 2
+    waves = (1 - layer_share(s, poisson)) * w / thickness
     return np.asarray((np.cos(np.outer(x, s / thickness)) * waves) @ np.cos(np.outer(s / thickness, t)))
+
+
+def layer_share(s: FloatArray, poisson: float) -> FloatArray:
+    """Return L at s = ξ h: how much a layer sinks under a wave of pressure, in units of what a half-space does."""
+    kappa = 3 - 4 * poisson
+    return np.asarray((2 * kappa * np.sinh(2 * s) - 4 * s) / (2 * kappa * np.cosh(2 * s) + 1 + kappa**2 + 4 * s**2))

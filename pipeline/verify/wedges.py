@@ -1,0 +1,79 @@
+"""A wedge that is as long as its body, between planes along which tissue slides: contact in plane strain."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import radians, tan
+
+import numpy as np
+from mpi4py import MPI
+
+from pipeline.mesh.distribute import distribute
+from pipeline.mesh.generate import MeshArrays
+from pipeline.mesh.of_case import mesh_arrays
+from pipeline.run.meshing import on_first_rank
+from pipeline.run.problem import solve_problem, tool_of
+from pipeline.scene.model import FREE, MIRROR
+from pipeline.solve.contact.problem import ContactProblem
+from pipeline.solve.spaces import Spaces
+from pipeline.study.load import parse
+from pipeline.study.sweep import Case
+from pipeline.verify.layer_wedge import layer_wedge
+from pipeline.verify.row import Row
+
+_YOUNG, _ANGLE = 10e3, 80.0
+# Half the width of contact and the strip's length along the wedge (m); the strip's half width, in thicknesses beyond
+# contact, where nothing is left of what the wedge does.
+_HALF, _LENGTH, _BESIDE = 1e-3, 1.25e-3, 8.0
+_SOURCE = "integral equation of plane strain"
+_QUARTER = ("x", "y")
+
+
+def wedge_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
+    """Yield the forces per length of wedges on strips, as they are solved; ``quick`` leaves one; collective."""
+    scenes = [(3.0, 0.3)] if quick else [(thick, nu) for thick in (3.0, 1.0, 0.5) for nu in (0.0, 0.3, 0.5)]
+    for thick, nu in scenes:
+        reference, value, bar = strip(comm, thick, nu)
+        name = f"strip on a rigid base, wedge, plane strain, b/h = {1 / thick:.2g}, ν = {nu:g}: F per length"
+        yield Row(name, "3D", reference, _SOURCE, value, bar)
+
+
+def strip(comm: MPI.Comm, thick: float, poisson: float) -> tuple[float, float, float]:
+    """Return F for each length (N/m) of a wedge on a strip ``thick`` half widths of contact thick; collective.
+
+    That of the integral equation first, then that of elements in three dimensions and its bar.
+    """
+    depth, share = layer_wedge(1 / tan(radians(_ANGLE)), _HALF, thick * _HALF, poisson)
+    case = _case(thick, depth, poisson)
+    body = distribute(comm, on_first_rank(comm, lambda: _held_apart(mesh_arrays(case, _QUARTER))))
+    with Spaces(body) as spaces, ContactProblem(spaces, tool_of(case), case.element) as problem:
+        found = solve_problem(case, problem, estimate=True)
+    return _YOUNG / (1 - poisson**2) * share, found.reaction[2] / _LENGTH, found.bar
+
+
+def _case(thick: float, depth: float, poisson: float) -> Case:
+    """Return a case whose wedge ends with its body, which a study file may not ask for."""
+    width = 2e3 * _HALF * (2 + _BESIDE * thick)
+    case = parse({
+        "body": {
+            "shape": "box", "size": [f"{1e3 * _LENGTH} mm", f"{width} mm", f"{1e3 * thick * _HALF!r} mm"],
+            "fixed": "bottom",
+        },
+        "material": {"young": f"{_YOUNG} Pa", "poisson": poisson},
+        "probe": {
+            "shape": "wedge", "angle": f"{_ANGLE} deg", "length": f"{800 * _LENGTH} mm", "depth": f"{depth!r} m",
+            "contact": "unilateral",
+        },
+        "mesh": {
+            "epsilon": "full", "fine": f"{500 * thick * _HALF!r} mm", "coarse": "20 mm", "rim": "0.1 mm",
+            "growth": 0.3, "degree": 2,
+        },
+    }).case(())  # fmt: skip
+    return replace(case, probe=case.probe.model_copy(update={"length": _LENGTH}))
+
+
+def _held_apart(arrays: MeshArrays) -> MeshArrays:
+    """Return the quarter with its end made a plane of symmetry, too."""
+    free, plane = arrays.facets[FREE], MIRROR["x"]
+    at_end = np.isclose(arrays.points[free][..., 0], _LENGTH / 2, rtol=1e-6).all(axis=1)
+    facets = {FREE: free[~at_end], plane: np.vstack([arrays.facets[plane], free[at_end]])}
+    return replace(arrays, facets=arrays.facets | facets)
