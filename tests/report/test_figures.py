@@ -62,6 +62,14 @@ def test_words_on_the_figure(tmp_path):
         assert word in text
 
 
+def test_the_papers_claim_stands_beside_bodies_that_are_cut_free_alone(tmp_path):
+    def drawn(outside):
+        data = dataset(mesh={"epsilon": EPSILONS, "outside": outside})
+        return draw(data, tmp_path / "a", ["svg"])[0].read_text().count("paper: 80 %")
+
+    assert [drawn(outside) for outside in (["free", "fixed"], ["coarse", "fixed"])] == [1, 0]
+
+
 def test_a_title_is_text_whatever_stands_in_it(tmp_path):
     data = dataset(mesh={"epsilon": EPSILONS}).assign_attrs(title="a < b & $c_x$ costs $5")
     assert "a &lt; b &amp; $c_x$ costs $5" in draw(data, tmp_path / "a", ["svg"])[0].read_text()
