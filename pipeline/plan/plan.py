@@ -82,6 +82,8 @@ def ask_for_exact(plan: Plan) -> Plan:
         if case.absence:
             keys.append(ABSENT)
             continue
+        if image := plan.images.get(case.index):
+            case = plan.study.case(image.of)  # noqa: PLW2901
         enough = max(accuracy, EXACT_OF_SLIT) if case.probe.slit else accuracy
         key = reference_key(case, enough)
         keys.append(key)

@@ -3,10 +3,12 @@
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
+from pipeline.plan.images import Image, image_key
 from pipeline.plan.key import case_key, digest
 from pipeline.plan.steps import OperatorStep, Solve, mesh_steps
 from pipeline.plan.symmetry import is_round, model_planes
 from pipeline.plan.work import Plan, Struck
+from pipeline.shapes.arrays import FloatArray
 
 # Fewer Poisson's ratios than this are solved one by one: a basis needs about five solutions itself.
 _FEWEST_RATIOS = 8
@@ -33,6 +35,32 @@ def strike_scaled(plan: Plan) -> Plan:
     """F is proportional to Young's modulus and to the depth: cases that differ in them only are solved once."""
     reason = _OF_STRESS_ALONE if any(solve.case.probe.is_unilateral for solve in plan.solves) else ""
     return _rekeyed(plan, "scaling", strike_scaled, lambda case: case_key(case, folded=True, scaled=True), reason)
+
+
+def strike_images(plan: Plan) -> Plan:
+    """Places that are each other's image, mirrored or turned about the body's axis, are solved once."""
+    first: dict[str, tuple[Solve, FloatArray]] = {}
+    key: dict[str, str] = {}
+    images: dict[tuple[int, ...], Image] = {}
+    for solve in plan.solves if _sweeps_places(plan) else ():
+        found = image_key(solve.case, scaled="scaling" in plan.used)
+        if found is None:
+            continue
+        text, matrix = found
+        other, there = first.setdefault(text, (solve, matrix))
+        if other is not solve:
+            key[solve.key] = other.key
+            image = Image(other.case.index, tuple(map(tuple, (matrix.T @ there).tolist())))
+            images |= dict.fromkeys(solve.serves, image)
+    solves = tuple(replace(solve, key=key.get(solve.key, solve.key)) for solve in plan.solves)
+    plan = replace(plan, solves=solves, keys=tuple(key.get(k, k) for k in plan.keys), images=images)
+    return _merged(plan, "images", _reason(strike_images))
+
+
+def _sweeps_places(plan: Plan) -> bool:
+    """Tell whether a tool of the plan's study stands in several places, or in several directions."""
+    found = {(probe.at, probe.axis, getattr(probe, "direction", None)) for probe in plan.study.probes}
+    return len(found) > 1
 
 
 def use_axisymmetry(plan: Plan) -> Plan:
@@ -103,6 +131,7 @@ REDUCTIONS: dict[str, Callable[[Plan], Plan]] = {
     "duplicates": strike_duplicates,
     "full": strike_past_body,
     "scaling": strike_scaled,
+    "images": strike_images,
     "axisymmetric": use_axisymmetry,
     "symmetry": use_symmetry,
     "sharing": share_meshes,

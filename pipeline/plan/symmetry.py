@@ -33,7 +33,7 @@ def is_round(case: Case) -> bool:
     if probe.motion == "all" or half_plane is None or case.is_closed:
         return False
     upright = frame.is_upright and frame.point[:2] == _ON_AXIS and case.travel[:2] == _ON_AXIS
-    is_same = probe.is_round and body.support.is_round()
+    is_same = probe.is_round and is_body_round(body)
     is_whole = not case.is_truncated or not half_plane.is_curved
     return upright and is_same and is_whole and not _is_held_below_stiffer(case)
 
@@ -52,16 +52,29 @@ def _is_held_below_stiffer(case: Case) -> bool:
     )
 
 
+def body_planes(body: Body) -> tuple[str, ...]:
+    """Return the planes in which a body, its support and what is in it are their own mirror images."""
+    held = {*body.mirror_planes()} & {*body.support.mirror_planes()}
+    # An inclusion is its own image, or there is no symmetry: pairs of images are not looked for.
+    return tuple(
+        plane
+        for number, plane in enumerate(PLANES)
+        if plane in held and all(inclusion.at[number] == 0.0 for inclusion in body.inclusion)
+    )
+
+
+def is_body_round(body: Body) -> bool:
+    """Tell whether a body, its support and what is in it are the same all round the z axis."""
+    return body.half_plane() is not None and body.support.is_round()
+
+
 @lru_cache(_MANY)
 def _geometry(body: Body, probe: Probe) -> tuple[str, ...]:
-    frame = probe.frame_on(body)
-    held = {*body.mirror_planes()} & {*body.support.mirror_planes()}
+    frame, held = probe.frame_on(body), body_planes(body)
     found = []
     for number, (plane, normal) in enumerate(PLANES.items()):
         along, across = (sum(n * t for n, t in zip(normal, unit, strict=True)) for unit in (frame.along, frame.across))
         upright = frame.point[number] == frame.axis[number] == 0.0
-        # An inclusion is its own image, or there is no symmetry: pairs of images are not looked for.
-        upright = upright and all(inclusion.at[number] == 0.0 for inclusion in body.inclusion)
         if plane in held and upright and probe.is_mirrored(along, across):
             found.append(plane)
     return tuple(found)

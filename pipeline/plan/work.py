@@ -1,8 +1,10 @@
 """The work that a study needs, as a value that reductions make smaller, each with its reason."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from pipeline.plan.cost import CostModel
+from pipeline.plan.images import Image
 from pipeline.plan.steps import MeshStep, Solve, mesh_steps
 from pipeline.study.sweep import Study
 
@@ -28,7 +30,7 @@ class Plan:
     ``used`` are the reductions that had their turn, whether they found work to strike out or not. ``stored`` are the
     keys that were on record; ``shared`` says that solves share meshes and assembly, ``reuse`` that
     they begin from their neighbours' solutions; ``cost`` estimates what steps take. Of a plan that is one shard's,
-    ``part`` are the keys that are its own.
+    ``part`` are the keys that are its own. ``images`` says, by index, of which other case a case is the image.
     """
 
     study: Study
@@ -42,6 +44,7 @@ class Plan:
     reuse: bool = False
     cost: CostModel = field(default_factory=CostModel)
     part: frozenset[str] | None = None
+    images: Mapping[tuple[int, ...], Image] = field(default_factory=dict)
 
     @property
     def meshes(self) -> tuple[MeshStep, ...]:

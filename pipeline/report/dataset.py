@@ -12,6 +12,7 @@ import xarray as xr
 
 from pipeline import __version__
 from pipeline.files import atomic
+from pipeline.plan.images import Image
 from pipeline.plan.key import digest
 from pipeline.plan.plan import Plan
 from pipeline.quantities import attributes, quantity_of
@@ -44,7 +45,10 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     """Arrange ``records`` (by key) as the dataset of the plan's study; ``run`` adds attributes of the run."""
     study = plan.study
     dims = tuple(axis.name for axis in study.axes)
-    flat = [_scaled(records.get(key), case) or absent(case) for key, case in zip(plan.keys, study.cases(), strict=True)]
+    flat = [
+        _imaged(_scaled(records.get(key), case), plan.images.get(case.index)) or absent(case)
+        for key, case in zip(plan.keys, study.cases(), strict=True)
+    ]
 
     def array(values: Any, dtype: Any) -> np.ndarray:
         return np.array(values, dtype=dtype).reshape(study.shape)
@@ -148,6 +152,14 @@ def _scaled(record: Record | None, case: Case) -> Record | None:
         record, force=nan, force_vector=(nan, nan, nan), energy=nan, energy_release=nan, max_strain=nan, balance=nan,
         contact_area=nan, contact_radius=nan,
     )  # fmt: skip
+
+
+def _imaged(record: Record | None, image: Image | None) -> Record | None:
+    """Return the record of the image of a case's place for the case itself."""
+    if record is None or image is None or not record.is_ok:
+        return record
+    vector, bars = image.vector(record.force_vector), image.bars(record.force_vector_error)
+    return replace(record, origin="image", force_vector=vector, force_vector_error=bars)
 
 
 def _frame(case: Case) -> Frame | None:

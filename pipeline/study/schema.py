@@ -169,7 +169,8 @@ class Solving(Section):
 
 
 REDUCTIONS = (
-    "duplicates", "full", "scaling", "axisymmetric", "symmetry", "sharing", "reuse", "reduced", "stored", "all",
+    "duplicates", "full", "scaling", "images", "axisymmetric", "symmetry", "sharing", "reuse", "reduced", "stored",
+    "all",
 )  # fmt: skip
 
 

@@ -200,6 +200,11 @@ class Study:
         return solve
 
     @cached_property
+    def probes(self) -> tuple[Probe, ...]:
+        """The probes, with every value that is swept of them."""
+        return tuple(probe for probe in self.sections["probe"] if isinstance(probe, Probe))
+
+    @cached_property
     def planning(self) -> Planning:
         """The planning section, which is not swept."""
         (planning,) = self.sections["plan"]

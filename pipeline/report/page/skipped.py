@@ -13,6 +13,7 @@ _ORIGINS = {
     "symmetric": "solved on a half or a quarter of the body",
     "axisymmetric": "solved on the meridian of a round scene",
     "scaled": "F of another case, in proportion to Young's modulus and depth",
+    "image": "F of another place, of which this one is the image",
     "reduced": "from a reduced basis in Poisson's ratio, with a bound on the error",
     "stored": "read back from the case store",
 }

@@ -1,0 +1,79 @@
+"""Places that are images of each other on one body: mirrored in its planes, or turned about its axis.
+
+The force on one is the image of the force on the other.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+from math import hypot
+from typing import Any
+
+from pipeline.plan.key import case_key, digest
+from pipeline.plan.symmetry import body_planes, is_body_round
+from pipeline.shapes.arrays import FloatArray, np
+from pipeline.study.sweep import Case
+
+# Places that differ by less than this, in units of the body, are the same; so are directions.
+_DIGITS = 9
+_SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class Image:
+    """The index of the case that is solved instead, and the matrix (3, 3), by rows, that takes its vectors here."""
+
+    of: tuple[int, ...]
+    rows: tuple[tuple[float, ...], ...]
+
+    def vector(self, values: tuple[float, float, float]) -> tuple[float, float, float]:
+        """Return the image of a vector."""
+        x, y, z = (sum(t * v for t, v in zip(row, values, strict=True) if abs(t) > _SAME) for row in self.rows)
+        return x, y, z
+
+    def bars(self, values: tuple[float, float, float]) -> tuple[float, float, float]:
+        """Return the bars on the components of the image: what all that a component is made of may be off by."""
+        x, y, z = (sum(abs(t) * v for t, v in zip(row, values, strict=True) if abs(t) > _SAME) for row in self.rows)
+        return x, y, z
+
+
+def image_key(case: Case, *, scaled: bool) -> tuple[str, FloatArray] | None:
+    """Return a key that images have in common, and the matrix (3, 3) that takes the case to where they are compared.
+
+    ``scaled`` leaves out what F is proportional to. None where no images are looked for: on bodies without symmetry,
+    and of tools whose stiffness is asked for.
+    """
+    if case.probe.motion == "all":
+        return None
+    found = max(_compared(case), key=lambda pair: pair[0], default=None)
+    if found is None:
+        return None
+    place, matrix = found
+    nowhere: dict[str, Any] = {"at": (0.0, 0.0), "axis": None}
+    nowhere |= {"direction": (1.0, 0.0, 0.0)} if hasattr(case.probe, "direction") else {}
+    elsewhere = replace(case, probe=case.probe.model_copy(update=nowhere))
+    return digest("\n".join([case_key(elsewhere, scaled=scaled), str(case.is_full), str(place)])), matrix
+
+
+def _compared(case: Case) -> Iterator[tuple[tuple[float, ...], FloatArray]]:
+    """Yield every image of a case's place, as numbers, with the matrix that takes the case there."""
+    probe, frame, extent = case.probe, case.frame, case.body.extent
+    along = (0.0, 0.0, 0.0) if probe.is_round else frame.along
+    turn, planes = np.eye(3), body_planes(case.body)
+    if is_body_round(case.body):
+        level = [v[:2] for v in (frame.point, frame.axis, along) if hypot(*v[:2]) > _SAME * extent]
+        if level:
+            x, y = (c / hypot(*level[0]) for c in level[0])
+            turn = np.array([[x, y, 0.0], [-y, x, 0.0], [0.0, 0.0, 1.0]])
+        planes = ("y",)
+    if not planes:
+        return
+    # A mirror turns a tool's length and breadth into a left hand: they must be their own image.
+    signs = [(-1.0, 1.0) if plane in planes and probe.is_mirrored(0.0, 1.0) else (1.0,) for plane in ("x", "y")]
+    is_pushed = case.travel == tuple(probe.depth * c for c in frame.axis) and probe.slit is None
+    turns_round = is_pushed and probe.is_mirrored(1.0, 0.0) and probe.is_mirrored(0.0, 1.0)
+    for x, y in product(*signs):
+        matrix = np.diag([x, y, 1.0]) @ turn
+        for sign in (1.0, -1.0) if turns_round else (1.0,):
+            vectors = (np.array(frame.point) / extent, frame.normal, frame.axis, sign * np.array(along))
+            yield tuple(float(c) for v in vectors for c in np.round(matrix @ np.array(v), _DIGITS) + 0.0), matrix
