@@ -95,6 +95,10 @@ _RESULTS = (
              "F_exact"),
     Quantity("force_exact_error", "1", "relative error bar (95 %) on force_exact", "± F_exact", in_per_cent=True),
     Quantity("accuracy", "1", "F / F_exact", "F/F_exact"),
+    Quantity("compliance", "m-1", "what the mesh adds to the compliance E d / F of the body: 1/F = 1/F_exact + c/(E d)",
+             "c", "added compliance c"),
+    Quantity("compliance_error", "m-1", "error bar on compliance, of the bars of both forces", "± c"),
+    Quantity("compliance_message", "", "why compliances do not add"),
     Quantity("speedup", "1", "time of the full-order case over time of this case", "speed-up",
              "speed-up $t_{full}/t$"),
     Quantity("contact_area", "m2", "area in contact, of unilateral contact, projected along the probe's axis", "area",
@@ -146,7 +150,7 @@ MESH_DIMENSIONS = tuple(quantity.name for quantity in _MESH)
 # Factor and unit of what people do not read in SI.
 _READ = {
     "m": (1e3, "mm"), "Pa": (1e-3, "kPa"), "N": (1e3, "mN"), "J": (1e6, "µJ"), "bytes": (1e-6, "MB"),
-    "m2": (1e6, "mm²"), "rad": (180 / pi, "°"), "1": (1.0, ""),
+    "m2": (1e6, "mm²"), "m-1": (1.0, "1/m"), "rad": (180 / pi, "°"), "1": (1.0, ""),
 }  # fmt: skip
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.quantities import MESH_DIMENSIONS
+from pipeline.report.compliance import Against, compliance
 from pipeline.report.guide import Guide, guide
 from pipeline.report.pareto import front
 from pipeline.report.table import words
@@ -60,6 +61,14 @@ class Accessor:
         See :func:`pipeline.report.guide.guide`; printed, the guide is the text of ``epsmesh guide``.
         """
         return guide(self._dataset, accuracy, budget)
+
+    def compliance(self, against: Against = "exact") -> xr.Dataset:
+        """Return what each mesh adds to the compliance of the body, c (1/m), with its error bar and, where there is
+        none, why: 1/F = 1/F_exact + c / (E d), or F_max ``against`` "full".
+
+        See :func:`pipeline.report.compliance.compliance`.
+        """
+        return compliance(self._dataset, against)
 
     def pareto(self) -> "pd.DataFrame":
         """Return, scene by scene, the cases that no other case of the scene beats in both time and error.

@@ -14,6 +14,7 @@ import xarray as xr
 
 from pipeline.report import guide_text
 from pipeline.report.guideline import Guideline
+from pipeline.report.sinking import tools
 from pipeline.report.table import DatasetError, arrange
 from pipeline.report.verdict import choose, judge, keeps, most_accurate
 from pipeline.units import parse_quantity
@@ -43,16 +44,19 @@ def guide(dataset: xr.Dataset, accuracy: str | float | None = None, budget: str 
     if table.lost.all():
         raise DatasetError(f"no case can be judged: {_listed(Counter(table.why.ravel()))}")
     verdicts = tuple(judge(table, row) for row in range(len(table.settings)))
-    keeping = [v for v in verdicts if keeps(v, verdicts, wanted, corrected=False) and v.seconds <= seconds]
+    keeping = [v for v in verdicts if keeps(v, verdicts, wanted, "force") and v.seconds <= seconds]
     return Guide(
         str(dataset.attrs.get("title", "")), wanted, seconds, int((~table.lost).sum()),
         tuple((name, len(np.unique(labels))) for name, labels in table.axes.items()),
-        verdicts, choose(verdicts, wanted, seconds), choose(verdicts, wanted, seconds, corrected=True),
-        most_accurate(verdicts, seconds), most_accurate(verdicts, seconds, corrected=True),
+        verdicts, choose(verdicts, wanted, seconds), choose(verdicts, wanted, seconds, "ratio"),
+        most_accurate(verdicts, seconds), most_accurate(verdicts, seconds, "ratio"),
+        choose(verdicts, wanted, seconds, "tools"), most_accurate(verdicts, seconds, "tools"),
         min(keeping, key=lambda v: v.dofs, default=None) if isfinite(wanted) else None,
         _counts(table.why[:, table.lost]), _counts(table.why[:, ~table.lost]),
         tuple(scene for scene, lost in zip(table.scenes, table.lost, strict=True) if lost),
         bool(np.isfinite(table.share).any()), _timing(dataset),
+        tools(case for case, one in zip(table.cases, table.sinking, strict=True) if case and not one.why_not),
+        _counts(np.array([one.why_not for one in table.sinking])),
     )  # fmt: skip
 
 

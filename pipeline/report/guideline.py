@@ -13,9 +13,11 @@ class Guideline:
     """The answer for ``accuracy`` (relative) and ``budget`` (s a case); infinite where not asked for.
 
     ``answer`` is the chosen setting, ``corrected`` the one with F_exact ≈ F / r, ``best`` and ``best_corrected`` the
-    most accurate there are within the budget; None if there is none. ``lean`` has the fewest unknowns of those
+    most accurate there are within the budget; ``carried`` and ``best_carried`` are those with the best law for other
+    tools on the same tissue; None if there is none. ``lean`` has the fewest unknowns of those
     that keep the accuracy. ``left_out`` counts the scenes lost to every setting, by reason, and ``unjudged`` the cases
-    that keep settings from being judged.
+    that keep settings from being judged. ``tools`` describes those that laws were fitted to; ``no_law`` counts the
+    scenes in which no law adds compliances, by reason.
     """
 
     title: str
@@ -28,12 +30,16 @@ class Guideline:
     corrected: Verdict | None
     best: Verdict | None
     best_corrected: Verdict | None
+    carried: Verdict | None
+    best_carried: Verdict | None
     lean: Verdict | None
     left_out: tuple[tuple[str, int], ...]
     unjudged: tuple[tuple[str, int], ...]
     lost: tuple[Labels, ...]
     has_full: bool
     timing: str
+    tools: tuple[str, ...] = ()
+    no_law: tuple[tuple[str, int], ...] = ()
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the table behind the answer, a row for each setting, in SI units; full order is ε = infinity."""
@@ -41,7 +47,7 @@ class Guideline:
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data, in SI units: dictionaries, lists, texts and numbers."""
-        chosen = ("answer", "corrected", "best", "best_corrected", "lean")
+        chosen = ("answer", "corrected", "best", "best_corrected", "carried", "best_carried", "lean")
         rows = dict(zip(map(id, self.verdicts), self.rows(), strict=True))
         return {
             "title": self.title, "accuracy": self.accuracy, "budget": self.budget, "scenes": self.scenes,
@@ -52,6 +58,7 @@ class Guideline:
             },
             "settings": list(rows.values()), "left_out": dict(self.left_out), "lost": list(self.lost),
             "unjudged": dict(self.unjudged), "timing": self.timing,
+            "tools": list(self.tools), "no_law": dict(self.no_law),
         }  # fmt: skip
 
     def of_each_outside(self) -> dict[str, tuple[Verdict | None, Verdict | None]]:
@@ -62,18 +69,27 @@ class Guideline:
             for name in names
         }
         return {
-            name: (choose(group, self.accuracy, self.budget), choose(group, self.accuracy, self.budget, corrected=True))
+            name: (choose(group, self.accuracy, self.budget), choose(group, self.accuracy, self.budget, "ratio"))
             for name, group in groups.items()
         }
 
 
 def _row(verdict: Verdict, guideline: Guideline) -> dict[str, Any]:
-    plain = {k: v for k, v in verdict.__dict__.items() if k not in ("labels", "mesh", "spread", "correction")}
+    plain = {k: v for k, v in verdict.__dict__.items() if k not in ("labels", "mesh", "spread", "correction", "laws")}
     spread = verdict.spread
     keeps = verdict.is_judged and verdict.error <= guideline.accuracy and verdict.seconds <= guideline.budget
     return {
         **verdict.labels, "mesh": verdict.mesh, **plain, "judged": verdict.is_judged, "keeps": bool(keeps),
         "ratio_min": spread.least, "ratio_max": spread.most, "ratio_spread": spread.width,
         "ratio_spread_relative": spread.relative, "ratio_spread_over": dict(spread.over),
-        "correction": asdict(verdict.correction),
+        "correction": asdict(verdict.correction), "laws": _laws(verdict),
     }  # fmt: skip
+
+
+def _laws(verdict: Verdict) -> dict[str, Any]:
+    laws, best = verdict.laws, verdict.laws.best
+    rows = {
+        law.name: {**{k: v for k, v in asdict(law).items() if k != "name"}, "carried": dict(law.carried)}
+        for law in laws.laws
+    }
+    return {**rows, "bar": laws.bar, "best": best.name if best else None}

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.quantities import MESH_DIMENSIONS, symbol, write
+from pipeline.report.sinking import LOADS, PLACES, Sinking
 from pipeline.study.load import parse
 from pipeline.study.problems import StudyError
 from pipeline.study.sweep import Case, Study
@@ -26,8 +27,9 @@ class DatasetError(Exception):
 class Table:
     """Mesh settings (rows) against scenes (columns); all arrays have that shape, NaN where ``why`` is not empty.
 
-    ``ratio`` is F/F_exact and ``bar`` what the error bars of both add to its distance from 1; ``share`` is F/F_max;
-    ``seconds`` what a case costs alone, ``dofs`` and ``cells`` those of the whole body.
+    ``ratio`` is F/F_exact and ``bar`` what the error bars of both add to its distance from 1, ``force_bar`` and
+    ``exact_bar`` are those relative bars; ``share`` is F/F_max; ``seconds`` what a case costs alone, ``dofs`` and
+    ``cells`` those of the whole body.
     """
 
     settings: tuple[Labels, ...]
@@ -37,12 +39,18 @@ class Table:
     exact: np.ndarray
     ratio: np.ndarray
     bar: np.ndarray
+    force_bar: np.ndarray
+    exact_bar: np.ndarray
     share: np.ndarray
     seconds: np.ndarray
     dofs: np.ndarray
     cells: np.ndarray
     why: np.ndarray
     meshes: tuple[Labels, ...]  # element sizes of each setting: what is swept and what is not
+    cases: tuple[Case | None, ...]  # of each scene, with some mesh; None if the study does not tell
+    sinking: tuple[Sinking, ...]  # of each scene's tool
+    tools: tuple[str, ...]  # the axes that make a tool what it is, and
+    loads: tuple[str, ...]  # those that only say how far it moves
 
     @cached_property
     def is_judged(self) -> np.ndarray:
@@ -83,14 +91,20 @@ def arrange(dataset: xr.Dataset) -> Table:
     why = _reasons(matrix("status"), matrix("message"), matrix("force_error"), matrix("force_exact"))
     blank = np.where(why == "", 0.0, np.nan)
     force, exact = matrix("force") + blank, matrix("force_exact") + blank
-    bars = matrix("force_error") + matrix("force_exact_error")
+    force_bar, exact_bar = matrix("force_error") + blank, matrix("force_exact_error") + blank
     counts = np.indices([dataset.sizes[d] for d in columns]).reshape(len(columns), len(scenes))
     study = study_of(dataset)
+    cases = tuple(case_at(dataset, study, labels, "mesh") for labels in scenes)
+    of_probe = (
+        {axis.name for axis in study.axes if axis.section == "probe" and axis.name in columns} if study else set()
+    )
     return Table(
         tuple(settings[i] for i in keep), tuple(scenes), dict(zip(columns, counts, strict=True)), force, exact,
-        force / exact, force / exact * bars, matrix("force_ratio") + blank, matrix("time_total") + blank,
-        matrix("dofs") + blank, matrix("cells") + blank, why,
+        force / exact, force / exact * (force_bar + exact_bar), force_bar, exact_bar, matrix("force_ratio") + blank,
+        matrix("time_total") + blank, matrix("dofs") + blank, matrix("cells") + blank, why,
         tuple(_mesh(dataset, study, settings[i]) for i in keep),
+        cases, tuple(Sinking.of(case) for case in cases), tuple(sorted(of_probe - LOADS - PLACES)),
+        tuple(sorted(of_probe & LOADS)),
     )  # fmt: skip
 
 
@@ -143,20 +157,32 @@ def _reasons(status: np.ndarray, message: np.ndarray, bar: np.ndarray, exact: np
     return why
 
 
+def case_at(dataset: xr.Dataset, study: Study | None, labels: Labels, free: str = "") -> Case | None:
+    """Return the case of ``study`` that has the ``labels``, the first of those that differ in the section ``free``.
+
+    None if there is none, or if the labels do not tell.
+    """
+    if study is None:
+        return None
+    # Of a dataset that somebody has selected from, a label may be left as a coordinate without dimension.
+    known = {name: _plain(dataset[name].values[()]) for name in dataset.coords if dataset[name].ndim == 0}
+    known |= {name: _plain(value) for name, value in labels.items()}
+    index = []
+    for axis in study.axes:
+        if axis.section != free and known.get(axis.name) not in axis.labels:
+            return None
+        index.append(0 if axis.section == free else axis.labels.index(known[axis.name]))
+    return study.case(tuple(index))
+
+
 def _mesh(dataset: xr.Dataset, study: Study | None, labels: Labels) -> Labels:
     """Return ε, outside, element sizes (m) and elements of a setting, as far as they are known; a rim left to the
     program is None.
     """
-    if study is None:
+    scene = {axis.name: axis.labels[0] for axis in study.axes if axis.section != "mesh"} if study else {}
+    case = case_at(dataset, study, scene | labels)
+    if case is None:
         return dict(labels)
-    # Of a dataset that somebody has selected from, a label may be left as a coordinate without dimension.
-    known = {name: _plain(dataset[name].values[()]) for name in dataset.coords if dataset[name].ndim == 0} | labels
-    index = []
-    for axis in study.axes:
-        if axis.section == "mesh" and known.get(axis.name) not in axis.labels:
-            return dict(labels)
-        index.append(axis.labels.index(known[axis.name]) if axis.section == "mesh" else 0)
-    case: Case = study.case(tuple(index))
     mesh = case.mesh
     if mesh.accuracy is not None:
         return {"accuracy": mesh.accuracy, "outside": mesh.outside}

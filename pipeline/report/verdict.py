@@ -2,12 +2,17 @@
 
 from dataclasses import dataclass, field
 from math import inf, isfinite, nan
+from typing import Literal
 
 import numpy as np
 
-from pipeline.report import correction
+from pipeline.report import correction, laws
 from pipeline.report.correction import Correction
+from pipeline.report.laws import Forces, Laws
 from pipeline.report.table import Labels, Table
+
+# What is judged: F as it stands, after division by an r taken from other scenes, or by the best law for other tools.
+Judged = Literal["force", "ratio", "tools"]
 
 
 @dataclass(frozen=True)
@@ -52,15 +57,18 @@ class Verdict:
     cells: float = nan
     spread: Spread = field(default_factory=Spread)
     correction: Correction = field(default_factory=Correction)
+    laws: Laws = field(default_factory=Laws)
 
     @property
     def is_judged(self) -> bool:
         """Whether every scene was computed with it."""
         return not self.missing and isfinite(self.error)
 
-    def error_as(self, *, corrected: bool) -> float:
-        """Return the worst error, as F stands or after division by r taken from other scenes."""
-        return self.correction.error if corrected else self.error
+    def error_of(self, judged: Judged) -> float:
+        """Return the worst error, error bars included; NaN where too few scenes tell."""
+        if judged == "tools":
+            return self.laws.best.error if self.laws.best else nan
+        return self.correction.error if judged == "ratio" else self.error
 
 
 def judge(table: Table, row: int) -> Verdict:
@@ -80,8 +88,23 @@ def judge(table: Table, row: int) -> Verdict:
         float(table.force[row, scene]), float(table.exact[row, scene]), float(table.seconds[row, use].max()),
         float(np.median(table.seconds[row, use])),
         float(table.dofs[row, use].max()), float(table.cells[row, use].max()), spread(share[row, use], axes),
-        correction.fit(ratio, bar, axes),
+        correction.fit(ratio, bar, axes), _laws(table, row, use),
     )  # fmt: skip
+
+
+def _laws(table: Table, row: int, use: np.ndarray) -> Laws:
+    """Judge the laws of one row on the scenes in ``use`` whose compliances add."""
+    use = use & np.array([not one.why_not for one in table.sinking])
+    sinking = [one for one, used in zip(table.sinking, use, strict=True) if used]
+    scale, exponent, square = (
+        np.array([getattr(one, name) for one in sinking]) for name in ("scale", "exponent", "square")
+    )
+    forces = Forces(
+        table.ratio[row, use], table.force_bar[row, use], table.exact_bar[row, use], scale / table.force[row, use],
+        exponent, square,
+    )  # fmt: skip
+    axes = {name: positions[use] for name, positions in table.axes.items()}
+    return laws.judge(forces, axes, table.tools, table.loads)
 
 
 def spread(share: np.ndarray, axes: dict[str, np.ndarray]) -> Spread:
@@ -102,27 +125,27 @@ def _alone(share: np.ndarray, axes: dict[str, np.ndarray], name: str) -> float:
 
 
 def choose(
-    verdicts: tuple[Verdict, ...], accuracy: float, budget: float = inf, *, corrected: bool = False
+    verdicts: tuple[Verdict, ...], accuracy: float, budget: float = inf, judged: Judged = "force"
 ) -> Verdict | None:
     """Return the setting to use: with the smallest ε, then the fewest unknowns; for a budget alone, the best."""
     if not isfinite(accuracy):
-        return most_accurate(verdicts, budget, corrected=corrected)
-    keeping = [v for v in verdicts if keeps(v, verdicts, accuracy, corrected=corrected) and v.seconds <= budget]
+        return most_accurate(verdicts, budget, judged)
+    keeping = [v for v in verdicts if keeps(v, verdicts, accuracy, judged) and v.seconds <= budget]
     return min(keeping, key=lambda v: (v.mesh.get("epsilon", inf), v.dofs), default=None)
 
 
-def most_accurate(verdicts: tuple[Verdict, ...], budget: float = inf, *, corrected: bool = False) -> Verdict | None:
+def most_accurate(verdicts: tuple[Verdict, ...], budget: float = inf, judged: Judged = "force") -> Verdict | None:
     """Return the judged setting with the smallest worst error whose every case takes no longer than ``budget`` s."""
-    within = [v for v in verdicts if v.is_judged and v.seconds <= budget and isfinite(v.error_as(corrected=corrected))]
-    return min(within, key=lambda v: (v.error_as(corrected=corrected), v.dofs), default=None)
+    within = [v for v in verdicts if v.is_judged and v.seconds <= budget and isfinite(v.error_of(judged))]
+    return min(within, key=lambda v: (v.error_of(judged), v.dofs), default=None)
 
 
-def keeps(verdict: Verdict, verdicts: tuple[Verdict, ...], accuracy: float, *, corrected: bool) -> bool:
+def keeps(verdict: Verdict, verdicts: tuple[Verdict, ...], accuracy: float, judged: Judged) -> bool:
     """Tell whether a setting keeps the accuracy, and every larger ε that was judged with it: not by chance."""
-    if not verdict.is_judged or not verdict.error_as(corrected=corrected) <= accuracy:
+    if not verdict.is_judged or not verdict.error_of(judged) <= accuracy:
         return False
     larger = (v for v in verdicts if v.is_judged and _is_larger(v, verdict))
-    return all(v.error_as(corrected=corrected) <= accuracy for v in larger)
+    return all(v.error_of(judged) <= accuracy for v in larger)
 
 
 def _is_larger(other: Verdict, verdict: Verdict) -> bool:

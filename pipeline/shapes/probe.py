@@ -237,6 +237,13 @@ class Probe(Section, ABC):
     def rim_distance(self, along: str, across: str, height: str, unit: float) -> str:
         """Write the distance to where contact is expected to end, as :meth:`edge_distance` does."""
 
+    # ---- on a half-space ------------------------------------------------------------------------------
+
+    @property
+    @abstractmethod
+    def force_exponent(self) -> float | None:
+        """The power of the depth that F goes with on a half-space; None if there is no such power."""
+
     # ---- sense ----------------------------------------------------------------------------------------
 
     @abstractmethod
@@ -248,6 +255,16 @@ class Punch(Probe):
     """A tool with a flat face, whose edge is where contact ends, unless it lifts off."""
 
     NOT_DRAWN = ("action", "depth", "contact", "slice", "motion")
+
+    @property
+    @abstractmethod
+    def mean_square(self) -> float:
+        """Mean square distance (m²) from the axis of where it presses a half-space, without friction."""
+
+    @property
+    def force_exponent(self) -> float | None:
+        """F is proportional to the depth, unless it holds a slit's faces apart, too."""
+        return None if self.slit else 1.0
 
     @abstractmethod
     def covers(self, points: FloatArray) -> BoolArray:

@@ -54,9 +54,15 @@ def seconds(case: Case) -> float:
     return 1.0 if case.is_full else 10 * case.mesh.epsilon * (0.5 if case.mesh.outside == "free" else 1)
 
 
+def exact_force(case: Case) -> float:
+    """F_exact (N)."""
+    return 5e-3 * case.material.young * case.probe.depth * (1 + case.material.poisson)
+
+
 def dataset(
     text: str = TEXT, ratio: Callable[[Case], float] = ratio, status: Callable[[Case], str] = lambda case: "ok",
     bar: float = BAR, seconds: Callable[[Case], float] = seconds, exact: Callable[[Case], bool] = lambda case: True,
+    exact_force: Callable[[Case], float] = exact_force,
 ) -> xr.Dataset:  # fmt: skip
     """Return the dataset of the study ``text`` with chosen F/F_exact, times, states, and scenes that have F_exact."""
     study = parse(tomllib.loads(text), file="known.toml", text=text)
@@ -64,8 +70,8 @@ def dataset(
     records = {}
     for solve in plan.solves:
         case = solve.case
-        force = 5e-3 * case.material.young * case.probe.depth * (1 + case.material.poisson)
-        content = {"young": case.material.young, "depth": case.probe.depth, "force_vector": (0.0, 0.0, force)}
+        force = exact_force(case)
+        content = {"young": case.scale.stress, "depth": case.scale.length, "force_vector": (0.0, 0.0, force)}
         if solve.is_reference:
             if exact(case):
                 records[solve.key] = Record(solve.key, "ok", force=force, force_error=EXACT_BAR, **content)

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from pipeline.report.figures.accuracy import accuracy
 from pipeline.report.figures.choose import KINDS, choose, lacks
+from pipeline.report.figures.compliance import compliance
 from pipeline.report.figures.convergence import convergence
 from pipeline.report.figures.epsilon import epsilon, ratio, speedup
 from pipeline.report.figures.exact import exact
@@ -19,7 +20,7 @@ __all__ = ["FIGURES", "KINDS", "STYLE", "choose", "draw", "figure", "lacks", "sa
 
 FIGURES: dict[str, Callable[[xr.Dataset, str, str], Figure]] = {
     "epsilon": epsilon, "exact": exact, "convergence": convergence, "accuracy": accuracy, "force": force,
-    "nothing": nothing, "ratio": ratio, "speedup": speedup,
+    "compliance": compliance, "nothing": nothing, "ratio": ratio, "speedup": speedup,
 }  # fmt: skip
 
 

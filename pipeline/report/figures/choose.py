@@ -3,10 +3,11 @@
 import numpy as np
 import xarray as xr
 
+from pipeline.report.compliance import tool_dimension
 from pipeline.report.figures.dimensions import mesh_dimensions, refinements
 
 # What can be drawn on request: the last two are parts of "epsilon".
-KINDS = ("epsilon", "exact", "convergence", "accuracy", "force", "nothing", "ratio", "speedup")
+KINDS = ("epsilon", "exact", "convergence", "accuracy", "force", "compliance", "nothing", "ratio", "speedup")
 
 
 def choose(dataset: xr.Dataset) -> list[str]:
@@ -23,6 +24,8 @@ def choose(dataset: xr.Dataset) -> list[str]:
     if has_error and any(dataset.sizes[dim] > 1 for dim in mesh_dimensions(dataset)):
         kinds.append("accuracy")
     kinds.append("force")
+    if "epsilon" in kinds and tool_dimension(dataset):
+        kinds.append("compliance")
     if has_exact and dataset["force"].dims:
         kinds.append("exact")
     return kinds
@@ -39,6 +42,7 @@ def lacks(dataset: xr.Dataset, kind: str) -> str:
         "exact": "a swept quantity, and F_exact ([solve] exact = true)",
         "convergence": "a swept mesh size, and F_exact or F_max",
         "accuracy": "swept meshes, and F_exact or F_max",
+        "compliance": "several tools and ε, the full order among them, in scenes whose compliances add",
         "force": "a case that has a force",
         "nothing": "that no case has a force",
     }

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import xarray as xr
 
 from pipeline.report.guide import guide
-from pipeline.report.guide_text import answer, cells_of, heads, in_order, number, percent, time
+from pipeline.report.guide_text import answer
+from pipeline.report.guide_words import cells_of, heads, in_order, number, percent, time
 from pipeline.report.table import DatasetError
 from pipeline.report.verdict import Verdict
 

@@ -22,6 +22,11 @@ class Cone(RoundIndenter):
         return Rounded(self.angle, self.tip)
 
     @property
+    def force_exponent(self) -> float | None:
+        """2 (A. E. H. Love) if it is sharp."""
+        return None if self.tip else 2.0
+
+    @property
     def limit(self) -> float:
         """Radius (m) of the shaft."""
         return self.radius

@@ -43,6 +43,11 @@ class Disc(Straight):
         """Length of the circle (m)."""
         return 2 * pi * self.radius
 
+    @property
+    def mean_square(self) -> float:
+        """Two thirds of the square of the radius (m²): its pressure goes like 1 / (a² - r²)^½."""
+        return 2 / 3 * self.radius**2
+
     def gap(self, body: Body, frame: Frame) -> float:
         """Return the distance (m) from the circle to the edge of the face."""
         return body.gap(frame.point) - self.radius

@@ -54,6 +54,11 @@ class Ellipse(Straight):
         h = 3 * ((a - b) / (a + b)) ** 2
         return pi * (a + b) * (1 + h / (10 + sqrt(4 - h)))
 
+    @property
+    def mean_square(self) -> float:
+        """A third of the sum of the squares of the semi-axes (m²)."""
+        return (self.axes[0] ** 2 + self.axes[1] ** 2) / 3
+
     def gap(self, body: Body, frame: Frame) -> float:
         """Return the distance (m) from the nearest point of the ellipse to the edge of the face."""
         return min(body.gap(frame.at(float(x), float(y))) for x, y in self.outline())

@@ -20,6 +20,11 @@ class Sphere(RoundIndenter):
         return Rounded(0.0, self.radius)
 
     @property
+    def force_exponent(self) -> float | None:
+        """3/2 (H. Hertz), as long as contact is small beside the ball."""
+        return 1.5
+
+    @property
     def limit(self) -> float:
         """The radius (m): tissue does not reach round the equator."""
         return self.radius

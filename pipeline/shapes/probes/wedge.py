@@ -38,6 +38,11 @@ class Wedge(Indenter):
         )  # fmt: skip
 
     @property
+    def force_exponent(self) -> float | None:
+        """None: the line load of an edge of some length goes with its depth and the logarithm of it."""
+        return None
+
+    @property
     def contact_width(self) -> float:
         """Half the width (m) of contact in the middle of the edge, on an elastic half-space."""
         return self.section.contact_width(self.depth, self.length)

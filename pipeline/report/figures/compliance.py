@@ -1,0 +1,85 @@
+"""E d / F against 1 / a: lines as far apart as the compliance that each ε adds, whatever the tool."""
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pipeline.report.compliance import sinking, tool_dimension
+from pipeline.report.figures.layout import arrange
+from pipeline.report.figures.panels import grid, panels
+from pipeline.report.figures.style import finish, look
+from pipeline.report.words import choice
+
+_PER_MM = 1e-3  # of 1/m
+_WHOLE = "whole_compliance"
+_OF_CONTACT = {"bonded": {"linestyle": "--", "markerfacecolor": "none"}}
+
+
+def compliance(dataset: xr.Dataset, title: str, warning: str) -> Figure:
+    """E d / F of tools with a known footprint, for each ε; lines: full order's, raised by one c for all of a kind."""
+    data, heading = _with_positions(dataset)
+    layout = arrange(data, (_WHOLE,), tool_dimension(dataset), flat=("epsilon",), most=(1, 3, 3))
+    figure = grid(layout, (_WHOLE,), height=2.4)
+    for panel in panels(figure, data, layout, (_WHOLE,)):
+        _draw(panel.ax, panel.data)
+        if panel.title:
+            panel.ax.set_title(panel.title)
+        if panel.is_first:
+            panel.ax.set_ylabel("$E d/F$ (1/mm)")
+        if panel.is_last:
+            panel.ax.set_xlabel(heading)
+    contacts = np.unique(data["touch"].values.astype(str))
+    bonded = "dashed: bonded" if "bonded" in contacts and len(contacts) > 1 else ""
+    finish(figure, title, "; ".join(filter(None, (bonded, layout.note))), warning)
+    return figure
+
+
+def _with_positions(dataset: xr.Dataset) -> tuple[xr.Dataset, str]:
+    """Return the dataset with E d / F and where each tool stands on the axis (1/mm), and the axis's heading.
+
+    Round flat tools stand at 1 / a, what else there is at E d / F of full order.
+    """
+    known = sinking(dataset)
+
+    def labelled(name: str) -> xr.DataArray:
+        values = [getattr(one, name) if one.exponent == 1.0 else np.nan for one in known.ravel()]
+        return xr.DataArray(np.reshape(values, known.shape), dims=dataset["force"].dims)
+
+    whole, inverse = _PER_MM * labelled("scale") / dataset["force"], _PER_MM * labelled("inverse")
+    is_round = bool(np.isfinite(inverse.where(np.isfinite(whole), 0.0)).all())
+    full = whole.where(np.isinf(dataset["epsilon"])).max("epsilon").broadcast_like(whole)
+    contact = np.array([one.contact for one in known.ravel()], dtype=object).reshape(known.shape)
+    data = dataset.assign({_WHOLE: whole, "position": inverse if is_round else full, "of_full_order": full,
+                           "touch": (dataset["force"].dims, contact)})  # fmt: skip
+    return data, "1/a (1/mm)" if is_round else "$E d/F_{max}$ (1/mm)"
+
+
+def _draw(ax: Axes, data: xr.Dataset) -> None:
+    """Draw the tools of one panel: bars of F, and full order's line raised by the mean of what is added."""
+    contacts = np.unique(data["touch"].values.astype(str))
+    order = np.argsort(data["epsilon"].values)[::-1]
+    for number, place in enumerate(order):
+        line = data.isel(epsilon=int(place))
+        for contact in contacts:
+            style = look(number) | (_OF_CONTACT.get(contact, {}) if len(contacts) > 1 else {})
+            label = choice(data["epsilon"], line["epsilon"].values[()])
+            _draw_tools(ax, line.where(line["touch"] == contact), style, label)
+    ax.set_xlim(left=0)
+
+
+def _draw_tools(ax: Axes, line: xr.Dataset, style: dict[str, str], label: str) -> None:
+    """Draw the tools of one kind of contact at one ε."""
+    x, y, full, bars = (
+        line[name].values.astype(float) for name in ("position", _WHOLE, "of_full_order", "force_error")
+    )
+    known = np.isfinite(x) & np.isfinite(y) & np.isfinite(full)
+    if not known.any():
+        return
+    x, y, full, bars = (values[known] for values in (x, y, full, bars))
+    ax.errorbar(x, y, np.nan_to_num(y * bars), label=label, capsize=2, elinewidth=0.8, **style | {"linestyle": "none"})
+    weight = full**-2.0  # relative errors of F count alike
+    along = np.argsort(x)
+    raised = full + np.sum(weight * (y - full)) / weight.sum()
+    lines = {"color": style["color"], "linestyle": style.get("linestyle", "-"), "linewidth": 0.8}
+    ax.plot(x[along], raised[along], **lines)
