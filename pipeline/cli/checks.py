@@ -25,7 +25,8 @@ def verify(
         typer.Option(
             metavar="NAME",
             help="Random scenes: design (any body and tool), proportions (cylinders), ellipses, regions (layers, "
-            "inclusions), organs, or tumours in them.",
+            "inclusions), organs, or tumours in them; of contact that is found: tools (on cylinders), contact (on "
+            "ellipsoids and layers, off the axis), wedges; slits (blades that stand in them).",
         ),
     ] = "design",
     quick: Quick = False,

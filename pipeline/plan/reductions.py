@@ -177,6 +177,7 @@ def _suits_a_basis(
     """Displacement elements depend on one parameter; and the bound is on the work of one movement, not on forces that
     several take. ``of_regions`` asks of bodies of several materials, whose parameters are too many, ``found`` of
     contact whose area changes with that parameter, ``closed`` of what is prescribed on a cut face and changes with it.
+    In a slit more is asked for than the work.
     """
     first = operator.solves[0]
     if bool(first.case.body.regions) != of_regions or first.case.probe.is_unilateral != found:
@@ -187,6 +188,7 @@ def _suits_a_basis(
         plain
         and len(values) >= _FEWEST_RATIOS
         and first.case.is_closed == closed
+        and first.case.probe.slit is None
         and first.case.movements == 1 + closed
     )
 

@@ -56,7 +56,8 @@ def meridian_problem(case: Case) -> Problem:
 def conditions_of(case: Case) -> Conditions:
     """Return what the probe of ``case`` prescribes."""
     bonded, unilateral = case.probe.contact == "bonded", case.probe.is_unilateral
-    return Conditions(bonded=bonded, unilateral=unilateral, front=_front_of(case))
+    tip = None if bonded else _tip_of(case)
+    return Conditions(bonded=bonded, unilateral=unilateral, front=_front_of(case), tip=tip)
 
 
 def tool_of(case: Case) -> Tool:
@@ -78,6 +79,15 @@ def _front_of(case: Case) -> Front | None:
         return None
     radius = _CLEAR * slit.room(case.body)
     return Front(frame.point, frame.along, slit.depth, slit.reach, radius)
+
+
+def _tip_of(case: Case) -> Front | None:
+    """Return the tip of the blade of ``case`` that stands in a slit, if it does."""
+    slit, frame = case.probe.slit, case.frame.upright
+    if slit is None:
+        return None
+    radius = _CLEAR * slit.room_at_tip(case.body)
+    return Front(frame.point, frame.along, slit.tip, slit.length / 2, radius)
 
 
 def round_tool_of(case: Case) -> RoundTool:
@@ -105,7 +115,9 @@ def loads_of(case: Case) -> Loads:
     if case.probe.motion == "all":
         return Loads.all(travel, frame.point)
     if slit := case.probe.slit:
-        return Loads.along(travel).opened(case.frame.upright.across, slit.width / 2)
+        # Along flanks that it slides on, tissue does not go with the blade.
+        pressed = Loads.along(travel) if case.probe.contact == "bonded" else Loads((), ())
+        return pressed.opened(case.frame.upright.across, slit.width / 2)
     if case.is_closed:
         return Loads.along(travel).with_far(PointForce(case.material.poisson, frame.point, case.column))
     # Across a plane of symmetry a probe slides without force along its axis, and presses without force along itself.

@@ -107,6 +107,11 @@ class Slit:
         ends = (*body.interfaces, *body.support.edges(), body.heights[0])
         return min(self.ahead, *(abs(end - top + self.depth) for end in ends))
 
+    def room_at_tip(self, body: Body) -> float:
+        """Return the distance (m) from the blade's tip to the nearest of the front, the surface and a layer's end."""
+        top = body.heights[1]
+        return min(self.ahead, self.tip, *(abs(end - top + self.tip) for end in body.interfaces))
+
 
 def _polygon(points: list[tuple[float, float]]) -> FloatArray:
     return np.array([(along, 0.0, height) for along, height in points])

@@ -25,12 +25,14 @@ class Conditions:
 
     Nothing is where contact is ``unilateral``: what touches is found, and held by those who find it. The support is
     held, and on planes of symmetry that bound the mesh so is the displacement across them. A probe that stands in a
-    slit, with that ``front``, touches both of its faces, and without bond holds them apart only.
+    slit, with that ``front``, touches both of its faces, and without bond holds them apart only: what pushes it on is
+    then at its ``tip``.
     """
 
     bonded: bool = True
     unilateral: bool = False
     front: Front | None = None
+    tip: Front | None = None
 
     @property
     def components(self) -> tuple[int, ...]:

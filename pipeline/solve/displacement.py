@@ -26,7 +26,7 @@ from pipeline.solve.linear import Level, LinearSolver, SolveError, is_direct
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.reaction import Response, reaction, sums
-from pipeline.solve.release import Release
+from pipeline.solve.release import Front, Release, Released
 from pipeline.solve.rim import plain_share
 from pipeline.solve.solution import BALANCE_LIMIT, MOST_ROUNDS, TOLERANCE, Solution, rest
 from pipeline.solve.spaces import ElasticSpace, Spaces
@@ -83,7 +83,7 @@ class DisplacementProblem:
         Raises:
             SolveError: if the solver did not converge, or the solution fails a check.
         """
-        fine, asked, released_finer = self._fine, tolerance, None
+        fine, asked = self._fine, tolerance
         direct = is_direct(method, self.dofs, fine.degree)
         tolerance *= TWO_SIDED if loads.far is not None else 1.0
         held = [fine.dofs.held(motion) for motion in loads.motions]
@@ -118,22 +118,23 @@ class DisplacementProblem:
             self.corrections = {m: u.array.copy() for m, u in zip(loads.motions, unknowns, strict=True)}
             self._move(held, loads)
             seconds = time.perf_counter() - start
+            released, pushed = self._released(law, held, loads)
             solution = Solution(
                 response, self._largest_strain(), fine.dofs.whole_dofs, self._body.cells,
-                iterations, assemble, solver.setup_seconds, seconds, released=self._released(law, held, loads),
+                iterations, assemble, solver.setup_seconds, seconds, released=released, pushed=pushed,
             )  # fmt: skip
             if not estimate:
                 return solution
             solver.close()  # what the next degree takes is the most memory of all
             start = time.perf_counter()
-            found, released_finer, more = self._decrements(law, levels, held, loads, stack)
+            found, (released_finer, pushed_finer), more = self._decrements(law, levels, held, loads, stack)
             plain = plain_share(self._body)
         shares = np.diag(found) / np.diag(response.stiffness)
         relative = np.array([error_bar(share, fine.degree, plain=plain) for share in shares])
         bars = stiffness_bars(response.stiffness, relative, apart=loads.apart)
         return replace(
             solution, decrements=found, plain=plain, bars=bars, estimate_iterations=more,
-            released_finer=released_finer, time_estimate=time.perf_counter() - start,
+            released_finer=released_finer, pushed_finer=pushed_finer, time_estimate=time.perf_counter() - start,
         ).with_release_bar(fine.degree)  # fmt: skip
 
     @staticmethod
@@ -202,10 +203,10 @@ class DisplacementProblem:
     @stage("error bar")
     def _decrements(
         self, law: MaterialLaw, levels: list[Level], held: list[FloatArray], loads: Loads, stack: ExitStack
-    ) -> tuple[FloatArray, FloatArray | None, int]:
+    ) -> tuple[FloatArray, Released, int]:
         """Return what one degree more takes away from the last stiffness of the whole body, and the iterations.
 
-        Between them is what it makes of the energy that a slit's front releases.
+        Between them is what it makes of the energy that a slit's front, and the blade's tip, release.
         """
         fine = self._fine
         finer = self._spaces.get(fine.degree + 1, self._conditions)
@@ -237,16 +238,13 @@ class DisplacementProblem:
     def _released(
         self, law: MaterialLaw, held: list[FloatArray], loads: Loads, finer: ElasticSpace | None = None,
         corrections: Sequence[FloatArray] = (),
-    ) -> FloatArray | None:  # fmt: skip
-        """Return what a slit's front in the whole body releases (J/m), by pairs of motions; collective.
+    ) -> Released:  # fmt: skip
+        """Return what a slit's front and the blade's tip in the whole body release (J/m), by pairs of motions.
 
-        It is that of the last solution, or of its ``corrections`` in a ``finer`` space.
+        They are those of the last solution, or of its ``corrections`` in a ``finer`` space; collective.
         """
-        if self._conditions.front is None:
-            return None
         space = finer or self._fine
         space.forms.set_law(law)
-        release = Release(self._body, self._conditions.front, space.forms.displacement, space.forms.lame)
 
         def put(amounts: FloatArray) -> None:
             self._move(held, Loads(loads.motions, tuple(amounts)))
@@ -257,9 +255,15 @@ class DisplacementProblem:
                 displacement.array[:] = space.forms.displacement.x.array[: space.dofs.owned] + amounts @ corrections
                 space.set_displacement(displacement)
 
-        found = release.matrix(len(held), put)
-        self._move(held, loads)
-        return 2.0 ** len(self._body.mirrored) * found
+        def of(line: Front | None) -> FloatArray | None:
+            if line is None:
+                return None
+            release = Release(self._body, line, space.forms.displacement, space.forms.lame)
+            found = 2.0 ** len(self._body.mirrored) * release.matrix(len(held), put)
+            self._move(held, loads)
+            return found
+
+        return of(self._conditions.front), of(self._conditions.tip)
 
     def _response(self, unknowns: list[PETSc.Vec], held: list[FloatArray], law: MaterialLaw, loads: Loads) -> Response:
         """Return the response to the motions whose solutions, less the prescribed displacements, are ``unknowns``."""

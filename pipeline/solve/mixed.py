@@ -35,7 +35,7 @@ from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw, SplitLaw
 from pipeline.solve.mixed_space import MixedSpace
 from pipeline.solve.reaction import Response, reaction, sums
-from pipeline.solve.release import Release
+from pipeline.solve.release import Front, Release, Released
 from pipeline.solve.rim import plain_share
 from pipeline.solve.saddle import Pair, Saddle, SaddleSolver
 from pipeline.solve.solution import BALANCE_LIMIT, TOLERANCE, Solution, rest
@@ -126,12 +126,12 @@ class MixedProblem:
                 raise SolveError(
                     f"forces do not balance: relative error {response.balance:.1e}, allowed {BALANCE_LIMIT:.0e}"
                 )
-            released = self._released(fine, split, unknowns, held)
+            released, pushed = self._released(fine, split, unknowns, held)
             self._move(unknowns, held, loads.amounts)
             strain = largest_strain(self._strain, self._body, self._conditions.front)
             solution = Solution(
                 _times(response, split.unit), strain, fine.whole_dofs, self._body.cells, iterations,
-                assemble, solver.setup_seconds, seconds, released=released,
+                assemble, solver.setup_seconds, seconds, released=released, pushed=pushed,
             )  # fmt: skip
             if not estimate:
                 return solution
@@ -165,18 +165,23 @@ class MixedProblem:
             space.set_fields((displacement, pressure))
 
     @stage("energy release")
-    def _released(
-        self, space: MixedSpace, split: SplitLaw, unknowns: list[Pair], held: list[FloatArray]
-    ) -> FloatArray | None:
-        """Return what a slit's front in the whole body releases (J/m), by pairs of motions; collective."""
-        if self._conditions.front is None:
-            return None
+    def _released(self, space: MixedSpace, split: SplitLaw, unknowns: list[Pair], held: list[FloatArray]) -> Released:
+        """Return what a slit's front and the blade's tip in the whole body release (J/m), by pairs of motions.
+
+        Collective.
+        """
         forms = space.displacements.forms
         forms.set_law(split.elastic)
-        pressure = (space.forms.pressure, forms.by_region(split.compliance))
-        release = Release(self._body, self._conditions.front, forms.displacement, forms.lame, pressure)
-        found = release.matrix(len(held), lambda amounts: self._move(unknowns, held, list(amounts), space))
-        return 2.0 ** len(self._body.mirrored) * split.unit * found
+
+        def of(line: Front | None) -> FloatArray | None:
+            if line is None:
+                return None
+            pressure = (space.forms.pressure, forms.by_region(split.compliance))
+            release = Release(self._body, line, forms.displacement, forms.lame, pressure)
+            found = release.matrix(len(held), lambda amounts: self._move(unknowns, held, list(amounts), space))
+            return 2.0 ** len(self._body.mirrored) * split.unit * found
+
+        return of(self._conditions.front), of(self._conditions.tip)
 
     @stage("error bar")
     def _estimate(
@@ -194,7 +199,7 @@ class MixedProblem:
                 finer.start_from(self._fine, pair, fine_values)
             iterations = self._correct(finer, solver, split, found, finer_held, _ESTIMATE_TOLERANCE)
             fine = self._response(finer, split, found, finer_held, loads)
-            released = self._released(finer, split, found, finer_held)
+            released, pushed = self._released(finer, split, found, finer_held)
         decrements, energies = coarse.stiffness - fine.stiffness, np.diag(coarse.stiffness)
         unseen = 2.0 ** len(self._body.mirrored) * np.array(solver.first_energies) / energies
         plain = plain_share(self._body)
@@ -203,7 +208,7 @@ class MixedProblem:
             for d, n in zip(np.diag(decrements) / energies, unseen, strict=True)
         ]
         return replace(
-            solution, decrements=split.unit * decrements, plain=plain, released_finer=released,
+            solution, decrements=split.unit * decrements, plain=plain, released_finer=released, pushed_finer=pushed,
             bars=stiffness_bars(solution.stiffness, np.array(relative), apart=loads.apart),
             estimate_iterations=iterations, time_estimate=time.perf_counter() - start,
         ).with_release_bar(self._degree)  # fmt: skip

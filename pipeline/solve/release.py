@@ -10,6 +10,11 @@ integral over a domain, with Eshelby's tensor). −dU is what a unit of advance 
 elements p div u − p²/(2 λ₁) takes the place of ½ λ₁ (div u)². In it v is piecewise linear on the mesh: of the discrete
 energy −dU is then the exact derivative as nodes move along.
 
+Where tissue slides along a blade, what it touches of the slit's faces goes on with its tip: v is then 1 on that edge
+and nothing on the front, and along the faces everywhere, so that what is prescribed, the displacement across them,
+stays as it is. dU is what it takes to push the blade on: at its tip the pressure is singular, and leaves a
+configurational force along the blade (D. Bigoni, F. Dal Corso, F. Bosi and D. Misseroni, Mech. Mater. 80, 368, 2015).
+
 It is quadratic in u: of a sum of motions, R_ij tells what each pair of them releases.
 """
 
@@ -29,13 +34,15 @@ from pipeline.solve.compiled import form, scalar_space, vector_space
 from pipeline.solve.forms import ElasticForms, dx, one_cell, strain
 from pipeline.solve.loads import Vector
 
+# What a unit of advance of a slit's front releases (n, n), and of the blade's tip; None where there is none.
+Released = tuple[FloatArray | None, FloatArray | None]
 # v is 1 up to the first of these shares of its radius, and nothing from the second on.
 _INNER, _OUTER = 0.4, 1.0
 
 
 @dataclass(frozen=True)
 class Front:
-    """Where the front of a slit is, in a mesh whose probe presses along -z; lengths in m.
+    """Where the front of a slit is, or a blade's tip in it, in a mesh whose probe presses along -z; lengths in m.
 
     ``point`` is where the probe's axis meets the surface, ``along`` the unit vector along the front, which is ``depth``
     below, from -``reach`` to ``reach`` or all through the body. Within ``radius`` of it nothing else is.

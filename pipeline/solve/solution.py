@@ -46,7 +46,9 @@ class Solution:
     found, ``iterations`` the linear solves that it took, and ``stored`` (J) is its strain energy, which is not half of
     F d. ``released`` (n, n) is the energy (J) that a metre of advance of a slit's front releases, a form of the amounts
     of the motions (:mod:`pipeline.solve.release`), ``released_finer`` what one degree more makes of it, and
-    ``release_bar`` the relative 95 % bar on what they release.
+    ``release_bar`` the relative 95 % bar on what they release. ``pushed``, ``pushed_finer`` and ``push_bar`` are the
+    same of the tip of a blade along which tissue slides: what its advance
+    takes, less than nothing is released, is the force on it.
     """
 
     response: Response
@@ -69,11 +71,20 @@ class Solution:
     released: FloatArray | None = None
     released_finer: FloatArray | None = None
     release_bar: float = nan
+    pushed: FloatArray | None = None
+    pushed_finer: FloatArray | None = None
+    push_bar: float = nan
 
     @property
     def reaction(self) -> Vector:
         """Force of the tissue on the probe (N)."""
-        return self.response.force
+        x, y, z = self.response.force
+        return x, y, z if self.pushed is None else self.push
+
+    @property
+    def push(self) -> float:
+        """Force (N) at the tip of a blade along which tissue slides; not a number if there is none."""
+        return -_form(self.pushed, self.response.amounts)
 
     @property
     def energy(self) -> float:
@@ -117,7 +128,7 @@ class Solution:
                     spanned += np.square(motion.direction)
                     bars += bar * np.abs(motion.direction)
         x, y, z = map(float, np.where(spanned > 1 - 1e-9, bars, nan))
-        return x, y, z
+        return x, y, z if self.pushed is None else abs(self.push) * self.push_bar
 
     @property
     def release(self) -> float:
@@ -129,7 +140,11 @@ class Solution:
         if self.released is None:
             return self
         finer = _form(self.released_finer, self.response.amounts)
-        return replace(self, release_bar=release_bar(self.release, finer, degree, self.bar))
+        pushed = -_form(self.pushed_finer, self.response.amounts)
+        return replace(
+            self, release_bar=release_bar(self.release, finer, degree, self.bar),
+            push_bar=release_bar(self.push, pushed, degree, self.bar),
+        )  # fmt: skip
 
     @property
     def is_shut(self) -> bool:
@@ -158,9 +173,16 @@ class Solution:
         if self.released is None or self.released_finer is None:
             return best
         finer = _form(self.released_finer, self.response.amounts)
-        return replace(
+        best = replace(
             best, released=extrapolate_release(self.released, self.released_finer, degree),
             release_bar=release_bar(self.release, finer, degree, best.bar, extrapolated=True),
+        )  # fmt: skip
+        if self.pushed is None or self.pushed_finer is None:
+            return best
+        pushed = -_form(self.pushed_finer, self.response.amounts)
+        return replace(
+            best, pushed=extrapolate_release(self.pushed, self.pushed_finer, degree),
+            push_bar=release_bar(self.push, pushed, degree, best.bar, extrapolated=True),
         )  # fmt: skip
 
 

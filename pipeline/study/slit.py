@@ -15,6 +15,7 @@ from pipeline.study.schema import Mesh
 
 # Between a slit's front and what ends below or above it there must be this share of what it runs ahead of the blade.
 _LEAST_ROOM = 0.25
+_ALIGNED = 1e-9
 # Points of a slit, along it and down, whose distance to inclusions is looked at.
 _POINTS = (81, 41)
 
@@ -31,6 +32,8 @@ def check_slit(body: Body, probe: Probe, problems: Problems) -> bool:
             "a slit goes straight down from the flat top of a box or a cylinder only",
         )  # fmt: skip
         return False
+    if probe.contact == "frictionless":
+        _check_sliding(body, slit, frame, problems)
     _check_depth(body, slit, problems)
     if len(problems.errors) == before:
         _check_support(body, slit, problems)
@@ -58,6 +61,22 @@ def check_slit_in(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> N
             "mesh.epsilon", in_mm(mesh.epsilon),
             f"keeps a column that the slit reaches out of: must be above {in_mm(slit.on_surface)}, or use "
             'outside = "coarse"',
+        )  # fmt: skip
+
+
+def _check_sliding(body: Body, slit: Slit, frame: Frame, problems: Problems) -> None:
+    """Report a blade that tissue slides along where its faces, or what its tip moves in, do not allow for it."""
+    if max(map(abs, frame.along)) < 1 - _ALIGNED:
+        problems.error(
+            "probe.direction", list(frame.along), "tissue slides along a blade in a slit that lies along x or y only: "
+            "turn the body, or use contact = 'bonded'",
+        )  # fmt: skip
+    least = _LEAST_ROOM * slit.ahead
+    if slit.tip > 0 and (room := slit.room_at_tip(body)) < least:
+        problems.error(
+            "probe.incision", in_mm(slit.depth),
+            f"puts the blade's tip {in_mm(room)} from the surface or where a layer ends: tissue that slides along it "
+            f"needs {in_mm(least)}, a quarter of how far the slit runs ahead",
         )  # fmt: skip
 
 

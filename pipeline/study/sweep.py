@@ -112,7 +112,8 @@ class Case:
     def movements(self) -> int:
         """How many motions are solved for: press, slide, opening of a slit, the far field's; or all six."""
         slides = self.travel != tuple(self.probe.depth * a for a in self.frame.axis)
-        return 6 if self.probe.motion == "all" else 1 + slides + (self.probe.slit is not None) + self.is_closed
+        opens = self.probe.slit is not None and self.probe.contact == "bonded"
+        return 6 if self.probe.motion == "all" else 1 + slides + opens + self.is_closed
 
     @property
     def tissues(self) -> tuple[Tissue, ...]:

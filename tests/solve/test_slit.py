@@ -65,6 +65,23 @@ def test_change_of_energy():
     assert release == pytest.approx((before - after) / (2 * step), rel=0.02)
 
 
+def test_flanks_that_slide():
+    """What it takes to push a blade on, with the front where it is, is what the energy gains: within the bar."""
+    step = 0.15e-3
+    found = [
+        run(case_of(contact="frictionless", ends="open", ahead=f"{1 + 1e3 * s} mm"), estimate=True)
+        for s in (-step, 0.0, step)
+    ]
+    (deeper, here, less_deep), amounts = found, found[1].response.amounts
+    slope = (finer(deeper)[0] - finer(less_deep)[0]) / (2 * step)
+    assert -float(amounts @ here.pushed_finer @ amounts) == pytest.approx(slope, rel=0.03)
+    assert here.reaction[2] == pytest.approx(slope, rel=here.push_bar)
+    assert 0.02 < here.push_bar < 0.1
+    best = here.extrapolated(2, "displacement", elsewhere=True)
+    assert best.reaction[2] == pytest.approx(slope, rel=0.03)
+    assert here.balance < 1e-6
+
+
 def test_symmetry():
     """A quarter of the body gives what the whole does, whose slit is made by reflection."""
     whole = run(case_of(), ())
@@ -124,3 +141,8 @@ def test_study_of_incisions():
     assert slid.energy_release == pytest.approx(pressed.energy_release, rel=1e-3)
     assert slid.force == pytest.approx(pressed.force, rel=1e-5)
     assert slid.energy > pressed.energy
+    sliding = {**SLIT_BLADE, "contact": "frictionless", "incision": "4 mm"}
+    soft, stiff = solve(body=BODY, probe=sliding, mesh=COARSEST, material=material).values()
+    assert 0 < soft.force < force[0, 1]
+    assert 0 < soft.force_error < 0.3
+    assert (stiff.force, stiff.energy_release) == pytest.approx((2 * soft.force, 2 * soft.energy_release), rel=1e-12)

@@ -2,6 +2,7 @@
 
 import pytest
 
+from pipeline.plan.plan import make_plan
 from pipeline.study.load import parse
 from pipeline.study.problems import StudyError
 from tests.cases import BLADE, raw
@@ -23,7 +24,12 @@ def problems(**changes):
     ("key", "said", "changes"),
     [
         ("probe.incision", "only a cut has an incision", {"probe": {**SLIT, "action": "pierce"}}),
-        ("probe.contact", "slide along it without force", {"probe": {**SLIT, "contact": "frictionless"}}),
+        ("probe.direction", "along x or y only", {"probe": {**SLIT, "contact": "frictionless",
+                                                           "direction": [1.0, 0.2, 0.0]}}),
+        ("probe.incision", "the blade's tip 0 mm from", {"probe": {**SLIT, "contact": "frictionless",
+                                                                  "incision": "5.1 mm"}, "body": LAYERED}),
+        ("probe.slice", "slides along without force", {"probe": {**SLIT, "contact": "frictionless",
+                                                                "slice": "0.1 mm"}}),
         ("probe.motion", "pressed and drawn only", {"probe": {**SLIT, "motion": "all"}}),
         ("probe.ahead", "leaves nothing of the blade in the slit", {"probe": {**SLIT, "incision": "1 mm"}}),
         ("probe.ahead", "there is no incision", {"probe": {**BLADE, "ahead": "1 mm"}}),
@@ -57,3 +63,11 @@ def test_no_incision():
     assert flat.slit is None
     assert flat.proportional_to == ("depth", "slice")
     assert deep.proportional_to == ()
+
+
+def test_depth_does_nothing_where_tissue_slides_along_the_blade():
+    """It says so; and each Poisson's ratio is solved: a reduced basis knows of the work only."""
+    poisson = [0.1, 0.2, 0.25, 0.3, 0.35, 0.4, 0.42]
+    sliding = parse(raw(probe={**SLIT, "contact": "frictionless"}, material={"poisson": poisson}))
+    assert any("does nothing" in warning for warning in sliding.warnings)
+    assert not any(solve.reduced for solve in make_plan(sliding).solves)

@@ -36,7 +36,7 @@ class Blade(Punch):
         Travel,
         Words(
             "Depth of the slit that it stands in. Its flanks then hold the slit's faces apart by its width, and take "
-            "them along; 0 presses its edge on the whole surface.",
+            "them along (bonded) or let them slide (frictionless). 0 presses its edge on the whole surface.",
             '"4 mm"',
         ),
     ] = 0.0
@@ -189,9 +189,9 @@ class Blade(Punch):
                 "the slit's front",
             )  # fmt: skip
         if self.contact == "frictionless":
-            problems.error(
-                "probe.contact", self.contact, "the flanks of a blade that stands in a slit slide along it without "
-                "force: use contact = 'bonded'",
+            problems.warn(
+                "probe.depth", in_mm(self.depth), "does nothing where tissue slides along a blade that stands in a "
+                "slit: F is what it takes to push it on from where it stands, `incision` - `ahead` deep",
             )  # fmt: skip
         if self.motion == "all":
             problems.error("probe.motion", self.motion, "a blade in a slit is pressed and drawn only: leave it out")

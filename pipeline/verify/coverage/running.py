@@ -1,6 +1,7 @@
 """Random scenes solved twice: on a mesh of chance, and to the accuracy of the truth."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from math import isfinite
 
 import numpy as np
@@ -22,7 +23,7 @@ _NAIVE = 0.35
 
 
 def trials(comm: MPI.Comm, count: int = COUNT, seed: int = SEED, family: str = "design") -> Iterator[Trial]:
-    """Yield ``count`` random trials of a family; the same seed gives the same ones; collective."""
+    """Yield the trials of ``count`` random scenes of a family; the same seed gives the same ones; collective."""
     random = np.random.default_rng(seed)
     thrown = FAMILIES[family]
     done = 0
@@ -36,7 +37,19 @@ def trials(comm: MPI.Comm, count: int = COUNT, seed: int = SEED, family: str = "
         except StudyError:  # the dice made no sense: a footprint over the edge, a ratio that locks
             continue
         done += 1
-        yield _trial(scene, mesh, case, truth)
+        trial = _trial(scene, mesh, case, truth)
+        yield trial
+        if isfinite(case.energy_release):
+            yield _of_release(trial, case, truth)
+
+
+def _of_release(trial: Trial, case: Record, truth: Record) -> Trial:
+    """Return the trial of the energy that a slit's front releases, of the scene of that of its force."""
+    degree, element = trial.kind
+    return replace(
+        trial, name=f"energy release: {trial.name}", force=case.energy_release, bar=case.energy_release_error,
+        truth=truth.energy_release, truth_bar=truth.energy_release_error, kind=(degree, f"{element}, released"),
+    )  # fmt: skip
 
 
 def _trial(scene: Section, mesh: Section, case: Record, truth: Record) -> Trial:
@@ -61,6 +74,8 @@ def _name(scene: Section, mesh: Section) -> str:
     at = f" at {' '.join(probe['at'])}" if "at" in probe else ""
     along = f" along {probe['direction'][0]:.2f} {probe['direction'][1]:.2f}" if "direction" in probe else ""
     tool = f"{probe['shape']} {probe.get('length') or probe.get('axes', probe.get('radius'))}{along}{at}"
+    if "incision" in probe:
+        tool += f" in a slit of {probe['incision']}, ends {probe['ends']},"
     sizes = f"rim {mesh['rim']} growth {mesh['growth']} fine {mesh['fine']}" if "rim" in mesh else "truth"
     return (
         f"{body['shape']} {_size(body)} on its {body['fixed']}{_regions(body)}, {tool} {probe['contact']},"
@@ -73,7 +88,9 @@ def _size(body: Section) -> str:
     """Write how large a body is."""
     if body["shape"] == "surface":
         return str(body["file"])
-    return f"{body['radius']} × {body['height']}" if body["shape"] == "cylinder" else " × ".join(body["size"])
+    if body["shape"] == "cylinder":
+        return f"{body['radius']} × {body['height']}"
+    return " × ".join(body["axes"] if body["shape"] == "ellipsoid" else body["size"])
 
 
 def _regions(body: Section) -> str:

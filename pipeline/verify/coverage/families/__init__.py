@@ -5,7 +5,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.verify.coverage.families import design, ellipses, organs, proportions, regions, tools, tumours
+from pipeline.verify.coverage.families import (
+    contact,
+    design,
+    ellipses,
+    organs,
+    proportions,
+    regions,
+    slits,
+    tools,
+    tumours,
+    wedges,
+)
 from pipeline.verify.sections import Section
 
 
@@ -29,4 +40,7 @@ FAMILIES: dict[str, Family] = {
     "regions": Family(regions.throw, regions.TRUTH),
     "tumours": Family(tumours.throw, tumours.TRUTH),
     "tools": Family(tools.throw, tools.TRUTH),
+    "contact": Family(contact.throw, contact.TRUTH),
+    "wedges": Family(wedges.throw, wedges.TRUTH),
+    "slits": Family(slits.throw, slits.TRUTH),
 }

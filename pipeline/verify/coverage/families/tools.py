@@ -27,7 +27,7 @@ def throw(random: np.random.Generator) -> tuple[Section, Section]:
         "material": {"young": "10 kPa", "poisson": float(random.choice(_POISSON))},
         "probe": _throw_tool(random),
     }
-    return scene, _throw_mesh(random)
+    return scene, throw_mesh(random)
 
 
 def _throw_tool(random: np.random.Generator) -> Section:
@@ -43,7 +43,7 @@ def _throw_tool(random: np.random.Generator) -> Section:
     return {"shape": kind, **shape, "contact": "unilateral"}
 
 
-def _throw_mesh(random: np.random.Generator) -> Section:
+def throw_mesh(random: np.random.Generator) -> Section:
     """Throw a mesh graded to where contact is expected to end, or as one would draw it who does not care."""
     if random.random() < 0.6:
         rim, growth, fine = random.uniform(0.1, 0.3), random.uniform(0.35, 0.6), _FAR
