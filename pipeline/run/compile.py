@@ -10,11 +10,14 @@ from pipeline.solve.cache import compiling
 from pipeline.solve.forms import compile_elastic
 from pipeline.solve.meridian_contact import TRIAL_DEGREE
 from pipeline.solve.mixed_forms import compile_mixed
+from pipeline.solve.regular import compile_regular
 from pipeline.solve.release import compile_release
 from pipeline.solve.single.cycle import compiles
 from pipeline.solve.straight.pattern import library
 from pipeline.stages import stage
 
+# What the regular part of a Green's function takes, whatever the elements of the case.
+_REGULAR = "regular", 0, False, False
 # What this process has seen to.
 _compiled: set[tuple[str, int, bool, bool]] = set()
 
@@ -24,6 +27,7 @@ def prepare(comm: MPI.Comm, solves: Collection[Solve]) -> None:
     """Compile what ``solves`` need and the cache does not have; collective."""
     if comm.rank == 0:
         needed = {_forms(solve) for solve in solves}
+        needed |= {_REGULAR for solve in solves if solve.case.has_own_far_field}
         if missing := needed - _compiled:
             with compiling():
                 for element, degree, of_regions, of_slit in sorted(missing):
@@ -45,6 +49,9 @@ def _forms(solve: Solve) -> tuple[str, int, bool, bool]:
 def _compile(element: str, degree: int, *, of_regions: bool, of_slit: bool) -> None:
     if element in ("axisymmetric", "elliptic"):
         compile_axisymmetric(curved=element == "elliptic", lowest=degree)
+        return
+    if element == _REGULAR[0]:
+        compile_regular()
         return
     library()
     compiles()

@@ -1,10 +1,13 @@
 """What solves a case on its mesh, if the memory is there for it."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.mesh.of_case import meridian_of
 from pipeline.plan.symmetry import mirror_planes, model_planes
+from pipeline.run.far_field import far_field_of
 from pipeline.run.memory import FreeMemory
 from pipeline.shapes.probes.round_indenter import RoundIndenter
 from pipeline.solve.axisymmetric import MeridianProblem
@@ -12,7 +15,6 @@ from pipeline.solve.conditions import Conditions
 from pipeline.solve.contact.problem import DEGREE, ContactProblem, Tool
 from pipeline.solve.contact.sets import ContactError
 from pipeline.solve.displacement import DisplacementProblem
-from pipeline.solve.far_field import PointForce
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
@@ -119,7 +121,7 @@ def loads_of(case: Case) -> Loads:
         pressed = Loads.along(travel) if case.probe.contact == "bonded" else Loads((), ())
         return pressed.opened(case.frame.upright.across, slit.width / 2)
     if case.is_closed:
-        return Loads.along(travel).with_far(PointForce(case.material.poisson, frame.point, case.column))
+        return Loads.along(travel).with_far(far_field_of(case))
     # Across a plane of symmetry a probe slides without force along its axis, and presses without force along itself.
     return Loads.along(travel, apart=mirror_planes(case) != model_planes(case))
 
@@ -146,6 +148,8 @@ def solve_problem(case: Case, problem: Problem, *, estimate: bool) -> Solution:
         if method != "auto" or not 0 < problem.dofs <= _MOST_DIRECT:
             raise
         solution = problem.solve(law, loads, method="direct", tolerance=tolerance, estimate=estimate)
+    if loads.far is not None:
+        solution = replace(solution, time_setup=solution.time_setup + loads.far.seconds)
     if solution.is_shut:
         raise SolveError("the blade's travel presses the slit shut at its front, where its faces would pass each other")
     return solution

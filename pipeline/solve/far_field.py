@@ -15,11 +15,18 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 
+# Below the centre there is no direction aside; a point this near to it, in units of the radius, is it.
+_TINY, _AT_CENTRE = 1e-14, 1e-9
+
 Place = tuple[float, float, float]
 
 
 class FarField(Protocol):
     """A displacement of what is beyond the cut face, free of loads but there; hashable."""
+
+    @property
+    def seconds(self) -> float:
+        """What it took to find."""
 
     def at(self, points: FloatArray) -> FloatArray:
         """Return the displacement (n, 3) of a unit, in m, at points (n, 3), in m, on the cut face."""
@@ -35,6 +42,11 @@ class PointForce:
     poisson: float
     centre: Place
     radius: float
+
+    @property
+    def seconds(self) -> float:
+        """It is a closed form."""
+        return 0.0
 
     def at(self, points: FloatArray) -> FloatArray:
         """Return the displacement (n, 3) of a unit, in m: ε/ρ times what depends on the direction alone."""
@@ -55,6 +67,20 @@ class PointForce:
         found[:, 2] = 3 * cosine**2
         return 2 * self.radius / distance[:, None] ** 2 * found
 
+    def stress(self, points: FloatArray) -> FloatArray:
+        """Return the stress (n, 3, 3) of a unit, in units of μ, with nothing at the centre itself."""
+        offsets = points - np.array(self.centre)
+        distance = np.linalg.norm(offsets, axis=1)
+        away = distance > _AT_CENTRE * self.radius
+        x, depth, r = offsets[away], -offsets[away, 2], distance[away]
+        flat, across = x * (1, 1, 0), np.maximum(r**2 - depth**2, _TINY * r**2)
+        share, softness = 1 / (r * (r + depth)), 1 - 2 * self.poisson
+        found = np.zeros((len(points), 3, 3))
+        found[away] = (-3 * depth / r**5)[:, None, None] * _outer(x)
+        found[away] += (softness * (2 * share - depth / r**3) / across)[:, None, None] * _outer(flat)
+        found[away] += (softness * (depth / r**3 - share))[:, None, None] * np.diag([1.0, 1.0, 0.0])
+        return 2 * self.radius * found
+
     def stiffness(self, mu: float) -> float:
         """Return twice the strain energy (N/m) of a unit beyond the half ball: -∫ u·σn of the two above."""
         softness = 1 - 2 * self.poisson
@@ -69,3 +95,7 @@ class PointForce:
         offsets = points - np.array(self.centre)
         distances = np.linalg.norm(offsets, axis=1)
         return offsets / distances[:, None], distances
+
+
+def _outer(vectors: FloatArray) -> FloatArray:
+    return np.asarray(vectors[:, :, None] * vectors[:, None, :])

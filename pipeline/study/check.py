@@ -14,7 +14,7 @@ from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe, is_direction
 from pipeline.shapes.section import Section, in_mm
-from pipeline.study.closure import check_closure
+from pipeline.study.closure import check_closure, check_far_field
 from pipeline.study.place import held_gap, place_error
 from pipeline.study.problems import Problems
 from pipeline.study.regions import tissues_of
@@ -65,6 +65,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         check_slit_in(body, probe, mesh, problems)
     for body, material, mesh in itertools.product(bodies, materials, meshes):
         _check_locking(dict(tissues_of(body, material)), mesh, problems)
+        check_far_field(material, mesh, problems)
     _check_reference(meshes, axes, problems)
     for solve in cast(Sequence[Solving], sections["solve"]):
         if "repeats" in solve.model_fields_set and not solve.timing:

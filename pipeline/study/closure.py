@@ -1,11 +1,16 @@
 """What a half ball, closed by the far field of a point force, can be cut out of, and for which tools."""
 
+from math import inf
+
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.contact import is_level
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import in_mm
 from pipeline.study.problems import Problems
-from pipeline.study.schema import Mesh
+from pipeline.study.schema import Material, Mesh
+
+# The regular part of a body's far field is found by displacement elements of degree 2; beyond this they lock.
+_MOST = 0.49
 
 
 def check_closure(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
@@ -16,15 +21,24 @@ def check_closure(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> N
         _refuse(mesh, "has an error of its own, which is not that of the mesh: leave accuracy out", problems)
     elif reason := _no_far_field(body, probe):
         _refuse(mesh, f'{reason}: use outside = "coarse" here', problems)
-    elif mesh.epsilon >= (room := _room(body, probe)):
+    elif mesh.epsilon >= (most := room(body, probe)):
         problems.error(
             "mesh.epsilon", in_mm(mesh.epsilon),
-            f"a half ball must lie inside the body: below {in_mm(room)}, or past all of it, which is the full order",
+            f"a half ball must lie inside the body: below {in_mm(most)}, or past all of it, which is the full order",
         )  # fmt: skip
     elif mesh.epsilon <= probe.circumradius:
         problems.error(
             "mesh.epsilon", in_mm(mesh.epsilon),
             f"a half ball must hold the footprint: above the probe's radius {in_mm(probe.circumradius)}",
+        )  # fmt: skip
+
+
+def check_far_field(material: Material, mesh: Mesh, problems: Problems) -> None:
+    """Report a material whose far field in a body is not found."""
+    if mesh.outside == "green" and mesh.epsilon < inf and material.poisson > _MOST:
+        problems.error(
+            "material.poisson", material.poisson,
+            f'is too near to 0.5 for outside = "green": at most {_MOST}; "halfspace" takes all',
         )  # fmt: skip
 
 
@@ -45,7 +59,7 @@ def _no_far_field(body: Body, probe: Probe) -> str:
     return ""
 
 
-def _room(body: Body, probe: Probe) -> float:
+def room(body: Body, probe: Probe) -> float:
     """Return the distance (m) from the contact to the nearest side of the body, or its bottom."""
     frame = probe.frame_on(body)
     return min(body.gap(frame.point), body.thickness(frame))

@@ -99,10 +99,11 @@ class Mesh(Section):
         Words("By how much an element may be larger for each unit of distance from the edge.", "0.5"),
     ] = 0.5
     outside: Annotated[
-        Literal["coarse", "free", "fixed", "halfspace"],
+        Literal["coarse", "free", "fixed", "halfspace", "green"],
         Words(
             "What becomes of the body beyond epsilon: meshed coarsely; or cut away, which leaves a column whose side "
-            "is free of traction, or fixed, or a half ball that is closed by the far field of a half-space.",
+            "is free of traction, or fixed; or a half ball, closed by the far field of a half-space, or by the body's "
+            "own, its Green's function.",
             '["coarse", "free"]',
             is_used=True,
         ),
@@ -134,7 +135,7 @@ class Mesh(Section):
     @property
     def is_closed(self) -> bool:
         """Whether what is kept of a body is a half ball, closed by a far field."""
-        return self.outside == "halfspace"
+        return self.outside in ("halfspace", "green")
 
     def column(self, reach: float) -> float:
         """Return the radius (m) of what is kept of a body of that ``reach`` from the probe's axis; infinite if all."""

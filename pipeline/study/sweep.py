@@ -168,6 +168,11 @@ class Case:
         return self.mesh.is_closed and not self.is_full
 
     @property
+    def has_own_far_field(self) -> bool:
+        """Whether what closes it is the Green's function of its body, and not that of a half-space."""
+        return self.is_closed and self.mesh.outside == "green"
+
+    @property
     def element(self) -> str:
         """The element that solves it: displacement or mixed."""
         return self.mesh.element_for(self.poisson)

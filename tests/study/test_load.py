@@ -155,6 +155,9 @@ MISTAKES = {
     ),
     "half ball below a blade that cuts": ({"probe": BLADE, "mesh": CLOSED}, ["mesh.outside", "presses, and neither"]),
     "half ball of six motions": ({"probe": {"motion": "all"}, "mesh": CLOSED}, ["mesh.outside", "nor turns"]),
+    "green function of what is incompressible": (
+        {"mesh": CLOSED | {"outside": "green"}, "material": {"poisson": 0.5}}, ["material.poisson = 0.5", "halfspace"],
+    ),
     "thin strip": ({"body": {"fixed": {"below": "-0.01 mm"}}}, ["body.fixed", "strip of 0.01 mm", "fine = 2 mm"]),
     "unknown reduction": ({"plan": {"without": ["magic"]}}, ["plan.without", "'duplicates'"]),
     "repeats": ({"solve": {"repeats": 3}}, ["solve.repeats", "timing"]),

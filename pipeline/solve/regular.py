@@ -1,0 +1,181 @@
+"""The regular part of a body's Green's function: what its sides and its support make of a point force on its top.
+
+    G = u + R, u the half-space's field; R has no loads in the body, -σ(u) n on what is free, -u on what is held.
+
+R is smooth where the force acts: a coarse mesh gives it, once for all tools, ε, and moduli. Within the largest half
+ball that the body holds it is kept as polynomials, by least squares. Beyond a half sphere Γ of radius ε, n outwards,
+
+    twice the energy of G = that of u - 2 ∫ R·σ(u) n - R(0)·P - ∫ R·σ(R) n,
+
+by Betti's theorem within, where the force P of u acts and R has none.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from pipeline.arrays import FloatArray
+from pipeline.mesh.distribute import BodyMesh, distribute
+from pipeline.solve.compiled import form, vector_space
+from pipeline.solve.conditions import Conditions
+from pipeline.solve.far_field import PointForce
+from pipeline.solve.forms import compile_elastic, one_cell
+from pipeline.solve.linear import Level, LinearSolver
+from pipeline.solve.loads import Motion
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.spaces import ElasticSpace, Spaces
+from pipeline.solve.vectors import vector
+
+# Of the elements that R is found with, and of the polynomials that it is kept as.
+DEGREE, _POWER = 2, 5
+_EXPONENTS = np.array([e for e in product(range(_POWER + 1), repeat=3) if sum(e) <= _POWER])
+# Points of quadrature on the half sphere, from pole to rim and round it.
+_UP, _ROUND = 16, 24
+
+
+@dataclass(frozen=True, eq=False)
+class Smooth:
+    """A displacement as polynomials of (x - ``centre``) / ``unit``, whose ``coefficients`` are (terms, 3), in m."""
+
+    centre: tuple[float, float, float]
+    unit: float
+    coefficients: FloatArray
+
+    @staticmethod
+    def fit(centre: tuple[float, float, float], unit: float, points: FloatArray, values: FloatArray) -> "Smooth":
+        """Return what fits ``values`` (n, 3) at ``points`` best in the mean square."""
+        found, *_ = np.linalg.lstsq(_terms((points - np.array(centre)) / unit), values, rcond=None)
+        return Smooth(centre, unit, found)
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return the displacement (n, 3), in m."""
+        return np.asarray(_terms((points - np.array(self.centre)) / self.unit) @ self.coefficients)
+
+    def traction(self, points: FloatArray, normals: FloatArray, ratio: float) -> FloatArray:
+        """Return σn (n, 3) in units of μ, for a ``ratio`` λ/μ."""
+        local = (points - np.array(self.centre)) / self.unit
+        gradient = np.stack([_terms(local, axis) @ self.coefficients for axis in range(3)], axis=-1) / self.unit
+        strain = gradient + gradient.transpose(0, 2, 1)
+        dilation = np.trace(gradient, axis1=1, axis2=2)
+        return np.asarray(np.einsum("nij,nj->ni", strain, normals) + ratio * dilation[:, None] * normals)
+
+
+@dataclass(frozen=True, eq=False)
+class BodyField:
+    """The far field of a body: that of a point force on a half-space, a unit, and what goes with it of ``regular``.
+
+    ``seconds`` is what the regular part took.
+    """
+
+    near: PointForce
+    regular: Smooth
+    seconds: float
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return the displacement (n, 3) of a unit, in m, within the half ball that ``regular`` was fitted in."""
+        return self.near.at(points) + self._scale * self.regular.at(points)
+
+    def stiffness(self, mu: float) -> float:
+        """Return twice the strain energy (N/m) of a unit beyond the half ball."""
+        return self.near.stiffness(mu) + mu * self._of_regular
+
+    @property
+    def _scale(self) -> float:
+        return self.near.radius / self.regular.unit
+
+    @cached_property
+    def _of_regular(self) -> float:
+        near, normals, weights = self.near, *_half_sphere()
+        points = np.array(near.centre) + near.radius * normals
+        weights = near.radius**2 * weights
+        inside = self._scale * self.regular.at(points)
+        pulled = self._scale * self.regular.traction(points, normals, _ratio(near.poisson))
+        ((_, _, up),) = self._scale * self.regular.at(np.array([near.centre]))
+        mixed = weights @ (inside * near.traction(points)).sum(axis=1)
+        return float(near.force(1.0) * up - 2 * mixed - weights @ (inside * pulled).sum(axis=1))
+
+
+def regular_part(body: BodyMesh, force: PointForce) -> Smooth:
+    """Return R for a unit of the field of ``force``, on a mesh of this process alone, as it is within its radius.
+
+    ``body`` may be the half or the quarter of which planes through the centre make the whole.
+
+    Raises:
+        SolveError: if that cannot be solved.
+    """
+    with Spaces(body) as spaces:
+        space = spaces.get(DEGREE, Conditions(unilateral=True))
+        places = np.asarray(space.dofs.space.tabulate_dof_coordinates())
+        values = _solved(space, force, places)
+    near = np.linalg.norm(places - np.array(force.centre), axis=1) <= force.radius
+    points, values = places[near], values.reshape(-1, 3)[near]
+    for axis in body.mirrored:
+        sign = np.where(np.arange(3) == axis, -1.0, 1.0)
+        points, values = np.vstack([points, sign * points]), np.vstack([values, sign * values])
+    return Smooth.fit(force.centre, force.radius, points, values)
+
+
+def _solved(space: ElasticSpace, force: PointForce, places: FloatArray) -> FloatArray:
+    law = MaterialLaw.of(_ratio(force.poisson), 1.0)
+    held = space.dofs.held(Motion(far=force, share=-1.0))
+    with (
+        vector(space.dofs.space) as rhs, vector(space.dofs.space) as unknown,
+        space.operators.lend(law, blocked=False) as (matrix, _),
+    ):  # fmt: skip
+        space.lift(rhs, held, law)
+        stress = force.stress(places)
+        pull, rows = _pull(space.dofs.space)
+        for row, values in zip(rows, stress.transpose(1, 0, 2), strict=True):
+            row.x.array[:] = values.ravel()
+        rhs.array[:] -= fem.assemble_vector(pull).array[: space.dofs.owned]
+        rhs.array[space.dofs.prescribed_owned] = 0.0
+        level = Level(space.dofs.space, matrix, space.dofs.prescribed)
+        solver = LinearSolver([level], direct=True, tolerance=0.5)
+        try:
+            solver.solve(rhs, unknown)
+        finally:
+            solver.close()
+        return np.asarray(unknown.array + held)
+
+
+def _pull(space: Any) -> tuple[Any, list[Any]]:
+    """Return the form of ∫ σn·v on the whole boundary, and the three functions that hold the rows of σ."""
+    rows, normal = [fem.Function(space) for _ in range(3)], ufl.FacetNormal(space.mesh)
+    test = ufl.TestFunction(space)
+    measure = ufl.ds(domain=space.mesh, metadata={"quadrature_degree": 2 * DEGREE + 2})
+    return form(sum(ufl.inner(row, normal) * test[i] for i, row in enumerate(rows)) * measure), rows
+
+
+def compile_regular() -> None:
+    """Compile the forms that the regular part takes."""
+    compile_elastic(DEGREE, straight=False, of_regions=False)
+    _pull(vector_space(distribute(MPI.COMM_SELF, one_cell(straight=False)).mesh, DEGREE))
+
+
+def _ratio(poisson: float) -> float:
+    return 2 * poisson / (1 - 2 * poisson)
+
+
+def _half_sphere() -> tuple[FloatArray, FloatArray]:
+    """Return points (n, 3) of the lower unit half sphere and the weights of a quadrature on it."""
+    nodes, weights = np.polynomial.legendre.leggauss(_UP)
+    cosine, angle = np.meshgrid((nodes + 1) / 2, 2 * np.pi * (np.arange(_ROUND) + 0.5) / _ROUND, indexing="ij")
+    sine = np.sqrt(1 - cosine**2)
+    points = np.stack([sine * np.cos(angle), sine * np.sin(angle), -cosine], axis=-1).reshape(-1, 3)
+    return points, np.repeat(weights / 2 * 2 * np.pi / _ROUND, _ROUND)
+
+
+def _terms(local: FloatArray, axis: int | None = None) -> FloatArray:
+    """Return the monomials (n, terms) at points (n, 3), or their derivatives along an ``axis``."""
+    powers = local[:, :, None] ** np.arange(_POWER + 1)
+    exponents, factor = _EXPONENTS, np.ones(len(_EXPONENTS))
+    if axis is not None:
+        factor = _EXPONENTS[:, axis]
+        exponents = np.maximum(_EXPONENTS - (np.arange(3) == axis), 0)
+    return np.asarray(factor * np.prod([powers[:, i, exponents[:, i]] for i in range(3)], axis=0))
