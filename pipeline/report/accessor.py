@@ -9,6 +9,7 @@ import xarray as xr
 from pipeline.quantities import MESH_DIMENSIONS
 from pipeline.report.compliance import Against, compliance
 from pipeline.report.guide import Guide, guide
+from pipeline.report.locate import Located, locate
 from pipeline.report.pareto import front
 from pipeline.report.table import words
 from pipeline.report.words import formula
@@ -69,6 +70,13 @@ class Accessor:
         See :func:`pipeline.report.compliance.compliance`.
         """
         return compliance(self._dataset, against)
+
+    def locate(self, body: str, healthy: str) -> Located:
+        """Return where, below the path or the raster of places, a ``body`` holds what the ``healthy`` one does not.
+
+        See :func:`pipeline.report.locate.locate`.
+        """
+        return locate(self._dataset, body, healthy)
 
     def pareto(self) -> "pd.DataFrame":
         """Return, scene by scene, the cases that no other case of the scene beats in both time and error.

@@ -7,7 +7,7 @@ from pipeline.report.compliance import tool_dimension
 from pipeline.report.figures.dimensions import mesh_dimensions, refinements
 
 # What can be drawn on request: the last two are parts of "epsilon".
-KINDS = ("epsilon", "exact", "convergence", "accuracy", "force", "compliance", "nothing", "ratio", "speedup")
+KINDS = ("epsilon", "exact", "convergence", "accuracy", "map", "force", "compliance", "nothing", "ratio", "speedup")
 
 
 def choose(dataset: xr.Dataset) -> list[str]:
@@ -23,6 +23,8 @@ def choose(dataset: xr.Dataset) -> list[str]:
         kinds.append("convergence")
     if has_error and any(dataset.sizes[dim] > 1 for dim in mesh_dimensions(dataset)):
         kinds.append("accuracy")
+    if all(dataset.sizes.get(name, 0) > 1 for name in ("x", "y")):
+        kinds.append("map")
     kinds.append("force")
     if "epsilon" in kinds and tool_dimension(dataset):
         kinds.append("compliance")
@@ -43,6 +45,7 @@ def lacks(dataset: xr.Dataset, kind: str) -> str:
         "convergence": "a swept mesh size, and F_exact or F_max",
         "accuracy": "swept meshes, and F_exact or F_max",
         "compliance": "several tools and ε, the full order among them, in scenes whose compliances add",
+        "map": "a raster of places ([probe.path])",
         "force": "a case that has a force",
         "nothing": "that no case has a force",
     }

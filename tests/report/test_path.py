@@ -1,0 +1,76 @@
+"""Datasets of paths: maps of the force, and what they tell of a place below."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import pipeline.report.accessor  # noqa: F401
+from pipeline.report.figures import choose, draw
+from pipeline.report.table import DatasetError
+from tests.cases import raw
+from tests.report.synthetic import dataset
+
+RASTER = {
+    "raster": {"x": {"from": "-15 mm", "to": "15 mm", "steps": 7}, "y": ["-12 mm", "-6 mm", "-2 mm", "2 mm", "9 mm"]}
+}
+LINE = {"line": {"from": ["-15 mm", "0 mm"], "to": ["15 mm", "0 mm"], "steps": 13}}
+BODIES = [raw()["body"] | {"name": name} for name in ("ill", "healthy")]
+
+
+def mapped(path, centre=(4e-3, -2e-3), height=0.2, **changes):
+    """Return a dataset in which the force on the ill body is larger round a centre."""
+    found = dataset(body=BODIES, probe={"path": path}, **changes)
+    square = (found["at_x"] - centre[0]) ** 2 + (found["at_y"] - centre[1]) ** 2
+    more = 1 + height * np.exp(-square / 5e-3**2)
+    return found.assign(force=found["force"] * xr.where(found["body"] == "ill", more, 1.0))
+
+
+def test_a_map_is_the_main_figure_of_a_raster_and_a_curve_that_of_a_line(tmp_path):
+    raster, line = mapped(RASTER), mapped(LINE)
+    assert choose(raster)[0] == "map"
+    assert choose(line)[0] == "force"
+    text = draw(raster, tmp_path / "a", ["svg"], ["map"])[0].read_text()
+    for word in ("ill", "healthy", "its error bar (mN)", "x (mm)", "95 %"):
+        assert word in text
+    assert "length along the path (mm)" in draw(line, tmp_path / "b", ["svg"])[0].read_text()
+
+
+def test_where_contact_is_lost_the_map_says_so_and_keeps_its_colours(tmp_path):
+    wide = {"raster": {"x": ["0 mm", "9 mm", "30 mm"], "y": ["0 mm", "19 mm"]}, "off": "lost"}
+    text = draw(mapped(wide), tmp_path / "a", ["svg"], ["map"])[0].read_text()
+    assert "contact lost" in text
+    assert "no force" in text
+
+
+@pytest.mark.parametrize("path", [RASTER, LINE], ids=["raster", "line"])
+def test_the_centre_of_the_excess_is_found_within_a_third_of_a_step(path):
+    centre = (4e-3, -2e-3 if path is RASTER else 0.0)
+    found = mapped(path, centre).epsmesh.locate(body="ill", healthy="healthy")
+    assert np.abs(np.array(found.point[:2]) - centre).max() < 5e-3 / 3
+    assert found.axis == (0.0, 0.0, -1.0)
+    assert found.distance((*centre, -7e-3)) == pytest.approx(np.hypot(*np.subtract(found.point[:2], centre)))
+    assert not found.reaches_edge
+    assert 0 < found.error[0] < 5e-3
+    assert "mm" in str(found)
+    assert found.plot().get_xlabel() == ("x (mm)" if path is RASTER else "length along the path (mm)")
+
+
+def test_an_excess_at_the_edge_is_said_to_go_on():
+    found = mapped(RASTER, (15e-3, 0.0)).epsmesh.locate("ill", "healthy")
+    assert found.reaches_edge
+    assert "edge" in str(found)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda data: mapped(RASTER, height=0.01), "nowhere"),
+        (lambda data: data.rename(path="depth") if "path" in data.dims else data.isel(x=0), "needs a"),
+        (lambda data: mapped(RASTER, material={"poisson": [0.3, 0.4]}), "poisson"),
+    ],
+)
+def test_what_cannot_be_located_is_said(change, words):
+    with pytest.raises(DatasetError, match=words):
+        change(mapped(RASTER)).epsmesh.locate("ill", "healthy")
+    with pytest.raises(DatasetError, match="no body"):
+        mapped(RASTER).epsmesh.locate("ill", "well")
