@@ -13,8 +13,8 @@ from pipeline.shapes.arrays import FloatArray
 # Fewer Poisson's ratios than this are solved one by one: a basis needs about five solutions itself.
 _FEWEST_RATIOS = 8
 _OF_STRESS_ALONE = (
-    "F is proportional to Young's modulus, and to the depth unless contact is unilateral: cases that differ in them "
-    "only are solved once."
+    "F is proportional to Young's modulus, and to the depth unless contact is unilateral or the tool stands in a slit: "
+    "cases that differ in them only are solved once."
 )
 _FOUND_CONTACT = "No reduced basis: the area of contact changes with Poisson's ratio, and each is solved."
 _CLOSED = "No reduced basis: the far field changes with Poisson's ratio, and each is solved."
@@ -33,7 +33,7 @@ def strike_duplicates(plan: Plan) -> Plan:
 
 def strike_scaled(plan: Plan) -> Plan:
     """F is proportional to Young's modulus and to the depth: cases that differ in them only are solved once."""
-    reason = _OF_STRESS_ALONE if any(solve.case.probe.is_unilateral for solve in plan.solves) else ""
+    reason = "" if all(solve.case.probe.proportional_to for solve in plan.solves) else _OF_STRESS_ALONE
     return _rekeyed(plan, "scaling", strike_scaled, lambda case: case_key(case, folded=True, scaled=True), reason)
 
 

@@ -46,7 +46,8 @@ class Probe(Section, ABC):
     depth: Annotated[
         Length,
         Words(
-            "How far the tool is pushed in. F is proportional to it unless contact is unilateral.",
+            "How far the tool is pushed in. F is proportional to it, unless contact is unilateral or it stands in a "
+            "slit.",
             '"0.2 mm"',
             is_used=True,
         ),

@@ -57,6 +57,23 @@ def test_refused(key, said, changes):
     assert [(name, said in text) for name, text in problems(**changes)] == [(key, True)]
 
 
+def test_lengths_have_units():
+    """A length that is refused is shown as it would be written."""
+    with pytest.raises(StudyError) as caught:
+        parse(raw(probe={**BLADE, "ahead": "1 mm"}))
+    assert "1 mm" in str(caught.value)
+    assert "0.001" not in str(caught.value)
+
+
+def test_depths_are_not_scaled():
+    """The reason for which moduli are scaled does not promise it of depths: F has a part that does not grow with it."""
+    probe = {**SLIT, "depth": ["0.1 mm", "0.2 mm"]}
+    plan = make_plan(parse(raw(probe=probe, material={"young": ["1 kPa", "2 kPa"]})))
+    (scaling,) = (struck for struck in plan.struck if struck.name == "scaling")
+    assert scaling.count > 0
+    assert "stands in a slit" in scaling.reason
+
+
 def test_no_incision():
     """An incision of nothing is a blade on the surface, whose F is proportional to depth; in a slit it is not."""
     flat, deep = (parse(raw(probe={**BLADE, "incision": d})).case(()).probe for d in ("0 mm", "4 mm"))

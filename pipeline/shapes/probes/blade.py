@@ -164,7 +164,8 @@ class Blade(Punch):
         else:
             for key in ("ahead", "ends"):
                 if key in self.model_fields_set:
-                    problems.error(f"probe.{key}", getattr(self, key), "is of a slit: there is no incision")
+                    found = in_mm(self.ahead) if key == "ahead" and self.ahead else getattr(self, key)
+                    problems.error(f"probe.{key}", found, "is of a slit: there is no incision")
         if self.slice > 0 and self.action != "cut":
             problems.error("probe.slice", in_mm(self.slice), 'only a cut slices: set action = "cut"')
         if self.slice > 0 and self.contact == "frictionless":
