@@ -188,12 +188,14 @@ def _check_gap(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None
 
 def _check_epsilon(mesh: Mesh, probe: Probe, problems: Problems) -> None:
     if mesh.epsilon < probe.circumradius:
-        problems.warn(
-            "mesh.epsilon",
-            in_mm(mesh.epsilon),
-            f"is less than the probe's radius {in_mm(probe.circumradius)}: part of the contact lies outside the fine "
-            "mesh" + (", and the column cuts the footprint off" if mesh.outside in ("free", "fixed") else ""),
-        )
+        reach, is_cut = in_mm(probe.circumradius), mesh.outside in ("free", "fixed")
+        if isinstance(probe, Indenter):
+            what = f"is less than {reach}, up to which the {probe.shape} may touch: contact may leave the fine mesh"
+            what += ", but not beyond the column" if is_cut else ""
+        else:
+            what = f"is less than the probe's radius {reach}: part of the contact lies outside the fine mesh"
+            what += ", and the column cuts the footprint off" if is_cut else ""
+        problems.warn("mesh.epsilon", in_mm(mesh.epsilon), what)
     if mesh.rim_size(probe.half_width) > probe.half_width:
         problems.warn(
             "mesh.rim",

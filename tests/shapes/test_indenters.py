@@ -106,6 +106,14 @@ def test_steep_tools_are_warned_of(probe, warned):
     assert any("slope" in warning for warning in study(probe=probe).warnings) == warned
 
 
+@pytest.mark.parametrize("outside", ["coarse", "free"])
+def test_a_small_epsilon_is_held_against_what_may_touch(outside):
+    """What may touch of a ball is no radius of it, and contact may well end within ε."""
+    (warning,) = (w for w in study(probe=SPHERE, mesh={"epsilon": "1 mm", "outside": outside}).warnings if "less" in w)
+    assert "1.152 mm, up to which the sphere may touch" in warning
+    assert ("column" in warning) == (outside == "free")
+
+
 @pytest.mark.parametrize("tool", [*TOOLS, "disc"])
 def test_f_is_proportional_to_stress_alone(tool):
     """Each depth is a record of its own, each modulus is not; no basis is made of Poisson's ratios, and it says why."""
