@@ -185,7 +185,7 @@ class ContactProblem:
         if not np.all(self._tool.ends_at(points)):
             raise ContactError(
                 "the contact reaches the edge of the part of the surface where it is looked for: "
-                "press the probe in less far"
+                "press the probe in less far, or set it up straighter"
             )
 
     def _response(self, elements: Kind, found: Found, loads: Loads) -> Response:
