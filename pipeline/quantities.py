@@ -52,6 +52,9 @@ _MESH = (
 _SCENE = (
     Quantity("young", "Pa", "Young's modulus", "E", "Young's modulus E"),
     Quantity("poisson", "1", "Poisson's ratio", "ν", "Poisson's ratio ν"),
+    Quantity("density", "kg/m^3", "density", "ρ", "density ρ"),
+    Quantity("gravity", "", "acceleration of gravity"),
+    Quantity("load", "", "loads"),
     Quantity("probe", "", "probe"),
     Quantity("body", "", "body"),
     Quantity("path", "m", "length along the path of the probe, as it is given", axis="length along the path"),
@@ -113,6 +116,16 @@ _RESULTS = (
     Quantity("energy_release_ratio", "1", "energy_release over that of the full-order mesh of the same study",
              "G/G_max"),
     Quantity("energy_release_exact", "J/m^2", "energy_release converged as force_exact is (G_exact)", "G_exact"),
+    Quantity("load_force", "N",
+             "what loads add to force while the probe is held; with the depth measured from the unloaded surface, the "
+             "probe bears force + load_force", "F_load", "force of the loads F_load"),
+    Quantity("load_force_error", "N", "error bar (95 %) on load_force"),
+    Quantity("load_force_vector", "N", "what loads add to force_vector while the probe is held"),
+    Quantity("load_force_ratio", "1", "load_force over that of the full-order mesh of the same study",
+             "F_load/F_load,max"),
+    Quantity("load_energy", "J", "strain energy of the loads while the probe is held; energy is what the depth adds"),
+    Quantity("sag", "m", "how far along its axis loads take a probe that is free to follow: the depth, from the "
+             "unloaded surface, at which it bears no force", "sag", "sag of the surface under the probe"),
     Quantity("max_strain", "1", "largest principal strain of a cell's mean strain, a tenth of the probe's half width "
              "or farther from its edge and from those of what is held",
              "largest strain", in_per_cent=True),
@@ -139,6 +152,10 @@ _RESULTS = (
 _OF_PIECES = (
     Quantity("young", "Pa", "Young's modulus", "E", "Young's modulus E"),
     Quantity("poisson", "1", "Poisson's ratio", "ν", "Poisson's ratio ν"),
+    Quantity("density", "kg/m^3", "density", "ρ", "density ρ"),
+    Quantity("pressure", "Pa", "pressure", "p", "pressure p"),
+    Quantity("traction", "", "traction"),
+    Quantity("on", "", "where it acts:"),
     Quantity("thickness", "m", "thickness"),
     Quantity("radius", "m", "radius"),
     Quantity("at", "", "centre"),

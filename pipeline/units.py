@@ -31,6 +31,16 @@ radian = [] = rad
 degree = 3.14159265358979323846 / 180 * radian = deg = °
 """.strip().splitlines()
 
+# By SI unit: an example of a quantity, and what it is.
+_KINDS = {
+    "m": ("10 mm", "a length"),
+    "Pa": ("10 kPa", "a pressure"),
+    "s": ("10 ms", "a time"),
+    "": ("1 %", "a share"),
+    "rad": ("60 deg", "an angle"),
+    "kg/m^3": ("1060 kg/m^3", "a density"),
+    "m/s^2": ("-9.81 m/s^2", "an acceleration"),
+}
 # Twelve digits: "3 mm" and "0.3 cm" must be one number wherever two cases are compared.
 _DIGITS = 12
 
@@ -52,14 +62,13 @@ def canonical(value: float) -> float:
 
 def parse_quantity(text: Any, unit: str) -> float:
     """Read ``"10 mm"`` into a number in the SI ``unit``; a bare number is refused, never guessed."""
-    example = {"m": "10 mm", "Pa": "10 kPa", "s": "10 ms", "": "1 %", "rad": "60 deg"}[unit]
+    example, kind = _KINDS[unit]
     allowed = f'a number with a unit as text, such as "{example}"'
     if not isinstance(text, str):
         raise PydanticCustomError("quantity", "{allowed}", {"allowed": allowed})
     try:
         quantity = _registry().Quantity(text)
         if not quantity.is_compatible_with(unit):
-            kind = {"m": "a length", "Pa": "a pressure", "s": "a time", "": "a share", "rad": "an angle"}[unit]
             raise PydanticCustomError("quantity", "{allowed}", {"allowed": f'{kind}, such as "{example}"'})
         magnitude = float(quantity.to(unit).magnitude)
     except PydanticCustomError:
@@ -77,6 +86,14 @@ def _length(text: Any) -> float:
 
 def _pressure(text: Any) -> float:
     return parse_quantity(text, "Pa")
+
+
+def _density(text: Any) -> float:
+    return parse_quantity(text, "kg/m^3")
+
+
+def _acceleration(text: Any) -> float:
+    return parse_quantity(text, "m/s^2")
 
 
 def _angle(text: Any) -> float:
@@ -97,4 +114,7 @@ Angle = Annotated[float, BeforeValidator(_angle), Field(json_schema_extra={"unit
 Rounding = Annotated[Coordinate, Field(ge=0)]
 Travel = Annotated[Coordinate, Field(ge=0)]
 Share = Annotated[float, BeforeValidator(_share), Field(json_schema_extra={"unit": "1"})]
-Pressure = Annotated[float, BeforeValidator(_pressure), Field(gt=0, json_schema_extra={"unit": "Pa"})]
+Stress = Annotated[float, BeforeValidator(_pressure), Field(json_schema_extra={"unit": "Pa"})]
+Pressure = Annotated[Stress, Field(gt=0)]
+Density = Annotated[float, BeforeValidator(_density), Field(gt=0, json_schema_extra={"unit": "kg/m^3"})]
+Acceleration = Annotated[float, BeforeValidator(_acceleration), Field(json_schema_extra={"unit": "m/s^2"})]

@@ -77,8 +77,13 @@ def _changes(plan: Plan, case: Case, solve: Solve | None) -> dict[str, str]:
     # What is known of contact: where none of it is, it cannot be another, and each depth has a mesh of its own.
     is_found = not case.probe.has_singular_edge
     deeper = {"depth": all_of_it if is_found else contact} if case.probe.is_unilateral else {}
+    if case.load.acts:
+        proportional = {"young, load": material, "depth": contact}
+    else:
+        nothing = "nothing: F is proportional" if "scaling" in plan.used else material
+        proportional = {", ".join(case.proportional_to): nothing}
     return {
-        ", ".join(case.proportional_to): "nothing: F is proportional" if "scaling" in plan.used else material,
+        **proportional,
         **deeper,
         "poisson": material,
         **({} if is_found else {"contact": contact}),

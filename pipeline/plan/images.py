@@ -41,9 +41,9 @@ def image_key(case: Case, *, scaled: bool) -> tuple[str, FloatArray] | None:
     """Return a key that images have in common, and the matrix (3, 3) that takes the case to where they are compared.
 
     ``scaled`` leaves out what F is proportional to. None where no images are looked for: on bodies without symmetry,
-    and of tools whose stiffness is asked for.
+    of tools whose stiffness is asked for, and where loads act, which tell one side from the other.
     """
-    if case.probe.motion == "all":
+    if case.probe.motion == "all" or case.load.acts:
         return None
     found = max(_compared(case), key=lambda pair: pair[0], default=None)
     if found is None:

@@ -7,10 +7,11 @@ from functools import lru_cache
 from math import inf
 from typing import Any
 
-from pipeline.plan.symmetry import mirror_planes, model_planes
+from pipeline.plan.symmetry import mirror_planes, movement_planes
 from pipeline.shapes.body import Body
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
+from pipeline.study.loads import Load
 from pipeline.study.schema import Mesh
 from pipeline.study.sweep import Case
 from pipeline.units import canonical
@@ -22,6 +23,7 @@ _MANY = 200_000  # sections of a large study
 # Keys that came later, with the value that stands for what was before: records of then stay valid.
 _LATER: dict[str, Any] = {
     "motion": "press",
+    "density": None,
     "layers": (),
     "inclusion": (),
     "axis": None,
@@ -39,15 +41,18 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
     ``folded`` takes every ε past the body for the full order; ``scaled`` leaves out what the force is proportional to.
     Timed cases are records of their own, each: they are never shared.
     """
+    scaled = scaled and not case.load.acts
     parts = [
         str(PHYSICS_VERSION),
         _body_text(case.body, case.scale.stress if scaled else 1.0),
-        text_of(case.material, case.material.PROPORTIONAL_TO if scaled else ()),
+        text_of(case.material, ("density", *(case.material.PROPORTIONAL_TO if scaled else ()))),
         text_of(case.probe, case.probe.proportional_to if scaled else ()),
         _ratios_text(case.probe) if scaled else "",
         _mesh_text(case.mesh, folded and case.is_full, case.probe.half_width, case.element),
         text_of(case.solve, ("timing", "repeats", "exact")),
     ]
+    if case.load.acts:
+        parts.append(_load_text(case.load, case.densities))
     if case.solve.timing:
         parts += [str(case.labels), str(case.solve.repeats)]
     return digest("\n".join(parts))
@@ -59,7 +64,8 @@ def reference_key(case: Case, accuracy: float) -> str:
     ratios = "0.0" if _slides_across_a_mirror(case) else _ratios_text(probe)
     parts = [
         f"{PHYSICS_VERSION} exact {accuracy!r}", _body_text(case.body, case.scale.stress),
-        text_of(case.material, case.material.PROPORTIONAL_TO), text_of(probe, probe.proportional_to), ratios,
+        text_of(case.material, ("density", *case.material.PROPORTIONAL_TO)),
+        text_of(probe, probe.proportional_to), ratios,
     ]  # fmt: skip
     return digest("\n".join(parts))
 
@@ -77,14 +83,14 @@ def operator_key(case: Case) -> str:
 
 
 def normalised(case: Case) -> Case:
-    """Return the case in the units of its scale, 1 Pa and 1 m, and pressed only: its force is F / (E d)."""
+    """Return the case in the units of its scale, 1 Pa and 1 m, pressed only, no loads: its force is F / (E d)."""
     travel = _ratios(case.probe)
     if _slides_across_a_mirror(case):
         travel = {key: float(number == 0) for number, key in enumerate(travel)}
     pressed: dict[str, Any] = {**travel, "motion": "press"}
     material = case.material.model_copy(update={"young": 1.0})
     body = _in_units_of(case.scale.stress, case.body)
-    return replace(case, body=body, material=material, probe=case.probe.model_copy(update=pressed))
+    return replace(case, body=body, material=material, probe=case.probe.model_copy(update=pressed), load=Load())
 
 
 @lru_cache(_MANY)
@@ -115,10 +121,18 @@ def _body_text(body: Body, stress: float | None = None) -> str:
         layer["thickness"] = ends[number]  # where it ends: one way to say it
     for inclusion, ball in zip(content["inclusion"], body.inclusion, strict=True):
         inclusion.update(axes=ball.surface.axes, radius=None)
-    for key in _PIECES if stress is None else ():
-        for piece in content.get(key, ()):
+    for piece in (piece for key in _PIECES for piece in content.get(key, ())):
+        del piece["density"]  # written with the loads
+        if stress is None:
             del piece["young"], piece["poisson"]
     return _text({key: value for key, value in content.items() if _LATER.get(key) != value})
+
+
+@lru_cache(_MANY)
+def _load_text(load: Load, densities: tuple[float | None, ...]) -> str:
+    """Write loads in canonical form, with the densities if there is gravity."""
+    content = load.model_dump()
+    return _text({**content, "densities": densities if any(load.gravity) else ()})
 
 
 def _ratios_text(probe: Probe) -> str:
@@ -158,7 +172,7 @@ def _mesh_text(mesh: Mesh, is_full: bool, half_width: float, element: str) -> st
 def _slides_across_a_mirror(case: Case) -> bool:
     """Where a blade moves across a plane of symmetry, that movement takes no force along the axis."""
     pressed = replace(case, probe=case.probe.model_copy(update={"motion": "press"}))
-    return mirror_planes(case) != model_planes(pressed)
+    return mirror_planes(case) != movement_planes(pressed)
 
 
 def _text(content: dict[str, Any]) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Any
 
-from pipeline.plan.symmetry import mirror_planes, model_planes
+from pipeline.plan.symmetry import mirror_planes, movement_planes
 from pipeline.shapes.indenter import Indenter
 from pipeline.study.check import held_gaps
 from pipeline.study.schema import Mesh
@@ -99,7 +99,7 @@ def half_width_of(case: Case) -> float:
 def _expected(case: Case, recipe: Recipe) -> float:
     """Return the error bar to expect of a recipe."""
     shape = case.probe.EXPECTED_ERROR
-    if mirror_planes(case) == model_planes(case):
+    if mirror_planes(case) == movement_planes(case):
         shape *= 1 + _SLIDE * _slide(case)
     if not case.is_plain:
         shape *= _ELSEWHERE[case.element]

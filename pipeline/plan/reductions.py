@@ -180,6 +180,8 @@ def _suits_a_basis(
     In a slit more is asked for than the work.
     """
     first = operator.solves[0]
+    if first.case.load.acts:
+        return False
     if bool(first.case.body.regions) != of_regions or first.case.probe.is_unilateral != found:
         return False
     values = {solve.key if of_regions else solve.case.material.poisson for solve in operator.solves}

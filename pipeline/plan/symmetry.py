@@ -21,16 +21,21 @@ def mirror_planes(case: Case) -> tuple[str, ...]:
     return _geometry(case.body, case.probe)
 
 
-def model_planes(case: Case) -> tuple[str, ...]:
-    """Return the mirror planes that the probe's movement respects, too: half or quarter of the body tells all."""
+def movement_planes(case: Case) -> tuple[str, ...]:
+    """Return the mirror planes that the probe's movement respects, too."""
     return _movement(case.body, case.probe)
 
 
+def model_planes(case: Case) -> tuple[str, ...]:
+    """Return those that loads respect, as well: half or quarter of the body tells all."""
+    return tuple(plane for plane in movement_planes(case) if case.load.is_mirrored(PLANES[plane]))
+
+
 def is_round(case: Case) -> bool:
-    """Tell whether body, support and probe are the same all round one axis, and the movement along it."""
+    """Tell whether body, support and probe are the same all round one axis, movement along it, no loads."""
     body, probe, frame = case.body, case.probe, case.frame
     half_plane = body.half_plane()
-    if probe.motion == "all" or half_plane is None or case.is_closed:
+    if probe.motion == "all" or half_plane is None or case.is_closed or case.load.acts:
         return False
     upright = frame.is_upright and frame.point[:2] == _ON_AXIS and case.travel[:2] == _ON_AXIS
     is_same = probe.is_round and is_body_round(body)

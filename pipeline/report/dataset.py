@@ -20,7 +20,7 @@ from pipeline.run.absent import absent
 from pipeline.run.record import Record
 from pipeline.shapes.frame import Frame, PlaceError
 from pipeline.shapes.from_file import FromFile
-from pipeline.study.sweep import Axis, Case
+from pipeline.study.sweep import Axis, Case, Study
 
 # The variables that are taken as they are from the records of the cases, and from those of F_exact.
 _FLOATS = (
@@ -30,6 +30,8 @@ _FLOATS = (
 # Those of contact that is found, if any of the study's is.
 _FOUND = ("contact_area", "contact_radius")
 _COUNTS = ("dofs", "cells", "iterations")
+# Of loads, if any of the study's acts; nought where none does.
+_OF_LOADS = ("load_force", "load_force_error", "load_energy", "sag")
 _EXACT = ("force_exact", "force_exact_error")
 # Of blades that stand in a slit.
 _OF_SLITS = ("energy_release", "energy_release_error", "energy_release_exact")
@@ -81,6 +83,7 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
             source = exact if name.endswith("_exact") else flat
             values = [getattr(r, name.removesuffix("_exact")) if r else nan for r in source]
             variables[name] = (dims, array(values, float), attributes(name))
+    variables |= _of_loads(study, flat)
     frames = [_frame(case) for case in study.cases()]
     for number, name in enumerate(_PLACE):
         places = [frame.point[number] if frame else nan for frame in frames]
@@ -103,6 +106,21 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     if any(axis.off for axis in study.axes):
         dataset = dataset.set_coords(_PLACE)
     return _add_ratios(dataset)
+
+
+def _of_loads(study: Study, flat: list[Record | None]) -> dict[str, Any]:
+    """Return the variables of loads, if any of the study's acts."""
+    if not any(case.load.acts for case in study.cases()):
+        return {}
+    dims = tuple(axis.name for axis in study.axes)
+    loaded = [_loaded(record, case) for record, case in zip(flat, study.cases(), strict=True)]
+    variables: dict[str, Any] = {}
+    for name in _OF_LOADS:
+        values = np.array([getattr(r, name) if r else nan for r in loaded], dtype=float)
+        variables[name] = (dims, values.reshape(study.shape), attributes(name))
+    vectors = np.array([r.load_force_vector if r else (nan,) * 3 for r in loaded]).reshape(*study.shape, 3)
+    variables["load_force_vector"] = ((*dims, "component"), vectors, attributes("load_force_vector"))
+    return variables
 
 
 def write(dataset: xr.Dataset, path: Path) -> None:
@@ -128,6 +146,8 @@ def _add_ratios(dataset: xr.Dataset) -> xr.Dataset:
     }  # fmt: skip
     if "energy_release" in dataset:
         ratios["energy_release_ratio"] = _over_full_order(dataset["energy_release"], dataset)
+    if "load_force" in dataset:
+        ratios["load_force_ratio"] = _over_full_order(dataset["load_force"], dataset)
     return dataset.assign(
         {name: values.transpose(*order).assign_attrs(attributes(name)) for name, values in ratios.items()}
     )
@@ -150,7 +170,8 @@ def _scaled(record: Record | None, case: Case) -> Record | None:
         return record.scaled(case.scale) if record else None
     return replace(
         record, force=nan, force_vector=(nan, nan, nan), energy=nan, energy_release=nan, max_strain=nan, balance=nan,
-        contact_area=nan, contact_radius=nan,
+        contact_area=nan, contact_radius=nan, load_force=nan, load_force_error=nan, load_energy=nan, sag=nan,
+        load_force_vector=(nan, nan, nan),
     )  # fmt: skip
 
 
@@ -160,6 +181,15 @@ def _imaged(record: Record | None, image: Image | None) -> Record | None:
         return record
     vector, bars = image.vector(record.force_vector), image.bars(record.force_vector_error)
     return replace(record, origin="image", force_vector=vector, force_vector_error=bars)
+
+
+def _loaded(record: Record | None, case: Case) -> Record | None:
+    """Return the record of a study of loads: what loads do that do not act is nought."""
+    if record is None or case.load.acts or not record.is_ok:
+        return record
+    return replace(
+        record, load_force=0.0, load_force_error=0.0, load_force_vector=(0.0, 0.0, 0.0), load_energy=0.0, sag=0.0
+    )
 
 
 def _frame(case: Case) -> Frame | None:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from math import nan
+from typing import Any
 
 import numpy as np
 
@@ -50,6 +51,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         max_strain=solution.max_strain,
         contact_area=solution.contact_area,
         contact_radius=solution.contact_radius,
+        **_of_loads(solution, turn),
         balance=solution.balance,
         dofs=solution.dofs,
         cells=solution.cells * 2 ** len(solve.mirrors),
@@ -63,6 +65,22 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         planned_cells=planned_cells,
         poisson=poisson,
     )
+
+
+def _of_loads(solution: Solution, turn: FloatArray | None) -> dict[str, Any]:
+    """Return what a record holds of loads, nothing where there are none."""
+    loaded, loads = solution.carried, solution.response.loads
+    if loaded is None:
+        return {}
+    force, axis = loaded.force(loads), (0.0, 0.0, -1.0)
+    return {
+        "load_force": force[2],
+        "load_force_error": loaded.bar_along(loads, axis),
+        "load_force_vector": turned_back(turn, force),
+        "load_energy": loaded.energy,
+        # Where the probe bears no force along its axis: held at a depth d it bears k d + load_force.
+        "sag": -force[2] / loaded.stiffness_along(loads, axis),
+    }
 
 
 def _front_length(case: Case) -> float:

@@ -6,7 +6,8 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.mesh.of_case import meridian_of
-from pipeline.plan.symmetry import mirror_planes, model_planes
+from pipeline.plan.symmetry import mirror_planes, movement_planes
+from pipeline.run.dead_loads import dead_loads_of
 from pipeline.run.far_field import far_field_of
 from pipeline.run.memory import FreeMemory
 from pipeline.shapes.probes.round_indenter import RoundIndenter
@@ -40,6 +41,8 @@ class CaseFailure(Exception):
 def problem_of(spaces: Spaces, case: Case, *, shared: bool, reuse: bool = False) -> FieldProblem:
     """Return what solves ``case`` in the spaces of its mesh, by the elements that suit it; collective."""
     if case.probe.is_unilateral:
+        if case.load.acts:
+            raise CaseFailure("loads are not computed where the area of contact is found")
         if case.mesh.degree != DEGREE:
             raise CaseFailure(f"unilateral contact is found by elements of degree {DEGREE}, not {case.mesh.degree}")
         return ContactProblem(spaces, tool_of(case), case.element)
@@ -49,7 +52,13 @@ def problem_of(spaces: Spaces, case: Case, *, shared: bool, reuse: bool = False)
 
 
 def meridian_problem(case: Case) -> Problem:
-    """Return what solves a round ``case`` on its meridian."""
+    """Return what solves a round ``case`` on its meridian.
+
+    Raises:
+        CaseFailure: if loads act: they are computed in three dimensions only.
+    """
+    if case.load.acts:
+        raise CaseFailure("loads are computed in three dimensions only")
     if case.probe.is_unilateral:
         return MeridianContact(meridian_of(case), round_tool_of(case))
     return MeridianProblem(meridian_of(case), conditions_of(case))
@@ -111,7 +120,11 @@ def round_tool_of(case: Case) -> RoundTool:
 
 
 def loads_of(case: Case) -> Loads:
-    """Return how the probe of ``case`` moves, on the mesh that is turned so that it presses along -z."""
+    """Return how the probe of ``case`` moves, and what loads act, on the mesh turned so that it presses along -z."""
+    return replace(_movement_of(case), dead=dead_loads_of(case))
+
+
+def _movement_of(case: Case) -> Loads:
     frame = case.frame.upright
     travel = case.probe.travel(frame)
     if case.probe.motion == "all":
@@ -123,7 +136,7 @@ def loads_of(case: Case) -> Loads:
     if case.is_closed:
         return Loads.along(travel).with_far(far_field_of(case))
     # Across a plane of symmetry a probe slides without force along its axis, and presses without force along itself.
-    return Loads.along(travel, apart=mirror_planes(case) != model_planes(case))
+    return Loads.along(travel, apart=mirror_planes(case) != movement_planes(case))
 
 
 def law_of(case: Case) -> MaterialLaw:

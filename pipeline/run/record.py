@@ -20,8 +20,10 @@ class Record:
     ``stiffness_error`` has the bars on its entries. ``contact_area`` (m²) and ``contact_radius`` (m) are those of
     unilateral contact. ``max_strain`` is read ``strain_clearance`` half widths of the probe from its edge or farther.
     ``energy_release`` (J/m²) is the mean along a slit's front, its relative 95 % bar ``energy_release_error``.
-    ``kind``, ``planned_cells`` and ``poisson`` are what its cost was estimated from (:mod:`pipeline.plan.cost`),
-    ``group`` the ranks that computed it.
+    Loads add ``load_force`` (N), of the bar ``load_force_error`` (N), to the force while the probe is held, in all
+    ``load_force_vector`` (N); ``load_energy`` (J) is their strain energy, ``sag`` (m) how far they take a probe that is
+    free along its axis. ``kind``, ``planned_cells`` and ``poisson`` are what its cost was estimated from
+    (:mod:`pipeline.plan.cost`), ``group`` the ranks that computed it.
     """
 
     key: str
@@ -43,6 +45,11 @@ class Record:
     strain_clearance: float = CLEAR
     contact_area: float = nan
     contact_radius: float = nan
+    load_force: float = nan
+    load_force_error: float = nan
+    load_force_vector: tuple[float, float, float] = (nan, nan, nan)
+    load_energy: float = nan
+    sag: float = nan
     balance: float = nan
     dofs: int = 0
     cells: int = 0
@@ -119,6 +126,8 @@ class Record:
         x, y, z = content["force_vector"]
         bx, by, bz = content.get("force_vector_error", (nan, nan, nan))
         content |= {"force_vector": (x, y, z), "force_vector_error": (bx, by, bz)}
+        x, y, z = content.get("load_force_vector", (nan, nan, nan))
+        content["load_force_vector"] = (x, y, z)
         for name in ("stiffness", "stiffness_error"):
             content[name] = tuple(tuple(row) for row in content.get(name, ()))
         if "strain_clearance" not in content and content.get("origin") != "axisymmetric":

@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import Field
 
 from pipeline.shapes.section import Section, Words
-from pipeline.units import Pressure
+from pipeline.units import Density, Pressure
 
 
 class Tissue(Section):
@@ -14,6 +14,12 @@ class Tissue(Section):
 
     young: Annotated[Pressure, Words("Young's modulus.", '"10 kPa"', is_used=True)]
     poisson: Annotated[float, Field(ge=0, le=0.5), Words("Poisson's ratio; 0.5 is incompressible.", "0.45")]
+
+    density: Annotated[
+        Density | None,
+        Field(json_schema_extra={"unit": "kg/m^3"}),
+        Words("Density, which gravity needs.", '"1060 kg/m^3"', default="none; of regions, the material's"),
+    ] = None
 
     @property
     def lame(self) -> tuple[float, float]:

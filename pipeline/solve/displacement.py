@@ -1,7 +1,9 @@
 """A body, a probe that displaces part of its surface, and the force that this takes, by displacement elements.
 
     find u with K u = 0 inside, u = the probe's motion on its footprint (bonded) or its normal part only
-    (frictionless), u = 0 on the support; K = λ A_λ + μ A_μ.
+    (frictionless), u = 0 on the support; K = λ A_λ + μ A_μ;
+
+and, where loads f act, w with K w = f, w = 0 on footprint and support (:mod:`pipeline.solve.carried`).
 
 The force is the reaction (:mod:`pipeline.solve.reaction`). Stress integrated under the probe is wrong by tens of per
 cent on the same solution.
@@ -17,8 +19,10 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
+from pipeline.solve.carried import Carried, carried_of, imbalance, shares
 from pipeline.solve.closure import TWO_SIDED, balanced, energy_beyond, far_share
 from pipeline.solve.conditions import Conditions
+from pipeline.solve.dead_loads import Applied
 from pipeline.solve.enrich import energy_decrements
 from pipeline.solve.error import error_bar, stiffness_bars
 from pipeline.solve.forms import mean_strain_form
@@ -51,6 +55,7 @@ class DisplacementProblem:
         self._shared, self._reuse = shared, reuse
         # By motion, the last solution for a unit of it less the prescribed displacements, owned dofs.
         self.corrections: dict[Motion, FloatArray] = {}
+        self._loaded: FloatArray | None = None  # the last solution for dead loads, owned dofs
         self._spaces, self._body, self._conditions = spaces, spaces.body, conditions
         self._fine = spaces.get(degree, conditions)
         self._strain = mean_strain_form(self._fine.dofs.space, self._fine.forms.displacement)
@@ -87,13 +92,17 @@ class DisplacementProblem:
         direct = is_direct(method, self.dofs, fine.degree)
         tolerance *= TWO_SIDED if loads.far is not None else 1.0
         held = [fine.dofs.held(motion) for motion in loads.motions]
+        applied = fine.applied(loads.dead)
         with ExitStack() as stack:
             start = time.perf_counter()
-            rhs, unknowns = ([stack.enter_context(vector(fine.dofs.space)) for _ in held] for _ in range(2))
-            for motion, values, load, unknown in zip(loads.motions, held, rhs, unknowns, strict=True):
+            columns = [*held, *applied]
+            rhs, unknowns = ([stack.enter_context(vector(fine.dofs.space)) for _ in columns] for _ in range(2))
+            for motion, values, load, unknown in zip(loads.motions, held, rhs, unknowns, strict=False):
                 fine.lift(load, values, law)
                 if self._reuse and motion in self.corrections:
                     unknown.array[:] = self.corrections[motion]
+            for dead in applied:
+                fine.put(rhs[-1], dead)
             assemble = time.perf_counter() - start
             levels, seconds = self._hierarchy(law, stack, direct=direct)
             assemble += seconds
@@ -101,27 +110,29 @@ class DisplacementProblem:
             stack.callback(solver.close)
             start = time.perf_counter()
             iterations = sum(map(solver.solve, rhs, unknowns))
-            response = self._response(unknowns, held, law, loads)
+            response, carried = self._response(unknowns, held, applied, law, loads)
             for _ in range(MOST_ROUNDS):
                 if direct or (share := rest(response.balance, asked)) == 1.0:
                     break
                 tolerance *= share
                 iterations += sum(solver.solve(*pair, tolerance) for pair in zip(rhs, unknowns, strict=True))
-                response = self._response(unknowns, held, law, loads)
+                response, carried = self._response(unknowns, held, applied, law, loads)
             if response.balance > BALANCE_LIMIT:
                 raise SolveError(
                     f"forces do not balance: relative error {response.balance:.1e}, allowed {BALANCE_LIMIT:.0e}"
                 )
             if loads.far is not None:
                 loads, held = self._close(response, unknowns, held)
-                response = balanced(self._response(unknowns, held, law, loads))
-            self.corrections = {m: u.array.copy() for m, u in zip(loads.motions, unknowns, strict=True)}
+                response = balanced(self._response(unknowns, held, applied, law, loads)[0])
+            self.corrections = {m: u.array.copy() for m, u in zip(loads.motions, unknowns, strict=False)}
+            self._loaded = unknowns[-1].array.copy() if applied else None
             self._move(held, loads)
             seconds = time.perf_counter() - start
             released, pushed = self._released(law, held, loads)
             solution = Solution(
                 response, self._largest_strain(), fine.dofs.whole_dofs, self._body.cells,
                 iterations, assemble, solver.setup_seconds, seconds, released=released, pushed=pushed,
+                carried=carried,
             )  # fmt: skip
             if not estimate:
                 return solution
@@ -129,12 +140,12 @@ class DisplacementProblem:
             start = time.perf_counter()
             found, (released_finer, pushed_finer), more = self._decrements(law, levels, held, loads, stack)
             plain = plain_share(self._body)
-        shares = np.diag(found) / np.diag(response.stiffness)
-        relative = np.array([error_bar(share, fine.degree, plain=plain) for share in shares])
-        bars = stiffness_bars(response.stiffness, relative, apart=loads.apart)
+        form = response.stiffness if carried is None else carried.form
+        relative = np.array([error_bar(share, fine.degree, plain=plain) for share in shares(found, form)])
         return replace(
-            solution, decrements=found, plain=plain, bars=bars, estimate_iterations=more,
-            released_finer=released_finer, pushed_finer=pushed_finer, time_estimate=time.perf_counter() - start,
+            solution.with_bars(found, stiffness_bars(form, relative), apart=loads.apart), plain=plain,
+            estimate_iterations=more, released_finer=released_finer, pushed_finer=pushed_finer,
+            time_estimate=time.perf_counter() - start,
         ).with_release_bar(fine.degree)  # fmt: skip
 
     @staticmethod
@@ -198,6 +209,8 @@ class DisplacementProblem:
         with vector(self._fine.dofs.space) as displacement:
             for motion, values, amount in zip(loads.motions, held, loads.amounts, strict=True):
                 displacement.array[:] += amount * self._unit(motion, values)
+            if loads.dead is not None and self._loaded is not None:
+                displacement.array[:] += self._loaded
             self._fine.set_displacement(displacement)
 
     @stage("error bar")
@@ -215,19 +228,22 @@ class DisplacementProblem:
         level, _ = self._level(finer, law, stack, blocked=True)
         solver = LinearSolver([*levels, level], direct=False, tolerance=0.5)
         stack.callback(solver.close)
-        residuals = [stack.enter_context(vector(finer.dofs.space)) for _ in held]
         moved = fine.forms.displacement.x.array.copy()
-        for motion, values, residual in zip(loads.motions, held, residuals, strict=True):
-            self._move([values], Loads((motion,), (1.0,)))
+        applied = finer.applied(loads.dead)
+        units = [([values], Loads((motion,), (1.0,))) for motion, values in zip(loads.motions, held, strict=True)]
+        units += [([], Loads((), (), dead=loads.dead)) for _ in applied]
+        residuals = [stack.enter_context(vector(finer.dofs.space)) for _ in units]
+        for unit, residual in zip(units, residuals, strict=True):
+            self._move(*unit)
             finer.forms.displacement.interpolate(fine.forms.displacement)
             finer.apply(residual, law)
             residual.scale(-1.0)
             residual.array[finer.dofs.prescribed_owned] = 0.0
+        for dead in applied:
+            finer.put(residuals[-1], dead)
         decrements, corrections, iterations = energy_decrements(solver, residuals, keep=self._has_slit)
         released = self._released(law, held, loads, finer, corrections)
         fine.forms.displacement.x.array[:] = moved
-        if loads.apart:
-            decrements = np.diag(np.diag(decrements))
         return 2.0 ** len(self._body.mirrored) * decrements, released, iterations
 
     @property
@@ -265,10 +281,16 @@ class DisplacementProblem:
 
         return of(self._conditions.front), of(self._conditions.tip)
 
-    def _response(self, unknowns: list[PETSc.Vec], held: list[FloatArray], law: MaterialLaw, loads: Loads) -> Response:
-        """Return the response to the motions whose solutions, less the prescribed displacements, are ``unknowns``."""
-        fine, owned = self._fine, self._fine.dofs.owned
-        units = [unknown.array + values[:owned] for unknown, values in zip(unknowns, held, strict=True)]
+    def _response(
+        self, unknowns: list[PETSc.Vec], held: list[FloatArray], applied: list[Applied], law: MaterialLaw, loads: Loads
+    ) -> tuple[Response, Carried | None]:
+        """Return the response to the motions whose solutions, less the prescribed displacements, are ``unknowns``.
+
+        The last of them is that of loads that are ``applied``, if any are: what they do comes after the response.
+        """
+        fine, owned, mirrored, count = self._fine, self._fine.dofs.owned, self._body.mirrored, len(held)
+        units = [unknown.array + values[:owned] for unknown, values in zip(unknowns, held, strict=False)]
+        units += [unknown.array.copy() for unknown in unknowns[count:]]
         residuals = []
         for unit in units:
             with vector(fine.dofs.space) as residual, vector(fine.dofs.space) as displacement:
@@ -277,7 +299,15 @@ class DisplacementProblem:
                 fine.apply(residual, law)
                 residuals.append(residual.array.copy())
         stationary = global_sum(fine.dofs.comm, np.array([[u @ r for r in residuals] for u in units]))
+        for dead in applied:
+            residuals[-1] -= dead.forces
         found = sums(fine.dofs, residuals, held)
-        beyond = energy_beyond(loads, law.lame_mu[0], self._body.mirrored)
-        response = reaction(loads, stationary + beyond, found.on_probe, self._body.mirrored)
-        return replace(response, balance=found.imbalance(np.diag(stationary), loads, self._body.mirrored))
+        beyond = energy_beyond(loads, law.lame_mu[0], mirrored)
+        response = reaction(loads, stationary[:count, :count] + beyond, found.on_probe[:count], mirrored)
+        balance = found.imbalance(np.diag(stationary)[:count], loads, mirrored)
+        if not applied:
+            return replace(response, balance=balance), None
+        works = global_sum(fine.dofs.comm, np.array([u @ applied[0].forces for u in units]))
+        balance = max(balance, imbalance(found, np.diag(stationary), works, applied[0], loads, mirrored))
+        loaded = carried_of(stationary, works, found.on_probe[-1], mirrored, apart=loads.apart)
+        return replace(response, balance=balance), loaded

@@ -6,6 +6,7 @@ from math import hypot
 import numpy as np
 
 from pipeline.arrays import FloatArray
+from pipeline.solve.dead_loads import DeadLoads
 from pipeline.solve.far_field import FarField
 
 Vector = tuple[float, float, float]
@@ -56,12 +57,14 @@ class Motion:
 class Loads:
     """What moves: the sum of ``motions``, each by its amount (m, or rad); translations are along orthogonal directions.
 
-    ``apart`` says that symmetry keeps the motions apart: none takes any work in the movement of another.
+    ``apart`` says that symmetry keeps the motions apart: none takes any work in the movement of another. ``dead`` are
+    the loads that act on the tissue meanwhile.
     """
 
     motions: tuple[Motion, ...]
     amounts: tuple[float, ...]
     apart: bool = False
+    dead: DeadLoads | None = None
 
     @property
     def far(self) -> FarField | None:
@@ -92,7 +95,7 @@ class Loads:
 
     def opened(self, normal: Vector, amount: float) -> "Loads":
         """Return the loads of a probe that also holds each face of a slit ``amount`` (m) off its plane."""
-        return Loads((*self.motions, Motion(opening=normal)), (*self.amounts, amount))
+        return replace(self, motions=(*self.motions, Motion(opening=normal)), amounts=(*self.amounts, amount))
 
     def with_far(self, far: FarField) -> "Loads":
         """Return the loads with a unit of the ``far`` field as a motion more, whose amount is to be found."""
@@ -105,4 +108,4 @@ class Loads:
 
     def times(self, factor: float) -> "Loads":
         """Return ``factor`` times the movement."""
-        return Loads(self.motions, tuple(factor * amount for amount in self.amounts), self.apart)
+        return replace(self, amounts=tuple(factor * amount for amount in self.amounts))

@@ -26,8 +26,10 @@ from typing import Any
 import numpy as np
 
 from pipeline.arrays import FloatArray
+from pipeline.solve.carried import Carried, carried_of, imbalance, shares
 from pipeline.solve.closure import balanced, energy_beyond, far_share
 from pipeline.solve.conditions import Conditions
+from pipeline.solve.dead_loads import Applied
 from pipeline.solve.error import error_bar, stiffness_bars
 from pipeline.solve.forms import mean_strain_form
 from pipeline.solve.linear import Level, SolveError
@@ -111,32 +113,36 @@ class MixedProblem:
         fine = self._fine
         start = time.perf_counter()
         held = [fine.displacements.dofs.held(motion) for motion in loads.motions]
+        applied = fine.displacements.applied(loads.dead)
         with ExitStack() as stack:
-            unknowns = [stack.enter_context(fine.pair()) for _ in held]
-            iterations = self._correct(fine, solver, split, unknowns, held, tolerance)
-            response = self._response(fine, split, unknowns, held, loads)
+            unknowns = [stack.enter_context(fine.pair()) for _ in [*held, *applied]]
+            iterations = self._correct(fine, solver, split, unknowns, held, applied, tolerance)
+            response, carried = self._response(fine, split, unknowns, held, applied, loads)
             if (share := rest(response.balance, tolerance)) < 1:
-                iterations += self._correct(fine, solver, split, unknowns, held, share)
-                response = self._response(fine, split, unknowns, held, loads)
+                iterations += self._correct(fine, solver, split, unknowns, held, applied, share)
+                response, carried = self._response(fine, split, unknowns, held, applied, loads)
             if loads.far is not None:
                 loads, held = self._close(response, unknowns, held)
-                response = balanced(self._response(fine, split, unknowns, held, loads))
+                response = balanced(self._response(fine, split, unknowns, held, applied, loads)[0])
             seconds = time.perf_counter() - start - (solver.setup_seconds if direct else 0.0)
             if response.balance > BALANCE_LIMIT:
                 raise SolveError(
                     f"forces do not balance: relative error {response.balance:.1e}, allowed {BALANCE_LIMIT:.0e}"
                 )
             released, pushed = self._released(fine, split, unknowns, held)
-            self._move(unknowns, held, loads.amounts)
+            amounts = [*loads.amounts, *(1.0 for _ in applied)]
+            self._move(unknowns, held, amounts)
             strain = largest_strain(self._strain, self._body, self._conditions.front)
             solution = Solution(
                 _times(response, split.unit), strain, fine.whole_dofs, self._body.cells, iterations,
                 assemble, solver.setup_seconds, seconds, released=released, pushed=pushed,
+                carried=carried and carried.times(split.unit),
             )  # fmt: skip
             if not estimate:
                 return solution
-            solution = self._estimate(solution, response, unknowns, held, split)
-            self._move(unknowns, held, loads.amounts)
+            coarse = response.stiffness if carried is None else carried.form
+            solution = self._estimate(solution, coarse, unknowns, held, split)
+            self._move(unknowns, held, amounts)
         return solution
 
     @staticmethod
@@ -159,8 +165,10 @@ class MixedProblem:
         space = space or self._fine
         owned = space.displacements.dofs.owned
         with space.pair() as (displacement, pressure):
-            for (u, p), values, amount in zip(unknowns, held, amounts, strict=True):
-                displacement.array[:] += amount * (u.array + values[:owned])
+            for number, ((u, p), amount) in enumerate(zip(unknowns, amounts, strict=True)):
+                displacement.axpy(amount, u)
+                if number < len(held):
+                    displacement.array[:] += amount * held[number][:owned]
                 pressure.axpy(amount, p)
             space.set_fields((displacement, pressure))
 
@@ -185,53 +193,69 @@ class MixedProblem:
 
     @stage("error bar")
     def _estimate(
-        self, solution: Solution, coarse: Response, unknowns: list[Pair], held: list[FloatArray], split: SplitLaw
+        self, solution: Solution, coarse: FloatArray, unknowns: list[Pair], held: list[FloatArray], split: SplitLaw
     ) -> Solution:
-        """Return ``solution``, whose response in the law's unit is ``coarse``, with its error bars; collective."""
-        start, loads = time.perf_counter(), coarse.loads
+        """Return ``solution``, whose form in the law's unit is ``coarse``, with its error bars; collective.
+
+        That is the stiffness, with a row more for loads.
+        """
+        start, loads = time.perf_counter(), solution.response.loads
         solver, _ = self._solver(self._degree + 1, direct=False)
         finer = self._space(self._degree + 1)
         finer_held = [finer.displacements.dofs.held(motion) for motion in loads.motions]
+        applied = finer.displacements.applied(loads.dead)
         with ExitStack() as stack:
-            found = [stack.enter_context(finer.pair()) for _ in held]
-            for pair, unknown, values, fine_values in zip(found, unknowns, held, finer_held, strict=True):
-                self._move([unknown], [values], [1.0])
-                finer.start_from(self._fine, pair, fine_values)
-            iterations = self._correct(finer, solver, split, found, finer_held, _ESTIMATE_TOLERANCE)
-            fine = self._response(finer, split, found, finer_held, loads)
+            found = [stack.enter_context(finer.pair()) for _ in unknowns]
+            for number, (pair, unknown) in enumerate(zip(found, unknowns, strict=True)):
+                self._move([unknown], held[number : number + 1], [1.0])
+                values = finer_held[number] if number < len(held) else np.zeros(finer.displacements.dofs.owned)
+                finer.start_from(self._fine, pair, values)
+            iterations = self._correct(finer, solver, split, found, finer_held, applied, _ESTIMATE_TOLERANCE)
+            fine, carried = self._response(finer, split, found, finer_held, applied, loads)
             released, pushed = self._released(finer, split, found, finer_held)
-        decrements, energies = coarse.stiffness - fine.stiffness, np.diag(coarse.stiffness)
-        unseen = 2.0 ** len(self._body.mirrored) * np.array(solver.first_energies) / energies
+        decrements = coarse - (fine.stiffness if carried is None else carried.form)
+        first = 2.0 ** len(self._body.mirrored) * np.diag(solver.first_energies)
         plain = plain_share(self._body)
         relative = [
             error_bar(d, self._degree, "mixed", plain=plain, unseen=n)
-            for d, n in zip(np.diag(decrements) / energies, unseen, strict=True)
+            for d, n in zip(shares(decrements, coarse), shares(first, coarse), strict=True)
         ]
+        bars = split.unit * stiffness_bars(coarse, np.array(relative))
         return replace(
-            solution, decrements=split.unit * decrements, plain=plain, released_finer=released, pushed_finer=pushed,
-            bars=stiffness_bars(solution.stiffness, np.array(relative), apart=loads.apart),
+            solution.with_bars(split.unit * decrements, bars, apart=loads.apart), plain=plain, released_finer=released,
+            pushed_finer=pushed,
             estimate_iterations=iterations, time_estimate=time.perf_counter() - start,
         ).with_release_bar(self._degree)  # fmt: skip
 
     @stage("iterations")
     def _correct(
         self, space: MixedSpace, solver: SaddleSolver, split: SplitLaw, unknowns: list[Pair], held: list[FloatArray],
-        tolerance: float,
+        applied: list[Applied], tolerance: float,
     ) -> int:  # fmt: skip
-        """Improve ``unknowns``, each less the prescribed displacements ``held``; return the iterations."""
+        """Improve ``unknowns``, each less the prescribed displacements ``held``; return the iterations.
+
+        The last is that of loads that are ``applied``, if any are.
+        """
         with ExitStack() as stack:
-            loads = [stack.enter_context(space.pair()) for _ in held]
-            for load, values in zip(loads, held, strict=True):
+            loads = [stack.enter_context(space.pair()) for _ in unknowns]
+            for load, values in zip(loads, held, strict=False):
                 space.lift(load, values, split.elastic)
+            for dead in applied:
+                space.displacements.put(loads[-1][0], dead, 1 / split.unit)
             return solver.solve(space.by_region(split.compliance), loads, unknowns, tolerance)
 
     def _response(
-        self, space: MixedSpace, split: SplitLaw, unknowns: list[Pair], held: list[FloatArray], loads: Loads
-    ) -> Response:
-        """Return the response, in the law's unit, to motions of solutions ``unknowns`` less ``held``; collective."""
+        self, space: MixedSpace, split: SplitLaw, unknowns: list[Pair], held: list[FloatArray],
+        applied: list[Applied], loads: Loads,
+    ) -> tuple[Response, Carried | None]:  # fmt: skip
+        """Return the response, in the law's unit, to motions of solutions ``unknowns`` less ``held``; collective.
+
+        After it comes what the loads do that are ``applied``, of which the last of ``unknowns`` is the solution.
+        """
         dofs, elastic, residuals, dilations, masses, moved = space.displacements.dofs, [], [], [], [], []
         c = space.by_region(split.compliance)
-        for unknown, values in zip(unknowns, held, strict=True):
+        for number, unknown in enumerate(unknowns):
+            values = held[number] if number < len(held) else np.zeros(dofs.owned)
             with space.pair() as (residual, dilation), space.pair() as (pull, mass_p), space.pair() as total:
                 total[0].array[:] = unknown[0].array + values[: dofs.owned]
                 unknown[1].copy(total[1])
@@ -250,13 +274,21 @@ class MixedProblem:
                       for u, p in moved]),
         )  # fmt: skip
         elastic_energy, coupled, compressed = np.moveaxis(products, -1, 0)
+        count, mirrored = len(held), self._body.mirrored
+        for dead in applied:
+            residuals[-1] -= dead.forces / split.unit
         found = sums(dofs, residuals, held)
-        beyond = energy_beyond(loads, split.elastic.lame_mu[0], self._body.mirrored)
-        response = reaction(
-            loads, elastic_energy + coupled + coupled.T - compressed + beyond, found.on_probe, self._body.mirrored
-        )
-        energies = np.diag(elastic_energy + compressed)
-        return replace(response, balance=found.imbalance(energies, loads, self._body.mirrored))
+        beyond = energy_beyond(loads, split.elastic.lame_mu[0], mirrored)
+        stationary, energies = elastic_energy + coupled + coupled.T - compressed, np.diag(elastic_energy + compressed)
+        response = reaction(loads, stationary[:count, :count] + beyond, found.on_probe[:count], mirrored)
+        balance = found.imbalance(energies[:count], loads, mirrored)
+        if not applied:
+            return replace(response, balance=balance), None
+        (dead,) = (load.times(1 / split.unit) for load in applied)
+        works = global_sum(dofs.comm, np.array([u @ dead.forces for u, _ in moved]))
+        balance = max(balance, imbalance(found, energies, works, dead, loads, mirrored))
+        loaded = carried_of(stationary, works, found.on_probe[-1], mirrored, apart=loads.apart)
+        return replace(response, balance=balance), loaded
 
     @stage("spaces, forms")
     def _space(self, degree: int) -> MixedSpace:

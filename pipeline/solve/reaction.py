@@ -73,19 +73,21 @@ def reaction(
     stiffness = 2.0 ** len(mirrored) * (stationary + stationary.T) / 2
     if loads.apart:
         stiffness = np.diag(np.diag(stiffness))
-    return Response(loads, stiffness, -_whole(on_probe, mirrored), balance)
+    return Response(loads, stiffness, -whole_force(on_probe, mirrored), balance)
 
 
 @dataclass(frozen=True)
 class Sums:
     """Sums of residuals of n motions on the modelled part; global: ``on_probe`` and ``on_support`` (n, 3), N per unit.
 
-    ``works`` (n) are held_j·r_j over all prescribed dofs.
+    ``works`` (n) are held_j·r_j over all prescribed dofs. With one residual more, that of loads, the first two are
+    (n + 1, 3), and ``crossed`` (n) are the products of the last residual with each held_j.
     """
 
     on_probe: FloatArray
     on_support: FloatArray
     works: FloatArray
+    crossed: FloatArray
 
     def imbalance(self, twice_energies: FloatArray, loads: Loads, mirrored: Sequence[int]) -> float:
         """Return the largest relative error of F·d = 2U (``twice_energies``, n) and of F_probe + F_support = 0.
@@ -93,7 +95,8 @@ class Sums:
         A rotation, or a slit that is opened, may take no force at all: its forces are measured by what its energy is
         worth in a translation.
         """
-        on_probe, on_support = (_whole(part, mirrored) for part in (self.on_probe, self.on_support))
+        count = len(loads.motions)
+        on_probe, on_support = (whole_force(part[:count], mirrored) for part in (self.on_probe, self.on_support))
         size = np.linalg.norm(on_probe, axis=1)
         straight = np.array([motion.is_translation for motion in loads.motions])
         stiffest = twice_energies[straight].max() if straight.any() else twice_energies.max()
@@ -104,17 +107,21 @@ class Sums:
 
 
 def sums(space: ConstrainedSpace, residuals: Sequence[FloatArray], held: Sequence[FloatArray]) -> Sums:
-    """Return what residuals of n motions (owned dofs) sum up to; ``held`` are the prescribed values; collective."""
+    """Return what residuals of n motions (owned dofs) sum up to; ``held`` are the prescribed values; collective.
+
+    One residual more is that of loads.
+    """
     prescribed, rows = space.prescribed_owned, []
-    for residual, values in zip(residuals, held, strict=True):
+    for residual in residuals:
         points = residual.reshape(-1, 3)
         on_probe, on_support = (points[dofs].sum(axis=0) for dofs in (space.probe_owned, space.fixed_owned))
-        rows.append([*on_probe, *on_support, residual[prescribed] @ values[prescribed]])
-    total = global_sum(space.comm, np.array(rows))
-    return Sums(total[:, :3], total[:, 3:6], total[:, 6])
+        rows.append([*on_probe, *on_support, *(residual[prescribed] @ values[prescribed] for values in held)])
+    total, count = global_sum(space.comm, np.array(rows)), len(held)
+    crossed = total[-1, 6:] if len(residuals) > count else np.zeros(count)
+    return Sums(total[:, :3], total[:, 3:6], np.diag(total[:count, 6:]).copy(), crossed)
 
 
-def _whole(forces: FloatArray, mirrored: Sequence[int]) -> FloatArray:
+def whole_force(forces: FloatArray, mirrored: Sequence[int]) -> FloatArray:
     """Return forces on the whole body: images double what lies in a plane of symmetry and cancel what is across it."""
     whole = np.full(3, 2.0 ** len(mirrored))
     whole[list(mirrored)] = 0.0

@@ -7,6 +7,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from pipeline.arrays import FloatArray
+from pipeline.solve.carried import Carried
 from pipeline.solve.error import extrapolate, extrapolate_found, extrapolate_release, release_bar
 from pipeline.solve.loads import Loads, Vector
 from pipeline.solve.material import MaterialLaw
@@ -47,8 +48,8 @@ class Solution:
     F d. ``released`` (n, n) is the energy (J) that a metre of advance of a slit's front releases, a form of the amounts
     of the motions (:mod:`pipeline.solve.release`), ``released_finer`` what one degree more makes of it, and
     ``release_bar`` the relative 95 % bar on what they release. ``pushed``, ``pushed_finer`` and ``push_bar`` are the
-    same of the tip of a blade along which tissue slides: what its advance
-    takes, less than nothing is released, is the force on it.
+    same of the tip of a blade along which tissue slides: what its advance takes, less than nothing is released, is the
+    force on it. ``carried`` is what loads do while the probe is held.
     """
 
     response: Response
@@ -74,6 +75,7 @@ class Solution:
     pushed: FloatArray | None = None
     pushed_finer: FloatArray | None = None
     push_bar: float = nan
+    carried: Carried | None = None
 
     @property
     def reaction(self) -> Vector:
@@ -130,6 +132,21 @@ class Solution:
         x, y, z = map(float, np.where(spanned > 1 - 1e-9, bars, nan))
         return x, y, z if self.pushed is None else abs(self.push) * self.push_bar
 
+    def with_bars(self, decrements: FloatArray, bars: FloatArray, *, apart: bool) -> "Solution":
+        """Return the solution with what one degree more takes away, and bars; loads have a row more than motions.
+
+        The entries between motions that symmetry keeps ``apart`` are zero, and known to be.
+        """
+        count = len(self.response.loads.motions)
+        decrements, bars = decrements.copy(), bars.copy()
+        if apart:
+            for matrix in (decrements, bars):
+                matrix[:count, :count] = np.diag(np.diag(matrix)[:count])
+        loaded = None if self.carried is None else replace(self.carried, decrements=decrements, bars=bars)
+        return replace(
+            self, decrements=decrements[:count, :count], bars=bars[:count, :count], carried=loaded
+        )  # fmt: skip
+
     @property
     def release(self) -> float:
         """Energy (J) that a metre of advance of the slit's front releases; not a number if there is no slit."""
@@ -170,6 +187,9 @@ class Solution:
             elsewhere=elsewhere,
         )  # fmt: skip
         best = replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
+        if self.carried is not None:
+            loaded = self.carried.extrapolated(degree, element, plain=self.plain, graded=graded)
+            best = replace(best, carried=loaded)
         if self.released is None or self.released_finer is None:
             return best
         finer = _form(self.released_finer, self.response.amounts)

@@ -6,6 +6,7 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.conditions import Conditions, ConstrainedSpace
+from pipeline.solve.dead_loads import Applied, DeadLoads, apply_loads
 from pipeline.solve.forms import ElasticForms
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.operator import Operators
@@ -47,6 +48,20 @@ class ElasticSpace:
         self.forms.displacement.x.array[:] = held
         self.apply(rhs, law)
         rhs.scale(-1.0)
+        rhs.array[self.dofs.prescribed_owned] = 0.0
+
+    @stage("loads")
+    def applied(self, loads: DeadLoads | None) -> list[Applied]:
+        """Return the dead loads on the dofs of the space, none if there are none; collective.
+
+        Raises:
+            SolveError: if no facet carries a traction.
+        """
+        return [] if loads is None else [apply_loads(loads, self.dofs.body, self.dofs.space)]
+
+    def put(self, rhs: PETSc.Vec, applied: Applied, factor: float = 1.0) -> None:
+        """Add ``factor`` times loads to ``rhs``, but for the prescribed dofs."""
+        rhs.array[:] += factor * applied.forces
         rhs.array[self.dofs.prescribed_owned] = 0.0
 
     def set_displacement(self, values: PETSc.Vec, factor: float = 1.0) -> None:

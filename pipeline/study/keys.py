@@ -38,6 +38,10 @@ SECTION_TEXTS = {
     "Optional.",
     "mesh": "Element sizes, elements, and what is kept of the body.",
     "solve": "How cases are solved and timed. Optional; lists are no sweeps here.",
+    "load": "What acts on the body besides the probe, and keeps its size and direction. F is what the depth adds; "
+    "`load_force` in the dataset is what loads add. Optional.",
+    "load.traction": "Forces on parts of the boundary, one table each. Optional; the values of one with a name can be "
+    "swept.",
     "plan": "What may be left out of the work. Optional; lists are no sweeps here.",
 }
 _QUANTITIES = {
@@ -45,6 +49,8 @@ _QUANTITIES = {
     "Pa": ("pressure", "pressures"),
     "1": ("per cent", "per cent"),
     "rad": ("angle", "angles"),
+    "kg/m^3": ("density", "densities"),
+    "m/s^2": ("acceleration", "accelerations"),
     "": ("number", "numbers"),
 }
 _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
@@ -113,6 +119,8 @@ def _takes(model: type[Section], name: str) -> str:
         return 'length > 0 | "full"'
     if name == "fixed":
         return '"bottom" | "sides" | "bottom+sides" | {below = length}'
+    if name == "on":
+        return 'face | "free" | {around = 3 lengths, radius = length}'
     field = model.model_fields[name]
     return _kind(model.model_json_schema()["properties"][name]) + _bounds(field)
 

@@ -11,10 +11,12 @@ from pydantic import BaseModel, ValidationError
 from pipeline.shapes.registry import LATER
 from pipeline.shapes.section import Section
 from pipeline.study.check import check_sense
+from pipeline.study.check_loads import check_loads
+from pipeline.study.loads import Load
 from pipeline.study.path import Way, read_path
 from pipeline.study.problems import Problem, Problems, StudyError, nearest, nested_model
 from pipeline.study.regions import check_regions, material_without_section
-from pipeline.study.schema import LATER_SECTIONS, NESTED, SECTIONS, SINGLE, Mesh
+from pipeline.study.schema import NESTED, SECTIONS, SINGLE, Mesh
 from pipeline.study.sweep import Axis, Study
 
 # A label needs its section's axes only; more combinations than this in one section is a slip of the pen.
@@ -59,7 +61,10 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "") -> Study:
         check_regions(sections, tuple(axes), problems)
     if not problems.errors:
         sections["material"] = sections["material"] or (material_without_section(sections["body"]),)
+        sections["load"] = sections["load"] or (Load(),)
         check_sense(sections, tuple(axes), problems)
+    if not problems.errors:
+        check_loads(sections, tuple(axes), problems)
     if problems.errors:
         raise StudyError(file, problems.errors)
     warnings = tuple(f"{file}: {warning}" for warning in problems.warnings)
@@ -89,9 +94,7 @@ def _beside(raw: dict[str, Any], folder: Path) -> dict[str, Any]:
 
 def _check_top(raw: dict[str, Any], problems: Problems) -> None:
     for key, value in raw.items():
-        if key in LATER_SECTIONS:
-            problems.error(key, None, f"this section is not supported; supported are {', '.join(SECTIONS)}")
-        elif key not in (*SECTIONS, "title"):
+        if key not in (*SECTIONS, "title"):
             problems.error(key, None, f"unknown section; {nearest(key, [*SECTIONS, 'title'])}")
         elif key == "title" and not isinstance(value, str):
             problems.error(key, value, "must be text")

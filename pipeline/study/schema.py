@@ -13,6 +13,7 @@ from pipeline.shapes.regions import Inclusion, Layer
 from pipeline.shapes.registry import BODIES, PROBES
 from pipeline.shapes.section import Section, Words
 from pipeline.shapes.tissue import Tissue
+from pipeline.study.loads import Load, Traction
 from pipeline.study.path import Path
 from pipeline.units import Length, Pressure, Share, parse_quantity
 
@@ -39,7 +40,7 @@ class Material(Tissue):
 
 def material_of(tissue: Tissue) -> Material:
     """Return the material of a layer or an inclusion."""
-    return Material.model_construct(young=tissue.young, poisson=tissue.poisson)
+    return Material.model_construct(young=tissue.young, poisson=tissue.poisson, density=tissue.density)
 
 
 # ---- mesh and solver --------------------------------------------------------------------------------
@@ -210,12 +211,14 @@ SECTIONS: dict[str, type[Section] | Mapping[str, type[Section]]] = {
     "mesh": Mesh,
     "solve": Solving,
     "plan": Planning,
+    "load": Load,
 }
 # Arrays of tables within a section: pieces of it, each with keys that can be swept.
-NESTED: dict[str, dict[str, type[Section]]] = {"body": {"layers": Layer, "inclusion": Inclusion}}
+NESTED: dict[str, dict[str, type[Section]]] = {
+    "body": {"layers": Layer, "inclusion": Inclusion},
+    "load": {"traction": Traction},
+}
 # Sections that say how, not what: their lists are no sweeps.
 SINGLE = ("solve", "plan")
 # Tables within a section that stand for one of its keys.
 TABLES: dict[str, dict[str, type[Section]]] = {"probe": {"path": Path}}
-# Sections of the format that this version does not compute: named as such, not as typing errors.
-LATER_SECTIONS = ("load",)

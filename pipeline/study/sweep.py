@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
 from typing import Any
@@ -14,13 +14,14 @@ from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.shapes.tissue import Tissue
+from pipeline.study.loads import Load
 from pipeline.study.place import CLEAR, is_clear, place_error
 from pipeline.study.schema import Material, Mesh, Planning, Solving, material_of
 
 # Keys that both body and probe have, or a variable of the dataset: their dimension says whose it is.
 _AMBIGUOUS = ("radius", "shape", "accuracy", "axis")
 
-_PARTS = ("body", "material", "probe", "mesh", "solve")
+_PARTS = ("body", "material", "probe", "mesh", "solve", "load")
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,7 @@ class Case:
     probe: Probe
     mesh: Mesh
     solve: Solving
+    load: Load = field(default_factory=Load)
 
     @property
     def labels(self) -> tuple[tuple[str, float | int | str], ...]:
@@ -110,10 +112,11 @@ class Case:
 
     @property
     def movements(self) -> int:
-        """How many motions are solved for: press, slide, opening of a slit, the far field's; or all six."""
+        """How many solutions there are: press, slide, opening of a slit, far field, or all six motions; and loads."""
         slides = self.travel != tuple(self.probe.depth * a for a in self.frame.axis)
         opens = self.probe.slit is not None and self.probe.contact == "bonded"
-        return 6 if self.probe.motion == "all" else 1 + slides + opens + self.is_closed
+        motions = 6 if self.probe.motion == "all" else 1 + slides + opens + self.is_closed
+        return motions + self.load.acts
 
     @property
     def tissues(self) -> tuple[Tissue, ...]:
@@ -124,6 +127,11 @@ class Case:
         return self.material, *self.body.regions
 
     @property
+    def densities(self) -> tuple[float | None, ...]:
+        """Densities (kg/m³) of the regions of the body, in the order of their numbers; None where there is none."""
+        return tuple(tissue.density if tissue.density is not None else self.material.density for tissue in self.tissues)
+
+    @property
     def poisson(self) -> float:
         """The largest Poisson's ratio of all regions."""
         return max(tissue.poisson for tissue in self.tissues)
@@ -131,6 +139,8 @@ class Case:
     @property
     def proportional_to(self) -> tuple[str, ...]:
         """The keys that F is proportional to, those of one section, or of all materials, changing together."""
+        if self.load.acts:
+            return ()
         first = ("young of all materials together",) if self.body.regions else self.material.PROPORTIONAL_TO
         return *first, *self.probe.proportional_to
 

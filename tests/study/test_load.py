@@ -65,7 +65,6 @@ MISTAKES = {
     "unknown shape": ({"probe": {"shape": "disk"}}, ['probe.shape = "disk"', "did you mean `disc`?"]),
     "unknown contact": ({"probe": {"contact": "glued"}}, ["probe.contact", "'bonded', 'frictionless' or 'unilateral'"]),
     "unknown element": ({"mesh": {"element": "hybrid"}}, ["mesh.element", "'mixed'"]),
-    "later section": ({"load": {"gravity": 1}}, ["load", "not supported"]),
     "wrong word": ({"mesh": {"outside": "void"}}, ['mesh.outside = "void"', "'coarse', 'free', 'fixed'"]),
     "degree": ({"mesh": {"degree": 4}}, ["mesh.degree = 4", "1, 2 or 3"]),
     "vector length": ({"body": {"size": ["1 mm", "2 mm"]}}, ["body.size", "3 values"]),

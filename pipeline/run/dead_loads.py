@@ -1,0 +1,71 @@
+"""The loads of a case as solvers take them: in newtons, on the mesh that is turned as it is solved."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pipeline.arrays import BoolArray, FloatArray
+from pipeline.shapes.frame import Frame, Vector
+from pipeline.shapes.surface import Surface
+from pipeline.solve.dead_loads import DeadLoads, SurfaceLoad
+from pipeline.study.loads import FREE, Cap, Traction
+from pipeline.study.sweep import Case
+
+_Test = Callable[[FloatArray, FloatArray], BoolArray]
+# A cap is what faces within this cosine of the way that the surface does at its centre.
+_SAME_WAY = 0.5
+
+
+def dead_loads_of(case: Case) -> DeadLoads | None:
+    """Return the loads of ``case``, None if there are none."""
+    load, turn = case.load, case.frame.turn
+    if not load.acts:
+        return None
+    weights: tuple[Vector, ...] = ()
+    if any(load.gravity):
+        gravity = _turned(turn, load.gravity)
+        densities = [density or 0.0 for density in case.densities]
+        weights = tuple((rho * gravity[0], rho * gravity[1], rho * gravity[2]) for rho in densities)
+    return DeadLoads(weights, tuple(_surface_load(case, traction) for traction in load.traction if traction.acts))
+
+
+def _surface_load(case: Case, traction: Traction) -> SurfaceLoad:
+    turn, on = case.frame.turn, traction.on
+    vector, pressure = _turned(turn, traction.traction or (0.0, 0.0, 0.0)), traction.pressure or 0.0
+    if isinstance(on, Cap):
+        place = case.body.frame(on.around)
+        outward = np.array(_turned(turn, place.outward))
+        within = _turned(turn, place.point), on.radius
+        return SurfaceLoad(lambda _, normals: np.asarray(normals @ outward > _SAME_WAY), vector, pressure, within)
+    if on == FREE:
+        return SurfaceLoad(lambda corners, _: np.ones(len(corners), dtype=bool), vector, pressure)
+    return SurfaceLoad(_on_face(case.body.surfaces(), on, case.frame), vector, pressure)
+
+
+def _on_face(surfaces: dict[str, tuple[Surface, ...]], name: str, frame: Frame) -> _Test:
+    """Return what tells whether facets are on the face ``name``: whether that is the nearest of all ``surfaces``.
+
+    Corners of a facet beside an edge may all lie on another face, but then its middle does not.
+    """
+
+    def on_face(corners: FloatArray, _: FloatArray) -> BoolArray:
+        points = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1)
+        points = points.reshape(-1, 3) if frame.turn is None else points.reshape(-1, 3) @ frame.turn
+        away = {
+            key: np.min([_farthest(surface, points) for surface in parts], axis=0) for key, parts in surfaces.items()
+        }
+        return np.asarray(away[name] <= np.min(list(away.values()), axis=0))
+
+    return on_face
+
+
+def _farthest(surface: Surface, points: FloatArray) -> FloatArray:
+    """Return the largest distance (m) of four points of each facet."""
+    return np.asarray(np.abs(surface.distance(points)).reshape(-1, 4).max(axis=1))
+
+
+def _turned(turn: FloatArray | None, vector: Vector) -> Vector:
+    if turn is None:
+        return vector
+    x, y, z = map(float, turn @ np.array(vector))
+    return x, y, z

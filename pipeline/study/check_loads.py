@@ -1,0 +1,127 @@
+"""Do loads fit the body that they act on, and is there anything in a scene that is not computed with them?"""
+
+from collections.abc import Sequence
+from itertools import product
+from math import dist, isfinite
+from typing import cast
+
+from pipeline.shapes.bodies.cad import FromCad
+from pipeline.shapes.body import Body
+from pipeline.shapes.frame import PlaceError
+from pipeline.shapes.probe import Probe
+from pipeline.shapes.section import Section, in_mm
+from pipeline.shapes.support import Faces, NamedFace
+from pipeline.study.loads import FREE, Cap, Load, Traction
+from pipeline.study.problems import Problems, nearest
+from pipeline.study.schema import Material, Mesh
+from pipeline.study.sweep import Axis
+
+# A centre this far off the surface, in units of the cap's radius, is not taken for a place on it.
+_FARTHEST_OFF = 0.5
+
+
+def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
+    """Check every load on every body, under every probe, and on every mesh."""
+    loads = [load for load in cast(Sequence[Load], sections["load"]) if _makes_sense(load, problems)]
+    acting = [load for load in loads if load.acts]
+    bodies, probes = cast(Sequence[Body], sections["body"]), cast(Sequence[Probe], sections["probe"])
+    meshes, materials = cast(Sequence[Mesh], sections["mesh"]), cast(Sequence[Material], sections["material"])
+    for axis in axes:
+        if axis.section == "load" and axis.piece and not axis.owner:
+            problems.error(axis.path, None, "its sweep needs a name: give its table one")
+    if not acting:
+        return
+    for probe in probes:
+        _check_probe(probe, problems)
+    for mesh in meshes:
+        if mesh.outside != "coarse" and isfinite(mesh.epsilon):
+            problems.error(
+                "mesh.outside", mesh.outside, "loads act on the whole body, and a part of it would carry others: "
+                'use outside = "coarse"',
+            )  # fmt: skip
+    if any(any(load.gravity) for load in acting):
+        for body, material in product(bodies, materials):
+            _check_densities(body, material, problems)
+    for body, load in product(bodies, acting):
+        for number, traction in enumerate(load.traction, start=1):
+            if _check_place(body, traction, f"load.traction[{number}].on", problems) and isinstance(traction.on, Cap):
+                for probe in probes:
+                    _check_beside(body, probe, traction.on, f"load.traction[{number}].on", problems)
+
+
+def _makes_sense(load: Load, problems: Problems) -> bool:
+    sane = True
+    for number, traction in enumerate(load.traction, start=1):
+        if (traction.pressure is None) == (traction.traction is None):
+            problems.error(
+                f"load.traction[{number}]", None, "needs a pressure (against the outward normal) or a traction (a "
+                "vector), and not both",
+            )  # fmt: skip
+            sane = False
+    return sane
+
+
+def _check_probe(probe: Probe, problems: Problems) -> None:
+    if probe.is_unilateral:
+        problems.error(
+            "probe.contact", probe.contact, "where a tool touches hangs on how loads have bent the surface, which is "
+            'not computed: use "bonded" or "frictionless", or leave [load] out',
+        )  # fmt: skip
+    if probe.slit is not None:
+        problems.error(
+            "probe.incision", in_mm(probe.slit.depth), "what loads do to a slit is not computed: leave the incision, "
+            "or [load], out",
+        )  # fmt: skip
+
+
+def _check_densities(body: Body, material: Material, problems: Problems) -> None:
+    if not body.is_filled and material.density is None:
+        problems.error("material.density", None, 'is required by gravity: density = "1060 kg/m^3"')
+    if body.is_filled:
+        for number, region in enumerate(body.regions, start=1):
+            if region.density is None and material.density is None:
+                problems.error(f"body: {region.name}", None, f"region {number} has no density, which gravity requires")
+
+
+def _check_place(body: Body, traction: Traction, key: str, problems: Problems) -> bool:
+    """Report a part of the boundary that there is not, and tell whether there is one."""
+    on, names = traction.on, sorted(body.surfaces())
+    if isinstance(on, Cap):
+        found = [in_mm(c) for c in on.around]
+        try:
+            off = dist(body.frame(on.around).point, on.around)
+        except PlaceError as error:
+            problems.error(key, found, str(error))
+            return False
+        if off > _FARTHEST_OFF * on.radius:
+            problems.error(
+                key, found, f"lies {in_mm(off)} off the body's surface: at most half the cap's radius, "
+                f"{in_mm(_FARTHEST_OFF * on.radius)}, is taken for a place on it",
+            )  # fmt: skip
+            return False
+        return True
+    if on != FREE and isinstance(body, FromCad):
+        problems.error(key, on, 'faces of a CAD file carry no tractions by name: use a cap round a point, or "free"')
+        return False
+    if on != FREE and on not in names:
+        problems.error(key, on, f"the {body.shape} has no such face; {nearest(on, [*names, FREE])}")
+        return False
+    support = body.support
+    held = support.names if isinstance(support, Faces) else (support.face,) if isinstance(support, NamedFace) else ()
+    if on in held:
+        problems.error(key, on, "is held: what acts there goes into the support")
+        return False
+    return True
+
+
+def _check_beside(body: Body, probe: Probe, cap: Cap, key: str, problems: Problems) -> None:
+    """Report a cap that may reach under the probe, which covers it there."""
+    try:
+        gap = dist(probe.frame_on(body).point, cap.around) - cap.radius - probe.circumradius
+    except PlaceError:
+        return
+    if gap < 0:
+        problems.error(
+            key, [in_mm(c) for c in cap.around], f"the cap reaches within {in_mm(-gap)} of what the probe may cover, "
+            f"up to {in_mm(probe.circumradius)} from its axis: move it away, or make it smaller",
+        )  # fmt: skip

@@ -1,0 +1,117 @@
+"""Loads on the body: gravity, and tractions on parts of its boundary."""
+
+from math import hypot
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic_core import PydanticCustomError
+
+from pipeline.shapes.frame import Vector
+from pipeline.shapes.section import Section, Words
+from pipeline.units import Acceleration, Coordinate, Length, Stress
+
+# Of all the boundary that is neither held nor under the probe.
+FREE = "free"
+# A component of a unit vector, or a coordinate in units of a cap's radius, that is smaller is none.
+_NONE = 1e-12
+
+
+class Cap(BaseModel):
+    """What of the boundary lies within a ball and faces the way that it does at the centre."""
+
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid")
+    around: tuple[Coordinate, Coordinate, Coordinate]
+    radius: Length
+
+
+def _on(value: Any) -> Any:
+    if isinstance(value, dict):
+        if set(value) != {"around", "radius"}:
+            raise PydanticCustomError(
+                "not_supported",
+                'a cap has a centre and a radius: {around = ["10 mm", "0 mm", "0 mm"], radius = "4 mm"}',
+            )
+        return Cap(**value)
+    if not isinstance(value, str):
+        raise PydanticCustomError(
+            "not_supported", 'must be a face by name, "free", or {around = ["10 mm", "0 mm", "0 mm"], radius = "4 mm"}'
+        )
+    return value
+
+
+class Traction(Section):
+    """A force for each area of part of the boundary: a vector, or a pressure against the outward normal."""
+
+    name: Annotated[
+        str,
+        Field(exclude=True, pattern=r"^([A-Za-z][A-Za-z0-9_-]*)?$"),
+        Words(
+            "Its name: letters, digits, _ and -. A sweep over its pressure is the dimension NAME_pressure.",
+            '"retractor"',
+            default="none: nothing of it is swept",
+        ),
+    ] = ""
+    on: Annotated[
+        str | Cap,
+        BeforeValidator(_on),
+        Words(
+            'Where it acts: a face of the body by name ("top", "sides", "bottom"; not of a CAD file), a cap '
+            'round a point of the surface, or "free", all of the boundary that is neither held nor under the probe.',
+            '"sides"',
+        ),
+    ]
+    pressure: Annotated[
+        Stress | None,
+        Field(json_schema_extra={"unit": "Pa"}),
+        Words("Pressure against the outward normal; negative, it pulls.", '"1 kPa"', default="none: it is a vector"),
+    ] = None
+    traction: Annotated[
+        tuple[Stress, Stress, Stress] | None,
+        Words("Force for each area, along x, y and z.", '["1 kPa", "0 Pa", "0 Pa"]', default="none: it is a pressure"),
+    ] = None
+
+    @property
+    def acts(self) -> bool:
+        """Whether it is not nought."""
+        return bool(self.pressure) or any(self.traction or ())
+
+
+class Load(Section):
+    """What acts on the body besides the probe."""
+
+    gravity: Annotated[
+        tuple[Acceleration, Acceleration, Acceleration],
+        Words(
+            "Acceleration along x, y and z; every material needs a density then.",
+            '["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]',
+            default="none",
+        ),
+    ] = (0.0, 0.0, 0.0)
+    traction: Annotated[
+        tuple[Traction, ...], Words("Forces on parts of the boundary.", "[[load.traction]]", default="none")
+    ] = ()
+
+    @property
+    def acts(self) -> bool:
+        """Whether there is any load."""
+        return any(self.gravity) or any(traction.acts for traction in self.traction)
+
+    def is_mirrored(self, normal: Vector) -> bool:
+        """Tell whether it is its own image in the plane through the origin with that unit normal, as the body is.
+
+        A face by name is, then; a cap if its centre lies in the plane: pairs of images are not looked for.
+        """
+        if abs(_along(self.gravity, normal)) > _NONE * hypot(*self.gravity):
+            return False
+        for traction in (traction for traction in self.traction if traction.acts):
+            vector = traction.traction or (0.0, 0.0, 0.0)
+            if abs(_along(vector, normal)) > _NONE * hypot(*vector):
+                return False
+            cap = traction.on
+            if isinstance(cap, Cap) and abs(_along(cap.around, normal)) > _NONE * cap.radius:
+                return False
+        return True
+
+
+def _along(vector: Vector, normal: Vector) -> float:
+    return sum(a * b for a, b in zip(vector, normal, strict=True))

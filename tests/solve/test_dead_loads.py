@@ -1,0 +1,141 @@
+"""Weights and tractions obey mechanics: closed forms, superposition, symmetry, and the energy that they leave."""
+
+from math import pi
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from pipeline.arrays import FloatArray
+from pipeline.mesh.distribute import BodyMesh
+from pipeline.run.dead_loads import dead_loads_of
+from pipeline.run.meshing import mesh_case
+from pipeline.solve.conditions import Conditions
+from pipeline.solve.dead_loads import apply_loads
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.spaces import ElasticSpace, Spaces
+from pipeline.solve.vectors import vector
+from tests.cases import solve, study
+
+YOUNG, HEIGHT = 10e3, 20e-3
+WEIGHT = 1060 * 9.81  # N/m³
+HEAVY = {"young": "10 kPa", "poisson": 0.3, "density": "1060 kg/m^3"}
+GRAVITY = {"gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]}
+CAP = {"around": ["9 mm", "0 mm", "0 mm"], "radius": "3 mm"}
+PULL = {"on": CAP, "traction": ["1 kPa", "0 Pa", "200 Pa"]}
+SIDES = {"on": "sides", "pressure": "100 Pa"}
+
+
+@pytest.fixture(scope="module")
+def body() -> BodyMesh:
+    """Return a quarter of the box in straight cells, on which polynomials are exact."""
+    mesh, _ = mesh_case(study(mesh={"degree": 1}).case(()), ("x", "y"), MPI.COMM_SELF)
+    return mesh
+
+
+def own_weight(x: FloatArray) -> FloatArray:
+    """Displacement (m) of a column of ν = 0 that stands on z = -H and bears its own weight."""
+    above = x[2] + HEIGHT
+    return np.vstack([0 * above, 0 * above, -WEIGHT / YOUNG * (HEIGHT * above - above**2 / 2)])
+
+
+def squeezed(x: FloatArray) -> FloatArray:
+    """Displacement (m) under a pressure of 100 Pa on the four sides, ν = 0."""
+    return np.asarray(-100.0 / YOUNG * x * np.array([[1.0], [1.0], [0.0]]))
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+@pytest.mark.parametrize(
+    ("load", "exact"), [(GRAVITY, own_weight), ({"traction": [SIDES]}, squeezed)], ids=["weight", "tension"]
+)
+def test_closed_forms_leave_no_residual(body, degree, load, exact):
+    dead = dead_loads_of(study(material=HEAVY, load=load).case(()))
+    with Spaces(body) as spaces:
+        space: ElasticSpace = spaces.get(degree, Conditions(unilateral=True))
+        space.forms.displacement.interpolate(exact)
+        applied = apply_loads(dead, body, space.dofs.space)
+        with vector(space.dofs.space) as residual:
+            space.apply(residual, MaterialLaw.of_moduli(YOUNG, 0.0))
+            left = residual.array - applied.forces
+    left[space.dofs.prescribed_owned] = 0.0
+    assert np.abs(left).max() < 1e-9 * applied.size
+
+
+def test_resultants_are_those_of_the_loads(body):
+    load = {**GRAVITY, "traction": [{"on": "sides", "traction": ["100 Pa", "0 Pa", "0 Pa"]}, PULL]}
+    found = []
+    for kept in (GRAVITY, {"traction": load["traction"][:1]}, {"traction": load["traction"][1:]}):
+        with Spaces(body) as spaces:
+            space = spaces.get(2, Conditions()).dofs.space
+            found.append(apply_loads(dead_loads_of(study(material=HEAVY, load=kept).case(())), body, space).resultant)
+    # Of a quarter of the box, in which half of the cap lies.
+    assert found[0] == pytest.approx([0, 0, -WEIGHT * 20e-3**3], abs=1e-12)
+    assert found[1] == pytest.approx([100 * 2 * 20e-3 * 20e-3, 0, 0], abs=1e-12)
+    assert found[2] == pytest.approx(np.array([1000, 0, 200]) * pi / 2 * 3e-3**2, rel=2e-3)
+
+
+@pytest.fixture(scope="module")
+def pulled():
+    (record,) = solve(load={"traction": [PULL]}).values()
+    return record
+
+
+def test_loads_add_up_and_leave_the_force_of_the_depth(pulled):
+    (plain,), (squeezed_,), (both,) = (
+        solve(load=load).values() for load in ({}, {"traction": [SIDES]}, {"traction": [PULL, SIDES]})
+    )
+    assert np.isnan(plain.load_force)
+    assert both.force == pytest.approx(plain.force, rel=1e-8)
+    parts = np.array([pulled.load_force_vector, squeezed_.load_force_vector])
+    assert both.load_force_vector == pytest.approx(parts.sum(axis=0), abs=1e-6 * pulled.load_force_vector[0])
+    assert both.load_force == both.load_force_vector[2]
+
+
+def test_loads_grow_apart_from_depth_and_modulus(pulled):
+    """The force that loads leave on a held probe hangs on neither; how far they take a free one falls with E."""
+    (other,) = solve(
+        load={"traction": [PULL]}, material={"young": "20 kPa"}, probe={"depth": "0.4 mm"}
+    ).values()  # fmt: skip
+    assert other.force == pytest.approx(4 * pulled.force, rel=1e-6)
+    assert other.load_force == pytest.approx(pulled.load_force, rel=1e-5)
+    assert other.load_energy == pytest.approx(pulled.load_energy / 2, rel=1e-5)
+    assert other.sag == pytest.approx(pulled.sag / 2, rel=1e-5)
+    # At the depth of the sag the probe bears nothing.
+    assert pulled.force * pulled.sag / pulled.depth + pulled.load_force == pytest.approx(0, abs=1e-9)
+
+
+def test_symmetry_changes_nothing(pulled):
+    (whole,) = solve(load={"traction": [PULL]}, mesh={"model": "3d"}).values()
+    assert pulled.origin == "symmetric"
+    assert whole.load_force_vector == pytest.approx(pulled.load_force_vector, abs=1e-6 * pulled.load_force_vector[0])
+    assert whole.load_energy == pytest.approx(pulled.load_energy, rel=1e-6)
+
+
+@pytest.mark.parametrize("contact", ["bonded", "frictionless"])
+def test_pressure_on_incompressible_tissue_is_borne_by_the_probe(contact):
+    """Held all round, with the pressure on what is left of the top: it is the same everywhere, and nothing moves."""
+    (record,) = solve(
+        body={"fixed": "bottom+sides"}, material={"poisson": 0.5}, probe={"contact": contact},
+        load={"traction": [{"on": "free", "pressure": "100 Pa"}]},
+    ).values()  # fmt: skip
+    assert record.load_force == pytest.approx(100 * pi * 3e-3**2, rel=1e-4)
+    assert record.load_energy == pytest.approx(0, abs=1e-9 * record.energy)
+
+
+def test_on_a_tilted_probe_loads_are_in_the_coordinates_of_the_body():
+    """Beneath an ellipsoid's side, tissue pushes the probe out along the normal."""
+    (record,) = solve(
+        body={"shape": "ellipsoid", "axes": ["20 mm", "18 mm", "15 mm"], "fixed": {"below": "-4 mm"}},
+        material={"young": "10 kPa", "poisson": 0.5}, probe={"at": ["8 mm", "5 mm", "11 mm"]},
+        mesh={"rim": "1.5 mm"}, load={"traction": [{"on": "surface", "pressure": "100 Pa"}]},
+    ).values()  # fmt: skip
+    size = np.linalg.norm(record.load_force_vector)
+    assert size == pytest.approx(100 * pi * 3e-3**2, rel=1e-3)
+    assert record.load_force == pytest.approx(size, rel=1e-3)
+    assert min(record.load_force_vector) > 0
+
+
+def test_the_bar_holds(pulled):
+    (finer,) = solve(load={"traction": [PULL]}, mesh={"degree": 3}).values()
+    assert abs(pulled.load_force - finer.load_force) < pulled.load_force_error
+    assert finer.load_force_error < pulled.load_force_error / 2
