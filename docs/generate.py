@@ -31,7 +31,8 @@ def study_page() -> str:
         "# Study file", "",
         "TOML. A list where one value is expected is a sweep, and a dimension of the dataset; so is an array of tables "
         "(`[[probe]]`), labelled by the tables' `name`. Quantities are text with a unit (`\"10 mm\"`, `\"12 kPa\"`, "
-        "`\"1 %\"`): prefixes of metre and pascal, `bar`, and `%`. `title` stands before the sections.",
+        "`\"1 %\"`): prefixes of metre and pascal, `bar`, and `%`; of loads "
+        "kg/m^3 and m/s^2. `title` stands before the sections.",
     ]  # fmt: skip
     for section in all_sections():
         lines += [
@@ -54,6 +55,8 @@ def dataset_page() -> str:
     """Return the page of every variable of a dataset."""
     study = tomllib.loads(starter("study"))
     study["probe"]["motion"] = "all"
+    study["mesh"]["outside"] = "coarse"
+    study["load"] = {"traction": [{"on": "sides", "pressure": "1 kPa"}]}
     dataset = build(make_plan(parse(study)), {})
     lines = [
         "# Dataset", "",

@@ -17,6 +17,7 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     from pipeline.verify.contact import contact_rows  # noqa: PLC0415
     from pipeline.verify.elements import element_rows  # noqa: PLC0415
     from pipeline.verify.forces import scene_rows  # noqa: PLC0415
+    from pipeline.verify.loads import load_rows  # noqa: PLC0415
     from pipeline.verify.regions import region_rows  # noqa: PLC0415
     from pipeline.verify.slits import slit_rows  # noqa: PLC0415
     from pipeline.verify.wedges import wedge_rows  # noqa: PLC0415
@@ -33,3 +34,4 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     yield from wedge_rows(comm, quick=quick)
     yield from slit_rows(comm, quick=quick)
     yield from closure_rows(comm, quick=quick)
+    yield from load_rows(comm, quick=quick)

@@ -1,0 +1,130 @@
+"""Loads against closed forms: own weight, tension, pressure in what does not yield, and a load beside a disc."""
+
+from collections.abc import Iterator
+from math import asin, pi
+
+import numpy as np
+from mpi4py import MPI
+
+from pipeline.plan.plan import make_plan
+from pipeline.run.dead_loads import dead_loads_of
+from pipeline.run.execute import compute
+from pipeline.run.meshing import mesh_case
+from pipeline.run.problem import law_of
+from pipeline.run.record import Record
+from pipeline.solve.conditions import Conditions
+from pipeline.solve.dead_loads import apply_loads
+from pipeline.solve.displacement import DisplacementProblem
+from pipeline.solve.spaces import Spaces
+from pipeline.solve.vectors import global_sum, vector
+from pipeline.study.load import parse
+from pipeline.verify.forces import FAR
+from pipeline.verify.row import Row
+from pipeline.verify.sections import Section, box, cylinder, disc, mesh, mm, tissue
+
+_YOUNG, _SIZE, _DENSITY, _GRAVITY, _STRESS = 10e3, (40e-3, 30e-3, 20e-3), 1060.0, 9.81, 100.0
+_HEAVY = {"density": f"{_DENSITY:g} kg/m^3"}
+_DOWN = {"gravity": ["0 m/s^2", "0 m/s^2", f"-{_GRAVITY} m/s^2"]}
+_PRESSED = {"traction": [{"on": "free", "pressure": f"{_STRESS:g} Pa"}]}
+# Of polynomials on straight cells, and of the area of a footprint that is drawn round, or projected.
+_EXACT, _AREA = 1e-8, 1e-3
+# Of the disc's radius: how far away the cap is, and its radius.
+_AWAY, _CAP = 5.0, 2.0
+
+
+def load_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
+    """Yield the rows of loads, as they are solved; ``quick`` leaves a few; collective."""
+    yield from _columns(comm)
+    yield from _pressures(comm, quick)
+    if not quick:
+        yield _incompressible_weight(comm)
+        yield _beside_a_disc(comm)
+
+
+def _columns(comm: MPI.Comm) -> Iterator[Row]:
+    """A box of ν = 0 that stands on its bottom, with no probe: twice its energy is the work of the loads."""
+    x, y, height = _SIZE
+    weight = (_DENSITY * _GRAVITY) ** 2 * x * y * height**3 / (3 * _YOUNG)
+    tension = _STRESS**2 * x * y * height / _YOUNG
+    pull = {"traction": [{"on": "top", "traction": ["0 Pa", "0 Pa", f"{_STRESS:g} Pa"]}]}
+    for name, load, reference in (("own weight", _DOWN, weight), ("tension", pull, tension)):
+        value = _work_without_probe(comm, load)
+        yield Row(f"box under {name}, ν = 0: work (J)", "3D", reference, "uniaxial stress", value, _EXACT)
+
+
+def _work_without_probe(comm: MPI.Comm, load: Section) -> float:
+    """Return the work (J) of loads on the box, of which a probe, on a side of it, touches nothing; collective."""
+    probe = disc(2) | {"at": [mm(20), "0 mm", mm(-10)]}
+    straight = mesh(rim=4, fine=8, degree=1) | {"model": "3d"}
+    x, y, z = (1e3 * length for length in _SIZE)
+    body = box(x, y, z)
+    study = parse({"body": body, "material": tissue(0.0) | _HEAVY, "probe": probe, "mesh": straight, "load": load})
+    case = study.case(())
+    found, _ = mesh_case(case, (), comm)
+    dead = dead_loads_of(case)
+    assert dead is not None
+    with Spaces(found) as spaces, DisplacementProblem(spaces, 2, Conditions(unilateral=True)) as problem:
+        dofs = problem.space.dofs
+        applied = apply_loads(dead, found, dofs.space)
+        with vector(dofs.space) as rhs, vector(dofs.space) as unknown, problem.solver(law_of(case), "direct") as solver:
+            problem.space.put(rhs, applied)
+            solver.solve(rhs, unknown)
+            return float(global_sum(comm, np.array([unknown.array @ applied.forces]))[0])
+
+
+def _pressures(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
+    """Where nothing can yield, pressure on what is free is borne by the probe over its own area.
+
+    Without bond a curved footprint bears none of what is across the axis, and tissue yields there.
+    """
+    round_ = {"shape": "ellipsoid", "axes": [mm(20), mm(18), mm(15)], "fixed": {"below": mm(-4)}}
+    for name, body, contacts in (
+        ("box", box(40, 30, 20, fixed="bottom+sides"), ("bonded",) if quick else ("bonded", "frictionless")),
+        ("ellipsoid", round_, () if quick else ("bonded",)),
+    ):
+        for contact in contacts:
+            record = _solve(comm, body, 0.5, disc(3, contact=contact), _PRESSED)
+            yield _row(
+                f"{name} under pressure, {contact}, ν = 0.5", _STRESS * pi * 3e-3**2, "hydrostatic", record, _AREA
+            )
+
+
+def _incompressible_weight(comm: MPI.Comm) -> Row:
+    """What does not yield, in a container, bears its weight by a pressure that is none at the top."""
+    record = _solve(comm, box(40, 30, 20, fixed="bottom+sides"), 0.5, disc(3), _DOWN)
+    share = record.load_force / (_DENSITY * _GRAVITY * float(np.prod(_SIZE)))
+    return Row(
+        "box in a container, own weight, ν = 0.5: share", "3D", 0.0, "hydrostatic", share, 1e-6, 0.0, record.message
+    )
+
+
+def _beside_a_disc(comm: MPI.Comm) -> Row:
+    """A pressure on a cap beside a frictionless disc on a half-space, by reciprocity: that disc's own surface is known.
+
+    Around a disc pushed in by d the surface sinks by 2/π d asin(a/r) (I. N. Sneddon, Int. J. Eng. Sci. 3, 47, 1965).
+    """
+    cap = {"around": [mm(_AWAY), "0 mm", "0 mm"], "radius": mm(_CAP)}
+    load = {"traction": [{"on": cap, "pressure": f"{_STRESS:g} Pa"}]}
+    record = _solve(comm, cylinder(FAR, FAR), 0.3, disc(1, contact="frictionless"), load)
+    radii, weights = np.polynomial.legendre.leggauss(40)
+    radii = (radii + 1) / 2 * _CAP
+    angles = 2 * pi * np.arange(80) / 80
+    sinking = [[2 / pi * asin(1 / np.hypot(_AWAY + r * np.cos(t), r * np.sin(t))) for t in angles] for r in radii]
+    mean = float(weights / 2 * _CAP * radii * 2 * pi @ np.mean(sinking, axis=1))
+    return _row("half-space, load beside a disc, frictionless, ν = 0.3", -_STRESS * mean * 1e-6, "I. N. Sneddon 1965",
+                record, 2e-3)  # fmt: skip
+
+
+def _solve(comm: MPI.Comm, body: Section, nu: float, probe: Section, load: Section) -> Record:
+    study = parse({
+        "body": body, "material": tissue(nu) | _HEAVY, "probe": probe, "load": load, "mesh": {"accuracy": "1 %"},
+        "solve": {"exact": False},
+    })  # fmt: skip
+    (record,) = compute(make_plan(study), comm).values()
+    return record
+
+
+def _row(name: str, reference: float, source: str, record: Record, reference_bar: float) -> Row:
+    """Return the row of the force that loads add."""
+    bar = record.load_force_error / abs(record.load_force)
+    return Row(f"{name}: load_force", "3D", reference, source, record.load_force, bar, reference_bar, record.message)
