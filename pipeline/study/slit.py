@@ -1,6 +1,6 @@
 """Whether a slit that a blade stands in fits into the body: within it, clear of the support and of other materials."""
 
-from math import isfinite
+from math import inf, isfinite
 
 import numpy as np
 
@@ -10,14 +10,15 @@ from pipeline.shapes.frame import Frame
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import in_mm
 from pipeline.shapes.slit import Slit
+from pipeline.shapes.surface import Surface
 from pipeline.study.problems import Problems
 from pipeline.study.schema import Mesh
 
 # Between a slit's front and what ends below or above it there must be this share of what it runs ahead of the blade.
 _LEAST_ROOM = 0.25
 _ALIGNED = 1e-9
-# Points of a slit, along it and down, whose distance to inclusions is looked at.
-_POINTS = (81, 41)
+# Points along a slit and down whose distance to an inclusion is looked at, and how often again near the nearest.
+_POINTS, _ROUNDS = 21, 8
 
 
 def check_slit(body: Body, probe: Probe, problems: Problems) -> bool:
@@ -114,13 +115,25 @@ def _check_room(body: Body, slit: Slit, problems: Problems) -> None:
 def _check_inclusions(body: Body, slit: Slit, frame: Frame, problems: Problems) -> None:
     """Report inclusions that a slit cuts, or that are nearer to it than it runs ahead of the blade."""
     half = slit.reach if isfinite(slit.reach) else body.extent
-    along, down = (grid.ravel() for grid in np.meshgrid(
-        np.linspace(-half, half, _POINTS[0]), np.linspace(0.0, slit.depth, _POINTS[1])))  # fmt: skip
-    points = frame.world(np.column_stack([along, np.zeros(len(along)), -down]))
     for number, inclusion in enumerate(body.inclusion, start=1):
-        if (room := float(inclusion.surface.distance(points).min())) < slit.ahead:
+        if (room := _distance(slit, half, frame, inclusion.surface)) < slit.ahead:
             problems.error(
                 f"body.inclusion[{number}].at", [in_mm(x) for x in inclusion.at],
                 f"{inclusion.name} must keep {in_mm(slit.ahead)} (how far the slit runs ahead of the blade) from the "
                 f"slit; it is {f'{in_mm(room)} from it' if room > 0 else 'cut by it'}",
             )  # fmt: skip
+
+
+def _distance(slit: Slit, half: float, frame: Frame, surface: Surface) -> float:
+    """Return the least distance (m) of a convex surface to a slit of some ``half`` length, negative if it is cut."""
+    ends = np.array([[-half, 0.0], [half, slit.depth]])
+    low, high = ends
+    least = inf
+    for _ in range(_ROUNDS):
+        along, down = (grid.ravel() for grid in np.meshgrid(*np.linspace(low, high, _POINTS).T))
+        distance = surface.distance(frame.world(np.column_stack([along, np.zeros(len(along)), -down])))
+        nearest, step = int(np.argmin(distance)), 2 * (high - low) / (_POINTS - 1)
+        middle = np.array([along[nearest], down[nearest]])
+        low, high = np.clip([middle - step, middle + step], *ends)
+        least = min(least, float(distance[nearest]))
+    return least

@@ -57,6 +57,17 @@ def test_refused(key, said, changes):
     assert [(name, said in text) for name, text in problems(**changes)] == [(key, True)]
 
 
+@pytest.mark.parametrize("at", [3.5, 5.25, 15.5])
+@pytest.mark.parametrize("beside", [0.0, 0.65])
+def test_inclusions_of_any_size_are_seen(at, beside):
+    """However long the slit is, and small the ball."""
+    ball = {"name": "cyst", "at": [f"{at} mm", f"{beside} mm", "-2.55 mm"], "radius": "0.4 mm"}
+    body = {**BOX, "inclusion": [{**ball, "young": "20 kPa", "poisson": 0.4}]}
+    ((key, text),) = problems(probe={**SLIT, "ends": "open", "ahead": "0.3 mm", "width": "0.3 mm"}, body=body)
+    assert key == "body.inclusion[1].at"
+    assert ("it is 0.25 mm from it" if beside else "it is cut by it") in text
+
+
 def test_lengths_have_units():
     """A length that is refused is shown as it would be written."""
     with pytest.raises(StudyError) as caught:
