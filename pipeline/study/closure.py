@@ -19,6 +19,8 @@ def check_closure(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> N
         return
     if mesh.accuracy is not None:
         _refuse(mesh, "has an error of its own, which is not that of the mesh: leave accuracy out", problems)
+    elif mesh.degree == 1:
+        problems.error("mesh.degree", 1, "is too low for a half ball, which straight elements cut: use 2 or 3")
     elif reason := _no_far_field(body, probe):
         _refuse(mesh, f'{reason}: use outside = "coarse" here', problems)
     elif mesh.epsilon >= (most := room(body, probe)):

@@ -142,6 +142,7 @@ MISTAKES = {
     ),
     "half ball past a side": ({"probe": {"at": ["12 mm", "0 mm"]}, "mesh": CLOSED}, ["mesh.epsilon", "below 8 mm"]),
     "half ball within the footprint": ({"mesh": CLOSED | {"epsilon": "2.9 mm"}}, ["mesh.epsilon", "above"]),
+    "half ball of straight elements": ({"mesh": CLOSED | {"degree": 1}}, ["mesh.degree = 1", "half ball"]),
     "half ball of an accuracy": ({"mesh": CLOSED | {"accuracy": "1 %"}}, ["mesh.outside", "an error of its own"]),
     "half ball of a curved body": ({"body": ELLIPSOID, "mesh": CLOSED}, ["mesh.outside", "box or a cylinder"]),
     "half ball below a tilted probe": ({"probe": {"axis": [0.5, 0, -1]}, "mesh": CLOSED}, ["mesh.outside", "down"]),
