@@ -1,11 +1,12 @@
 """The laws of correction in words: which one to use for other tools on the same tissue, and how sure it is."""
 
-from math import isfinite, nan
+from collections.abc import Callable
+from math import inf, isfinite, isnan, nan
 
 from pipeline.quantities import symbol
 from pipeline.report.guide_words import cells_of, cost, heads, in_order, percent, table
 from pipeline.report.guideline import Guideline
-from pipeline.report.laws import LAWS, Law
+from pipeline.report.laws import LAWS, Law, Laws
 from pipeline.report.table import words
 
 _SHORT = {"ratio": "F/r", "compliance": "c", "second order": "c + g m²"}
@@ -44,24 +45,25 @@ def comparison(guide: Guideline) -> list[str]:
     """Return the table of how far each law is off where a value of a parameter was left out of its fit."""
     judged = [v for v in in_order(guide) if v.is_judged and v.laws.laws]
     names = [name for name, length in guide.axes if length > 1]
-    known = [
-        (law, name) for law in LAWS for name in names
-        if any(isfinite(_carried(v.laws.laws[LAWS.index(law)], name)) for v in judged)
-    ]  # fmt: skip
+    what = "F_max" if any(v.laws_of_full.laws for v in judged) else "F_exact"
+    off = [_off(v.laws_of_full if what == "F_max" else v.laws) for v in judged]
+    known = [(law, name) for law in LAWS for name in names if any(not isnan(each(law, name)) for each in off)]
     if not known:
         return []
     rows = [[*heads(guide), *(f"{_SHORT[law]} by {symbol(name)}" for law, name in known), "bars", "best for tools"]]
-    for v in judged:
-        off = [_carried(v.laws.laws[LAWS.index(law)], name) for law, name in known]
-        best = v.laws.best
-        rows.append([*cells_of(v), *map(percent, off), percent(v.laws.bar), _SHORT[best.name] if best else ""])
+    for v, each in zip(judged, off, strict=True):
+        values = [each(law, name) for law, name in known]
+        cells = ["∞" if value == inf else percent(value) for value in values]
+        rows.append([*cells_of(v), *cells, percent(v.laws.bar), _SHORT[v.laws.best.name] if v.laws.best else ""])
     return [
-        "How far is F_exact off by a law whose constants are from the scenes alike in all but one parameter? Largest,",
-        "on values left out of the fit, without error bars (bars: the largest of F and F_exact together).",
+        f"How far is {what} off by a law whose constants are from the scenes alike in all but one parameter? Largest,",
+        "on values left out of the fit, without error bars (bars: largest of F and F_exact together; best: with them).",
         *table(rows, len(heads(guide))),
-        "r: F_exact ≈ F / r; c: 1/F_exact ≈ 1/F - c/(E d); g m²: m² is the mean square of where a flat tool presses.",
-    ]  # fmt: skip
+        "r: F_exact ≈ F / r; c: 1/F_exact ≈ 1/F - c/(E d); m²: mean square distance of F from the axis.",
+    ]
 
 
-def _carried(law: Law, name: str) -> float:
-    return dict(law.carried).get(name, nan)
+def _off(laws: Laws) -> Callable[[str, str], float]:
+    """Return how to look up how far a law is off, by its name and that of the parameter."""
+    found = {(law.name, name): value for law in laws.laws for name, value in law.carried}
+    return lambda law, name: found.get((law, name), nan)

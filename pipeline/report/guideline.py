@@ -4,6 +4,7 @@ from dataclasses import asdict, dataclass
 from math import inf
 from typing import Any
 
+from pipeline.report.laws import Laws
 from pipeline.report.table import Labels
 from pipeline.report.verdict import Verdict, choose
 
@@ -74,20 +75,29 @@ class Guideline:
         }
 
 
+# Parts of a verdict that are no number or text.
+_APART = ("labels", "mesh", "spread", "correction", "laws", "laws_of_full")
+
+
 def _row(verdict: Verdict, guideline: Guideline) -> dict[str, Any]:
-    plain = {k: v for k, v in verdict.__dict__.items() if k not in ("labels", "mesh", "spread", "correction", "laws")}
+    plain = {
+        k: v
+        for k, v in verdict.__dict__.items()
+        if k not in ("labels", "mesh", "spread", "correction", "laws", "laws_of_full")
+    }
     spread = verdict.spread
     keeps = verdict.is_judged and verdict.error <= guideline.accuracy and verdict.seconds <= guideline.budget
     return {
         **verdict.labels, "mesh": verdict.mesh, **plain, "judged": verdict.is_judged, "keeps": bool(keeps),
         "ratio_min": spread.least, "ratio_max": spread.most, "ratio_spread": spread.width,
         "ratio_spread_relative": spread.relative, "ratio_spread_over": dict(spread.over),
-        "correction": asdict(verdict.correction), "laws": _laws(verdict),
+        "correction": asdict(verdict.correction), "laws": _laws(verdict.laws),
+        "laws_of_full": _laws(verdict.laws_of_full),
     }  # fmt: skip
 
 
-def _laws(verdict: Verdict) -> dict[str, Any]:
-    laws, best = verdict.laws, verdict.laws.best
+def _laws(laws: Laws) -> dict[str, Any]:
+    best = laws.best
     rows = {
         law.name: {**{k: v for k, v in asdict(law).items() if k != "name"}, "carried": dict(law.carried)}
         for law in laws.laws

@@ -2,8 +2,8 @@
 
 - "ratio": F_exact = F / r.
 - "compliance": 1/F_exact = 1/F - c / (E d), see :mod:`pipeline.report.compliance`.
-- "second order": the same with c + g m², m² the mean square distance from the axis of where a flat tool presses: what a
-  cut adds is not quite the same for every point of contact.
+- "second order": the same with c + g m², m² the mean square distance from the axis of where the tool presses: what
+  a cut adds is not quite the same for every point of contact.
 
 Constants are fitted by least squares of the relative error of F_exact, to the scenes that are alike in all but one
 parameter of the study (the tool, the thickness, ν, …), leaving out those with one value of it, which are then judged.

@@ -42,7 +42,7 @@ def _is_along(vector: Sequence[float], unit: Vector) -> bool:
 @dataclass(frozen=True)
 class Sinking:
     """How far a tool sinks for its force: E d (N/m), the power of d that F goes with, the mean square (m²) of where it
-    presses (NaN of a tool that is not flat), 1 / radius (1/m) of a round one, its contact, and ``why_not``.
+    presses, 1 / radius (1/m) of a round one, its contact, and ``why_not``.
     """
 
     scale: float
@@ -61,9 +61,8 @@ class Sinking:
         if why:
             return Sinking(scale, why_not=why)
         probe = case.probe
-        square = probe.mean_square if isinstance(probe, Punch) else nan
         inverse = 1 / probe.circumradius if isinstance(probe, Punch) and probe.is_round else nan
-        return Sinking(scale, float(probe.force_exponent or nan), square, inverse, probe.contact)
+        return Sinking(scale, float(probe.force_exponent or nan), probe.mean_square, inverse, probe.contact)
 
 
 def tools(cases: Iterable[Case]) -> tuple[str, ...]:

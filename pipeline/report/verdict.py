@@ -40,7 +40,9 @@ class Verdict:
 
     ``deviation`` is the worst |F/F_exact - 1|, ``error`` the worst with the error bars; ``limit`` the scene that has
     it, its ``force`` and ``exact`` in N. ``seconds``, ``dofs`` and ``cells`` are the largest over the scenes, ``usual``
-    is the median of the seconds. A setting with ``missing`` scenes is not judged: its errors are those of the rest.
+    is the median of the seconds. ``laws`` are those that take F to F_exact, ``laws_of_full`` those that take it to
+    F_max, without bars: what they leave is of ε alone, and not of the mesh's elements. A setting with ``missing``
+    scenes is not judged: its errors are those of the rest.
     """
 
     labels: Labels
@@ -58,6 +60,7 @@ class Verdict:
     spread: Spread = field(default_factory=Spread)
     correction: Correction = field(default_factory=Correction)
     laws: Laws = field(default_factory=Laws)
+    laws_of_full: Laws = field(default_factory=Laws)
 
     @property
     def is_judged(self) -> bool:
@@ -89,20 +92,22 @@ def judge(table: Table, row: int) -> Verdict:
         float(np.median(table.seconds[row, use])),
         float(table.dofs[row, use].max()), float(table.cells[row, use].max()), spread(share[row, use], axes),
         correction.fit(ratio, bar, axes), _laws(table, row, use),
+        _laws(table, row, use, of_full=True),
     )  # fmt: skip
 
 
-def _laws(table: Table, row: int, use: np.ndarray) -> Laws:
+def _laws(table: Table, row: int, use: np.ndarray, *, of_full: bool = False) -> Laws:
     """Judge the laws of one row on the scenes in ``use`` whose compliances add."""
     use = use & np.array([not one.why_not for one in table.sinking])
+    ratio = table.share[row, use] if of_full else table.ratio[row, use]
+    if not np.isfinite(ratio).all():
+        return Laws()
+    bar, exact_bar = (0.0 * ratio if of_full else part[row, use] for part in (table.force_bar, table.exact_bar))
     sinking = [one for one, used in zip(table.sinking, use, strict=True) if used]
     scale, exponent, square = (
         np.array([getattr(one, name) for one in sinking]) for name in ("scale", "exponent", "square")
     )
-    forces = Forces(
-        table.ratio[row, use], table.force_bar[row, use], table.exact_bar[row, use], scale / table.force[row, use],
-        exponent, square,
-    )  # fmt: skip
+    forces = Forces(ratio, bar, exact_bar, scale / table.force[row, use], exponent, square)
     axes = {name: positions[use] for name, positions in table.axes.items()}
     return laws.judge(forces, axes, table.tools, table.loads)
 

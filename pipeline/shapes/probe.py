@@ -245,6 +245,17 @@ class Probe(Section, ABC):
     def force_exponent(self) -> float | None:
         """The power of the depth that F goes with on a half-space; None if there is no such power."""
 
+    @property
+    @abstractmethod
+    def mean_square(self) -> float:
+        """Mean square distance (m²) of F from the axis on a half-space, without friction, as it counts for compliance.
+
+        A compliance c + g (s² + s'²)/2 between points at s and s' from the axis adds c + g ``mean_square``. Where
+        contact grows with depth, this is the mean square of the pressure times 1 + p / 2n, F going with the power n of
+        the depth and the square of the radius with p: energies change by F² times the mean square. NaN where
+        that is not known.
+        """
+
     # ---- sense ----------------------------------------------------------------------------------------
 
     @abstractmethod
@@ -256,11 +267,6 @@ class Punch(Probe):
     """A tool with a flat face, whose edge is where contact ends, unless it lifts off."""
 
     NOT_DRAWN = ("action", "depth", "contact", "slice", "motion")
-
-    @property
-    @abstractmethod
-    def mean_square(self) -> float:
-        """Mean square distance (m²) from the axis of where it presses a half-space, without friction."""
 
     @property
     def force_exponent(self) -> float | None:

@@ -14,6 +14,7 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     from pipeline.solve.cache import compiling  # noqa: PLC0415 (the folder's face loads no solver)
     from pipeline.verify.bodies import body_rows  # noqa: PLC0415
     from pipeline.verify.closure import closure_rows  # noqa: PLC0415
+    from pipeline.verify.compliance import compliance_rows  # noqa: PLC0415
     from pipeline.verify.contact import contact_rows  # noqa: PLC0415
     from pipeline.verify.elements import element_rows  # noqa: PLC0415
     from pipeline.verify.forces import scene_rows  # noqa: PLC0415
@@ -30,6 +31,7 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     yield from scene_rows(comm, quick=quick)
     yield from region_rows(comm, quick=quick)
     yield from body_rows(comm, quick=quick)
+    yield from compliance_rows(comm, quick=quick)
     yield from contact_rows(comm, quick=quick)
     yield from wedge_rows(comm, quick=quick)
     yield from slit_rows(comm, quick=quick)

@@ -56,6 +56,18 @@ def layered_disc(layer: Solid, thickness: float, base: Solid, radius: float, dep
     return float(2 * pi * layer.shear / (1 - layer.poisson) * thickness * (step @ phi))
 
 
+def added_compliance(layer: Solid, thickness: float, base: Solid) -> tuple[float, float]:
+    """Return what the base adds to E d / F of a small tool on a half-space of the layer: c (1/m) and g (1/m³).
+
+    A point force sinks itself by c / E more than on the half-space, and two at s and s' from one point sink each other
+    by (c + g (s² + s'²)/2) / E in the mean over directions: the wave's J₀ to its second order.
+    """
+    k, weight = _gauss(_LAST, ceil(_LAST))
+    beyond = weight * (surface_compliance(layer, base, k) - 1)
+    scale = (1 - layer.poisson**2) / pi
+    return scale * float(beyond.sum()) / thickness, -scale / 2 * float(beyond @ k**2) / thickness**3
+
+
 def surface_compliance(layer: Solid, base: Solid, k: FloatArray) -> FloatArray:
     """Return H of waves ``k`` (n,) in units of 1 / h: how far they sink, relative to a half-space of the layer."""
     nothing = np.zeros_like(k)

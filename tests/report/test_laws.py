@@ -139,7 +139,7 @@ def test_one_compliance_serves_all_tools_and_a_ratio_does_not():
     text = str(found)
     assert "1/F_exact ≈ 1/F - c/(E d): outside free, ε = 6 mm, c = 90 … 135 1/m by tissue" in text
     assert "disc, bonded, 1 to 4 mm" in text
-    assert "How far is F_exact off by a law" in text
+    assert "How far is F_max off by a law" in text
     row = found.to_dict()["carried"]
     assert row["laws"]["best"] == "compliance"
     assert row["laws"]["compliance"]["carried"]["height"] == dict(one.carried)["height"]

@@ -29,6 +29,8 @@ def compliance(dataset: xr.Dataset, title: str, warning: str) -> Figure:
             panel.ax.set_ylabel("$E d/F$ (1/mm)")
         if panel.is_last:
             panel.ax.set_xlabel(heading)
+    for ax in figure.axes:  # they share it: not before all are drawn
+        ax.set_xlim(left=0)
     contacts = np.unique(data["touch"].values.astype(str))
     bonded = "dashed: bonded" if "bonded" in contacts and len(contacts) > 1 else ""
     finish(figure, title, "; ".join(filter(None, (bonded, layout.note))), warning)
@@ -65,7 +67,6 @@ def _draw(ax: Axes, data: xr.Dataset) -> None:
             style = look(number) | (_OF_CONTACT.get(contact, {}) if len(contacts) > 1 else {})
             label = choice(data["epsilon"], line["epsilon"].values[()])
             _draw_tools(ax, line.where(line["touch"] == contact), style, label)
-    ax.set_xlim(left=0)
 
 
 def _draw_tools(ax: Axes, line: xr.Dataset, style: dict[str, str], label: str) -> None:

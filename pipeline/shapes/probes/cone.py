@@ -1,5 +1,6 @@
 """A cone, sharp or rounded."""
 
+from math import nan
 from typing import Annotated, Literal
 
 from pipeline.shapes.probes.round_indenter import RoundIndenter
@@ -25,6 +26,11 @@ class Cone(RoundIndenter):
     def force_exponent(self) -> float | None:
         """2 (A. E. H. Love) if it is sharp."""
         return None if self.tip else 2.0
+
+    @property
+    def mean_square(self) -> float:
+        """Half the square of the radius of contact (m²) if it is sharp: a third of it, times 3/2."""
+        return nan if self.tip else self.contact_width**2 / 2
 
     @property
     def limit(self) -> float:

@@ -25,6 +25,11 @@ class Sphere(RoundIndenter):
         return 1.5
 
     @property
+    def mean_square(self) -> float:
+        """8/15 of the square of the radius of contact (m²): 2/5 of it, times 4/3."""
+        return 8 / 15 * self.contact_width**2
+
+    @property
     def limit(self) -> float:
         """The radius (m): tissue does not reach round the equator."""
         return self.radius

@@ -1,5 +1,6 @@
 """A wedge, sharp or rounded."""
 
+from math import nan
 from typing import Annotated, Literal
 
 from pipeline.shapes.arrays import BoolArray, FloatArray, np
@@ -41,6 +42,11 @@ class Wedge(Indenter):
     def force_exponent(self) -> float | None:
         """None: the line load of an edge of some length goes with its depth and the logarithm of it."""
         return None
+
+    @property
+    def mean_square(self) -> float:
+        """Not known."""
+        return nan
 
     @property
     def contact_width(self) -> float:

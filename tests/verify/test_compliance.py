@@ -1,0 +1,64 @@
+"""Compliances of a layer on a rigid base, from three integral equations, and what tools say of themselves by them."""
+
+from math import inf, pi, radians, tan
+
+import pytest
+
+from pipeline.study.load import parse
+from pipeline.verify.layer_contact import layer_contact
+from pipeline.verify.layered import Solid, added_compliance, layered_disc
+from tests.cases import raw
+
+YOUNG, NU = 10e3, 0.3
+PLANE = YOUNG / (1 - NU**2)
+LAYER, RIGID = Solid(YOUNG, NU), Solid(inf, NU)
+
+
+def probe(**keys):
+    """Return a probe of a study."""
+    return next(parse(raw() | {"probe": keys}).cases()).probe
+
+
+def added(force, half_space, depth, exponent):
+    """Return the compliance (1/m) that brings the force on a half-space to ``force``."""
+    return YOUNG * depth / force * (1 - (force / half_space) ** (1 / exponent))
+
+
+def test_a_small_disc_finds_the_compliance_of_the_layer():
+    disc = probe(shape="disc", radius="1 mm", depth="0.01 mm")
+    for thickness, rest in ((20e-3, 1e-5), (10e-3, 1e-4)):
+        c, g = added_compliance(LAYER, thickness, RIGID)
+        force = layered_disc(LAYER, thickness, RIGID, 1e-3, 1e-5)
+        found = added(force, 2 * PLANE * 1e-3 * 1e-5, 1e-5, disc.force_exponent)
+        assert found == pytest.approx(c + g * disc.mean_square, rel=rest)
+        assert abs(found / c - 1) > 20 * rest
+
+
+@pytest.mark.parametrize("shape", ["sphere", "cone"])
+def test_tools_of_which_more_touches_with_depth_find_the_same(shape):
+    """Their law is F = f(d - F c / E) with f on a half-space, which is a power, and the term of second order is right.
+
+    A paraboloid stands for the ball, from which it differs by (a/R)².
+    """
+    angle, radius, a, thickness = radians(89), 1.0, 1e-3, 20e-3
+    slope = (lambda r: r / radius) if shape == "sphere" else (lambda r: 1 / tan(angle) + 0 * r)
+    depth, force = layer_contact(slope, a, thickness, NU)
+    c, g = added_compliance(LAYER, thickness, RIGID)
+    keys = {"radius": "1 m"} if shape == "sphere" else {"angle": "89 deg", "radius": "1 m"}
+    tool = probe(shape=shape, depth=f"{depth!r} m", **keys)
+    n = tool.force_exponent
+    half_space = {"sphere": 4 / 3 * radius**0.5 * depth**1.5, "cone": 2 / pi * tan(angle) * depth**2}[shape]
+    found = added(PLANE * force, PLANE * half_space, depth, n)
+    assert found == pytest.approx(c + g * tool.mean_square, rel=2e-4)
+    assert abs(found / c - 1) > 1e-3
+
+
+def test_flat_tools_press_between_evenly_and_at_their_edges():
+    for keys, sides in (
+        ({"shape": "blade", "length": "8 mm", "width": "1 mm"}, (8e-3, 1e-3)),
+        ({"shape": "blade", "length": "2 mm", "width": "2 mm"}, (2e-3, 2e-3)),
+    ):
+        evenly = sum(side**2 for side in sides) / 12
+        assert evenly < probe(depth="0.1 mm", **keys).mean_square < 1.5 * evenly
+    round_one = probe(shape="disc", radius="2 mm", depth="0.1 mm")
+    assert probe(shape="ellipse", axes=["2 mm", "2 mm"], depth="0.1 mm").mean_square == round_one.mean_square
