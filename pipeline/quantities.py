@@ -155,7 +155,7 @@ _OF_PIECES = (
     Quantity("density", "kg/m^3", "density", "ρ", "density ρ"),
     Quantity("pressure", "Pa", "pressure", "p", "pressure p"),
     Quantity("traction", "", "traction"),
-    Quantity("on", "", "where it acts:"),
+    Quantity("on", "", "place", "place"),
     Quantity("thickness", "m", "thickness"),
     Quantity("radius", "m", "radius"),
     Quantity("at", "", "centre"),

@@ -340,7 +340,7 @@ def _axis(section: str, place: Place, raw: list[Any], parsed: list[Section], pro
     if isinstance(values[0], tuple):
         labels = [" ".join(str(part) for part in value) for value in raw]
     elif any(isinstance(value, dict) for value in raw):
-        labels = [" ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else value for value in raw]
+        labels = [_labelled(value) if isinstance(value, dict) else value for value in raw]
     else:
         labels = values
     for label in dict.fromkeys(labels):
@@ -351,6 +351,11 @@ def _axis(section: str, place: Place, raw: list[Any], parsed: list[Section], pro
     if not outer:
         return Axis(section, str(key), tuple(labels), unit)
     return Axis(section, str(key), tuple(labels), unit, written(tuple(outer)), owners[0].name)
+
+
+def _labelled(table: dict[str, Any]) -> str:
+    """Write a table as a label: its keys and values, lists as their parts."""
+    return " ".join(f"{k} {' '.join(map(str, v)) if isinstance(v, list) else v}" for k, v in table.items())
 
 
 def _at(section: Any, place: list[str | int]) -> Any:
