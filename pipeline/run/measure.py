@@ -41,7 +41,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         depth=case.scale.length,
         force=force,
         force_error=bar / abs(force),
-        force_vector=turned_back(turn, solution.reaction),
+        force_vector=turned_back(turn, _known_of(case, solution)),
         force_vector_error=_vector_bars(solution, turn),
         stiffness=_rows(solution.stiffness, turn) if case.probe.motion == "all" else (),
         stiffness_error=_rows(solution.bars, turn, bars=True) if case.probe.motion == "all" else (),
@@ -81,6 +81,14 @@ def _of_loads(solution: Solution, turn: FloatArray | None) -> dict[str, Any]:
         # Where the probe bears no force along its axis: held at a depth d it bears k d + load_force.
         "sag": -force[2] / loaded.stiffness_along(loads, axis),
     }
+
+
+def _known_of(case: Case, solution: Solution) -> Vector:
+    """Return the reaction (N), not a number where a far field of the force along the axis alone cannot tell."""
+    x, y, z = solution.reaction
+    if not case.is_closed or case.probe.contact != "bonded":
+        return x, y, z
+    return x and nan, y and nan, z
 
 
 def _front_length(case: Case) -> float:

@@ -83,6 +83,14 @@ def test_green_function_makes_it_the_force_on_the_body():
     assert 0 < record.force / exact - 1 < CLOSURE["frictionless", 0.3] + record.force_error
 
 
+def test_force_aside_is_not_told():
+    """A bonded tool beside the middle pulls sideways: a far field of the force along its axis knows nothing of that."""
+    mesh = {**MESH, "epsilon": "5 mm", "fine": "5 mm", "rim": "1 mm", "growth": 2.0}
+    (record,) = solve(probe={"at": ["3 mm", "0 mm"]}, mesh=mesh).values()
+    x, y, z = record.force_vector
+    assert np.isnan(x) and y == 0 and z == record.force
+
+
 def test_stress_is_that_of_the_displacement():
     """Of a point force, for which tractions on half spheres are written down, too; none on the face."""
     field = PointForce(0.3, (0.0, 0.0, 0.0), 1.0)
