@@ -60,7 +60,7 @@ def story(plan: Plan, index: tuple[int, ...]) -> dict[str, Any]:
         "element": f"{case.element}, degree {case.mesh.degree}"
         if case.mesh.accuracy is None
         else "chosen for accuracy",
-        "steps": _steps(solve, step) if solve else ["none: its record is stored"],
+        "steps": _steps(plan, solve, step) if solve else ["none: its record is stored"],
         "record_shared_with": [str(c) for c in same],
         "mesh_shared_with": [s.label for s in step.solves if s is not solve] if step else [],
         "reference_key": plan.reference_keys[position] if plan.reference_keys else "",
@@ -91,11 +91,22 @@ def _changes(plan: Plan, case: Case, solve: Solve | None) -> dict[str, str]:
     }
 
 
-def _steps(solve: Solve, step: MeshStep | None) -> list[str]:
+def _steps(plan: Plan, solve: Solve, step: MeshStep | None) -> list[str]:
     if solve.axisymmetric:
         if solve.case.probe.is_unilateral:
             return ["meridian: a few meshes and direct solves in two dimensions until the area of contact is found"]
         return ["meridian: mesh, assembly and direct solve in two dimensions"]
     part = {0: "whole body", 1: "half of the body", 2: "quarter of the body"}[len(solve.mirrors)]
     shared = f", shared by {len(step.solves)} solves" if step and len(step.solves) > 1 else ""
-    return [f"mesh of the {part}{shared}", f"operator and solve, {solve.case.element} elements", "error bar"]
+    return [f"mesh of the {part}{shared}", *_solving(plan, solve, step), "error bar"]
+
+
+def _solving(plan: Plan, solve: Solve, step: MeshStep | None) -> list[str]:
+    operator = next((o for o in step.operators if solve in o.solves), None) if step else None
+    plain = f"operator and solve, {solve.case.element} elements"
+    if operator is None or not solve.case.probe.is_unilateral:
+        return [plain]
+    depths = max(len(sweep) for sweep in operator.sweeps if solve in sweep)
+    if plan.condensed and operator.is_condensed:
+        return [f"operator and, on a small body, a surface condensed for {depths} depths: a dense solve, and its bar"]
+    return [f"{plain}, begun from the neighbours of {depths} depths" if plan.reuse and depths > 1 else plain]

@@ -30,6 +30,7 @@ _LATER: dict[str, Any] = {
     "incision": 0.0,
     "ahead": None,
     "ends": "blade",
+    "depth_range": None,
 }
 # What a body may hold of other materials.
 _PIECES = ("layers", "inclusion")
@@ -60,7 +61,7 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
 
 def reference_key(case: Case, accuracy: float) -> str:
     """Key of F_exact of the case's scene, for E = 1 and depth = 1: of what F / (E d) depends on, no mesh."""
-    probe = case.probe.model_copy(update={"motion": "press"})
+    probe = case.probe.model_copy(update=_pressed(case.probe))
     ratios = "0.0" if _slides_across_a_mirror(case) else _ratios_text(probe)
     parts = [
         f"{PHYSICS_VERSION} exact {accuracy!r}", _body_text(case.body, case.scale.stress),
@@ -73,13 +74,14 @@ def reference_key(case: Case, accuracy: float) -> str:
 def mesh_key(case: Case) -> str:
     """Key of the case's mesh: body, footprint, sizes, and whether elements are straight or curved."""
     sizes = _mesh_text(case.mesh, case.is_full, case.probe.half_width, "")
-    footprint = text_of(case.probe, case.probe.NOT_DRAWN)
+    footprint = text_of(case.probe, case.probe.not_drawn)
     return digest("\n".join([_body_text(case.body), footprint, sizes, str(case.mesh.degree > 1)]))
 
 
 def operator_key(case: Case) -> str:
-    """Key of the case's spaces and conditions on its mesh: all but the material."""
-    return digest("\n".join([mesh_key(case), text_of(case.probe), str(case.mesh.degree), case.element]))
+    """Key of the case's spaces and conditions on its mesh: all but the material, and the depth if contact is found."""
+    probe = text_of(case.probe, ("depth",) if case.probe.is_unilateral else ())
+    return digest("\n".join([mesh_key(case), probe, str(case.mesh.degree), case.element]))
 
 
 def normalised(case: Case) -> Case:
@@ -87,10 +89,15 @@ def normalised(case: Case) -> Case:
     travel = _ratios(case.probe)
     if _slides_across_a_mirror(case):
         travel = {key: float(number == 0) for number, key in enumerate(travel)}
-    pressed: dict[str, Any] = {**travel, "motion": "press"}
+    pressed = {**travel, **_pressed(case.probe)}
     material = case.material.model_copy(update={"young": 1.0})
     body = _in_units_of(case.scale.stress, case.body)
     return replace(case, body=body, material=material, probe=case.probe.model_copy(update=pressed), load=Load())
+
+
+def _pressed(probe: Probe) -> dict[str, Any]:
+    """Return what changes of a probe that is pressed only, once, and has a mesh of its own."""
+    return {"motion": "press", **dict.fromkeys(probe.SWEPT)}
 
 
 @lru_cache(_MANY)

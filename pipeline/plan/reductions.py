@@ -3,9 +3,10 @@
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
+from pipeline.plan import estimate
 from pipeline.plan.images import Image, image_key
 from pipeline.plan.key import case_key, digest
-from pipeline.plan.steps import OperatorStep, Solve, mesh_steps
+from pipeline.plan.steps import MOST_DOFS, MeshStep, OperatorStep, Solve, mesh_steps
 from pipeline.plan.symmetry import is_round, model_planes
 from pipeline.plan.work import Plan, Struck
 from pipeline.shapes.arrays import FloatArray
@@ -18,6 +19,10 @@ _OF_STRESS_ALONE = (
 )
 _FOUND_CONTACT = "No reduced basis: the area of contact changes with Poisson's ratio, and each is solved."
 _CLOSED = "No reduced basis: the far field changes with Poisson's ratio, and each is solved."
+_LONE_DEPTHS = (
+    "No start from neighbouring depths: each depth of this tool has a mesh of its own; probe.depth_range makes it one "
+    "for all."
+)
 _SEVERAL_MATERIALS = "No reduced basis: a body of several materials has more parameters than one, and each is solved."
 
 
@@ -88,10 +93,25 @@ def share_meshes(plan: Plan) -> Plan:
 
 
 def reuse_solutions(plan: Plan) -> Plan:
-    """A solve begins from the solutions for the neighbouring Poisson's ratios."""
+    """A solve begins from the solutions for the neighbouring Poisson's ratios, or depths where contact is found."""
     plan = replace(plan, reuse=True)
-    count = sum(len(operator.solves) - 1 for step in plan.meshes for operator in step.operators)
+    operators = [operator for step in plan.meshes for operator in step.operators if not step.axisymmetric]
+    count = sum(len(operator.solves) - _fresh(operator) for operator in operators)
+    if not count and _has_lone_depths(operators):
+        return replace(plan, struck=(*plan.struck, Struck("reuse", 0, _LONE_DEPTHS)))
     return plan.struck_by("reuse", count, _reason(reuse_solutions))
+
+
+def condense_sweeps(plan: Plan) -> Plan:
+    """Ten or more depths of a tool that finds its contact, on one mesh of a small body: what may touch is condensed
+    once, and each depth is solved on that.
+    """
+    if not plan.shared:
+        return plan
+    plan = replace(plan, condensed=True)
+    steps = [step for step in plan.meshes if not step.axisymmetric and _is_small(step)]
+    count = sum(len(operator.solves) for step in steps for operator in step.operators if operator.is_condensed)
+    return plan.struck_by("condensed", count, _reason(condense_sweeps))
 
 
 def use_reduced_basis(plan: Plan) -> Plan:
@@ -137,11 +157,12 @@ REDUCTIONS: dict[str, Callable[[Plan], Plan]] = {
     "sharing": share_meshes,
     "reuse": reuse_solutions,
     "reduced": use_reduced_basis,
+    "condensed": condense_sweeps,
 }
 
 
 def _reason(reduction: Callable[..., Plan]) -> str:
-    return (reduction.__doc__ or "").strip()
+    return " ".join((reduction.__doc__ or "").split())
 
 
 def _rekeyed(
@@ -169,6 +190,35 @@ def _joined(solves: Iterable[Solve]) -> tuple[tuple[int, ...], ...]:
 def _mirrored(solve: Solve) -> Solve:
     use = solve.case.mesh.model == "auto" and not solve.axisymmetric
     return replace(solve, mirrors=model_planes(solve.case)) if use else solve
+
+
+def _fresh(operator: OperatorStep) -> int:
+    """Return how many solves of an operator have no neighbour to begin from."""
+    return len(operator.sweeps) if operator.case.probe.is_unilateral else 1
+
+
+def _has_lone_depths(operators: list[OperatorStep]) -> bool:
+    """Tell whether solves differ in the depth only, and have meshes of their own for that."""
+    seen = set[str]()
+    for solve in (solve for operator in operators for solve in operator.solves):
+        case, probe = solve.case, solve.case.probe
+        if probe.is_unilateral and any(getattr(probe, key) is None for key in probe.SWEPT):
+            same = repr((case.body, case.tissues, case.mesh, probe.model_dump(exclude={"depth"})))
+            if same in seen:
+                return True
+            seen.add(same)
+    return False
+
+
+def _is_small(step: MeshStep) -> bool:
+    """Tell whether a body is small enough to be condensed, as far as can be told before it is meshed."""
+    case = step.case
+    cells = estimate.cells(case) * 0.5 ** len(step.mirrors)
+    return (
+        case.element == "displacement"
+        and case.solve.method != "iterative"
+        and (estimate.dofs(cells, case.mesh.degree) <= MOST_DOFS)
+    )
 
 
 def _suits_a_basis(

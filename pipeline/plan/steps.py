@@ -7,6 +7,11 @@ from pipeline.plan.key import mesh_key, operator_key
 from pipeline.study.schema import Mesh
 from pipeline.study.sweep import Case
 
+# From so many depths of found contact on a small body on, the body is condensed to the surface that may touch.
+FEWEST_DEPTHS = 10
+# Unknowns up to which a body counts as small there, measured: docs/solvers.md.
+MOST_DOFS = 40_000
+
 
 @dataclass(frozen=True)
 class Solve:
@@ -39,7 +44,9 @@ class Solve:
 
 @dataclass(frozen=True)
 class OperatorStep:
-    """Solves that share spaces, conditions and the assembly: they differ in material only."""
+    """Solves that share spaces, conditions and the assembly: they differ in material only, or in the depth of a tool
+    whose contact is found.
+    """
 
     solves: tuple[Solve, ...]
 
@@ -47,6 +54,24 @@ class OperatorStep:
     def case(self) -> Case:
         """A case that stands for all of them."""
         return self.solves[0].case
+
+    @property
+    def sweeps(self) -> tuple[tuple[Solve, ...], ...]:
+        """The solves by material, those of each in the order of their depths."""
+        return tuple(
+            tuple(sorted(group, key=lambda solve: solve.case.probe.depth))
+            for group in _grouped(self.solves, lambda solve: tuple(tissue.lame for tissue in solve.case.tissues))
+        )
+
+    @property
+    def is_condensed(self) -> bool:
+        """Whether found contact has so many depths, of each material, that it pays to condense a small body: not where
+        an accuracy is asked for, and every depth must prove its own.
+        """
+        is_plain = self.case.probe.is_unilateral and not self.case.solve.timing
+        return is_plain and all(
+            len(sweep) >= FEWEST_DEPTHS and all(solve.goal is None for solve in sweep) for sweep in self.sweeps
+        )
 
 
 @dataclass(frozen=True)

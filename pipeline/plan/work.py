@@ -29,8 +29,9 @@ class Plan:
     are ``ABSENT`` where the tool has left the body.
     ``used`` are the reductions that had their turn, whether they found work to strike out or not. ``stored`` are the
     keys that were on record; ``shared`` says that solves share meshes and assembly, ``reuse`` that
-    they begin from their neighbours' solutions; ``cost`` estimates what steps take. Of a plan that is one shard's,
-    ``part`` are the keys that are its own. ``images`` says, by index, of which other case a case is the image.
+    they begin from their neighbours' solutions, ``condensed`` that many depths of found contact on a small body are
+    solved on its surface; ``cost`` estimates what steps take. Of a plan that is one shard's, ``part`` are the keys that
+    are its own. ``images`` says, by index, of which other case a case is the image.
     """
 
     study: Study
@@ -42,6 +43,7 @@ class Plan:
     stored: frozenset[str] = frozenset()
     shared: bool = False
     reuse: bool = False
+    condensed: bool = False
     cost: CostModel = field(default_factory=CostModel)
     part: frozenset[str] | None = None
     images: Mapping[tuple[int, ...], Image] = field(default_factory=dict)

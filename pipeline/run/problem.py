@@ -38,14 +38,19 @@ class CaseFailure(Exception):
     """A case cannot be computed, for a reason that all ranks have agreed on."""
 
 
-def problem_of(spaces: Spaces, case: Case, *, shared: bool, reuse: bool = False) -> FieldProblem:
-    """Return what solves ``case`` in the spaces of its mesh, by the elements that suit it; collective."""
+def problem_of(
+    spaces: Spaces, case: Case, *, shared: bool, reuse: bool = False, condense: bool = False
+) -> FieldProblem:
+    """Return what solves ``case`` in the spaces of its mesh, by the elements that suit it; collective.
+
+    ``condense`` says that many depths are to come.
+    """
     if case.probe.is_unilateral:
         if case.load.acts:
             raise CaseFailure("loads are not computed where the area of contact is found")
         if case.mesh.degree != DEGREE:
             raise CaseFailure(f"unilateral contact is found by elements of degree {DEGREE}, not {case.mesh.degree}")
-        return ContactProblem(spaces, tool_of(case), case.element)
+        return ContactProblem(spaces, tool_of(case), case.element, reuse=reuse, condense=condense)
     if case.element == "mixed":
         return MixedProblem(spaces, case.mesh.degree, conditions_of(case))
     return DisplacementProblem(spaces, case.mesh.degree, conditions_of(case), shared=shared, reuse=reuse)
@@ -80,7 +85,7 @@ def tool_of(case: Case) -> Tool:
         # All of a flat tool's footprint is below its face, whatever rounding has made of the nodes on the edge.
         return (0.0 if probe.has_singular_edge else probe.profile(local[:, :2])) - local[:, 2]
 
-    return Tool(probe.depth, height, lambda points: probe.ends_at(frame.local(points)[:, :2]))
+    return Tool(height, lambda points: probe.ends_at(frame.local(points)[:, :2]))
 
 
 def _front_of(case: Case) -> Front | None:

@@ -15,7 +15,7 @@ from pipeline.mesh.distribute import BodyMesh
 from pipeline.mesh.generate import MeshError
 from pipeline.plan import estimate
 from pipeline.plan.plan import Plan
-from pipeline.plan.steps import MeshStep, OperatorStep, Solve, mesh_steps
+from pipeline.plan.steps import MOST_DOFS, MeshStep, OperatorStep, Solve, mesh_steps
 from pipeline.plan.symmetry import model_planes
 from pipeline.run.attempts import Attempts
 from pipeline.run.basis import reduced_records
@@ -28,6 +28,7 @@ from pipeline.run.problem import CaseFailure, check_memory, lacks_memory, meridi
 from pipeline.run.progress import Progress
 from pipeline.run.provenance import provenance
 from pipeline.run.record import Record
+from pipeline.run.sweeping import in_order
 from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.linear import SolveError, is_direct
 from pipeline.solve.solution import FieldProblem
@@ -112,14 +113,17 @@ class StepRunner:
     def _operate(self, step: OperatorStep, ground: Ground) -> None:
         """Solve every material of an operator, or a few of them and the rest from these."""
         shared = self._assembles_parts(step, ground.mesh)
-        problem = self._caught(lambda: problem_of(ground.spaces, step.case, shared=shared, reuse=self._plan.reuse))
+        condense, reuse = self._condenses(step, ground.mesh), self._plan.reuse
+        problem = self._caught(
+            lambda: problem_of(ground.spaces, step.case, shared=shared, reuse=reuse, condense=condense)
+        )
         if isinstance(problem, Failure):
             self._fail(step.solves, problem)
             return
         with problem:
             if step.solves[0].reduced and isinstance(problem, DisplacementProblem):
                 self._reduce(step, problem, ground)
-            for solve in step.solves:
+            for solve in in_order(step, condensed=condense) if reuse or condense else step.solves:
                 if solve.key not in self._records:
                     self._record(solve, partial(self._solve, solve, problem, ground, _bar_of(solve)))
 
@@ -212,6 +216,13 @@ class StepRunner:
         degree = step.case.mesh.degree
         needed = estimate.enriched_memory(estimate.dofs(mesh.cells, degree), degree, parts=True)
         return self._comm.size > 1 and len(step.solves) > 2 and not lacks_memory(self._free, needed, "")
+
+    def _condenses(self, step: OperatorStep, mesh: BodyMesh) -> bool:
+        """Tell whether the surface is condensed for many depths: of a small body, on one rank; collective."""
+        size = estimate.dofs(mesh.cells, step.case.mesh.degree)
+        needed = estimate.solving_memory(size, step.case.mesh.degree, direct=True)
+        is_small = self._comm.size == 1 and size <= MOST_DOFS
+        return self._plan.condensed and step.is_condensed and is_small and not lacks_memory(self._free, needed, "")
 
     def _stamp(self, record: Record, memory: PeakMemory) -> Record:
         date = datetime.now(UTC).isoformat(timespec="seconds")

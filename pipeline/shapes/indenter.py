@@ -16,7 +16,7 @@ from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.rounded import Rounded
-from pipeline.shapes.section import Problems, Words
+from pipeline.shapes.section import Problems, Words, in_mm
 from pipeline.units import Length
 
 # Candidates reach this far past where the undeformed tool and surface intersect: on a thin incompressible layer tissue
@@ -24,8 +24,14 @@ from pipeline.units import Length
 CANDIDATES = 1.5
 # Contact is expected to end between its edge on a half-space and this much farther out: bodies are finite.
 BAND = 1.15
+# Depths that differ by less than this share are one.
+_ROUNDING = 1e-9
 # The steepest a tool may stand on the surface at the edge of contact: strains are of that order.
 _STEEPEST = 0.3
+
+
+def _texts(lengths: tuple[float, ...]) -> list[str]:
+    return [in_mm(length) for length in lengths]
 
 
 def _found(value: Any) -> Any:
@@ -45,11 +51,21 @@ class Indenter(Probe):
     # On meshes graded to where contact ends nothing is singular: not more than a disc's.
     EXPECTED_ERROR = 1.0
     NOT_DRAWN: ClassVar[tuple[str, ...]] = ("action", "contact", "motion")
+    SWEPT = ("depth_range",)
 
     action: Literal["pierce"] = "pierce"
     depth: Annotated[
         Length, Words("How far the tool is pushed in, from where its lowest point touches.", '"0.5 mm"', is_used=True)
     ]
+    depth_range: Annotated[
+        tuple[Length, Length] | None,
+        Words(
+            "Least and largest depth of a sweep on one mesh: nodes where the tool touches at the largest, small "
+            "elements wherever contact ends in between. Such a sweep starts each depth from its neighbours.",
+            '["0.1 mm", "0.5 mm"]',
+            default="a mesh for each depth",
+        ),
+    ] = None
     contact: Annotated[
         Literal["unilateral"],
         BeforeValidator(_found),
@@ -76,10 +92,27 @@ class Indenter(Probe):
     # ---- what follows ---------------------------------------------------------------------------------
 
     @property
+    def not_drawn(self) -> tuple[str, ...]:
+        """Keys on which the mesh does not depend: nor on the depth, where the mesh is one for many."""
+        return (*self.NOT_DRAWN, "depth") if self.depth_range else self.NOT_DRAWN
+
+    @property
+    def depths(self) -> tuple[float, float]:
+        """The least and the largest depth (m) that the mesh is for."""
+        return self.depth_range or (self.depth, self.depth)
+
+    @property
+    def contact_widths(self) -> tuple[float, float]:
+        """Half the widths (m) of contact that are expected at these depths."""
+        least, largest = (self.model_copy(update={"depth": depth}).contact_width for depth in self.depths)
+        return least, largest
+
+    @property
     def edge_band(self) -> tuple[float, float]:
         """The least and the largest half width (m) at which contact is expected to end."""
         most = self.footprint.half_width
-        return min(self.contact_width, most), min(BAND * self.contact_width, most)
+        least, largest = self.contact_widths
+        return min(least, most), min(BAND * largest, most)
 
     @property
     def rim_offset(self) -> float:
@@ -154,7 +187,15 @@ class Indenter(Probe):
         return self.footprint.outline()
 
     def check(self, problems: Problems) -> None:
-        """Warn of a depth at which strains are large."""
+        """Report a depth that the mesh is not for, and warn of one at which strains are large."""
+        least, largest = self.depths
+        if least > largest:
+            problems.error("probe.depth_range", _texts(self.depths), "must begin with the smaller depth")
+        elif not (1 - _ROUNDING) * least <= self.depth <= (1 + _ROUNDING) * largest:
+            problems.error(
+                "probe.depth", in_mm(self.depth), f"is not within depth_range, {in_mm(least)} to {in_mm(largest)}, "
+                "which the mesh is for: widen that, or leave it out for a mesh of each depth",
+            )  # fmt: skip
         slope = float(self.section.slope(np.array([self.contact_width]))[0])
         if slope > _STEEPEST:
             problems.warn(

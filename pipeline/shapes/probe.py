@@ -91,6 +91,8 @@ class Probe(Section, ABC):
     PROPORTIONAL_TO: ClassVar[tuple[str, ...]]
     # Keys on which its footprint, and so the mesh, does not depend.
     NOT_DRAWN: ClassVar[tuple[str, ...]]
+    # Keys that serve sweeps of a tool on one mesh, and say nothing of the tool itself.
+    SWEPT: ClassVar[tuple[str, ...]] = ()
     # Error of F on a mesh that is graded to the footprint's edge, in units of that of a disc: docs/accuracy.md.
     EXPECTED_ERROR: ClassVar[float]
 
@@ -112,6 +114,11 @@ class Probe(Section, ABC):
     @abstractmethod
     def travel(self, frame: Frame) -> Vector:
         """Return the prescribed displacement (m) of the footprint."""
+
+    @property
+    def not_drawn(self) -> tuple[str, ...]:
+        """Keys on which the mesh does not depend."""
+        return self.NOT_DRAWN
 
     @property
     def is_unilateral(self) -> bool:

@@ -49,6 +49,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         _check_mesh(mesh, problems)
     for mesh, probe in itertools.product(meshes, probes):
         _check_epsilon(mesh, probe, problems)
+        _check_depth_range(mesh, probe, problems)
     for body, mesh in itertools.product(bodies, meshes):
         body.support.check(body.heights, mesh.fine, problems)
         _check_outside(body, mesh, problems)
@@ -202,6 +203,16 @@ def _check_epsilon(mesh: Mesh, probe: Probe, problems: Problems) -> None:
             in_mm(mesh.rim_size(probe.half_width)),
             f"does not resolve the probe, whose half width is {in_mm(probe.half_width)}: F may be far off",
         )
+
+
+def _check_depth_range(mesh: Mesh, probe: Probe, problems: Problems) -> None:
+    """Refuse one mesh for many depths whose sizes are chosen for the accuracy of each."""
+    if mesh.accuracy is not None and isinstance(probe, Indenter) and probe.depth_range:
+        problems.error(
+            "probe.depth_range", [in_mm(depth) for depth in probe.depth_range],
+            "is for meshes with sizes of your own: where an accuracy is asked for, each depth has one that is chosen "
+            "for it; leave one of the two out",
+        )  # fmt: skip
 
 
 def _check_outside(body: Body, mesh: Mesh, problems: Problems) -> None:

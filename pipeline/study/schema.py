@@ -171,8 +171,8 @@ class Solving(Section):
 
 
 REDUCTIONS = (
-    "duplicates", "full", "scaling", "images", "axisymmetric", "symmetry", "sharing", "reuse", "reduced", "stored",
-    "all",
+    "duplicates", "full", "scaling", "images", "axisymmetric", "symmetry", "sharing", "reuse", "reduced", "condensed",
+    "stored", "all",
 )  # fmt: skip
 
 

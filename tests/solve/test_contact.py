@@ -85,7 +85,7 @@ def test_flat_probe_that_does_not_lift_off_is_the_frictionless_one():
 
 def test_face_that_is_inclined_lifts_off_on_one_side():
     """If it stuck to the surface, tilting would add no force: pull on one side what it presses on the other."""
-    inclined = Tool(0.1e-3, lambda points: 0.15 * points[:, 0], lambda points: np.ones(len(points), dtype=bool))
+    inclined = Tool(lambda points: 0.15 * points[:, 0], lambda points: np.ones(len(points), dtype=bool))
     with pressed(inclined, probe=DISC) as (problem, law, loads):
         force = problem.solve(law, loads).reaction[2]
     touching = problem.obstacle.candidates.points[problem.found.active, 0]
@@ -143,7 +143,7 @@ def test_error_bar_holds_a_finer_mesh(scene):
 
 
 def test_contact_that_is_cut_off_is_refused():
-    ball = Tool(0.1e-3, lambda x: (x[:, :2] ** 2).sum(axis=1) / 40e-3, lambda x: np.zeros(len(x), dtype=bool))
+    ball = Tool(lambda x: (x[:, :2] ** 2).sum(axis=1) / 40e-3, lambda x: np.zeros(len(x), dtype=bool))
     with pressed(ball, probe=DISC) as (problem, law, loads), pytest.raises(ContactError, match="reaches the edge"):
         problem.solve(law, loads)
 

@@ -26,7 +26,7 @@ class RoundIndenter(Indenter):
     @property
     def footprint(self) -> Probe:
         """The disc that holds all that it may touch."""
-        radius = min(CANDIDATES * self.section.reach(self.depth), self.limit)
+        radius = min(CANDIDATES * self.section.reach(self.depths[1]), self.limit)
         return Disc.model_construct(shape="disc", radius=radius, depth=self.depth, at=self.at, axis=self.axis)
 
     @property
@@ -55,4 +55,4 @@ class RoundIndenter(Indenter):
         inner, outer = (unit * radius for radius in self.edge_band)
         radius = f"Sqrt({along}^2+{across}^2)"
         aside = f"Max(Max({inner:.12g}-{radius},{radius}-{outer:.12g}),0)"
-        return f"Sqrt({aside}^2+Max(Fabs({height})-{unit * self.depth:.12g},0)^2)"
+        return f"Sqrt({aside}^2+Max(Fabs({height})-{unit * self.depths[1]:.12g},0)^2)"

@@ -32,7 +32,7 @@ class Wedge(Indenter):
     @property
     def footprint(self) -> Probe:
         """The rectangle, as long as the edge, that holds all that it may touch."""
-        width = 2 * CANDIDATES * self.section.reach(self.depth)
+        width = 2 * CANDIDATES * self.section.reach(self.depths[1])
         return Blade.model_construct(
             shape="blade", length=self.length, width=width, direction=self.direction, depth=self.depth, at=self.at,
             axis=self.axis,
@@ -56,8 +56,9 @@ class Wedge(Indenter):
     @property
     def edge_band(self) -> tuple[float, float]:
         """The least and the largest distance (m) from the edge at which contact is expected to end, off its ends."""
-        inner, _ = super().edge_band
-        return inner, min(1.3 * inner, self.section.reach(self.depth))
+        most = self.footprint.half_width
+        least, largest = (min(width, most) for width in self.contact_widths)
+        return least, min(1.3 * largest, self.section.reach(self.depths[1]))
 
     def profile(self, points: FloatArray) -> FloatArray:
         """Return the heights (m) of the tool, infinite beyond its ends."""
@@ -82,7 +83,7 @@ class Wedge(Indenter):
         aside = f"Max(Max({inner:.12g}-Fabs({across}),Fabs({across})-{outer:.12g}),0)"
         to_strips = f"Sqrt({aside}^2+Max({beyond},0)^2)"
         to_ends = f"Sqrt({beyond}^2+Max(Fabs({across})-{outer:.12g},0)^2)"
-        return f"Sqrt(Min({to_strips},{to_ends})^2+Max(Fabs({height})-{unit * self.depth:.12g},0)^2)"
+        return f"Sqrt(Min({to_strips},{to_ends})^2+Max(Fabs({height})-{unit * self.depths[1]:.12g},0)^2)"
 
     def check(self, problems: Problems) -> None:
         """Report a rounding wider than the edge is long."""

@@ -113,6 +113,14 @@ class DisplacementElements:
             self.space.apply(forces, self._law)
             return np.array(forces.array)
 
+    def unknowns(self) -> tuple[FloatArray, ...]:
+        """Return a copy of the displacement (m), owned dofs."""
+        return (np.array(self.displacement.array),)
+
+    def start_at(self, unknowns: tuple[FloatArray, ...]) -> None:
+        """Take over a displacement (m), owned dofs."""
+        (self.displacement.array[:],) = unknowns
+
     def start_from(self, coarse: ElasticSpace) -> None:
         """Take over the displacement of the forms of another space; collective."""
         self.space.forms.displacement.interpolate(coarse.forms.displacement)

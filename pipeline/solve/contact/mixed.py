@@ -163,6 +163,15 @@ class MixedElements:
             self.mixed.apply(residual, pull, dilation, self._split.elastic)
             return np.asarray(self._split.unit * (residual.array + pull.array))
 
+    def unknowns(self) -> tuple[FloatArray, ...]:
+        """Return a copy of displacement (m) and pressure (in the law's unit), owned dofs."""
+        return tuple(np.array(part.array) for part in self.unknown)
+
+    def start_at(self, unknowns: tuple[FloatArray, ...]) -> None:
+        """Take over displacement and pressure, owned dofs."""
+        for part, values in zip(self.unknown, unknowns, strict=True):
+            part.array[:] = values
+
     def start_from(self, coarse: ElasticSpace) -> None:
         """Take over the displacement of the forms of another space; collective. There is no pressure yet."""
         self.space.forms.displacement.interpolate(coarse.forms.displacement)

@@ -15,12 +15,14 @@ import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.solve.contact.area import contact_area
+from pipeline.solve.contact.condensed import CondensedElements, suits
 from pipeline.solve.contact.displacement import DisplacementElements
 from pipeline.solve.contact.error import displacement_decrement, mixed_decrement
 from pipeline.solve.contact.levels import CONDITIONS
 from pipeline.solve.contact.mixed import MixedElements
 from pipeline.solve.contact.sets import ContactError, Found, Obstacle, find_set
 from pipeline.solve.contact.surface import find_candidates
+from pipeline.solve.contact.sweep import Kind, Sweep
 from pipeline.solve.error import error_bar, found_bar
 from pipeline.solve.forms import mean_strain_form
 from pipeline.solve.linear import SolveError
@@ -32,8 +34,6 @@ from pipeline.solve.solution import BALANCE_LIMIT, TOLERANCE, Solution
 from pipeline.solve.spaces import Spaces
 from pipeline.solve.strain import largest_strain, principal_strains
 from pipeline.solve.vectors import global_sum
-
-Kind = DisplacementElements | MixedElements
 
 DEGREE = 2
 # Energy norm of the error to which each set but the last one is solved, relative to that of the solution.
@@ -48,27 +48,31 @@ _FIRST_RATIO = 1.5
 
 @dataclass(frozen=True)
 class Tool:
-    """A probe's surface, pushed in by ``depth`` (m) along -z.
+    """A probe's surface, to be pushed in along -z.
 
     ``height`` gives, at points (n, 3) of the undeformed surface (m), how far above each the probe's surface is before
     it moves, infinite where there is no probe. ``ends_at`` tells of points (n, 3) on the candidates' edge whether the
     probe itself ends there: elsewhere contact must not reach that edge.
     """
 
-    depth: float
     height: Callable[[FloatArray], FloatArray]
     ends_at: Callable[[FloatArray], BoolArray]
 
 
 class ContactProblem:
-    """The spaces of a mesh and a probe: solves for any material. A context manager.
+    """The spaces of a mesh and a probe: solves for any material and depth. A context manager.
 
-    How far the probe goes it knows itself: of the loads it takes that they are along the axis. ``found`` is what was
-    found last of the ``obstacle``, None before.
+    ``obstacle`` is what was in the way last, ``found`` what was found of it, None before.
     """
 
-    def __init__(self, spaces: Spaces, tool: Tool, element: str = "displacement"):
+    def __init__(
+        self, spaces: Spaces, tool: Tool, element: str = "displacement", *, reuse: bool = False, condense: bool = False
+    ):
         """Prepare for elements of a kind; collective.
+
+        With ``reuse``, a depth begins with what is known of others of the same material. ``condense`` says that many
+        depths of each material are to come: where the body is small, its surface is condensed for them, and they share
+        error bars.
 
         Raises:
             SolveError: if candidates and support share a point.
@@ -77,14 +81,18 @@ class ContactProblem:
         self._is_mixed = element == "mixed"
         self._fine, coarse = (spaces.get(degree, CONDITIONS) for degree in (DEGREE, 1))
         self._candidates = find_candidates(self._body, self._fine.dofs.space, coarse.dofs.space)
-        self.obstacle = Obstacle(self._candidates, tool.height(self._candidates.points) - tool.depth, tool.depth)
+        self._heights = tool.height(self._candidates.points)
+        self.obstacle: Obstacle | None = None
         self.found: Found | None = None
+        self._reuse, self._condense = reuse or condense, condense
+        self._sweep: Sweep | None = None
         self._strain = mean_strain_form(self._fine.dofs.space, self._fine.forms.displacement)
 
     def __enter__(self) -> "ContactProblem":
         return self
 
-    def __exit__(self, *_: object) -> None: ...
+    def __exit__(self, *_: object) -> None:
+        self._forget()
 
     @property
     def dofs(self) -> int:
@@ -105,11 +113,12 @@ class ContactProblem:
             ContactError: if the contact does not settle, or reaches the candidates' edge where the probe does not end.
         """
         start = time.perf_counter()
+        depth, before = loads.amounts[0], self._sweep
+        setup = 0.0 if before is None else before.elements.setup_seconds
+        self.obstacle = obstacle = Obstacle(self._candidates, self._heights - depth, depth)
         with ExitStack() as stack:
-            elements, first = self._start(law, method, stack)
-            tolerances = _LOOSE, _STRICTER * tolerance
-            active = self._candidates.spread(first.active)
-            found = find_set(elements, self.obstacle, active, tolerances, first.state.energy)
+            sweep, first, found = self._find(law, method, (_LOOSE, _STRICTER * tolerance), stack)
+            elements = sweep.elements
             elements.show()
             self._check_edge(found.active)
             self.found = found
@@ -118,33 +127,48 @@ class ContactProblem:
                 raise SolveError(
                     f"forces do not balance: relative error {response.balance:.1e}, allowed {BALANCE_LIMIT:.0e}"
                 )
-            solution = self._solution(elements, first, found, response, time.perf_counter() - start)
+            if self._reuse:
+                sweep.keep(depth, found)
+            seconds = elements.assembly_seconds, elements.setup_seconds
+            if sweep is before:  # nothing is assembled for a further depth
+                seconds = 0.0, seconds[1] - setup
+            solution = self._solution(first, found, response, (*seconds, time.perf_counter() - start - sum(seconds)))
             if not estimate:
                 return solution
             start = time.perf_counter()
-            taken, share, more = self._estimate(elements, law, found)
+            taken, share, more = self._estimate(sweep, obstacle, found)
         return replace(
             solution, decrements=taken * response.stiffness, bars=share * response.stiffness,
             plain=plain_share(self._body), estimate_iterations=more, time_estimate=time.perf_counter() - start,
         )  # fmt: skip
 
-    def _solution(self, elements: Kind, first: Found, found: Found, response: Response, seconds: float) -> Solution:
-        """Return the solution, which took ``seconds`` with all assembly and set-up; collective."""
+    def _solution(self, first: int, found: Found, response: Response, seconds: tuple[float, float, float]) -> Solution:
+        """Return the solution, which took ``first`` sets of degree 1 to begin with, and ``seconds`` for assembly,
+        set-up and the rest; collective.
+        """
+        assert self.obstacle is not None
         area = self._whole * contact_area(self.obstacle, found.active, found.state)
-        assembly, setup = elements.assembly_seconds, elements.setup_seconds
         return Solution(
             response, largest_strain(self._strain, self._body), self._fine.dofs.whole_dofs, self._body.cells,
-            first.sets + found.sets, assembly, setup, seconds - assembly - setup,
+            first + found.sets, *seconds,
             contact_area=area, contact_radius=(area / np.pi) ** 0.5,
             stored=None if self._is_as_prescribed(found) else self._whole * found.state.energy / 2,
         )  # fmt: skip
 
     def _is_as_prescribed(self, found: Found) -> bool:
         """Tell whether all of a face touches and moves by the depth: the area of contact was no question."""
-        return bool(found.active.all() and np.ptp(self.obstacle.bounds) <= _SAME * self._tool.depth)
+        assert self.obstacle is not None
+        return bool(found.active.all() and np.ptp(self.obstacle.bounds) <= _SAME * self.obstacle.depth)
 
-    def _estimate(self, elements: Kind, law: MaterialLaw, found: Found) -> tuple[float, float, int]:
+    def _estimate(self, sweep: Sweep, obstacle: Obstacle, found: Found) -> tuple[float, float, int]:
         """Return the share of the energy that degree 3 takes away, that of the force's bar, and the iterations."""
+        if known := sweep.bar(obstacle.depth):
+            return *known, 0
+        taken, share, more = self._estimated(sweep.elements, sweep.law, found)
+        sweep.keep_bar(obstacle.depth, taken, share)
+        return taken, share, more
+
+    def _estimated(self, elements: Kind, law: MaterialLaw, found: Found) -> tuple[float, float, int]:
         facets = self._candidates.closed_facets(found.active)
         if isinstance(elements, MixedElements):
             taken, unseen, more = mixed_decrement(self._spaces, elements, law, self._candidates, facets)
@@ -166,8 +190,49 @@ class ContactProblem:
         """How many times what is modelled makes the body."""
         return 2.0 ** len(self._body.mirrored)
 
+    def _find(
+        self, law: MaterialLaw, method: str, tolerances: tuple[float, float], stack: ExitStack
+    ) -> tuple[Sweep, int, Found]:
+        """Return the elements, how many sets of degree 1 were solved, and what was found; collective."""
+        assert self.obstacle is not None
+        if sweep := self._sweep_of(law, method):
+            try:
+                found = sweep.find(self.obstacle, tolerances)
+                if found is not None:
+                    return sweep, 0, found
+            except SolveError:  # afresh, then
+                self._forget()
+        with ExitStack() as inner:
+            elements, first = self._start(law, method, inner)
+            active = self._candidates.spread(first.active)
+            found = find_set(elements, self.obstacle, active, tolerances, first.state.energy)
+            sweep = Sweep(law, method, elements, inner.pop_all())
+        if self._reuse:
+            self._forget()
+            self._sweep = sweep
+        else:
+            stack.callback(sweep.close)
+        return sweep, first.sets, found
+
+    def _sweep_of(self, law: MaterialLaw, method: str) -> Sweep | None:
+        """Return what is kept of a material, or else, if the surface is to be condensed, that; collective."""
+        if self._sweep is not None and (self._sweep.law, self._sweep.method) == (law, method):
+            return self._sweep
+        self._forget()
+        if self._condense and not self._is_mixed and suits(self._fine, self._candidates, method):
+            with ExitStack() as stack:
+                elements = CondensedElements(self._spaces, DEGREE, law, self._candidates, stack)
+                self._sweep = Sweep(law, method, elements, stack.pop_all())
+        return self._sweep
+
+    def _forget(self) -> None:
+        if self._sweep is not None:
+            self._sweep.close()
+            self._sweep = None
+
     def _start(self, law: MaterialLaw, method: str, stack: ExitStack) -> tuple[Kind, Found]:
         """Return the elements, with a displacement to start from, and the set found on elements of degree 1."""
+        assert self.obstacle is not None
         with ExitStack() as inner:
             coarse = DisplacementElements(self._spaces, 1, _softer(law), self._candidates, method, inner)
             below = (self.obstacle.bounds < 0) & coarse.nodes
@@ -198,7 +263,7 @@ class ContactProblem:
         balance = max(abs(support / force - 1), abs(work / state.energy - 1))
         if not (np.isfinite(balance) and force > 0):
             raise SolveError(f"the solution is not a number or has no force ({force:g} N)")
-        stiffness = self._whole * force / self._tool.depth
+        stiffness = self._whole * force / loads.amounts[0]
         return Response(loads, np.array([[stiffness]]), np.array([[0.0, 0.0, stiffness]]), balance)
 
 

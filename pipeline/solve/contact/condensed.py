@@ -1,0 +1,132 @@
+"""Displacement elements condensed to the nodes that may touch: a set, and a depth, then cost a small dense solve.
+
+With a unit force on each candidate in turn, the displacements of all of them are the columns of the compliance C, the
+inverse of the stiffness condensed to these nodes. Of a set A that is moved to b, the reactions are the solution of
+C_AA r = b, exact as those of a direct solve: what is found does not depend on where the search began.
+"""
+
+import time
+from contextlib import ExitStack
+
+import numpy as np
+from petsc4py import PETSc
+from scipy.linalg import cho_factor, cho_solve
+
+from pipeline.arrays import BoolArray, FloatArray, Int32Array
+from pipeline.solve.contact.displacement import DisplacementElements
+from pipeline.solve.contact.levels import Hierarchy
+from pipeline.solve.contact.sets import State
+from pipeline.solve.contact.surface import Candidates
+from pipeline.solve.linear import Level, LinearSolver, SolveError
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.spaces import ElasticSpace, Spaces
+from pipeline.solve.vectors import vector
+from pipeline.stages import stage
+
+# Surfaces up to which it pays for ten depths, measured: docs/solvers.md.
+_MOST_CANDIDATES = 1_500
+# Right-hand sides at a time.
+_TOGETHER = 64
+
+
+def suits(space: ElasticSpace, candidates: Candidates, method: str) -> bool:
+    """Tell whether to condense the surface of a small body: on one process, if a direct solve is not ruled out."""
+    small = len(candidates) <= _MOST_CANDIDATES
+    return method != "iterative" and space.dofs.comm.size == 1 and small
+
+
+class CondensedElements(DisplacementElements):
+    """Displacements of degree 2 on one process, with the compliance of the candidates. Freed with the stack."""
+
+    def __init__(self, spaces: Spaces, degree: int, law: MaterialLaw, candidates: Candidates, stack: ExitStack):
+        """Assemble, factorise and condense.
+
+        Raises:
+            SolveError: if candidates and support share a point, or the factorisation fails.
+        """
+        super().__init__(spaces, degree, law, candidates, "direct", stack)
+        self._stack = stack
+        self._multigrid: Hierarchy | None = None
+        self._free = self._factor()
+        stack.callback(self._free.close)
+        self.setup_seconds = self._free.setup_seconds
+        self._dofs = self.numbering.normal_dofs(self.nodes)
+        order = np.argsort(3 * self.numbering.local + 2)
+        self._place = np.empty_like(order)
+        self._place[order] = np.arange(len(order))  # of each candidate among the sorted dofs
+        start = time.perf_counter()
+        self._compliance = self._condense()
+        self.setup_seconds += time.perf_counter() - start
+
+    def _factor(self) -> LinearSolver:
+        space = self.space.dofs
+        level = Level(space.space, self.hierarchy.finest, space.prescribed)
+        return LinearSolver([level], direct=True, tolerance=1.0)
+
+    @stage("condensation")
+    def _condense(self) -> FloatArray:
+        """Return C (n, n), in m/N, symmetric."""
+        count, size = len(self._dofs), self.space.dofs.owned
+        compliance = np.empty((count, count))
+        factor = self._free.ksp.pc.getFactorMatrix()
+        for first in range(0, count, _TOGETHER):
+            here = self._dofs[first : first + _TOGETHER]
+            loads = np.zeros((size, len(here)), order="F")
+            loads[here, np.arange(len(here))] = 1.0
+            compliance[:, first : first + len(here)] = _solve_many(factor, loads)[self._dofs]
+        compliance = compliance[np.ix_(self._place, self._place)]
+        return (compliance + compliance.T) / 2
+
+    def hold(self, active: BoolArray) -> None:
+        """Hold the ``active`` candidates (n) from now on."""
+        self._active = active
+
+    def improve(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
+        """Find the reactions that move what is held to ``bounds`` (n, m): exactly, whatever the ``tolerance``.
+
+        Raises:
+            SolveError: if the compliance is not definite.
+        """
+        held = np.flatnonzero(self._active)
+        try:
+            pressed = cho_solve(cho_factor(self._compliance[np.ix_(held, held)], check_finite=False), bounds[held])
+        except np.linalg.LinAlgError as error:
+            raise SolveError("the condensed surface has no positive compliance") from error
+        self._reactions = np.zeros(len(bounds))
+        self._reactions[held] = pressed
+        return 1
+
+    def state(self) -> State:
+        """Return what the candidates do."""
+        moved = self._compliance @ self._reactions
+        return State(moved, self._reactions, float(moved @ self._reactions))
+
+    def show(self) -> None:
+        """Make the displacement, of the whole body for the reactions found, that of the space's forms."""
+        with vector(self.space.dofs.space) as loads:
+            self.numbering.put(loads.array, self._reactions, self._active)
+            self._free.solve(loads, self.displacement)
+        super().show()
+
+    def held_levels(self, facets: Int32Array, stack: ExitStack) -> list[Level]:
+        """Return the levels of multigrid, which are kept for the next depth, with the local ``facets`` held."""
+        if self._multigrid is None:
+            self._multigrid = Hierarchy(
+                self._spaces, self.space.degree, self._law, self._candidates, self._stack, direct=False
+            )
+        return self._multigrid.hold_facets(facets)
+
+
+def _solve_many(factor: PETSc.Mat, loads: FloatArray) -> FloatArray:
+    """Return the solutions (m, n) for the columns of ``loads`` (m, n)."""
+    right = PETSc.Mat().createDense(loads.shape, array=loads, comm=PETSc.COMM_SELF)
+    left = PETSc.Mat().createDense(loads.shape, comm=PETSc.COMM_SELF)
+    left.setUp()
+    try:
+        factor.matSolve(right, left)
+        return np.array(left.getDenseArray())
+    except PETSc.Error as error:
+        raise SolveError(f"the factorisation failed (PETSc error {error.ierr})") from error
+    finally:
+        right.destroy()
+        left.destroy()

@@ -1,0 +1,133 @@
+"""Depths of one tool on one mesh: each begins from its neighbours, or on a condensed surface, with the same forces."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from pipeline.plan.describe import story
+from pipeline.plan.key import case_key, mesh_key, normalised, reference_key
+from pipeline.plan.plan import make_plan
+from pipeline.plan.steps import FEWEST_DEPTHS
+from pipeline.report.dataset import build
+from pipeline.run.execute import compute
+from pipeline.study.problems import StudyError
+from tests.cases import study
+
+SMALL = {"shape": "cylinder", "radius": "6 mm", "height": "5 mm"}
+DEPTHS = [f"{depth:.4g} mm" for depth in np.linspace(0.04, 0.12, FEWEST_DEPTHS)]
+MESH = {"fine": "2 mm", "coarse": "2 mm", "rim": "0.4 mm", "growth": 0.6}
+
+
+def sphere(depths, *, on_one_mesh=True):
+    """Return a ball beside the axis of its body, so that half of that is solved."""
+    ends = {"depth_range": [DEPTHS[0], DEPTHS[-1]]} if on_one_mesh else {}
+    return {"shape": "sphere", "radius": "6 mm", "depth": depths, "at": ["0.5 mm", "0 mm"], **ends}
+
+
+def run(depths, without=(), stored=(), **changes):
+    plan = make_plan(study(body=SMALL, probe=sphere(depths), mesh=MESH | changes.pop("mesh", {}), **changes),
+                     without=without)  # fmt: skip
+    dataset = build(plan, compute(plan, MPI.COMM_SELF))
+    assert set(np.unique(dataset["status"])) == {"ok"}
+    return plan, dataset
+
+
+@pytest.fixture(scope="module")
+def plainly():
+    """What each depth gives by itself."""
+    return run(DEPTHS, ("condensed", "reuse"))[1]
+
+
+@pytest.mark.parametrize("without", [(), ("condensed",)], ids=["condensed", "from neighbours"])
+def test_force_is_that_of_each_depth_by_itself(plainly, without):
+    plan, found = run(DEPTHS, without)
+    counts = {struck.name: struck.count for struck in plan.struck}
+    assert counts["reuse"] == len(DEPTHS) - 1
+    assert counts.get("condensed", 0) == (0 if without else len(DEPTHS))
+    np.testing.assert_allclose(found["force"], plainly["force"], rtol=1e-8)
+    for name in ("contact_area", "energy", "max_strain"):
+        np.testing.assert_allclose(found[name], plainly[name], rtol=1e-6)
+    assert float(found["iterations"].mean()) < 0.75 * float(plainly["iterations"].mean())
+
+
+def test_bars_on_a_condensed_surface_are_not_smaller(plainly):
+    """Some depths have their own, the others those of these."""
+    _, found = run(DEPTHS)
+    ratio = (found["force_error"] / plainly["force_error"]).values
+    assert ratio[[0, -1]] == pytest.approx(1.0, rel=0.05)
+    assert ratio.min() > 0.95
+    assert ratio.max() < 4
+
+
+def test_some_of_the_depths_have_the_forces_of_all(plainly):
+    """As in a run that goes on where another one ended: other neighbours, too few to condense for."""
+    some = [8, 3, 5]
+    plan, found = run([DEPTHS[number] for number in some])
+    assert "condensed" not in {struck.name for struck in plan.struck}
+    by_depth = dict(zip(found["depth"].values, found["force"].values, strict=True))
+    for number in some:
+        depth = float(plainly["depth"][number])
+        assert by_depth[depth] == pytest.approx(float(plainly["force"][number]), rel=1e-8)
+
+
+def test_mixed_elements_and_two_materials_start_from_their_own_neighbours():
+    depths, changes = DEPTHS[:2], {"material": {"poisson": [0.45, 0.5]}, "mesh": {"element": "mixed", "rim": "0.6 mm"}}
+    (_, found), (_, alone) = (run(depths, without, **changes) for without in ((), ("reuse",)))
+    np.testing.assert_allclose(found["force"], alone["force"], rtol=1e-8)
+
+
+def test_flat_tools_on_curved_bodies_share_their_mesh_as_it_is():
+    """Their footprint is the same at every depth."""
+    ball = {"shape": "ellipsoid", "axes": ["8 mm", "8 mm", "6 mm"], "fixed": {"below": "-2 mm"}}
+    disc = {"shape": "disc", "radius": "1.5 mm", "contact": "unilateral", "depth": DEPTHS[:2]}
+    found, alone = (
+        compute(make_plan(study(body=ball, probe=disc, mesh=MESH | {"rim": "0.6 mm"}), without=without), MPI.COMM_SELF)
+        for without in (("axisymmetric",), ("axisymmetric", "reuse"))
+    )
+    for key, record in found.items():
+        assert record.force == pytest.approx(alone[key].force, rel=1e-8)
+        assert record.iterations < alone[key].iterations or record.depth == min(r.depth for r in found.values())
+
+
+def test_plan_tells_why_depths_are_solved_alone():
+    plan = make_plan(study(body=SMALL, probe=sphere(DEPTHS, on_one_mesh=False), mesh=MESH))
+    assert len(plan.meshes) == len(DEPTHS)
+    (reason,) = (struck.reason for struck in plan.struck if struck.name == "reuse")
+    assert "depth_range" in reason
+    together = make_plan(study(body=SMALL, probe=sphere(DEPTHS), mesh=MESH))
+    assert len(together.meshes) == 1
+    assert "condensed for 10 depths" in " ".join(story(together, (3,))["steps"])
+    timed = make_plan(study(body=SMALL, probe=sphere(DEPTHS), mesh=MESH, solve={"timing": True, "exact": False}))
+    assert not timed.struck
+    assert len(timed.meshes) == len(DEPTHS)
+
+
+def test_keys_of_tools_without_a_range_and_of_the_exact_force_do_not_know_of_it():
+    (alone,) = study(body=SMALL, probe=sphere(DEPTHS[1], on_one_mesh=False), mesh=MESH).cases()
+    one, other = study(body=SMALL, probe=sphere(DEPTHS[1:3]), mesh=MESH).cases()
+    assert mesh_key(one) == mesh_key(other) != mesh_key(alone)
+    assert case_key(one) != case_key(alone)
+    assert reference_key(one, 1e-3) == reference_key(alone, 1e-3)
+    assert normalised(one).probe == normalised(alone).probe
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"probe": sphere("0.2 mm")}, r"probe\.depth.*is not within depth_range, 0\.04 mm to 0\.12 mm"),
+        ({"probe": sphere("0.1 mm") | {"depth_range": ["0.2 mm", "0.1 mm"]}}, "must begin with the smaller depth"),
+        ({"mesh": {"accuracy": "1 %"} | dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))},
+         "is for meshes with sizes of your own"),
+    ],
+)  # fmt: skip
+def test_depths_that_a_mesh_cannot_be_for_are_refused(changes, message):
+    with pytest.raises(StudyError, match=message):
+        study(**({"body": SMALL, "probe": sphere("0.1 mm"), "mesh": MESH} | changes))
+
+
+@pytest.mark.mpi
+def test_ranks_agree():
+    plan = make_plan(study(body=SMALL, probe=sphere(DEPTHS[:3]), mesh=MESH))
+    together, alone = (compute(plan, comm) for comm in (MPI.COMM_WORLD, MPI.COMM_SELF))
+    for key, record in alone.items():
+        assert together[key].force == pytest.approx(record.force, rel=3e-8)
