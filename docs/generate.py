@@ -63,14 +63,17 @@ def dataset_page() -> str:
         "`results/<study>.nc`: netCDF4, SI units, CF attributes. Its dimensions are what the study sweeps, in the "
         "file's order, with coordinates named like the keys of `body`, `material`, `probe` and `mesh`. An array of "
         "tables gives the dimension `probe` or `body`; a radius or shape is `probe_radius`, `body_radius`; a key of a "
-        "layer or an inclusion has its name before it, `skin_young`. `epsilon` is infinite for the full order.", "",
+        "layer or an inclusion has its name before it, `skin_young`. A path gives the dimension `path`, a raster "
+        "`x` and `y`: lengths in m, and `at_x`, `at_y` and `at_z` are then coordinates. `epsilon` is infinite for the "
+        "full order.", "",
         *_table(("variable", "unit", "meaning")),
     ]  # fmt: skip
     for name, variable in sorted(dataset.data_vars.items()):
         unit = variable.attrs.get("units", "text")
         lines.append(_row(f"`{name}`", "" if unit == "1" else unit, variable.attrs.get("long_name", "")))
     lines += [
-        "", "Values are missing (NaN; -1 for counts) where a case failed, was skipped or has not been run.", "",
+        "", "Values are missing (NaN; -1 for counts) where a case failed, was skipped or has not been run. Where a "
+        "path has left the body, `status` is `lost` and `force` 0.", "",
         "Attributes of the dataset: the study's text (`study`) and its hash, versions of the program and its "
         "libraries, git commit, host, ranks, start and end.",
     ]  # fmt: skip

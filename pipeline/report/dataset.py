@@ -1,7 +1,7 @@
 """The dataset of a study: every record in its place, with labels, units and provenance."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from math import isinf, nan
 from pathlib import Path
@@ -103,8 +103,8 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     if has_stiffness:
         coordinates |= {"movement": list(_MOTIONS), "conjugate": list(_MOTIONS)}
     dataset = xr.Dataset(variables, coordinates, _attributes(plan, flat, run or {}))
-    if any(axis.off for axis in study.axes):
-        dataset = dataset.set_coords(_PLACE)
+    if path := {axis.name for axis in study.axes if axis.off}:
+        dataset = dataset.assign_coords({name: _along(dataset[name], path) for name in _PLACE})
     return _add_ratios(dataset)
 
 
@@ -127,6 +127,15 @@ def write(dataset: xr.Dataset, path: Path) -> None:
     """Write ``dataset`` to ``path`` as netCDF4: to a new file beside it, which then takes its place."""
     with atomic(path) as temporary:
         dataset.to_netcdf(temporary, format="NETCDF4", engine="netcdf4")
+
+
+def _along(place: xr.DataArray, path: Collection[str]) -> xr.DataArray:
+    """Return a coordinate of places without the dimensions, other than its ``path``'s, on which it does not depend."""
+    for dim in place.dims:
+        first = place.isel({dim: 0}, drop=True)
+        if dim not in path and bool(((place == first) | (place.isnull() & first.isnull())).all()):
+            place = first
+    return place
 
 
 def _add_ratios(dataset: xr.Dataset) -> xr.Dataset:
