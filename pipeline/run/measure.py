@@ -8,14 +8,17 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.plan.cost import features
+from pipeline.plan.recipe import half_width_of
 from pipeline.plan.steps import Solve
 from pipeline.run.record import Record
 from pipeline.shapes.body import Layered
 from pipeline.shapes.frame import Vector
+from pipeline.shapes.indenter import Indenter
 from pipeline.solve.error import is_graded
 from pipeline.solve.solution import Solution
 from pipeline.study.sweep import Case
 
+_ROUNDING = 1e-9
 TIMES = ("time_mesh", "time_assemble", "time_setup", "time_solve")
 
 
@@ -28,9 +31,9 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
     case = solve.case
     kind, planned_cells, poisson = features(solve)
     if solve.goal is not None and not solve.axisymmetric:
-        half_width = case.probe.half_width
-        graded = is_graded(case.mesh.rim_size(half_width) / half_width, case.mesh.growth)
-        solution = solution.extrapolated(case.mesh.degree, case.element, graded=graded, elsewhere=not case.is_plain)
+        solution = solution.extrapolated(
+            case.mesh.degree, case.element, graded=is_graded_to_contact(case), elsewhere=not case.is_plain
+        )
     # It was solved with the probe pressing along -z; the record is in the coordinates of the body.
     turn, force, bar = case.frame.turn, solution.reaction[2], solution.reaction_bars[2]
     return Record(
@@ -89,6 +92,14 @@ def _known_of(case: Case, solution: Solution) -> Vector:
     if not case.is_closed or case.probe.contact != "bonded":
         return x, y, z
     return x and nan, y and nan, z
+
+
+def is_graded_to_contact(case: Case) -> bool:
+    """Tell whether the mesh of ``case`` is graded to where contact ends, or is expected to."""
+    rim = case.mesh.rim_size(case.probe.half_width) / half_width_of(case)
+    # The coarsest recipe is that of the limit itself, in the same units: no rounding may put it beyond.
+    rim *= 1 - _ROUNDING if isinstance(case.probe, Indenter) else 1.0
+    return is_graded(rim, case.mesh.growth)
 
 
 def _front_length(case: Case) -> float:

@@ -36,8 +36,10 @@ _LIMITS_ELSEWHERE = {"displacement": (0.4, 0.4), "mixed": (0.5, 0.9)}
 # The energy that a slit's front releases is at that of degree p + 1, less (centre ± spread) θ times what that changed.
 _RELEASE = (0.45, 0.9)
 # Found contact: |F_2 - F_exact| in units of what degree 3 takes away, and of N; and what is left, in bars, once F_2 is
-# corrected by half of it: on graded meshes of plain bodies, and elsewhere.
-_FOUND, _FOUND_UNSEEN, _FOUND_SPREAD = 1.6, 1.4, (0.4, 0.6)
+# corrected by half of it: on meshes graded to where contact is expected to end, of plain bodies and of others, and on
+# meshes that are not.
+_FOUND, _FOUND_UNSEEN = 1.6, 1.4
+_FOUND_SPREAD, _FOUND_SPREAD_ELSEWHERE, _FOUND_SPREAD_COARSE = 0.4, 0.5, 0.8
 # Graded to the edge: the coarsest that was measured, relative to the probe's half width, and the growth from there.
 _GRADED = (0.4, 0.7)
 
@@ -114,13 +116,15 @@ def found_bar(decrement: float, unseen: float = 0.0) -> float:
 
 
 def extrapolate_found(
-    stiffness: FloatArray, decrements: FloatArray, bars: FloatArray, *, usual: bool = True
+    stiffness: FloatArray, decrements: FloatArray, bars: FloatArray, *, graded: bool = True, elsewhere: bool = False
 ) -> tuple[FloatArray, FloatArray]:
     """Return what F / d (1, 1) of found contact tends to, and the bar on it: F_2 is too large by half a bar or so.
 
-    ``usual`` tells that the mesh is graded, and the body of one material with a plane surface.
+    ``graded`` tells that the mesh is, to where contact is expected to end, ``elsewhere`` that this may not be all that
+    F errs by.
     """
-    return stiffness - _FOUND / 2 * decrements, _FOUND_SPREAD[0 if usual else 1] * bars
+    spread = _FOUND_SPREAD_ELSEWHERE if elsewhere else _FOUND_SPREAD
+    return stiffness - _FOUND / 2 * decrements, (spread if graded else _FOUND_SPREAD_COARSE) * bars
 
 
 def _theta(degree: int) -> float:

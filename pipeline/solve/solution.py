@@ -179,8 +179,9 @@ class Solution:
         if self.decrements is None or self.bars is None:
             return self
         if self.stored is not None:
-            usual = graded and not elsewhere
-            stiffness, bars = extrapolate_found(self.stiffness, self.decrements, self.bars, usual=usual)
+            stiffness, bars = extrapolate_found(
+                self.stiffness, self.decrements, self.bars, graded=graded, elsewhere=elsewhere
+            )
             return replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
         stiffness, bars = extrapolate(
             self.stiffness, self.decrements, self.bars, degree, element, plain=self.plain, graded=graded,

@@ -13,6 +13,7 @@ from pipeline.plan.plan import make_plan
 from pipeline.run.execute import compute
 from pipeline.run.meshing import on_first_rank
 from pipeline.run.problem import conditions_of
+from pipeline.run.record import Record
 from pipeline.scene.model import FIXED, FREE, PROBE, SLIT
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.displacement import DisplacementProblem
@@ -50,6 +51,8 @@ def slit_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
         )  # fmt: skip
     for nu in () if quick else (0.3, 0.5):
         yield _change_of_energy(comm, nu)
+    if not quick:
+        yield _pushed_on(comm, 0.3)
 
 
 def strip(comm: MPI.Comm, degree: int) -> tuple[float, float]:
@@ -79,24 +82,41 @@ def strip(comm: MPI.Comm, degree: int) -> tuple[float, float]:
 
 def _change_of_energy(comm: MPI.Comm, nu: float) -> Row:
     """Fronts a little deeper and less deep below the same blade tell what is released between."""
-    records = []
-    for step in (-_STEP, 0.0, _STEP):
-        scene: dict[str, Section] = {
-            "body": {"shape": "box", "size": ["20 mm", "20 mm", "12 mm"], "fixed": "bottom"},
-            "material": {"young": "10 kPa", "poisson": nu},
-            "probe": {
-                "action": "cut", "shape": "blade", "length": "6 mm", "width": "1 mm", "depth": "0.1 mm", "ends": "open",
-                "incision": f"{4 + step} mm", "ahead": f"{1 + step} mm",
-            },
-            "mesh": {"accuracy": "0.3 %"},
-            "solve": {"exact": False},
-        }  # fmt: skip
-        (record,) = compute(make_plan(parse(scene)), comm).values()
-        records.append(record)
+    records = [_blade(comm, nu, "bonded", 4 + step, 1 + step, "0.3 %") for step in (-_STEP, 0.0, _STEP)]
     before, here, after = records
     slope = (before.energy - after.energy) / (2e-3 * _STEP * 20e-3)
-    message = next((record.message for record in records if record.message), "")
     return Row(
         f"open slit, ν = {nu:g}: energy release", "3D", slope, "-dU/dA of two depths", here.energy_release,
-        here.energy_release_error, _LEFT, message,
+        here.energy_release_error, _LEFT, _message(records),
     )  # fmt: skip
+
+
+def _pushed_on(comm: MPI.Comm, nu: float) -> Row:
+    """Blades that tissue slides along, a little deeper and less deep above the same front, tell what pushing takes."""
+    records = [_blade(comm, nu, "frictionless", 4.0, 1 + step, "1 %") for step in (-_STEP, 0.0, _STEP)]
+    deeper, here, less_deep = records
+    slope = (deeper.energy - less_deep.energy) / (2e-3 * _STEP)
+    return Row(
+        f"open slit, faces slide, ν = {nu:g}: force", "3D", slope, "dU/ds of two depths of the blade", here.force,
+        here.force_error, _LEFT, _message(records),
+    )  # fmt: skip
+
+
+def _blade(comm: MPI.Comm, nu: float, contact: str, incision: float, ahead: float, accuracy: str) -> Record:
+    """Solve an open slit, of which ``incision`` and ``ahead`` are in mm."""
+    scene: dict[str, Section] = {
+        "body": {"shape": "box", "size": ["20 mm", "20 mm", "12 mm"], "fixed": "bottom"},
+        "material": {"young": "10 kPa", "poisson": nu},
+        "probe": {
+            "action": "cut", "shape": "blade", "length": "6 mm", "width": "1 mm", "depth": "0.1 mm", "ends": "open",
+            "incision": f"{incision} mm", "ahead": f"{ahead} mm", "contact": contact,
+        },
+        "mesh": {"accuracy": accuracy},
+        "solve": {"exact": False},
+    }  # fmt: skip
+    (record,) = compute(make_plan(parse(scene)), comm).values()
+    return record
+
+
+def _message(records: list[Record]) -> str:
+    return next((record.message for record in records if record.message), "")

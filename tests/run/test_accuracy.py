@@ -1,12 +1,16 @@
 """Accuracy asked for, and F_exact: reached, proved by the truth, and shared wherever F is proportional."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from pipeline.plan.plan import make_plan
+from pipeline.plan.recipe import meshes_for
 from pipeline.report.dataset import build
 from pipeline.run.execute import compute
+from pipeline.run.measure import is_graded_to_contact
 from pipeline.study.load import parse
 from pipeline.verify import known
 from tests.cases import BLADE, raw
@@ -111,3 +115,13 @@ def test_slice_across_a_plane_of_symmetry_takes_no_force_along_the_axis():
 
     assert references() == 1
     assert references(at=["2 mm", "3 mm"]) == 2
+
+
+@pytest.mark.parametrize("depth", [0.03, 0.1, 0.17, 0.31])
+def test_meshes_for_found_contact_are_graded_to_where_it_ends(depth):
+    """The coarsest is at the limit of what is, whatever rounding does; one as coarse beside the footprint is not."""
+    ball = {"shape": "sphere", "radius": "9 mm", "depth": f"{depth} mm"}
+    case = parse({**raw(probe=ball), "mesh": {"accuracy": "2 %"}}).case(())
+    assert all(is_graded_to_contact(replace(case, mesh=mesh)) for mesh in meshes_for(case, 0.02))
+    coarse = case.mesh.model_copy(update={"rim": 0.39 * case.probe.half_width, "growth": 0.5})
+    assert not is_graded_to_contact(replace(case, mesh=coarse))
