@@ -162,7 +162,10 @@ class StepRunner:
             return record
         told = self._afresh(replace(solve, mirrors=model_planes(solve.case)), memory, Bar.IF_ROOM)
         seconds = told.time_total + told.time_error
-        return replace(record, force_error=told.force_error, time_error=seconds, message=told.message)
+        return replace(
+            record, force_error=told.force_error, load_force_error=told.load_force_error, time_error=seconds,
+            message=told.message,
+        )  # fmt: skip
 
     def _afresh(self, solve: Solve, memory: PeakMemory, bar: Bar) -> Record:
         """Compute one case, mesh and all; collective."""

@@ -31,14 +31,7 @@ def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
             problems.error(axis.path, None, "its sweep needs a name: give its table one")
     if not acting:
         return
-    for probe in probes:
-        _check_probe(probe, problems)
-    for mesh in meshes:
-        if mesh.outside != "coarse" and isfinite(mesh.epsilon):
-            problems.error(
-                "mesh.outside", mesh.outside, "loads act on the whole body, and a part of it would carry others: "
-                'use outside = "coarse"',
-            )  # fmt: skip
+    _check_combinations(probes, meshes, materials, problems)
     if any(any(load.gravity) for load in acting):
         for body, material in product(bodies, materials):
             _check_densities(body, material, problems)
@@ -47,6 +40,24 @@ def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
             if _check_place(body, traction, f"load.traction[{number}].on", problems) and isinstance(traction.on, Cap):
                 for probe in probes:
                     _check_beside(body, probe, traction.on, f"load.traction[{number}].on", problems)
+
+
+def _check_combinations(
+    probes: Sequence[Probe], meshes: Sequence[Mesh], materials: Sequence[Material], problems: Problems
+) -> None:
+    """Report what is not computed together with loads."""
+    for probe in probes:
+        _check_probe(probe, problems)
+    for mesh in meshes:
+        if mesh.outside != "coarse" and isfinite(mesh.epsilon):
+            problems.error(
+                "mesh.outside", mesh.outside, "loads act on the whole body, and a part of it would carry others: "
+                'use outside = "coarse"',
+            )  # fmt: skip
+    for material in materials:
+        # A law that is not linear takes loads and depth in steps, and nothing of it adds up.
+        if (law := getattr(material, "law", "linear")) != "linear":
+            problems.error("material.law", law, 'loads are computed with law = "linear" only: leave [load] out')
 
 
 def _makes_sense(load: Load, problems: Problems) -> bool:

@@ -12,6 +12,7 @@ from tests.cases import BLADE, raw, study
 DOWN = ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]
 CAP = {"around": ["9 mm", "0 mm", "0 mm"], "radius": "3 mm"}
 PULL = {"on": CAP, "traction": ["1 kPa", "0 Pa", "0 Pa"]}
+AIR = {"on": "sides", "pressure": "1 kPa"}
 HEAVY = {"young": "10 kPa", "poisson": 0.3, "density": "1060 kg/m^3"}
 SKIN = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.3}
 
@@ -113,3 +114,10 @@ def test_what_loads_do_is_not_scaled_and_f_exact_is_that_without_loads():
 def test_a_traction_is_swept_by_its_name():
     swept = study(load={"traction": [{"name": "air", "on": "top", "pressure": ["1 kPa", "2 kPa"]}]})
     assert [axis.name for axis in swept.axes] == ["air_pressure"]
+
+
+def test_places_on_either_side_are_no_images_where_loads_act():
+    line = {"line": {"from": ["-8 mm", "0 mm"], "to": ["8 mm", "0 mm"], "steps": 3}}
+    probe = {"shape": "disc", "radius": "3 mm", "depth": "0.2 mm", "path": line}
+    loaded, plain = (make_plan(study(probe=probe, **load)) for load in ({"load": {"traction": [AIR]}}, {}))
+    assert [len(set(plan.keys)) for plan in (loaded, plain)] == [3, 2]
