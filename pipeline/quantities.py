@@ -55,6 +55,7 @@ _SCENE = (
     Quantity("density", "kg/m^3", "density", "ρ", "density ρ"),
     Quantity("gravity", "", "acceleration of gravity"),
     Quantity("load", "", "loads"),
+    Quantity("law", "", "law of the material"),
     Quantity("probe", "", "probe"),
     Quantity("body", "", "body"),
     Quantity("path", "m", "length along the path of the probe, as it is given", axis="length along the path"),
@@ -126,6 +127,7 @@ _RESULTS = (
     Quantity("load_energy", "J", "strain energy of the loads while the probe is held; energy is what the depth adds"),
     Quantity("sag", "m", "how far along its axis loads take a probe that is free to follow: the depth, from the "
              "unloaded surface, at which it bears no force", "sag", "sag of the surface under the probe"),
+    Quantity("linear_ratio", "1", "force over that of linear elasticity in the same study", "F/F_linear"),
     Quantity("max_strain", "1", "largest principal strain of a cell's mean strain, a tenth of the probe's half width "
              "or farther from its edge and from those of what is held",
              "largest strain", in_per_cent=True),

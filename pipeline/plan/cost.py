@@ -107,7 +107,7 @@ def features(solve: Solve) -> tuple[str, float, float]:
         return _FOUND if case.probe.is_unilateral else "meridian", 1.0, 0.0
     movements = "" if case.movements == 1 else f" {case.movements}"
     return (
-        f"{case.element} {case.mesh.degree}{movements}",
+        f"{case.material.law if case.material.is_large else case.element} {case.mesh.degree}{movements}",
         estimate.cells(case) * 0.5 ** len(solve.mirrors),
         _poisson(case),
     )

@@ -31,6 +31,7 @@ _LATER: dict[str, Any] = {
     "ahead": None,
     "ends": "blade",
     "depth_range": None,
+    "law": "linear",
 }
 # What a body may hold of other materials.
 _PIECES = ("layers", "inclusion")
@@ -47,7 +48,7 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
         str(PHYSICS_VERSION),
         _body_text(case.body, case.scale.stress if scaled else 1.0),
         text_of(case.material, ("density", *(case.material.PROPORTIONAL_TO if scaled else ()))),
-        text_of(case.probe, case.probe.proportional_to if scaled else ()),
+        text_of(case.probe, case.moves_in_proportion if scaled else ()),
         _ratios_text(case.probe) if scaled else "",
         _mesh_text(case.mesh, folded and case.is_full, case.probe.half_width, case.element),
         text_of(case.solve, ("timing", "repeats", "exact")),
@@ -79,9 +80,12 @@ def mesh_key(case: Case) -> str:
 
 
 def operator_key(case: Case) -> str:
-    """Key of the case's spaces and conditions on its mesh: all but the material, and the depth if contact is found."""
+    """Key of the case's spaces and conditions on its mesh: all but the material's moduli, and the depth if contact is
+    found.
+    """
     probe = text_of(case.probe, ("depth",) if case.probe.is_unilateral else ())
-    return digest("\n".join([mesh_key(case), probe, str(case.mesh.degree), case.element]))
+    law = [case.material.law] if case.material.is_large else []
+    return digest("\n".join([mesh_key(case), probe, str(case.mesh.degree), case.element, *law]))
 
 
 def normalised(case: Case) -> Case:

@@ -19,6 +19,9 @@ __all__ = ["EXACT", "Plan", "Struck", "ask_for_exact", "declare", "first_attempt
 EXACT, _EXACT_SHARE = 1e-3, 0.3
 # Three times the cells, and ten times the time, is what a thousandth takes at the many edges of a slit.
 EXACT_OF_SLIT = 3e-3
+_NO_EXACT = (
+    "F_exact of neo-Hookean bodies is not computed: what their elements converge to is known to their bars only."
+)
 _LOST = "Where the tool does not stand on the body, nothing is solved."
 
 
@@ -71,16 +74,23 @@ def first_attempts(plan: Plan) -> Plan:
 
 
 def ask_for_exact(plan: Plan) -> Plan:
-    """Add F_exact of every scene, once for all meshes, Young's moduli and depths: F is proportional to both."""
+    """Add F_exact of every scene, once for all meshes, Young's moduli and depths: F is proportional to both.
+
+    There is none of neo-Hookean bodies.
+    """
     plan = first_attempts(plan)
     if not plan.study.solve.exact:
         return plan
     accuracy = min([EXACT, *(solve.goal * _EXACT_SHARE for solve in plan.solves if solve.goal)])
     found: dict[str, Solve] = {}
-    keys = []
+    keys, large = [], 0
     for case in plan.study.cases():
         if case.absence:
             keys.append(ABSENT)
+            continue
+        if case.material.is_large:
+            keys.append(ABSENT)
+            large += 1
             continue
         if image := plan.images.get(case.index):
             case = plan.study.case(image.of)  # noqa: PLW2901
@@ -89,6 +99,9 @@ def ask_for_exact(plan: Plan) -> Plan:
         keys.append(key)
         if key not in found:
             found[key] = _reference(key, case, enough)
+    plan = plan.struck_by("exact", large, _NO_EXACT)
+    if large == len(keys):
+        return plan
     return replace(plan, solves=(*plan.solves, *found.values()), reference_keys=tuple(keys))
 
 

@@ -23,6 +23,11 @@ _LONE_DEPTHS = (
     "No start from neighbouring depths: each depth of this tool has a mesh of its own; probe.depth_range makes it one "
     "for all."
 )
+_LARGE = (
+    "F is proportional to Young's modulus, and to the depth unless the body is neo-Hookean: cases that differ in them "
+    "only are solved once."
+)
+_NOT_ADDED = "No reduced basis: large displacements are not sums of others, and each Poisson's ratio is solved."
 _SEVERAL_MATERIALS = "No reduced basis: a body of several materials has more parameters than one, and each is solved."
 
 
@@ -39,6 +44,7 @@ def strike_duplicates(plan: Plan) -> Plan:
 def strike_scaled(plan: Plan) -> Plan:
     """F is proportional to Young's modulus and to the depth: cases that differ in them only are solved once."""
     reason = "" if all(solve.case.probe.proportional_to for solve in plan.solves) else _OF_STRESS_ALONE
+    reason = _LARGE if any(solve.case.material.is_large for solve in plan.solves) else reason
     return _rekeyed(plan, "scaling", strike_scaled, lambda case: case_key(case, folded=True, scaled=True), reason)
 
 
@@ -133,6 +139,8 @@ def use_reduced_basis(plan: Plan) -> Plan:
         return replace(plan, struck=(*plan.struck, Struck("reduced", 0, _FOUND_CONTACT)))
     if not many and any(_suits_a_basis(operator, closed=True) for operator in operators):
         return replace(plan, struck=(*plan.struck, Struck("reduced", 0, _CLOSED)))
+    if not many and any(_suits_a_basis(operator, large=True) for operator in operators):
+        return replace(plan, struck=(*plan.struck, Struck("reduced", 0, _NOT_ADDED)))
     return plan.struck_by("reduced", len(many), _reason(use_reduced_basis))
 
 
@@ -194,6 +202,8 @@ def _mirrored(solve: Solve) -> Solve:
 
 def _fresh(operator: OperatorStep) -> int:
     """Return how many solves of an operator have no neighbour to begin from."""
+    if operator.case.material.is_large:
+        return len(operator.solves)
     return len(operator.sweeps) if operator.case.probe.is_unilateral else 1
 
 
@@ -222,17 +232,19 @@ def _is_small(step: MeshStep) -> bool:
 
 
 def _suits_a_basis(
-    operator: OperatorStep, *, of_regions: bool = False, found: bool = False, closed: bool = False
+    operator: OperatorStep, *, of_regions: bool = False, found: bool = False, closed: bool = False, large: bool = False
 ) -> bool:
     """Displacement elements depend on one parameter; and the bound is on the work of one movement, not on forces that
     several take. ``of_regions`` asks of bodies of several materials, whose parameters are too many, ``found`` of
-    contact whose area changes with that parameter, ``closed`` of what is prescribed on a cut face and changes with it.
-    In a slit more is asked for than the work.
+    contact whose area changes with that parameter, ``closed`` of what is prescribed on a cut face and changes with it,
+    ``large`` of large displacements, which are not the sum of any others. In a slit more is asked for than the work.
     """
     first = operator.solves[0]
     if first.case.load.acts:
         return False
     if bool(first.case.body.regions) != of_regions or first.case.probe.is_unilateral != found:
+        return False
+    if first.case.material.is_large != large:
         return False
     values = {solve.key if of_regions else solve.case.material.poisson for solve in operator.solves}
     plain = first.goal is None and not first.axisymmetric and first.case.element == "displacement"
@@ -248,9 +260,9 @@ def _suits_a_basis(
 def _asks_for_accuracy_or_truncation(plan: Plan) -> bool:
     """Tell whether a study varies scenes and truncation, but not the mesh: sizes, elements, or ε with all outside.
 
-    Half balls are solved in three dimensions, and what they are compared with, too.
+    Half balls and neo-Hookean bodies are solved in three dimensions, and what they are compared with, too.
     """
-    if any(solve.case.is_closed for solve in plan.solves):
+    if any(solve.case.is_closed or solve.case.material.is_large for solve in plan.solves):
         return False
     swept = {axis.key for axis in plan.study.axes if axis.section == "mesh"}
     if swept - {"epsilon", "outside", "accuracy"}:

@@ -32,10 +32,13 @@ def model_planes(case: Case) -> tuple[str, ...]:
 
 
 def is_round(case: Case) -> bool:
-    """Tell whether body, support and probe are the same all round one axis, movement along it, no loads."""
+    """Tell whether body, support and probe are the same all round one axis, movement along it, no loads.
+
+    None is at large displacements: there are no elements for them on the meridian.
+    """
     body, probe, frame = case.body, case.probe, case.frame
     half_plane = body.half_plane()
-    if probe.motion == "all" or half_plane is None or case.is_closed or case.load.acts:
+    if half_plane is None or probe.motion == "all" or case.is_closed or case.load.acts or case.material.is_large:
         return False
     upright = frame.is_upright and frame.point[:2] == _ON_AXIS and case.travel[:2] == _ON_AXIS
     is_same = probe.is_round and is_body_round(body)

@@ -157,6 +157,8 @@ def _add_ratios(dataset: xr.Dataset) -> xr.Dataset:
         ratios["energy_release_ratio"] = _over_full_order(dataset["energy_release"], dataset)
     if "load_force" in dataset:
         ratios["load_force_ratio"] = _over_full_order(dataset["load_force"], dataset)
+    if "law" in dataset.dims and "linear" in dataset["law"].values:
+        ratios["linear_ratio"] = force / force.sel(law="linear", drop=True)
     return dataset.assign(
         {name: values.transpose(*order).assign_attrs(attributes(name)) for name, values in ratios.items()}
     )

@@ -8,6 +8,7 @@ from pipeline.plan.steps import Solve
 from pipeline.solve.axisymmetric import compile_axisymmetric
 from pipeline.solve.cache import compiling
 from pipeline.solve.forms import compile_elastic
+from pipeline.solve.large.forms import compile_neo_hookean
 from pipeline.solve.meridian_contact import TRIAL_DEGREE
 from pipeline.solve.mixed_forms import compile_mixed
 from pipeline.solve.regular import compile_regular
@@ -18,6 +19,7 @@ from pipeline.stages import stage
 
 # What the regular part of a Green's function takes, whatever the elements of the case.
 _REGULAR = "regular", 0, False, False
+_LARGE = "neo-hookean"
 # What this process has seen to.
 _compiled: set[tuple[str, int, bool, bool]] = set()
 
@@ -43,6 +45,8 @@ def _forms(solve: Solve) -> tuple[str, int, bool, bool]:
         half_plane = body.half_plane()
         kind = "elliptic" if half_plane and half_plane.is_curved else "axisymmetric"
         return kind, TRIAL_DEGREE if solve.case.probe.is_unilateral else 0, False, False
+    if solve.case.material.is_large:
+        return _LARGE, mesh.degree, False, False
     return solve.case.element, mesh.degree, bool(body.regions), solve.case.probe.slit is not None
 
 
@@ -58,5 +62,7 @@ def _compile(element: str, degree: int, *, of_regions: bool, of_slit: bool) -> N
     compile_elastic(degree, straight=degree == 1, of_regions=of_regions)
     if element == "mixed":
         compile_mixed(degree)
+    if element == _LARGE:
+        compile_neo_hookean(degree, straight=degree == 1)
     if of_slit:
         compile_release(degree, mixed=element == "mixed", of_regions=of_regions)

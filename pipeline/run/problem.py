@@ -16,6 +16,8 @@ from pipeline.solve.conditions import Conditions
 from pipeline.solve.contact.problem import DEGREE, ContactProblem, Tool
 from pipeline.solve.contact.sets import ContactError
 from pipeline.solve.displacement import DisplacementProblem
+from pipeline.solve.large.newton import LargeError
+from pipeline.solve.large.problem import LargeProblem
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
@@ -51,6 +53,8 @@ def problem_of(
         if case.mesh.degree != DEGREE:
             raise CaseFailure(f"unilateral contact is found by elements of degree {DEGREE}, not {case.mesh.degree}")
         return ContactProblem(spaces, tool_of(case), case.element, reuse=reuse, condense=condense)
+    if case.material.is_large:
+        return LargeProblem(spaces, case.mesh.degree, conditions_of(case))
     if case.element == "mixed":
         return MixedProblem(spaces, case.mesh.degree, conditions_of(case))
     return DisplacementProblem(spaces, case.mesh.degree, conditions_of(case), shared=shared, reuse=reuse)
@@ -160,7 +164,7 @@ def solve_problem(case: Case, problem: Problem, *, estimate: bool) -> Solution:
     method, tolerance = case.solve.method, case.solve.tolerance
     try:
         solution = problem.solve(law, loads, method=method, tolerance=tolerance, estimate=estimate)
-    except ContactError:
+    except (ContactError, LargeError):
         raise
     except SolveError:
         if method != "auto" or not 0 < problem.dofs <= _MOST_DIRECT:

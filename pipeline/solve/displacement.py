@@ -13,7 +13,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from petsc4py import PETSc
@@ -60,7 +60,7 @@ class DisplacementProblem:
         self._fine = spaces.get(degree, conditions)
         self._strain = mean_strain_form(self._fine.dofs.space, self._fine.forms.displacement)
 
-    def __enter__(self) -> "DisplacementProblem":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -32,7 +32,12 @@ def largest_strain(mean_strain: tuple[Any, Any], body: BodyMesh, front: Front | 
 
     Nearer to an edge (:func:`pipeline.solve.rim.clear_cells`) it grows without end as elements there get smaller.
     """
+    return largest_of(principal_strains(mean_strain, body), body, front)
+
+
+def largest_of(principal: FloatArray, body: BodyMesh, front: Front | None = None) -> float:
+    """Return the largest of the ``principal`` strains (cells, 3), by magnitude, clear of singular edges; collective."""
     if body.mesh not in _clear:
         _clear[body.mesh] = clear_cells(body, front)
-    local = float(np.abs(principal_strains(mean_strain, body)[_clear[body.mesh]]).max(initial=0.0))
+    local = float(np.abs(principal[_clear[body.mesh]]).max(initial=0.0))
     return float(body.comm.allreduce(local, op=MPI.MAX))

@@ -15,6 +15,7 @@ from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe, is_direction
 from pipeline.shapes.section import Section, in_mm
 from pipeline.study.closure import check_closure, check_far_field
+from pipeline.study.large import check_large
 from pipeline.study.place import held_gap, place_error
 from pipeline.study.problems import Problems
 from pipeline.study.regions import tissues_of
@@ -41,8 +42,10 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         if isinstance(body, FromFile):
             for notice in body.notices:
                 problems.warn("body.file", body.file, notice)
-    for probe in probes:
+    linear = [material for material in materials if not material.is_large]
+    for probe in probes if linear else ():
         _check_depth(probe, problems)
+    for probe in probes:
         _check_motion(probe, problems)
         probe.check(problems)
     for mesh in meshes:
@@ -64,7 +67,8 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         _check_gap(body, probe, mesh, problems)
         _check_straight(body, probe, mesh, problems)
         check_slit_in(body, probe, mesh, problems)
-    for body, material, mesh in itertools.product(bodies, materials, meshes):
+    check_large(bodies, materials, probes, meshes, problems)
+    for body, material, mesh in itertools.product(bodies, linear, meshes):
         _check_locking(dict(tissues_of(body, material)), mesh, problems)
         check_far_field(material, mesh, problems)
     _check_reference(meshes, axes, problems)
@@ -82,8 +86,9 @@ def _check_depth(probe: Probe, problems: Problems) -> None:
         problems.warn(
             "probe.depth",
             in_mm(probe.depth),
-            f"is more than {_LINEAR:.0%} of the probe's half width {in_mm(probe.half_width)}: linear elasticity is "
-            f"then an extrapolation ({proportional})",
+            f"is {probe.depth / probe.half_width:.0%} of the probe's half width {in_mm(probe.half_width)}: above "
+            f"{_LINEAR:.0%}, where F of a neo-Hookean body is about 1 % less, linear elasticity is an extrapolation "
+            f"({proportional})",
         )
 
 

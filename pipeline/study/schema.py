@@ -21,7 +21,7 @@ from pipeline.units import Length, Pressure, Share, parse_quantity
 
 
 class Material(Tissue):
-    """Isotropic linear elasticity."""
+    """Isotropic elasticity, linear or, at large displacements, neo-Hookean."""
 
     young: Annotated[Pressure, Words("Young's modulus. F is proportional to it.", '"10 kPa"', is_used=True)]
     poisson: Annotated[
@@ -34,8 +34,25 @@ class Material(Tissue):
         ),
     ]
 
+    law: Annotated[
+        Literal["linear", "neo-hookean"],
+        Words(
+            "Linear elasticity, or a compressible neo-Hookean body at large displacements, the same at small depths: "
+            "for bonded probes that press, one material, and Poisson's ratios from 0.2 to 0.45.",
+            '["linear", "neo-hookean"]',
+        ),
+    ] = "linear"
+
     # Keys that F is proportional to, if all of them change together.
     PROPORTIONAL_TO: ClassVar[tuple[str, ...]] = ("young",)
+    # Poisson's ratios of neo-Hookean bodies. Below the first, tissue at the probe's edge gives way, and F hangs on the
+    # elements there (docs/accuracy.md); the elements are of displacements alone, and lock above the second.
+    OF_LARGE: ClassVar[tuple[float, float]] = (0.2, 0.45)
+
+    @property
+    def is_large(self) -> bool:
+        """Whether displacements are taken to be large: F is then not proportional to the depth."""
+        return self.law != "linear"
 
 
 def material_of(tissue: Tissue) -> Material:

@@ -142,12 +142,17 @@ class Case:
         if self.load.acts:
             return ()
         first = ("young of all materials together",) if self.body.regions else self.material.PROPORTIONAL_TO
-        return *first, *self.probe.proportional_to
+        return *first, *self.moves_in_proportion
+
+    @property
+    def moves_in_proportion(self) -> tuple[str, ...]:
+        """The keys of the probe that F is proportional to: none where displacements are large."""
+        return () if self.material.is_large else self.probe.proportional_to
 
     @property
     def scale(self) -> Scale:
         """The units in which its results do not depend on what they are proportional to."""
-        return Scale(self.material.young, self.probe.scale)
+        return Scale(self.material.young, self.probe.scale if self.moves_in_proportion else 1.0)
 
     @property
     def is_plain(self) -> bool:
@@ -185,7 +190,7 @@ class Case:
     @property
     def element(self) -> str:
         """The element that solves it: displacement or mixed."""
-        return self.mesh.element_for(self.poisson)
+        return "displacement" if self.material.is_large else self.mesh.element_for(self.poisson)
 
     def __str__(self) -> str:
         return ", ".join(f"{name} = {text}" for name, text in self.words.items()) or "the one case"

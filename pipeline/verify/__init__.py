@@ -18,6 +18,7 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     from pipeline.verify.contact import contact_rows  # noqa: PLC0415
     from pipeline.verify.elements import element_rows  # noqa: PLC0415
     from pipeline.verify.forces import scene_rows  # noqa: PLC0415
+    from pipeline.verify.large import large_rows  # noqa: PLC0415
     from pipeline.verify.loads import load_rows  # noqa: PLC0415
     from pipeline.verify.regions import region_rows  # noqa: PLC0415
     from pipeline.verify.slits import slit_rows  # noqa: PLC0415
@@ -37,3 +38,4 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     yield from slit_rows(comm, quick=quick)
     yield from closure_rows(comm, quick=quick)
     yield from load_rows(comm, quick=quick)
+    yield from large_rows(comm, quick=quick)

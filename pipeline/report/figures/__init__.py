@@ -14,6 +14,7 @@ from pipeline.report.figures.convergence import convergence
 from pipeline.report.figures.epsilon import epsilon, ratio, speedup
 from pipeline.report.figures.exact import exact
 from pipeline.report.figures.force import force, nothing
+from pipeline.report.figures.linear import linear
 from pipeline.report.figures.map import force_map
 from pipeline.report.figures.style import STYLE, save
 
@@ -21,7 +22,7 @@ __all__ = ["FIGURES", "KINDS", "STYLE", "choose", "draw", "figure", "lacks", "sa
 
 FIGURES: dict[str, Callable[[xr.Dataset, str, str], Figure]] = {
     "epsilon": epsilon, "exact": exact, "convergence": convergence, "accuracy": accuracy, "map": force_map,
-    "force": force, "compliance": compliance, "nothing": nothing, "ratio": ratio, "speedup": speedup,
+    "force": force, "compliance": compliance, "linear": linear, "nothing": nothing, "ratio": ratio, "speedup": speedup,
 }  # fmt: skip
 
 

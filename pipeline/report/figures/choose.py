@@ -7,7 +7,10 @@ from pipeline.report.compliance import tool_dimension
 from pipeline.report.figures.dimensions import mesh_dimensions, refinements
 
 # What can be drawn on request: the last two are parts of "epsilon".
-KINDS = ("epsilon", "exact", "convergence", "accuracy", "map", "force", "compliance", "nothing", "ratio", "speedup")
+KINDS = (
+    "epsilon", "exact", "convergence", "accuracy", "map", "force", "compliance", "linear", "nothing", "ratio",
+    "speedup",
+)  # fmt: skip
 
 
 def choose(dataset: xr.Dataset) -> list[str]:
@@ -15,6 +18,8 @@ def choose(dataset: xr.Dataset) -> list[str]:
     if not _known(dataset, "force"):
         return ["nothing"]
     kinds = []
+    if dataset.sizes.get("depth", 0) > 1 and _known(dataset, "linear_ratio"):
+        kinds.append("linear")
     if dataset.sizes.get("epsilon", 0) > 1 and _known(dataset, "force_ratio"):
         kinds.append("epsilon")
     has_exact = _known(dataset, "accuracy")
@@ -46,6 +51,7 @@ def lacks(dataset: xr.Dataset, kind: str) -> str:
         "accuracy": "swept meshes, and F_exact or F_max",
         "compliance": "several tools and ε, the full order among them, in scenes whose compliances add",
         "map": "a raster of places ([probe.path])",
+        "linear": "several depths, and both laws of the material",
         "force": "a case that has a force",
         "nothing": "that no case has a force",
     }

@@ -1,0 +1,1 @@
+"""Large displacements: neo-Hookean bodies, by Newton's method over load steps."""

@@ -1,0 +1,196 @@
+"""Newton's method for the equilibrium of a neo-Hookean body whose prescribed displacements are in place.
+
+PETSc's SNES with a line search; the linear systems by conjugate gradients, preconditioned by the multigrid of linear
+elasticity, which is set up once: the tangent differs from it by what strain makes of the stiffness.
+"""
+
+import itertools
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+from dolfinx.fem import petsc as fem_petsc
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from pipeline import compat
+from pipeline.solve.large.forms import NeoHookeanForms
+from pipeline.solve.linear import LinearSolver, SolveError, explain
+from pipeline.solve.spaces import ElasticSpace
+from pipeline.solve.vectors import add_from_ghosts, fill, vector
+from pipeline.stages import stage
+
+# Each linear system's error, relative, in the energy norm: Newton's method gains three digits a step.
+_LINEAR, _MOST_LINEAR = 1e-4, 400
+# Residual that is left, relative to the forces on what is prescribed, and the most steps to get there.
+_LEFT, _MOST_STEPS = 1e-9, 25
+# A step that turns tissue inside out is halved, at most this often.
+_HALVINGS = 12
+# Of the gain that the slope promises, a step must bring so much.
+_GAIN = 1e-4
+
+_prefixes = itertools.count()
+
+
+class LargeError(SolveError):
+    """Newton's method does not get to where the probe is to be."""
+
+
+class Equilibrium:
+    """A neo-Hookean body in the spaces of linear elasticity, and Newton's method for it; ``close`` frees it."""
+
+    def __init__(self, space: ElasticSpace, forms: NeoHookeanForms, solver: LinearSolver):
+        """Set up; collective. ``solver`` is that of linear elasticity."""
+        self._space, self._forms, self._solver = space, forms, solver
+        self._held = space.dofs.prescribed_owned
+        self.tangent = fem_petsc.create_matrix(forms.tangent)
+        self.tangent.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        self.tangent.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
+        start = 3 * space.dofs.space.dofmap.index_map.local_range[0]
+        self._rows = (self._held + start).astype(PETSc.IntType)
+        self.iterations = 0
+
+    def close(self) -> None:
+        """Free the tangent."""
+        self.tangent.destroy()
+
+    def energy(self, displacement: PETSc.Vec) -> float:
+        """Return the stored energy (J) of the modelled part, not a number if tissue is inside out; collective."""
+        self._space.set_displacement(displacement)
+        return float(self._space.dofs.comm.allreduce(fem.assemble_scalar(self._forms.energy), op=MPI.SUM))
+
+    def forces(self, displacement: PETSc.Vec, result: PETSc.Vec) -> None:
+        """Write the nodal forces (N), on prescribed dofs, too, into ``result``; collective."""
+        self._space.set_displacement(displacement)
+        assemble(self._forms.residual, result)
+
+    @stage("tangent solves")
+    def move(self, displacement: PETSc.Vec, prescribed: PETSc.Vec, result: PETSc.Vec) -> None:
+        """Write the movement into ``result`` that a small one of the ``prescribed`` dofs makes; collective.
+
+        Raises:
+            LargeError: if the tangent is not definite: the tissue gives way.
+        """
+        with self._linear() as ksp, vector(self._space.dofs.space) as load:
+            self._assemble(displacement)
+            self.tangent.mult(prescribed, load)
+            load.scale(-1.0)
+            load.array[self._held] = prescribed.array[self._held]
+            self.tangent.zeroRowsColumns(self._rows, 1.0)
+            result.set(0.0)
+            ksp.setOperators(self.tangent)
+            self._checked(ksp, lambda: ksp.solve(load, result))
+            self.iterations += ksp.its
+
+    @stage("Newton's method")
+    def settle(self, displacement: PETSc.Vec, scale: float) -> int:
+        """Find the equilibrium from ``displacement``, its prescribed dofs fixed; return Newton's steps; collective.
+
+        ``scale`` (N) is the size of the forces on what is prescribed.
+
+        Raises:
+            LargeError: if there is none nearby.
+        """
+        snes = PETSc.SNES().create(self._space.dofs.comm)
+        with self._linear(snes.ksp), vector(self._space.dofs.space) as residual:
+            try:
+                snes.setType("newtonls")
+                snes.setFunction(self._function, residual)
+                snes.setJacobian(self._jacobian, self.tangent, self.tangent)
+                snes.setLineSearchPreCheck(self._shorten)
+                prefix = f"epsmesh_large{next(_prefixes)}_"
+                snes.setOptionsPrefix(prefix)
+                PETSc.Options()[prefix + "snes_linesearch_type"] = "basic"
+                snes.setFromOptions()
+                PETSc.Options().delValue(prefix + "snes_linesearch_type")
+                snes.setTolerances(rtol=0.0, atol=_LEFT * scale, stol=0.0, max_it=_MOST_STEPS)
+                self._checked(snes, lambda: snes.solve(None, displacement))
+                self.iterations += snes.getLinearSolveIterations()
+                return int(snes.getIterationNumber())
+            finally:
+                snes.destroy()
+
+    def _function(self, _: PETSc.SNES | None, displacement: PETSc.Vec, result: PETSc.Vec) -> None:
+        self._space.set_displacement(displacement)
+        assemble(self._forms.residual, result)
+        result.array[self._held] = 0.0
+
+    def _jacobian(self, _: PETSc.SNES, displacement: PETSc.Vec, tangent: PETSc.Mat, __: PETSc.Mat) -> None:
+        self._assemble(displacement)
+        tangent.zeroRowsColumns(self._rows, 1.0)
+
+    def _assemble(self, displacement: PETSc.Vec) -> None:
+        self._space.set_displacement(displacement)
+        compat.assemble_matrix(self._forms.tangent, [], 1.0, "aij", self.tangent)
+
+    def _shorten(self, here: PETSc.Vec, step: PETSc.Vec) -> bool:
+        """Halve a ``step`` (which is subtracted) until no tissue is inside out behind it, and less energy is stored.
+
+        Where rounding hides what is gained of that, the residual tells.
+        """
+        with vector(self._space.dofs.space) as there, vector(self._space.dofs.space) as residual:
+            stored = self.energy(here)
+            self._function(None, here, residual)
+            left, slope = residual.norm(), residual.dot(step)
+            for halvings in range(_HALVINGS):
+                there.array[:] = here.array - step.array
+                energy, share = self.energy(there), 0.5**halvings
+                if np.isfinite(energy):
+                    if energy <= stored - _GAIN * share * slope:
+                        return halvings > 0
+                    self._function(None, there, residual)
+                    if residual.norm() <= (1 - _GAIN * share) * left:
+                        return halvings > 0
+                step.scale(0.5)
+        return True
+
+    @contextmanager
+    def _linear(self, ksp: PETSc.KSP | None = None) -> Iterator[PETSc.KSP]:
+        own = ksp is None
+        ksp = ksp or PETSc.KSP().create(self._space.dofs.comm)
+        ksp.setType("cg")
+        ksp.setNormType(PETSc.KSP.NormType.NATURAL)
+        ksp.setTolerances(rtol=_LINEAR, atol=0.0, max_it=_MOST_LINEAR)
+        ksp.pc.setType("python")
+        ksp.pc.setPythonContext(_Preconditioner(self._solver))
+        try:
+            yield ksp
+        finally:
+            if own:
+                ksp.destroy()
+
+    @staticmethod
+    def _checked(solver: Any, solve: Any) -> None:
+        """Run a solver of PETSc, and see that it has converged."""
+        try:
+            solve()
+        except PETSc.Error as error:
+            raise LargeError(explain(error)) from error
+        if solver.getConvergedReason() <= 0:
+            raise LargeError(f"reason {solver.getConvergedReason()}")
+
+
+class _Preconditioner:
+    """The preconditioner of linear elasticity, as one of PETSc's own."""
+
+    def __init__(self, solver: LinearSolver):
+        self._solver = solver
+
+    def apply(self, _: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
+        self._solver.precondition(residual, result)
+
+
+def assemble(form: Any, result: PETSc.Vec) -> None:
+    """Assemble a linear form into ``result``, ghosts summed up; collective."""
+    with result.localForm() as local:
+        local.set(0.0)
+    fem_petsc.assemble_vector(result, form)
+    add_from_ghosts(result)
+
+
+def tangent_product(forms: NeoHookeanForms, x: PETSc.Vec, result: PETSc.Vec) -> None:
+    """Write K x into ``result``, of all dofs, with the tangent K at the forms' displacement; collective."""
+    fill(forms.direction, x)
+    assemble(forms.product, result)

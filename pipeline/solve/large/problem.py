@@ -1,0 +1,247 @@
+"""A neo-Hookean body that a bonded probe presses, by displacement elements, in steps of the depth.
+
+The force is the reaction: nodal forces on the probe's dofs, along the travel as the work that they do on it. It must
+be the derivative of the stored energy by the depth, whose integral over the steps is held against the energy itself.
+
+Its error bar is made as that of linear elasticity, by one degree more. With the residual r of the solution u there,
+and r' that of v = ∂u/∂d under the tangent K,
+
+    F_p - F_{p+1} = r'·K⁻¹ r,    of second order in what degree p + 1 changes.
+
+(r'·K⁻¹ r' · r·K⁻¹ r)^½ is at least that, and takes its place: it does not vanish by chance. For K stands the operator
+of linear elasticity: at moderate depths the result is the same to a few per cent, and at larger ones elements of one
+degree more give way at the probe's edge, where the tangent is not definite.
+"""
+
+import time
+from contextlib import ExitStack
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from pipeline.arrays import FloatArray
+from pipeline.solve.displacement import DisplacementProblem
+from pipeline.solve.enrich import energy_decrements
+from pipeline.solve.error import error_bar
+from pipeline.solve.large.forms import NeoHookeanForms
+from pipeline.solve.large.newton import Equilibrium, LargeError, assemble, tangent_product
+from pipeline.solve.linear import Level, LinearSolver, is_direct
+from pipeline.solve.loads import Loads
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.reaction import Response, reaction, sums
+from pipeline.solve.rim import plain_share
+from pipeline.solve.solution import BALANCE_LIMIT, TOLERANCE, Solution
+from pipeline.solve.strain import largest_of
+from pipeline.solve.vectors import vector
+from pipeline.stages import stage
+
+# The depth is reached in so many steps at least; smaller ones than this share of it are not tried.
+_FEWEST, _SMALLEST = 3, 1 / 50
+# A step that leaves less than this share of the way goes to its end.
+_SLIVER = 1e-6
+# Newton's steps that make a step of the depth one to lengthen the next of.
+_EASY = 4
+# Work and energy may differ by this share, and by what rounding makes of energies where strains are tiny. Where an
+# element at the edge folds between the points that it is integrated at, energy is lost that no work was done for.
+_WORK, _ROUNDING = 3e-4, 1e-13
+
+
+class LargeProblem(DisplacementProblem):
+    """The spaces of a mesh, a degree and conditions, for neo-Hookean bodies of one material; a context manager."""
+
+    def solve(
+        self, law: MaterialLaw, loads: Loads, *, method: str = "auto", tolerance: float = TOLERANCE,
+        estimate: bool = False,
+    ) -> Solution:  # fmt: skip
+        """Press to the depth of ``loads``, one translation, in steps, and return force, energy and checks; collective.
+
+        ``tolerance`` has no part in it: Newton's method ends where what it gains is rounding.
+
+        Raises:
+            LargeError: if Newton's method does not get there, or what it finds fails a check.
+        """
+        (motion,), (depth,) = loads.motions, loads.amounts
+        fine, held = self._fine, self._fine.dofs.held(motion)
+        self._forms = NeoHookeanForms(fine.dofs.space, fine.forms)
+        with ExitStack() as stack:
+            direct = is_direct(method, self.dofs, fine.degree)
+            levels, assembly = self._hierarchy(law, stack, direct=direct)
+            solver = LinearSolver(levels, direct=direct, tolerance=TOLERANCE)
+            stack.callback(solver.close)
+            start = time.perf_counter()
+            body = Equilibrium(fine, self._forms, solver)
+            stack.callback(body.close)
+            displacement, rate = (stack.enter_context(vector(fine.dofs.space)) for _ in range(2))
+            path = self._press(body, displacement, held, depth, law)
+            response = self._reaction_at(body, displacement, held, loads)
+            self._check(path, law)
+            fine.set_displacement(displacement)
+            seconds = time.perf_counter() - start
+            whole = 2.0 ** len(self._body.mirrored)
+            solution = Solution(
+                response, self._largest_strain(), fine.dofs.whole_dofs, self._body.cells, body.iterations,
+                assembly, solver.setup_seconds, seconds, stored=whole * path[-1, 2],
+            )  # fmt: skip
+            if not estimate:
+                return solution
+            start = time.perf_counter()
+            with vector(fine.dofs.space) as unit:
+                unit.array[:] = held[: fine.dofs.owned]
+                body.move(displacement, unit, rate)
+            found, more = self._decrement(law, levels, displacement, rate, stack)
+            fine.set_displacement(displacement)
+        plain = plain_share(self._body)
+        decrement = whole * np.sqrt(found[0, 0] * found[1, 1])
+        if not decrement < response.stiffness[0, 0] * depth:
+            raise LargeError(
+                f"no error bar: elements of degree {fine.degree + 1}, of which it is made, give way at the probe's "
+                "edge; use a smaller depth, a larger rim, or degree 2"
+            )
+        bar = error_bar(decrement / (response.stiffness[0, 0] * depth), fine.degree, plain=plain)
+        return replace(
+            solution, decrements=np.array([[decrement / depth]]), plain=plain, bars=bar * response.stiffness,
+            estimate_iterations=more, time_estimate=time.perf_counter() - start,
+        )  # fmt: skip
+
+    def fields(self) -> tuple[Any, FloatArray]:
+        """Return the last displacement (m) and each owned cell's principal stretches, less 1; collective."""
+        return self._fine.forms.displacement, self._forms.principal_strains(self._body)
+
+    def _largest_strain(self) -> float:
+        return largest_of(self._forms.principal_strains(self._body), self._body, self._conditions.front)
+
+    def _press(
+        self, body: Equilibrium, displacement: PETSc.Vec, held: FloatArray, depth: float, law: MaterialLaw
+    ) -> FloatArray:
+        """Take ``displacement`` to that at ``depth``; return depth (m), force (N) and energy (J) of each step.
+
+        Force and energy are those of the modelled part. Each step begins along the tangent; one that Newton's method
+        cannot end is halved.
+
+        Raises:
+            LargeError: if that gets too small.
+        """
+        space, owned = self._fine.dofs.space, self._fine.dofs.owned
+        self._fine.forms.set_law(law)
+        path, step = [(0.0, 0.0, 0.0)], depth / _FEWEST
+        with vector(space) as unit, vector(space) as rate, vector(space) as trial, vector(space) as forces:
+            unit.array[:] = held[:owned]
+            while (reached := path[-1][0]) < depth:
+                body.move(displacement, unit, rate)
+                step, steps = self._step(body, displacement, rate, trial, (reached, step, depth))
+                displacement.array[:] = trial.array
+                energy = body.energy(displacement)
+                body.forces(displacement, forces)
+                there = depth if step >= depth - reached else reached + step
+                path.append((there, self._work(forces, held), energy))
+                step = min(step * (2 if steps <= _EASY else 1), depth / _FEWEST)
+        return np.array(path)
+
+    def _step(
+        self, body: Equilibrium, displacement: PETSc.Vec, rate: PETSc.Vec, trial: PETSc.Vec,
+        way: tuple[float, float, float],
+    ) -> tuple[float, int]:  # fmt: skip
+        """Write the equilibrium a step farther into ``trial``; return the step (m), and Newton's steps to it.
+
+        ``rate`` is the tangent at ``displacement``, for a metre; ``way`` how far it is, the step to try, the depth (m).
+        """
+        reached, step, depth = way
+        if step > (1 - _SLIVER) * (depth - reached):
+            step = depth - reached  # not one more for what rounding leaves
+        with vector(self._fine.dofs.space) as forces:
+            while True:
+                trial.array[:] = displacement.array + step * rate.array
+                try:
+                    if not np.isfinite(body.energy(trial)):
+                        raise LargeError("tissue is turned inside out")
+                    body.forces(trial, forces)
+                    return step, body.settle(trial, self._norm_on_held(forces))
+                except LargeError as error:
+                    step /= 2
+                    if step < _SMALLEST * depth:
+                        raise LargeError(_stopped(reached, depth, error)) from error
+
+    def _norm_on_held(self, forces: PETSc.Vec) -> float:
+        on_held = forces.array[self._fine.dofs.prescribed_owned]
+        return float(np.sqrt(self._fine.dofs.comm.allreduce(float(on_held @ on_held))))
+
+    def _work(self, forces: PETSc.Vec, held: FloatArray) -> float:
+        return float(self._fine.dofs.comm.allreduce(float(forces.array @ held[: self._fine.dofs.owned])))
+
+    def _reaction_at(self, body: Equilibrium, displacement: PETSc.Vec, held: FloatArray, loads: Loads) -> Response:
+        """Return the response of the whole body, as a secant; see that forces balance."""
+        (depth,), fine = loads.amounts, self._fine
+        with vector(fine.dofs.space) as forces:
+            body.forces(displacement, forces)
+            found = sums(fine.dofs, [forces.array / depth], [held])
+        stationary = found.works[None]
+        response = reaction(loads, stationary, found.on_probe, self._body.mirrored)
+        balance = found.imbalance(found.works, loads, self._body.mirrored)
+        if not balance <= BALANCE_LIMIT:
+            raise LargeError(f"forces do not balance: relative error {balance:.1e}, allowed {BALANCE_LIMIT:.0e}")
+        return replace(response, balance=balance)
+
+    def _check(self, path: FloatArray, law: MaterialLaw) -> None:
+        """See that the force is the derivative of the energy by the depth, along the ``path``.
+
+        Raises:
+            LargeError: if it is not.
+        """
+        depth, force, energy = path.T
+        depths = depth / depth[-1]
+        through = np.polynomial.Polynomial.fit(depths, force, min(len(path) - 1, 4)).integ(lbnd=0.0)
+        wrong = abs(float(through(1.0)) * depth[-1] / energy[-1] - 1)
+        rounding = _ROUNDING * law.lame_mu[0] * self._volume() / energy[-1]
+        if not wrong <= _WORK + rounding:
+            raise LargeError(
+                f"the force is not the derivative of the energy by the depth: {wrong:.1e} apart, since an element at "
+                "the probe's edge folds; use a smaller depth, a larger rim, or degree 2"
+            )
+
+    def _volume(self) -> float:
+        points = np.ptp(np.asarray(self._body.mesh.geometry.x), axis=0)
+        return float(self._body.comm.allreduce(float(points.prod())))
+
+    @stage("error bar")
+    def _decrement(
+        self, law: MaterialLaw, levels: list[Level], displacement: PETSc.Vec, rate: PETSc.Vec, stack: ExitStack
+    ) -> tuple[FloatArray, int]:
+        """Return a·K⁻¹·b (2, 2) of the residuals of the solution and of its ``rate`` in the space of one degree more.
+
+        And the iterations that it took.
+        """
+        fine = self._fine
+        finer = self._spaces.get(fine.degree + 1, self._conditions)
+        if len(levels) == 1:
+            levels = [*(self._level(space, law, stack, blocked=True)[0] for space in self._coarser()), *levels]
+        level, _ = self._level(finer, law, stack, blocked=True)
+        solver = LinearSolver([*levels, level], direct=False, tolerance=0.5)
+        stack.callback(solver.close)
+        forms = NeoHookeanForms(finer.dofs.space, finer.forms)
+        finer.forms.set_law(law)
+        residuals = [stack.enter_context(vector(finer.dofs.space)) for _ in range(2)]
+        with vector(finer.dofs.space) as there:
+            fine.set_displacement(rate)
+            finer.forms.displacement.interpolate(fine.forms.displacement)
+            there.array[:] = finer.forms.displacement.x.array[: finer.dofs.owned]
+            fine.set_displacement(displacement)
+            finer.forms.displacement.interpolate(fine.forms.displacement)
+            assemble(forms.residual, residuals[0])
+            tangent_product(forms, there, residuals[1])
+        for residual in residuals:
+            residual.scale(-1.0)
+            residual.array[finer.dofs.prescribed_owned] = 0.0
+        if not all(np.isfinite(residual.norm()) for residual in residuals):
+            raise LargeError("elements of one degree more turn tissue inside out, so that no error bar can be made")
+        found, _, iterations = energy_decrements(solver, residuals)
+        return found, iterations
+
+
+def _stopped(reached: float, depth: float, why: LargeError) -> str:
+    """Return what to say of a path that ends."""
+    return (
+        f"Newton's method stopped at a depth of {reached * 1e3:.3g} mm of {depth * 1e3:.3g} mm ({why}): the tissue "
+        "gives way there, or elements at the probe's edge are squeezed to nothing; use a smaller depth, or a larger rim"
+    )

@@ -1,0 +1,44 @@
+"""Neo-Hookean bodies, against linear elasticity where depths are small, and the half plane's elements where not."""
+
+from collections.abc import Iterator
+
+from mpi4py import MPI
+
+from pipeline.verify.compare import solve
+from pipeline.verify.row import Row
+from pipeline.verify.sections import cylinder, disc, mesh, study
+
+# F over that of linear elasticity, cylinder R = H = 20 a / 3, ν = 0.3: piecewise linear elements of the half plane,
+# each of one volume, down to 0.002 a at the edge; what elements of a fifth of the size changed bounds the error.
+_RATIO = {0.1: 0.988, 0.2: 0.976}
+_RATIO_BAR = 1.5e-3
+# F / F_linear - 1 is of the order of the depth over the radius.
+_SMALL = 1e-3
+
+
+def large_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
+    """Yield the rows, as they are solved; ``quick`` leaves out the deepest; collective."""
+    sizes = mesh(rim=0.6, growth=0.6, fine=3)
+    linear, nonlinear = (_scene(law, _SMALL) for law in ("linear", "neo-hookean"))
+    reference, _, message = solve(comm, "3D", linear, sizes)
+    value, _, more = solve(comm, "3D", nonlinear, sizes)
+    name = "finite cylinder, disc, neo-Hookean"
+    yield Row(
+        f"{name}, d = a/1000", "3D", reference, "linear elasticity, same mesh", value, 0.2 * _SMALL,
+        message=message or more,
+    )  # fmt: skip
+    for depth, ratio in _RATIO.items():
+        if quick and depth > min(_RATIO):
+            return
+        exact, bar, message = solve(comm, "2D", _scene("linear", depth))
+        value, own, more = solve(comm, "3D", _scene("neo-hookean", depth), mesh(rim=0.75, growth=0.5, fine=3))
+        yield Row(
+            f"{name}, d = {depth:g} a", "3D", ratio * exact, f"F_linear × {ratio}, in the half plane", value, own,
+            bar + _RATIO_BAR, message or more,
+        )  # fmt: skip
+
+
+def _scene(law: str, depth: float) -> dict[str, dict[str, object]]:
+    """Return a disc of 3 mm on the cylinder, ``depth`` in units of its radius."""
+    scene = study(0.3, cylinder(), disc(3, 3 * depth))
+    return {**scene, "material": {**scene["material"], "law": law}}

@@ -1,0 +1,113 @@
+"""Large displacements: neo-Hookean bodies are linear ones at small depths, and obey closed forms at any."""
+
+import numpy as np
+import pytest
+from dolfinx import fem
+from mpi4py import MPI
+
+from pipeline.plan.plan import make_plan
+from pipeline.run.meshing import mesh_case
+from pipeline.scene.model import FIXED
+from pipeline.solve.compiled import vector_space
+from pipeline.solve.forms import ElasticForms
+from pipeline.solve.large.forms import NeoHookeanForms
+from pipeline.solve.material import MaterialLaw
+from pipeline.study.problems import StudyError
+from tests.cases import BLADE, force, solve, study
+
+LARGE = {"law": "neo-hookean"}
+SKIN = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.4}
+
+
+@pytest.mark.parametrize("stretch", [0.6, 1.0, 1.5])
+def test_uniform_stretch(stretch):
+    """Pulled along z with free sides: what is stored, and the force on each face, are the closed form's."""
+    (planned,) = make_plan(study(material=LARGE)).solves
+    body, _ = mesh_case(planned.case, planned.mirrors, MPI.COMM_SELF, None)
+    law = MaterialLaw.of_moduli(10e3, 0.3)
+    lame_lambda, mu = law.lame
+    # Of the sides: μ (b - 1/b) + λ (J - 1) b stretch = 0 with J = b² stretch, by Newton's method.
+    b = 1.0
+    for _ in range(50):
+        volume = b * b * stretch
+        wrong = mu * (b - 1 / b) + lame_lambda * (volume - 1) * b * stretch
+        b -= wrong / (mu * (1 + 1 / b**2) + lame_lambda * stretch * (volume - 1 + 2 * volume))
+    volume = b * b * stretch
+    density = mu / 2 * (2 * b**2 + stretch**2 - 3) - mu * np.log(volume) + lame_lambda / 2 * (volume - 1) ** 2
+    stress = mu * (stretch - 1 / stretch) + lame_lambda * (volume - 1) * b**2
+    space = vector_space(body.mesh, 2)
+    linear = ElasticForms(space)
+    linear.set_law(law)
+    linear.displacement.interpolate(lambda x: np.array([(b - 1) * x[0], (b - 1) * x[1], (stretch - 1) * x[2]]))
+    forms = NeoHookeanForms(space, linear)
+    quarter = 20e-3**3
+    assert fem.assemble_scalar(forms.energy) == pytest.approx(quarter * density, rel=1e-9, abs=1e-12)
+    nodal = np.array(fem.assemble_vector(forms.residual).array).reshape(-1, 3)
+    bottom = fem.locate_dofs_topological(space, 2, body.facets[FIXED])
+    expected = -stress * 20e-3**2
+    assert nodal[bottom, 2].sum() == pytest.approx(expected, rel=1e-9, abs=1e-10)
+    scale = abs(expected) + 1e-3
+    points = space.tabulate_dof_coordinates()
+    inner = (points[:, 2] < -1e-6) & (points[:, 2] > -20e-3 + 1e-6)
+    assert np.abs(nodal[inner, 2]).max() < 1e-10 * scale  # no force but on the ends
+    assert np.abs(nodal[inner & (points[:, 0] > 1e-6), 0]).max() < 1e-10 * scale
+
+
+def test_small_depths_are_linear():
+    ratios = {}
+    for depth in (0.003, 0.006):
+        changes = {"probe": {"depth": f"{depth} mm"}}
+        ratios[depth] = force(material=LARGE, **changes) / force(**changes)
+    assert ratios[0.003] == pytest.approx(1.0, abs=2e-4)
+    assert (ratios[0.006] - 1) / (ratios[0.003] - 1) == pytest.approx(2.0, rel=0.02)
+
+
+def test_quarter_is_the_whole_and_force_goes_with_the_modulus():
+    probe = {"depth": "0.3 mm"}
+    (whole,) = solve(material=LARGE, probe=probe, mesh={"model": "3d"}).values()
+    quarter, stiff = solve(material=LARGE | {"young": ["10 kPa", "30 kPa"]}, probe=probe).values()
+    assert (quarter.origin, whole.origin) == ("symmetric", "solved")
+    assert whole.force == pytest.approx(quarter.force, rel=1e-6)
+    assert whole.force_error == pytest.approx(quarter.force_error, rel=0.1)
+    assert whole.max_strain == pytest.approx(quarter.max_strain, rel=1e-5)
+    assert stiff.origin == "scaled"
+    assert stiff.force == pytest.approx(3 * quarter.force, rel=1e-12)
+    assert stiff.energy == pytest.approx(3 * quarter.energy, rel=1e-12)
+
+
+def test_every_depth_is_solved_and_none_is_another_s():
+    depths = {"depth": ["0.1 mm", "0.2 mm"]}
+    plan = make_plan(study(material={"law": ["linear", "neo-hookean"]}, probe=depths, solve={"exact": True}))
+    assert len({solve.key for solve in plan.solves if not solve.is_reference}) == 3  # one of them is linear
+    assert sum(solve.is_reference for solve in plan.solves) == 1
+    assert any("neo-Hookean" in struck.reason for struck in plan.struck)
+
+
+def test_a_depth_that_is_not_reached_fails_and_says_where():
+    (record,) = solve(material=LARGE, probe={"depth": "9 mm"}).values()
+    assert record.status == "failed"
+    assert "stopped at a depth of" in record.message
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"material": LARGE | {"poisson": 0.46}}, "material.poisson"),
+        ({"material": LARGE | {"poisson": 0.1}}, "material.poisson"),
+        ({"mesh": {"element": "mixed"}}, "mesh.element"),
+        ({"mesh": {"accuracy": "1 %"}}, "mesh.accuracy"),
+        ({"mesh": {"epsilon": "8 mm", "outside": "halfspace"}}, "mesh.outside"),
+        ({"probe": {"contact": "frictionless"}}, "probe.contact"),
+        ({"probe": {"contact": "unilateral"}}, "probe.contact"),
+        ({"probe": {"motion": "all"}}, "probe.motion"),
+        ({"probe": BLADE | {"slice": "0.1 mm"}}, "probe.slice"),
+        ({"probe": BLADE | {"incision": "2 mm"}}, "probe.incision"),
+        (
+            {"body": {"layers": [{"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.4}]}},
+            "material.law",
+        ),
+    ],
+)
+def test_what_it_is_not_for_is_refused(changes, key):
+    with pytest.raises(StudyError, match=key):
+        study(**({"material": LARGE} | changes))
