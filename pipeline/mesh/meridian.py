@@ -79,7 +79,8 @@ class Meridian:
     Of the body, only r < ``column`` is kept; the face of that cut is free, or held if ``column_fixed``.
     ``interfaces`` are the heights z (m), from the top down, at which one layer ends and the next begins: regions 1, 2,
     ... of the mesh. What lies below them all is another layer if ``is_filled``, else region 0. ``kinks`` are radii (m)
-    within the disc at which the displacement that it prescribes is not smooth.
+    within the disc at which the displacement that it prescribes is not smooth. Of its face
+    the rings ``lost``, pairs of radii (m) from the innermost on, do not touch.
     """
 
     radius: float
@@ -91,6 +92,7 @@ class Meridian:
     interfaces: tuple[float, ...] = ()
     is_filled: bool = False
     kinks: tuple[float, ...] = ()
+    lost: tuple[tuple[float, float], ...] = ()
 
     @property
     def is_cut(self) -> bool:
@@ -226,6 +228,12 @@ def _outline(meridian: Meridian) -> tuple[list[tuple[float, float]], list[str]]:
         groups.append(PROBE)
     else:
         groups[-1] = PROBE
+    for inner, end in reversed(meridian.lost):
+        corners.append((ratio(end, a), 0.0))
+        groups.append(FREE)
+        if inner > 0:
+            corners.append((ratio(inner, a), 0.0))
+            groups.append(PROBE)
     corners.append((0.0, 0.0))
     groups.append(AXIS)
     return corners, groups

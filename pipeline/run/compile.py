@@ -9,7 +9,7 @@ from pipeline.solve.axisymmetric import compile_axisymmetric
 from pipeline.solve.cache import compiling
 from pipeline.solve.forms import compile_elastic
 from pipeline.solve.large.forms import compile_neo_hookean
-from pipeline.solve.meridian_contact import TRIAL_DEGREE
+from pipeline.solve.meridian_trials import TRIAL_DEGREE
 from pipeline.solve.mixed_forms import compile_mixed
 from pipeline.solve.regular import compile_regular
 from pipeline.solve.release import compile_release

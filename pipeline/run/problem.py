@@ -21,7 +21,8 @@ from pipeline.solve.large.problem import LargeProblem
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
-from pipeline.solve.meridian_contact import MeridianContact, RoundTool
+from pipeline.solve.meridian_contact import MeridianContact
+from pipeline.solve.meridian_trials import RoundTool
 from pipeline.solve.mixed import MixedProblem
 from pipeline.solve.release import Front
 from pipeline.solve.solution import FieldProblem, Problem, Solution

@@ -1,4 +1,4 @@
-"""Whether a round patch of contact on the meridian is one: pressed everywhere within, clear of the tool beyond."""
+"""Whether contact on the meridian, one round patch or one ring, is one: pressed all over, clear of the tool beside."""
 
 from collections.abc import Callable
 
@@ -13,10 +13,15 @@ from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
 # Tension below this share of the mean pressure, penetration below this share of the depth: what a radius that is off
 # by 1e-4 leaves.
 _TENSION, _PENETRATION = 1e-2, 1e-4
-# Pressures are not read nearer to the edge than this, in units of its radius: there they are the radius' error.
+# Pressures are not read nearer to an edge than this, in units of the outer one's radius: there they are its error.
 _BESIDE_EDGE = 1e-3
 # A height this near to the top, in units of the radius of contact, is the top's.
 _LEVEL = 1e-9
+_ROUNDING = 1e-12
+
+
+class LiftsOff(SolveError):
+    """Contact that was taken for one round patch, and would have to pull."""
 
 
 def check_signs(
@@ -28,19 +33,25 @@ def check_signs(
     ``gap`` is that between tool and surface at radii up to ``limit`` (m) when its lowest point touches.
 
     Raises:
-        SolveError: if the tool pulls somewhere, or goes through the surface beside the contact.
+        LiftsOff: if the tool pulls somewhere.
+        SolveError: if it goes through the surface beside the contact.
     """
     dofs, places = forms.on(PROBE)
     order = np.argsort(places[:, 0])
     radii, reactions = places[order, 0], residual[dofs[order, 1]]
-    ends = np.unique(arrays.points[arrays.facets[PROBE], 0])
-    pressure = -np.linalg.solve(_mass(radii, ends), reactions)
-    mean = -2 * reactions.sum()
-    within = radii < 1 - _BESIDE_EDGE
-    if (tension := -pressure[within].min() / mean) > _TENSION:
-        at = max(float(radii[within][np.argmin(pressure[within])]) * arrays.unit, 0.0)
-        raise SolveError(
-            f"contact is not one round patch: {1e3 * at:.3g} mm from the axis the tool would pull with {tension:.1%} "
+    mean, tension, at = -2 * reactions.sum(), 0.0, 0.0
+    rings = _rings(arrays)
+    shape = "one round patch" if len(rings) == 1 and not rings[0][0] else "what it was taken for"
+    for ends in rings:
+        here = (radii > ends[0] - _ROUNDING) & (radii < ends[-1] + _ROUNDING)
+        pressure = -np.linalg.solve(_mass(radii[here], ends), reactions[here])
+        inner = ends[0] + _BESIDE_EDGE if ends[0] > 0 else -_BESIDE_EDGE
+        within = (radii[here] < ends[-1] - _BESIDE_EDGE) & (radii[here] > inner)
+        if within.any() and (pull := -pressure[within].min() / mean) > tension:
+            tension, at = pull, max(float(radii[here][within][np.argmin(pressure[within])]) * arrays.unit, 0.0)
+    if tension > _TENSION:
+        raise LiftsOff(
+            f"contact is not {shape}: {1e3 * at:.3g} mm from the axis the tool would pull with {tension:.1%} "
             'of the mean pressure; use model = "3d"'
         )
     dofs, places = forms.on(FREE)
@@ -51,9 +62,17 @@ def check_signs(
     if (through := -clear.min(initial=0.0) / depth) > _PENETRATION:
         at = places[beside, 0][np.argmin(clear)] * arrays.unit
         raise SolveError(
-            f"contact is not one round patch: {1e3 * at:.3g} mm from the axis the tool would go through the surface "
+            f"contact is not {shape}: {1e3 * at:.3g} mm from the axis the tool would go through the surface "
             f'by {through:.1%} of its depth; use model = "3d"'
         )
+
+
+def _rings(arrays: MeridianArrays) -> list[FloatArray]:
+    """Return, of each round or ring-shaped piece of the contact, the radii at which its elements end."""
+    edges = np.sort(arrays.points[arrays.facets[PROBE], 0], axis=1)
+    edges = edges[np.argsort(edges[:, 0])]
+    (breaks,) = np.nonzero(edges[1:, 0] > edges[:-1, 1] + _ROUNDING)
+    return [np.append(piece[:, 0], piece[-1, 1]) for piece in np.split(edges, breaks + 1)]
 
 
 def _mass(radii: FloatArray, ends: FloatArray) -> FloatArray:
