@@ -79,7 +79,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
 
 def _check_depth(probe: Probe, problems: Problems) -> None:
     """Warn of depths at which strains are large below an edge; a tool that is not flat tells of its own."""
-    if isinstance(probe, Indenter):
+    if isinstance(probe, Indenter) or probe.half_width <= 0:  # a slit that leaves nothing of a blade says so itself
         return
     proportional = "F stays proportional to depth" if probe.proportional_to else "strains are taken to be small"
     if probe.depth > _LINEAR * probe.half_width:
