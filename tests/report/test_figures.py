@@ -62,6 +62,17 @@ def test_words_on_the_figure(tmp_path):
         assert word in text
 
 
+def test_where_contact_is_found_force_and_area_are_drawn_against_the_depth(tmp_path):
+    study = dataset(probe={"depth": ["0.1 mm", "0.2 mm"]}, mesh={"epsilon": EPSILONS})
+    assert "contact" not in choose(study)
+    assert "several depths" in lacks(study, "contact")
+    found = study.assign(contact_area=study["force"].copy(data=np.full(study["force"].shape, 2e-6)))
+    found["contact_area"].attrs["units"] = "m2"
+    assert choose(found)[:2] == ["contact", "epsilon"]
+    text = draw(found, tmp_path / "a", ["svg"])[0].read_text()
+    assert all(word in text for word in ("area in contact (mm²)", "reaction force F (mN)", "depth d (mm)"))
+
+
 def test_the_papers_claim_stands_beside_bodies_that_are_cut_free_alone(tmp_path):
     def drawn(outside):
         data = dataset(mesh={"epsilon": EPSILONS, "outside": outside})

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from pipeline.report.figures.accuracy import accuracy
 from pipeline.report.figures.choose import KINDS, choose, lacks
 from pipeline.report.figures.compliance import compliance
+from pipeline.report.figures.contact import contact
 from pipeline.report.figures.convergence import convergence
 from pipeline.report.figures.epsilon import epsilon, ratio, speedup
 from pipeline.report.figures.exact import exact
@@ -22,7 +23,8 @@ __all__ = ["FIGURES", "KINDS", "STYLE", "choose", "draw", "figure", "lacks", "sa
 
 FIGURES: dict[str, Callable[[xr.Dataset, str, str], Figure]] = {
     "epsilon": epsilon, "exact": exact, "convergence": convergence, "accuracy": accuracy, "map": force_map,
-    "force": force, "compliance": compliance, "linear": linear, "nothing": nothing, "ratio": ratio, "speedup": speedup,
+    "force": force, "compliance": compliance, "linear": linear, "contact": contact, "nothing": nothing,
+    "ratio": ratio, "speedup": speedup,
 }  # fmt: skip
 
 

@@ -8,8 +8,8 @@ from pipeline.report.figures.dimensions import mesh_dimensions, refinements
 
 # What can be drawn on request: the last two are parts of "epsilon".
 KINDS = (
-    "epsilon", "exact", "convergence", "accuracy", "map", "force", "compliance", "linear", "nothing", "ratio",
-    "speedup",
+    "epsilon", "exact", "convergence", "accuracy", "map", "force", "compliance", "linear", "contact", "nothing",
+    "ratio", "speedup",
 )  # fmt: skip
 
 
@@ -20,6 +20,8 @@ def choose(dataset: xr.Dataset) -> list[str]:
     kinds = []
     if dataset.sizes.get("depth", 0) > 1 and _known(dataset, "linear_ratio"):
         kinds.append("linear")
+    if dataset.sizes.get("depth", 0) > 1 and _known(dataset, "contact_area"):
+        kinds.append("contact")
     if dataset.sizes.get("epsilon", 0) > 1 and _known(dataset, "force_ratio"):
         kinds.append("epsilon")
     has_exact = _known(dataset, "accuracy")
@@ -52,6 +54,7 @@ def lacks(dataset: xr.Dataset, kind: str) -> str:
         "compliance": "several tools and ε, the full order among them, in scenes whose compliances add",
         "map": "a raster of places ([probe.path])",
         "linear": "several depths, and both laws of the material",
+        "contact": "several depths, and a tool whose contact is found (unilateral)",
         "force": "a case that has a force",
         "nothing": "that no case has a force",
     }

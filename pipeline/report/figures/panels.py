@@ -58,7 +58,7 @@ def draw_curves(panel: Panel, layout: Layout, factor: float = 1.0, errors: str =
         known = np.isfinite(y)
         style = look(position) | ({} if axis.joins and len(axis.positions) > 1 else {"linestyle": "none"})
         label = choices(panel.data, curve) if known.any() else None
-        x = axis.positions + _aside(axis, position, len(layout.curves), bool(errors))
+        x = axis.positions + _aside(axis, position, len(layout.curves))
         if errors:
             bars = np.nan_to_num(np.abs(y * line[errors].values))[known]
             panel.ax.errorbar(x[known], y[known], bars, label=label, capsize=2, elinewidth=0.8, **style)
@@ -74,12 +74,9 @@ def draw_curves(panel: Panel, layout: Layout, factor: float = 1.0, errors: str =
     return axis
 
 
-def _aside(axis: Horizontal, position: int, count: int, has_bars: bool) -> float:
-    """Return how far beside its value a point stands, so that words' points and error bars do not hide one another."""
-    share = position / (count - 1) - 0.5 if count > 1 else 0.0
-    if not axis.joins:
-        return 0.3 * share
-    return 0.03 * share * float(np.ptp(axis.positions)) if has_bars and not axis.is_log else 0.0
+def _aside(axis: Horizontal, position: int, count: int) -> float:
+    """Return how far beside a word its points stand, so that they do not hide one another; a number's stand on it."""
+    return 0.0 if axis.joins or count < 2 else 0.3 * (position / (count - 1) - 0.5)
 
 
 def _width(columns: int) -> float:
