@@ -1,7 +1,7 @@
 """What becomes of a computed record: kept, failed, or the next mesh tried, where an accuracy is asked for."""
 
 from dataclasses import replace
-from math import isfinite
+from math import isfinite, nan
 
 from pipeline.plan.steps import Solve
 from pipeline.run.measure import add_times
@@ -55,7 +55,16 @@ def _checked(solve: Solve, record: Record) -> Record:
         return failed(record, f"the error bar came out as {bar}")
     if solve.goal is None and bar > _WORST_BAR:
         return failed(record, f"error bar {100 * bar:.0f} %: the mesh is too coarse for this scene; use a smaller rim")
-    return failed(record, f"the error bar came out as {bar:.2g}") if bar < 0 else record
+    return failed(record, f"the error bar came out as {bar:.2g}") if bar < 0 else _without_wide_release(record)
+
+
+def _without_wide_release(record: Record) -> Record:
+    """Return ``record`` without the energy that a slit's front releases, if that is known by its order alone."""
+    if not record.energy_release_error > _WORST_BAR:
+        return record
+    unknown = f"energy_release is not known: error bar {100 * record.energy_release_error:.0f} %, use a finer mesh"
+    message = "; ".join(filter(None, (record.message, unknown)))
+    return replace(record, energy_release=nan, energy_release_error=nan, message=message)
 
 
 def _concluded(solve: Solve, last: Record, earlier: list[Record]) -> Record:

@@ -87,11 +87,18 @@ def _of_loads(solution: Solution, turn: FloatArray | None) -> dict[str, Any]:
 
 
 def _known_of(case: Case, solution: Solution) -> Vector:
-    """Return the reaction (N), not a number where a far field of the force along the axis alone cannot tell."""
+    """Return the reaction (N), not a number where it is not known and no symmetry makes it nought.
+
+    A far field of the force along the axis tells that alone. Along a blade on which tissue slides, what pushes on its
+    two ends is not looked at.
+    """
     x, y, z = solution.reaction
-    if not case.is_closed or case.probe.contact != "bonded":
-        return x, y, z
-    return x and nan, y and nan, z
+    if case.is_closed and case.probe.contact == "bonded":
+        return x and nan, y and nan, z
+    if case.probe.slit and case.probe.contact != "bonded":
+        along = case.frame.upright.along
+        return (x and nan, y, z) if abs(along[0]) > abs(along[1]) else (x, y and nan, z)
+    return x, y, z
 
 
 def is_graded_to_contact(case: Case) -> bool:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from pipeline.shapes.body import Body
+from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import in_mm
 from pipeline.study.problems import Problems
@@ -39,7 +40,12 @@ def check_large(
 
 
 def _check_probe(probe: Probe, problems: Problems) -> None:
-    if probe.contact != "bonded":
+    if isinstance(probe, Indenter):
+        problems.error(
+            "probe.shape", probe.shape, f"finds its contact, which is for linear elasticity, not for {_LAW}: use a "
+            "disc, an ellipse or a blade",
+        )  # fmt: skip
+    elif probe.contact != "bonded":
         problems.error("probe.contact", probe.contact, f'must be "bonded" with {_LAW}')
     if probe.motion != "press":
         problems.error("probe.motion", probe.motion, f'must be "press" with {_LAW}: one stiffness says nothing then')

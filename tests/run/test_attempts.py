@@ -1,7 +1,7 @@
 """What becomes of a computed force: kept with its bar, failed with a reason, or tried on the next mesh."""
 
 from dataclasses import replace
-from math import inf, nan
+from math import inf, isnan, nan
 
 import pytest
 from mpi4py import MPI
@@ -52,6 +52,16 @@ def judged(solve, *records: Record) -> Record:
 def test_a_force_that_is_no_number_is_a_failure(solve, force):
     found = judged(solve, record(1e-4, force=force))
     assert (found.status, found.message) == ("failed", f"the force came out as {force}")
+
+
+def test_an_energy_released_that_is_known_by_its_order_alone_is_left_out():
+    known = judged(plain(), record(1e-2, energy_release=3.0, energy_release_error=0.4))
+    assert (known.status, known.energy_release, known.message) == ("ok", 3.0, "")
+    found = judged(plain(), record(1e-2, energy_release=3.0, energy_release_error=1.22))
+    assert (found.status, found.force) == ("ok", 2.0)
+    assert isnan(found.energy_release)
+    assert isnan(found.energy_release_error)
+    assert "error bar 122 %" in found.message
 
 
 @pytest.mark.parametrize("bar", [nan, inf, -0.2])

@@ -99,6 +99,7 @@ def test_a_depth_that_is_not_reached_fails_and_says_where():
         ({"mesh": {"epsilon": "8 mm", "outside": "halfspace"}}, "mesh.outside"),
         ({"probe": {"contact": "frictionless"}}, "probe.contact"),
         ({"probe": {"contact": "unilateral"}}, "probe.contact"),
+        ({"probe": {"shape": "sphere", "radius": "5 mm", "depth": "0.1 mm"}}, "probe.shape"),
         ({"probe": {"motion": "all"}}, "probe.motion"),
         ({"probe": BLADE | {"slice": "0.1 mm"}}, "probe.slice"),
         ({"probe": BLADE | {"incision": "2 mm"}}, "probe.incision"),
