@@ -40,7 +40,7 @@ def _size() -> Iterator[Cell]:
 
 
 def _depth() -> Iterator[Cell]:
-    for depth in (0.01, 1e-9, 1e-4, 1.0, 1e3):
+    for depth in (0.01, 1e-9, 1e-4, 1.0, 19.0):
         yield _same("depth (mm)", f"{depth:g}", study(probe=disc(depth=depth)), depth / 0.01)
 
 
