@@ -210,7 +210,7 @@ def test_a_surface_that_is_not_the_files_is_never_filled(file, monkeypatch):
 def test_thin_parts_are_meshed_with_smaller_elements_where_large_ones_would_meet_across_them(tmp_path, monkeypatch):
     """A ball with a brim: elements as large as the ball allows cross in the brim, and only there are they smaller.
 
-    Whether they really cross hangs on gmsh's version: the first attempt fails here in any case.
+    Whether they really cross hangs on gmsh's version: the first attempt fails here in any case, and a later one serves.
     """
     directions, facets = sphere(24)
     brim = ((directions / np.array([60e-3, 60e-3, 4e-3])) ** 2).sum(axis=1) ** -0.5
@@ -227,7 +227,7 @@ def test_thin_parts_are_meshed_with_smaller_elements_where_large_ones_would_meet
 
     monkeypatch.setattr(make, "mesh_organ", fails_at_first)
     mesh = mesh_scanned(a_scene, a_scene.body, sizes)
-    assert len(attempts) == 2
+    assert len(attempts) > 1
     assert volume(mesh) == pytest.approx(a_scene.body.volume, rel=0.01)
     assert qualities(mesh).min() > 0.05
 
