@@ -195,6 +195,16 @@ class DisplacementProblem:
         """Return the spaces of lower degree; collective."""
         return [self._spaces.get(degree, self._conditions) for degree in range(1, self._fine.degree)]
 
+    def _finer(self, law: MaterialLaw, levels: list[Level], stack: ExitStack) -> tuple[ElasticSpace, LinearSolver]:
+        """Return the space of one degree more and a solver in it above ``levels``, freed with the stack; collective."""
+        finer = self._spaces.get(self._fine.degree + 1, self._conditions)
+        if len(levels) == 1:
+            levels = [*(self._level(space, law, stack, blocked=True)[0] for space in self._coarser()), *levels]
+        level, _ = self._level(finer, law, stack, blocked=True)
+        solver = LinearSolver([*levels, level], direct=False, tolerance=0.5)
+        stack.callback(solver.close)
+        return finer, solver
+
     def _level(self, space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, blocked: bool) -> tuple[Level, float]:
         blocked = blocked and space.degree > 1
         matrix, seconds = stack.enter_context(space.operators.lend(law, blocked=blocked, shared=self._shared))
@@ -222,12 +232,7 @@ class DisplacementProblem:
         Between them is what it makes of the energy that a slit's front, and the blade's tip, release.
         """
         fine = self._fine
-        finer = self._spaces.get(fine.degree + 1, self._conditions)
-        if len(levels) == 1:
-            levels = [*(self._level(space, law, stack, blocked=True)[0] for space in self._coarser()), *levels]
-        level, _ = self._level(finer, law, stack, blocked=True)
-        solver = LinearSolver([*levels, level], direct=False, tolerance=0.5)
-        stack.callback(solver.close)
+        finer, solver = self._finer(law, levels, stack)
         moved = fine.forms.displacement.x.array.copy()
         applied = finer.applied(loads.dead)
         units = [([values], Loads((motion,), (1.0,))) for motion, values in zip(loads.motions, held, strict=True)]

@@ -213,12 +213,7 @@ class LargeProblem(DisplacementProblem):
         And the iterations that it took.
         """
         fine = self._fine
-        finer = self._spaces.get(fine.degree + 1, self._conditions)
-        if len(levels) == 1:
-            levels = [*(self._level(space, law, stack, blocked=True)[0] for space in self._coarser()), *levels]
-        level, _ = self._level(finer, law, stack, blocked=True)
-        solver = LinearSolver([*levels, level], direct=False, tolerance=0.5)
-        stack.callback(solver.close)
+        finer, solver = self._finer(law, levels, stack)
         forms = NeoHookeanForms(finer.dofs.space, finer.forms)
         finer.forms.set_law(law)
         residuals = [stack.enter_context(vector(finer.dofs.space)) for _ in range(2)]

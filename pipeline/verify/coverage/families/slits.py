@@ -3,6 +3,7 @@
 import numpy as np
 
 from pipeline.verify.coverage.families.dice import log_uniform
+from pipeline.verify.coverage.families.tools import full_order
 from pipeline.verify.sections import Section
 
 # Both truths are extrapolated, and then far better than their bars; more takes minutes at so many edges.
@@ -41,7 +42,4 @@ def _throw_mesh(random: np.random.Generator) -> Section:
         rim, growth, fine = random.uniform(0.12, 0.17), random.uniform(0.5, 0.7), _FAR
     else:
         rim, growth, fine = random.uniform(0.2, 0.5), random.uniform(0.5, 1.0), random.uniform(1.0, 3.0)
-    return {
-        "epsilon": "full", "outside": "coarse", "fine": f"{fine:.3g} mm", "coarse": f"{_FAR:.3g} mm",
-        "rim": f"{rim:.3g} mm", "growth": float(np.round(growth, 2)), "degree": 2,
-    }  # fmt: skip
+    return full_order(rim, growth, fine, _FAR)

@@ -49,7 +49,12 @@ def throw_mesh(random: np.random.Generator) -> Section:
         rim, growth, fine = random.uniform(0.1, 0.3), random.uniform(0.35, 0.6), _FAR
     else:
         rim, growth, fine = random.uniform(0.4, 0.8), random.uniform(0.5, 1.0), random.uniform(1.0, 3.0)
+    return full_order(rim, growth, fine, _FAR)
+
+
+def full_order(rim: float, growth: float, fine: float, coarse: float) -> Section:
+    """Return the mesh of degree 2 of a whole body, of these sizes (mm)."""
     return {
-        "epsilon": "full", "outside": "coarse", "fine": f"{fine:.3g} mm", "coarse": f"{_FAR:.3g} mm",
+        "epsilon": "full", "outside": "coarse", "fine": f"{fine:.3g} mm", "coarse": f"{coarse:.3g} mm",
         "rim": f"{rim:.3g} mm", "growth": float(np.round(growth, 2)), "degree": 2,
     }  # fmt: skip
