@@ -25,7 +25,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's own mpirun: another one on PATH would not fit Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies docs test test-debian13 slurm-test verify benchmark peers plain-loop resolution stress soak lint format clean
+.PHONY: help setup study studies docs test test-debian13 slurm-test verify benchmark peers plain-loop realtime resolution stress soak lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -79,6 +79,10 @@ peers: setup ## NGSolve and scikit-fem against this program, time to a true erro
 
 plain-loop: setup ## a study as a plain FEniCSx script runs it, against this program (idle, an hour or two)
 	$(PYTHON) -m benchmarks.plain_loop $(STUDY) $(LOOP_ARGS)
+
+realtime: setup ## the real-time evaluator: a shared library, and its tests in C, C++, Python and under sanitizers
+	$(CC) -std=c99 -O2 -Wall -Wextra -pedantic -fPIC -shared realtime/epsmesh.c -o realtime/libepsmesh.so -lm
+	$(PYTHON) -m pytest tests/realtime $(PYTEST_ARGS)
 
 resolution: setup ## what a file's resolution, noise and voxels change of F (a quarter of an hour): results/resolution.png
 	$(MPI_ENV) $(PYTHON) -m benchmarks.resolution

@@ -1,0 +1,59 @@
+"""The file of a real-time model: netCDF classic with 64-bit offsets, which a few lines of C read.
+
+All numbers that a query needs are doubles, in SI units, for a body with E = 1:
+
+    format                   1
+    reciprocal, curvature    (poisson, v, u) Chebyshev coefficients of t = 1/(c + c_ref) (m) and of h t³ (1)
+    c_ref                    1/m
+    is_round                 1: u = 2(x² + y²)/X² - 1 alone; 0: u = 2(x/X)² - 1, v = 2(y/Y)² - 1
+    reach                    (2,) X and Y (m), half extents of the region, or its radius twice
+    sides, thickness         (2,) half extents of the face (m), or its radius twice; way to the support (m)
+    origin, axes             (3,) and (3, 3): the middle of the face, and rows x, y and outward normal
+    poisson_range            (2,) of Poisson's ratios
+    young, poisson           those of the study (Pa, 1), which hold where a query gives none
+    largest                  largest radius of contact, in units of the way to the nearest side or the bottom
+    bar                      (3,) b: c may be off by (b0 + b2 (a/room)⁴)/room + b1 |h| <r²>
+
+What people read besides: check_* (check) are touches that no bar was fitted to, by full solves of the program and by
+the model; attributes say what was exported, by which version and from which study.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from pipeline.arrays import FloatArray
+from pipeline.files import atomic
+from pipeline.realtime.model import FORMAT, Model
+
+Checks = Mapping[str, tuple[str, FloatArray]]
+
+
+def write_model(path: Path, model: Model, checks: Checks, attributes: Mapping[str, str]) -> None:
+    """Write a model with its ``checks``, (unit, values) by name, in one piece or not at all."""
+    table = model.table
+    numbers = {
+        "format": FORMAT, "c_ref": table.c_ref, "is_round": float(table.is_round), "thickness": model.thickness,
+        "young": model.young, "poisson": model.poisson, "largest": model.largest,
+    }  # fmt: skip
+    variables: dict[str, tuple[tuple[str, ...], FloatArray, dict[str, str]]] = {
+        "reciprocal": (("poisson_node", "v", "u"), table.reciprocal, {"units": "m"}),
+        "curvature": (("poisson_node", "v", "u"), table.curvature, {"units": "1"}),
+        "reach": (("pair",), np.array(table.reach), {"units": "m"}),
+        "sides": (("pair",), np.array(model.sides), {"units": "m"}),
+        "origin": (("component",), model.origin, {"units": "m"}),
+        "axes": (("row", "component"), model.axes, {"units": "1"}),
+        "poisson_range": (("pair",), np.array(table.poisson), {"units": "1"}),
+        "bar": (("term",), np.array(model.bar), {"units": "1"}),
+    }
+    units = {"c_ref": "1/m", "thickness": "m", "young": "Pa"}
+    for name, value in numbers.items():
+        variables[name] = ((), np.array(value), {"units": units.get(name, "1")})
+    for name, (unit, values) in checks.items():
+        variables[f"check_{name}"] = (("check",), np.asarray(values, dtype=float), {"units": unit})
+    dataset = xr.Dataset(variables, attrs=dict(attributes))
+    encoding = {name: {"_FillValue": None} for name in variables}
+    with atomic(path) as temporary:
+        dataset.to_netcdf(temporary, format="NETCDF3_64BIT", engine="netcdf4", encoding=encoding)

@@ -1,0 +1,94 @@
+"""Numbers out of a netCDF classic file with 64-bit offsets ("CDF-2"), every length held against what there is."""
+
+import struct
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+_MAGIC = b"CDF\x02"
+_DIMENSION, _VARIABLE, _ATTRIBUTE, _DOUBLE = 10, 11, 12, 6
+_BYTES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 4, 6: 8}
+# No model has as many.
+_MOST, _MOST_RANK, _MOST_NAME = 256, 4, 256
+
+
+class ModelError(ValueError):
+    """A file that is no model, or not a whole one."""
+
+
+def read_doubles(data: bytes) -> dict[str, NDArray[np.float64]]:
+    """Return the variables of doubles without a record dimension in ``data``, by name.
+
+    Raises:
+        ModelError: if the file is cut short, of another kind, or contradicts itself.
+    """
+    reader = _Reader(data)
+    if reader.take(4) != _MAGIC:
+        raise ModelError("this is no netCDF classic file with 64-bit offsets")
+    reader.count()  # records, which models have none of
+    lengths = [(reader.name(), reader.number())[1] for _ in range(reader.listed(_DIMENSION))]
+    reader.skip_attributes()
+    found = {}
+    for _ in range(reader.listed(_VARIABLE)):
+        name = reader.name()
+        rank = reader.count(_MOST_RANK)
+        numbers = [reader.number() for _ in range(rank)]
+        if any(number >= len(lengths) for number in numbers):
+            raise ModelError(f"{name} has a dimension that the file does not have")
+        reader.skip_attributes()
+        kind, _, begin = reader.number(), reader.number(), reader.offset()
+        shape = [lengths[number] for number in numbers]
+        if kind == _DOUBLE and 0 not in shape:
+            found[name] = reader.doubles(begin, shape)
+    return found
+
+
+@dataclass
+class _Reader:
+    data: bytes
+    at: int = field(default=0)
+
+    def take(self, size: int) -> bytes:
+        if size > len(self.data) - self.at:
+            raise ModelError("the file is cut short")
+        self.at += size
+        return self.data[self.at - size : self.at]
+
+    def number(self) -> int:
+        return int(struct.unpack(">I", self.take(4))[0])
+
+    def offset(self) -> int:
+        return int(struct.unpack(">Q", self.take(8))[0])
+
+    def count(self, most: int = _MOST) -> int:
+        if (found := self.number()) > most:
+            raise ModelError(f"the file counts {found} of what a model has at most {most} of")
+        return found
+
+    def listed(self, tag: int) -> int:
+        """Return how many follow of what ``tag`` says, or none if the list is absent."""
+        found, count = self.number(), self.count()
+        if found != tag and (found or count):
+            raise ModelError("the file's header is damaged")
+        return count
+
+    def name(self) -> str:
+        size = self.count(_MOST_NAME)
+        return self.take(size + -size % 4)[:size].decode("utf-8", "replace")
+
+    def skip_attributes(self) -> None:
+        for _ in range(self.listed(_ATTRIBUTE)):
+            self.name()
+            if (kind := self.number()) not in _BYTES:
+                raise ModelError("the file's header is damaged")
+            size = self.number() * _BYTES[kind]
+            self.take(size + -size % 4)
+
+    def doubles(self, begin: int, shape: list[int]) -> NDArray[np.float64]:
+        count = 1
+        for length in shape:
+            count *= length
+        if begin > len(self.data) or 8 * count > len(self.data) - begin:
+            raise ModelError("the file is cut short")
+        return np.frombuffer(self.data, ">f8", count, begin).astype(np.float64).reshape(shape)

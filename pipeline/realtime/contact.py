@@ -1,0 +1,192 @@
+"""What a frictionless tool and a body do to each other, from c, h and their slopes at one place: closed forms, E = 1.
+
+A force F, pressed on at t, sinks the face at s, both from the tool's axis, by its field on a half-space, and by
+F·(c + g·(s + t) + h (s² + t²)/4), ∇c = 2g: the regular part of the body's Green's function up to second order. Such a
+body under a round tool is the half-space under one whose profile has Fh/4·r² more (I. N. Sneddon, 1965), exactly:
+
+    D(a) = a ∫ f'(r) / (a² - r²)^½ dr,    F = 2E* ∫ D_e(a) - D_e(s) ds,    D_e(s) = D(s) + F h s²/2,
+    d = D_e(a) + F c + h/4·∫ p r²,    ∫ p r² = 4E* ∫ s² (D_e(a) - D_e(s)) ds.
+
+The slope g tilts the face by Fg, which moves the pressure aside by what a disc of the contact's radius would feel:
+-2/3·E* a³ F² g² in the complementary energy U(F), d = ∂U/∂F. All forces are slopes of one energy: at a fixed depth
+the force aside is ∂U/∂x, and a closed path does no work.
+"""
+
+from dataclasses import dataclass
+from math import pi, sqrt, tan
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Pair = NDArray[np.float64]
+
+# Steps of Newton's method, which is kept within a bracket; the radius is then exact to rounding.
+_STEPS, _SAME = 60, 4e-16
+# Of terms in the series of a ball, the last is below rounding for contact up to 0.6 of its radius.
+_TERMS, _NEGLIGIBLE = 40, 1e-17
+
+
+@dataclass(frozen=True)
+class Place:
+    """c (1/m), h (1/m³) and g² (1/m⁴) of a body with E = 1 at a place, their slopes along x and y, and E*."""
+
+    c: float
+    h: float
+    tilt: float
+    slope_c: Pair
+    slope_h: Pair
+    slope_tilt: Pair
+    plane: float
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Force (N/Pa) against the tool, force aside on it, dF/dd (N/m/Pa), radius of contact (m) and ∫ p r² / F (m²)."""
+
+    force: float
+    aside: Pair
+    stiffness: float
+    radius: float
+    mean_square: float
+
+
+@dataclass(frozen=True)
+class Disc:
+    """A flat round punch of ``radius`` (m)."""
+
+    radius: float
+
+    def press(self, depth: float, place: Place, most: float) -> Contact | None:
+        """Return the contact at a ``depth`` (m), or nothing if its radius is more than ``most`` (m)."""
+        a, h, stiff = self.radius, place.h, place.plane
+        if a > most:
+            return None
+        force = depth / (tangent(a, place) - 4 / 3 * stiff * a**3 * place.tilt)
+        slope = place.slope_c + place.slope_h * (a**2 / 3 - 4 / 45 * stiff * h * a**5)
+        aside = 0.5 * force**2 * (slope - 4 / 3 * stiff * a**3 * place.slope_tilt)
+        return Contact(force, aside, force / depth, a, 2 / 3 * a**2 - 8 / 45 * stiff * h * a**5)
+
+
+@dataclass(frozen=True)
+class Round:
+    """A tool of revolution, given by D(s), D'(s), ∫ D and ∫ s² D from 0 to s, all in m and m³."""
+
+    limit: float
+
+    def profile(self, s: float) -> tuple[float, float, float, float]:
+        """Return the four at s (m)."""
+        raise NotImplementedError
+
+    def first(self, depth: float) -> float:
+        """Return about what the radius of contact (m) is at a ``depth`` (m)."""
+        raise NotImplementedError
+
+    def press(self, depth: float, place: Place, most: float) -> Contact | None:
+        """Return the contact at a ``depth`` (m), or nothing if its radius is more than ``most`` (m)."""
+        low, high = 0.0, min(most, self.limit)
+        if not self._at(high, place).depth >= depth:
+            return None
+        a = min(self.first(depth), 0.5 * high)
+        for _ in range(_STEPS):
+            found = self._at(a, place)
+            low, high = (a, high) if found.depth < depth else (low, a)
+            step = a - (found.depth - depth) / found.slope if found.slope > 0 else low
+            step = step if low < step < high else 0.5 * (low + high)
+            if abs(step - a) <= _SAME * a:
+                break
+            a = step
+        return _contact(a, self._at(a, place), place)
+
+    def _at(self, a: float, place: Place) -> "_Pressed":
+        """Return what presses the contact to a radius ``a`` (m), its depth below 0 if h leaves no such contact."""
+        stiff, h = place.plane, place.h
+        sunk, steep, area, moment = self.profile(a)
+        own = 1 - 2 / 3 * stiff * h * a**3
+        if own <= 0:
+            return _Pressed(-1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        force = 2 * stiff * (a * sunk - area) / own
+        square = 4 * stiff * (a**3 / 3 * sunk - moment) + 4 / 15 * stiff * h * force * a**5
+        growth = 2 * stiff * a * steep + 2 * stiff * h * force * a**2
+        power = own / growth * force / a
+        effect = -2 / 3 * stiff * place.tilt * a**3 * force * (2 + 3 * power)
+        depth = sunk + 0.5 * h * force * a**2 + place.c * force + 0.25 * h * square + effect
+        compliance = tangent(a, place) + effect * (1 + 3 * power) / force
+        return _Pressed(depth, compliance * growth / own, force, square, growth, compliance)
+
+
+class _Pressed(NamedTuple):
+    """Depth (m) and its slope with the radius of contact, force, ∫ p r², own·dF/da, and dd/dF."""
+
+    depth: float
+    slope: float
+    force: float
+    square: float
+    growth: float
+    compliance: float
+
+
+def _contact(a: float, found: _Pressed, place: Place) -> Contact:
+    force, stiff, square = found.force, place.plane, found.square / found.force
+    of_h = 0.25 * force**2 * square + 4 / 3 * stiff**2 * place.tilt * a**5 * force**3 / found.growth
+    of_tilt = -2 / 3 * stiff * a**3 * force**2
+    aside = 0.5 * force**2 * place.slope_c + of_h * place.slope_h + of_tilt * place.slope_tilt
+    return Contact(force, aside, 1 / found.compliance, a, square)
+
+
+@dataclass(frozen=True)
+class Ball(Round):
+    """A sphere of ``radius`` (m)."""
+
+    radius: float
+
+    def profile(self, s: float) -> tuple[float, float, float, float]:
+        """D(s) = s artanh(s/R), by its series, which does not cancel."""
+        t = (s / self.radius) ** 2
+        power, sums = t, [0.0, 0.0, 0.0, 0.0]
+        for k in range(_TERMS):
+            term = power / (2 * k + 1)
+            sums[0] += term
+            sums[1] += (2 * k + 2) * term
+            sums[2] += term / (2 * k + 3)
+            sums[3] += term / (2 * k + 5)
+            if term <= _NEGLIGIBLE * sums[0]:
+                break
+            power *= t
+        return self.radius * sums[0], self.radius / s * sums[1], self.radius * s * sums[2], self.radius * s**3 * sums[3]
+
+    def first(self, depth: float) -> float:
+        """H. Hertz, 1882."""
+        return sqrt(self.radius * depth)
+
+
+@dataclass(frozen=True)
+class Cone(Round):
+    """A sharp cone whose flank rises by ``slope`` (1/tan of the half angle to the axis)."""
+
+    slope: float
+
+    def profile(self, s: float) -> tuple[float, float, float, float]:
+        """D(s) = π/2·m s (A. E. H. Love, 1939)."""
+        steep = 0.5 * pi * self.slope
+        return steep * s, steep, steep * s**2 / 2, steep * s**4 / 4
+
+    def first(self, depth: float) -> float:
+        """A. E. H. Love, 1939."""
+        return 2 / pi * depth / self.slope
+
+
+def tangent(a: float, place: Place) -> float:
+    """Return dd/dF (Pa m/N) while the radius of contact is ``a``, but for what the tilt adds."""
+    c, h, stiff = place.c, place.h, place.plane
+    return 0.5 / (stiff * a) + c + a**2 / 3 * h - 2 / 45 * stiff * h**2 * a**5
+
+
+def ball(radius: float) -> Ball:
+    """Return the ball of a ``radius`` (m); its series holds up to 0.6 of it."""
+    return Ball(0.6 * radius, radius)
+
+
+def cone(angle: float, radius: float) -> Cone:
+    """Return the cone of a half ``angle`` (rad) to the axis that ends at a ``radius`` (m)."""
+    return Cone(radius, 1 / tan(angle))

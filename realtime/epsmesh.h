@@ -1,0 +1,75 @@
+/* Forces of tools on a body from a model file of `epsmesh export`: C99, no allocation, no locks, no input or output.
+ *
+ * SI units throughout. A model is plain memory: fill it once with epsmesh_load from the bytes of the file, then any
+ * number of threads may query it. The formulas are those of pipeline/realtime/contact.py, where they are derived.
+ */
+#ifndef EPSMESH_H
+#define EPSMESH_H
+
+#include <stddef.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { EPSMESH_MOST = 64, EPSMESH_MOST_IN_ALL = 8192 };
+
+typedef enum {
+    EPSMESH_OK,
+    EPSMESH_LOST,     /* the tool does not touch: all numbers are 0 */
+    EPSMESH_OUTSIDE,  /* the place is outside the model's region */
+    EPSMESH_LARGE,    /* tool or contact too large for a place so near to a side or the bottom */
+    EPSMESH_DEEP,     /* deeper than the model was made for */
+    EPSMESH_TOOL,     /* no such tool, or a size of it is missing */
+    EPSMESH_INPUT,    /* a number is not finite, or not positive where it must be */
+    EPSMESH_POISSON,  /* Poisson's ratio is outside the model's range */
+    EPSMESH_TILTED,   /* the tool must press along the face's inward normal */
+    EPSMESH_OFF,      /* the place is not on the face */
+    EPSMESH_DAMAGED,  /* the model's numbers make no sense here */
+    EPSMESH_NO_MODEL, /* the file is of another kind or version, cut short, or contradicts itself */
+    EPSMESH_STATUSES
+} epsmesh_status;
+
+typedef enum { EPSMESH_DISC, EPSMESH_SPHERE, EPSMESH_CONE } epsmesh_shape;
+
+typedef struct {
+    double reciprocal[EPSMESH_MOST_IN_ALL], curvature[EPSMESH_MOST_IN_ALL]; /* Chebyshev, over (nu, v, u) */
+    int counts[3], is_round, is_loaded;
+    double c_ref, reach[2], sides[2], thickness, origin[3], axes[3][3], poisson_range[2];
+    double young, poisson, largest, bar[3];
+} epsmesh_model;
+
+typedef struct {
+    epsmesh_shape shape;
+    double radius;         /* m: of a disc, of a ball, of a cone where it ends */
+    double angle;          /* rad: of a cone's flank to its axis; else unused */
+    double at[3];          /* m: where its axis meets the face */
+    double axis[3];        /* along which it presses; 0, 0, 0 is the inward normal */
+    double depth;          /* m */
+    double young, poisson; /* Pa, 1; those of model->young and model->poisson unless they change */
+} epsmesh_query;
+
+typedef struct {
+    epsmesh_status status;
+    double force[3];       /* N: what the tissue does to the tool, in the body's coordinates */
+    double force_error;    /* relative, of its part along the normal */
+    double stiffness;      /* N/m: dF/dd at a fixed place */
+    double contact_radius; /* m */
+} epsmesh_touch;
+
+/* Fill `model` from the `size` bytes of a file at `data`: EPSMESH_OK or EPSMESH_NO_MODEL. */
+epsmesh_status epsmesh_load(epsmesh_model *model, const void *data, size_t size);
+
+/* Return a query of the model's own E and nu, along the inward normal, with all else unset. */
+epsmesh_query epsmesh_ask(const epsmesh_model *model);
+
+/* Answer a query; all numbers are NaN unless the status is EPSMESH_OK or EPSMESH_LOST. */
+epsmesh_touch epsmesh_touch_at(const epsmesh_model *model, const epsmesh_query *query);
+
+/* Return the word that Python uses for a status. */
+const char *epsmesh_word(epsmesh_status status);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,83 @@
+/* Hold a model file, whole, cut short and damaged, against what epsmesh.h promises: `test_epsmesh MODEL`. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "epsmesh.h"
+
+static unsigned long state = 1;
+
+static unsigned long draw(void) {
+    state = (state * 1103515245UL + 12345UL) & 0x7fffffffUL;
+    return state >> 8;
+}
+
+static double within(double low, double high) { return low + (high - low) * (double)draw() / (double)(1UL << 23); }
+
+static int failures = 0;
+
+static void expect(int is_right, const char *what) {
+    if (is_right) return;
+    failures++;
+    fprintf(stderr, "failed: %s\n", what);
+}
+
+/* Ask at random places; a refusal has no numbers, an answer has finite ones. */
+static void ask_around(const epsmesh_model *model, int times) {
+    static const double sizes[] = {1e-3, 5e-3, 5e-3};
+    int i, j;
+    for (i = 0; i < times; i++) {
+        epsmesh_query query = epsmesh_ask(model);
+        epsmesh_touch touch;
+        double x = within(-1.1, 1.1) * model->reach[0], y = within(-1.1, 1.1) * model->reach[1];
+        query.shape = (epsmesh_shape)(i % 3);
+        query.radius = sizes[i % 3], query.angle = 1.2;
+        for (j = 0; j < 3; j++) query.at[j] = model->origin[j] + x * model->axes[0][j] + y * model->axes[1][j];
+        query.depth = within(-1e-5, 5e-4);
+        if (i % 17 == 0) query.depth = (double)NAN;
+        touch = epsmesh_touch_at(model, &query);
+        if (touch.status == EPSMESH_OK || touch.status == EPSMESH_LOST) {
+            expect(isfinite(touch.force[0] + touch.force[1] + touch.force[2]), "a force is finite");
+            expect(isfinite(touch.force_error + touch.stiffness + touch.contact_radius), "an answer is finite");
+        } else {
+            expect(isnan(touch.force[0]) && isnan(touch.stiffness), "a refusal has no numbers");
+        }
+        expect(strlen(epsmesh_word(touch.status)) > 0, "a status has a word");
+    }
+}
+
+int main(int count, char **words) {
+    static epsmesh_model model, damaged;
+    static unsigned char data[1 << 20];
+    unsigned char *part;
+    size_t size, i;
+    epsmesh_query query;
+    FILE *file = count == 2 ? fopen(words[1], "rb") : NULL;
+    if (!file) return fprintf(stderr, "usage: test_epsmesh MODEL\n"), 2;
+    size = fread(data, 1, sizeof data, file);
+    fclose(file);
+    expect(epsmesh_load(&model, data, size) == EPSMESH_OK, "the model is read");
+    ask_around(&model, 3000);
+    expect(epsmesh_load(&damaged, NULL, 0) == EPSMESH_NO_MODEL, "nothing is no model");
+    memset(&query, 0, sizeof query);
+    expect(epsmesh_touch_at(&damaged, &query).status == EPSMESH_NO_MODEL, "what was not loaded is not asked");
+    for (i = 0; i < size; i += 1 + size / 2000) {
+        part = (unsigned char *)malloc(i ? i : 1); /* of its own size, so that a sanitizer sees what is read past it */
+        if (!part) return 2;
+        memcpy(part, data, i);
+        expect(epsmesh_load(&damaged, part, i) == EPSMESH_NO_MODEL, "a part is no model");
+        free(part);
+    }
+    part = (unsigned char *)malloc(size);
+    if (!part) return 2;
+    for (i = 0; i < 20000; i++) {
+        int flips = 1 + (int)(draw() % 4);
+        memcpy(part, data, size);
+        while (flips--) part[draw() % (i % 2 ? size : 1500 < size ? 1500 : size)] = (unsigned char)draw();
+        if (epsmesh_load(&damaged, part, size) == EPSMESH_OK) ask_around(&damaged, 6);
+    }
+    free(part);
+    printf("%s\n", failures ? "failed" : "passed");
+    return failures ? 1 : 0;
+}

@@ -1,0 +1,29 @@
+"""A body of smooth random c and h, as a model and as a file."""
+
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.export.file import write_model
+from pipeline.realtime.model import Model, load
+from pipeline.realtime.table import Table
+
+
+def random_model(*, is_round: bool = False, turned: bool = False) -> Model:
+    rng = np.random.default_rng(4)
+    shape = (3, 1, 7) if is_round else (3, 6, 7)
+    order = sum(np.ogrid[: shape[0], : shape[1], : shape[2]])
+    reciprocal, curvature = rng.standard_normal((2, *shape)) / np.maximum(order, 1) ** 2 / 20
+    reciprocal[0, 0, 0], curvature[0, 0, 0] = 1.0, 0.8
+    reach, sides = ((0.03, 0.03), (0.036, 0.036)) if is_round else ((0.03, 0.025), (0.036, 0.03))
+    table = Table(0.02 * reciprocal, 0.06 * curvature, 45.0, reach, is_round, (0.3, 0.49))
+    axes = np.linalg.qr(rng.standard_normal((3, 3)))[0] if turned else np.eye(3)
+    origin = np.array([0.1, -0.2, 0.05]) if turned else np.zeros(3)
+    return Model(table, origin, axes, sides, 0.02, 10e3, 0.45, 0.5, (0.02, 0.1, 0.5))
+
+
+def write_random(path: Path, **kind: bool) -> Model:
+    """Write a model, and return it as it is read."""
+    checks = {"force": ("N", np.array([0.1, 0.2])), "bar": ("1", np.array([0.01, 0.01]))}
+    write_model(path, random_model(**kind), checks, {"title": "random"})
+    return load(path)

@@ -1,0 +1,91 @@
+"""The same queries in C: the same numbers, the same refusals; sanitizers find nothing, and C++ takes it as well."""
+
+import ctypes
+import shutil
+import subprocess
+from math import nan
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.realtime.synthetic import write_random
+
+SOURCES = Path(__file__).parents[2] / "realtime"
+STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror")
+SHAPES = ("disc", "sphere", "cone")
+
+pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+
+
+class Query(ctypes.Structure):
+    _fields_ = (
+        ("shape", ctypes.c_int), ("radius", ctypes.c_double), ("angle", ctypes.c_double), ("at", ctypes.c_double * 3),
+        ("axis", ctypes.c_double * 3), ("depth", ctypes.c_double), ("young", ctypes.c_double),
+        ("poisson", ctypes.c_double),
+    )  # fmt: skip
+
+
+class Touch(ctypes.Structure):
+    _fields_ = (
+        ("status", ctypes.c_int), ("force", ctypes.c_double * 3), ("force_error", ctypes.c_double),
+        ("stiffness", ctypes.c_double), ("contact_radius", ctypes.c_double),
+    )  # fmt: skip
+
+
+def compiled(*arguments: object) -> None:
+    found = subprocess.run([*map(str, arguments)], capture_output=True, text=True, check=False)
+    assert found.returncode == 0, found.stderr
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    path = tmp_path_factory.mktemp("realtime") / "libepsmesh.so"
+    compiled("cc", *STRICT, "-fPIC", "-shared", SOURCES / "epsmesh.c", "-o", path, "-lm")
+    found = ctypes.CDLL(str(path))
+    found.epsmesh_touch_at.restype, found.epsmesh_word.restype = Touch, ctypes.c_char_p
+    return found
+
+
+@pytest.mark.parametrize("kind", [{}, {"is_round": True}, {"turned": True}])
+def test_c_and_numpy_agree(library, tmp_path, kind):
+    model = write_random(tmp_path / "model.nc", **kind)
+    data, room = (tmp_path / "model.nc").read_bytes(), ctypes.create_string_buffer(1 << 18)
+    assert library.epsmesh_load(room, data, ctypes.c_size_t(len(data))) == 0
+    rng, seen = np.random.default_rng(7), set()
+    for number in range(600):
+        shape = number % 3
+        x, y = rng.uniform(-1.05, 1.05, 2) * model.table.reach
+        at = model.origin + x * model.axes[0] + y * model.axes[1]
+        depth, radius = rng.uniform(-5e-5, 1e-3), (2e-3, 6e-3, 5e-3)[shape] * rng.uniform(0.5, 2)
+        young, poisson = rng.uniform(1e3, 1e5), rng.uniform(0.29, 0.5)
+        if number % 23 == 0:
+            depth, at[2] = (nan, at[2]) if number % 2 else (depth, at[2] + 1e-3)
+        asked = {"at": at, "depth": depth, "radius": radius, "angle": 1.1, "young": young, "poisson": poisson}
+        expected = model.query(SHAPES[shape], **asked)
+        triple = ctypes.c_double * 3
+        query = Query(shape, radius, 1.1, triple(*at), triple(*-model.axes[2]), depth, young, poisson)
+        found = library.epsmesh_touch_at(room, ctypes.byref(query))
+        assert library.epsmesh_word(found.status).decode() == expected.status
+        values = np.array([*found.force, found.force_error, found.stiffness, found.contact_radius])
+        known = np.array([*expected.force, expected.force_error, expected.stiffness, expected.contact_radius])
+        scale = np.array([*[np.linalg.norm(expected.force)] * 3, *known[3:]])
+        assert np.all((np.abs(values - known) <= 1e-12 * scale) | np.isnan(known))
+        assert np.array_equal(np.isnan(values), np.isnan(known))
+        seen.add(expected.status)
+    assert seen >= {"ok", "lost", "outside", "poisson", "large"}
+
+
+def test_a_damaged_file_breaks_nothing(tmp_path):
+    write_random(tmp_path / "model.nc")
+    program = tmp_path / "test_epsmesh"
+    sanitize = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+    compiled("cc", *STRICT, *sanitize, SOURCES / "epsmesh.c", SOURCES / "test_epsmesh.c", "-o", program, "-lm")
+    compiled(program, tmp_path / "model.nc")
+
+
+@pytest.mark.skipif(shutil.which("c++") is None, reason="there is no C++ compiler")
+def test_it_is_cpp_as_well(tmp_path):
+    strict = ("-std=c++11", *STRICT[1:])
+    for name in ("epsmesh.c", "test_epsmesh.c"):
+        compiled("c++", *strict, "-x", "c++", "-c", SOURCES / name, "-o", tmp_path / f"{name}.o")

@@ -1,0 +1,169 @@
+"""Forces in real time, held against quadrature and against mechanics; what a model does not know it refuses."""
+
+from dataclasses import replace
+from math import nan, pi, tan
+
+import numpy as np
+import pytest
+from scipy.special import ellipe, ellipk
+
+from pipeline.realtime import Model, ModelError
+from pipeline.realtime.contact import Disc, Place, ball, cone
+from pipeline.realtime.model import model_of
+from tests.realtime.synthetic import random_model, write_random
+
+TOOLS = (
+    ("disc", {"radius": 2e-3}),
+    ("sphere", {"radius": 6e-3}),
+    ("cone", {"radius": 5e-3, "angle": 1.2}),
+)
+AT = (0.011, 0.017, 0.0)
+
+
+def deep(model: Model, name: str, sizes: dict, depth: float = 3e-4, at=AT, **more):
+    touch = model.query(name, at=at, depth=depth, **sizes, **more)
+    assert touch.status == "ok", touch
+    return touch
+
+
+def rings(place: Place, a: float, depth: float, profile, count: int = 400) -> float:
+    """Return the force of a tool whose contact has radius ``a``, by rings of constant pressure on a half-space."""
+    edges = a * np.sin(np.linspace(0, pi / 2, count + 1))
+    r = (edges[1:] + edges[:-1]) / 2
+
+    def disc(b):  # the displacement at r of a unit pressure within b (K. L. Johnson, Contact Mechanics, 3.29)
+        inside = np.minimum(r / b, 1) ** 2
+        outside = np.minimum(b / r, 1) ** 2
+        far = r / b * (ellipe(outside) - (1 - outside) * ellipk(np.minimum(outside, 1 - 1e-15)))
+        return 4 * b / (pi * place.plane) * np.where(r < b, ellipe(inside), far)
+
+    columns = [disc(b) for b in edges[1:]]
+    matrix = np.array([c - p for c, p in zip(columns, [0 * r, *columns[:-1]], strict=True)]).T
+    areas = pi * np.diff(edges**2)
+    matrix += (place.c + place.h / 4 * np.add.outer(r**2, r**2)) * areas
+    pressure = np.linalg.solve(matrix, depth - profile(r))
+    return float(areas @ pressure)
+
+
+@pytest.mark.parametrize(
+    ("tool", "profile"),
+    [
+        (Disc(2e-3), lambda r: 0 * r),
+        (ball(6e-3), lambda r: 6e-3 - np.sqrt(36e-6 - r**2)),
+        (cone(1.2, 5e-3), lambda r: r / tan(1.2)),
+    ],
+)
+@pytest.mark.parametrize("h", [6e5, -2e5])
+def test_a_round_tool_is_that_of_an_integral_equation(tool, profile, h):
+    none = np.zeros(2)
+    place = Place(30.0, h, 0.0, none, none, none, 1 / (1 - 0.45**2))
+    contact = tool.press(4e-4, place, 1.0)
+    assert contact is not None
+    assert contact.force == pytest.approx(rings(place, contact.radius, 4e-4, profile), rel=3e-3)
+    # Any other circle presses less, or pulls: of these, contact takes the one with the largest force.
+    for other in (0.9, 1.1) if not isinstance(tool, Disc) else ():
+        assert rings(place, other * contact.radius, 4e-4, profile) < contact.force
+
+
+def test_a_body_that_is_a_half_space_gives_the_closed_forms():
+    none, stiff = np.zeros(2), 1 / (1 - 0.3**2)
+    place = Place(0.0, 0.0, 0.0, none, none, none, stiff)
+    assert Disc(2e-3).press(1e-4, place, 1.0).force == pytest.approx(2 * stiff * 2e-3 * 1e-4)
+    hertz = 4 / 3 * stiff * 1.0**0.5 * 1e-6**1.5
+    assert ball(1.0).press(1e-6, place, 1.0).force == pytest.approx(hertz, rel=1e-6)
+    love = 2 / pi * stiff * 1e-4**2 * tan(1.2)
+    assert cone(1.2, 5e-3).press(1e-4, place, 1.0).force == pytest.approx(love)
+
+
+@pytest.mark.parametrize(("name", "sizes"), TOOLS)
+@pytest.mark.parametrize("is_round", [False, True])
+def test_a_closed_loop_does_no_work(name, sizes, is_round):
+    model = random_model(is_round=is_round)
+    angle, weight = 2 * pi * np.arange(64) / 64, 2 * pi / 64
+    places = np.stack([0.008 + 0.006 * np.cos(angle), 0.01 + 0.005 * np.sin(angle), 0 * angle], axis=1)
+    depths = 3e-4 + 5e-5 * np.sin(angle + 1)
+    forces = np.array([deep(model, name, sizes, d, at).force for d, at in zip(depths, places, strict=True)])
+    moved = np.stack([-0.006 * np.sin(angle), 0.005 * np.cos(angle), -5e-5 * np.cos(angle + 1)], axis=1)
+    stored = 0.4 * forces[0, 2] * depths[0]
+    assert abs(weight * (forces * moved).sum()) < 1e-8 * stored
+    # It is the force aside that makes it so.
+    assert abs(weight * (forces * moved)[:, 2].sum()) > 1e-4 * stored
+
+
+@pytest.mark.parametrize(("name", "sizes"), TOOLS)
+def test_stiffness_is_the_slope_of_the_force(name, sizes):
+    model, step = random_model(), 1e-8
+    up, down = (deep(model, name, sizes, 3e-4 + s).force[2] for s in (step, -step))
+    assert deep(model, name, sizes).stiffness == pytest.approx((up - down) / (2 * step), rel=1e-5)
+
+
+@pytest.mark.parametrize(("name", "sizes"), TOOLS)
+def test_force_goes_with_the_modulus_and_the_frame(name, sizes, tmp_path):
+    model, turned = random_model(), write_random(tmp_path / "turned.nc", turned=True)
+    touch = deep(model, name, sizes)
+    assert deep(model, name, sizes, young=30e3).force == pytest.approx(3 * touch.force)
+    at = turned.origin + turned.axes.T @ np.array(AT)
+    other = deep(turned, name, sizes, at=at, axis=-turned.axes[2])
+    assert turned.axes @ other.force == pytest.approx(touch.force)
+    assert other.force_error == pytest.approx(touch.force_error)
+    assert deep(model, name, sizes, poisson=0.3).force[2] != pytest.approx(touch.force[2], rel=1e-3)
+
+
+@pytest.mark.parametrize(("name", "sizes"), TOOLS)
+def test_contact_is_lost_and_regained(name, sizes):
+    model = random_model()
+    lost = model.query(name, at=AT, depth=-1e-4, **sizes)
+    assert lost.status == "lost"
+    assert not lost.force.any()
+    forces = [deep(model, name, sizes, depth).force[2] for depth in (1e-9, 1e-6, 1e-4)]
+    assert 0 < forces[0] < forces[1] < forces[2]
+
+
+@pytest.mark.parametrize(
+    ("query", "status"),
+    [
+        ({"at": (0.0301, 0.0, 0.0)}, "outside"),
+        ({"at": (0.0, 0.0, 1e-3)}, "off"),
+        ({"at": (nan, 0.0, 0.0)}, "input"),
+        ({"at": (0.0, 0.0)}, "input"),
+        ({"depth": nan}, "input"),
+        ({"depth": 0.02}, "deep"),
+        ({"young": 0.0}, "input"),
+        ({"poisson": 0.2}, "poisson"),
+        ({"axis": (0.1, 0.0, -1.0)}, "tilted"),
+        ({"axis": (0.0, 0.0, 1.0)}, "tilted"),
+        ({"axis": (0.0, 0.0, 0.0)}, "input"),
+        ({"radius": -1.0}, "input"),
+        ({"radius": nan}, "tool"),
+        ({"radius": 0.012}, "large"),
+        ({"at": (0.0, 0.0249, 0.0), "radius": 3e-3}, "large"),
+        ({"tool": "blade"}, "tool"),
+        ({"tool": "cone"}, "tool"),
+        ({"tool": "sphere", "radius": 2e-3, "depth": 2e-3}, "large"),
+    ],
+)
+def test_what_a_model_does_not_know_it_refuses(query, status):
+    asked = {"tool": "disc", "radius": 2e-3, "at": AT, "depth": 1e-4} | query
+    touch = random_model().query(asked.pop("tool"), **asked)
+    assert touch.status == status
+    assert touch.message
+    assert np.isnan([*touch.force, touch.force_error, touch.stiffness, touch.contact_radius]).all()
+
+
+def test_no_part_of_a_file_is_a_model(tmp_path):
+    write_random(tmp_path / "model.nc")
+    data = (tmp_path / "model.nc").read_bytes()
+    model_of(data)
+    for size in range(0, len(data), 7):
+        with pytest.raises(ModelError):
+            model_of(data[:size])
+    for foreign in (b"", b"CDF\x01" + data[4:], b"\x89HDF\r\n\x1a\n" + data[8:], b"CDF\x02" + b"\xff" * 400):
+        with pytest.raises(ModelError):
+            model_of(foreign)
+
+
+def test_tables_that_make_no_sense_give_a_status():
+    model = random_model()
+    table = replace(model.table, reciprocal=-model.table.reciprocal)
+    touch = replace(model, table=table).query("disc", radius=2e-3, at=AT, depth=1e-4)
+    assert touch.status == "damaged"
