@@ -10,6 +10,7 @@ ball that the body holds it is kept as polynomials, by least squares. Beyond a h
 by Betti's theorem within, where the force P of u acts and R has none.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -26,7 +27,7 @@ from pipeline.solve.compiled import form, vector_space
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.far_field import PointForce
 from pipeline.solve.forms import compile_elastic, one_cell
-from pipeline.solve.linear import Level, LinearSolver
+from pipeline.solve.linear import Level, LinearSolver, SolveError
 from pipeline.solve.loads import Motion
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.spaces import ElasticSpace, Spaces
@@ -56,6 +57,12 @@ class Smooth:
     def at(self, points: FloatArray) -> FloatArray:
         """Return the displacement (n, 3), in m."""
         return np.asarray(_terms((points - np.array(self.centre)) / self.unit) @ self.coefficients)
+
+    def at_centre(self) -> tuple[FloatArray, FloatArray]:
+        """Return the displacement (3,), in m, at the centre, and ∂²/∂x² + ∂²/∂y² of it (3,), in 1/m."""
+        places = {tuple(exponents): number for number, exponents in enumerate(_EXPONENTS.tolist())}
+        flat, bent = places[0, 0, 0], [places[2, 0, 0], places[0, 2, 0]]
+        return self.coefficients[flat], 2 * self.coefficients[bent].sum(axis=0) / self.unit**2
 
     def traction(self, points: FloatArray, normals: FloatArray, ratio: float) -> FloatArray:
         """Return σn (n, 3) in units of μ, for a ``ratio`` λ/μ."""
@@ -109,39 +116,56 @@ def regular_part(body: BodyMesh, force: PointForce) -> Smooth:
     Raises:
         SolveError: if that cannot be solved.
     """
+    return next(regular_parts(body, [force]))
+
+
+def regular_parts(body: BodyMesh, forces: Sequence[PointForce]) -> Iterator[Smooth]:
+    """Yield R for each of ``forces``, of one Poisson's ratio, as ``regular_part`` does: one factorisation for all.
+
+    Raises:
+        SolveError: if that cannot be solved, or if the mesh is too coarse for the radius of a force.
+    """
     with Spaces(body) as spaces:
         space = spaces.get(DEGREE, Conditions(unilateral=True))
         places = np.asarray(space.dofs.space.tabulate_dof_coordinates())
-        values = _solved(space, force, places)
+        for force, values in zip(forces, _solved(space, forces, places), strict=True):
+            yield _fitted(body, force, places, values.reshape(-1, 3))
+
+
+def _fitted(body: BodyMesh, force: PointForce, places: FloatArray, values: FloatArray) -> Smooth:
     near = np.linalg.norm(places - np.array(force.centre), axis=1) <= force.radius
-    points, values = places[near], values.reshape(-1, 3)[near]
+    points, values = places[near], values[near]
     for axis in body.mirrored:
         sign = np.where(np.arange(3) == axis, -1.0, 1.0)
         points, values = np.vstack([points, sign * points]), np.vstack([values, sign * values])
+    if len(points) < len(_EXPONENTS):
+        raise SolveError(f"{len(points)} nodes of the mesh are too few for the regular part at {force.centre}")
     return Smooth.fit(force.centre, force.radius, points, values)
 
 
-def _solved(space: ElasticSpace, force: PointForce, places: FloatArray) -> FloatArray:
-    law = MaterialLaw.of(_ratio(force.poisson), 1.0)
-    held = space.dofs.held(Motion(far=force, share=-1.0))
+def _solved(space: ElasticSpace, forces: Sequence[PointForce], places: FloatArray) -> Iterator[FloatArray]:
+    law = MaterialLaw.of(_ratio(forces[0].poisson), 1.0)
+    pull, rows = _pull(space.dofs.space)
     with (
         vector(space.dofs.space) as rhs, vector(space.dofs.space) as unknown,
         space.operators.lend(law, blocked=False) as (matrix, _),
     ):  # fmt: skip
-        space.lift(rhs, held, law)
-        stress = force.stress(places)
-        pull, rows = _pull(space.dofs.space)
-        for row, values in zip(rows, stress.transpose(1, 0, 2), strict=True):
-            row.x.array[:] = values.ravel()
-        rhs.array[:] -= fem.assemble_vector(pull).array[: space.dofs.owned]
-        rhs.array[space.dofs.prescribed_owned] = 0.0
         level = Level(space.dofs.space, matrix, space.dofs.prescribed)
         solver = LinearSolver([level], direct=True, tolerance=0.5)
         try:
-            solver.solve(rhs, unknown)
+            for force in forces:
+                held = space.dofs.held(Motion(far=force, share=-1.0))
+                rhs.set(0.0)
+                space.lift(rhs, held, law)
+                for row, values in zip(rows, force.stress(places).transpose(1, 0, 2), strict=True):
+                    row.x.array[:] = values.ravel()
+                rhs.array[:] -= fem.assemble_vector(pull).array[: space.dofs.owned]
+                rhs.array[space.dofs.prescribed_owned] = 0.0
+                unknown.set(0.0)
+                solver.solve(rhs, unknown)
+                yield np.asarray(unknown.array + held)
         finally:
             solver.close()
-        return np.asarray(unknown.array + held)
 
 
 def _pull(space: Any) -> tuple[Any, list[Any]]:

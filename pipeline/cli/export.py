@@ -1,0 +1,81 @@
+"""The command that makes a real-time model of a study's body."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pipeline import __version__
+from pipeline.cli.console import error, load_solvers, print_json
+from pipeline.cli.words import DEFAULT_OUTPUT, DONE, SOME_FAILED, File, Json, fail, load_all
+
+# Of --accuracy: less than the tables and the formulas are good for; more than is of use.
+_ACCURACIES = (0.002, 0.2)
+_MOST_CHECKS = 1000
+# The share of the judged touches whose errors the bars must hold.
+_HELD = 0.95
+
+
+def export(
+    file: File,
+    accuracy: Annotated[str, typer.Option(help='How near forces must be to those of full solves: "1%".')] = "1%",
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="MODEL", help="The model [default: results/STUDY.epsm.nc].", show_default=False
+        ),
+    ] = None,
+    checks: Annotated[
+        int, typer.Option(min=4, max=_MOST_CHECKS, help="Full solves that the bar is fitted to and, half, judged on.")
+    ] = 24,
+    as_json: Json = False,
+) -> None:
+    """Make a model that answers 1,000 times a second: forces of round tools anywhere on a box or a cylinder.
+
+    Exit status 1 if its bars do not hold what they must on the touches that they are judged on.
+
+    Example: epsmesh export studies/quick.toml --accuracy 1% -o box.epsm.nc
+    """
+    from pipeline.export.scope import ExportError, scope_of
+    from pipeline.units import parse_quantity
+
+    try:
+        wanted = parse_quantity(accuracy, "")
+    except ValueError as wrong:
+        fail(f"--accuracy {accuracy}: {wrong}")
+    if not _ACCURACIES[0] <= wanted <= _ACCURACIES[1]:
+        fail(f"--accuracy {accuracy}: must be between {100 * _ACCURACIES[0]:g}% and {100 * _ACCURACIES[1]:g}%")
+    (study,) = load_all([file])
+    path = output or DEFAULT_OUTPUT / f"{study.name}.epsm.nc"
+    try:
+        scope = scope_of(study)
+    except ExportError as problem:
+        fail(str(problem))
+    load_solvers()
+    from mpi4py import MPI
+
+    from pipeline.export.export import export as make_model
+    from pipeline.export.export import write
+    from pipeline.mesh.generate import MeshError
+    from pipeline.solve.linear import SolveError
+
+    if MPI.COMM_WORLD.size > 1:
+        fail("export works in one process: start it without mpirun")
+    try:
+        exported = make_model(scope, wanted, checks)
+        write(exported, path, scope, file, __version__)
+    except (ExportError, OSError) as problem:
+        fail(str(problem))
+    except (MeshError, SolveError, RuntimeError) as problem:
+        error(f"{file}: {problem}")
+        raise typer.Exit(SOME_FAILED) from None
+    found = exported.summary(wanted) | {"file": str(path)}
+    if as_json:
+        print_json(found)
+    else:
+        print(f"wrote {path}: {found['places']} places solved for, {found['coefficients']} coefficients")
+        print(
+            f"judged on {found['judged']} touches: {100 * found['held']:.0f} % held by their bars, largest error "
+            f"{100 * found['largest_error']:.2g} %, median bar {100 * found['median_bar']:.2g} %"
+        )
+    raise typer.Exit(DONE if exported.held >= _HELD else SOME_FAILED)

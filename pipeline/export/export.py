@@ -1,0 +1,99 @@
+"""A study as a real-time model: tabulated, its bar fitted to full solves, and judged on others."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.arrays import FloatArray
+from pipeline.export.checks import Check, check_touches, columns, needed
+from pipeline.export.compliance import Region, coarse_mesh, compliances
+from pipeline.export.file import write_model
+from pipeline.export.scope import ExportError, Scope
+from pipeline.export.tabulate import Places, tabulate
+from pipeline.realtime.model import Model
+from pipeline.shapes.bodies.box import Box
+
+# What is left out beside the sides, of the smaller of half the width and the thickness; how large contact may be, in
+# units of the way to the nearest side or the bottom.
+MARGIN, LARGEST = 0.15, 0.4
+# The table may miss c by this share of what the asked accuracy leaves for the largest disc; full solves are as much
+# more precise. Bars before they are fitted: of c, of h's part, and of the fourth power of what a contact measures.
+_SHARE, _PRECISE, _BARS = 0.4, 0.25, (5e-4, 0.03, 0.1)
+_SEEDS = (1, 2)
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A model with the touches that its bar was fitted to and those that it was judged on; places solved for."""
+
+    model: Model
+    fitted: list[Check]
+    judged: list[Check]
+    missed: float
+    places: int
+
+    @property
+    def held(self) -> float:
+        """The share of the judged touches whose error the bars hold."""
+        return float(np.mean([check.is_held for check in self.judged]))
+
+    def summary(self, accuracy: float) -> dict[str, float]:
+        """Return what there is to say of it, with what share of its judged touches is as near as was asked for."""
+        errors = np.abs([check.error for check in self.judged])
+        return {
+            "places": self.places, "coefficients": 2 * self.model.table.reciprocal.size, "judged": len(self.judged),
+            "held": self.held, "largest_error": float(errors.max()), "as_asked": float(np.mean(errors <= accuracy)),
+            "median_bar": float(np.median([check.bar for check in self.judged])), "table_missed": self.missed,
+        }  # fmt: skip
+
+
+def export(scope: Scope, accuracy: float, checks: int, *, margin: float = MARGIN, largest: float = LARGEST) -> Exported:
+    """Return the model of a study to a relative ``accuracy``, with half of ``checks`` fitted to and half judged on.
+
+    Raises:
+        ExportError: if the body leaves no region.
+        MeshError, SolveError, RuntimeError: if a mesh, a regular part or a full solve fails.
+    """
+    region = Region.of(scope.body, margin)
+    if min(region.reach) <= 0:
+        raise ExportError("the body leaves no region: ask for a smaller margin")
+    mesh = coarse_mesh(scope.case, region)
+    solved: list[tuple[float, float]] = []
+
+    def counted(places: Places, poisson: float) -> FloatArray:
+        solved.extend(places)
+        return compliances(mesh, region, places, poisson)
+
+    table, missed = tabulate(region, scope.poissons, counted, _SHARE * accuracy)
+    top = scope.body.heights[1]
+    bare = Model(
+        table, np.array([0.0, 0.0, top]), np.eye(3), region.sides, region.thickness, scope.young, scope.poisson,
+        largest, _BARS,
+    )  # fmt: skip
+    precise = _PRECISE * accuracy
+    halves = [checks - checks // 2, checks // 2]
+    fitted, judged = (
+        check_touches(bare, region, scope.body, count, seed, precise)
+        for count, seed in zip(halves, _SEEDS, strict=True)
+    )
+    factor = needed(fitted)
+    first, second, third = _BARS
+    model = replace(bare, bar=(factor * first, factor * second, factor * third))
+    fitted, judged = ([replace(check, bar=factor * check.bar) for check in half] for half in (fitted, judged))
+    return Exported(model, fitted, judged, missed, len(solved))
+
+
+def write(exported: Exported, path: Path, scope: Scope, study: Path, version: str) -> None:
+    """Write a model with its checks and where it comes from."""
+    model, body = exported.model, scope.body
+    sizes = body.size if isinstance(body, Box) else (body.radius, body.height)
+    attributes = {
+        "title": f"Real-time model of a {body.shape}, frictionless tools",
+        "source": f"epsmesh {version}, {study.name}",
+        "body": f"{body.shape}, " + " x ".join(f"{1e3 * size:g}" for size in sizes) + " mm, held at its bottom",
+        "tools": "disc, sphere, sharp cone: frictionless, straight down, contact up to "
+        f"{model.largest:g} of the way to the nearest side or the bottom",
+        "held": f"{sum(check.is_held for check in exported.judged)} of {len(exported.judged)} judged touches",
+    }
+    write_model(path, model, columns(exported.fitted, exported.judged), attributes)
