@@ -161,6 +161,7 @@ static int is_sound(const epsmesh_model *m) {
             if (!(fabs(dot) < 1e-9)) return 0;
         }
     }
+    if (m->bar[3] < 0) return 0;
     for (i = 0; i < 2; i++)
         if (!(0 < m->reach[i] && m->reach[i] < m->sides[i])) return 0;
     if (m->is_round && m->counts[1] != 1) return 0;
@@ -178,7 +179,7 @@ epsmesh_status epsmesh_load(epsmesh_model *m, const void *data, size_t size) {
         {"curvature", m->curvature, EPSMESH_MOST_IN_ALL, {0}, -1},
         {"axes", m->axes[0], 9, {0}, -1},
         {"origin", m->origin, 3, {0}, -1},
-        {"bar", m->bar, 3, {0}, -1},
+        {"bar", m->bar, 4, {0}, -1},
         {"reach", m->reach, 2, {0}, -1},
         {"sides", m->sides, 2, {0}, -1},
         {"poisson_range", m->poisson_range, 2, {0}, -1},
@@ -191,7 +192,7 @@ epsmesh_status epsmesh_load(epsmesh_model *m, const void *data, size_t size) {
         {"largest", &m->largest, 1, {0}, -1},
     };
     static const int ranks[WANTED] = {3, 3, 2, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0};
-    static const size_t firsts[] = {3, 3, 3, 2, 2, 2};
+    static const size_t firsts[] = {3, 3, 4, 2, 2, 2};
     m->is_loaded = 0;
     r.data = (const unsigned char *)data, r.size = size, r.at = 0, r.failed = data == NULL;
     if (!read_variables(&r, w)) return EPSMESH_NO_MODEL;
@@ -453,7 +454,8 @@ epsmesh_touch epsmesh_touch_at(const epsmesh_model *m, const epsmesh_query *q) {
     }
     share = (k.radius / room) * (k.radius / room);
     t.status = EPSMESH_OK, t.stiffness = q->young * k.stiffness, t.contact_radius = k.radius;
-    t.force_error = k.stiffness * ((m->bar[0] + m->bar[2] * share * share) / room + m->bar[1] * fabs(p.h) * k.mean_square);
+    t.force_error = m->bar[3] + k.stiffness * ((m->bar[0] + m->bar[2] * share * share) / room +
+                                               m->bar[1] * fabs(p.h) * k.mean_square);
     for (i = 0; i < 3; i++)
         t.force[i] = q->young * (k.aside[0] * m->axes[0][i] + k.aside[1] * m->axes[1][i] + k.force * m->axes[2][i]);
     if (!(k.force > 0 && is_positive(t.stiffness) && isfinite(t.force_error) && isfinite(t.force[0]) &&

@@ -36,7 +36,7 @@ typedef struct {
     double reciprocal[EPSMESH_MOST_IN_ALL], curvature[EPSMESH_MOST_IN_ALL]; /* Chebyshev, over (nu, v, u) */
     int counts[3], is_round, is_loaded;
     double c_ref, reach[2], sides[2], thickness, origin[3], axes[3][3], poisson_range[2];
-    double young, poisson, largest, bar[3];
+    double young, poisson, largest, bar[4];
 } epsmesh_model;
 
 typedef struct {

@@ -44,8 +44,8 @@ class Check:
 
     @property
     def is_held(self) -> bool:
-        """Whether both bars together hold the difference."""
-        return abs(self.error) <= self.bar + self.full_error
+        """Whether the model's bar holds the difference."""
+        return abs(self.error) <= self.bar
 
 
 @stage("checks")
@@ -107,9 +107,9 @@ def _mm(length: float) -> str:
     return f"{1e3 * length:.12g} mm"
 
 
-def needed(checks: Sequence[Check]) -> float:
-    """Return the factor by which bars must grow to hold the errors of ``checks``, with a safety, at least 1."""
-    return max(1.0, _SAFETY * max((abs(check.error) + check.full_error) / check.bar for check in checks))
+def needed(checks: Sequence[Check], floor: float) -> float:
+    """Return by how much bars must grow, ``floor`` apart, to hold errors with a safety, at least 1."""
+    return max(1.0, _SAFETY * max((abs(check.error) - floor) / (check.bar - floor) for check in checks))
 
 
 def columns(fitted: Sequence[Check], judged: Sequence[Check]) -> dict[str, tuple[str, FloatArray]]:

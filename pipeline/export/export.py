@@ -18,8 +18,9 @@ from pipeline.shapes.bodies.box import Box
 # units of the way to the nearest side or the bottom.
 MARGIN, LARGEST = 0.15, 0.4
 # The table may miss c by this share of what the asked accuracy leaves for the largest disc; full solves are as much
-# more precise. Bars before they are fitted: of c, of h's part, and of the fourth power of what a contact measures.
-_SHARE, _PRECISE, _BARS = 0.4, 0.25, (5e-4, 0.03, 0.1)
+# more precise. Bars before they are fitted: of c, of h's part, and of the fourth power of what a contact measures;
+# besides, no bar is shorter than what full solves tell.
+_SHARE, _PRECISE, _BARS = 0.4, 0.25, (1e-3, 0.03, 0.1)
 _SEEDS = (1, 2)
 
 
@@ -66,21 +67,22 @@ def export(scope: Scope, accuracy: float, checks: int, *, margin: float = MARGIN
         return compliances(mesh, region, places, poisson)
 
     table, missed = tabulate(region, scope.poissons, counted, _SHARE * accuracy)
-    top = scope.body.heights[1]
+    top, precise = scope.body.heights[1], _PRECISE * accuracy
     bare = Model(
         table, np.array([0.0, 0.0, top]), np.eye(3), region.sides, region.thickness, scope.young, scope.poisson,
-        largest, _BARS,
+        largest, (*_BARS, precise),
     )  # fmt: skip
-    precise = _PRECISE * accuracy
     halves = [checks - checks // 2, checks // 2]
     fitted, judged = (
         check_touches(bare, region, scope.body, count, seed, precise)
         for count, seed in zip(halves, _SEEDS, strict=True)
     )
-    factor = needed(fitted)
+    factor = needed(fitted, precise)
     first, second, third = _BARS
-    model = replace(bare, bar=(factor * first, factor * second, factor * third))
-    fitted, judged = ([replace(check, bar=factor * check.bar) for check in half] for half in (fitted, judged))
+    model = replace(bare, bar=(factor * first, factor * second, factor * third, precise))
+    fitted, judged = (
+        [replace(check, bar=precise + factor * (check.bar - precise)) for check in half] for half in (fitted, judged)
+    )
     return Exported(model, fitted, judged, missed, len(solved))
 
 

@@ -12,7 +12,7 @@ All numbers that a query needs are doubles, in SI units, for a body with E = 1:
     poisson_range            (2,) of Poisson's ratios
     young, poisson           those of the study (Pa, 1), which hold where a query gives none
     largest                  largest radius of contact, in units of the way to the nearest side or the bottom
-    bar                      (3,) b: c may be off by (b0 + b2 (a/room)⁴)/room + b1 |h| <r²>
+    bar                      (4,) b: c may be off by (b0 + b2 (a/room)⁴)/room + b1 |h| <r²>, and F by b3 of it besides
 
 What people read besides: check_* (check) are touches that no bar was fitted to, by full solves of the program and by
 the model; attributes say what was exported, by which version and from which study.

@@ -59,7 +59,8 @@ class Model:
     """A body's face: ``origin`` (3,) and ``axes`` (3, 3), rows x, y and the outward normal; sizes in m, E in Pa.
 
     ``sides`` are the half extents of the face, ``largest`` the largest radius of contact in units of the way to the
-    nearest side or the bottom, ``bar`` the shares of c, of h's part and of what is beyond it that count as error.
+    nearest side or the bottom, ``bar`` the shares of c, of h's part, of what is beyond
+    it, and of F, that count as error.
     """
 
     table: Table
@@ -70,7 +71,7 @@ class Model:
     young: float
     poisson: float
     largest: float
-    bar: tuple[float, float, float]
+    bar: tuple[float, float, float, float]
 
     def query(
         self,
@@ -112,7 +113,7 @@ class Model:
             return _refused("large")
         normal = modulus * contact.force
         force = np.array([*(modulus * contact.aside), normal]) @ self.axes
-        error = contact.stiffness * self._uncertain(place, room, contact)
+        error = contact.stiffness * self._uncertain(place, room, contact) + self.bar[3]
         if not (np.isfinite(force).all() and isfinite(error) and contact.force > 0 and contact.stiffness > 0):
             return _refused("damaged")
         return Touch("ok", force, error, modulus * contact.stiffness, contact.radius)
@@ -150,7 +151,7 @@ class Model:
 
     def _uncertain(self, place: Place, room: float, contact: Contact) -> float:
         """Return how far c may be off (1/m), what is left out of it included."""
-        of_c, of_h, beyond = self.bar
+        of_c, of_h, beyond, _ = self.bar
         share = (contact.radius / room) ** 4
         return (of_c + beyond * share) / room + of_h * abs(place.h) * contact.mean_square
 
@@ -171,7 +172,7 @@ def model_of(data: bytes) -> Model:
         ModelError: if they are no model, or of another version, or damaged.
     """
     found = read_doubles(data)
-    shapes = {"reciprocal": 3, "curvature": 3, "origin": (3,), "axes": (3, 3), "bar": (3,)}
+    shapes = {"reciprocal": 3, "curvature": 3, "origin": (3,), "axes": (3, 3), "bar": (4,)}
     shapes |= dict.fromkeys(("reach", "sides", "poisson_range"), (2,))
     shapes |= dict.fromkeys(("format", "is_round", "c_ref", "thickness", "young", "poisson", "largest"), ())
     for name, shape in shapes.items():
@@ -190,7 +191,9 @@ def model_of(data: bytes) -> Model:
         found["reciprocal"], found["curvature"], float(found["c_ref"]), (reach[0], reach[1]), is_round,
         (ratios[0], ratios[1]),
     )  # fmt: skip
-    return Model(table, found["origin"], found["axes"], (sides[0], sides[1]), bar=(bar[0], bar[1], bar[2]), **rest)
+    return Model(
+        table, found["origin"], found["axes"], (sides[0], sides[1]), bar=(bar[0], bar[1], bar[2], bar[3]), **rest
+    )
 
 
 def _check(found: dict[str, NDArray[np.float64]]) -> None:

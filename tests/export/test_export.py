@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from pipeline.export.checks import Check, needed
 from pipeline.export.compliance import Region, coarse_mesh, compliances
 from pipeline.export.scope import ExportError, scope_of
 from pipeline.export.tabulate import tabulate
@@ -96,7 +97,7 @@ def middle() -> Model:
     t = 1 / (c + 100)
     numbers = (np.full((1, 1, 1), t), np.full((1, 1, 1), h * t**3))
     table = Table(*numbers, 100.0, region.reach, True, (0.45, 0.45))
-    return Model(table, np.zeros(3), np.eye(3), region.sides, 0.02, 10e3, 0.45, 0.5, (0.0, 0.0, 0.0))
+    return Model(table, np.zeros(3), np.eye(3), region.sides, 0.02, 10e3, 0.45, 0.5, (0.0, 0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -119,3 +120,11 @@ def test_forces_are_those_of_full_solves(middle, probe, asked, most):
     touch = middle.query(asked.pop("tool"), at=(0.0, 0.0, 0.0), depth=depth, **asked)
     assert touch.status == "ok"
     assert touch.force[2] == pytest.approx(force, rel=most + bar)
+
+
+def test_bars_grow_until_they_hold_what_they_were_fitted_to():
+    touches = [Check(0, 0, 1e-3, 1e-5, 0.4, 1.0, 1e-3, 1 + error, 0.006) for error in (0.001, -0.011)]
+    assert needed(touches[:1], 0.002) == 1.0
+    factor = needed(touches, 0.002)
+    assert 0.011 < 0.002 + factor * (0.006 - 0.002) < 0.015
+    assert [touch.is_held for touch in touches] == [True, False]

@@ -19,7 +19,7 @@ def random_model(*, is_round: bool = False, turned: bool = False) -> Model:
     table = Table(0.02 * reciprocal, 0.06 * curvature, 45.0, reach, is_round, (0.3, 0.49))
     axes = np.linalg.qr(rng.standard_normal((3, 3)))[0] if turned else np.eye(3)
     origin = np.array([0.1, -0.2, 0.05]) if turned else np.zeros(3)
-    return Model(table, origin, axes, sides, 0.02, 10e3, 0.45, 0.5, (0.02, 0.1, 0.5))
+    return Model(table, origin, axes, sides, 0.02, 10e3, 0.45, 0.5, (0.02, 0.1, 0.5, 0.001))
 
 
 def write_random(path: Path, **kind: bool) -> Model:
