@@ -30,7 +30,7 @@ def test_memory_of_a_solve_is_not_underestimated(method):
     """In a process of its own: one that has solved before keeps memory for the next time."""
     code = (
         "from tests.cases import solve;"
-        f"(r,) = solve(mesh={{'fine': '2 mm', 'model': '3d'}}, solve={{'method': '{method}'}}).values();"
+        f"(r,) = solve(mesh={{'fine': '2.5 mm', 'model': '3d'}}, solve={{'method': '{method}'}}).values();"
         "print(r.memory, r.dofs)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
