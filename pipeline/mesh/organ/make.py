@@ -12,6 +12,7 @@ from pipeline.mesh.generate import GeometryError, MeshArrays, MeshError, orient
 from pipeline.mesh.organ.base import DEVIATION, Base, Kept, far_surface, put_back
 from pipeline.mesh.organ.contact import Contact, set_in
 from pipeline.mesh.organ.field import Field
+from pipeline.mesh.organ.folds import unfolded
 from pipeline.mesh.organ.inclusions import inclusion_surfaces
 from pipeline.mesh.organ.remesh import remesh
 from pipeline.mesh.organ.sheet import PROBE, Sheet, edges_of, group_names
@@ -24,8 +25,9 @@ from pipeline.shapes.scanned import Scanned
 # The surface is meshed twice: only the second time its points are dense where sizes change fast.
 _PASSES = 2
 # Where elements far from the contact are so large that the surface meets itself across a thin part or a gap, they are
-# to be no larger than these are wide; if that is not enough, this many times smaller everywhere.
-_ATTEMPTS = ((1, False), (1, True), (2, False), (4, False), (8, False))
+# to be no larger than these are wide. If that is not enough, facets folded upon each other at sharp rims are opened;
+# at last elements are this many times smaller everywhere.
+_ATTEMPTS = ((1, False, False), (1, True, False), (1, True, True), (2, False, True), (4, False, True), (8, False, True))
 # The remesher turns lengths into units of its own and back, which moves points by rounding.
 _SAME = 1e-6
 # A share of the body's volume: chords of elements leave half a per cent of an organ out, which their curved edges bring
@@ -43,9 +45,9 @@ def mesh_scanned(scene: Scene, body: Scanned, sizes: Sizes, kept: Kept | None = 
         MeshError: if a mesh generator fails with smaller elements, too.
     """
 
-    def mesh(finer: int, adapted: bool) -> MeshArrays:
+    def mesh(finer: int, adapted: bool, opened: bool) -> MeshArrays:
         smaller = replace(sizes, column=sizes.column / finer)
-        return mesh_organ(scene, smaller, far_surface(body, kept, finer, adapted))
+        return mesh_organ(scene, smaller, far_surface(body, kept, finer, adapted), opened)
 
     for attempt in _ATTEMPTS[:-1]:
         try:
@@ -57,9 +59,10 @@ def mesh_scanned(scene: Scene, body: Scanned, sizes: Sizes, kept: Kept | None = 
     return mesh(*_ATTEMPTS[-1])
 
 
-def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
+def mesh_organ(scene: Scene, sizes: Sizes, far: Base, opened: bool = False) -> MeshArrays:
     """Mesh a ``scene`` whose body is bounded by triangles, from its surface ``far`` from the contact.
 
+    If ``opened``, folds of the surface are, at the cost of points that are then beside it.
     The same input gives the same arrays, bit for bit.
 
     Raises:
@@ -75,6 +78,8 @@ def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
     contact = set_in(far.sheet, scene.frame, scene.footprint, sizes, lift)
     field = Field(sizes, scene.frame, contact.edge, far.narrow, inclusion_sizes(scene.body, sizes.growth))
     sheet = _to_sizes(contact, field, _Truth(scene, far, lift))
+    if opened:
+        sheet = unfolded(sheet)
     _check_whole(sheet, scene.body.volume)
     points, cells, regions = fill(sheet.points, sheet.facets, field, inclusion_surfaces(scene.body.inclusion, field))
     facets = {name: sheet.facets[sheet.group == number] for number, name in group_names().items()}
