@@ -30,9 +30,9 @@ def study_page() -> str:
     lines = [
         "# Study file", "",
         "TOML. A list where one value is expected is a sweep, and a dimension of the dataset; so is an array of tables "
-        "(`[[probe]]`), labelled by the tables' `name`. Quantities are text with a unit (`\"10 mm\"`, `\"12 kPa\"`, "
-        "`\"1 %\"`): prefixes of metre and pascal, `bar`, and `%`; of loads "
-        "kg/m^3 and m/s^2. `title` stands before the sections.",
+        "(`[[probe]]`), labelled by the tables' `name`. Quantities are text, one number and one unit (`\"10 mm\"`, "
+        "`\"12 kPa\"`, `\"1 %\"`): prefixes of metre and pascal, `bar`, and `%`; of loads kg/m^3 and m/s^2. A decimal "
+        "comma, a ±, or anything that would have to be calculated is an error. `title` stands before the sections.",
     ]  # fmt: skip
     for section in all_sections():
         lines += [

@@ -1,7 +1,12 @@
-"""Quantities written with their unit, as text, and read into SI numbers."""
+"""Quantities written with their unit, as text, and read into SI numbers.
 
+One number and one unit, by a grammar of our own: pint, whose texts are calculations, is asked what a unit is worth.
+"""
+
+import re
+from dataclasses import dataclass
 from functools import cache
-from math import pi
+from math import inf, pi
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BeforeValidator, Field
@@ -31,18 +36,41 @@ radian = [] = rad
 degree = 3.14159265358979323846 / 180 * radian = deg = °
 """.strip().splitlines()
 
-# By SI unit: an example of a quantity, and what it is.
+
+@dataclass(frozen=True)
+class _Kind:
+    """What a quantity is called, an example of one, and the units that people write it in."""
+
+    name: str
+    example: str
+    units: tuple[str, ...]
+
+
+# By SI unit.
 _KINDS = {
-    "m": ("10 mm", "a length"),
-    "Pa": ("10 kPa", "a pressure"),
-    "s": ("10 ms", "a time"),
-    "": ("1 %", "a share"),
-    "rad": ("60 deg", "an angle"),
-    "kg/m^3": ("1060 kg/m^3", "a density"),
-    "m/s^2": ("-9.81 m/s^2", "an acceleration"),
+    "m": _Kind("a length", "10 mm", ("mm", "cm", "m", "µm")),
+    "Pa": _Kind("a pressure", "10 kPa", ("Pa", "kPa", "MPa", "GPa", "bar", "mbar", "N/m^2", "N/mm^2")),
+    "s": _Kind("a time", "10 ms", ("s", "ms", "µs")),
+    "": _Kind("a share", "1 %", ("%",)),
+    "rad": _Kind("an angle", "60 deg", ("deg", "°", "rad")),
+    "kg/m^3": _Kind("a density", "1060 kg/m^3", ("kg/m^3", "g/cm^3")),
+    "m/s^2": _Kind("an acceleration", "-9.81 m/s^2", ("m/s^2", "mm/s^2")),
 }
+# Pure numbers by another name: alone they are a unit, within another one they would hide a factor.
+_PURE = {"": ("%", "percent"), "rad": ("deg", "degree", "°", "rad", "radian")}
 # Twelve digits: "3 mm" and "0.3 cm" must be one number wherever two cases are compared.
 _DIGITS = 12
+
+# What is written as something else by a keyboard, a word processor or a table that it was copied from.
+_SPELLINGS = str.maketrans({"\N{MINUS SIGN}": "-", "\N{GREEK SMALL LETTER MU}": "\N{MICRO SIGN}", "²": "^2", "³": "^3",
+                            "·": "*", "⋅": "*", "\N{NO-BREAK SPACE}": " ", "\N{NARROW NO-BREAK SPACE}": " ",
+                            "\N{THIN SPACE}": " "})  # fmt: skip
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?(?![0-9.])")
+_FACTOR = re.compile(r"([A-Za-zµ]+|%|°)(?:(?:\^|\*\*)(-?[0-9]))?")
+# Products, then divisors, one after the other: "kg/m s^2" would be read in two ways.
+_UNIT = re.compile(rf"{_FACTOR.pattern}(?:(?: |\*){_FACTOR.pattern})*(?:/{_FACTOR.pattern})*")
+_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
+_NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)\b", re.IGNORECASE)
 
 
 @cache
@@ -61,23 +89,64 @@ def canonical(value: float) -> float:
 
 
 def parse_quantity(text: Any, unit: str) -> float:
-    """Read ``"10 mm"`` into a number in the SI ``unit``; a bare number is refused, never guessed."""
-    example, kind = _KINDS[unit]
-    allowed = f'a number with a unit as text, such as "{example}"'
+    """Read one number and one unit, ``"10 mm"``, into a number in the SI ``unit``; nothing else is read, or guessed.
+
+    A share may be a pure number, too: ``"0.05"``.
+
+    Raises:
+        ValueError: with what is allowed, and what is wrong with ``text``.
+    """
     if not isinstance(text, str):
-        raise PydanticCustomError("quantity", "{allowed}", {"allowed": allowed})
-    try:
-        quantity = _registry().Quantity(text)
-        if not quantity.is_compatible_with(unit):
-            raise PydanticCustomError("quantity", "{allowed}", {"allowed": f'{kind}, such as "{example}"'})
-        magnitude = float(quantity.to(unit).magnitude)
-    except PydanticCustomError:
-        raise
-    except Exception:  # pint raises many kinds, down to tokenizer errors, on text that is no quantity
-        raise PydanticCustomError("quantity", "{allowed}", {"allowed": allowed}) from None
-    if not abs(magnitude) < float("inf"):
-        raise PydanticCustomError("quantity", "{allowed}", {"allowed": "a finite number with a unit"})
-    return canonical(magnitude)
+        raise _refusal(unit, "")
+    plain = text.translate(_SPELLINGS).strip()
+    if comma := _COMMA.match(plain):
+        whole, fraction = comma.group().split(",")
+        others = f" or {whole}{fraction}" if len(fraction) == 3 else ""
+        raise _refusal(unit, f"{comma.group()} has a comma: write {whole}.{fraction}{others}")
+    found = _NUMBER.match(plain)
+    if found is None:
+        finite = "the number must be finite" if _NOT_FINITE.match(plain) else "it begins with a number"
+        raise _refusal(unit, finite)
+    value, rest = float(found.group()), plain[found.end() :].strip()
+    factor = _factor(rest, unit)
+    if not rest and abs(value) >= 1:
+        raise _refusal(unit, f'{found.group()} without a unit would be {100 * value:g} %: is "{value:g} %" meant, that '
+                             f"is {value / 100:g}?")  # fmt: skip
+    if not abs(value * factor) < inf:
+        raise _refusal(unit, "the number must be finite")
+    return canonical(value * factor)
+
+
+@cache
+def _factor(text: str, unit: str) -> float:
+    """Return what a number before the unit ``text`` is multiplied with to be one in the SI ``unit``."""
+    kind = _KINDS[unit]
+    if not text and unit == "":
+        return 1.0
+    allowed = f"allowed are {', '.join(kind.units)}" if len(kind.units) > 1 else f"write {kind.units[0]}"
+    if not text:
+        raise _refusal(unit, f"the unit is missing; {allowed}")
+    if not _UNIT.fullmatch(text):
+        raise _refusal(unit, f"one number and one unit are taken, and `{text}` is no unit; {allowed}")
+    for symbol, _ in _FACTOR.findall(text):
+        if symbol not in _registry():
+            meant = next((u for u in kind.units if u.casefold() == text.casefold()), None)
+            raise _refusal(unit, f"unknown unit `{symbol}`; " + (f"did you mean {meant}?" if meant else allowed))
+    is_pure = any(symbol in pure for pure in _PURE.values() for symbol, _ in _FACTOR.findall(text))
+    if is_pure and text not in _PURE.get(unit, ()):
+        raise _refusal(unit, f"`{text}` is no unit of {kind.name}; {allowed}")
+    quantity = _registry().Quantity(1.0, text.replace("**", "^"))
+    if not quantity.is_compatible_with(unit) or (not is_pure and unit in _PURE):
+        raise _refusal(unit, f"`{text}` is no unit of {kind.name}; {allowed}")
+    return float(quantity.to(unit).magnitude)
+
+
+def _refusal(unit: str, why: str) -> PydanticCustomError:
+    kind = _KINDS[unit]
+    what = (
+        f'{kind.name}, such as "{kind.example}"' if why else f'a number with a unit as text, such as "{kind.example}"'
+    )
+    return PydanticCustomError("quantity", "{allowed}", {"allowed": f"{what}; {why}" if why else what})
 
 
 def _length(text: Any) -> float:

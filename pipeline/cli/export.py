@@ -42,7 +42,7 @@ def export(
     try:
         wanted = parse_quantity(accuracy, "")
     except ValueError as wrong:
-        fail(f"--accuracy {accuracy}: {wrong}")
+        fail(f"--accuracy {accuracy}: must be {wrong}")
     if not _ACCURACIES[0] <= wanted <= _ACCURACIES[1]:
         fail(f"--accuracy {accuracy}: must be between {100 * _ACCURACIES[0]:g}% and {100 * _ACCURACIES[1]:g}%")
     (study,) = load_all([file])

@@ -66,11 +66,10 @@ def quantity(name: str, value: str | float, unit: str) -> float:
     Raises:
         ValueError: with what is allowed.
     """
-    example = {"": "5 %", "s": "10 ms"}[unit]
     try:
         number = parse_quantity(value, unit) if isinstance(value, str) else float(value)
-    except ValueError:
-        raise ValueError(f'{name} = {value!r}: must be a number with a unit as text, such as "{example}"') from None
+    except ValueError as wrong:
+        raise ValueError(f"{name} = {value!r}: must be {wrong}") from None
     if not 0 < number < (1 if unit == "" else inf):
         allowed = 'more than "0 %" and less than "100 %"' if unit == "" else 'more than "0 s"'
         raise ValueError(f"{name} = {value!r}: must be {allowed}")

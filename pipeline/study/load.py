@@ -35,7 +35,7 @@ def load(path: str | Path) -> Study:
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # some editors begin a file with the mark of its encoding
         raw = tomllib.loads(text)
     except OSError as error:
         raise StudyError(str(path), [Problem("file", None, error.strerror or str(error))]) from None
