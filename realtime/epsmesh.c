@@ -6,7 +6,7 @@
 #include <string.h>
 
 static const double PI = 3.14159265358979323846;
-static const double FORMAT = 1.0, TOUCHING = 1e-12, SMALLEST = 1e-6, OFF = 1e-6, ALIGNED = 1e-6;
+static const double FORMAT = 2.0, TOUCHING = 1e-12, SMALLEST = 1e-6, SLENDER = 0.02, SOFT = 1e-12;
 static const double BALL_LIMIT = 0.6, NEGLIGIBLE = 1e-17, SAME = 4e-16;
 enum { STEPS = 60, TERMS = 40 };
 
@@ -81,11 +81,11 @@ static double as_double(const unsigned char *b) {
 typedef struct {
     const char *name;
     double *into;
-    size_t room, length[3];
+    size_t room, length[4];
     int rank; /* -1: not yet found */
 } wanted;
 
-enum { WANTED = 15 };
+enum { WANTED = 22, OPTIONAL = 21 };
 
 /* Return where the `n` doubles of a variable begin, or NULL if they are not all in the file. */
 static const unsigned char *found_at(const reader *r, const unsigned char *begin, const size_t *shape, int rank,
@@ -105,7 +105,7 @@ static const unsigned char *found_at(const reader *r, const unsigned char *begin
 
 static int fill(wanted *w, const unsigned char *values, size_t n, const size_t *shape, int rank) {
     size_t i;
-    if (rank > 3 || n == 0 || n > w->room) return 0;
+    if (rank > 4 || n == 0 || n > w->room) return 0;
     for (i = 0; i < (size_t)rank; i++) w->length[i] = shape[i];
     for (i = 0; i < n; i++) {
         w->into[i] = as_double(values + 8 * i);
@@ -154,7 +154,7 @@ static int read_variables(reader *r, wanted *w) {
 static int is_sound(const epsmesh_model *m) {
     int i, j, k;
     for (i = 0; i < 3; i++) {
-        if (m->counts[i] > EPSMESH_MOST || m->bar[i] < 0) return 0;
+        if (m->bar[i] < 0) return 0;
         for (j = 0; j < 3; j++) {
             double dot = i == j ? -1.0 : 0.0;
             for (k = 0; k < 3; k++) dot += m->axes[i][k] * m->axes[j][k];
@@ -164,14 +164,15 @@ static int is_sound(const epsmesh_model *m) {
     if (m->bar[3] < 0) return 0;
     for (i = 0; i < 2; i++)
         if (!(0 < m->reach[i] && m->reach[i] < m->sides[i])) return 0;
-    if (m->is_round && m->counts[1] != 1) return 0;
+    if (m->is_round && (m->counts[1] != 1 || m->face_counts[0] != 1)) return 0;
+    if (!(m->off > 0 && m->aligned > 0 && m->aligned <= 0.5)) return 0;
     if (!(-1 < m->poisson_range[0] && m->poisson_range[0] <= m->poisson && m->poisson <= m->poisson_range[1])) return 0;
     if (m->poisson_range[1] > 0.5 || (m->counts[0] > 1 && m->poisson_range[0] == m->poisson_range[1])) return 0;
     return m->thickness > 0 && m->young > 0 && m->largest > 0 && m->largest <= 1;
 }
 
 epsmesh_status epsmesh_load(epsmesh_model *m, const void *data, size_t size) {
-    double format, is_round;
+    double format, is_round, even[2], leans;
     reader r;
     int i;
     wanted w[WANTED] = {
@@ -190,20 +191,41 @@ epsmesh_status epsmesh_load(epsmesh_model *m, const void *data, size_t size) {
         {"young", &m->young, 1, {0}, -1},
         {"poisson", &m->poisson, 1, {0}, -1},
         {"largest", &m->largest, 1, {0}, -1},
+        {"off", &m->off, 1, {0}, -1},
+        {"aligned", &m->aligned, 1, {0}, -1},
+        {"leans", &leans, 1, {0}, -1},
+        {"even", even, 2, {0}, -1},
+        {"height", m->height, EPSMESH_MOST_IN_ALL, {0}, -1},
+        {"bend", m->bend, EPSMESH_MOST_IN_ALL, {0}, -1},
+        {"tensors", m->tensors, EPSMESH_TENSORS * EPSMESH_MOST_IN_ALL, {0}, -1}, /* may be missing */
     };
-    static const int ranks[WANTED] = {3, 3, 2, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0};
+    static const int ranks[WANTED] = {3, 3, 2, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 2, 4};
     static const size_t firsts[] = {3, 3, 4, 2, 2, 2};
     m->is_loaded = 0;
     r.data = (const unsigned char *)data, r.size = size, r.at = 0, r.failed = data == NULL;
     if (!read_variables(&r, w)) return EPSMESH_NO_MODEL;
     for (i = 0; i < WANTED; i++)
-        if (w[i].rank != ranks[i] || (i >= 2 && i < 8 && w[i].length[0] != firsts[i - 2])) return EPSMESH_NO_MODEL;
+        if ((i < OPTIONAL || w[i].rank >= 0) && w[i].rank != ranks[i]) return EPSMESH_NO_MODEL;
+    for (i = 0; i < WANTED; i++)
+        if ((i >= 2 && i < 8 && w[i].length[0] != firsts[i - 2])) return EPSMESH_NO_MODEL;
     if (w[2].length[1] != 3 || format != FORMAT || (is_round != 0 && is_round != 1)) return EPSMESH_NO_MODEL;
-    m->is_round = is_round == 1;
+    if ((leans != 0 && leans != 1) || w[18].length[0] != 2) return EPSMESH_NO_MODEL;
+    m->is_round = is_round == 1, m->leans = leans == 1, m->has_tensors = w[OPTIONAL].rank == 4;
+    for (i = 0; i < 2; i++) {
+        if ((even[i] != 0 && even[i] != 1) || w[19].length[i] != w[20].length[i]) return EPSMESH_NO_MODEL;
+        if (w[19].length[i] > EPSMESH_MOST) return EPSMESH_NO_MODEL;
+        m->even[i] = even[i] == 1, m->face_counts[i] = (int)w[19].length[i];
+    }
+    if (m->has_tensors && w[OPTIONAL].length[0] != EPSMESH_TENSORS) return EPSMESH_NO_MODEL;
     for (i = 0; i < 3; i++) {
         if (w[0].length[i] != w[1].length[i]) return EPSMESH_NO_MODEL;
+        if (m->has_tensors && w[OPTIONAL].length[i + 1] != w[0].length[i]) return EPSMESH_NO_MODEL;
+        if (w[0].length[i] > EPSMESH_MOST) return EPSMESH_NO_MODEL;
         m->counts[i] = (int)w[0].length[i];
     }
+    m->is_flat = 1;
+    for (i = 0; i < m->face_counts[0] * m->face_counts[1]; i++)
+        if (m->height[i] != 0 || m->bend[i] != 0) m->is_flat = 0;
     m->is_loaded = is_sound(m);
     return m->is_loaded ? EPSMESH_OK : EPSMESH_NO_MODEL;
 }
@@ -211,12 +233,17 @@ epsmesh_status epsmesh_load(epsmesh_model *m, const void *data, size_t size) {
 /* ---- the table ---- */
 
 typedef struct {
-    double c, h, tilt, slope_c[2], slope_h[2], slope_tilt[2], plane;
+    double c, h, tilt, slope_c[2], slope_h[2], slope_tilt[2], plane, poisson, bend, slope_bend[2];
+    double bent[2], bent_slopes[2][2], lean[2], hessian[2][2], regular[3][3]; /* of blades and bonded tools */
 } place;
 
 typedef struct {
     double f, slope[2], xx, xy, yy;
 } value;
+
+typedef struct {
+    double nu[3][EPSMESH_MOST], left[3][EPSMESH_MOST], right[3][EPSMESH_MOST];
+} terms;
 
 static void polynomials(double at, int n, double p[3][EPSMESH_MOST]) {
     int i;
@@ -229,20 +256,31 @@ static void polynomials(double at, int n, double p[3][EPSMESH_MOST]) {
     }
 }
 
-static value along(const epsmesh_model *m, const double *table, const double nu[3][EPSMESH_MOST],
-                   const double left[3][EPSMESH_MOST], const double right[3][EPSMESH_MOST], double x, double y) {
-    int i, j, k, rows = m->counts[1], columns = m->counts[2];
-    double f = 0, fu = 0, fv = 0, fuu = 0, fuv = 0, fvv = 0, bend = 4 / (m->reach[0] * m->reach[0]);
+static void directions(const epsmesh_model *m, double x, double y, int rows, int columns, terms *p) {
+    double a = m->reach[0], b = m->reach[1], u, v;
+    if (m->is_round) {
+        u = 2 * (x * x + y * y) / (a * a) - 1, v = 0;
+    } else {
+        u = m->even[0] ? 2 * (x / a) * (x / a) - 1 : x / a;
+        v = m->even[1] ? 2 * (y / b) * (y / b) - 1 : y / b;
+    }
+    polynomials(v, rows, p->left);
+    polynomials(u, columns, p->right);
+}
+
+static value along(const epsmesh_model *m, const double *table, const terms *p, const int counts[3], double x, double y) {
+    int i, j, k, rows = counts[1], columns = counts[2];
+    double f = 0, fu = 0, fv = 0, fuu = 0, fuv = 0, fvv = 0, a = m->reach[0], b = m->reach[1], bend = 4 / (a * a);
     value found;
     for (j = 0; j < rows; j++) {
         double sum[3] = {0, 0, 0};
         for (k = 0; k < columns; k++) {
             double flat = 0;
-            for (i = 0; i < m->counts[0]; i++) flat += nu[0][i] * table[(i * rows + j) * columns + k];
-            sum[0] += flat * right[0][k], sum[1] += flat * right[1][k], sum[2] += flat * right[2][k];
+            for (i = 0; i < counts[0]; i++) flat += p->nu[0][i] * table[(i * rows + j) * columns + k];
+            sum[0] += flat * p->right[0][k], sum[1] += flat * p->right[1][k], sum[2] += flat * p->right[2][k];
         }
-        f += left[0][j] * sum[0], fu += left[0][j] * sum[1], fuu += left[0][j] * sum[2];
-        fv += left[1][j] * sum[0], fuv += left[1][j] * sum[1], fvv += left[2][j] * sum[0];
+        f += p->left[0][j] * sum[0], fu += p->left[0][j] * sum[1], fuu += p->left[0][j] * sum[2];
+        fv += p->left[1][j] * sum[0], fuv += p->left[1][j] * sum[1], fvv += p->left[2][j] * sum[0];
     }
     found.f = f;
     if (m->is_round) {
@@ -250,41 +288,107 @@ static value along(const epsmesh_model *m, const double *table, const double nu[
         found.slope[0] = fu * ux, found.slope[1] = fu * uy;
         found.xx = fuu * ux * ux + fu * bend, found.xy = fuu * ux * uy, found.yy = fuu * uy * uy + fu * bend;
     } else {
-        double other = 4 / (m->reach[1] * m->reach[1]), ux = bend * x, vy = other * y;
+        double ux = m->even[0] ? bend * x : 1 / a, uxx = m->even[0] ? bend : 0;
+        double vy = m->even[1] ? 4 / (b * b) * y : 1 / b, vyy = m->even[1] ? 4 / (b * b) : 0;
         found.slope[0] = fu * ux, found.slope[1] = fv * vy;
-        found.xx = fuu * ux * ux + fu * bend, found.xy = fuv * ux * vy, found.yy = fvv * vy * vy + fv * other;
+        found.xx = fuu * ux * ux + fu * uxx, found.xy = fuv * ux * vy, found.yy = fvv * vy * vy + fv * vyy;
     }
     return found;
 }
 
-static int place_at(const epsmesh_model *m, double x, double y, double ratio, place *p) {
-    double nu[3][EPSMESH_MOST], left[3][EPSMESH_MOST], right[3][EPSMESH_MOST], u, v, t, q, xx, xy, yy;
-    double low = m->poisson_range[0], high = m->poisson_range[1], a = m->reach[0], b = m->reach[1];
+/* What blades and bonded tools take: the factors of the seven tables are those of pipeline/realtime/table.py. */
+static void shape_at(const epsmesh_model *m, const terms *s, double x, double y, double t, const double slope_t[2],
+                     place *p) {
+    double a = m->reach[0], b = m->reach[1], xi = x / a, eta = y / b, f[EPSMESH_TENSORS], g, own[2];
+    size_t whole = (size_t)m->counts[0] * (size_t)m->counts[1] * (size_t)m->counts[2];
+    int i, k;
+    for (k = 0; k < EPSMESH_TENSORS; k++) {
+        value v = along(m, m->tensors + (size_t)k * whole, s, m->counts, x, y);
+        g = 1, own[0] = own[1] = 0;
+        if ((k == 0 || k == 5) && m->is_round) g = xi * xi - eta * eta, own[0] = 2 * xi / a, own[1] = -2 * eta / b;
+        if (k == 1 || k == 6) g = 2 * xi * eta, own[0] = 2 * eta / a, own[1] = 2 * xi / b;
+        if (k == 2) g = xi;
+        if (k == 3) g = eta;
+        f[k] = g * v.f;
+        for (i = 0; i < 2 && k < 2; i++)
+            p->bent_slopes[k][i] = ((g * v.slope[i] + v.f * own[i]) - 3 * f[k] * slope_t[i] / t) / (t * t * t);
+    }
+    p->bent[0] = f[0] / (t * t * t), p->bent[1] = f[1] / (t * t * t);
+    p->regular[0][0] = (f[4] + f[5]) / t, p->regular[1][1] = (f[4] - f[5]) / t, p->regular[2][2] = p->c;
+    p->regular[0][1] = p->regular[1][0] = f[6] / t;
+    p->regular[0][2] = p->regular[2][0] = f[2] / t;
+    p->regular[1][2] = p->regular[2][1] = f[3] / t;
+}
+
+static int place_at(const epsmesh_model *m, double x, double y, double ratio, int whole, place *p) {
+    double t, q, low = m->poisson_range[0], high = m->poisson_range[1];
     value of_t, of_q;
-    int i;
-    u = m->is_round ? 2 * (x * x + y * y) / (a * a) - 1 : 2 * (x / a) * (x / a) - 1;
-    v = m->is_round ? 0 : 2 * (y / b) * (y / b) - 1;
-    polynomials(high == low ? 0 : (2 * ratio - low - high) / (high - low), m->counts[0], nu);
-    polynomials(v, m->counts[1], left);
-    polynomials(u, m->counts[2], right);
-    of_t = along(m, m->reciprocal, (const double(*)[EPSMESH_MOST])nu, (const double(*)[EPSMESH_MOST])left,
-                 (const double(*)[EPSMESH_MOST])right, x, y);
-    of_q = along(m, m->curvature, (const double(*)[EPSMESH_MOST])nu, (const double(*)[EPSMESH_MOST])left,
-                 (const double(*)[EPSMESH_MOST])right, x, y);
+    terms s;
+    int i, j;
+    polynomials(high == low ? 0 : (2 * ratio - low - high) / (high - low), m->counts[0], s.nu);
+    directions(m, x, y, m->counts[1], m->counts[2], &s);
+    of_t = along(m, m->reciprocal, &s, m->counts, x, y);
+    of_q = along(m, m->curvature, &s, m->counts, x, y);
     t = of_t.f, q = of_q.f;
     if (!(t > 0)) return 0;
     for (i = 0; i < 2; i++) {
         p->slope_c[i] = -of_t.slope[i] / (t * t);
         p->slope_h[i] = of_q.slope[i] / (t * t * t) - 3 * q * of_t.slope[i] / (t * t * t * t);
+        for (j = 0; j < 2; j++) {
+            double second = i == j ? (i ? of_t.yy : of_t.xx) : of_t.xy;
+            p->hessian[i][j] = m->leans ? 2 * of_t.slope[i] * of_t.slope[j] / (t * t * t) - second / (t * t) : 0;
+        }
     }
-    xx = 2 * of_t.slope[0] * of_t.slope[0] / (t * t * t) - of_t.xx / (t * t);
-    xy = 2 * of_t.slope[0] * of_t.slope[1] / (t * t * t) - of_t.xy / (t * t);
-    yy = 2 * of_t.slope[1] * of_t.slope[1] / (t * t * t) - of_t.yy / (t * t);
-    p->slope_tilt[0] = 0.5 * (xx * p->slope_c[0] + xy * p->slope_c[1]);
-    p->slope_tilt[1] = 0.5 * (xy * p->slope_c[0] + yy * p->slope_c[1]);
-    p->tilt = 0.25 * (p->slope_c[0] * p->slope_c[0] + p->slope_c[1] * p->slope_c[1]);
-    p->c = 1 / t - m->c_ref, p->h = q / (t * t * t), p->plane = 1 / (1 - ratio * ratio);
+    for (i = 0; i < 2; i++) {
+        p->lean[i] = m->leans ? p->slope_c[i] : 0;
+        p->slope_tilt[i] = 0.5 * (p->hessian[i][0] * p->slope_c[0] + p->hessian[i][1] * p->slope_c[1]);
+    }
+    p->tilt = 0.25 * (p->lean[0] * p->lean[0] + p->lean[1] * p->lean[1]);
+    p->c = 1 / t - m->c_ref, p->h = q / (t * t * t), p->plane = 1 / (1 - ratio * ratio), p->poisson = ratio;
+    p->bend = p->slope_bend[0] = p->slope_bend[1] = p->bent[0] = p->bent[1] = 0;
+    if (whole) shape_at(m, &s, x, y, t, of_t.slope, p);
     return 1;
+}
+
+/* ---- the face ---- */
+
+typedef struct {
+    double height, slope[2], second[2][2], bend, slope_bend[2], normal[3];
+} spot;
+
+static spot face_at(const epsmesh_model *m, double x, double y) {
+    spot f = {0, {0, 0}, {{0, 0}, {0, 0}}, 0, {0, 0}, {0, 0, 1}};
+    int counts[3], i;
+    double steep;
+    terms s;
+    value z, bend;
+    if (m->is_flat) return f;
+    counts[0] = 1, counts[1] = m->face_counts[0], counts[2] = m->face_counts[1];
+    s.nu[0][0] = 1;
+    directions(m, x, y, counts[1], counts[2], &s);
+    z = along(m, m->height, &s, counts, x, y);
+    bend = along(m, m->bend, &s, counts, x, y);
+    f.height = z.f, f.bend = bend.f;
+    f.second[0][0] = z.xx, f.second[1][1] = z.yy, f.second[0][1] = f.second[1][0] = z.xy;
+    steep = sqrt(1 + z.slope[0] * z.slope[0] + z.slope[1] * z.slope[1]);
+    for (i = 0; i < 2; i++) {
+        f.slope[i] = z.slope[i], f.slope_bend[i] = bend.slope[i];
+        f.normal[i] = -z.slope[i] / steep;
+    }
+    f.normal[2] = 1 / steep;
+    return f;
+}
+
+/* The force on a tool whose tip is at p - d n: its work is what the energy loses. */
+static void force_at(const spot *f, double push, const double aside[2], double depth, double out[3]) {
+    double steep = sqrt(1 + f->slope[0] * f->slope[0] + f->slope[1] * f->slope[1]), m[2][2], det, x, y;
+    int i, j;
+    for (i = 0; i < 2; i++)
+        for (j = 0; j < 2; j++) m[i][j] = (i == j) + f->slope[i] * f->slope[j] + depth / steep * f->second[i][j];
+    det = m[0][0] * m[1][1] - m[0][1] * m[1][0];
+    x = (m[1][1] * aside[0] - m[0][1] * aside[1]) / det, y = (m[0][0] * aside[1] - m[1][0] * aside[0]) / det;
+    out[0] = push * f->normal[0] + x, out[1] = push * f->normal[1] + y;
+    out[2] = push * f->normal[2] + x * f->slope[0] + y * f->slope[1];
 }
 
 /* ---- contact ---- */
@@ -342,9 +446,14 @@ static pressed press_to(double a, const epsmesh_query *tool, const place *p) {
     pressed k = {-1, 0, 0, 0, 0, 0};
     if (!(own > 0)) return k;
     profile(tool, a, d);
+    d[0] += p->bend * a * a, d[1] += 2 * p->bend * a, d[2] += p->bend * cube(a) / 3, d[3] += p->bend * fifth(a) / 5;
     k.force = 2 * stiff * (a * d[0] - d[2]) / own;
     k.square = 4 * stiff * (cube(a) / 3 * d[0] - d[3]) + 4.0 / 15 * stiff * h * k.force * fifth(a);
     k.growth = 2 * stiff * a * d[1] + 2 * stiff * h * k.force * a * a;
+    if (k.growth <= 0 || k.force <= 0) {
+        pressed none = {-1, 0, 0, 0, 0, 0};
+        return none;
+    }
     power = own / k.growth * k.force / a;
     effect = -2.0 / 3 * stiff * p->tilt * cube(a) * k.force * (2 + 3 * power);
     k.depth = d[0] + 0.5 * h * k.force * a * a + p->c * k.force + 0.25 * h * k.square + effect;
@@ -376,8 +485,66 @@ static int press_round(const epsmesh_query *tool, const place *p, double most, c
            4.0 / 3 * p->plane * p->plane * p->tilt * fifth(a) * cube(found.force) / found.growth;
     of_tilt = -2.0 / 3 * p->plane * cube(a) * found.force * found.force;
     for (i = 0; i < 2; i++)
-        k->aside[i] = 0.5 * found.force * found.force * p->slope_c[i] + of_h * p->slope_h[i] + of_tilt * p->slope_tilt[i];
+        k->aside[i] = 0.5 * found.force * found.force * p->slope_c[i] + of_h * p->slope_h[i] +
+                      of_tilt * p->slope_tilt[i] + 0.5 * found.square * p->slope_bend[i];
     return 1;
+}
+
+/* A rectangle's stiffness, where it presses, and how it resists to be tilted: pipeline/realtime/contact.py */
+static const double RECTANGLE[5][8] = {
+    {1.5467288, -0.5389724, 0.154788, -0.0121522, 0.0020102, -0.0001257, 6e-06, -1.4e-06},
+    {0.4134192, 0.0443058, 0.0039289, -0.0011234, -0.0003526, 1.7e-06, 2.01e-05, 4.2e-06},
+    {0.484368, -0.0181444, -0.0053293, -0.0007768, 1.19e-05, 3.22e-05, 7.5e-06, 8e-07},
+    {1.8450174, -0.0168921, 0.2328837, 0.0145178, 0.0050319, 0.0002247, -2e-06, -6.7e-06},
+    {1.7362244, 0.2238417, 0.0903649, 0.0247386, 0.0048149, 0.0006582, 5.88e-05, 3.6e-06},
+};
+
+static int press_blade(const epsmesh_query *q, const double edge[2], const place *p, double most, contact *k) {
+    double big = 0.5 * (q->length > q->width ? q->length : q->width), c8[3][EPSMESH_MOST], r[5] = {0, 0, 0, 0, 0};
+    double small = 0.5 * (q->length > q->width ? q->width : q->length), e[2][2], lean[2], twice[2], mean, half, soft;
+    double of_place[2], along_edge, across;
+    int i, j;
+    if (sqrt(big * big + small * small) > most) return 0;
+    polynomials(1 - 2 * log(small / big) / log(SLENDER), 8, c8);
+    for (i = 0; i < 5; i++)
+        for (j = 0; j < 8; j++) r[i] += RECTANGLE[i][j] * c8[0][j];
+    for (i = 0; i < 2; i++) e[0][i] = edge[i];
+    if (q->length < q->width) e[0][0] = -edge[1], e[0][1] = edge[0];
+    e[1][0] = -e[0][1], e[1][1] = e[0][0];
+    along_edge = r[1] * big * big, across = r[2] * small * small;
+    lean[0] = p->plane * r[3] * big * big * sqrt(big * small), lean[1] = p->plane * r[4] * small * small * big;
+    twice[0] = e[0][0] * e[0][0] - e[0][1] * e[0][1], twice[1] = 2 * e[0][0] * e[0][1];
+    mean = (along_edge + across) / 2, half = along_edge - across;
+    soft = 1 / (p->plane * r[0] * 2 * sqrt(big * small)) + p->c + mean * p->h +
+           half * (twice[0] * p->bent[0] + twice[1] * p->bent[1]);
+    for (i = 0; i < 2; i++)
+        of_place[i] = p->slope_c[i] + mean * p->slope_h[i] +
+                      half * (twice[0] * p->bent_slopes[0][i] + twice[1] * p->bent_slopes[1][i]);
+    for (j = 0; j < 2; j++) {
+        double slope = p->lean[0] * e[j][0] + p->lean[1] * e[j][1];
+        soft -= lean[j] * slope * slope / 4;
+        for (i = 0; i < 2; i++)
+            of_place[i] -= lean[j] / 2 * slope * (p->hessian[i][0] * e[j][0] + p->hessian[i][1] * e[j][1]);
+    }
+    k->force = q->depth / soft, k->stiffness = 1 / soft, k->radius = sqrt(big * big + small * small);
+    k->mean_square = along_edge + across;
+    for (i = 0; i < 2; i++) k->aside[i] = 0.5 * k->force * k->force * of_place[i];
+    return 1;
+}
+
+/* The last column of the inverse of compliances, as force per depth. */
+static contact press_bonded(double a, double depth, const place *p) {
+    double shear = 0.5 / (1 + p->poisson), soft = 1 - 2 * p->poisson, xx, yy, zz, xy, xz, yz, det;
+    double down = 4 * shear * a * (soft > SOFT ? log(1 + 2 * soft) / soft : 2);
+    double aside = 8 * shear * a / (2 - p->poisson);
+    contact k;
+    xx = p->regular[0][0] + 1 / aside, yy = p->regular[1][1] + 1 / aside, xy = p->regular[0][1];
+    xz = p->regular[0][2], yz = p->regular[1][2], zz = p->regular[2][2] + 1 / down + a * a / 3 * p->h;
+    det = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
+    k.force = depth * (xx * yy - xy * xy) / det, k.stiffness = k.force / depth;
+    k.aside[0] = depth * (xy * yz - xz * yy) / det, k.aside[1] = depth * (xy * xz - xx * yz) / det;
+    k.radius = a, k.mean_square = 2.0 / 3 * a * a;
+    return k;
 }
 
 /* ---- queries ---- */
@@ -391,13 +558,39 @@ static double room_at(const epsmesh_model *m, double x, double y) {
 
 static int is_positive(double x) { return isfinite(x) && x > 0; }
 
-static epsmesh_status misfit(const epsmesh_model *m, const epsmesh_query *q, double local[3]) {
+/* Return whether the tool is one that the model knows; `edge` is the direction of a blade on the face. */
+static epsmesh_status tool_of(const epsmesh_model *m, const epsmesh_query *q, double edge[2]) {
+    int i, j, is_blade = q->shape == EPSMESH_BLADE, has_angle = q->shape == EPSMESH_CONE;
+    edge[0] = 1, edge[1] = 0;
+    if ((int)q->shape < EPSMESH_DISC || (int)q->shape > EPSMESH_BONDED_DISC) return EPSMESH_TOOL;
+    if ((is_blade || q->shape == EPSMESH_BONDED_DISC) && !m->has_tensors) return EPSMESH_TOOL;
+    if (!is_blade) {
+        if (!isfinite(q->radius) || (has_angle && !isfinite(q->angle))) return EPSMESH_TOOL;
+        if (q->radius < SMALLEST || (has_angle && !(0.01 <= q->angle && q->angle <= PI / 2 - 0.001)))
+            return EPSMESH_INPUT;
+        return EPSMESH_OK;
+    }
+    if (!isfinite(q->length) || !isfinite(q->width)) return EPSMESH_TOOL;
+    if (q->length < SMALLEST || q->width < SMALLEST) return EPSMESH_INPUT;
+    if (!isfinite(q->along[0]) || !isfinite(q->along[1]) || !isfinite(q->along[2])) return EPSMESH_INPUT;
+    if (q->along[0] != 0 || q->along[1] != 0 || q->along[2] != 0) {
+        double size;
+        for (i = 0; i < 2; i++)
+            for (edge[i] = 0, j = 0; j < 3; j++) edge[i] += m->axes[i][j] * q->along[j];
+        size = sqrt(edge[0] * edge[0] + edge[1] * edge[1]);
+        if (!is_positive(size)) return EPSMESH_INPUT;
+        edge[0] /= size, edge[1] /= size;
+    }
+    return q->width < SLENDER * q->length || q->length < SLENDER * q->width ? EPSMESH_TOOL : EPSMESH_OK;
+}
+
+static epsmesh_status misfit(const epsmesh_model *m, const epsmesh_query *q, double local[3], double edge[2], spot *f) {
     double length = 0, inward = 0, shift;
-    int i, j, has_angle = q->shape == EPSMESH_CONE;
+    epsmesh_status status;
+    int i, j;
     if (!m->is_loaded) return EPSMESH_NO_MODEL;
-    if (q->shape != EPSMESH_DISC && q->shape != EPSMESH_SPHERE && !has_angle) return EPSMESH_TOOL;
-    if (!isfinite(q->radius) || (has_angle && !isfinite(q->angle))) return EPSMESH_TOOL;
-    if (q->radius < SMALLEST || (has_angle && !(0.01 <= q->angle && q->angle <= PI / 2 - 0.001))) return EPSMESH_INPUT;
+    status = tool_of(m, q, edge);
+    if (status != EPSMESH_OK) return status;
     if (!isfinite(q->depth) || !isfinite(q->poisson) || !is_positive(q->young)) return EPSMESH_INPUT;
     for (i = 0; i < 3; i++) {
         local[i] = 0;
@@ -405,16 +598,20 @@ static epsmesh_status misfit(const epsmesh_model *m, const epsmesh_query *q, dou
             shift = q->at[j] - m->origin[j];
             local[i] += m->axes[i][j] * shift;
         }
-        if (!isfinite(local[i]) || !isfinite(q->axis[i])) return EPSMESH_INPUT;
-        length += q->axis[i] * q->axis[i];
-        inward -= m->axes[2][i] * q->axis[i];
+        if (!isfinite(local[i])) return EPSMESH_INPUT;
     }
-    if (!isfinite(length)) return EPSMESH_INPUT;
-    if (length > 0 && !(inward / sqrt(length) >= 1 - 0.5 * ALIGNED * ALIGNED)) return EPSMESH_TILTED;
-    if (fabs(local[2]) > OFF * m->thickness) return EPSMESH_OFF;
     if (m->is_round ? !(local[0] * local[0] + local[1] * local[1] <= m->reach[0] * m->reach[0])
                     : !(fabs(local[0]) <= m->reach[0] && fabs(local[1]) <= m->reach[1]))
         return EPSMESH_OUTSIDE;
+    *f = face_at(m, local[0], local[1]);
+    for (i = 0; i < 3; i++) {
+        if (!isfinite(q->axis[i])) return EPSMESH_INPUT;
+        length += q->axis[i] * q->axis[i];
+        for (j = 0; j < 3; j++) inward -= f->normal[i] * m->axes[i][j] * q->axis[j];
+    }
+    if (!isfinite(length)) return EPSMESH_INPUT;
+    if (length > 0 && !(inward / sqrt(length) >= 1 - 0.5 * m->aligned * m->aligned)) return EPSMESH_TILTED;
+    if (!(fabs(local[2] - f->height) <= m->off)) return EPSMESH_OFF;
     if (!(m->poisson_range[0] <= q->poisson && q->poisson <= m->poisson_range[1])) return EPSMESH_POISSON;
     if (q->depth >= m->thickness) return EPSMESH_DEEP;
     return q->depth <= TOUCHING ? EPSMESH_LOST : EPSMESH_OK;
@@ -431,33 +628,42 @@ epsmesh_query epsmesh_ask(const epsmesh_model *m) {
     epsmesh_query q;
     memset(&q, 0, sizeof q);
     q.radius = q.angle = q.depth = q.at[0] = q.at[1] = q.at[2] = (double)NAN;
+    q.length = q.width = (double)NAN;
     q.young = m->young, q.poisson = m->poisson;
     return q;
 }
 
 epsmesh_touch epsmesh_touch_at(const epsmesh_model *m, const epsmesh_query *q) {
-    double local[3], room, share;
-    epsmesh_status status = misfit(m, q, local);
+    double local[3], edge[2], force[3], room, share, bent;
+    spot f;
+    epsmesh_status status = misfit(m, q, local, edge, &f);
     epsmesh_touch t;
     place p;
     contact k;
-    int i;
+    int i, j, is_disc = q->shape == EPSMESH_DISC || q->shape == EPSMESH_BONDED_DISC, fits;
     if (status == EPSMESH_LOST) return all(status, 0.0);
     if (status != EPSMESH_OK) return all(status, (double)NAN);
-    if (!place_at(m, local[0], local[1], q->poisson, &p)) return all(EPSMESH_DAMAGED, (double)NAN);
+    if (!place_at(m, local[0], local[1], q->poisson, q->shape >= EPSMESH_BLADE, &p))
+        return all(EPSMESH_DAMAGED, (double)NAN);
+    p.bend = f.bend, p.slope_bend[0] = f.slope_bend[0], p.slope_bend[1] = f.slope_bend[1];
     room = room_at(m, local[0], local[1]);
-    if (q->shape == EPSMESH_DISC) {
-        if (q->radius > m->largest * room) return all(EPSMESH_LARGE, (double)NAN);
-        k = press_disc(q->radius, q->depth, &p);
-    } else if (!press_round(q, &p, m->largest * room, &k)) {
-        return all(EPSMESH_LARGE, (double)NAN);
+    if (is_disc) {
+        fits = q->radius <= m->largest * room;
+        k = q->shape == EPSMESH_DISC ? press_disc(q->radius, q->depth, &p) : press_bonded(q->radius, q->depth, &p);
+    } else if (q->shape == EPSMESH_BLADE) {
+        fits = press_blade(q, edge, &p, m->largest * room, &k);
+    } else {
+        fits = press_round(q, &p, m->largest * room, &k);
     }
+    if (!fits) return all(EPSMESH_LARGE, (double)NAN);
     share = (k.radius / room) * (k.radius / room);
+    bent = fabs(p.h) + 2 * sqrt(p.bent[0] * p.bent[0] + p.bent[1] * p.bent[1]);
     t.status = EPSMESH_OK, t.stiffness = q->young * k.stiffness, t.contact_radius = k.radius;
     t.force_error = m->bar[3] + k.stiffness * ((m->bar[0] + m->bar[2] * share * share) / room +
-                                               m->bar[1] * fabs(p.h) * k.mean_square);
+                                               m->bar[1] * bent * k.mean_square);
+    force_at(&f, k.force, k.aside, q->depth, force);
     for (i = 0; i < 3; i++)
-        t.force[i] = q->young * (k.aside[0] * m->axes[0][i] + k.aside[1] * m->axes[1][i] + k.force * m->axes[2][i]);
+        for (t.force[i] = 0, j = 0; j < 3; j++) t.force[i] += q->young * force[j] * m->axes[j][i];
     if (!(k.force > 0 && is_positive(t.stiffness) && isfinite(t.force_error) && isfinite(t.force[0]) &&
           isfinite(t.force[1]) && isfinite(t.force[2])))
         return all(EPSMESH_DAMAGED, (double)NAN);

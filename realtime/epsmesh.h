@@ -12,7 +12,7 @@
 extern "C" {
 #endif
 
-enum { EPSMESH_MOST = 64, EPSMESH_MOST_IN_ALL = 8192 };
+enum { EPSMESH_MOST = 64, EPSMESH_MOST_IN_ALL = 4096, EPSMESH_TENSORS = 7 };
 
 typedef enum {
     EPSMESH_OK,
@@ -20,7 +20,7 @@ typedef enum {
     EPSMESH_OUTSIDE,  /* the place is outside the model's region */
     EPSMESH_LARGE,    /* tool or contact too large for a place so near to a side or the bottom */
     EPSMESH_DEEP,     /* deeper than the model was made for */
-    EPSMESH_TOOL,     /* no such tool, or a size of it is missing */
+    EPSMESH_TOOL,     /* no such tool, or a size of it is missing, or the model has no tables for it */
     EPSMESH_INPUT,    /* a number is not finite, or not positive where it must be */
     EPSMESH_POISSON,  /* Poisson's ratio is outside the model's range */
     EPSMESH_TILTED,   /* the tool must press along the face's inward normal */
@@ -30,13 +30,14 @@ typedef enum {
     EPSMESH_STATUSES
 } epsmesh_status;
 
-typedef enum { EPSMESH_DISC, EPSMESH_SPHERE, EPSMESH_CONE } epsmesh_shape;
+typedef enum { EPSMESH_DISC, EPSMESH_SPHERE, EPSMESH_CONE, EPSMESH_BLADE, EPSMESH_BONDED_DISC } epsmesh_shape;
 
 typedef struct {
     double reciprocal[EPSMESH_MOST_IN_ALL], curvature[EPSMESH_MOST_IN_ALL]; /* Chebyshev, over (nu, v, u) */
-    int counts[3], is_round, is_loaded;
+    double tensors[EPSMESH_TENSORS * EPSMESH_MOST_IN_ALL], height[EPSMESH_MOST_IN_ALL], bend[EPSMESH_MOST_IN_ALL];
+    int counts[3], face_counts[2], is_round, even[2], leans, has_tensors, is_flat, is_loaded;
     double c_ref, reach[2], sides[2], thickness, origin[3], axes[3][3], poisson_range[2];
-    double young, poisson, largest, bar[4];
+    double young, poisson, largest, off, aligned, bar[4];
 } epsmesh_model;
 
 typedef struct {
@@ -47,6 +48,8 @@ typedef struct {
     double axis[3];        /* along which it presses; 0, 0, 0 is the inward normal */
     double depth;          /* m */
     double young, poisson; /* Pa, 1; those of model->young and model->poisson unless they change */
+    double length, width;  /* m: of a blade's edge; else unused */
+    double along[3];       /* along which its length lies; 0, 0, 0 is the face's x */
 } epsmesh_query;
 
 typedef struct {

@@ -20,7 +20,7 @@ static double now(void) {
 int main(int count, char **words) {
     static epsmesh_model model;
     static unsigned char data[1 << 20];
-    static const char *const names[] = {"disc", "sphere", "cone", "nothing"};
+    static const char *const names[] = {"disc", "sphere", "cone", "blade", "bonded", "nothing"};
     long i, n = count > 2 ? atol(words[2]) : 20000;
     double *took = n > 0 ? (double *)malloc((size_t)n * sizeof *took) : NULL, sum = 0;
     FILE *file = count > 1 ? fopen(words[1], "rb") : NULL;
@@ -30,15 +30,16 @@ int main(int count, char **words) {
         return 2;
     }
     fclose(file);
-    for (shape = 0; shape < 4; shape++) {
+    for (shape = 0; shape < 6; shape++) {
         for (i = 0; i < n; i++) {
             epsmesh_query query = epsmesh_ask(&model);
             double x = 0.8 * model.reach[0] * ((double)(i % 101) / 50 - 1), begin;
             query.shape = (epsmesh_shape)shape, query.angle = 1.2;
             query.radius = 0.05 * model.thickness, query.depth = 0.002 * model.thickness;
+            query.length = 0.1 * model.thickness, query.width = 0.02 * model.thickness;
             for (axis = 0; axis < 3; axis++) query.at[axis] = model.origin[axis] + x * model.axes[0][axis];
             begin = now();
-            if (shape < 3) sum += epsmesh_touch_at(&model, &query).force[2];
+            if (shape < 5) sum += epsmesh_touch_at(&model, &query).force[2];
             took[i] = now() - begin;
         }
         qsort(took, (size_t)n, sizeof *took, rising);

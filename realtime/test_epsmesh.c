@@ -25,14 +25,15 @@ static void expect(int is_right, const char *what) {
 
 /* Ask at random places; a refusal has no numbers, an answer has finite ones. */
 static void ask_around(const epsmesh_model *model, int times) {
-    static const double sizes[] = {1e-3, 5e-3, 5e-3};
+    static const double sizes[] = {1e-3, 5e-3, 5e-3, 0, 1e-3};
     int i, j;
     for (i = 0; i < times; i++) {
         epsmesh_query query = epsmesh_ask(model);
         epsmesh_touch touch;
         double x = within(-1.1, 1.1) * model->reach[0], y = within(-1.1, 1.1) * model->reach[1];
-        query.shape = (epsmesh_shape)(i % 3);
-        query.radius = sizes[i % 3], query.angle = 1.2;
+        query.shape = (epsmesh_shape)(i % 5);
+        query.radius = sizes[i % 5], query.angle = 1.2;
+        query.length = 3e-3, query.width = within(1e-5, 4e-3), query.along[i % 3] = within(-1, 1);
         for (j = 0; j < 3; j++) query.at[j] = model->origin[j] + x * model->axes[0][j] + y * model->axes[1][j];
         query.depth = within(-1e-5, 5e-4);
         if (i % 17 == 0) query.depth = (double)NAN;

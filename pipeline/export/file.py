@@ -2,16 +2,21 @@
 
 All numbers that a query needs are doubles, in SI units, for a body with E = 1:
 
-    format                   1
+    format                   2
     reciprocal, curvature    (poisson, v, u) Chebyshev coefficients of t = 1/(c + c_ref) (m) and of h t³ (1)
+    tensors                  (7, poisson, v, u) what blades and bonded tools take (pipeline/realtime/table.py); may lack
     c_ref                    1/m
-    is_round                 1: u = 2(x² + y²)/X² - 1 alone; 0: u = 2(x/X)² - 1, v = 2(y/Y)² - 1
+    is_round                 1: u = 2(x² + y²)/X² - 1 alone
+    even                     (2,) 1: u = 2(x/X)² - 1, v = 2(y/Y)² - 1; 0: u = x/X, v = y/Y
+    leans                    1: the tilt of the face by its force is to be added; 0: it is in h
+    height, bend             (face_v, face_u) coefficients of the face's z (m) and its mean curvature (1/m), 0 if flat
+    off, aligned             how far off the face (m), and its normal (rad), a query may be
     reach                    (2,) X and Y (m), half extents of the region, or its radius twice
-    sides, thickness         (2,) half extents of the face (m), or its radius twice; way to the support (m)
+    sides, thickness         (2,) half extents of the face (m), or its radius twice; way to support or other tissue
     origin, axes             (3,) and (3, 3): the middle of the face, and rows x, y and outward normal
     poisson_range            (2,) of Poisson's ratios
     young, poisson           those of the study (Pa, 1), which hold where a query gives none
-    largest                  largest radius of contact, in units of the way to the nearest side or the bottom
+    largest                  largest radius of contact, in units of the way to the nearest side or to ``thickness``
     bar                      (4,) b: c may be off by (b0 + b2 (a/room)⁴)/room + b1 |h| <r²>, and F by b3 of it besides
 
 What people read besides: check_* (check) are touches that no bar was fitted to, by full solves of the program and by
@@ -36,11 +41,15 @@ def write_model(path: Path, model: Model, checks: Checks, attributes: Mapping[st
     table = model.table
     numbers = {
         "format": FORMAT, "c_ref": table.c_ref, "is_round": float(table.is_round), "thickness": model.thickness,
-        "young": model.young, "poisson": model.poisson, "largest": model.largest,
+        "young": model.young, "poisson": model.poisson, "largest": model.largest, "leans": float(table.leans),
+        "off": model.off, "aligned": model.aligned,
     }  # fmt: skip
     variables: dict[str, tuple[tuple[str, ...], FloatArray, dict[str, str]]] = {
         "reciprocal": (("poisson_node", "v", "u"), table.reciprocal, {"units": "m"}),
         "curvature": (("poisson_node", "v", "u"), table.curvature, {"units": "1"}),
+        "even": (("pair",), np.array(table.even, dtype=float), {"units": "1"}),
+        "height": (("face_v", "face_u"), model.face.height, {"units": "m"}),
+        "bend": (("face_v", "face_u"), model.face.bend, {"units": "1/m"}),
         "reach": (("pair",), np.array(table.reach), {"units": "m"}),
         "sides": (("pair",), np.array(model.sides), {"units": "m"}),
         "origin": (("component",), model.origin, {"units": "m"}),
@@ -48,7 +57,9 @@ def write_model(path: Path, model: Model, checks: Checks, attributes: Mapping[st
         "poisson_range": (("pair",), np.array(table.poisson), {"units": "1"}),
         "bar": (("term",), np.array(model.bar), {"units": "1"}),
     }
-    units = {"c_ref": "1/m", "thickness": "m", "young": "Pa"}
+    if len(table.tensors):
+        variables["tensors"] = (("tensor", "poisson_node", "v", "u"), table.tensors, {"units": "1"})
+    units = {"c_ref": "1/m", "thickness": "m", "young": "Pa", "off": "m", "aligned": "rad"}
     for name, value in numbers.items():
         variables[name] = ((), np.array(value), {"units": units.get(name, "1")})
     for name, (unit, values) in checks.items():

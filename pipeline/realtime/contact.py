@@ -12,8 +12,8 @@ The slope g tilts the face by Fg, which moves the pressure aside by what a disc 
 the force aside is ∂U/∂x, and a closed path does no work.
 """
 
-from dataclasses import dataclass
-from math import pi, sqrt, tan
+from dataclasses import dataclass, field
+from math import cos, hypot, log, log1p, nan, pi, sin, sqrt, tan
 from typing import NamedTuple
 
 import numpy as np
@@ -25,11 +25,31 @@ Pair = NDArray[np.float64]
 _STEPS, _SAME = 60, 4e-16
 # Of terms in the series of a ball, the last is below rounding for contact up to 0.6 of its radius.
 _TERMS, _NEGLIGIBLE = 40, 1e-17
+# Of 1 - 2ν, below which a logarithm over it is its limit.
+_SOFT = 1e-12
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """What tools take that are not round, or stick: see ``pipeline.realtime.table``.
+
+    ``bent`` holds A₁ and A_xy (1/m³), ``bent_slopes`` (2, 2) theirs; ``lean`` (2,) is ∇c (1/m²) and ``hessian`` (2, 2)
+    its slope, both 0 where the lean of the face is in h; ``regular`` (3, 3) is R (1/m).
+    """
+
+    bent: Pair
+    bent_slopes: Pair
+    lean: Pair
+    hessian: Pair
+    regular: Pair
+
+
+@dataclass(frozen=True, eq=False)
 class Place:
-    """c (1/m), h (1/m³) and g² (1/m⁴) of a body with E = 1 at a place, their slopes along x and y, and E*."""
+    """c (1/m), h (1/m³) and g² (1/m⁴) of a body with E = 1 at a place, their slopes along x and y, and E*.
+
+    ``bend`` (1/m) is the mean curvature of the face, positive where it is a dome, with its slope.
+    """
 
     c: float
     h: float
@@ -38,6 +58,10 @@ class Place:
     slope_h: Pair
     slope_tilt: Pair
     plane: float
+    bend: float = 0.0
+    slope_bend: Pair = field(default_factory=lambda: np.zeros(2))
+    shape: Shape | None = None
+    poisson: float = nan
 
 
 @dataclass(frozen=True)
@@ -102,12 +126,17 @@ class Round:
         """Return what presses the contact to a radius ``a`` (m), its depth below 0 if h leaves no such contact."""
         stiff, h = place.plane, place.h
         sunk, steep, area, moment = self.profile(a)
+        # A dome is met by a tool that is as much sharper.
+        sunk, steep = sunk + place.bend * a**2, steep + 2 * place.bend * a
+        area, moment = area + place.bend * a**3 / 3, moment + place.bend * a**5 / 5
         own = 1 - 2 / 3 * stiff * h * a**3
         if own <= 0:
             return _Pressed(-1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         force = 2 * stiff * (a * sunk - area) / own
         square = 4 * stiff * (a**3 / 3 * sunk - moment) + 4 / 15 * stiff * h * force * a**5
         growth = 2 * stiff * a * steep + 2 * stiff * h * force * a**2
+        if growth <= 0 or force <= 0:
+            return _Pressed(-1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         power = own / growth * force / a
         effect = -2 / 3 * stiff * place.tilt * a**3 * force * (2 + 3 * power)
         depth = sunk + 0.5 * h * force * a**2 + place.c * force + 0.25 * h * square + effect
@@ -131,6 +160,7 @@ def _contact(a: float, found: _Pressed, place: Place) -> Contact:
     of_h = 0.25 * force**2 * square + 4 / 3 * stiff**2 * place.tilt * a**5 * force**3 / found.growth
     of_tilt = -2 / 3 * stiff * a**3 * force**2
     aside = 0.5 * force**2 * place.slope_c + of_h * place.slope_h + of_tilt * place.slope_tilt
+    aside = aside + 0.5 * found.square * place.slope_bend
     return Contact(force, aside, 1 / found.compliance, a, square)
 
 
@@ -176,10 +206,92 @@ class Cone(Round):
         return 2 / pi * depth / self.slope
 
 
+@dataclass(frozen=True)
+class Blade:
+    """A flat rectangular punch of half ``length`` and half ``width`` (m), its edge along ``turn`` (rad) from x.
+
+    Its stiffness on a half-space, where it presses, and how it resists to be tilted are those of its proportions,
+    fitted to an integral equation (A. E. H. Love's rectangles, graded to the edges) to 1e-5.
+    """
+
+    length: float
+    width: float
+    turn: float
+
+    def press(self, depth: float, place: Place, most: float) -> Contact | None:
+        """Return the contact at a ``depth`` (m), or nothing if half its diagonal is more than ``most`` (m)."""
+        long, short = self.length, self.width
+        if hypot(long, short) > most or place.shape is None:
+            return None
+        at = 1 - 2 * log(short / long) / log(_SLENDER)
+        force, along, across, lean_along, lean_across = np.polynomial.chebyshev.chebval(at, _RECTANGLE).tolist()
+        stiff = place.plane
+        along, across = along * long**2, across * short**2
+        edge = np.array([cos(self.turn), sin(self.turn)])
+        side = np.array([-edge[1], edge[0]])
+        leans = stiff * lean_along * long**2.5 * short**0.5, stiff * lean_across * short**2 * long
+        shape = place.shape
+        # e·A·e = h/2 + (A₁ cos 2φ + A_xy sin 2φ), and the other sign across.
+        double = np.array([cos(2 * self.turn), sin(2 * self.turn)])
+        mean, half = (along + across) / 2, along - across
+        soft = 1 / (stiff * force * 2 * sqrt(long * short)) + place.c
+        soft += mean * place.h + half * float(double @ shape.bent)
+        of_place = place.slope_c + mean * place.slope_h + half * (double @ shape.bent_slopes)
+        for lean, direction in zip(leans, (edge, side), strict=True):
+            slope = float(shape.lean @ direction)
+            soft -= lean * slope**2 / 4
+            of_place = of_place - lean / 2 * slope * (shape.hessian @ direction)
+        push = depth / soft
+        return Contact(push, 0.5 * push**2 * of_place, 1 / soft, hypot(long, short), along + across)
+
+
+# Of a rectangle, half sides l ≥ w, E* = 1, in Chebyshev polynomials of 1 - 2 log(w/l)/log(1/50): F/d in units of
+# 2 √(l w), <x²>/l² and <y²>/w² of its pressure, and moment per tilt about its short and long axis in l^2.5 w^0.5, l w².
+_SLENDER = 0.02
+_RECTANGLE = np.array([
+    [1.5467288, -0.5389724, 0.154788, -0.0121522, 0.0020102, -0.0001257, 6e-06, -1.4e-06],
+    [0.4134192, 0.0443058, 0.0039289, -0.0011234, -0.0003526, 1.7e-06, 2.01e-05, 4.2e-06],
+    [0.484368, -0.0181444, -0.0053293, -0.0007768, 1.19e-05, 3.22e-05, 7.5e-06, 8e-07],
+    [1.8450174, -0.0168921, 0.2328837, 0.0145178, 0.0050319, 0.0002247, -2e-06, -6.7e-06],
+    [1.7362244, 0.2238417, 0.0903649, 0.0247386, 0.0048149, 0.0006582, 5.88e-05, 3.6e-06],
+]).T  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Bonded:
+    """A flat round punch of ``radius`` (m) that tissue sticks to, and that does not turn."""
+
+    radius: float
+
+    def press(self, depth: float, place: Place, most: float) -> Contact | None:
+        """Return the contact at a ``depth`` (m), or nothing if its radius is more than ``most`` (m).
+
+        Straight down V. I. Mossakovskii's stiffness (1954), aside R. D. Mindlin's of a disc that does not lift (1949).
+        """
+        a, ratio = self.radius, place.poisson
+        if a > most or place.shape is None:
+            return None
+        shear = 0.5 / (1 + ratio)
+        soft = 1 - 2 * ratio
+        down = 4 * shear * a * (log1p(2 * soft) / soft if soft > _SOFT else 2.0)
+        aside = 8 * shear * a / (2 - ratio)
+        compliance = place.shape.regular + np.diag([1 / aside, 1 / aside, 1 / down + a**2 / 3 * place.h])
+        force = depth * np.linalg.inv(compliance)[:, 2]
+        return Contact(float(force[2]), force[:2], float(force[2]) / depth, a, 2 / 3 * a**2)
+
+
 def tangent(a: float, place: Place) -> float:
     """Return dd/dF (Pa m/N) while the radius of contact is ``a``, but for what the tilt adds."""
     c, h, stiff = place.c, place.h, place.plane
     return 0.5 / (stiff * a) + c + a**2 / 3 * h - 2 / 45 * stiff * h**2 * a**5
+
+
+def blade(length: float, width: float, turn: float) -> Blade | None:
+    """Return the blade of a ``length`` and a ``width`` (m), or nothing if it is too slender to be known."""
+    long, short = max(length, width) / 2, min(length, width) / 2
+    if short < _SLENDER * long:
+        return None
+    return Blade(long, short, turn if length >= width else turn + pi / 2)
 
 
 def ball(radius: float) -> Ball:

@@ -1,7 +1,7 @@
 """A model file as an object that is asked for forces: refuses with a status and a sentence, and never extrapolates."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from math import inf, isfinite, nan, pi, prod
 from pathlib import Path
 
@@ -9,15 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.realtime.classic import ModelError, read_doubles
-from pipeline.realtime.contact import Contact, Disc, Place, Round, ball, cone
-from pipeline.realtime.table import Table
+from pipeline.realtime.contact import Blade, Bonded, Contact, Disc, Place, Round, ball, blade, cone
+from pipeline.realtime.face import Face
+from pipeline.realtime.table import TENSORS, Table
 
-FORMAT = 1.0
-# A depth (m) below which nothing touches; the smallest tool (m); how far off the face, in units of the thickness, and
-# how far off the normal a query may be.
-_TOUCHING, _SMALLEST, _OFF, _ALIGNED = 1e-12, 1e-6, 1e-6, 1e-6
+FORMAT = 2.0
+# A depth (m) below which nothing touches; the smallest tool (m).
+_TOUCHING, _SMALLEST = 1e-12, 1e-6
 # Coefficients along one direction, and in all: the C side holds as many.
-MOST, MOST_IN_ALL = 64, 8192
+MOST, MOST_IN_ALL = 64, 4096
+
+# What may be said of the contact of a tool; and numbers of a file that are the model's as they are.
+_CONTACTS = {
+    "disc": ("frictionless", "bonded"), "blade": ("frictionless",), "sphere": ("unilateral",), "cone": ("unilateral",),
+}  # fmt: skip
+_NUMBERS = ("thickness", "young", "poisson", "largest", "off", "aligned")
+Tool = Disc | Round | Blade | Bonded
 
 _SENTENCES = {
     "ok": "",
@@ -25,7 +32,8 @@ _SENTENCES = {
     "outside": "The place is outside the model's region: move the tool there, or export a wider region.",
     "large": "The tool, or its contact, is too large for a place so near to a side or the bottom.",
     "deep": "The depth is more than the model was made for.",
-    "tool": "The model knows no such tool, or it lacks a size: disc(radius), sphere(radius), cone(radius, angle).",
+    "tool": "The model knows no such tool, or it lacks a size: disc(radius), sphere(radius), cone(radius, angle), "
+    "blade(length, width).",
     "input": "A number of the query is not finite, or not positive where it must be.",
     "poisson": "Poisson's ratio is outside the model's range.",
     "tilted": "The tool must press along the face's inward normal.",
@@ -58,9 +66,10 @@ class Touch:
 class Model:
     """A body's face: ``origin`` (3,) and ``axes`` (3, 3), rows x, y and the outward normal; sizes in m, E in Pa.
 
-    ``sides`` are the half extents of the face, ``largest`` the largest radius of contact in units of the way to the
-    nearest side or the bottom, ``bar`` the shares of c, of h's part, of what is beyond
-    it, and of F, that count as error.
+    ``sides`` are the half extents of the face, ``thickness`` the way to the support, or to where the tissue changes;
+    ``largest`` is the largest radius of contact in units of the way to the nearest side or there, ``bar`` the shares of
+    c, of h's part, of what is beyond it, and of F, that count as error. ``face`` tells the height of what is not flat.
+    A query may be ``off`` the face by so much (m), and its axis by the angle ``aligned`` (rad) off the normal.
     """
 
     table: Table
@@ -72,6 +81,9 @@ class Model:
     poisson: float
     largest: float
     bar: tuple[float, float, float, float]
+    face: Face = field(default_factory=Face)
+    off: float = 0.0
+    aligned: float = 1e-6
 
     def query(
         self,
@@ -84,39 +96,51 @@ class Model:
         young: float | None = None,
         poisson: float | None = None,
         axis: Sequence[float] | None = None,
+        length: float = nan,
+        width: float = nan,
+        along: Sequence[float] | None = None,
+        contact: str | None = None,
     ) -> Touch:
         """Return what a ``tool`` of a ``radius`` (m; ``angle`` of a cone, rad, to its axis) feels ``at`` x, y, z (m).
 
         ``depth`` (m) is along the inward normal, as is ``axis``; without ``young`` (Pa) or ``poisson`` those of the
-        study count. Raises nothing: see ``status``.
+        study count. A blade has a ``length`` and a ``width`` (m) and lies ``along`` a direction, or the face's x.
+        ``contact`` is "frictionless" (a disc, a blade) or "unilateral" (a sphere, a cone), or of a disc "bonded": such
+        a one sticks where it is. Raises nothing: see ``status``.
         """
         modulus = self.young if young is None else float(young)
         ratio = self.poisson if poisson is None else float(poisson)
-        shape = _tool(tool, radius, angle)
+        shape = self._tool(tool, contact, (radius, angle, length, width), along)
         if isinstance(shape, str):
             return _refused(shape)
-        local, aligned = self._local(at, axis)
+        whole = isinstance(shape, Blade | Bonded)
+        local = self._local(at)
         if not (np.isfinite(local).all() and isfinite(depth) and isfinite(ratio) and 0 < modulus < inf):
             return _refused("input")
         x, y, z = local.tolist()
-        if reason := self._misfit((x, y, z), depth, ratio, aligned):
+        if not self.table.holds(x, y):
+            return _refused("outside")
+        spot = self.face.at(self.table, x, y)
+        if reason := self._misfit(z - spot.height, depth, ratio, axis, spot.normal):
             return _refused(reason)
         if depth <= _TOUCHING:
             return Touch("lost", np.zeros(3), 0.0, 0.0, 0.0)
         room = self.room(x, y)
         try:
-            place = self.table.at(x, y, ratio)
-            contact = shape.press(depth, place, self.largest * room)
+            place = self.table.at(x, y, ratio, whole=whole)
+            if not self.face.is_flat:
+                place = replace(place, bend=spot.bend, slope_bend=spot.slope_bend)
+            found = shape.press(depth, place, self.largest * room)
+            force = spot.force(found, depth) @ self.axes if found else np.zeros(3)
         except ArithmeticError:
             return _refused("damaged")
-        if contact is None:
+        if found is None:
             return _refused("large")
-        normal = modulus * contact.force
-        force = np.array([*(modulus * contact.aside), normal]) @ self.axes
-        error = contact.stiffness * self._uncertain(place, room, contact) + self.bar[3]
-        if not (np.isfinite(force).all() and isfinite(error) and contact.force > 0 and contact.stiffness > 0):
+        force *= modulus
+        error = found.stiffness * self._uncertain(place, room, found) + self.bar[3]
+        if not (np.isfinite(force).all() and isfinite(error) and found.force > 0 and found.stiffness > 0):
             return _refused("damaged")
-        return Touch("ok", force, error, modulus * contact.stiffness, contact.radius)
+        return Touch("ok", force, error, modulus * found.stiffness, found.radius)
 
     def room(self, x: float, y: float) -> float:
         """Return the distance (m) from a place to the nearest side, or to the bottom."""
@@ -124,27 +148,47 @@ class Model:
             return min(self.sides[0] - float(np.hypot(x, y)), self.thickness)
         return min(self.sides[0] - abs(x), self.sides[1] - abs(y), self.thickness)
 
-    def _local(self, at: Sequence[float], axis: Sequence[float] | None) -> tuple[NDArray[np.float64], bool]:
-        place = np.asarray(at, dtype=float)
-        if place.shape != (3,):
-            return np.full(3, nan), True
-        if axis is None:
-            return self.axes @ (place - self.origin), True
-        pointed = np.asarray(axis, dtype=float)
-        if pointed.shape != (3,) or not np.isfinite(pointed).all() or not (length := np.linalg.norm(pointed)) > 0:
-            return np.full(3, nan), True
-        return self.axes @ (place - self.origin), float(-self.axes[2] @ pointed / length) >= 1 - 0.5 * _ALIGNED**2
+    def _tool(
+        self, name: str, contact: str | None, sizes: tuple[float, float, float, float], along: Sequence[float] | None
+    ) -> "Tool | str":
+        """Return a tool, or the status of one that is none, or that the model has no tables for."""
+        if name not in _CONTACTS or contact not in (None, *_CONTACTS[name]):
+            return "tool"
+        if (name == "blade" or contact == "bonded") and not len(self.table.tensors):
+            return "tool"
+        if name != "blade":
+            return _bonded(sizes[0]) if contact == "bonded" else _round(name, *sizes[:2])
+        if not all(isfinite(size) for size in sizes[2:]):
+            return "tool"
+        if min(sizes[2:]) < _SMALLEST:
+            return "input"
+        edge = np.array([1.0, 0.0])
+        if along is not None:
+            given = np.asarray(along, dtype=float)
+            if given.shape != (3,) or not np.isfinite(given).all():
+                return "input"
+            edge = (self.axes @ given)[:2]
+        if not np.hypot(*edge) > 0:
+            return "input"
+        return blade(sizes[2], sizes[3], float(np.arctan2(edge[1], edge[0]))) or "tool"
 
-    def _misfit(self, local: tuple[float, float, float], depth: float, ratio: float, aligned: bool) -> str:
+    def _local(self, at: Sequence[float]) -> NDArray[np.float64]:
+        place = np.asarray(at, dtype=float)
+        return self.axes @ (place - self.origin) if place.shape == (3,) else np.full(3, nan)
+
+    def _misfit(
+        self, off: float, depth: float, ratio: float, axis: Sequence[float] | None, normal: NDArray[np.float64]
+    ) -> str:
         """Return the status of a query that the model does not answer, or nothing."""
-        x, y, z = local
         low, high = self.table.poisson
-        if not aligned:
-            return "tilted"
-        if abs(z) > _OFF * self.thickness:
+        if axis is not None:
+            pointed = np.asarray(axis, dtype=float)
+            if pointed.shape != (3,) or not np.isfinite(pointed).all() or not (length := np.linalg.norm(pointed)) > 0:
+                return "input"
+            if not float(-normal @ (self.axes @ pointed) / length) >= 1 - 0.5 * self.aligned**2:
+                return "tilted"
+        if abs(off) > self.off:
             return "off"
-        if not self.table.holds(x, y):
-            return "outside"
         if not low <= ratio <= high:
             return "poisson"
         return "deep" if depth >= self.thickness else ""
@@ -153,7 +197,8 @@ class Model:
         """Return how far c may be off (1/m), what is left out of it included."""
         of_c, of_h, beyond, _ = self.bar
         share = (contact.radius / room) ** 4
-        return (of_c + beyond * share) / room + of_h * abs(place.h) * contact.mean_square
+        bent = abs(place.h) + (2 * float(np.hypot(*place.shape.bent)) if place.shape else 0.0)
+        return (of_c + beyond * share) / room + of_h * bent * contact.mean_square
 
 
 def load(path: str | Path) -> Model:
@@ -172,9 +217,12 @@ def model_of(data: bytes) -> Model:
         ModelError: if they are no model, or of another version, or damaged.
     """
     found = read_doubles(data)
-    shapes = {"reciprocal": 3, "curvature": 3, "origin": (3,), "axes": (3, 3), "bar": (4,)}
-    shapes |= dict.fromkeys(("reach", "sides", "poisson_range"), (2,))
-    shapes |= dict.fromkeys(("format", "is_round", "c_ref", "thickness", "young", "poisson", "largest"), ())
+    shapes = {"reciprocal": 3, "curvature": 3, "origin": (3,), "axes": (3, 3), "bar": (4,), "height": 2, "bend": 2}
+    shapes |= dict.fromkeys(("reach", "sides", "poisson_range", "even"), (2,))
+    shapes |= {"tensors": 4} if "tensors" in found else {}
+    shapes |= dict.fromkeys(("format", "is_round", "c_ref", "leans", *_NUMBERS), ())
+    if "format" in found and found["format"].shape == () and found["format"] != FORMAT:
+        raise ModelError(f"the file has format {float(found['format']):g}, and this program reads {FORMAT:g}")
     for name, shape in shapes.items():
         values = found.get(name)
         if values is None:
@@ -185,24 +233,31 @@ def model_of(data: bytes) -> Model:
             raise ModelError(f"{name} is not finite")
     _check(found)
     reach, sides, ratios, bar = (found[name].tolist() for name in ("reach", "sides", "poisson_range", "bar"))
-    rest = {name: float(found[name]) for name in ("thickness", "young", "poisson", "largest")}
-    is_round = bool(found["is_round"] == 1.0)
+    rest = {name: float(found[name]) for name in _NUMBERS}
+    is_round, (even_x, even_y) = bool(found["is_round"] == 1.0), found["even"] == 1.0
+    tensors = {"tensors": found["tensors"]} if "tensors" in found else {}
     table = Table(
         found["reciprocal"], found["curvature"], float(found["c_ref"]), (reach[0], reach[1]), is_round,
-        (ratios[0], ratios[1]),
+        (ratios[0], ratios[1]), (bool(even_x), bool(even_y)), leans=bool(found["leans"] == 1.0), **tensors,
     )  # fmt: skip
     return Model(
-        table, found["origin"], found["axes"], (sides[0], sides[1]), bar=(bar[0], bar[1], bar[2], bar[3]), **rest
-    )
+        table, found["origin"], found["axes"], (sides[0], sides[1]), bar=(bar[0], bar[1], bar[2], bar[3]),
+        face=Face(found["height"], found["bend"]), **rest,
+    )  # fmt: skip
 
 
 def _check(found: dict[str, NDArray[np.float64]]) -> None:
     """Hold the numbers of a file against what a model's can be."""
     shape, axes, (low, high) = found["reciprocal"].shape, found["axes"], found["poisson_range"]
     reach, sides = found["reach"], found["sides"]
-    if found["format"] != FORMAT:
-        raise ModelError(f"the file has format {float(found['format']):g}, and this program reads {FORMAT:g}")
+    flags, face, tensors = found["even"], found["height"].shape, found.get("tensors")
     fits = {
+        "even": all(flag in (0.0, 1.0) for flag in flags),
+        "leans": float(found["leans"]) in (0.0, 1.0),
+        "height": face == found["bend"].shape and max(face) <= MOST and (face[0] == 1 or not found["is_round"]),
+        "off": bool(found["off"] > 0),
+        "aligned": bool(0 < found["aligned"] <= 0.5),
+        "tensors": tensors is None or tensors.shape == (TENSORS, *shape),
         "reciprocal": shape == found["curvature"].shape and max(shape) <= MOST and prod(shape) <= MOST_IN_ALL,
         "is_round": bool(found["is_round"] == 0) or (bool(found["is_round"] == 1) and shape[1] == 1),
         "axes": bool(np.abs(axes @ axes.T - np.eye(3)).max() < 1e-9),
@@ -218,11 +273,15 @@ def _check(found: dict[str, NDArray[np.float64]]) -> None:
             raise ModelError(f"{name} is not that of a model")
 
 
-def _tool(name: str, radius: float, angle: float) -> "Disc | Round | str":
+def _bonded(radius: float) -> "Bonded | str":
+    if not isfinite(radius):
+        return "tool"
+    return Bonded(radius) if radius >= _SMALLEST else "input"
+
+
+def _round(name: str, radius: float, angle: float) -> "Disc | Round | str":
     """Return a tool, or the status of one that is none."""
     sizes = (radius, angle) if name == "cone" else (radius,)
-    if name not in ("disc", "sphere", "cone"):
-        return "tool"
     if not all(isfinite(size) for size in sizes):
         return "tool"
     if radius < _SMALLEST or (name == "cone" and not 0.01 <= angle <= pi / 2 - 0.001):

@@ -97,7 +97,7 @@ def middle() -> Model:
     t = 1 / (c + 100)
     numbers = (np.full((1, 1, 1), t), np.full((1, 1, 1), h * t**3))
     table = Table(*numbers, 100.0, region.reach, True, (0.45, 0.45))
-    return Model(table, np.zeros(3), np.eye(3), region.sides, 0.02, 10e3, 0.45, 0.5, (0.0, 0.0, 0.0, 0.0))
+    return Model(table, np.zeros(3), np.eye(3), region.sides, 0.02, 10e3, 0.45, 0.5, (0.0, 0.0, 0.0, 0.0), off=1e-8)
 
 
 @pytest.mark.parametrize(

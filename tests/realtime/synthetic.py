@@ -5,21 +5,29 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.export.file import write_model
+from pipeline.realtime.face import Face
 from pipeline.realtime.model import Model, load
 from pipeline.realtime.table import Table
 
 
-def random_model(*, is_round: bool = False, turned: bool = False) -> Model:
+def random_model(*, is_round: bool = False, turned: bool = False, is_even: bool = True, curved: bool = False) -> Model:
     rng = np.random.default_rng(4)
     shape = (3, 1, 7) if is_round else (3, 6, 7)
     order = sum(np.ogrid[: shape[0], : shape[1], : shape[2]])
     reciprocal, curvature = rng.standard_normal((2, *shape)) / np.maximum(order, 1) ** 2 / 20
     reciprocal[0, 0, 0], curvature[0, 0, 0] = 1.0, 0.8
     reach, sides = ((0.03, 0.03), (0.036, 0.036)) if is_round else ((0.03, 0.025), (0.036, 0.03))
-    table = Table(0.02 * reciprocal, 0.06 * curvature, 45.0, reach, is_round, (0.3, 0.49))
+    tensors = rng.standard_normal((7, *shape)) / np.maximum(order, 1) ** 2 * 0.05
+    kind = {"even": (is_even, is_even), "leans": not curved, "tensors": np.zeros((0, 1, 1, 1)) if curved else tensors}
+    table = Table(0.02 * reciprocal, 0.06 * curvature, 45.0, reach, is_round, (0.3, 0.49), **kind)
     axes = np.linalg.qr(rng.standard_normal((3, 3)))[0] if turned else np.eye(3)
     origin = np.array([0.1, -0.2, 0.05]) if turned else np.zeros(3)
-    return Model(table, origin, axes, sides, 0.02, 10e3, 0.45, 0.5, (0.02, 0.1, 0.5, 0.001))
+    face = Face()
+    if curved:
+        heights = rng.standard_normal((2, 1 if is_round else 4, 5)) / np.arange(1, 6) ** 3
+        face = Face(2e-3 * heights[0], 4.0 * heights[1])
+    rest = {"face": face, "off": 1e-7, "aligned": 0.02 if curved else 1e-6}
+    return Model(table, origin, axes, sides, 0.02, 10e3, 0.45, 0.5, (0.02, 0.1, 0.5, 0.001), **rest)
 
 
 def write_random(path: Path, **kind: bool) -> Model:

@@ -8,7 +8,7 @@ import pytest
 from scipy.special import ellipe, ellipk
 
 from pipeline.realtime import Model, ModelError
-from pipeline.realtime.contact import Disc, Place, ball, cone
+from pipeline.realtime.contact import Disc, Place, Shape, ball, blade, cone
 from pipeline.realtime.model import model_of
 from tests.realtime.synthetic import random_model, write_random
 
@@ -16,6 +16,7 @@ TOOLS = (
     ("disc", {"radius": 2e-3}),
     ("sphere", {"radius": 6e-3}),
     ("cone", {"radius": 5e-3, "angle": 1.2}),
+    ("blade", {"length": 6e-3, "width": 1e-3}),
 )
 AT = (0.011, 0.017, 0.0)
 
@@ -88,6 +89,41 @@ def test_a_closed_loop_does_no_work(name, sizes, is_round):
     assert abs(weight * (forces * moved).sum()) < 1e-8 * stored
     # It is the force aside that makes it so.
     assert abs(weight * (forces * moved)[:, 2].sum()) > 1e-4 * stored
+
+
+@pytest.mark.parametrize(("name", "sizes"), TOOLS[:3])
+@pytest.mark.parametrize("is_round", [False, True])
+def test_nor_does_one_over_a_curved_face(name, sizes, is_round):
+    model, count = random_model(curved=True, turned=True, is_round=is_round), 64
+    tips, forces, depths, aside = [], [], [], []
+    for angle in 2 * pi * np.arange(count) / count:
+        x, y, depth = 0.01 + 0.004 * np.cos(angle), 0.012 + 0.004 * np.sin(angle), 3e-4 + 1e-4 * np.sin(angle + 1)
+        spot = model.face.at(model.table, x, y)
+        at = model.origin + np.array([x, y, spot.height]) @ model.axes
+        normal = spot.normal @ model.axes
+        forces.append(deep(model, name, sizes, depth, at, axis=-normal).force)
+        aside.append(np.linalg.norm(np.cross(forces[-1], normal)) / (forces[-1] @ normal))
+        tips.append(at - depth * normal)
+        depths.append(depth)
+    turns = 1j * np.fft.fftfreq(count, 1 / count)[:, None]
+    moved = np.real(np.fft.ifft(turns * np.fft.fft(tips, axis=0), axis=0))
+    assert max(aside) > 1e-5
+    stored = 0.4 * np.linalg.norm(forces[0]) * depths[0]
+    assert abs(2 * pi / count * (np.array(forces) * moved).sum()) < 1e-8 * stored
+
+
+def test_a_slender_blade_is_a_strip():
+    none, stiff, long, short = np.zeros(2), 1 / (1 - 0.3**2), 50e-3, 1e-3
+    flat = Shape(none, np.zeros((2, 2)), none, np.zeros((2, 2)), np.zeros((3, 3)))
+    place = Place(0.0, 0.0, 0.0, none, none, none, stiff, shape=flat)
+    contact = blade(2 * long, 2 * short, 0.3).press(1e-4, place, 1.0)
+    # It is more than the ellipse within, and less than the one round it (A. E. Green and I. N. Sneddon, 1950).
+    ellipse = pi * stiff * long * 1e-4 / ellipk(1 - (short / long) ** 2)
+    assert ellipse < contact.force < 2**0.5 * ellipse
+    # Pressure falls towards the ends from what it is on a segment, where it is the same all along.
+    assert long**2 / 3 < contact.mean_square < long**2 / 2
+    assert blade(2 * short, 2 * long, 0.3 - pi / 2).press(1e-4, place, 1.0).force == contact.force
+    assert blade(3 * long, short, 0.0) is None
 
 
 @pytest.mark.parametrize(("name", "sizes"), TOOLS)

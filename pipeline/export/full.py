@@ -1,0 +1,85 @@
+"""Full solves of the program: one touch of a tool on a study's body, with the bar of its force."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import degrees, isfinite
+from typing import Any
+
+from mpi4py import MPI
+
+from pipeline.arrays import FloatArray, np
+from pipeline.plan.plan import make_plan
+from pipeline.run.execute import compute
+from pipeline.study.load import parse
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A tool of a study: its name, sizes (m; ``angle`` in rad) and, of a blade, the direction of its edge."""
+
+    name: str
+    radius: float = 0.0
+    angle: float = 0.0
+    length: float = 0.0
+    width: float = 0.0
+    along: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    contact: str = "frictionless"
+
+    @property
+    def sizes(self) -> dict[str, Any]:
+        """What a query takes of it."""
+        if self.name == "blade":
+            return {"length": self.length, "width": self.width, "along": self.along}
+        sizes: dict[str, Any] = {"radius": self.radius, "contact": self.contact}
+        return sizes | ({"angle": self.angle} if self.name == "cone" else {})
+
+    @property
+    def section(self) -> dict[str, Any]:
+        """The keys of the study's section that say what it is."""
+        found: dict[str, Any] = {"shape": self.name, "contact": self.contact}
+        if self.name == "blade":
+            return found | {"length": _mm(self.length), "width": _mm(self.width), "direction": list(self.along)}
+        found["radius"] = _mm(self.radius)
+        return found | ({"angle": f"{degrees(self.angle):.12g} deg"} if self.name == "cone" else {})
+
+
+@dataclass(frozen=True)
+class Full:
+    """What a full solve found: F (N) along the axis, its relative bar, and what the tissue does to the tool (3,)."""
+
+    force: float
+    error: float
+    vector: FloatArray
+
+
+@dataclass(frozen=True)
+class Solver:
+    """Full solves on the body of a study, whose ``sections`` are those of its file, to a relative ``accuracy``."""
+
+    sections: Mapping[str, Any]
+    file: str
+    young: float
+    accuracy: float
+
+    def press(self, tool: Tool, at: tuple[float, ...], depth: float, poisson: float | None) -> Full:
+        """Return the force of a tool at x and y, or x, y and z (m), at a ``depth`` (m).
+
+        Without ``poisson`` the study's own materials count, else all is of one material with that ratio.
+
+        Raises:
+            RuntimeError: if it failed.
+        """
+        own = {name: value for name, value in self.sections.items() if name in ("body", "material")}
+        if poisson is not None:
+            own["material"] = {"young": f"{self.young:.12g} Pa", "poisson": poisson}
+        place = {"at": [_mm(x) for x in at], "depth": _mm(depth)}
+        mesh = {"accuracy": f"{100 * self.accuracy:.6g} %"}
+        raw = own | {"probe": tool.section | place, "mesh": mesh, "solve": {"exact": False}}
+        (record,) = compute(make_plan(parse(raw, file=self.file)), MPI.COMM_SELF).values()
+        if not record.is_ok or not isfinite(record.force_error):
+            raise RuntimeError(f"a full solve of a {tool.name} at {place['at']} failed: {record.message}")
+        return Full(record.force, record.force_error, np.array(record.force_vector))
+
+
+def _mm(length: float) -> str:
+    return f"{1e3 * length:.12g} mm"
