@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import typer
 
-from pipeline.cli import checks, export, guide, merge, new, plan, report, store, study, view
+from pipeline.cli import checks, export, guide, merge, new, plan, report, store, study, touch, view
 from pipeline.cli.console import make_patient
 
 _HELP = """How fine must a mesh be, and where, for the reaction force of a surgical tool?
@@ -22,7 +22,7 @@ app = typer.Typer(
 )
 _COMMANDS: tuple[Callable[..., None], ...] = (
     new.new, study.validate, plan.plan, study.run, merge.merge, study.status, plan.explain, report.plot, report.report,
-    guide.guide, view.view, export.export,
+    guide.guide, view.view, export.export, touch.touch,
     checks.verify, checks.stress, checks.benchmark, study.version,
 )  # fmt: skip
 for _command in _COMMANDS:

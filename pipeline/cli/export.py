@@ -28,6 +28,9 @@ def export(
     checks: Annotated[
         int, typer.Option(min=4, max=_MOST_CHECKS, help="Full solves that the bar is fitted to and, half, judged on.")
     ] = 24,
+    surface: Annotated[
+        bool, typer.Option("--surface/--no-surface", help="With what `epsmesh touch` shows of the body: megabytes.")
+    ] = True,
     as_json: Json = False,
 ) -> None:
     """Make a model that answers 1,000 times a second: forces of round tools anywhere on a box or a cylinder.
@@ -62,7 +65,7 @@ def export(
     if MPI.COMM_WORLD.size > 1:
         fail("export works in one process: start it without mpirun")
     try:
-        exported = make_model(scope, wanted, checks)
+        exported = make_model(scope, wanted, checks, surface=surface)
         write(exported, path, scope, file, __version__)
     except (ExportError, OSError) as problem:
         fail(str(problem))

@@ -9,7 +9,9 @@ import numpy as np
 from mpi4py import MPI
 
 from pipeline.arrays import FloatArray
+from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import BodyMesh, distribute
+from pipeline.mesh.generate import MeshArrays
 from pipeline.mesh.of_case import mesh_arrays
 from pipeline.shapes.bodies.box import Box
 from pipeline.shapes.bodies.cylinder import Cylinder
@@ -24,6 +26,8 @@ from pipeline.study.sweep import Case
 # Elements of the mesh: so many along the way from the region's edge to the sides, so many through the thickness; they
 # grow by so much in between.
 _NEAR, _THROUGH, _GROWTH = 2.5, 4, 0.4
+# A mid node this far from the middle, in lengths of its edge, is a quarter point.
+_ASIDE = 0.2
 
 
 @dataclass(frozen=True)
@@ -72,7 +76,21 @@ def coarse_mesh(case: Case, region: Region, finer: float = 1.0) -> BodyMesh:
         length, width = 2 * region.reach[0], 2 * region.reach[1]
         probe = Blade.model_construct(shape="blade", length=length, width=width, **size)
     mesh = Mesh.model_construct(epsilon=region.margin, fine=near, coarse=max(near, far), rim=near, growth=_GROWTH)
-    return distribute(MPI.COMM_SELF, mesh_arrays(replace(case, probe=probe, mesh=mesh), ()))
+    return distribute(MPI.COMM_SELF, _without_quarter_points(mesh_arrays(replace(case, probe=probe, mesh=mesh), ())))
+
+
+def _without_quarter_points(arrays: MeshArrays) -> MeshArrays:
+    """Return a mesh whose edges all have their mid nodes in the middle: nothing is singular at the edge of a region.
+
+    An element with quarter points on two sides of a facet has no Jacobian in its corner, where quadrature may need it.
+    """
+    if arrays.cells.shape[1] == len(EDGES) + 4:
+        (p, q), mid = np.moveaxis(arrays.points[arrays.cells[:, EDGES]], 2, 0), arrays.points[arrays.cells[:, 4:]]
+        share = np.einsum("nei,nei->ne", mid - p, q - p) / np.einsum("nei,nei->ne", q - p, q - p)
+        points, moved = arrays.points.copy(), np.abs(share - 0.5) > _ASIDE
+        points[arrays.cells[:, 4:][moved]] = ((p + q) / 2)[moved]
+        arrays = replace(arrays, points=points)
+    return arrays
 
 
 @stage("regular parts")

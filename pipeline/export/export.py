@@ -10,8 +10,10 @@ from pipeline.export.checks import Check, check_touches, columns, needed
 from pipeline.export.compliance import Region, coarse_mesh, compliances
 from pipeline.export.file import write_model
 from pipeline.export.scope import ExportError, Scope
+from pipeline.export.surface import tabulate_surface
 from pipeline.export.tabulate import Places, tabulate
 from pipeline.realtime.model import Model
+from pipeline.realtime.surface import SurfaceTable
 from pipeline.shapes.bodies.box import Box
 
 # What is left out beside the sides, of the smaller of half the width and the thickness; how large contact may be, in
@@ -35,6 +37,7 @@ class Exported:
     judged: list[Check]
     missed: float
     places: int
+    surface: SurfaceTable | None = None
 
     @property
     def held(self) -> float:
@@ -51,8 +54,13 @@ class Exported:
         }  # fmt: skip
 
 
-def export(scope: Scope, accuracy: float, checks: int, *, margin: float = MARGIN, largest: float = LARGEST) -> Exported:
+def export(
+    scope: Scope, accuracy: float, checks: int, *, margin: float = MARGIN, largest: float = LARGEST,
+    surface: bool = False,
+) -> Exported:  # fmt: skip
     """Return the model of a study to a relative ``accuracy``, with half of ``checks`` fitted to and half judged on.
+
+    With ``surface`` it holds what is seen of the body, too.
 
     Raises:
         ExportError: if the body leaves no region.
@@ -85,7 +93,8 @@ def export(scope: Scope, accuracy: float, checks: int, *, margin: float = MARGIN
     fitted, judged = (
         [replace(check, bar=precise + factor * (check.bar - precise)) for check in half] for half in (fitted, judged)
     )
-    return Exported(model, fitted, judged, missed, len(solved))
+    seen = tabulate_surface(mesh, region, scope.poissons, model.origin) if surface else None
+    return Exported(model, fitted, judged, missed, len(solved), seen)
 
 
 def write(exported: Exported, path: Path, scope: Scope, study: Path, version: str) -> None:
@@ -100,4 +109,4 @@ def write(exported: Exported, path: Path, scope: Scope, study: Path, version: st
         f"{model.largest:g} of the way to the nearest side or the bottom",
         "held": f"{sum(check.is_held for check in exported.judged)} of {len(exported.judged)} judged touches",
     }
-    write_model(path, model, columns(exported.fitted, exported.judged), attributes)
+    write_model(path, model, columns(exported.fitted, exported.judged), attributes, exported.surface)

@@ -19,24 +19,38 @@ All numbers that a query needs are doubles, in SI units, for a body with E = 1:
     largest                  largest radius of contact, in units of the way to the nearest side or to ``thickness``
     bar                      (4,) b: c may be off by (b0 + b2 (a/room)⁴)/room + b1 |h| <r²>, and F by b3 of it besides
 
+A model may hold what is seen of the body (pipeline/realtime/surface.py), in smaller numbers, which C passes over:
+
+    surface_points           (vertex, component) m, from the middle of the face along its axes
+    surface_triangles        (triangle, corner)
+    surface_modes            (vertex, component, mode), whole numbers, and
+    surface_amounts          (mode, poisson_degree, y_degree, x_degree) Chebyshev coefficients: R (m/N for E = 1)
+    surface_error            the most that R times the way to the nearest side or the bottom was off where it was judged
+
 What people read besides: check_* (check) are touches that no bar was fitted to, by full solves of the program and by
 the model; attributes say what was exported, by which version and from which study.
 """
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
 from pipeline.arrays import FloatArray
 from pipeline.files import atomic
 from pipeline.realtime.model import FORMAT, Model
+from pipeline.realtime.surface import SurfaceTable
 
 Checks = Mapping[str, tuple[str, FloatArray]]
+Variable = tuple[tuple[str, ...], npt.NDArray[Any], dict[str, str]]
 
 
-def write_model(path: Path, model: Model, checks: Checks, attributes: Mapping[str, str]) -> None:
+def write_model(
+    path: Path, model: Model, checks: Checks, attributes: Mapping[str, str], surface: SurfaceTable | None = None
+) -> None:
     """Write a model with its ``checks``, (unit, values) by name, in one piece or not at all."""
     table = model.table
     numbers = {
@@ -44,7 +58,7 @@ def write_model(path: Path, model: Model, checks: Checks, attributes: Mapping[st
         "young": model.young, "poisson": model.poisson, "largest": model.largest, "leans": float(table.leans),
         "off": model.off, "aligned": model.aligned,
     }  # fmt: skip
-    variables: dict[str, tuple[tuple[str, ...], FloatArray, dict[str, str]]] = {
+    variables: dict[str, Variable] = {
         "reciprocal": (("poisson_node", "v", "u"), table.reciprocal, {"units": "m"}),
         "curvature": (("poisson_node", "v", "u"), table.curvature, {"units": "1"}),
         "even": (("pair",), np.array(table.even, dtype=float), {"units": "1"}),
@@ -64,7 +78,19 @@ def write_model(path: Path, model: Model, checks: Checks, attributes: Mapping[st
         variables[name] = ((), np.array(value), {"units": units.get(name, "1")})
     for name, (unit, values) in checks.items():
         variables[f"check_{name}"] = (("check",), np.asarray(values, dtype=float), {"units": unit})
+    variables |= _of_surface(surface) if surface else {}
     dataset = xr.Dataset(variables, attrs=dict(attributes))
     encoding = {name: {"_FillValue": None} for name in variables}
     with atomic(path) as temporary:
         dataset.to_netcdf(temporary, format="NETCDF3_64BIT", engine="netcdf4", encoding=encoding)
+
+
+def _of_surface(surface: SurfaceTable) -> dict[str, Variable]:
+    degrees = ("mode", "poisson_degree", "y_degree", "x_degree")
+    return {
+        "surface_points": (("vertex", "component"), surface.points, {"units": "m"}),
+        "surface_triangles": (("triangle", "corner"), surface.triangles, {"units": "1"}),
+        "surface_modes": (("vertex", "component", "mode"), surface.modes.astype(np.int16), {"units": "1"}),
+        "surface_amounts": (degrees, surface.amounts, {"units": "m/N Pa"}),
+        "surface_error": ((), np.array(surface.error), {"units": "1"}),
+    }

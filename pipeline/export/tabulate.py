@@ -37,7 +37,7 @@ def tabulate(
             found.update(zip(new, compliances(new, float(ratio)), strict=True))
         if table is not None:
             missed = max(
-                abs(table.at(x, y, float(ratio)).c - found[x, y][0]) * region.room(x, y)
+                _missed(table, (x, y), float(ratio), found[x, y][0]) * region.room(x, y)
                 for ratio, found in zip(ratios, known, strict=True)
                 for x, y in new
             )
@@ -47,6 +47,14 @@ def tabulate(
             break
     assert table is not None
     return table, float(missed)
+
+
+def _missed(table: Table, place: tuple[float, float], poisson: float, c: float) -> float:
+    """Return by how much a table misses c at a place, infinitely if it makes no sense of it."""
+    try:
+        return abs(table.at(*place, poisson).c - c)
+    except ArithmeticError:
+        return np.inf
 
 
 def _table(region: Region, poissons: tuple[float, float], size: int, values: FloatArray) -> Table:

@@ -2,5 +2,6 @@
 
 from pipeline.realtime.classic import ModelError
 from pipeline.realtime.model import Model, Touch, load
+from pipeline.realtime.surface import Surface, load_surface
 
-__all__ = ["Model", "ModelError", "Touch", "load"]
+__all__ = ["Model", "ModelError", "Surface", "Touch", "load", "load_surface"]

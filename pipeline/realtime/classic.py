@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 _MAGIC = b"CDF\x02"
 _DIMENSION, _VARIABLE, _ATTRIBUTE, _DOUBLE = 10, 11, 12, 6
 _BYTES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 4, 6: 8}
+_TYPES = {3: ">i2", 4: ">i4", 5: ">f4", 6: ">f8"}
 # No model has as many.
 _MOST, _MOST_RANK, _MOST_NAME = 256, 4, 256
 
@@ -23,6 +24,19 @@ def read_doubles(data: bytes) -> dict[str, NDArray[np.float64]]:
     Raises:
         ModelError: if the file is cut short, of another kind, or contradicts itself.
     """
+    return _read(data, (_DOUBLE,))
+
+
+def read_numbers(data: bytes) -> dict[str, NDArray[np.float64]]:
+    """Return the variables of numbers of any kind, as doubles; else as ``read_doubles`` does.
+
+    Raises:
+        ModelError: as ``read_doubles``.
+    """
+    return _read(data, tuple(_TYPES))
+
+
+def _read(data: bytes, kinds: tuple[int, ...]) -> dict[str, NDArray[np.float64]]:
     reader = _Reader(data)
     if reader.take(4) != _MAGIC:
         raise ModelError("this is no netCDF classic file with 64-bit offsets")
@@ -39,8 +53,8 @@ def read_doubles(data: bytes) -> dict[str, NDArray[np.float64]]:
         reader.skip_attributes()
         kind, _, begin = reader.number(), reader.number(), reader.offset()
         shape = [lengths[number] for number in numbers]
-        if kind == _DOUBLE and 0 not in shape:
-            found[name] = reader.doubles(begin, shape)
+        if kind in kinds and 0 not in shape:
+            found[name] = reader.numbers(_TYPES[kind], begin, shape)
     return found
 
 
@@ -85,10 +99,10 @@ class _Reader:
             size = self.number() * _BYTES[kind]
             self.take(size + -size % 4)
 
-    def doubles(self, begin: int, shape: list[int]) -> NDArray[np.float64]:
-        count = 1
+    def numbers(self, kind: str, begin: int, shape: list[int]) -> NDArray[np.float64]:
+        width, count = int(kind[-1]), 1
         for length in shape:
             count *= length
-        if begin > len(self.data) or 8 * count > len(self.data) - begin:
+        if begin > len(self.data) or width * count > len(self.data) - begin:
             raise ModelError("the file is cut short")
-        return np.frombuffer(self.data, ">f8", count, begin).astype(np.float64).reshape(shape)
+        return np.frombuffer(self.data, kind, count, begin).astype(np.float64).reshape(shape)

@@ -26,7 +26,7 @@ _CONTACTS = {
 _NUMBERS = ("thickness", "young", "poisson", "largest", "off", "aligned")
 Tool = Disc | Round | Blade | Bonded
 
-_SENTENCES = {
+SENTENCES = {
     "ok": "",
     "lost": "The tool does not touch.",
     "outside": "The place is outside the model's region: move the tool there, or export a wider region.",
@@ -59,7 +59,7 @@ class Touch:
     @property
     def message(self) -> str:
         """A sentence on the status, or nothing if it is "ok"."""
-        return _SENTENCES[self.status]
+        return SENTENCES[self.status]
 
 
 @dataclass(frozen=True, eq=False)

@@ -59,7 +59,7 @@ class Table:
         """
         low, high = self.poisson
         middle = 0.0 if high == low else (2 * poisson - low - high) / (high - low)
-        of_poisson = _polynomials(middle, len(self.reciprocal))[0]
+        of_poisson = polynomials(middle, len(self.reciprocal))[0]
         tables = np.stack([self.reciprocal, self.curvature])
         if whole:
             tables = np.concatenate([tables, self.tensors])
@@ -95,7 +95,7 @@ class Table:
         else:
             u = 2 * (x / a) ** 2 - 1 if self.even[0] else x / a
             v = 2 * (y / b) ** 2 - 1 if self.even[1] else y / b
-        left, right = _polynomials(v, tables.shape[1]), _polynomials(u, tables.shape[2])
+        left, right = polynomials(v, tables.shape[1]), polynomials(u, tables.shape[2])
         return [self._along(found, x, y) for found in left @ tables @ right.T]
 
     def _along(self, found: Array, x: float, y: float) -> _Local:
@@ -135,7 +135,7 @@ def factors(xi: float, eta: float, reach: tuple[float, float], is_round: bool) -
     return [apart, twist, along, across, (one, none), apart, twist]
 
 
-def _polynomials(at: float, count: int) -> Array:
+def polynomials(at: float, count: int) -> Array:
     """Return T_n, T_n' and T_n'' (3, count)."""
     values, slopes, bends = [1.0, at], [0.0, 1.0], [0.0, 0.0]
     for _ in range(2, count):

@@ -21,7 +21,8 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from pipeline.arrays import FloatArray
+from pipeline import compat
+from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve.compiled import form, vector_space
 from pipeline.solve.conditions import Conditions
@@ -163,7 +164,10 @@ def _solved(space: ElasticSpace, forces: Sequence[PointForce], places: FloatArra
                 rhs.array[space.dofs.prescribed_owned] = 0.0
                 unknown.set(0.0)
                 solver.solve(rhs, unknown)
-                yield np.asarray(unknown.array + held)
+                found = np.asarray(unknown.array + held)
+                if not np.isfinite(found).all():
+                    raise SolveError(f"the regular part at {force.centre} is not finite")
+                yield found
         finally:
             solver.close()
 
@@ -203,3 +207,47 @@ def _terms(local: FloatArray, axis: int | None = None) -> FloatArray:
         factor = _EXPONENTS[:, axis]
         exponents = np.maximum(_EXPONENTS - (np.arange(3) == axis), 0)
     return np.asarray(factor * np.prod([powers[:, i, exponents[:, i]] for i in range(3)], axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class OnBoundary:
+    """R on a body's boundary, by quadratic triangles: their ``nodes`` (n, 3) in m, ``triangles`` (m, 6) of them.
+
+    Corners run round the outward normal; behind them come the middles of the sides opposite to each. ``values``
+    (forces, n, 3), in m, belong to a unit of the field of each force.
+    """
+
+    nodes: FloatArray
+    triangles: IntArray
+    values: FloatArray
+
+
+def regular_on_boundary(body: BodyMesh, forces: Sequence[PointForce]) -> OnBoundary:
+    """Return R on the whole boundary for each of ``forces``, of one Poisson's ratio, as ``regular_part`` finds it.
+
+    Raises:
+        SolveError: if that cannot be solved.
+    """
+    with Spaces(body) as spaces:
+        space = spaces.get(DEGREE, Conditions(unilateral=True))
+        places = np.asarray(space.dofs.space.tabulate_dof_coordinates())
+        used, triangles = np.unique(_outer_triangles(compat.cell_dofs(space.dofs.space), places), return_inverse=True)
+        values = [found.reshape(-1, 3)[used] for found in _solved(space, forces, places)]
+    return OnBoundary(places[used], triangles.reshape(-1, 6), np.array(values))
+
+
+def _outer_triangles(cells: IntArray, places: FloatArray) -> IntArray:
+    """Return the triangles (m, 6) that belong to one cell (k, 10) alone."""
+    # In a tetrahedron the edge of the corners i < j is numbered from the last pair on (basix).
+    middle = {pair: 4 + number for number, pair in enumerate([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])}
+    faces = [(1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)]
+    columns = [[i, j, k, middle[j, k], middle[i, k], middle[i, j]] for i, j, k in faces]
+    triangles = cells[:, columns].reshape(-1, 6)
+    _, first, times = np.unique(np.sort(triangles[:, :3], axis=1), axis=0, return_index=True, return_counts=True)
+    outer = first[times == 1]
+    found = triangles[outer]
+    a, b, c = (places[found[:, i]] for i in range(3))
+    inner = places[np.take_along_axis(cells[outer // 4], (outer % 4)[:, None], axis=1)[:, 0]]
+    turned = np.einsum("ni,ni->n", np.cross(b - a, c - a), inner - a) > 0
+    found[turned] = found[turned][:, [0, 2, 1, 3, 5, 4]]
+    return np.asarray(found)

@@ -7,6 +7,7 @@ import numpy as np
 from pipeline.export.file import write_model
 from pipeline.realtime.face import Face
 from pipeline.realtime.model import Model, load
+from pipeline.realtime.surface import Surface, SurfaceTable, load_surface
 from pipeline.realtime.table import Table
 
 
@@ -35,3 +36,29 @@ def write_random(path: Path, **kind: bool) -> Model:
     checks = {"force": ("N", np.array([0.1, 0.2])), "bar": ("1", np.array([0.01, 0.01]))}
     write_model(path, random_model(**kind), checks, {"title": "random"})
     return load(path)
+
+
+def random_surface(*, rank: int = 5, **kind: bool) -> Surface:
+    """A face and a floor of squares, and modes as small as a far field is."""
+    model, rng = random_model(**kind), np.random.default_rng(5)
+    x, y = (np.linspace(-side, side, 9) for side in model.sides)
+    flat = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    points = np.vstack([np.column_stack([flat, np.full(len(flat), z)]) for z in (0.0, -model.thickness)])
+    corner = np.add.outer(9 * np.arange(8), np.arange(8)).ravel()
+    face = np.vstack(
+        [np.column_stack([corner, corner + 1, corner + 10]), np.column_stack([corner, corner + 10, corner + 9])]
+    )
+    triangles = np.vstack([face, face[:, ::-1] + len(flat)]).astype(np.int32)
+    modes = rng.integers(-32767, 32768, (len(points), 3, rank)).astype(np.float32)
+    amounts = (2e-5 * rng.standard_normal((rank, 3, 4, 5))).astype(np.float32)
+    table = SurfaceTable(
+        points.astype(np.float32), triangles, modes, amounts, 0.01, model.table.reach, model.table.poisson
+    )
+    return Surface(model, table)
+
+
+def write_surface(path: Path, **kind: bool) -> Surface:
+    """Write a model with its surface, and return it as it is read."""
+    made = random_surface(**kind)
+    write_model(path, made.model, {}, {"title": "random"}, made.table)
+    return load_surface(path)

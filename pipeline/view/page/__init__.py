@@ -16,7 +16,7 @@ from pipeline.view.fields import Fields
 from pipeline.view.page.numbers import Numbers, mesh_numbers
 from pipeline.view.viewpoint import Viewpoint
 
-_TEMPLATES = Path(__file__).parent / "templates"
+TEMPLATES = Path(__file__).parent / "templates"
 _SCRIPTS = ("mesh.js", "scene.js", "camera.js", "page.js")  # each knows those before it
 _MM = 1e3
 
@@ -31,14 +31,14 @@ def write_page(fields: Fields, path: Path, title: str) -> Path:
 
 def render(fields: Fields, title: str) -> str:
     """Return the page of a case as HTML; it loads nothing else."""
-    script = "\n".join((_TEMPLATES / name).read_text(encoding="utf-8") for name in _SCRIPTS)
+    script = "\n".join((TEMPLATES / name).read_text(encoding="utf-8") for name in _SCRIPTS)
     numbers = mesh_numbers(fields)
     environment = Environment(
-        loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
     return environment.get_template("view.html.j2").render(
-        title=title, facts=_facts(fields), style=(_TEMPLATES / "view.css").read_text(encoding="utf-8"), script=script,
+        title=title, facts=_facts(fields), style=(TEMPLATES / "view.css").read_text(encoding="utf-8"), script=script,
         script_hash=b64encode(sha256(script.encode()).digest()).decode(),
         told=json.dumps(_told(fields, numbers), allow_nan=False).replace("</", r"<\/"), numbers=numbers.text,
     )  # fmt: skip

@@ -83,7 +83,7 @@ def mesh_numbers(fields: Fields) -> Numbers:
         arrays["strains"] = _steps(fields.strain, _STRAINS * worst, worst)[order]
         name = "largest principal strain"
         colours.insert(2, _scale(name, "%", 100 * _STRAINS * worst, 100 * worst, YLORRD, array="strains"))
-    return Numbers(_text(arrays), [(name, a.dtype.str[1:], a.size) for name, a in arrays.items()], colours, _MM * shift)
+    return Numbers(packed(arrays), layout(arrays), colours, _MM * shift)
 
 
 def _scale(name: str, unit: str, low: float, high: float, stops: tuple[str, ...], array: str = "") -> dict[str, Any]:
@@ -121,7 +121,12 @@ def _steps(values: FloatArray, low: float, high: float) -> npt.NDArray[np.uint8]
     return np.round(255 * np.clip(share, 0, 1)).astype("u1")
 
 
-def _text(arrays: dict[str, npt.NDArray[Any]]) -> str:
+def layout(arrays: dict[str, npt.NDArray[Any]]) -> list[tuple[str, str, int]]:
+    """Return what a page is told of its arrays: name, type and length of each."""
+    return [(name, a.dtype.str[1:], a.size) for name, a in arrays.items()]
+
+
+def packed(arrays: dict[str, npt.NDArray[Any]]) -> str:
     """Return arrays, of each first every number's first byte, then every second one, deflated, as base64."""
     planes = [np.ascontiguousarray(a).view("u1").reshape(-1, a.itemsize).T.tobytes() for a in arrays.values()]
     return b64encode(zlib.compress(b"".join(planes), _DEFLATE)).decode()

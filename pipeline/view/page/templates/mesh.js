@@ -3,7 +3,7 @@
 
 const KINDS = { f4: Float32Array, i4: Int32Array, i2: Int16Array, u1: Uint8Array };
 
-// Return the arrays of a page by name: first bytes of all numbers, then second ones; cells and faces as differences.
+// Return the arrays of a page by name: first bytes of all numbers, then second ones.
 async function unpack(text, layout) {
   const coded = atob(text);
   const bytes = new Uint8Array(coded.length);
@@ -20,6 +20,12 @@ async function unpack(text, layout) {
     start += width * count;
     found[name] = made;
   }
+  return found;
+}
+
+// Return the arrays of a mesh, whose cells and faces are stored as differences.
+async function unpackMesh(text, layout) {
+  const found = await unpack(text, layout);
   const { cells, faces } = found;
   const m = cells.length / 4;
   for (let i = 1; i < m; i++) cells[i] += cells[i - 1];

@@ -172,6 +172,6 @@ class Page {
     return;
   }
   const told = JSON.parse(document.getElementById("told").textContent);
-  const arrays = await unpack(document.getElementById("numbers").textContent, told.arrays);
+  const arrays = await unpackMesh(document.getElementById("numbers").textContent, told.arrays);
   new Page(told, new Mesh(arrays, told.shift), gl);
 })();

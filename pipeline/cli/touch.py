@@ -1,0 +1,61 @@
+"""The command that opens a real-time model as a page."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pipeline.cli.words import DONE, fail
+
+
+def touch(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="A model that `epsmesh export` made.")],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="PAGE",
+            help="Write the page as one HTML file, and serve nothing.",
+            show_default=False,
+        ),
+    ] = None,
+    open_it: Annotated[bool, typer.Option("--open/--no-open", help="Open it in the browser.")] = True,
+) -> None:
+    """Drag a tool over a body in a browser: its surface, the force, and its error bar, at once.
+
+    The page is served on this machine's own address alone, until Ctrl-C.
+
+    Example: epsmesh touch results/quick.epsm.nc
+
+    Example: epsmesh touch results/quick.epsm.nc -o quick.html
+    """
+    from pipeline.realtime import ModelError, load_surface
+    from pipeline.touch.page import render, write_touch_page
+
+    try:
+        surface = load_surface(model)
+        if output is not None:
+            path = write_touch_page(surface, output, model.name)
+            print(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB), to be opened in a browser")
+            raise typer.Exit(DONE)
+        text = render(surface, model.name)
+    except (ModelError, OSError) as problem:
+        fail(f"{model}: {problem}")
+    _serve(text, open_it=open_it)
+
+
+def _serve(text: str, *, open_it: bool) -> None:
+    """Serve the page until Ctrl-C."""
+    import webbrowser
+
+    from pipeline.touch.server import PageServer
+
+    with PageServer(text) as server:
+        print(f"{server.address} (Ctrl-C ends it)", flush=True)
+        if open_it:
+            webbrowser.open(server.address)
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt:
+            print()

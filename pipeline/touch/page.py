@@ -1,0 +1,117 @@
+"""A real-time model as a page: one HTML file that holds the model, what evaluates it, and what draws it."""
+
+import json
+from base64 import b64encode
+from hashlib import sha256
+from math import hypot
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from pipeline.files import atomic
+from pipeline.realtime.model import SENTENCES
+from pipeline.realtime.surface import Surface
+from pipeline.view import palette
+from pipeline.view.page import TEMPLATES as OF_VIEW
+from pipeline.view.page.numbers import layout, packed
+
+_TEMPLATES = Path(__file__).parent / "templates"
+# Each knows those before it.
+_SCRIPTS = (
+    _TEMPLATES / "evaluate.js", OF_VIEW / "mesh.js", OF_VIEW / "scene.js", OF_VIEW / "camera.js",
+    _TEMPLATES / "surface.js", _TEMPLATES / "tool.js", _TEMPLATES / "touch.js",
+)  # fmt: skip
+_STYLES = (OF_VIEW / "view.css", _TEMPLATES / "touch.css")
+_MM = 1e3
+# Of the way to the nearest side or to the bottom: the radius that the page begins with, and the depths that it offers.
+_RADIUS, _RADII, _DEPTH, _DEPTHS = 0.12, (0.02, 0.4), 0.04, (-0.02, 0.15)
+_YOUNG = (0.1, 10.0)
+_ANGLES = (20.0, 85.0)
+
+
+def write_touch_page(surface: Surface, path: Path, title: str) -> Path:
+    """Write the page of a model to ``path``, in place of an earlier one only once it is whole."""
+    text = render(surface, title)
+    with atomic(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return path
+
+
+def render(surface: Surface, title: str) -> str:
+    """Return the page of a model as HTML; it loads nothing else."""
+    script = "\n".join(path.read_text(encoding="utf-8") for path in _SCRIPTS)
+    arrays = _arrays(surface)
+    environment = Environment(
+        loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
+    return environment.get_template("touch.html.j2").render(
+        title=title, facts=_facts(surface), sliders=_sliders(surface), script=script,
+        style="\n".join(path.read_text(encoding="utf-8") for path in _STYLES),
+        script_hash=b64encode(sha256(script.encode()).digest()).decode(),
+        told=json.dumps(_told(surface, arrays), allow_nan=False).replace("</", r"<\/"), numbers=packed(arrays),
+    )  # fmt: skip
+
+
+def _facts(surface: Surface) -> list[str]:
+    model = surface.model
+    x, y = (_MM * reach for reach in model.table.reach)
+    region = (
+        f"places up to {x:.3g} mm from the middle" if model.table.is_round else f"x to ±{x:.3g} mm and y to ±{y:.3g} mm"
+    )
+    return [
+        f"Good for {region}; frictionless tools, straight down.",
+        "Drag on the face to move the tool, beside it to turn the body; scroll to zoom.",
+    ]
+
+
+def _sliders(surface: Surface) -> list[dict[str, Any]]:
+    """Return what can be changed, in the units of the page."""
+    model = surface.model
+    size = _MM * min(*model.sides, model.thickness)
+    x, y = (_MM * side for side in model.sides)
+    low, high = model.table.poisson
+    rows: list[tuple[str, str, float, float, float]] = [
+        ("x", "x, mm", -x, x, 0.0),
+        ("y", "y, mm", -y, y, 0.0),
+        ("depth", "depth, mm", size * _DEPTHS[0], size * _DEPTHS[1], size * _DEPTH),
+        ("radius", "radius, mm", size * _RADII[0], size * _RADII[1], size * _RADIUS),
+        ("angle", "angle to the axis, °", *_ANGLES, 60.0),
+        ("young", "E, kPa", _YOUNG[0] * model.young / 1e3, _YOUNG[1] * model.young / 1e3, model.young / 1e3),
+        ("poisson", "ν", low, high, model.poisson),
+    ]
+    return [dict(zip(("name", "label", "low", "high", "value"), row, strict=True)) for row in rows]
+
+
+def _arrays(surface: Surface) -> dict[str, Any]:
+    table = surface.table
+    return {
+        "points": table.points.T.astype("<f4"), "triangles": table.triangles.T.astype("<i4"),
+        "modes": table.modes.astype("<i2"), "amounts": table.amounts.astype("<f4"),
+    }  # fmt: skip
+
+
+def _told(surface: Surface, arrays: dict[str, Any]) -> dict[str, Any]:
+    """Return what the script is told besides the arrays; the camera's lengths are in mm, along the face's axes."""
+    model, table = surface.model, surface.table
+    low, high = table.points.min(axis=0), table.points.max(axis=0)
+    names = ("thickness", "young", "poisson", "largest", "sides", "bar", "off")
+    numbers = {name: getattr(model, name) for name in names} | {
+        "origin": model.origin.tolist(), "axes": model.axes.tolist(), "c_ref": model.table.c_ref,
+        "reach": model.table.reach, "even": model.table.even,
+        "leans": model.table.leans, "is_round": model.table.is_round, "poisson_range": model.table.poisson,
+        "reciprocal": model.table.reciprocal.tolist(), "curvature": model.table.curvature.tolist(),
+    }  # fmt: skip
+    return {
+        "model": numbers,
+        "arrays": layout(arrays),
+        "shape": table.amounts.shape,
+        "eye": (np.array([-0.5, -0.75, 0.55]) / hypot(0.5, 0.75, 0.55)).tolist(),
+        "centre": (_MM * (low + high) / 2).tolist(),
+        "radius": float(_MM * np.linalg.norm(high - low) / 2),
+        "stops": palette.YLGNBU,
+        "ink": {"footprint": palette.FOOTPRINT, "held": palette.HELD, "probe": palette.TOOL},
+        "sentences": SENTENCES,
+    }

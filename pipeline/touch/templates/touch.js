@@ -1,0 +1,202 @@
+// The page: a hand that moves the tool, and what it feels.
+
+const field = (name) => document.querySelector(`[name=${name}]`);
+const say = (id, text) => {
+  document.getElementById(id).textContent = text;
+};
+const short = (value, digits = 3) => String(Number(value.toPrecision(digits)));
+const MM = 1e3;
+const DEGREE = Math.PI / 180;
+// The arrow of the largest force so far is this share of the body's size; arrows are this thick.
+const ARROW = 0.35;
+const THICK = 0.008;
+// The error bar that fills its gauge.
+const DOUBT = 0.05;
+
+class Page {
+  constructor(told, arrays, gl) {
+    this.told = told;
+    this.model = new Model(told.model);
+    this.surface = new Surface(this.model, arrays, told.shape);
+    this.canvas = gl.canvas;
+    this.made = new Vertices();
+    this.scene = new Scene(gl, told.ink);
+    this.scene.colour({ stops: told.stops, labels: null });
+    this.largest = 0;
+    this.size = told.radius;
+    this.listen();
+    this.camera = new Camera(gl.canvas, told.eye, told.radius, 1e-3 * told.radius);
+    this.camera.listen(() => this.redraw());
+    this.camera.look(told.centre, 0);
+    this.whole();
+  }
+  listen() {
+    for (const { name } of document.querySelectorAll("#panel [name]")) {
+      field(name).addEventListener("input", () => this.redraw());
+    }
+    field("whole").addEventListener("click", () => this.whole());
+    addEventListener("resize", () => this.redraw());
+    const { canvas } = this;
+    let held = null;
+    // Before the camera's own: what begins on the face moves the tool.
+    canvas.addEventListener("pointerdown", (event) => {
+      const place = event.button === 0 && !event.shiftKey && held === null && this.under(event);
+      if (!place) return;
+      held = event.pointerId;
+      canvas.setPointerCapture(held);
+      event.stopImmediatePropagation();
+      this.moveTo(place);
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      if (event.pointerId !== held) return;
+      event.stopImmediatePropagation();
+      const place = this.onPlane(event);
+      if (place) this.moveTo(place);
+    });
+    for (const end of ["pointerup", "pointercancel"]) {
+      canvas.addEventListener(end, (event) => {
+        if (event.pointerId === held) held = null;
+      });
+    }
+  }
+  // Where the eye's ray meets the plane of the face (mm), or nothing.
+  onPlane({ clientX, clientY }) {
+    const { camera, canvas } = this;
+    const [right, up, back] = camera.basis();
+    if (back[2] < 0.05) return null;
+    const [dx, dy] = [clientX - canvas.clientWidth / 2, canvas.clientHeight / 2 - clientY].map((d) => d * camera.scale());
+    const from = along(along(camera.target, dx, right), dy, up);
+    const hit = along(from, -from[2] / back[2], back);
+    return [hit[0], hit[1]];
+  }
+  under(event) {
+    const place = this.onPlane(event);
+    if (!place) return null;
+    const [a, b] = this.model.sides.map((side) => MM * side);
+    const [x, y] = place;
+    const isOn = this.model.is_round ? Math.hypot(x, y) <= a : Math.abs(x) <= a && Math.abs(y) <= b;
+    return isOn ? place : null;
+  }
+  moveTo([x, y]) {
+    field("x").value = x;
+    field("y").value = y;
+    this.redraw();
+  }
+  whole() {
+    const [, up] = this.camera.basis();
+    const panel = innerWidth < 600 ? 0 : document.getElementById("panel").offsetWidth;
+    const wide = (this.canvas.clientWidth - panel) / this.canvas.clientHeight;
+    this.camera.look(along(this.told.centre, 0.25 * this.size, up), this.size * Math.max(1.05, 1 / wide));
+    this.camera.pan(-panel / 2, 0);
+    this.redraw();
+  }
+  // What is asked, in SI units.
+  get query() {
+    const value = (name) => field(name).valueAsNumber;
+    const { model } = this;
+    const place = model.body([value("x") / MM, value("y") / MM, 0]).map((part, i) => part + model.origin[i]);
+    return {
+      tool: field("tool").value, at: place, depth: value("depth") / MM, radius: value("radius") / MM,
+      angle: value("angle") * DEGREE, young: value("young") * 1e3, poisson: value("poisson"),
+    };
+  }
+  redraw() {
+    if (!this.asked) requestAnimationFrame(() => this.draw());
+    this.asked = true;
+  }
+  draw() {
+    this.asked = false;
+    const { query, model } = this;
+    field("angle").parentElement.hidden = query.tool !== "cone";
+    const began = performance.now();
+    const touch = model.query(query);
+    const isIn = touch.status === "ok";
+    const triangles = isIn ? this.surface.press(query, touch, true) : null;
+    const took = performance.now() - began;
+    this.made.size = 0;
+    this.fillBody(triangles, query.depth * MM);
+    if (isIn) this.fillArrow(query, touch);
+    this.scene.body.fill(this.made);
+    this.fillTool(query, isIn);
+    this.scene.draw(this.camera, {
+      factor: 1, plane: null, epsilon: 0, edges: field("edges").checked, marks: true, tool: true,
+    });
+    this.tell(query, touch, took);
+  }
+  fillBody(pressed, deepest) {
+    const { made, surface } = this;
+    const { rest, moved, n, m } = surface;
+    const count = pressed ? pressed.length : 3 * m;
+    for (let i = 0; i < count; i++) {
+      const v = pressed ? pressed[i] : surface.triangles[(i % 3) * m + Math.floor(i / 3)];
+      const first = made.further();
+      const { data } = made;
+      let square = 0;
+      for (let k = 0; k < 3; k++) {
+        const shift = pressed ? MM * moved[3 * v + k] : 0;
+        data[first + k] = MM * rest[3 * v + k];
+        data[first + 3 + k] = shift;
+        square += shift * shift;
+        data[first + 8 + k] = k === i % 3 ? 1 : 0;
+      }
+      data[first + 6] = Math.sqrt(square) / deepest;
+      data[first + 7] = FREE;
+    }
+  }
+  fillArrow({ at, depth }, { force, error }) {
+    const [x, y] = this.model.local(at).map((value) => MM * value);
+    const local = this.model.axes.map((axis) => inner(axis, force));
+    const size = Math.hypot(...local);
+    this.largest = Math.max(this.largest, size);
+    const length = (ARROW * this.size * size) / this.largest;
+    arrow(this.made, [x, y, -MM * depth], local.map((value) => value / size), length, error, THICK * this.size);
+  }
+  fillTool({ tool, at, depth, radius, angle }, isIn) {
+    const made = new Vertices();
+    const place = this.model.local(at).map((value) => MM * value);
+    const down = isIn || depth <= 0 ? -MM * depth : 0;
+    turned(made, profileOf(tool, MM * radius, angle), place, down, TOOL);
+    this.scene.gl.uniform3fv(this.scene.at("probe"), rgb(isIn ? this.told.ink.probe : this.told.ink.footprint));
+    this.scene.tool.fill(made);
+  }
+  tell(query, touch, took) {
+    for (const name of ["x", "y", "depth", "radius", "angle", "young", "poisson"]) {
+      field(name).previousElementSibling.textContent = short(field(name).valueAsNumber);
+    }
+    const isIn = touch.status === "ok";
+    say("status", isIn ? "" : this.told.sentences[touch.status]);
+    document.body.dataset.status = touch.status;
+    const local = this.model.axes.map((axis) => inner(axis, touch.force));
+    const [normal, aside] = [local[2], Math.hypot(local[0], local[1])];
+    const bar = document.querySelector("#gauge .bar");
+    const whisker = document.querySelector("#gauge .whisker");
+    const full = this.largest * 1.1 || 1;
+    bar.style.width = isIn ? `${(100 * normal) / full}%` : "0";
+    document.querySelector("#doubt .bar").style.width = isIn ? `${Math.min(100, (100 * touch.error) / DOUBT)}%` : "0";
+    whisker.hidden = !isIn;
+    if (isIn) {
+      whisker.style.left = `${(100 * normal * (1 - touch.error)) / full}%`;
+      whisker.style.width = `${(200 * normal * touch.error) / full}%`;
+    }
+    const known = touch.status === "ok" || touch.status === "lost";
+    say("force", known ? `${short(normal)} N` : "–");
+    say("error", isIn ? `± ${short(100 * touch.error, 2)} %` : "");
+    say("aside", known ? `${short(1e3 * aside, 2)} mN` : "–");
+    say("stiffness", known ? `${short(touch.stiffness)} N/m` : "–");
+    say("contact", known ? `${short(MM * touch.radius)} mm` : "–");
+    say("took", isIn ? `${took.toFixed(1)} ms` : "–");
+  }
+}
+
+let page = null;
+(async () => {
+  const gl = document.querySelector("canvas").getContext("webgl2", { antialias: true });
+  if (!gl) {
+    const trouble = document.getElementById("trouble");
+    trouble.textContent = "This browser does not draw in three dimensions (WebGL 2), or has it switched off.";
+    trouble.hidden = false;
+    return;
+  }
+  const told = JSON.parse(document.getElementById("told").textContent);
+  page = new Page(told, await unpack(document.getElementById("numbers").textContent, told.arrays), gl);
+})();

@@ -1,0 +1,107 @@
+"""What is seen of a touch: closed forms held against each other and against the tool; files that are none."""
+
+from dataclasses import replace
+from math import pi, tan
+
+import numpy as np
+import pytest
+
+from pipeline.export.file import write_model
+from pipeline.realtime import ModelError, load
+from pipeline.realtime.contact import Disc, Place, ball, cone
+from pipeline.realtime.surface import _MOMENTS, _below, _on_face, surface_of
+from tests.realtime.synthetic import random_surface, write_random, write_surface
+
+POISSON = 0.4
+PLANE = 1 / (1 - POISSON**2)
+SHAPES = {"disc": Disc(2e-3), "sphere": ball(0.4), "cone": cone(1.2, 5e-3)}
+AT = (0.011, 0.007, 0.0)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_the_face_leaves_the_tool_without_a_step(name):
+    none = np.zeros(2)
+    depth = 2e-6 if name == "sphere" else 2e-4  # of a large ball, which Hertz's paraboloid is
+    contact = SHAPES[name].press(depth, Place(0.0, 0.0, 0.0, none, none, none, PLANE), 1.0)
+    a = contact.radius
+    sunk, share = _on_face(name, np.array([a]), a, PLANE)
+    rise = {"disc": 0.0, "sphere": a**2 / 0.8, "cone": a / tan(1.2)}[name]
+    assert contact.force * sunk[0] == pytest.approx(depth - rise, rel=1e-4)
+    assert share[0] == pytest.approx(1.0)
+    assert contact.mean_square == pytest.approx(_MOMENTS[name] * a**2, rel=1e-4)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_far_from_a_contact_its_force_and_second_moment_are_what_is_seen(name):
+    a, rho = 1e-3, np.array([4e-3, 8e-3])
+    sunk, share = _on_face(name, rho, a, PLANE)
+    away = np.column_stack([rho, 0 * rho, 0 * rho])
+    found = _below(away, POISSON, _MOMENTS[name] * a**2)
+    aside = (1 - 2 * POISSON) * (1 + POISSON) / (2 * pi) * share / rho
+    np.testing.assert_array_less(np.abs(found[:, 2] + sunk) / sunk, 0.4 * (a / rho) ** 4)
+    np.testing.assert_allclose(-found[:, 0], aside, rtol=1e-9)
+
+
+def test_below_the_face_a_ring_of_forces_does_what_its_second_moment_tells():
+    away, a = np.array([[0.02, 0.01, -0.015], [0.004, -0.02, -0.02]]), 2e-3
+    angle = 2 * pi * np.arange(24) / 24
+    ring = np.stack([a * np.cos(angle), a * np.sin(angle), 0 * angle], axis=1)
+    known = np.mean([_below(away - place, POISSON, 1e-30) for place in ring], axis=0)
+    point, found = (_below(away, POISSON, square) for square in (1e-30, a**2))
+    assert np.abs(found - known).max() < 0.03 * np.abs(point - known).max()
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_the_contact_has_the_shape_of_the_tool_in_any_frame(turned):
+    surface = random_surface(turned=turned)
+    model = surface.model
+    at = model.origin + model.axes.T @ np.array(AT)
+    at = surface.points[np.argmin(np.linalg.norm(surface.points - at, axis=1))]
+    touch, moved = surface.press("sphere", at=at, depth=3e-4, radius=6e-3)
+    assert touch.status == "ok"
+    rho = np.linalg.norm(surface.points - at, axis=1)
+    assert (moved @ model.axes[2])[rho.argmin()] == pytest.approx(-3e-4)
+    plain = random_surface()
+    local = model.axes @ (at - model.origin)
+    _, other = plain.press("sphere", at=local, depth=3e-4, radius=6e-3)
+    np.testing.assert_allclose(moved @ model.axes.T, other, atol=1e-9)
+
+
+def test_no_touch_moves_nothing_and_a_refusal_shows_nothing():
+    surface = random_surface()
+    touch, moved = surface.press("disc", at=AT, depth=-1e-4, radius=2e-3)
+    assert (touch.status, np.abs(moved).max()) == ("lost", 0.0)
+    touch, moved = surface.press("disc", at=(0.031, 0.0, 0.0), depth=1e-4, radius=2e-3)
+    assert touch.status == "outside"
+    assert np.isnan(moved).all()
+
+
+def test_a_file_holds_the_surface_and_one_without_says_so(tmp_path):
+    made, read = random_surface(), write_surface(tmp_path / "model.nc")
+    for asked in ({"tool": "disc", "radius": 2e-3}, {"tool": "cone", "radius": 2e-3, "angle": 1.0}):
+        (touch, one), (_, other) = (s.press(at=AT, depth=1e-4, **asked) for s in (made, read))
+        assert touch.status == "ok"
+        np.testing.assert_array_equal(one, other)
+    assert load(tmp_path / "model.nc").query("disc", radius=2e-3, at=AT, depth=1e-4).status == "ok"
+    write_random(tmp_path / "bare.nc")
+    with pytest.raises(ModelError, match="surface"):
+        surface_of((tmp_path / "bare.nc").read_bytes())
+
+
+def test_a_damaged_surface_is_refused(tmp_path):
+    made = random_surface()
+    table = made.table
+    damaged = (
+        {"triangles": table.triangles + 1000}, {"error": -1.0}, {"points": np.full_like(table.points, np.nan)},
+        {"amounts": np.full_like(table.amounts, np.inf)}, {"triangles": table.triangles[:, :2]},
+    )  # fmt: skip
+    for number, wrong in enumerate(damaged):
+        path = tmp_path / f"{number}.nc"
+        write_model(path, made.model, {}, {}, replace(table, **wrong))
+        with pytest.raises(ModelError):
+            surface_of(path.read_bytes())
+    write_surface(tmp_path / "whole.nc")
+    data = (tmp_path / "whole.nc").read_bytes()
+    for size in range(0, len(data), 997):
+        with pytest.raises(ModelError):
+            surface_of(data[:size])

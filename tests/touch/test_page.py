@@ -1,0 +1,195 @@
+"""The page of a real-time model: numpy's numbers, a mouse that moves the tool, a server that serves nothing else."""
+
+import json
+import os
+import threading
+from http.client import HTTPConnection
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from pipeline.touch.page import render, write_touch_page
+from pipeline.touch.server import HOST, PageServer
+from tests.realtime.synthetic import random_surface, write_random, write_surface
+from tests.report.browser import CHROMIUM, Browser
+
+in_browser = pytest.mark.skipif(CHROMIUM is None and not os.environ.get("CI"), reason="chromium is not installed")
+KINDS = ({}, {"is_round": True}, {"turned": True})
+SHAPES = ("disc", "sphere", "cone")
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    with Browser(tmp_path_factory.mktemp("profile"), webgl=True) as found:
+        found.look_like(1000, 700)
+        yield found
+
+
+def opened(browser, folder, **kind):
+    surface = random_surface(**kind)
+    path = write_touch_page(surface, folder / "page.html", "a < b")
+    browser.open(path)
+    drawn(browser)
+    return surface, path
+
+
+def drawn(browser):
+    browser.ask("new Promise(done => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(done)), 100))")
+
+
+def change(browser, **values):
+    for name, value in values.items():
+        browser.ask(
+            f"(e => {{ e.value = {json.dumps(value)}; e.dispatchEvent(new Event('input', {{bubbles: true}})); }})"
+            f"(document.querySelector('[name={name}]'))"
+        )
+    drawn(browser)
+
+
+def told(browser, name):
+    return browser.ask(f"document.getElementById({json.dumps(name)}).textContent")
+
+
+def queries(model, count):
+    rng = np.random.default_rng(8)
+    for number in range(count):
+        tool = SHAPES[number % 3]
+        x, y = rng.uniform(-1.05, 1.05, 2) * model.table.reach
+        at = model.origin + x * model.axes[0] + y * model.axes[1]
+        yield {
+            "tool": tool, "at": at.tolist(), "depth": float(rng.uniform(-5e-5, 1e-3)), "angle": 1.1,
+            "radius": {"disc": 2e-3, "sphere": 6e-3, "cone": 5e-3}[tool] * float(rng.uniform(0.5, 2)),
+            "young": float(rng.uniform(1e3, 1e5)), "poisson": float(rng.uniform(0.29, 0.5)),
+        }  # fmt: skip
+
+
+@in_browser
+@pytest.mark.parametrize("kind", KINDS)
+def test_numbers_are_those_of_numpy(browser, tmp_path, kind):
+    surface, path = opened(browser, tmp_path, **kind)
+    asked = list(queries(surface.model, 900))
+    plain = "({status, force, error, stiffness, radius}) => [status, ...force, error, stiffness, radius]"
+    found = browser.ask(f"{json.dumps(asked)}.map(q => page.model.query(q)).map({plain})")
+    seen = set()
+    for query, (status, *numbers) in zip(asked, found, strict=True):
+        touch = surface.model.query(**query)
+        assert status == touch.status
+        seen.add(status)
+        if status == "ok":
+            known = [*touch.force, touch.force_error, touch.stiffness, touch.contact_radius]
+            scale = [*[np.linalg.norm(touch.force)] * 3, *known[3:]]
+            assert np.all(np.abs(np.array(numbers) - known) <= 1e-10 * np.array(scale))
+    assert seen >= {"ok", "lost", "outside", "poisson", "large"}
+    for query in [q for q in asked if surface.model.query(**q).status == "ok"][:6]:
+        moved = browser.ask(
+            f"(q => {{ page.surface.press(q, page.model.query(q), false); const {{moved, n}} = page.surface; "
+            f"return Array.from(moved.subarray(0, 3 * n)); }})({json.dumps(query)})"
+        )
+        _, known = surface.press(**query)
+        local = known @ surface.model.axes.T
+        np.testing.assert_allclose(np.reshape(moved, (-1, 3)), local, atol=1e-5 * query["depth"])
+    assert browser.messages == []
+    assert browser.requests == [path.as_uri()]
+
+
+@in_browser
+def test_a_mouse_moves_the_tool_on_the_face_and_turns_the_body_beside_it(browser, tmp_path):
+    surface, _ = opened(browser, tmp_path)
+    assert browser.ask("document.title") == "a < b"
+    change(browser, x=0, y=0, depth=0.3, radius=2)
+    place = browser.ask(
+        "(([right, up, back], c) => { const at = [0, 0, 0].map((v, i) => v - c.target[i]); const s = 1 / c.scale();"
+        "return [c.canvas.clientWidth / 2 + s * dot(at, right), c.canvas.clientHeight / 2 - s * dot(at, up)]; })"
+        "(page.camera.basis(), page.camera)"
+    )
+    drag(browser, place, (place[0] + 40, place[1]))
+    x, y = (browser.ask(f"document.querySelector('[name={name}]').valueAsNumber") for name in "xy")
+    assert np.hypot(x, y) == pytest.approx(40 * browser.ask("page.camera.scale()"), rel=0.3)
+    touch = surface.model.query("disc", radius=2e-3, depth=3e-4, at=(1e-3 * x, 1e-3 * y, 0.0))
+    assert told(browser, "force") == f"{touch.force[2]:.3g} N"
+    assert told(browser, "error") == f"± {100 * touch.force_error:.2g} %"
+    angle = browser.ask("page.camera.azimuth")
+    drag(browser, (40, 600), (100, 600))
+    assert browser.ask("page.camera.azimuth") != angle
+    assert told(browser, "force") == f"{touch.force[2]:.3g} N"
+    assert browser.messages == []
+
+
+def drag(browser, start, end):
+    for kind, (x, y) in (("mousePressed", start), ("mouseMoved", end), ("mouseReleased", end)):
+        browser.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
+    drawn(browser)
+
+
+@in_browser
+def test_the_dent_is_seen_and_outside_the_region_no_number_is(browser, tmp_path):
+    opened(browser, tmp_path)
+    change(browser, depth=-0.1)
+    browser.screenshot(tmp_path / "rest.png", whole=False)
+    change(browser, depth=1)
+    browser.screenshot(tmp_path / "pressed.png", whole=False)
+    rest, pressed = (imread(tmp_path / f"{name}.png")[80:, :700, :3] for name in ("rest", "pressed"))
+    assert np.mean(rest.min(axis=-1) < 0.97) > 0.1
+    assert np.mean(np.abs(rest - pressed).max(axis=-1) > 0.05) > 0.01
+    change(browser, x=33)
+    assert "outside" in told(browser, "status")
+    assert [told(browser, name) for name in ("force", "error", "stiffness", "contact")] == ["–", "", "–", "–"]
+    change(browser, x=0, tool="cone")
+    assert told(browser, "status") == ""
+    assert told(browser, "force").endswith(" N")
+
+
+@in_browser
+def test_fits_a_phone_and_the_dark(browser, tmp_path):
+    browser.look_like(375, 700, dark=True)
+    opened(browser, tmp_path)
+    assert browser.ask("document.documentElement.scrollWidth") <= 375
+    assert browser.ask("getComputedStyle(document.body).backgroundColor") == "rgb(20, 23, 27)"
+    browser.look_like(1000, 700)
+
+
+def test_the_server_gives_the_page_at_its_own_address_alone():
+    text = render(random_surface(), "page")
+    with PageServer(text) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        try:
+            assert server.server_address[0] == HOST == "127.0.0.1"
+            host = f"{HOST}:{server.server_port}"
+            assert answer(server, server.path, host) == (200, text)
+            wrong = [("/", host), ("/favicon.ico", host), (server.path + "x", host), (server.path, "evil.example")]
+            for path, named in [*wrong, ("/../../etc/passwd", host), (server.path[:-2] + "/", host)]:
+                status, body = answer(server, path, named)
+                assert status == 404
+                assert "<canvas" not in body
+        finally:
+            server.shutdown()
+            thread.join()
+    assert len(server.path) > 20
+    with PageServer(text) as other:
+        assert other.path != server.path
+
+
+def answer(server, path, host):
+    connection = HTTPConnection(HOST, server.server_port, timeout=10)
+    connection.putrequest("GET", path, skip_host=True)
+    connection.putheader("Host", host)
+    connection.endheaders()
+    response = connection.getresponse()
+    found = response.status, response.read().decode()
+    connection.close()
+    return found
+
+
+def test_the_command_writes_a_file_and_says_what_is_no_model(epsmesh, tmp_path):
+    write_surface(tmp_path / "model.nc")
+    done = epsmesh("touch", tmp_path / "model.nc", "-o", tmp_path / "page.html")
+    assert done.exit_code == 0, done.output
+    assert "<canvas" in (tmp_path / "page.html").read_text()
+    write_random(tmp_path / "bare.nc")
+    for path, word in (("bare.nc", "surface"), ("page.html", "netCDF"), ("none.nc", "No such file")):
+        wrong = epsmesh("touch", tmp_path / path, "-o", tmp_path / "x.html")
+        assert wrong.exit_code == 2
+        assert word in wrong.output
+    assert not (tmp_path / "x.html").exists()
