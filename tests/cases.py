@@ -35,7 +35,7 @@ def study(**changes: Any) -> Study:
 
 def solve(comm: MPI.Comm = MPI.COMM_SELF, **changes: Any) -> dict[tuple[int, ...], Record]:
     """Run the base study with changes and return the record of every case, each place's own, by index."""
-    plan = make_plan(study(**changes), without=("images",))
+    plan = make_plan(study(**changes), without=("images", "moved"))
     records = compute(plan, comm)
     return {
         case.index: records[key].scaled(case.scale) for case, key in zip(plan.study.cases(), plan.keys, strict=True)

@@ -1,6 +1,7 @@
 """Places that are images of each other on one body: mirrored in its planes, or turned about its axis.
 
-The force on one is the image of the force on the other.
+The force on one is the image of the force on the other. A column, or a half ball that a half-space closes, is its own
+image anywhere on flat tissue, as long as it keeps clear of the sides: the whole body is not.
 """
 
 from collections.abc import Iterator
@@ -12,19 +13,27 @@ from typing import Any
 from pipeline.plan.key import case_key, digest
 from pipeline.plan.symmetry import body_planes, is_body_round
 from pipeline.shapes.arrays import FloatArray, np
+from pipeline.shapes.body import Layered
+from pipeline.shapes.contact import is_level
 from pipeline.study.sweep import Case
 
 # Places that differ by less than this, in units of the body, are the same; so are directions.
 _DIGITS = 9
 _SAME = 1e-9
+# What keys have in the place of a place.
+NOWHERE = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class Image:
-    """The index of the case that is solved instead, and the matrix (3, 3), by rows, that takes its vectors here."""
+    """The index of the case that is solved instead, and the matrix (3, 3), by rows, that takes its vectors here.
+
+    ``of_scene`` says that the whole body is the other's image, too, and not only what the mesh keeps of it.
+    """
 
     of: tuple[int, ...]
-    rows: tuple[tuple[float, ...], ...]
+    rows: tuple[tuple[float, ...], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    of_scene: bool = True
 
     def vector(self, values: tuple[float, float, float]) -> tuple[float, float, float]:
         """Return the image of a vector."""
@@ -49,10 +58,25 @@ def image_key(case: Case, *, scaled: bool) -> tuple[str, FloatArray] | None:
     if found is None:
         return None
     place, matrix = found
-    nowhere: dict[str, Any] = {"at": (0.0, 0.0), "axis": None}
+    nowhere: dict[str, Any] = {"at": NOWHERE, "axis": None}
     nowhere |= {"direction": (1.0, 0.0, 0.0)} if hasattr(case.probe, "direction") else {}
     elsewhere = replace(case, probe=case.probe.model_copy(update=nowhere))
     return digest("\n".join([case_key(elsewhere, scaled=scaled), str(case.is_full), str(place)])), matrix
+
+
+def moved_key(case: Case, *, scaled: bool) -> str:
+    """Return a key that all places have in common where what is kept of the body is the same, "" where it is not.
+
+    That is a column in level layers, or a half ball closed by a half-space, clear of the sides. Not where inclusions
+    or loads are, and not one that the body's own far field closes, which knows where it stands.
+    """
+    body, frame = case.body, case.frame
+    if not case.is_truncated or case.has_own_far_field or case.load.acts or not isinstance(body, Layered):
+        return ""
+    if body.inclusion or not is_level(body, frame) or body.gap(frame.point) <= (1 + _SAME) * case.column:
+        return ""
+    elsewhere = replace(case, probe=case.probe.model_copy(update={"at": NOWHERE}))
+    return digest("\n".join([case_key(elsewhere, scaled=scaled), "moved"]))
 
 
 def _compared(case: Case) -> Iterator[tuple[tuple[float, ...], FloatArray]]:

@@ -92,7 +92,7 @@ def ask_for_exact(plan: Plan) -> Plan:
             keys.append(ABSENT)
             large += 1
             continue
-        if image := plan.images.get(case.index):
+        if (image := plan.images.get(case.index)) and image.of_scene:
             case = plan.study.case(image.of)  # noqa: PLW2901
         enough = max(accuracy, EXACT_OF_SLIT) if case.probe.slit else accuracy
         key = reference_key(case, enough)

@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from pipeline.plan import estimate
-from pipeline.plan.images import Image, image_key
-from pipeline.plan.key import case_key, digest
+from pipeline.plan.images import NOWHERE, Image, image_key, moved_key
+from pipeline.plan.key import case_key, digest, mesh_key
 from pipeline.plan.steps import MOST_DOFS, MeshStep, OperatorStep, Solve, mesh_steps
 from pipeline.plan.symmetry import is_round, model_planes
 from pipeline.plan.work import Plan, Struck
@@ -68,6 +68,22 @@ def strike_images(plan: Plan) -> Plan:
     return _merged(plan, "images", _reason(strike_images))
 
 
+def strike_moved(plan: Plan) -> Plan:
+    """A column, or a half ball that a half-space closes, is the same anywhere on flat tissue: it is solved once."""
+    first: dict[str, Solve] = {}
+    key: dict[str, str] = {}
+    images = dict(plan.images)
+    for solve in plan.solves if _sweeps_places(plan) else ():
+        text = moved_key(solve.case, scaled="scaling" in plan.used)
+        other = first.setdefault(text, solve) if text else solve
+        if other is not solve:
+            key[solve.key] = other.key
+            images = dict.fromkeys(solve.serves, Image(other.case.index, of_scene=False)) | images
+    solves = tuple(replace(solve, key=key.get(solve.key, solve.key)) for solve in plan.solves)
+    plan = replace(plan, solves=solves, keys=tuple(key.get(k, k) for k in plan.keys), images=images)
+    return _merged(plan, "moved", _reason(strike_moved))
+
+
 def _sweeps_places(plan: Plan) -> bool:
     """Tell whether a tool of the plan's study stands in several places, or in several directions."""
     found = {(probe.at, probe.axis, getattr(probe, "direction", None)) for probe in plan.study.probes}
@@ -93,13 +109,26 @@ def use_symmetry(plan: Plan) -> Plan:
 
 
 def share_meshes(plan: Plan) -> Plan:
-    """Cases on the same geometry and sizes share one mesh, and its set-up if they differ in the material only."""
-    plan = replace(plan, shared=True)
+    """Cases on the same geometry and sizes share one mesh, and its set-up if they differ in the material only; half
+    balls that the body's own far field closes, in the place, too.
+    """
+    first: dict[str, tuple[float, ...]] = {}
+    solves = tuple(_standing(solve, first) for solve in plan.solves)
+    plan = replace(plan, solves=solves, shared=True)
     return plan.struck_by("sharing", len(plan.solves) - len(mesh_steps(plan.solves)), _reason(share_meshes))
 
 
+def _standing(solve: Solve, first: dict[str, tuple[float, ...]]) -> Solve:
+    """Return a solve of a half ball with the place of the ``first`` one that is the same but for its place."""
+    if not solve.case.is_closed:
+        return solve
+    at = tuple(solve.case.probe.at)
+    nowhere = replace(solve, stands=NOWHERE).ground
+    return replace(solve, stands=first.setdefault(f"{mesh_key(nowhere)} {solve.mirrors}", at))
+
+
 def reuse_solutions(plan: Plan) -> Plan:
-    """A solve begins from the solutions for the neighbouring Poisson's ratios, or depths where contact is found."""
+    """A solve begins from the solutions for neighbouring Poisson's ratios or places, or depths if contact is found."""
     plan = replace(plan, reuse=True)
     operators = [operator for step in plan.meshes for operator in step.operators if not step.axisymmetric]
     count = sum(len(operator.solves) - _fresh(operator) for operator in operators)
@@ -160,6 +189,7 @@ REDUCTIONS: dict[str, Callable[[Plan], Plan]] = {
     "full": strike_past_body,
     "scaling": strike_scaled,
     "images": strike_images,
+    "moved": strike_moved,
     "axisymmetric": use_axisymmetry,
     "symmetry": use_symmetry,
     "sharing": share_meshes,

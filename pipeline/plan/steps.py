@@ -19,7 +19,8 @@ class Solve:
 
     ``mirrors`` are the planes of symmetry ("x": x = 0) that leave half or a quarter of the body to be solved;
     ``axisymmetric`` leaves the meridian; ``reduced`` may be answered from a reduced basis. A case with a ``goal``, the
-    relative error asked for, is tried again with the meshes of ``later`` until its error bar is below it.
+    relative error asked for, is tried again with the meshes of ``later`` until its error bar is below it. ``stands``
+    is where the probe of the case stands whose mesh it shares, if that is elsewhere on the body.
     """
 
     key: str
@@ -31,6 +32,14 @@ class Solve:
     later: tuple[Mesh, ...] = ()
     is_reference: bool = False
     reduced: bool = False
+    stands: tuple[float, ...] | None = None
+
+    @property
+    def ground(self) -> Case:
+        """The case on whose mesh it is solved: but for its place, itself."""
+        if self.stands is None:
+            return self.case
+        return replace(self.case, probe=self.case.probe.model_copy(update={"at": self.stands}))
 
     @property
     def label(self) -> str:
@@ -44,8 +53,8 @@ class Solve:
 
 @dataclass(frozen=True)
 class OperatorStep:
-    """Solves that share spaces, conditions and the assembly: they differ in material only, or in the depth of a tool
-    whose contact is found.
+    """Solves that share spaces, conditions and the assembly: they differ in material only, in the depth of a tool whose
+    contact is found, or in where the half ball stands that is kept of a body.
     """
 
     solves: tuple[Solve, ...]
@@ -107,14 +116,14 @@ def mesh_steps(solves: Collection[Solve], *, shared: bool = True) -> tuple[MeshS
         return tuple(MeshStep((OperatorStep((solve,)),)) for solve in solves)
     steps = []
     for group in _grouped(solves, _mesh_of):
-        operators = _grouped(group, lambda solve: operator_key(solve.case))
+        operators = _grouped(group, lambda solve: operator_key(solve.ground))
         steps.append(MeshStep(tuple(OperatorStep(found) for found in operators)))
     return tuple(steps)
 
 
 def _mesh_of(solve: Solve) -> Hashable:
     """Tell apart the meshes of solves: each meridian is one of its own."""
-    return (solve.key if solve.axisymmetric else mesh_key(solve.case), solve.mirrors)
+    return (solve.key if solve.axisymmetric else mesh_key(solve.ground), solve.mirrors)
 
 
 def _grouped(solves: Collection[Solve], key: Callable[[Solve], Hashable]) -> list[tuple[Solve, ...]]:

@@ -129,12 +129,15 @@ def round_tool_of(case: Case) -> RoundTool:
     return RoundTool(gap, probe.circumradius)
 
 
-def loads_of(case: Case) -> Loads:
-    """Return how the probe of ``case`` moves, and what loads act, on the mesh turned so that it presses along -z."""
-    return replace(_movement_of(case), dead=dead_loads_of(case))
+def loads_of(case: Case, meshed: Case | None = None) -> Loads:
+    """Return how the probe of ``case`` moves, and what loads act, on the mesh turned so that it presses along -z.
+
+    ``meshed`` is the case that the mesh was made for, if that is another: a half ball elsewhere on the body.
+    """
+    return replace(_movement_of(case, meshed or case), dead=dead_loads_of(case))
 
 
-def _movement_of(case: Case) -> Loads:
+def _movement_of(case: Case, meshed: Case) -> Loads:
     frame = case.frame.upright
     travel = case.probe.travel(frame)
     if case.probe.motion == "all":
@@ -144,7 +147,7 @@ def _movement_of(case: Case) -> Loads:
         pressed = Loads.along(travel) if case.probe.contact == "bonded" else Loads((), ())
         return pressed.opened(case.frame.upright.across, slit.width / 2)
     if case.is_closed:
-        return Loads.along(travel).with_far(far_field_of(case))
+        return Loads.along(travel).with_far(far_field_of(case).moved(meshed.frame.point))
     # Across a plane of symmetry a probe slides without force along its axis, and presses without force along itself.
     return Loads.along(travel, apart=mirror_planes(case) != movement_planes(case))
 
@@ -155,13 +158,15 @@ def law_of(case: Case) -> MaterialLaw:
     return MaterialLaw(tuple(value for value, _ in moduli), tuple(value for _, value in moduli))
 
 
-def solve_problem(case: Case, problem: Problem, *, estimate: bool) -> Solution:
+def solve_problem(case: Case, problem: Problem, *, estimate: bool, meshed: Case | None = None) -> Solution:
     """Solve a case; where iterations do not converge and the system is small, directly. Collective.
+
+    ``meshed`` is the case that the mesh was made for, if that is another: see ``loads_of``.
 
     Raises:
         SolveError: if that fails, too, or what is found cannot be.
     """
-    law, loads = law_of(case), loads_of(case)
+    law, loads = law_of(case), loads_of(case, meshed)
     method, tolerance = case.solve.method, case.solve.tolerance
     try:
         solution = problem.solve(law, loads, method=method, tolerance=tolerance, estimate=estimate)

@@ -20,6 +20,7 @@ from pipeline.plan.symmetry import model_planes
 from pipeline.run.attempts import Attempts
 from pipeline.run.basis import reduced_records
 from pipeline.run.compile import prepare
+from pipeline.run.far_field import share_far_fields
 from pipeline.run.measure import TIMES, record_of
 from pipeline.run.memory import FreeMemory, PeakMemory, give_back
 from pipeline.run.mesh_cache import MeshCache
@@ -120,6 +121,7 @@ class StepRunner:
         if isinstance(problem, Failure):
             self._fail(step.solves, problem)
             return
+        self._caught(lambda: share_far_fields(solve.case for solve in step.solves))  # or each finds its own
         with problem:
             if step.solves[0].reduced and isinstance(problem, DisplacementProblem):
                 self._reduce(step, problem, ground)
@@ -181,7 +183,8 @@ class StepRunner:
         direct = is_direct(case.solve.method, problem.dofs, degree)
         check_memory(self._free, estimate.solving_memory(problem.dofs, degree, direct=direct), "solving")
         missing = self._lacks_room(bar, problem.dofs, degree)
-        solution = solve_problem(case, problem, estimate=bar is not Bar.NONE and not missing)
+        estimate_it = bar is not Bar.NONE and not missing
+        solution = solve_problem(case, problem, estimate=estimate_it, meshed=solve.ground)
         record = record_of(solve, solution, ground.seconds)
         return replace(self._stamp(record, ground.memory), message=missing)
 
@@ -205,7 +208,7 @@ class StepRunner:
 
     def _mesh(self, solve: Solve) -> tuple[BodyMesh, float]:
         """Return the distributed mesh of a solve and the seconds that it took; collective. What is timed is made."""
-        case = solve.case
+        case = solve.ground
         self._progress.note(f"meshing: {solve.label}")
         check_memory(self._free, estimate.case_memory(case, share=0.5 ** len(solve.mirrors)), "this case")
         return mesh_case(case, solve.mirrors, self._comm, None if case.solve.timing else self._cache)

@@ -7,9 +7,9 @@ how much of the far field there is, and is a part of the energy that is made sta
 energy of what the far field leaves out: of the order (a/ε)³ (small, bonded) and (a/ε)⁵.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import log, pi
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -33,6 +33,9 @@ class FarField(Protocol):
 
     def stiffness(self, mu: float) -> float:
         """Return twice the strain energy (N/m) of a unit beyond the cut face, for the shear modulus ``mu`` (Pa)."""
+
+    def moved(self, centre: Place) -> Self:
+        """Return it as it is seen from a half ball of the same size round another ``centre`` (m)."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +92,10 @@ class PointForce:
     def force(self, mu: float) -> float:
         """Return the force (N/m) that makes a unit."""
         return 4 * pi * mu * self.radius
+
+    def moved(self, centre: Place) -> "PointForce":
+        """Return that of a force at another ``centre`` (m)."""
+        return replace(self, centre=centre)
 
     def _directions(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return unit vectors (n, 3) from the centre, and distances (n), in m."""

@@ -11,7 +11,7 @@ by Betti's theorem within, where the force P of u acts and R has none.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from typing import Any
@@ -26,7 +26,7 @@ from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve.compiled import form, vector_space
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.far_field import PointForce
+from pipeline.solve.far_field import Place, PointForce
 from pipeline.solve.forms import compile_elastic, one_cell
 from pipeline.solve.linear import Level, LinearSolver, SolveError
 from pipeline.solve.loads import Motion
@@ -92,6 +92,10 @@ class BodyField:
     def stiffness(self, mu: float) -> float:
         """Return twice the strain energy (N/m) of a unit beyond the half ball."""
         return self.near.stiffness(mu) + mu * self._of_regular
+
+    def moved(self, centre: Place) -> "BodyField":
+        """Return the same field about another ``centre`` (m): as on the mesh of a half ball that stands there."""
+        return replace(self, near=self.near.moved(centre), regular=replace(self.regular, centre=centre))
 
     @property
     def _scale(self) -> float:

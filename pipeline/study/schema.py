@@ -188,8 +188,8 @@ class Solving(Section):
 
 
 REDUCTIONS = (
-    "duplicates", "full", "scaling", "images", "axisymmetric", "symmetry", "sharing", "reuse", "reduced", "condensed",
-    "stored", "all",
+    "duplicates", "full", "scaling", "images", "moved", "axisymmetric", "symmetry", "sharing", "reuse", "reduced",
+    "condensed", "stored", "all",
 )  # fmt: skip
 
 

@@ -20,6 +20,7 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     from pipeline.verify.forces import scene_rows  # noqa: PLC0415
     from pipeline.verify.large import large_rows  # noqa: PLC0415
     from pipeline.verify.loads import load_rows  # noqa: PLC0415
+    from pipeline.verify.paths import path_rows  # noqa: PLC0415
     from pipeline.verify.regions import region_rows  # noqa: PLC0415
     from pipeline.verify.slits import slit_rows  # noqa: PLC0415
     from pipeline.verify.wedges import wedge_rows  # noqa: PLC0415
@@ -37,5 +38,6 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     yield from wedge_rows(comm, quick=quick)
     yield from slit_rows(comm, quick=quick)
     yield from closure_rows(comm, quick=quick)
+    yield from path_rows(comm, quick=quick)
     yield from load_rows(comm, quick=quick)
     yield from large_rows(comm, quick=quick)

@@ -41,6 +41,33 @@ def test_images_are_found_where_body_and_tool_have_them(expected, path, changes)
     assert solves(path, **changes) == expected
 
 
+ACROSS = {"line": {"from": ["-5 mm", "1 mm"], "to": ["11 mm", "3 mm"], "steps": 5}}
+COLUMN = {"outside": "free", "epsilon": "8 mm"}
+
+
+@pytest.mark.parametrize(
+    ("expected", "mesh", "changes"),
+    [
+        (1, COLUMN, {}),
+        (1, COLUMN, {"body": {"layers": [{"name": "skin", "thickness": "3 mm", "young": "50 kPa", "poisson": 0.4}]}}),
+        (1, COLUMN, {"body": {"fixed": "bottom+sides"}, "probe": BLADE}),
+        (1, {"outside": "halfspace", "epsilon": "8 mm"}, {}),
+        (2, {"outside": "free", "epsilon": "10 mm"}, {}),  # the last one is 9 mm from a side
+        (5, {"outside": "coarse", "epsilon": "8 mm"}, {}),
+        (5, {"outside": "green", "epsilon": "8 mm"}, {}),
+        (5, COLUMN, {"body": {"inclusion": [LUMP | {"at": ["2 mm", "3 mm", "-8 mm"]}]}}),
+        (5, COLUMN, {"plan": {"without": ["moved"]}}),
+    ],
+)
+def test_what_is_cut_out_of_flat_tissue_is_the_same_anywhere(expected, mesh, changes):
+    assert solves(ACROSS, changes.pop("probe", None), mesh={"degree": 2} | mesh, **changes) == expected
+
+
+def test_f_exact_is_the_bodys_where_the_column_is_the_same_anywhere():
+    plan = make_plan(study(probe={"path": ACROSS}, mesh=COLUMN, solve={"exact": True}))
+    assert len({*plan.keys}) == 1 and len({*plan.reference_keys}) == 5
+
+
 def test_a_blade_that_slices_keeps_its_sense():
     """Drawn along x, towards the wall or away from it: no images but those in y = 0."""
     line = {"points": [["9 mm", "5 mm"], ["-9 mm", "5 mm"], ["9 mm", "-5 mm"]]}

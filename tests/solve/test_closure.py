@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from pipeline.plan.plan import make_plan
+from pipeline.run import far_field
+from pipeline.run.execute import compute
 from pipeline.solve.far_field import PointForce
 from pipeline.verify import known
 from tests.cases import solve, study
@@ -81,6 +84,25 @@ def test_green_function_makes_it_the_force_on_the_body():
     ).values()  # fmt: skip
     assert known.half_space_disc(YOUNG, 0.3, 3e-3, DEPTH, "frictionless")[0] < 0.96 * exact
     assert 0 < record.force / exact - 1 < CLOSURE["frictionless", 0.3] + record.force_error
+
+
+def test_half_balls_of_a_path_stand_on_one_mesh():
+    """Far fields differ, of which one factorisation gives all: forces are those of meshes of their own, within bars."""
+    path = {"points": [["1 mm", "2 mm"], ["-9 mm", "4 mm"], ["5 mm", "-11 mm"]]}
+    changes = {"probe": {"radius": "2 mm", "path": path}, "mesh": {**MESH, "rim": "0.6 mm", "outside": "green"}}
+    plan = make_plan(study(**changes))
+    assert len(plan.solves) == 3 and len(plan.meshes) == 1 and len(plan.meshes[0].operators) == 1
+    again = make_plan(study(**changes), stored={plan.keys[0]})
+    assert [solve.ground for solve in again.solves] == [solve.ground for solve in plan.solves[1:]]  # not the second's
+    far_field._known.clear()
+    shared = compute(plan, MPI.COMM_SELF)
+    assert len({seconds for _, seconds in far_field._known.values()}) == 1  # of one factorisation
+    far_field._known.clear()
+    alone = compute(make_plan(study(**changes), without=("sharing",)), MPI.COMM_SELF)
+    forces = np.array([[records[key].force for key in plan.keys] for records in (shared, alone)])
+    assert len({seconds for _, seconds in far_field._known.values()}) == 3
+    assert np.ptp(forces[0]) > 0.01 * forces[0, 0]  # the sides are felt
+    assert forces[0] == pytest.approx(forces[1], rel=5e-3)
 
 
 def test_force_aside_is_not_told():
