@@ -40,6 +40,7 @@ _MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _NO_STIFFNESS = ((nan,) * 6,) * 6
 # Where the probe touches, and along which unit vector it advances.
 _PLACE = ("at_x", "at_y", "at_z")
+_OF_CLOSURE = "of half balls closed by a far field, error bars are those of the mesh alone, not of the closure"
 _MISSING = -1  # of counts, which have no NaN
 
 
@@ -103,6 +104,8 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     if has_stiffness:
         coordinates |= {"movement": list(_MOTIONS), "conjugate": list(_MOTIONS)}
     dataset = xr.Dataset(variables, coordinates, _attributes(plan, flat, run or {}))
+    if any(case.is_closed for case in study.cases() if not case.absence):
+        dataset["force_error"].attrs["comment"] = _OF_CLOSURE
     if path := {axis.name for axis in study.axes if axis.off}:
         dataset = dataset.assign_coords({name: _along(dataset[name], path) for name in _PLACE})
     return _add_ratios(dataset)

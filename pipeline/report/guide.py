@@ -5,6 +5,7 @@ added. Nothing is claimed of a case that was not computed: a setting that lacks 
 setting can be judged on are left out of every claim, and named.
 """
 
+import json
 from collections import Counter
 from math import inf, isfinite
 from typing import Any
@@ -84,8 +85,14 @@ def _listed(counts: Counter[Any]) -> str:
     return "; ".join(f"{count} {text}" for text, count in counts.most_common())
 
 
+def _has_meridians(dataset: xr.Dataset) -> bool:
+    struck = json.loads(str(dataset.attrs.get("reductions", "[]")))
+    return any(one["name"] == "axisymmetric" for one in struck)
+
+
 def _timing(dataset: xr.Dataset) -> str:
     """Say what the times are worth: where they were taken, and whether every case ran afresh and alone."""
     ranks = str(dataset.attrs.get("ranks", 1))  # "1, 2" where groups of ranks differed
     where = f"{ranks} rank{'s' * (ranks != '1')} of {dataset.attrs.get('host', 'an unnamed machine')}"
+    where += ", round scenes on their meridian, with elements of its own" if _has_meridians(dataset) else ""
     return f"{where}, {'every case afresh and alone' if dataset.attrs.get('timing') else 'no timing study'}"

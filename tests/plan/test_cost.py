@@ -96,3 +96,8 @@ def test_meshes_that_may_have_to_follow_are_counted():
     alone = replace(step, operators=(OperatorStep((replace(solve, later=()),)),))
     all_of_them, first = CostModel().step(step).seconds, CostModel().step(alone).seconds
     assert first < all_of_them < 2 * first
+
+
+def test_large_displacements_are_expected_to_take_many_solves():
+    linear, large = (CostModel().seconds("solve", f"{kind} 2", 1e4, 0.4) for kind in ("displacement", "neo-hookean"))
+    assert 20 < large / linear < 80  # 27 to 60 of them, as measured; more at a third of the radius

@@ -62,6 +62,25 @@ def test_words_on_the_figure(tmp_path):
         assert word in text
 
 
+def test_what_loads_add_is_drawn_against_epsilon(tmp_path):
+    study = dataset(mesh={"epsilon": EPSILONS})
+    assert "loads" not in choose(study) and "[load]" in lacks(study, "loads")
+    found = study.assign({name: -1.0 * study["force"].copy() for name in ("load_force", "load_force_error", "sag")})
+    for name, unit in (("load_force", "N"), ("sag", "m")):
+        found[name].attrs["units"] = unit
+    assert choose(found)[:2] == ["epsilon", "loads"]
+    text = draw(found, tmp_path / "a", ["svg"], ["loads"])[0].read_text()
+    assert all(word in text for word in ("sag (mm)", "ε-mesh radius ε (mm)", "F_load: what loads add"))
+
+
+def test_what_error_bars_of_half_balls_leave_out_is_said(tmp_path):
+    closed = {"epsilon": ["6 mm", "8 mm", "full"], "degree": 2}
+    plain, half = (dataset(mesh=closed | {"outside": outside}) for outside in ("free", "fixed"))
+    assert "comment" not in plain["force_error"].attrs
+    half["force_error"].attrs["comment"] = "not of the closure"
+    assert "not of the closure" in draw(half, tmp_path / "a", ["svg"])[0].read_text()
+
+
 def test_where_contact_is_found_force_and_area_are_drawn_against_the_depth(tmp_path):
     study = dataset(probe={"depth": ["0.1 mm", "0.2 mm"]}, mesh={"epsilon": EPSILONS})
     assert "contact" not in choose(study)

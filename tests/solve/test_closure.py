@@ -5,6 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from pipeline.plan.plan import make_plan
+from pipeline.report.dataset import build
 from pipeline.run import far_field
 from pipeline.run.execute import compute
 from pipeline.solve.far_field import PointForce
@@ -103,6 +104,7 @@ def test_half_balls_of_a_path_stand_on_one_mesh():
     assert len({seconds for _, seconds in far_field._known.values()}) == 3
     assert np.ptp(forces[0]) > 0.01 * forces[0, 0]  # the sides are felt
     assert forces[0] == pytest.approx(forces[1], rel=5e-3)
+    assert "not of the closure" in build(plan, shared)["force_error"].attrs["comment"]
 
 
 def test_force_aside_is_not_told():

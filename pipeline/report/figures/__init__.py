@@ -16,6 +16,7 @@ from pipeline.report.figures.epsilon import epsilon, ratio, speedup
 from pipeline.report.figures.exact import exact
 from pipeline.report.figures.force import force, nothing
 from pipeline.report.figures.linear import linear
+from pipeline.report.figures.loads import loads
 from pipeline.report.figures.map import force_map
 from pipeline.report.figures.style import STYLE, save
 
@@ -23,8 +24,8 @@ __all__ = ["FIGURES", "KINDS", "STYLE", "choose", "draw", "figure", "lacks", "sa
 
 FIGURES: dict[str, Callable[[xr.Dataset, str, str], Figure]] = {
     "epsilon": epsilon, "exact": exact, "convergence": convergence, "accuracy": accuracy, "map": force_map,
-    "force": force, "compliance": compliance, "linear": linear, "contact": contact, "nothing": nothing,
-    "ratio": ratio, "speedup": speedup,
+    "force": force, "compliance": compliance, "linear": linear, "contact": contact, "loads": loads,
+    "nothing": nothing, "ratio": ratio, "speedup": speedup,
 }  # fmt: skip
 
 
@@ -54,8 +55,9 @@ def figure(dataset: xr.Dataset, kind: str, *, titled: bool = True) -> Figure:
 
 
 def _missing(dataset: xr.Dataset) -> str:
-    """Say which cases have no force."""
+    """Say which cases have no force, and what error bars leave out."""
     words = {"failed": "failed (×)", "skipped": "skipped", "pending": "not yet run", "lost": "contact lost"}
     counts = {word: int((dataset["status"] == state).sum()) for state, word in words.items()}
     text = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
-    return f"cases: {text}" if text else ""
+    comment = str(dataset["force_error"].attrs.get("comment", "")) if "force_error" in dataset else ""
+    return "; ".join(filter(None, (f"cases: {text}" if text else "", comment)))

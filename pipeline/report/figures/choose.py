@@ -5,11 +5,12 @@ import xarray as xr
 
 from pipeline.report.compliance import tool_dimension
 from pipeline.report.figures.dimensions import mesh_dimensions, refinements
+from pipeline.report.figures.loads import dimension
 
 # What can be drawn on request: the last two are parts of "epsilon".
 KINDS = (
-    "epsilon", "exact", "convergence", "accuracy", "map", "force", "compliance", "linear", "contact", "nothing",
-    "ratio", "speedup",
+    "epsilon", "exact", "convergence", "accuracy", "map", "force", "compliance", "linear", "contact", "loads",
+    "nothing", "ratio", "speedup",
 )  # fmt: skip
 
 
@@ -24,6 +25,8 @@ def choose(dataset: xr.Dataset) -> list[str]:
         kinds.append("contact")
     if dataset.sizes.get("epsilon", 0) > 1 and _known(dataset, "force_ratio"):
         kinds.append("epsilon")
+    if _known(dataset, "load_force") and dimension(dataset):
+        kinds.append("loads")
     has_exact = _known(dataset, "accuracy")
     has_error = has_exact or _known(dataset, "force_ratio")
     if has_error and refinements(dataset):
@@ -55,6 +58,7 @@ def lacks(dataset: xr.Dataset, kind: str) -> str:
         "map": "a raster of places ([probe.path])",
         "linear": "several depths, and both laws of the material",
         "contact": "several depths, and a tool whose contact is found (unilateral)",
+        "loads": "[load], and a swept quantity",
         "force": "a case that has a force",
         "nothing": "that no case has a force",
     }

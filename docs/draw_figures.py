@@ -1,0 +1,144 @@
+"""The figures of the documentation that come of studies: ``python docs/draw_figures.py [NAME ...]``.
+
+Each is drawn from ``results/<study>.nc``, as ``make studies`` leaves them, into ``docs/figures/<name>.png``; what has
+no dataset yet is named. Pictures of meshes are of ``epsmesh view``, those of scenes of ``draw_scenes.py``.
+"""
+
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+import matplotlib.pyplot as plt
+import xarray as xr
+from matplotlib.figure import Figure
+
+import pipeline
+from pipeline.report.compliance import sinking
+from pipeline.report.figures import STYLE, figure
+from pipeline.report.figures.style import COLOURS
+
+DOCS = Path(__file__).parent
+RESULTS, PICTURES = DOCS.parent / "results", DOCS / "figures"
+DPI = 130
+# Tools of compliance.toml, by their contact.
+MARKS = {"o": "slides", "s": "sticks", "^": "ball", "D": "cone"}
+KINDS: dict[str, Callable[[str], bool]] = {
+    "slides": lambda name: name.endswith("mm"), "sticks": lambda name: name.endswith("sticks"),
+    "ball": lambda name: name == "ball", "cone": lambda name: name == "cone",
+}  # fmt: skip
+# What the paper claims of F/F_max, at ε (mm).
+PAPER = (10.0, 0.8)
+
+
+def guideline(data: xr.Dataset) -> Figure:
+    """F/F_max of free columns, by tissue and by tool, and the paper's claim."""
+    drawn, axes = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
+    for ax, by in zip(axes, ("body", "probe"), strict=True):
+        data.epsmesh.plot_ratio(ax, by=by, outside="free")
+        ax.plot(*PAPER, "*", markersize=13, color="#d81b60", zorder=5)
+        ax.annotate("paper: 80 %", PAPER, (8, -10), textcoords="offset points", color="#d81b60", fontsize=8)
+        ax.set_ylim(0, 1.05)
+    return drawn
+
+
+def one_number(data: xr.Dataset) -> Figure:
+    """c of every tool over that of the smallest disc that slides, against the mean square distance of F, over ε²."""
+    found = data.epsmesh.compliance("full")["compliance"].sel(outside="free")
+    known = sinking(data)
+    dims = data["force"].dims
+    square = xr.DataArray([one.square for one in known.ravel()], dims="case").values.reshape(known.shape)
+    square = xr.DataArray(square, dims=dims, coords={dim: data[dim] for dim in dims}).sel(outside="free")
+    drawn, axes = plt.subplots(1, 2, figsize=(9, 3.2), sharey=True, layout="constrained")
+    for ax, nu in zip(axes, data["poisson"].values, strict=True):
+        for epsilon, colour in zip((5e-3, 7e-3, 10e-3), COLOURS, strict=False):
+            c, m = (part.sel(poisson=nu, epsilon=epsilon) for part in (found, square))
+            least = float(c.sel(probe="disc 0.5 mm"))
+            for marker, kind in MARKS.items():
+                tools = [name for name in map(str, c["probe"].values) if KINDS[kind](name)]
+                x, y = m.sel(probe=tools) / epsilon**2, c.sel(probe=tools) / least
+                ax.plot(
+                    x,
+                    100 * (y - 1),
+                    marker,
+                    color=colour,
+                    markersize=5,
+                    fillstyle="none" if kind == "sticks" else "full",
+                )
+            ax.plot([], [], "-", color=colour, label=f"ε = {1e3 * epsilon:g} mm")
+        ax.set_title(f"ν = {nu:g}", fontsize=9)
+        ax.set_xlabel("m²/ε²")
+    for marker, kind in MARKS.items():
+        axes[1].plot([], [], marker, color="black", fillstyle="none" if kind == "sticks" else "full", label=kind)
+    axes[0].set_ylabel("c beyond that of the disc of 0.5 mm (%)")
+    axes[0].legend(handles=axes[0].get_legend_handles_labels()[0], fontsize=8)
+    axes[1].legend(handles=axes[1].get_legend_handles_labels()[0][-len(MARKS) :], fontsize=8)
+    return drawn
+
+
+def closure(data: xr.Dataset) -> Figure:
+    """F/F_max of what may be beyond ε, of three scenes."""
+    drawn, axes = plt.subplots(1, 3, figsize=(9.5, 3.2), sharey=True, layout="constrained")
+    scenes = (("needle 1 mm", "10 mm thick"), ("trocar 3 mm", "10 mm thick"), ("blade 6 mm", "30 mm thick"))
+    for ax, (probe, body) in zip(axes, scenes, strict=True):
+        data.epsmesh.plot_ratio(ax, probe=probe, body=body)
+        ax.set_title(f"{probe}, {body}", fontsize=9)
+        ax.set_ylim(0.3, 1.2)
+        if ax is not axes[0]:
+            ax.get_legend().remove()
+            ax.set_ylabel("")
+    return drawn
+
+
+def path_excess(data: xr.Dataset) -> Figure:
+    """By how much the tumour makes a needle's force larger, and where it is found."""
+    found = data.epsmesh.locate(body="with a tumour", healthy="healthy").plot().figure
+    assert isinstance(found, Figure)
+    return found
+
+
+def of_kind(kind: str) -> Callable[[xr.Dataset], Figure]:
+    """Return what draws one of the program's own figures."""
+    return partial(figure, kind=kind)
+
+
+# By picture: the study, and what draws it.
+FIGURES: dict[str, tuple[str, Callable[[xr.Dataset], Figure]]] = {
+    "figure3": ("figure3", of_kind("epsilon")),
+    "speedup": ("speedup", of_kind("epsilon")),
+    "guideline": ("guideline", guideline),
+    "compliance": ("compliance", of_kind("compliance")),
+    "one_number": ("compliance", one_number),
+    "closure": ("closure", closure),
+    "needle": ("needle", of_kind("contact")),
+    "path": ("path", of_kind("map")),
+    "path_excess": ("path", path_excess),
+    "retractor": ("retractor", of_kind("loads")),
+    "large_depth": ("large_depth", of_kind("linear")),
+}
+
+
+def main(names: list[str]) -> int:
+    """Draw the pictures called ``names``, or all; return how many could not be drawn."""
+    missing = 0
+    for name in names or FIGURES:
+        study, draw = FIGURES[name]
+        path = RESULTS / f"{study}.nc"
+        if not path.exists():
+            print(f"{name}: no {path}: epsmesh run studies/{study}.toml")
+            missing += 1
+            continue
+        with mpl.rc_context(STYLE):
+            drawn = draw(pipeline.open(path))
+            drawn.savefig(PICTURES / f"{name}.png", dpi=DPI)
+        plt.close(drawn)
+        print(f"{name}: {PICTURES / name}.png")
+    return missing
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
