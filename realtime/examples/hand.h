@@ -1,0 +1,83 @@
+/* What all hosts share: a tool in a hand, the force on it, and what is done when the model does not answer. C99 and C++.
+ *
+ * The tool is a point that moves freely; its depth is how far it is below the plane of the face, straight above or below
+ * which it touches. Nothing here blocks or allocates but `hand_load`, which is called once, before the loop.
+ */
+#ifndef EPSMESH_HAND_H
+#define EPSMESH_HAND_H
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "../epsmesh.h"
+
+/* Of the force, what is left a millisecond after the model began to refuse, and what comes back in one. */
+#define HAND_FADES 0.98
+#define HAND_RETURNS 0.02
+
+typedef struct {
+    epsmesh_model model;
+    epsmesh_query tool;    /* shape and sizes; place and depth are filled in */
+    double most;           /* N: no device is asked for more */
+    double share;          /* of the force that is rendered: 1, but after a refusal */
+    double last[3];        /* N: the last force that the model gave */
+    double stiffness;      /* N/m, for whoever watches it */
+    double error;          /* relative */
+    epsmesh_status status; /* of the last call */
+} hand;
+
+/* Read a model of a face that is flat: 0, or what went wrong. The tool is a ball of `radius` (m). */
+static const char *hand_load(hand *h, const char *path, double radius, double most) {
+    FILE *file = fopen(path, "rb");
+    long size = -1;
+    void *data = NULL;
+    epsmesh_status status = EPSMESH_NO_MODEL;
+    if (!file) return "the model cannot be opened";
+    if (!fseek(file, 0, SEEK_END)) size = ftell(file);
+    rewind(file);
+    if (size > 0) data = malloc((size_t)size);
+    if (data && fread(data, 1, (size_t)size, file) == (size_t)size) status = epsmesh_load(&h->model, data, (size_t)size);
+    free(data);
+    fclose(file);
+    if (status != EPSMESH_OK) return "the file is no model that this version reads";
+    if (!h->model.is_flat) return "this loop knows flat faces only";
+    if (!(radius > 0 && most > 0)) return "radius and largest force must be positive";
+    h->tool = epsmesh_ask(&h->model);
+    h->tool.shape = EPSMESH_SPHERE, h->tool.radius = radius;
+    h->most = most, h->share = 1, h->stiffness = h->error = 0, h->status = EPSMESH_LOST;
+    h->last[0] = h->last[1] = h->last[2] = 0;
+    return NULL;
+}
+
+/* Put the force (N) on a tool whose lowest point is at `tip` (m), both in the body's coordinates, into `force`. */
+static void hand_feel(hand *h, const double tip[3], double force[3]) {
+    const double *out = h->model.axes[2];
+    double above = 0, size = 0;
+    epsmesh_touch touch;
+    int i;
+    for (i = 0; i < 3; i++) above += out[i] * (tip[i] - h->model.origin[i]);
+    for (i = 0; i < 3; i++) h->tool.at[i] = tip[i] - above * out[i];
+    h->tool.depth = -above;
+    if (above > 0) {
+        /* Nothing touches, inside the region or outside it. */
+        h->status = EPSMESH_LOST, h->share = 1, h->stiffness = h->error = 0;
+        for (i = 0; i < 3; i++) h->last[i] = force[i] = 0;
+        return;
+    }
+    touch = epsmesh_touch_at(&h->model, &h->tool);
+    h->status = touch.status;
+    if (touch.status == EPSMESH_OK || touch.status == EPSMESH_LOST) {
+        h->share = fmin(1, h->share + HAND_RETURNS);
+        h->stiffness = touch.stiffness, h->error = touch.force_error;
+        for (i = 0; i < 3; i++) h->last[i] = touch.force[i];
+    } else {
+        /* No number is made up: what there was fades, so that the hand feels no blow. */
+        h->share *= HAND_FADES, h->stiffness = h->error = 0;
+    }
+    for (i = 0; i < 3; i++) size += h->last[i] * h->last[i];
+    size = sqrt(size);
+    for (i = 0; i < 3; i++) force[i] = h->share * h->last[i] * (size > h->most ? h->most / size : 1);
+}
+
+#endif

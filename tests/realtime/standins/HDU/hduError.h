@@ -1,0 +1,1 @@
+int hduIsSchedulerError(const HDErrorInfo *);

@@ -1,0 +1,94 @@
+"""Glue for simulators: what compiles, what a loop of it renders, and that a refusal is no blow."""
+
+import ctypes
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.realtime.synthetic import write_random
+from tests.realtime.test_c import SOURCES, STRICT, compiled
+
+EXAMPLES, STANDINS = SOURCES / "examples", Path(__file__).parent / "standins"
+RADIUS, MOST = 5e-3, 0.2
+
+pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+
+
+@pytest.mark.parametrize("name", ["openhaptics.c", "unity.c", "chai3d.cpp", "EpsmeshForceFeedback.cpp"])
+def test_examples_are_what_a_compiler_takes(name):
+    if name.endswith(".cpp") and shutil.which("c++") is None:
+        pytest.skip("there is no C++ compiler")
+    compiler = ("c++", "-std=c++17") if name.endswith(".cpp") else ("cc", "-std=c99")
+    compiled(*compiler, *STRICT[2:], "-fsyntax-only", "-I", STANDINS, EXAMPLES / name)
+
+
+@pytest.fixture(scope="module")
+def plugin(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("unity")
+    compiled(
+        "cc", *STRICT, "-fPIC", "-shared", EXAMPLES / "unity.c", SOURCES / "epsmesh.c", "-o", folder / "lib.so", "-lm"
+    )
+    found = ctypes.CDLL(str(folder / "lib.so"))
+    found.epsmesh_unity_open.restype = ctypes.c_void_p
+    found.epsmesh_unity_open.argtypes = [ctypes.c_char_p, ctypes.c_double, ctypes.c_double]
+    found.epsmesh_unity_close.argtypes = [ctypes.c_void_p]
+    triple = ctypes.POINTER(ctypes.c_double)
+    found.epsmesh_unity_feel.argtypes = [ctypes.c_void_p, triple, triple, triple]
+    return found
+
+
+def opened(plugin, path, most=MOST):
+    return plugin.epsmesh_unity_open(str(path).encode(), RADIUS, most)
+
+
+def feel(plugin, tool, x, y, above):
+    """Return force (3,), in the model's axes, and status."""
+    tip, force, error = (ctypes.c_double * 3)(x, above, y), (ctypes.c_double * 3)(), ctypes.c_double()
+    status = plugin.epsmesh_unity_feel(tool, tip, force, ctypes.byref(error))
+    return np.array([force[0], force[2], force[1]]), status
+
+
+def test_a_loop_renders_the_model_and_no_more_than_the_device(plugin, tmp_path):
+    model = write_random(tmp_path / "model.nc")
+    tool = opened(plugin, tmp_path / "model.nc", most=0.004)
+    assert feel(plugin, tool, 0.01, 0.005, 1e-3)[0].tolist() == [0, 0, 0]
+    clamped = []
+    for depth in np.linspace(1e-5, 6e-4, 30):
+        force, status = feel(plugin, tool, 0.01, 0.005, -depth)
+        touch = model.query("sphere", radius=RADIUS, at=(0.01, 0.005, 0.0), depth=float(depth))
+        size = np.linalg.norm(touch.force)
+        assert status == 0
+        np.testing.assert_allclose(force, touch.force * min(1.0, 0.004 / size), rtol=1e-9)
+        clamped.append(size > 0.004)
+    assert {*clamped} == {True, False}
+    plugin.epsmesh_unity_close(tool)
+
+
+def test_a_refusal_fades_and_returns_without_a_blow(plugin, tmp_path):
+    model = write_random(tmp_path / "model.nc")
+    tool, inside, outside = (
+        opened(plugin, tmp_path / "model.nc"),
+        model.table.reach[0] - 1e-9,
+        model.table.reach[0] + 1e-3,
+    )
+    first, status = feel(plugin, tool, inside, 0.0, -1e-4)
+    assert status == 0
+    forces, statuses = zip(*(feel(plugin, tool, outside, 0.0, -1e-4) for _ in range(400)), strict=True)
+    assert min(statuses) > 1
+    sizes = np.linalg.norm([first, *forces], axis=1)
+    assert np.all(np.diff(sizes) <= 0)
+    assert np.abs(np.diff(sizes)).max() < 0.03 * sizes[0]
+    assert sizes[-1] < 1e-3 * sizes[0]
+    back = np.linalg.norm([feel(plugin, tool, inside, 0.0, -1e-4)[0] for _ in range(60)], axis=1)
+    assert np.abs(np.diff([sizes[-1], *back])).max() < 0.03 * sizes[0]
+    assert back[-1] == pytest.approx(sizes[0])
+    plugin.epsmesh_unity_close(tool)
+
+
+def test_no_model_is_no_tool(plugin, tmp_path):
+    (tmp_path / "none.nc").write_bytes(b"CDF\x02")
+    write_random(tmp_path / "curved.nc", curved=True)
+    for name in ("none.nc", "missing.nc", "curved.nc"):
+        assert opened(plugin, tmp_path / name) is None
