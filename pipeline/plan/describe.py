@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from pipeline.plan.cost import speed_up
+from pipeline.plan.deeper import depth_key
 from pipeline.plan.plan import Plan
 from pipeline.plan.schedule import schedule
 from pipeline.plan.steps import MeshStep, Solve
@@ -77,6 +78,8 @@ def _changes(plan: Plan, case: Case, solve: Solve | None) -> dict[str, str]:
     # What is known of contact: where none of it is, it cannot be another, and each depth has a mesh of its own.
     is_found = not case.probe.has_singular_edge
     deeper = {"depth": all_of_it if is_found else contact} if case.probe.is_unilateral else {}
+    if depth_key(case) and "scaling" in plan.used:
+        deeper = {"depth": f"nothing: F {'is proportional' if case.probe.is_unilateral else 'does not depend on it'}"}
     if case.load.acts:
         proportional = {"young, load": material, "depth": contact}
     else:

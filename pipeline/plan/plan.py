@@ -94,6 +94,8 @@ def ask_for_exact(plan: Plan) -> Plan:
             continue
         if (image := plan.images.get(case.index)) and image.of_scene:
             case = plan.study.case(image.of)  # noqa: PLW2901
+        if deeper := plan.deeper.get(case.index):
+            case = plan.study.case(deeper.of)  # noqa: PLW2901
         enough = max(accuracy, EXACT_OF_SLIT) if case.probe.slit else accuracy
         key = reference_key(case, enough)
         keys.append(key)

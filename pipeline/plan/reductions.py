@@ -4,17 +4,19 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from pipeline.plan import estimate
+from pipeline.plan.deeper import Deeper, deeper_than, depth_key
 from pipeline.plan.images import NOWHERE, Image, image_key, moved_key
 from pipeline.plan.key import case_key, digest, mesh_key
 from pipeline.plan.steps import MOST_DOFS, MeshStep, OperatorStep, Solve, mesh_steps
 from pipeline.plan.symmetry import is_round, model_planes
 from pipeline.plan.work import Plan, Struck
 from pipeline.shapes.arrays import FloatArray
+from pipeline.study.sweep import Case
 
 # Fewer Poisson's ratios than this are solved one by one: a basis needs about five solutions itself.
 _FEWEST_RATIOS = 8
 _OF_STRESS_ALONE = (
-    "F is proportional to Young's modulus, and to the depth unless contact is unilateral or the tool stands in a slit: "
+    "F is proportional to Young's modulus, and to the depth unless contact grows with it or the tool stands in a slit: "
     "cases that differ in them only are solved once."
 )
 _FOUND_CONTACT = "No reduced basis: the area of contact changes with Poisson's ratio, and each is solved."
@@ -45,7 +47,19 @@ def strike_scaled(plan: Plan) -> Plan:
     """F is proportional to Young's modulus and to the depth: cases that differ in them only are solved once."""
     reason = "" if all(solve.case.probe.proportional_to for solve in plan.solves) else _OF_STRESS_ALONE
     reason = _LARGE if any(solve.case.material.is_large for solve in plan.solves) else reason
-    return _rekeyed(plan, "scaling", strike_scaled, lambda case: case_key(case, folded=True, scaled=True), reason)
+    first: dict[str, Case] = {}
+    deeper: dict[tuple[int, ...], Deeper] = {}
+    for solve in plan.solves:
+        text = depth_key(solve.case)
+        if text and (other := first.setdefault(text, solve.case)).probe.depth != solve.case.probe.depth:
+            deeper |= dict.fromkeys(solve.serves, deeper_than(solve.case, other))
+
+    def key(case: Case) -> str:
+        # Records are those of a depth: which one is solved for the others is the study's order.
+        text = depth_key(case)
+        return case_key(first[text] if text else case, folded=True, scaled=True)
+
+    return _rekeyed(replace(plan, deeper=deeper), "scaling", strike_scaled, key, reason)
 
 
 def strike_images(plan: Plan) -> Plan:

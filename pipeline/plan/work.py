@@ -4,9 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from pipeline.plan.cost import CostModel
+from pipeline.plan.deeper import Deeper
 from pipeline.plan.images import Image
 from pipeline.plan.steps import MeshStep, Solve, mesh_steps
-from pipeline.study.sweep import Study
+from pipeline.study.sweep import Case, Scale, Study
 
 # The key, in place of a record's, of a case whose tool does not stand on the body.
 ABSENT = ""
@@ -31,7 +32,8 @@ class Plan:
     keys that were on record; ``shared`` says that solves share meshes and assembly, ``reuse`` that
     they begin from their neighbours' solutions, ``condensed`` that many depths of found contact on a small body are
     solved on its surface; ``cost`` estimates what steps take. Of a plan that is one shard's, ``part`` are the keys that
-    are its own. ``images`` says, by index, of which other case a case is the image.
+    are its own. ``images`` says, by index, of which other case a case is the image, ``deeper`` of which it is so many
+    times as deep.
     """
 
     study: Study
@@ -47,6 +49,12 @@ class Plan:
     cost: CostModel = field(default_factory=CostModel)
     part: frozenset[str] | None = None
     images: Mapping[tuple[int, ...], Image] = field(default_factory=dict)
+    deeper: Mapping[tuple[int, ...], Deeper] = field(default_factory=dict)
+
+    def scale_of(self, case: Case) -> Scale:
+        """Return the scale of a case of the study, to which the record of its key is taken."""
+        deeper = self.deeper.get(case.index)
+        return replace(case.scale, length=deeper.times * case.scale.length) if deeper else case.scale
 
     @property
     def meshes(self) -> tuple[MeshStep, ...]:

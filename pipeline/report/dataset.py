@@ -20,7 +20,7 @@ from pipeline.run.absent import absent
 from pipeline.run.record import Record
 from pipeline.shapes.frame import Frame, PlaceError
 from pipeline.shapes.from_file import FromFile
-from pipeline.study.sweep import Axis, Case, Study
+from pipeline.study.sweep import Axis, Case, Scale, Study
 
 # The variables that are taken as they are from the records of the cases, and from those of F_exact.
 _FLOATS = (
@@ -49,7 +49,7 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     study = plan.study
     dims = tuple(axis.name for axis in study.axes)
     flat = [
-        _imaged(_scaled(records.get(key), case), plan.images.get(case.index)) or absent(case)
+        _imaged(_scaled(records.get(key), plan.scale_of(case)), plan.images.get(case.index)) or absent(case)
         for key, case in zip(plan.keys, study.cases(), strict=True)
     ]
 
@@ -57,7 +57,10 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
         return np.array(values, dtype=dtype).reshape(study.shape)
 
     keys = plan.reference_keys or [""] * len(flat)
-    exact = [_scaled(records.get(key), case) or absent(case) for key, case in zip(keys, study.cases(), strict=True)]
+    exact = [
+        _scaled(records.get(key), plan.scale_of(case)) or absent(case)
+        for key, case in zip(keys, study.cases(), strict=True)
+    ]
     variables: dict[str, Any] = {}
     found = _FOUND if any(case.probe.is_unilateral for case in study.cases()) else ()
     for name in (*_FLOATS, *found):
@@ -175,13 +178,13 @@ def _over_full_order(values: xr.DataArray, dataset: xr.Dataset) -> xr.DataArray:
     return values / full
 
 
-def _scaled(record: Record | None, case: Case) -> Record | None:
-    """Return the record for the scale of ``case``; of a failure, without what is not known.
+def _scaled(record: Record | None, scale: Scale) -> Record | None:
+    """Return the record for the ``scale`` of a case; of a failure, without what is not known.
 
     How far its bar missed, and what it took, is.
     """
     if record is None or record.is_ok:
-        return record.scaled(case.scale) if record else None
+        return record.scaled(scale) if record else None
     return replace(
         record, force=nan, force_vector=(nan, nan, nan), energy=nan, energy_release=nan, max_strain=nan, balance=nan,
         contact_area=nan, contact_radius=nan, load_force=nan, load_force_error=nan, load_energy=nan, sag=nan,

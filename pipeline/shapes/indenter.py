@@ -108,6 +108,11 @@ class Indenter(Probe):
         return least, largest
 
     @property
+    @abstractmethod
+    def expected_radius(self) -> float:
+        """Radius (m) of the smallest circle about the axis that contact is expected to stay within."""
+
+    @property
     def edge_band(self) -> tuple[float, float]:
         """The least and the largest half width (m) at which contact is expected to end."""
         most = self.footprint.half_width

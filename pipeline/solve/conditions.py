@@ -66,14 +66,15 @@ class ConstrainedSpace:
         """Collective.
 
         Raises:
-            SolveError: if the footprint and the support share a point.
+            SolveError: if what the probe moves and the support share a point.
         """
         self._body, self.comm, self.degree, self.conditions = body, body.comm, degree, conditions
         self.space = space = vector_space(body.mesh, degree)
         index_map = space.dofmap.index_map
         self.owned, self.dofs = 3 * index_map.size_local, 3 * index_map.size_global
         probe, fixed = (_points(space, body, name) for name in (PROBE, FIXED))
-        if self.comm.allreduce(len(np.intersect1d(probe, fixed))):
+        # What may touch may be held, too, as long as it does not: who finds contact looks after that.
+        if not conditions.unilateral and self.comm.allreduce(len(np.intersect1d(probe, fixed))):
             raise SolveError("the probe's footprint touches the held face: no displacement satisfies both conditions")
         mirrors = list(zip(body.mirrored, _planes(space, body), strict=True))
         single = [(3 * probe + axis, axis) for axis in conditions.components]

@@ -129,8 +129,11 @@ class _Search:
     def __init__(self, meridian: HalfPlane, tool: RoundTool, law: MaterialLaw, clock: Clock):
         self._tool, self._clock = tool, clock
         kept = meridian.radius if isinstance(meridian, EllipticMeridian) else meridian.kept_radius
-        self._widest = _WIDEST * kept
+        # A flat tool that covers all of a column ends where that does; contact that grows must not get there.
+        covers = tool.limit >= kept and tool.is_flat(kept)
+        self._widest = kept if covers else _WIDEST * kept
         self._limit = min(tool.limit, self._widest)
+        self._covers = covers
         self.trials = Trials(meridian, tool, law, clock)
 
     def find(self, depth: float) -> _Patch:
@@ -140,7 +143,7 @@ class _Search:
         for _ in range(_MOST_TRIALS):
             trial = self.trials.at(radius)
             if radius == self._limit and trial.depth <= depth:
-                if radius == self._widest < self._tool.limit:
+                if radius == self._widest < self._tool.limit and not self._covers:
                     raise SolveError("contact reaches the edge of what is kept of the body")
                 return _Patch(radius, inf)
             if trial.depth <= 0:

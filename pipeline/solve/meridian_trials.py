@@ -46,6 +46,10 @@ class RoundTool:
     limit: float
     kinks: tuple[float, ...] = ()
 
+    def is_flat(self, radius: float) -> bool:
+        """Tell whether it lies on the surface all the way to a ``radius`` (m) when it touches."""
+        return not np.any(self.gap(np.linspace(0.0, radius, _POINTS)))
+
     def indentation(self, radius: float) -> float:
         """Return the depth (m) at which contact on an elastic half-space has a ``radius`` (I. N. Sneddon, 1965)."""
         sine, weights = _quarter_turn()

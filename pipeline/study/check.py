@@ -166,7 +166,7 @@ def held_gaps(body: Body, probe: Probe, mesh: Mesh) -> dict[str, float]:
     if not gaps and (beside := body.support.gap(probe.gap(body, frame))) is not None:
         gaps["body.fixed"] = beside
     if mesh.outside not in ("coarse", "free") and isfinite(column := mesh.column(body.reach(frame))):
-        gaps["mesh.epsilon"] = column - probe.circumradius
+        gaps["mesh.epsilon"] = column - (probe.expected_radius if isinstance(probe, Indenter) else probe.circumradius)
     return {key: gap for key, gap in gaps.items() if gap > 0}
 
 

@@ -148,6 +148,17 @@ def test_contact_that_is_cut_off_is_refused():
         problem.solve(law, loads)
 
 
+def test_what_may_touch_may_be_held_as_long_as_it_does_not():
+    """In a held column narrower than the candidates F is that of the meridian; a tool that reaches the column fails."""
+    column = {"epsilon": "1.6 mm", "outside": "fixed"}
+    known = solve(body=SMALL, probe=SPHERE, mesh=COARSE | column, plan={"without": []})[()]
+    found = record(mesh=column)
+    assert known.origin == "axisymmetric"
+    assert found.force == pytest.approx(known.force, rel=found.force_error)
+    (wide,) = solve(body=SMALL, probe=DISC | {"radius": "1.6 mm"}, mesh=COARSE | column).values()
+    assert "runs into what is held" in wide.message
+
+
 def test_other_degrees_are_refused():
     with pytest.raises(StudyError, match="must be 2 where contact is unilateral"):
         study(body=SMALL, probe=SPHERE, mesh=COARSE | {"degree": 3})

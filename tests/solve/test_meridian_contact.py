@@ -47,6 +47,17 @@ def sneddon(section, radius):
     return 2 * radius**2 * float(pi / 4 * weights @ (sine**2 * section.slope(radius * sine)))
 
 
+def test_a_flat_tool_wider_than_a_column_covers_it():
+    """Tissue that cannot lift off is pressed as below the frictionless tool that moves as far."""
+    column = Meridian(12.0, 6.0, 3.0, column=2.0)
+    found = pressed(flat(3.0), 0.1, column)
+    known = MeridianProblem(column, Conditions(bonded=False)).solve(LAW, Loads.along((0.0, 0.0, -0.1)))
+    assert found.response.stiffness == pytest.approx(known.response.stiffness, rel=1e-9)
+    assert found.contact_area == pytest.approx(4 * pi, rel=1e-12)
+    with pytest.raises(SolveError, match="edge of what is kept"):
+        pressed(RoundTool(Rounded(0.0, 200.0).height, 200.0), 0.1, column)
+
+
 @pytest.mark.parametrize(
     ("section", "kinks", "depth"),
     [(Rounded(0.0, 8.0), (), 1 / 8), (Rounded(pi / 3), (0.0,), 0.9)],

@@ -46,6 +46,8 @@ def problems(**changes):
         ("body.inclusion[1].at", "must keep 1 mm", {"probe": SLIT, "body": {**BOX, "inclusion": [TUMOUR]}}),
         ("probe.incision", "flat top of a box or a cylinder", {"probe": SLIT, "body": ORGAN}),
         ("probe.incision", "flat top of a box or a cylinder", {"probe": {**SLIT, "axis": [0.1, 0.0, -1.0]}}),
+        ("probe.depth", "through the slit's front below its tip", {"probe": {**SLIT, "depth": "1 mm"}}),
+        ("probe.slice", "through the slit's front at its end", {"probe": {**SLIT, "slice": "1.5 mm"}}),
         ("mesh.degree", "needs quarter points", {"probe": SLIT, "mesh": {"degree": 1}}),
         ("mesh.epsilon", "the slit reaches out of", {"probe": SLIT, "mesh": {"epsilon": "5 mm", "outside": "free"}}),
         ("mesh.outside", "an open slit would run into", {"probe": {**SLIT, "ends": "open"},

@@ -189,6 +189,8 @@ class Blade(Punch):
                 f"is less than the blade's width {in_mm(self.width)}: linear elasticity is then an extrapolation at "
                 "the slit's front",
             )  # fmt: skip
+        if self.contact == "bonded":
+            self._check_travel(slit, problems)
         if self.contact == "frictionless":
             problems.warn(
                 "probe.depth", in_mm(self.depth), "does nothing where tissue slides along a blade that stands in a "
@@ -196,3 +198,13 @@ class Blade(Punch):
             )  # fmt: skip
         if self.motion == "all":
             problems.error("probe.motion", self.motion, "a blade in a slit is pressed and drawn only: leave it out")
+
+    def _check_travel(self, slit: Slit, problems: Problems) -> None:
+        """Report a blade that would run through the front of its slit: tissue there is not cut open by it."""
+        travels = {"depth": (self.depth, "below its tip"), "slice": (0.0 if slit.is_open else self.slice, "at its end")}
+        for key, (travel, where) in travels.items():
+            if travel >= slit.ahead:
+                problems.error(
+                    f"probe.{key}", in_mm(travel), f"runs the blade through the slit's front {where}, which is "
+                    f"{in_mm(slit.ahead)} ahead of it and is not cut open: must be below that",
+                )  # fmt: skip

@@ -34,6 +34,11 @@ class RoundIndenter(Indenter):
         """Radius (m) of contact on an elastic half-space."""
         return min(self.section.contact_radius(self.depth), self.limit)
 
+    @property
+    def expected_radius(self) -> float:
+        """The larger of the radii (m) between which contact is expected to end."""
+        return self.edge_band[1]
+
     def profile(self, points: FloatArray) -> FloatArray:
         """Return the heights (m) of the tool, infinite beyond where it ends."""
         distance = np.hypot(points[:, 0], points[:, 1])

@@ -1,6 +1,6 @@
 """A wedge, sharp or rounded."""
 
-from math import nan
+from math import hypot, nan
 from typing import Annotated, Literal
 
 from pipeline.shapes.arrays import BoolArray, FloatArray, np
@@ -59,6 +59,11 @@ class Wedge(Indenter):
         most = self.footprint.half_width
         least, largest = (min(width, most) for width in self.contact_widths)
         return least, min(1.3 * largest, self.section.reach(self.depths[1]))
+
+    @property
+    def expected_radius(self) -> float:
+        """Distance (m) of the corners of what is expected to touch."""
+        return hypot(self.length / 2, self.edge_band[1])
 
     def profile(self, points: FloatArray) -> FloatArray:
         """Return the heights (m) of the tool, infinite beyond its ends."""

@@ -42,7 +42,7 @@ class CondensedElements(DisplacementElements):
         """Assemble, factorise and condense.
 
         Raises:
-            SolveError: if candidates and support share a point, or the factorisation fails.
+            SolveError: if the factorisation fails.
         """
         super().__init__(spaces, degree, law, candidates, "direct", stack)
         self._stack = stack

@@ -24,11 +24,7 @@ class DisplacementElements:
     def __init__(
         self, spaces: Spaces, degree: int, law: MaterialLaw, candidates: Candidates, method: str, stack: ExitStack
     ):
-        """Assemble; collective.
-
-        Raises:
-            SolveError: if candidates and support share a point.
-        """
+        """Assemble; collective."""
         self.space: ElasticSpace = spaces.get(degree, CONDITIONS)
         self._spaces, self._law, self._candidates = spaces, law, candidates
         self._direct = is_direct(method, self.space.dofs.dofs, degree)

@@ -30,11 +30,7 @@ class MixedElements:
     def __init__(
         self, spaces: Spaces, degree: int, law: MaterialLaw, candidates: Candidates, method: str, stack: ExitStack
     ):
-        """Assemble; collective.
-
-        Raises:
-            SolveError: if candidates and support share a point.
-        """
+        """Assemble; collective."""
         self.space: ElasticSpace = spaces.get(degree, CONDITIONS)
         self.mixed = MixedSpace(spaces.body, self.space)
         stack.callback(self.mixed.close)

@@ -21,7 +21,7 @@ from pipeline.solve.contact.error import displacement_decrement, mixed_decrement
 from pipeline.solve.contact.levels import CONDITIONS
 from pipeline.solve.contact.mixed import MixedElements
 from pipeline.solve.contact.sets import ContactError, Found, Obstacle, find_set
-from pipeline.solve.contact.surface import find_candidates
+from pipeline.solve.contact.surface import Numbering, find_candidates
 from pipeline.solve.contact.sweep import Kind, Sweep
 from pipeline.solve.error import error_bar, found_bar
 from pipeline.solve.forms import mean_strain_form
@@ -74,14 +74,13 @@ class ContactProblem:
         depths of each material are to come: where the body is small, its surface is condensed for them, and they share
         error bars.
 
-        Raises:
-            SolveError: if candidates and support share a point.
         """
         self._spaces, self._tool, self._body = spaces, tool, spaces.body
         self._is_mixed = element == "mixed"
         self._fine, coarse = (spaces.get(degree, CONDITIONS) for degree in (DEGREE, 1))
         self._candidates = find_candidates(self._body, self._fine.dofs.space, coarse.dofs.space)
         self._heights = tool.height(self._candidates.points)
+        self._supported = self._held_by_support()
         self.obstacle: Obstacle | None = None
         self.found: Found | None = None
         self._reuse, self._condense = reuse or condense, condense
@@ -110,12 +109,15 @@ class ContactProblem:
 
         Raises:
             SolveError: if a linear solver fails, or the solution a check.
-            ContactError: if the contact does not settle, or reaches the candidates' edge where the probe does not end.
+            ContactError: if the contact does not settle, reaches the candidates' edge where the probe does not end, or
+                what is held of the body.
         """
         start = time.perf_counter()
         depth, before = loads.amounts[0], self._sweep
         setup = 0.0 if before is None else before.elements.setup_seconds
         self.obstacle = obstacle = Obstacle(self._candidates, self._heights - depth, depth)
+        if np.any(obstacle.bounds[self._supported] < 0):
+            raise ContactError("the probe runs into what is held of the body: no displacement satisfies both")
         with ExitStack() as stack:
             sweep, first, found = self._find(law, method, (_LOOSE, _STRICTER * tolerance), stack)
             elements = sweep.elements
@@ -244,6 +246,13 @@ class ContactProblem:
             elements = kind(self._spaces, DEGREE, law, self._candidates, method, stack)
             elements.start_from(coarse.space)
         return elements, first
+
+    def _held_by_support(self) -> BoolArray:
+        """Tell which candidates (n) are held by the support; collective. Of them none is ever found to touch."""
+        space = self._fine.dofs
+        is_held = np.zeros(space.owned)
+        is_held[3 * space.fixed_owned + 2] = 1.0
+        return np.asarray(Numbering(space.space, self._candidates.nodes).gather(is_held) > 0)
 
     def _check_edge(self, active: BoolArray) -> None:
         points = self._candidates.points[active & self._candidates.is_edge]
