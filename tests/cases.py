@@ -38,7 +38,8 @@ def solve(comm: MPI.Comm = MPI.COMM_SELF, **changes: Any) -> dict[tuple[int, ...
     plan = make_plan(study(**changes), without=("images", "moved"))
     records = compute(plan, comm)
     return {
-        case.index: records[key].scaled(plan.scale_of(case)) for case, key in zip(plan.study.cases(), plan.keys, strict=True)
+        case.index: records[key].scaled(plan.scale_of(case))
+        for case, key in zip(plan.study.cases(), plan.keys, strict=True)
     }
 
 

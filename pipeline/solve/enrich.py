@@ -66,7 +66,10 @@ def _correct(solver: LinearSolver, residual: PETSc.Vec, *, keep: bool) -> tuple[
             solver.precondition(residual, preconditioned)
             rz = residual.dot(preconditioned)
             if rz < -_ROUNDING * total:
-                raise SolveError("the error estimate has no positive preconditioner")
+                if not solver.look_closer():
+                    raise SolveError("the error estimate has no positive preconditioner")
+                previous = 0.0  # begin again, from what is left
+                continue
             if rz <= 0.0:  # nothing is left to gain
                 return total, solution, iteration
             direction.aypx(rz / previous if previous else 0.0, preconditioned)

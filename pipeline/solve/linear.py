@@ -85,6 +85,7 @@ class LinearSolver:
         """
         self._levels = levels
         self._is_single = not direct and not linear and suits(self._matrices)
+        self._looked_closer = False
         self._owned: list[Any] = []
         matrix = levels[-1].matrix
         start = time.perf_counter()
@@ -133,17 +134,32 @@ class LinearSolver:
             self.ksp.setTolerances(rtol=tolerance)
         if target is not None:
             self.ksp.setTolerances(rtol=0.0, atol=target)
+        its = self._iterate(rhs, solution)
+        reason = self.ksp.getConvergedReason()
+        if reason == PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC and self.look_closer():
+            its += self._iterate(rhs, solution)
+            reason = self.ksp.getConvergedReason()
+        if reason <= 0:
+            raise SolveError(f"the linear solver did not converge: {reason_name(reason)} after {its} iterations")
+        return its
+
+    def _iterate(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> int:
         try:
             self.ksp.setInitialGuessNonzero(self.ksp.getType() != "preonly")
             self.ksp.solve(rhs, solution)
         except PETSc.Error as error:
             raise SolveError(explain(error)) from error
-        reason = self.ksp.getConvergedReason()
-        if reason <= 0:
-            raise SolveError(
-                f"the linear solver did not converge: {reason_name(reason)} after {self.ksp.its} iterations"
-            )
-        return self.ksp.its
+        return int(self.ksp.its)
+
+    def look_closer(self) -> bool:
+        """Make an indefinite preconditioner definite, if that was not tried: what smoothers took for their largest
+        eigenvalue was too small. Cycles in single precision alone can.
+        """
+        if not self._is_single or self._looked_closer:
+            return False
+        self._looked_closer = True
+        self._cycle.look_closer()
+        return True
 
     @property
     def can_hold(self) -> bool:

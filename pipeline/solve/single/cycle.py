@@ -45,6 +45,9 @@ void to_double(int count, double scale, const float* x, double* y);
 _STEPS, _LEFT, _RAISED, _LANCZOS = 2, 0.1, 1.15, 5
 # Where the material jumps, as PETSc's own: see :mod:`pipeline.solve.linear`.
 _LANCZOS_JUMPS = 12
+# Beyond 1.1 times what it is taken for, an eigenvalue makes the cycle indefinite. A few slender elements have one of
+# which noise has little; so many steps find it.
+_LANCZOS_CLOSER = 40
 
 
 def suits(matrices: list[PETSc.Mat]) -> bool:
@@ -128,6 +131,13 @@ class SmoothedLevel:
         self.size, self._held = 3 * rows, np.empty(0, dtype=np.int32)
         self._product, self._direction, self.scratch = (np.zeros(self.size, dtype=np.float32) for _ in range(3))
         self._most = _RAISED * self._largest_eigenvalue(_LANCZOS_JUMPS if jumps else _LANCZOS)
+
+    def look_closer(self) -> None:
+        """Find the largest eigenvalue by many more steps, for the smoother from now on."""
+        held = self._held
+        self.hold(np.empty(0, dtype=np.int32))  # the matrix knows nothing of what is held
+        self._most = max(self._most, _RAISED * self._largest_eigenvalue(_LANCZOS_CLOSER))
+        self.hold(held)
 
     def hold(self, dofs: Int32Array) -> None:
         """Let the smoother alone hold ``dofs`` from now on, which the matrix knows nothing of, and no others.
@@ -232,6 +242,11 @@ class SingleCycle:
             for between, (below, above) in zip(self._interpolations, masks, strict=True)
         ]
         self._coarse = coarse
+
+    def look_closer(self) -> None:
+        """Let each level's smoother find its largest eigenvalue by many more steps."""
+        for level in self._levels:
+            level.look_closer()
 
     def apply(self, _: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Write one cycle's correction for ``residual`` into ``result``."""
