@@ -2,6 +2,7 @@
 
 import json
 from contextlib import contextmanager
+from dataclasses import replace
 from math import pi, sqrt, tan
 
 import numpy as np
@@ -10,8 +11,9 @@ from mpi4py import MPI
 
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of, loads_of, tool_of
+from pipeline.solve.contact.area import contact_area
 from pipeline.solve.contact.problem import ContactProblem, Tool
-from pipeline.solve.contact.sets import ContactError
+from pipeline.solve.contact.sets import ContactError, Obstacle, State, next_set
 from pipeline.solve.spaces import Spaces
 from pipeline.study.problems import StudyError
 from tests.cases import solve, study
@@ -77,6 +79,24 @@ def test_nothing_pulls_and_nothing_comes_through(element):
     assert apart.min() > -1e-9 * obstacle.depth
     assert np.abs(apart[active]).max() < 1e-9 * obstacle.depth
     assert solution.balance < 1e-6
+
+
+def test_what_is_pressed_stays_what_pulls_goes_and_what_came_through_is_held():
+    state = State(1e-3 * np.array([0.0, 1.0, -1.0, 0.0]), np.array([-1.0, 0.0, 0.0, 0.5]), energy=1.0)
+    obstacle = Obstacle(None, np.zeros(4), depth=5e-3)
+    assert next_set(obstacle, np.array([True, False, False, True]), state).tolist() == [True, True, False, False]
+
+
+def test_area_between_nodes_is_that_of_a_gap_that_opens_like_beside_a_smooth_tool():
+    """On four elements a radius, to 1 %."""
+    with pressed() as (problem, law, loads):
+        problem.solve(law, loads)
+        obstacle, state = replace(problem.obstacle, bounds=np.zeros(len(problem.found.active))), problem.found.state
+        distance = np.hypot(*obstacle.candidates.points[:, :2].T)
+        for radius in (0.8e-3, 1e-3):
+            parted = replace(state, moved=-(np.maximum(distance - radius, 0.0) ** 1.5))
+            found = contact_area(obstacle, distance <= radius, parted)
+            assert found == pytest.approx(pi / 4 * radius**2, rel=0.01)
 
 
 def test_flat_probe_that_does_not_lift_off_is_the_frictionless_one():

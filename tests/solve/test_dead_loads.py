@@ -74,6 +74,15 @@ def test_resultants_are_those_of_the_loads(body):
     assert found[2] == pytest.approx(np.array([1000, 0, 200]) * pi / 2 * 3e-3**2, rel=2e-3)
 
 
+def test_each_layer_has_its_own_weight():
+    skin = {"name": "skin", "thickness": "5 mm", "young": "10 kPa", "poisson": 0.3, "density": "2120 kg/m^3"}
+    case = study(body={"layers": [skin]}, material=HEAVY, load=GRAVITY, mesh={"degree": 1}).case(())
+    layered, _ = mesh_case(case, ("x", "y"), MPI.COMM_SELF)
+    with Spaces(layered) as spaces:
+        applied = apply_loads(dead_loads_of(case), layered, spaces.get(1, Conditions()).dofs.space)
+    assert applied.resultant == pytest.approx([0, 0, -WEIGHT * (2 * 5e-3 + 15e-3) * 20e-3**2], abs=1e-12)
+
+
 @pytest.fixture(scope="module")
 def pulled():
     (record,) = solve(load={"traction": [PULL]}).values()

@@ -68,6 +68,7 @@ def test_quarter_is_the_whole_and_force_goes_with_the_modulus():
     quarter, stiff = solve(material=LARGE | {"young": ["10 kPa", "30 kPa"]}, probe=probe).values()
     assert (quarter.origin, whole.origin) == ("symmetric", "solved")
     assert whole.force == pytest.approx(quarter.force, rel=1e-6)
+    assert whole.energy == pytest.approx(quarter.energy, rel=1e-6)
     assert whole.force_error == pytest.approx(quarter.force_error, rel=0.1)
     assert whole.max_strain == pytest.approx(quarter.max_strain, rel=1e-5)
     assert stiff.origin == "scaled"

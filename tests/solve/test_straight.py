@@ -16,6 +16,7 @@ from pipeline.solve.material import MaterialLaw
 from pipeline.solve.mixed import MixedProblem
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.straight.pattern import pattern
+from pipeline.solve.vectors import vector
 from tests.solve.test_mixed import PRESS, law, make_mesh
 
 
@@ -33,6 +34,26 @@ def test_what_is_lent_stays_as_it_is(shared):
         assert first.norm() == before
         space.operators.close()
         assert first.norm() == before
+
+
+@pytest.mark.mpi
+def test_operators_of_two_parts_are_those_assembled_whole():
+    """One material after the other, in the same matrix."""
+    mesh = make_mesh(MPI.COMM_WORLD)
+    space, other = (ElasticSpace(mesh, 2, Conditions()) for _ in range(2))
+    free = np.setdiff1d(np.arange(space.dofs.owned), space.dofs.prescribed)
+    for material in (MaterialLaw.of(2.0, 1.0), MaterialLaw.of(5.0, 3.0)):
+        with (
+            space.operators.lend(material, blocked=True, shared=True) as (parts, _),
+            other.operators.lend(material, blocked=True) as (whole, _),
+            vector(space.dofs.space) as x, vector(space.dofs.space) as y, vector(space.dofs.space) as z,
+        ):  # fmt: skip
+            x.array[free] = np.sin(np.arange(len(free)))
+            parts.mult(x, y)
+            whole.mult(x, z)
+            assert np.abs(y.array - z.array).max() < 1e-12 * np.abs(z.array).max()
+    for made in (space, other):
+        made.operators.close()
 
 
 def test_a_point_of_very_many_cells():
