@@ -7,6 +7,9 @@ NP ?= 1
 PYTEST_ARGS ?=
 PEERS_ARGS ?=
 LOOP_ARGS ?=
+SOAK_ARGS ?=
+FAULTS_ARGS ?=
+MUTANTS_ARGS ?=
 
 # A selection of tests may hold none for 2 ranks (pytest's status 5); the whole suite may not.
 NONE_OK = $(if $(PYTEST_ARGS),|| [ $$? -eq 5 ])
@@ -25,7 +28,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's own mpirun: another one on PATH would not fit Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies docs test test-debian13 slurm-test verify benchmark peers plain-loop realtime resolution stress soak lint format clean
+.PHONY: help setup study studies docs test test-debian13 slurm-test verify benchmark peers plain-loop realtime resolution stress soak faults mutants lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -91,14 +94,21 @@ resolution: setup ## what a file's resolution, noise and voxels change of F (a q
 stress: setup ## numerical stability: a matrix of extremes (10 minutes)
 	$(EPSMESH) stress
 
-soak: setup ## two thousand meshes in one process: memory stays flat (15 minutes)
-	$(MPI_ENV) $(PYTHON) -m benchmarks.soak
+soak: setup ## 20,000 cases on 2,000 meshes in one run: memory and pace stay flat (half an hour; SOAK_ARGS=2000: a part)
+	$(MPI_ENV) $(PYTHON) -m benchmarks.soak $(SOAK_ARGS)
 
-lint: setup ## ruff, mypy and the layers of the imports
+faults: setup ## runs killed at a hundred moments: nothing finished is lost (half an hour; FAULTS_ARGS=20: fewer)
+	$(MPI_ENV) $(PYTHON) -m benchmarks.faults $(FAULTS_ARGS)
+
+mutants: setup ## wrong numbers on purpose, one at a time: every one is noticed (20 minutes): results/mutants.md
+	$(MPI_ENV) $(PYTHON) -m benchmarks.mutants $(MUTANTS_ARGS)
+
+lint: setup ## ruff, mypy, the layers of the imports, and whether the list of mutants fits the code
 	.venv/bin/ruff check
 	.venv/bin/ruff format --check
 	.venv/bin/mypy
 	.venv/bin/lint-imports
+	$(PYTHON) -m benchmarks.mutants --check
 
 format: setup ## let ruff mend and format
 	.venv/bin/ruff check --fix

@@ -1,13 +1,21 @@
-"""Two thousand cases, each with a mesh of its own, in one process: memory stays flat, no communicator runs out.
+"""Tens of thousands of cases in one run: memory stays flat, the pace too, and the store answers in milliseconds.
 
     python -m benchmarks.soak [CASES]            mpirun -n 2 python -m benchmarks.soak
 
-Prints the resident memory of the first rank as it goes; exit status 1 if a case fails, or if the memory grows by more
-than 50 kB a case after a fifth of the way: a record, and the types that ctypes keeps of gmsh's arrays, take half of it.
+Ten cases on each mesh, each solved, their records in a store on disk. Prints, at each twentieth of the way, the
+resident memory of the first rank, the processor time it takes for a case (which other programs on the machine hardly
+change), and the median of what the store takes to write a record and to find one. Exit status 1 if a case fails, if
+memory grows by more than 50 kB a mesh after a fifth of the way (a record, and the types that ctypes keeps of gmsh's
+arrays, take half of it), if the pace of the last three fifths differs by more than 10 %, or if the store takes more
+than 10 ms to find a record.
 """
 
+import statistics
 import sys
 import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import psutil
 from mpi4py import MPI
@@ -16,47 +24,96 @@ from pipeline.plan.plan import make_plan
 from pipeline.run.execute import execute
 from pipeline.run.progress import Silent
 from pipeline.run.record import Record
+from pipeline.run.store import Store
 from pipeline.study.load import parse
 
-CASES = 2_000
-_GROWTH = 50e3  # bytes a case
+CASES, _ON_A_MESH = 20_000, 10
+_GROWTH = 50e3  # bytes a mesh
+_PACE = 0.1
+_ANSWER = 10e-3  # s
+_MARKS = 20
+_ASKED = 50
 
 
 def study(cases: int) -> dict[str, object]:
-    """Return a study of small scenes, no two of which share a mesh."""
-    radii = [f"{2 + i / cases:.6f} mm" for i in range(cases)]
+    """Return a study of small scenes, of which ten share a mesh and none another's solution."""
+    meshes = max(cases // _ON_A_MESH, 1)
     return {
         "body": {"shape": "box", "size": ["30 mm", "30 mm", "15 mm"], "fixed": "bottom"},
-        "material": {"young": "10 kPa", "poisson": 0.4},
-        "probe": {"action": "pierce", "shape": "disc", "radius": radii, "depth": "0.1 mm"},
+        "material": {"young": "10 kPa", "poisson": [0.04 * number for number in range(_ON_A_MESH)]},
+        "probe": {"action": "pierce", "shape": "disc", "radius": [f"{2 + i / meshes:.6f} mm" for i in range(meshes)],
+                  "depth": "0.1 mm"},
         "mesh": {"epsilon": "full", "fine": "6 mm", "coarse": "6 mm", "rim": "1 mm", "growth": 0.9, "degree": 1,
                  "model": "3d"},
         "solve": {"exact": False},
+        "plan": {"without": ["reduced"]},
     }  # fmt: skip
+
+
+@dataclass
+class Log:
+    """What is seen on the way, by marks: cases, memory (bytes), processor time (s), and the store's times (s)."""
+
+    store: Store
+    every: int
+    count: int = 0
+    keys: list[str] = field(default_factory=list)
+    puts: list[float] = field(default_factory=list)
+    marks: list[tuple[int, float, float, float, float]] = field(default_factory=list)
+    start: float = field(default_factory=time.perf_counter)
+
+    def keep(self, record: Record) -> None:
+        """Store a record; at each mark look at everything."""
+        before = time.perf_counter()
+        self.store.put(record)
+        self.puts.append(time.perf_counter() - before)
+        self.count += 1
+        self.keys.append(record.key)
+        if self.count % self.every:
+            return
+        answers = []
+        for key in self.keys[:: max(len(self.keys) // _ASKED, 1)]:
+            before = time.perf_counter()
+            assert key in self.store.get([key])
+            answers.append(time.perf_counter() - before)
+        memory, spent = psutil.Process().memory_info().rss, time.process_time()
+        put, found = statistics.median(self.puts), statistics.median(answers)
+        self.puts.clear()
+        self.marks.append((self.count, memory, spent, put, found))
+        each = self.pace(len(self.marks) - 2, len(self.marks) - 1) if len(self.marks) > 1 else spent / self.count
+        print(f"{self.count:6} cases {time.perf_counter() - self.start:7.0f} s {memory / 1e6:7.0f} MB "
+              f"{1e3 * each:6.1f} ms a case; store: {1e3 * put:.2f} ms to write, {1e3 * found:.2f} ms to find",
+              flush=True)  # fmt: skip
+
+    def pace(self, first: int, last: int) -> float:
+        """Return the processor time of a case (s) between two marks."""
+        (n, _, before, *_), (m, _, after, *_) = self.marks[first], self.marks[last]
+        return (after - before) / (m - n)
 
 
 def main(cases: int) -> int:
     """Run the soak; collective. Returns the exit status."""
-    comm, start = MPI.COMM_WORLD, time.perf_counter()
+    comm = MPI.COMM_WORLD
     plan = make_plan(parse(study(cases)))
-    kept: list[Record] = []
-    memory: list[float] = []
-
-    def keep(record: Record) -> None:
-        kept.append(record)
-        if len(kept) % max(cases // 20, 1) == 0:
-            memory.append(psutil.Process().memory_info().rss)
-            print(f"{len(kept):6} cases {time.perf_counter() - start:7.0f} s {memory[-1] / 1e6:7.0f} MB", flush=True)
-
-    failed = execute(plan, comm, keep, Silent())
-    rest = comm.gather(psutil.Process().memory_info().rss)
-    if comm.rank != 0:
-        return 0
-    first = len(memory) // 5
-    growth = (memory[-1] - memory[first]) / (cases * (len(memory) - 1 - first) / len(memory))
-    print(f"{len(kept)} cases, {len(plan.meshes)} meshes, {failed} failed; memory grew by {growth / 1e3:.0f} kB a case")
+    with TemporaryDirectory() as folder:
+        log = Log(Store(Path(folder) / "cases.sqlite"), max(cases // _MARKS, 1)) if comm.rank == 0 else None
+        failed = execute(plan, comm, log.keep if log else lambda _: None, Silent())
+        rest = comm.gather(psutil.Process().memory_info().rss)
+        if log is None:
+            return 0
+        log.store.close()
+    first, middle, last = len(log.marks) // 5, 3 * len(log.marks) // 5, len(log.marks) - 1
+    growth = (log.marks[last][1] - log.marks[first][1]) / (log.marks[last][0] - log.marks[first][0]) * _ON_A_MESH
+    early, late = log.pace(first, middle), log.pace(middle, last)
+    slowest = max(found for *_, found in log.marks)
+    print(
+        f"{log.count} cases, {len(plan.meshes)} meshes, {failed} failed; memory grew by {growth / 1e3:.1f} kB a mesh;"
+    )
+    print(f"{1e3 * early:.1f} ms a case, then {1e3 * late:.1f} ({100 * (late / early - 1):+.1f} %);")
+    print(f"the store finds a record in {1e3 * slowest:.2f} ms at most")
     print("MB of each rank at the end:", *(round(size / 1e6) for size in rest or ()))
-    return int(failed > 0 or len(kept) < cases or growth > _GROWTH)
+    wrong = growth > _GROWTH or abs(late / early - 1) > _PACE or slowest > _ANSWER
+    return int(failed > 0 or log.count < cases or wrong)
 
 
 if __name__ == "__main__":

@@ -138,6 +138,10 @@ _RESULTS = (
     Quantity("time_solve", "s", "time to solve and to evaluate the force", "solve"),
     Quantity("time_error", "s", "time spent on the error bar, not in time_total", "error bar"),
     Quantity("time_total", "s", "time that this case costs alone", "time", "run time of the case"),
+    Quantity("time_spread", "1", "largest less smallest time_total of the repeats of a timed case, over their median",
+             "spread of the repeats", in_per_cent=True),
+    Quantity("load", "1", "processes that ran or wanted to, a core, when the record was made (mean of a minute, the "
+             "program's own included): above 1 times are too long", "load of the machine"),
     Quantity("memory", "bytes", "peak memory of all ranks", "memory"),
     Quantity("dofs", "1", "unknowns of the whole body", "unknowns"),
     Quantity("cells", "1", "elements of the whole body", "cells"),

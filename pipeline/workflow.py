@@ -16,15 +16,17 @@ from pipeline.plan.cost import CostModel
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.plan.shard import Shard
 from pipeline.report.publish import publish
+from pipeline.run.deadline import watched
 from pipeline.run.outcome import count_states, failures
 from pipeline.run.progress import Silent, Terminal
 from pipeline.run.reading import read_rows
 from pipeline.run.record import Record
 from pipeline.run.store import Store, StoreError
+from pipeline.stages import stage
 from pipeline.study.sweep import Study
 
 # Seconds that the first rank has, when a parallel run is interrupted, to write what is finished.
-_GRACE = 30
+_GRACE = 15
 
 
 @dataclass
@@ -115,7 +117,8 @@ def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Term
     if opened.store is not None:
         opened.store.close()
         if plan.part is None:
-            files = publish(plan, opened.records, {"start": start, "end": _now()}, output)
+            with stage("results"):
+                files = publish(plan, opened.records, {"start": start, "end": _now()}, output)
     counts = count_states(plan, opened.records)
     if not interrupted:
         counts = comm.bcast(counts)
@@ -173,14 +176,18 @@ def _interruptible() -> Iterator[list[int]]:
 
     def interrupt(number: int, _: Any) -> NoReturn:
         received.append(number)
+        watch.answer()
         raise KeyboardInterrupt
 
-    before = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield received
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    with watched(*before) as watch:
+        try:
+            for number in before:
+                signal.signal(number, interrupt)
+            yield received
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
 
 
 def _known_beside(path: Path | None, keys: Collection[str]) -> dict[str, Record]:

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipeline.cli.console import print_json
+from pipeline.cli.console import print_json, warning
 from pipeline.cli.words import (
     DEFAULT_OUTPUT,
+    DONE,
+    SOME_FAILED,
     File,
     Json,
     Output,
@@ -27,6 +29,7 @@ from pipeline.cli.words import (
 from pipeline.plan.describe import story, summary
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.run.remaining import format_seconds
+from pipeline.run.room import MEMORY_SHARE, machine_room
 from pipeline.study.sweep import Case, Study
 
 if TYPE_CHECKING:
@@ -42,13 +45,17 @@ def plan(
     store: StoreFile = None,
     without: Without = None,
     ranks: Annotated[int, typer.Option(metavar="N", help="Ranks that the run will have.", min=1)] = 1,
+    memory: Annotated[
+        float | None,
+        typer.Option(metavar="GB", help="Memory that the run will have; else what is free here, now.", min=0.1),
+    ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
     as_json: Json = False,
 ) -> None:
     """Show what a study needs done, and what is struck out.
 
-    With the reasons, and an estimate of time and memory.
+    With the reasons, and an estimate of time and memory. Ends with 1 if no case would fit into memory.
 
     Example: epsmesh plan studies/figure3.toml
 
@@ -57,15 +64,36 @@ def plan(
     (study,) = load_all([file])
     made, _ = _planned(study, output, store, check_names(without))
     found = summary(made, ranks)
+    room = machine_room() if memory is None else 1e9 * memory
+    found |= {"memory_available": room, "too_large": sum(_is_large(step, room) for step in found["steps"])}
+    _show(study, found, quiet=quiet, verbose=verbose, as_json=as_json)
+    # Where all cases are too large, that of F_exact may still be solved: for nothing.
+    asked = [step for step in found["steps"] if not step["exact"]] or found["steps"]
+    nothing_fits = bool(asked) and all(_is_large(step, room) for step in asked)
+    if found["too_large"] and not as_json:
+        what = "no case fits" if nothing_fits else f"{found['too_large']} of {found['meshes']} steps do not fit"
+        warning(
+            f"{what} into the {room / 1e9:.1f} GB of memory that are there, and will be refused: use larger elements, "
+            "a smaller epsilon, or a larger machine (--memory)"
+        )
+    raise typer.Exit(SOME_FAILED if nothing_fits else DONE)
+
+
+def _is_large(step: dict[str, Any], room: float) -> bool:
+    return bool(step["memory"] > MEMORY_SHARE * room)
+
+
+def _show(study: Study, found: dict[str, Any], *, quiet: bool, verbose: bool, as_json: bool) -> None:
+    """Print the summary of a plan."""
     if as_json:
         print_json(found)
         return
     exact = f" ({found['exact']} of them for F_exact)" if found["exact"] else ""
     to_do = f"{found['meshes']} meshes, {found['operators']} operators, {found['solves']} solves{exact}"
-    on = f"on {ranks} {'rank' if ranks == 1 else 'ranks'}"
+    on = f"on {found['ranks']} {'rank' if found['ranks'] == 1 else 'ranks'}"
     cost = f"{format_seconds(found['seconds'])} {on}, {found['memory'] / 1e9:.1f} GB for the largest step"
     if quiet:
-        print(f"{file}: {found['cases']} cases; to do: {to_do}{f'; {cost}' if found['steps'] else ''}")
+        print(f"{study.file}: {found['cases']} cases; to do: {to_do}{f'; {cost}' if found['steps'] else ''}")
         return
     warn(study)
     print(f"{study.title}: {found['cases']} cases{axes_of(study)}")

@@ -11,6 +11,7 @@ import numpy as np
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.compat import gmsh_session
 from pipeline.mesh.follow import middle_nodes, rounded_sizes
+from pipeline.mesh.reason import reason
 from pipeline.mesh.regions import region_sizes
 from pipeline.mesh.size import Sizes, set_size_field
 from pipeline.scene.model import CUT, FIXED, FREE, MIRROR, PROBE, SLIT, TISSUE, Scene, SceneError, build
@@ -87,7 +88,7 @@ def _generate(scene: Scene, sizes: Sizes, start: float) -> MeshArrays:
             set_size_field(sizes, scene.probe, scene.frame, scene.scale, more, lifted)
             gmsh.model.mesh.generate(3)
         except Exception as error:  # gmsh raises bare Exception
-            raise MeshError(f"gmsh: {error or gmsh.logger.getLastError()}") from error
+            raise MeshError(f"gmsh: {reason(error)}") from error
         return _collect(scene, rim_curves, start)
 
 
@@ -98,7 +99,7 @@ def _built(scene: Scene) -> list[int]:
     except SceneError as error:
         raise GeometryError(str(error)) from None
     except Exception as error:  # so does its geometry kernel
-        raise GeometryError(f"gmsh: {error or gmsh.logger.getLastError()}") from error
+        raise GeometryError(f"gmsh: {reason(error)}") from error
 
 
 @contextmanager

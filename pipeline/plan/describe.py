@@ -20,7 +20,10 @@ def summary(plan: Plan, ranks: int = 1) -> dict[str, Any]:
         found = [plan.cost.step(step) for step in phase.steps]
         costs = [step.seconds / speed_up(phase.size) for step in found]
         seconds += _makespan(costs, ranks // phase.size)
-        steps += [vars(s) | {"seconds": cost, "ranks": phase.size} for s, cost in zip(found, costs, strict=True)]
+        steps += [
+            vars(s) | {"seconds": cost, "ranks": phase.size, "exact": all(solve.is_reference for solve in step.solves)}
+            for step, s, cost in zip(phase.steps, found, costs, strict=True)
+        ]
     return {
         "study": plan.study.file,
         "cases": len(plan.keys),

@@ -25,7 +25,7 @@ from pipeline.study.sweep import Axis, Case, Scale, Study
 # The variables that are taken as they are from the records of the cases, and from those of F_exact.
 _FLOATS = (
     "force", "force_error", "energy", "max_strain", "balance", "time_mesh", "time_assemble", "time_setup", "time_solve",
-    "time_error", "time_total", "memory",
+    "time_error", "time_total", "time_spread", "load", "memory",
 )  # fmt: skip
 # Those of contact that is found, if any of the study's is.
 _FOUND = ("contact_area", "contact_radius")

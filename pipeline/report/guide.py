@@ -17,6 +17,7 @@ from pipeline.report import guide_text
 from pipeline.report.guideline import Guideline
 from pipeline.report.sinking import tools
 from pipeline.report.table import DatasetError, arrange
+from pipeline.report.times import doubts
 from pipeline.report.verdict import choose, judge, keeps, most_accurate
 from pipeline.units import parse_quantity
 
@@ -57,7 +58,7 @@ def guide(dataset: xr.Dataset, accuracy: str | float | None = None, budget: str 
         tuple(scene for scene, lost in zip(table.scenes, table.lost, strict=True) if lost),
         bool(np.isfinite(table.share).any()), _timing(dataset),
         tools(case for case, one in zip(table.cases, table.sinking, strict=True) if case and not one.why_not),
-        _counts(np.array([one.why_not for one in table.sinking])),
+        _counts(np.array([one.why_not for one in table.sinking])), tuple(doubts(dataset)),
     )  # fmt: skip
 
 

@@ -81,6 +81,7 @@ def _details(verdict: Verdict, guide: Guideline) -> list[str]:
     return [
         f"  elements     {elements(verdict.mesh)}",
         f"  cost         {cost(verdict)}, on {guide.timing}",
+        *(f"  times        {doubt}" for doubt in guide.doubts),
         f"  worst error  {percent(verdict.error)}{spare}; {percent(verdict.deviation)} without error bars",
         f"  limited      {f'F = {newton(verdict.force)}, F_exact = {newton(verdict.exact)}'}{limit}",
     ]

@@ -18,7 +18,7 @@ class Guideline:
     tools on the same tissue; None if there is none. ``lean`` has the fewest unknowns of those
     that keep the accuracy. ``left_out`` counts the scenes lost to every setting, by reason, and ``unjudged`` the cases
     that keep settings from being judged. ``tools`` describes those that laws were fitted to; ``no_law`` counts the
-    scenes in which no law adds compliances, by reason.
+    scenes in which no law adds compliances, by reason; ``doubts`` say what makes times worth less.
     """
 
     title: str
@@ -41,6 +41,7 @@ class Guideline:
     timing: str
     tools: tuple[str, ...] = ()
     no_law: tuple[tuple[str, int], ...] = ()
+    doubts: tuple[str, ...] = ()
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the table behind the answer, a row for each setting, in SI units; full order is ε = infinity."""
@@ -58,7 +59,7 @@ class Guideline:
                 for name, (plain, law) in self.of_each_outside().items()
             },
             "settings": list(rows.values()), "left_out": dict(self.left_out), "lost": list(self.lost),
-            "unjudged": dict(self.unjudged), "timing": self.timing,
+            "unjudged": dict(self.unjudged), "timing": self.timing, "doubts": list(self.doubts),
             "tools": list(self.tools), "no_law": dict(self.no_law),
         }  # fmt: skip
 

@@ -2,21 +2,16 @@
 
 import ctypes
 import gc
-import os
-import resource
-from collections.abc import Iterator
 from contextlib import suppress
-from math import inf
 from pathlib import Path
 
 import psutil
 from mpi4py import MPI
 
+from pipeline.run.room import machine_room, process_room
 from pipeline.stages import stage
 
 _C = ctypes.CDLL(None)
-# A limit of cgroup v1 above this is none.
-_NO_LIMIT = 2**60
 _kept: list[bool] = []
 
 
@@ -65,57 +60,8 @@ class FreeMemory:
 
         What the machines have free, or, if less, what containers, Slurm's grant or the limits of the processes leave.
         """
-        free = min(psutil.virtual_memory().available, container_room(), _granted()) if self._is_first else 0.0
-        return float(min(self._comm.allreduce(free), self._comm.allreduce(_room_of_process())))
-
-
-def container_room(table: Path = Path("/proc/self/cgroup"), root: Path = Path("/sys/fs/cgroup")) -> float:
-    """Return the bytes that this process's control groups leave, infinity where none has a limit.
-
-    The limit of a group holds for all below it, too: the tightest one counts. Memory that only caches files is free.
-    """
-    return min(_rooms(table, root), default=inf)
-
-
-def _rooms(table: Path, root: Path) -> Iterator[float]:
-    with suppress(OSError):
-        for line in table.read_text().splitlines():
-            _, controllers, path = line.split(":", 2)
-            if controllers == "":
-                base, names = root, ("memory.max", "memory.current", "inactive_file")
-            elif "memory" in controllers.split(","):
-                base, names = root / "memory", ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
-            else:
-                continue
-            group = base / path.strip("/")
-            # In a container the path is that of the machine, and what is mounted is the container's own group.
-            for folder in (group, *group.parents):
-                if folder.is_relative_to(base):
-                    yield _room_of_group(folder, *names)
-
-
-def _room_of_group(folder: Path, limit_name: str, usage_name: str, cache_name: str) -> float:
-    try:
-        limit = (folder / limit_name).read_text().strip()
-        if limit == "max" or int(limit) >= _NO_LIMIT:
-            return inf
-        usage = int((folder / usage_name).read_text())
-        lines = (line.split() for line in (folder / "memory.stat").read_text().splitlines())
-        return float(int(limit) - usage + next((int(value) for name, value in lines if name == cache_name), 0))
-    except (OSError, ValueError):
-        return inf
-
-
-def _room_of_process() -> float:
-    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
-    return inf if limit == resource.RLIM_INFINITY else float(limit - psutil.Process().memory_info().vms)
-
-
-def _granted() -> float:
-    """Return the bytes of this machine that Slurm grants the job, less what this process holds: more would end it."""
-    each_cpu = float(os.environ.get("SLURM_MEM_PER_CPU") or 0) * float(os.environ.get("SLURM_CPUS_ON_NODE") or 1)
-    granted = 1e6 * (float(os.environ.get("SLURM_MEM_PER_NODE") or 0) or each_cpu)  # 0: all there is
-    return max(0.0, granted - psutil.Process().memory_info().rss) if granted else inf
+        free = machine_room() if self._is_first else 0.0
+        return float(min(self._comm.allreduce(free), self._comm.allreduce(process_room())))
 
 
 def _peak_of_process() -> int:

@@ -10,6 +10,7 @@ from pipeline.plan.symmetry import mirror_planes, movement_planes
 from pipeline.run.dead_loads import dead_loads_of
 from pipeline.run.far_field import far_field_of
 from pipeline.run.memory import FreeMemory
+from pipeline.run.room import MEMORY_SHARE
 from pipeline.shapes.probes.round_indenter import RoundIndenter
 from pipeline.solve.axisymmetric import MeridianProblem
 from pipeline.solve.conditions import Conditions
@@ -33,8 +34,6 @@ from pipeline.study.sweep import Case
 _MOST_DIRECT = 60_000
 # What is virtually moved round a slit's front is this near to it, in units of the distance to anything else.
 _CLEAR = 0.7
-# A case may take this share of the memory that is free when it begins.
-_MEMORY_SHARE = 0.9
 
 
 class CaseFailure(Exception):
@@ -196,6 +195,6 @@ def check_memory(free: FreeMemory, needed: float, what: str) -> None:
 def lacks_memory(free: FreeMemory, needed: float, what: str) -> str:
     """Return what to say if ``needed`` bytes are too much, the same on every rank; collective."""
     available = free.available()
-    if needed <= _MEMORY_SHARE * available:
+    if needed <= MEMORY_SHARE * available:
         return ""
     return f"{what} needs about {needed / 1e9:.1f} GB of memory, {available / 1e9:.1f} GB are available"

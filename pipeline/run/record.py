@@ -23,7 +23,8 @@ class Record:
     Loads add ``load_force`` (N), of the bar ``load_force_error`` (N), to the force while the probe is held, in all
     ``load_force_vector`` (N); ``load_energy`` (J) is their strain energy, ``sag`` (m) how far they take a probe that is
     free along its axis. ``kind``, ``planned_cells`` and ``poisson`` are what its cost was estimated from
-    (:mod:`pipeline.plan.cost`), ``group`` the ranks that computed it.
+    (:mod:`pipeline.plan.cost`), ``group`` the ranks that computed it. What times are worth tell ``time_spread``, that
+    of repeats relative to their median, and ``load``, the processes a core that ran or wanted to.
     """
 
     key: str
@@ -60,6 +61,8 @@ class Record:
     time_setup: float = nan
     time_solve: float = nan
     time_error: float = nan
+    time_spread: float = nan
+    load: float = nan
     kind: str = ""
     planned_cells: float = nan
     poisson: float = nan

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from enum import Enum
 from functools import partial
+from math import nan
 from typing import TypeVar
 
 import numpy as np
@@ -29,6 +30,7 @@ from pipeline.run.problem import CaseFailure, check_memory, lacks_memory, meridi
 from pipeline.run.progress import Progress
 from pipeline.run.provenance import provenance
 from pipeline.run.record import Record
+from pipeline.run.room import machine_load
 from pipeline.run.sweeping import in_order
 from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.linear import SolveError, is_direct
@@ -159,7 +161,7 @@ class StepRunner:
         bar = Bar.NONE if solve.goal is None else Bar.NEEDED
         records = [self._afresh(solve, memory, bar) for _ in range(solve.case.solve.repeats)]
         medians = {n: statistics.median(getattr(r, n) for r in records) for n in (*TIMES, "time_error")}
-        record = replace(records[-1], **medians)
+        record = replace(records[-1], **medians, time_spread=_spread([r.time_total for r in records]))
         if bar is Bar.NEEDED:
             return record
         told = self._afresh(replace(solve, mirrors=model_planes(solve.case)), memory, Bar.IF_ROOM)
@@ -233,8 +235,9 @@ class StepRunner:
     def _stamp(self, record: Record, memory: PeakMemory) -> Record:
         date = datetime.now(UTC).isoformat(timespec="seconds")
         return replace(
-            record, memory=memory.peak(), group=self._comm.size, provenance=self._provenance | {"date": date}
-        )
+            record, memory=memory.peak(), load=machine_load(), group=self._comm.size,
+            provenance=self._provenance | {"date": date},
+        )  # fmt: skip
 
     def _record(self, solve: Solve, compute: Callable[[], Record]) -> None:
         """Compute and keep a record; if that fails, keep a record of the failure."""
@@ -271,6 +274,11 @@ class StepRunner:
             if self._comm.size > 1:
                 raise
             return Failure(f"{type(error).__name__}: {error}")
+
+
+def _spread(seconds: list[float]) -> float:
+    """Return how far times are apart, relative to their median; not a number of one."""
+    return (max(seconds) - min(seconds)) / statistics.median(seconds) if len(seconds) > 1 else nan
 
 
 def _bar_of(solve: Solve) -> Bar:

@@ -140,14 +140,15 @@ class Store(Records):
         self._database.executemany("INSERT OR REPLACE INTO records VALUES (?, ?, ?)", rows)
 
     def prune(self, *, older_than: float | None = None, failed: bool = False) -> int:
-        """Remove records stored more than ``older_than`` seconds ago, failed ones, and what is no record of its key.
+        """Remove records stored ``older_than`` seconds ago or before, failed ones, and what is no record of its key.
 
         Returns their number.
         """
         gone = []
         for key, text, stored in self.rows():
             record = _readable(text)
-            is_old = older_than is not None and time.time() - stored > older_than
+            # A clock that has gone back leaves records of a time to come.
+            is_old = older_than is not None and max(time.time() - stored, 0.0) >= older_than
             if is_old or _fault(key, record) or (failed and record and not record.is_ok):
                 gone.append(key)
         self._database.executemany("DELETE FROM records WHERE key = ?", [(key,) for key in gone])

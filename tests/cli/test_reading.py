@@ -97,6 +97,18 @@ def test_status_asks_after_a_run_without_reductions(epsmesh, small, tmp_path):
     assert epsmesh("status", small, "--without", "everything").exit_code == 2
 
 
+def test_a_plan_of_which_nothing_fits_into_memory_ends_with_1(epsmesh, small):
+    done = epsmesh("plan", small, "--memory", 0.1)
+    assert done.exit_code == 1
+    assert "no case fits into the 0.1 GB of memory that are there" in done.stderr
+    assert json.loads(epsmesh("plan", small, "--memory", 0.1, "--json").stdout)["too_large"] > 0
+    told = json.loads(epsmesh("plan", small, "--memory", 100, "--json").stdout)
+    assert told["too_large"] == 0
+    needed = sorted(step["memory"] for step in told["steps"])
+    some = epsmesh("plan", small, "--memory", (needed[0] + needed[-1]) / 2 / 0.9e9)
+    assert (some.exit_code, "steps do not fit" in some.stderr) == (0, True)
+
+
 def test_explain_tells_what_the_plan_used(epsmesh, small):
     for without, words in (([], "F is proportional"), (["--without", "scaling"], "one solve, on the same mesh")):
         told = json.loads(epsmesh("explain", small, *without, "--json").stdout)

@@ -11,6 +11,7 @@ from math import isnan
 import psutil
 import pytest
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from pipeline.plan.plan import make_plan
 from pipeline.run import meshing, problem
@@ -25,6 +26,7 @@ from tests.cases import BLADE, solve, study
 WORLD = MPI.COMM_WORLD
 SCRIPT = """
 from mpi4py import MPI
+from petsc4py import PETSc
 from tests.cases import BLADE, solve
 for method in ("iterative", "direct"):
     for key, record in solve(MPI.COMM_WORLD, probe=BLADE, material={"poisson": [0.3, 0.49]},
@@ -163,6 +165,20 @@ def test_wrong_solution_is_a_failed_case():
     (record,) = solve(WORLD, solve={"method": "iterative", "tolerance": 1e-3}).values()
     assert record.status == "failed"
     assert "do not balance" in record.message
+
+
+@pytest.mark.skipif(WORLD.size > 1, reason="with several ranks such a failure ends the run")
+@pytest.mark.parametrize("error", [MemoryError("no room for 64 MB"), PETSc.Error(55), RuntimeError("std::bad_alloc")])
+def test_a_case_that_runs_out_of_memory_all_the_same_fails_alone(monkeypatch, error):
+    def solve_problem(case, *arguments, **options):
+        if case.material.poisson == 0.3:
+            raise error
+        return problem.solve_problem(case, *arguments, **options)
+
+    monkeypatch.setattr("pipeline.run.runner.solve_problem", solve_problem)
+    records = solve(material={"poisson": [0.3, 0.4]})
+    assert [records[i,].status for i in range(2)] == ["failed", "ok"]
+    assert str(error) in records[0,].message
 
 
 def test_gmsh_failure_is_a_failed_case(monkeypatch):

@@ -7,7 +7,8 @@ from math import inf
 import pytest
 from mpi4py import MPI
 
-from pipeline.run.memory import FreeMemory, container_room
+from pipeline.run.memory import FreeMemory
+from pipeline.run.room import container_room
 
 V2 = ("memory.max", "memory.current", "inactive_file", "")
 V1 = ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file", "memory")

@@ -14,6 +14,7 @@ from pipeline.compat import gmsh_session
 from pipeline.mesh.generate import GeometryError, MeshError, model_options
 from pipeline.mesh.organ.lines import cross
 from pipeline.mesh.organ.sheet import FIXED, PROBE, Sheet, compact, edges_of
+from pipeline.mesh.reason import reason
 from pipeline.mesh.size import Sizes, set_size_field
 from pipeline.shapes.frame import Frame
 from pipeline.shapes.probe import Probe
@@ -191,7 +192,7 @@ def _mesh_plane(local: FloatArray, loops: list[list[int]], rim: FloatArray, prob
         try:
             mesh.generate(2)
         except Exception as error:
-            raise MeshError(f"gmsh: {error or gmsh.logger.getLastError()}") from error
+            raise MeshError(f"gmsh: {reason(error)}") from error
         tags, coordinates, _ = mesh.getNodes()
         position = np.full(int(tags.max()) + 1, -1, dtype=np.int64)
         order = np.argsort(tags)

@@ -9,6 +9,7 @@ from pipeline.arrays import FloatArray, IntArray
 from pipeline.compat import gmsh_session
 from pipeline.mesh.generate import MeshError, model_options
 from pipeline.mesh.organ.field import Field, set_field
+from pipeline.mesh.reason import reason
 from pipeline.shapes.triangles import enclosed
 from pipeline.stages import stage
 
@@ -50,7 +51,7 @@ def fill(
         try:
             model.mesh.generate(3)
         except Exception as error:  # gmsh raises bare Exception
-            raise MeshError(f"gmsh: {error or gmsh.logger.getLastError()}") from error
+            raise MeshError(f"gmsh: {reason(error)}") from error
         found, coordinates, _ = model.mesh.getNodes()
         parts = [model.mesh.getElementsByType(_TETRAHEDRON, volume)[1] for volume in volumes]
         if not all(map(len, parts)):

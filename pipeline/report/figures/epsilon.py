@@ -13,6 +13,7 @@ from pipeline.report.figures.layout import arrange
 from pipeline.report.figures.panels import draw_curves, grid, panels
 from pipeline.report.figures.style import CLAIM, LINE, finish
 from pipeline.report.table import study_of
+from pipeline.report.times import doubts
 from pipeline.report.words import formula, heading
 
 # The paper's claims: 80 % of F_max at ε = 10 mm, 50 times faster.
@@ -49,7 +50,8 @@ def _against_epsilon(dataset: xr.Dataset, quantities: Sequence[str], title: str,
         if panel.is_first:
             is_speedup = panel.quantity == "speedup"
             panel.ax.set_ylabel(heading(dataset["speedup"]) if is_speedup else formula(panel.quantity))
-    finish(figure, title, layout.note, warning)
+    timed = doubts(dataset) if "speedup" in quantities else []
+    finish(figure, title, layout.note, "; ".join(filter(None, (warning, *timed))))
     return figure
 
 

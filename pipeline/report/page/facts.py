@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from pipeline.report.times import doubts
 from pipeline.report.words import choices
 
 # Cases that a message names; the table shows all of them.
@@ -29,6 +30,8 @@ def facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
         values = dataset[name].values * scale if name in dataset else np.array([np.nan])
         if np.isfinite(values).any() and not (name == "speedup" and np.nanmax(values) == 1):
             found.append((text, f"{np.nanmax(values):.2g}{unit}"))
+    if any(name == "largest speed-up" for name, _ in found):
+        found += [("speed-ups", text) for text in doubts(dataset)]
     if taken := _taken(dataset):
         found.append(("run", taken))
     return found

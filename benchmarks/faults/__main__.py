@@ -1,0 +1,82 @@
+"""Runs are killed at random moments: what is finished stays, and the next run ends as if nothing had happened.
+
+    python -m benchmarks.faults [MOMENTS] [--seed N]
+
+Each moment has a signal (SIGKILL, SIGTERM, SIGINT), one rank or two, of which one alone may be struck, and a phase:
+while forms are compiled, while gmsh meshes, while it is solved, while records or results are written. After it all
+processes must be gone within 30 s, the store must be sound and hold every record that it held, no file be torn; and a
+run on the same store must end with the dataset of one that nobody disturbed. Ends with 1 if anything is wrong.
+"""
+
+import argparse
+import random
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from benchmarks.faults.moment import Left, Moment, Scene, draw
+from tests.compare import assert_same
+from tests.studies import small_text
+
+MOMENTS, SEED = 100, 1
+# Of the compiled forms, so many are missing: their compilation is a phase of every run.
+_MISSING = 1
+STUDY = small_text(
+    material={"poisson": [0.3, 0.4]}, mesh={"epsilon": ["4 mm", "full"], "outside": ["coarse", "free"], "degree": 1},
+    solve={"exact": False},
+)  # fmt: skip
+
+
+def main(arguments: list[str]) -> int:
+    """Run; return the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.faults")
+    parser.add_argument("moments", nargs="?", type=int, default=MOMENTS)
+    parser.add_argument("--seed", type=int, default=SEED)
+    options = parser.parse_args(arguments)
+    wrong, struck, longest, start = 0, Counter[str](), 0.0, time.monotonic()
+    with TemporaryDirectory(prefix="epsmesh-faults-") as folder:
+        whole = undisturbed(Path(folder))
+        for number in range(options.moments):
+            moment = draw(number, options.seed)
+            left, after = one(Path(folder) / str(number), whole, moment, random.Random(f"{options.seed} {number}"))
+            faults = (*left.faults, *after)
+            wrong += bool(faults)
+            struck[f"{moment.phase}: {left.stage or 'over before'}"] += 1
+            longest = max(longest, left.seconds if left.stage else 0.0)
+            told = f"{number:4} {moment} -> {left.stage or '-'}, status {left.status}, quiet in {left.seconds:.1f} s"
+            print(told, *faults, sep="\n     WRONG: ", flush=True)
+    seconds = time.monotonic() - start
+    print(
+        f"{options.moments} moments in {seconds:.0f} s, {wrong} with faults, quiet in {longest:.1f} s at most; struck"
+    )
+    print(*(f"  {name} {count}" for name, count in sorted(struck.items())), sep="\n")
+    return int(wrong > 0)
+
+
+def undisturbed(folder: Path) -> Scene:
+    """Return the scene of a run that nobody disturbs: its compiled forms are those of the others."""
+    (folder / "cache").mkdir()
+    whole = Scene(folder / "whole", STUDY, folder / "cache", 0, random.Random())
+    if status := whole.run_on():
+        raise SystemExit(f"the run fails by itself, status {status}:\n{(whole.folder / 'said').read_text()}")
+    return whole
+
+
+def one(folder: Path, whole: Scene, moment: Moment, dice: random.Random) -> tuple[Left, list[str]]:
+    """Strike once; return what was left, and what is wrong with what the next run makes of it."""
+    scene = Scene(folder, STUDY, whole.folder / "cache", _MISSING, dice)
+    left = scene.strike(moment)
+    ranks = 1 if moment.ranks > 1 and dice.random() < 0.5 else moment.ranks
+    if status := scene.run_on(ranks):
+        return left, [f"the next run ends with {status}: {(folder / 'said').read_text()[-2000:]}"]
+    try:
+        assert_same(scene.dataset, whole.dataset, alike=False)
+    except AssertionError as error:
+        return left, [f"the next run gives another dataset: {error}"]
+    return left, []
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
