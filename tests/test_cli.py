@@ -132,10 +132,12 @@ def test_interrupted_parallel_run_writes_what_is_done(spawn, small, tmp_path):
     assert (xr.load_dataset(tmp_path / "small.nc")["status"] == "ok").all()
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_run_killed_at_random_moments_yields_the_same_dataset(spawn, small, tmp_path, seed):
-    """SIGKILL, again and again, at any moment: nothing finished is lost, and in the end nothing tells it happened."""
-    random = np.random.default_rng(seed)
+def test_run_killed_at_random_moments_yields_the_same_dataset(spawn, small, tmp_path):
+    """SIGKILL, again and again, at any moment: nothing finished is lost, and in the end nothing tells it happened.
+
+    `make faults` does so a hundred times, with other signals, phases and ranks.
+    """
+    random = np.random.default_rng(1)
     words = command("run", small, "--output", tmp_path / "killed", "--meshes", tmp_path / "meshes")
     done = 0
     for _ in range(4):
