@@ -143,7 +143,7 @@ class DisplacementProblem:
         form = response.stiffness if carried is None else carried.form
         relative = np.array([error_bar(share, fine.degree, plain=plain) for share in shares(found, form)])
         return replace(
-            solution.with_bars(found, stiffness_bars(form, relative), apart=loads.apart), plain=plain,
+            solution.with_bars(found, stiffness_bars(form, relative), "displacement", apart=loads.apart), plain=plain,
             estimate_iterations=more, released_finer=released_finer, pushed_finer=pushed_finer,
             time_estimate=time.perf_counter() - start,
         ).with_release_bar(fine.degree)  # fmt: skip

@@ -222,8 +222,8 @@ class MixedProblem:
         ]
         bars = split.unit * stiffness_bars(coarse, np.array(relative))
         return replace(
-            solution.with_bars(split.unit * decrements, bars, apart=loads.apart), plain=plain, released_finer=released,
-            pushed_finer=pushed,
+            solution.with_bars(split.unit * decrements, bars, "mixed", apart=loads.apart), plain=plain,
+            released_finer=released, pushed_finer=pushed,
             estimate_iterations=iterations, time_estimate=time.perf_counter() - start,
         ).with_release_bar(self._degree)  # fmt: skip
 

@@ -7,7 +7,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.carried import Carried
+from pipeline.solve.carried import Carried, load_bars
 from pipeline.solve.error import extrapolate, extrapolate_found, extrapolate_release, release_bar
 from pipeline.solve.loads import Loads, Vector
 from pipeline.solve.material import MaterialLaw
@@ -132,7 +132,7 @@ class Solution:
         x, y, z = map(float, np.where(spanned > 1 - 1e-9, bars, nan))
         return x, y, z if self.pushed is None else abs(self.push) * self.push_bar
 
-    def with_bars(self, decrements: FloatArray, bars: FloatArray, *, apart: bool) -> "Solution":
+    def with_bars(self, decrements: FloatArray, bars: FloatArray, element: str, *, apart: bool) -> "Solution":
         """Return the solution with what one degree more takes away, and bars; loads have a row more than motions.
 
         The entries between motions that symmetry keeps ``apart`` are zero, and known to be.
@@ -142,10 +142,10 @@ class Solution:
         if apart:
             for matrix in (decrements, bars):
                 matrix[:count, :count] = np.diag(np.diag(matrix)[:count])
-        loaded = None if self.carried is None else replace(self.carried, decrements=decrements, bars=bars)
-        return replace(
-            self, decrements=decrements[:count, :count], bars=bars[:count, :count], carried=loaded
+        loaded = self.carried and replace(
+            self.carried, decrements=decrements, bars=load_bars(bars, decrements, element)
         )  # fmt: skip
+        return replace(self, decrements=decrements[:count, :count], bars=bars[:count, :count], carried=loaded)
 
     @property
     def release(self) -> float:

@@ -94,10 +94,16 @@ def test_blocks_of_a_page_run(page, checkout):
 _PIECES = [b for page in pages() if page.name != "scenes.md" for b in blocks(page, ("toml",))]
 
 
+@pytest.fixture(scope="module")
+def begun():
+    """The text of the study that ``epsmesh new`` writes."""
+    return starter("mine")
+
+
 @pytest.mark.parametrize("block", _PIECES, ids=str)
-def test_pieces_of_studies_are_valid(block):
+def test_pieces_of_studies_are_valid(block, begun):
     """Each, put into the study that ``epsmesh new`` writes, makes a study, in the folder of the project's own."""
-    study = tomllib.loads(starter("mine"))
+    study = tomllib.loads(begun)
     for name, piece in tomllib.loads(block.text).items():
         whole = not isinstance(piece, dict) or "shape" in piece
         study[name] = piece if whole else {**study.get(name, {}), **piece}

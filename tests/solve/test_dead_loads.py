@@ -10,6 +10,7 @@ from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.run.dead_loads import dead_loads_of
 from pipeline.run.meshing import mesh_case
+from pipeline.solve.carried import load_bars
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.dead_loads import apply_loads
 from pipeline.solve.material import MaterialLaw
@@ -148,3 +149,14 @@ def test_the_bar_holds(pulled):
     (finer,) = solve(load={"traction": [PULL]}, mesh={"degree": 3}).values()
     assert abs(pulled.load_force - finer.load_force) < pulled.load_force_error
     assert finer.load_force_error < pulled.load_force_error / 2
+
+
+@pytest.mark.parametrize("element", ["displacement", "mixed"])
+def test_the_bar_tells_errors_apart_that_are_at_other_places(element):
+    """As wide as the root of both bars where both err alike, a share of it where they do not, and never none."""
+    root, bars = 6.0, np.array([[4.0, 6.0], [6.0, 9.0]])
+    alike, apart, none = (np.array([[1.0, s], [s, 4.0]]) for s in (2.0, 0.2, 0.0))
+    found = [load_bars(bars, decrements, element)[0, 1] for decrements in (alike, apart, none)]
+    assert found[0] == root and root > 2 * found[1] and found[1] > found[2] > 0.1 * root
+    still = load_bars(bars, np.diag([1.0, 0.0]), element)  # loads that do no work
+    assert np.array_equal(still, still.T) and still[0, 1] == root and np.array_equal(np.diag(still), np.diag(bars))
