@@ -159,6 +159,17 @@ def test_what_is_sharp_stays_sharp(tmp_path):
     assert area(mesh, "fixed") == pytest.approx(1600e-6 + 4 * 400e-6, rel=1e-9)
 
 
+def test_a_blade_has_straight_edges_in_its_own_plane(file):
+    """Of which each is several elements long."""
+    blade = study(probe={"shape": "blade", "length": "8 mm", "width": "2 mm", "depth": "0.1 mm"}).case(()).probe
+    a_scene = Placed(surface(file), blade, rim_segments=0)
+    mesh = mesh_organ(a_scene, SIZES, far_surface(a_scene.body))
+    x, y, _ = a_scene.frame.local(mesh.points[mesh.rim]).T
+    np.testing.assert_allclose(np.maximum(np.abs(x) / 4e-3, np.abs(y) / 1e-3), 1.0, atol=1e-9)
+    assert len(mesh.rim) >= 20e-3 / SIZES.rim
+    assert qualities(mesh).min() > 0.02
+
+
 def test_a_footprint_over_the_edge_is_refused(file):
     a_scene = scene(file)
 
