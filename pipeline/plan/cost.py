@@ -20,7 +20,7 @@ _PARALLEL = 0.8
 # Seconds on one core of 2020s hardware: for each tetrahedron; and of the mixed element, as a multiple.
 _MESH, _MIXED = 2e-5, 1.3
 _SOLVE = {1: 5e-6, 2: 2e-5, 3: 5e-5, 4: 1.6e-4}
-_MERIDIAN = 0.5
+_MERIDIAN, _MERIDIAN_BYTES = 0.5, 4.5e8
 # And one whose contact is to be found: so many times that.
 _FOUND, _TRIALS = "meridian contact", 2.0
 # Share of the meshes that miss the accuracy they were chosen for: 5 of 60 scenes, 9 of 48 blades that slice.
@@ -80,14 +80,14 @@ class CostModel:
             title += f" and {len(step.solves) - 1} more"
         if step.axisymmetric:
             seconds = sum(self.seconds("solve", *features(solve)) for solve in step.solves)
-            return StepEstimate("meridian", len(step.solves), len(step.solves), 1e3, seconds, 3e8, title)
+            return StepEstimate("meridian", len(step.solves), len(step.solves), 1e3, seconds, _MERIDIAN_BYTES, title)
         kind, cells, _ = features(step.solves[0])
         seconds = self.seconds("mesh", kind, cells, 0.0)
         for solve in step.solves:
             kind, _, poisson = features(solve)
             seconds += sum(self.seconds(stage, kind, cells, poisson) for stage in ("solve", "bar"))
             seconds += self._further(solve)
-        memory = estimate.case_memory(step.case, 0.5 ** len(step.mirrors))
+        memory = estimate.peak_memory(step.case, 0.5 ** len(step.mirrors))
         return StepEstimate("mesh", len(step.solves), len(step.operators), cells, seconds, memory, title)
 
     def _further(self, solve: Solve) -> float:

@@ -10,11 +10,22 @@ _TETRAHEDRON = 0.21
 # what two more matrices take. Measured: docs/solvers.md.
 _BYTES_PER_DOF = {"iterative": {1: 2500, 2: 1900, 3: 2000, 4: 2800}, "direct": {1: 9000, 2: 9000, 3: 10_000}}
 _BYTES_OF_PARTS = {1: 1000, 2: 1500, 3: 2200, 4: 3300}
+# So many times that for the error bar of a mixed element; measured on organs, degrees 2 and 3.
+_MIXED_BAR = 2.0
 _BASE = 200e6
+# What a process holds besides once it has meshed and solved: programs, compiled forms.
+_LOADED = 100e6
 # Dofs for each tetrahedron on large meshes, three components.
 _DOFS_PER_CELL = {1: 0.55, 2: 4.4, 3: 15.0, 4: 35.0}
 # Bytes gmsh and the arrays take for each tetrahedron while meshing.
 _BYTES_PER_CELL = 1000
+# Far elements of a round side, in its radius; tetrahedra on a boundary beyond those of the volume, for each of its
+# triangles; and, for each unit of a surface's curvature over elements of unit size, how many follow it.
+_OF_BEND, _ON_BOUNDARY, _FOLLOW = 0.5, 1.4, 30.0
+_TRIANGLE = 0.43
+# Elements on an inclusion, in its smallest semi-axis, and in a layer, in its thickness (mesh/regions.py); and so many
+# times more than their sizes tell, since faces of elements lie where materials meet.
+_ON_INCLUSION, _IN_LAYER, _MEETING = 0.4, 0.5, 1.75
 
 
 def cells(case: Case) -> float:
@@ -26,6 +37,7 @@ def cells(case: Case) -> float:
     total = length * pi * (1 / rim - 1 / mesh.fine) ** 2 * rim / (2 * growth**2) if rim < mesh.fine else 0.0
     # Below an area in which contact may end: ∫ 1 / (rim + growth s)³ ds.
     total += area / (2 * growth * rim**2)
+    total += _of_bend(case) + _of_regions(case)
     epsilon = min(mesh.epsilon, (3 * body.volume / (2 * pi)) ** (1 / 3))
     if case.is_full or mesh.epsilon == inf:
         return (total + body.volume / mesh.fine**3) / _TETRAHEDRON
@@ -45,6 +57,39 @@ def cells(case: Case) -> float:
     return total / _TETRAHEDRON
 
 
+def _of_bend(case: Case) -> float:
+    """Return what sides that are not plane ask for, in cubes of the size, far from the contact."""
+    body, far = case.body, _OF_BEND * case.body.bend
+    if case.column < inf or far == inf:
+        return 0.0
+    triangles = 6 * body.volume ** (2 / 3) / (_TRIANGLE * far**2)
+    return body.volume / far**3 + _TETRAHEDRON * (_ON_BOUNDARY * triangles + _FOLLOW * body.curvature / far)
+
+
+def _of_regions(case: Case) -> float:
+    """Return what layers and inclusions ask for, in cubes of the size."""
+    body, growth = case.body, case.mesh.growth
+    # Both sides of an inclusion's surface: ∫ 1 / (0.4 least + growth s)³ ds.
+    total = sum(_area(one.surface.axes) / (growth * (_ON_INCLUSION * min(one.surface.axes)) ** 2)
+                for one in body.inclusion)  # fmt: skip
+    top = body.heights[1]
+    high = top
+    for low in body.interfaces:
+        size, radius = _IN_LAYER * (high - low), case.probe.circumradius + top - low
+        if size < case.mesh.fine:
+            within = pi * radius**2 * (high - low) / size**3
+            beside, below = (ring / (2 * growth * size**2) for ring in (2 * pi * radius * (high - low), pi * radius**2))
+            total += within + beside + below
+        high = low
+    return _MEETING * total
+
+
+def _area(axes: tuple[float, float, float]) -> float:
+    """Return the area (m²) of an ellipsoid to a per cent (K. Thomsen)."""
+    a, b, c = (axis**1.6 for axis in axes)
+    return float(4 * pi * ((a * b + a * c + b * c) / 3) ** (1 / 1.6))
+
+
 def dofs(count: float, degree: int) -> float:
     """Estimate the unknowns on ``count`` tetrahedra."""
     return _DOFS_PER_CELL[degree] * count
@@ -58,10 +103,17 @@ def solving_memory(dofs: float, degree: int, *, direct: bool, parts: bool = Fals
     return _BASE + per_dof * growth * dofs
 
 
-def enriched_memory(dofs: float, degree: int, *, parts: bool = False) -> float:
+def enriched_memory(dofs: float, degree: int, *, mixed: bool = False, parts: bool = False) -> float:
     """Estimate the bytes that an error bar takes: a solve of one degree more than that of ``dofs`` unknowns."""
-    growth = _DOFS_PER_CELL[degree + 1] / _DOFS_PER_CELL[degree]
+    growth = _DOFS_PER_CELL[degree + 1] / _DOFS_PER_CELL[degree] * (_MIXED_BAR if mixed else 1.0)
     return solving_memory(growth * dofs, degree + 1, direct=False, parts=parts)
+
+
+def peak_memory(case: Case, share: float = 1.0) -> float:
+    """Estimate the bytes that a case takes with its error bar, within a factor of 1.5; see :func:`case_memory`."""
+    degree, mixed = case.mesh.degree, case.element == "mixed"
+    enriched = enriched_memory(dofs(share * cells(case), degree), degree, mixed=mixed)
+    return _LOADED + max(case_memory(case, share), enriched)
 
 
 def case_memory(case: Case, share: float = 1.0) -> float:

@@ -184,13 +184,13 @@ class StepRunner:
         case, degree = solve.case, solve.case.mesh.degree
         direct = is_direct(case.solve.method, problem.dofs, degree)
         check_memory(self._free, estimate.solving_memory(problem.dofs, degree, direct=direct), "solving")
-        missing = self._lacks_room(bar, problem.dofs, degree)
+        missing = self._lacks_room(bar, problem.dofs, degree, case.element)
         estimate_it = bar is not Bar.NONE and not missing
         solution = solve_problem(case, problem, estimate=estimate_it, meshed=solve.ground)
         record = record_of(solve, solution, ground.seconds)
         return replace(self._stamp(record, ground.memory), message=missing)
 
-    def _lacks_room(self, bar: Bar, dofs: int, degree: int) -> str:
+    def _lacks_room(self, bar: Bar, dofs: int, degree: int, element: str) -> str:
         """Return what to say if there is no memory for an error bar that may be left out; collective.
 
         Raises:
@@ -198,7 +198,7 @@ class StepRunner:
         """
         if bar is Bar.NONE:
             return ""
-        needed = estimate.enriched_memory(dofs, degree)
+        needed = estimate.enriched_memory(dofs, degree, mixed=element == "mixed")
         if bar is Bar.NEEDED:
             check_memory(self._free, needed, "the error bar that proves the accuracy")
         return lacks_memory(self._free, needed, "the error bar")

@@ -149,6 +149,11 @@ class Body(Section, ABC):
     def bend(self) -> float:
         """Radius (m) of the roundest of its sides, which elements must resolve; infinite if all are flat."""
 
+    @property
+    def curvature(self) -> float:
+        """Integral (m) of the mean curvature over its surface, twice, as far as ``bend`` does not tell of it."""
+        return 0.0
+
     @abstractmethod
     def outline(self) -> list[FloatArray]:
         """Return its edges as lines of points (n, 3), in m, for pictures."""

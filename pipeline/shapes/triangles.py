@@ -38,6 +38,17 @@ class Triangles:
         return float(np.linalg.norm(doubled_normals(self.points, self.facets), axis=1).sum()) / 2
 
     @cached_property
+    def curvature(self) -> float:
+        """Integral (m) of the mean curvature over it, twice: by how much facets turn at each edge, times its length."""
+        pairs = np.sort(np.stack([self.facets, np.roll(self.facets, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+        order = np.lexsort((pairs[:, 1], pairs[:, 0]))
+        start, end = self.points[pairs[order[::2]].T]
+        normals = doubled_normals(self.points, self.facets)
+        one, other = normals[(order // 3).reshape(-1, 2).T]
+        turn = np.arctan2(np.linalg.norm(np.cross(one, other), axis=1), (one * other).sum(axis=1))
+        return float((turn * np.linalg.norm(end - start, axis=1)).sum())
+
+    @cached_property
     def bounds(self) -> tuple[Vector, Vector]:
         """Lowest and highest coordinates (m)."""
         low, high = self.points.min(axis=0).tolist(), self.points.max(axis=0).tolist()

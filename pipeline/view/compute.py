@@ -78,7 +78,8 @@ def _attempt(
     with Spaces(mesh) as spaces, problem_of(spaces, case, shared=False) as problem:
         direct = is_direct(case.solve.method, problem.dofs, degree)
         check_memory(FreeMemory(comm), estimate.solving_memory(problem.dofs, degree, direct=direct), "solving")
-        room = bar and not lacks_memory(FreeMemory(comm), estimate.enriched_memory(problem.dofs, degree), "")
+        needed = estimate.enriched_memory(problem.dofs, degree, mixed=case.element == "mixed")
+        room = bar and not lacks_memory(FreeMemory(comm), needed, "")
         note(f"solving for {problem.dofs} unknowns")
         solution = solve_problem(case, problem, estimate=room or solve.goal is not None)
         points = comm.bcast(len(arrays.points) if arrays is not None else 0)

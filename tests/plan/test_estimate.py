@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+from pipeline.mesh.of_case import mesh_arrays
 from pipeline.plan import estimate
 from tests.cases import BLADE, solve, study
 
@@ -23,6 +24,18 @@ def test_cells(name, probe):
     changes = {"mesh": MESHES[name] | {"degree": 1, "model": "3d"}} | ({"probe": BLADE} if probe == "blade" else {})
     (record,) = solve(**changes).values()
     assert 0.5 < estimate.cells(study(**changes).case(())) / record.cells < 2.0
+
+
+ORGAN = {"shape": "surface", "file": "meshes/kidney.obj", "unit": "mm", "fixed": {"below": "-10 mm"}}
+BALL = {"name": "ball", "at": ["0 mm", "0 mm", "-6 mm"], "radius": "3 mm", "young": "9 kPa", "poisson": 0.3}
+LAYER = {"name": "skin", "thickness": "1 mm", "young": "60 kPa", "poisson": 0.45}
+
+
+@pytest.mark.parametrize("body", [ORGAN, {"inclusion": [BALL]}, {"layers": [LAYER]}], ids=["organ", "tumour", "skin"])
+def test_cells_that_a_surface_and_regions_ask_for(body):
+    sizes = {"fine": "15 mm", "coarse": "15 mm", "growth": 0.5}
+    case = study(body=body, probe={"at": ["0 mm", "0 mm"]}, mesh=sizes).case(())
+    assert 0.55 < estimate.cells(case) / len(mesh_arrays(case, ()).cells) < 1.6
 
 
 @pytest.mark.parametrize("method", ["direct", "iterative"])

@@ -10,6 +10,7 @@ from pipeline.plan.key import case_key, mesh_key
 from pipeline.shapes.bodies.surface import FromSurface
 from pipeline.shapes.frame import PlaceError
 from pipeline.shapes.skin import Skin
+from pipeline.shapes.triangles import Triangles
 from pipeline.study.problems import StudyError
 from tests.cases import study
 from tests.organs import AXES, box, ellipsoid, sphere, write_stl
@@ -43,6 +44,11 @@ def test_sizes_are_those_of_the_file(a_body):
     assert a_body.volume == pytest.approx(4 / 3 * pi * AXES.prod(), rel=5e-3)
     assert a_body.extent == pytest.approx(120e-3, rel=2e-3)
     assert a_body.heights == pytest.approx((-30e-3, 30e-3), rel=2e-3)
+
+
+def test_curvature_of_a_ball_is_that_of_its_radius():
+    points, facets = sphere(16)
+    assert Triangles(3e-3 * points, facets).curvature == pytest.approx(8 * pi * 3e-3, rel=0.01)
 
 
 @pytest.mark.parametrize("at", [(10e-3, -8e-3), (-20e-3, 5e-3), (30e-3, 20e-3)])

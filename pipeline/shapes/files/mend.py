@@ -3,7 +3,6 @@
 from pipeline.shapes.arrays import FloatArray, IntArray, np
 from pipeline.shapes.files.edges import Edges
 from pipeline.shapes.files.weld import weld
-from pipeline.shapes.triangles import doubled_normals
 
 # Points of open edges that are nearer to each other than this share of the extent are one: a file's numbers have six
 # digits or so.
@@ -91,8 +90,10 @@ def without_flats(points: FloatArray, facets: IntArray) -> tuple[IntArray, list[
 
 def flats(points: FloatArray, facets: IntArray) -> IntArray:
     """Return the facets without area."""
-    longest = _lengths(points, facets).max(axis=1)
-    (found,) = np.nonzero(np.linalg.norm(doubled_normals(points, facets), axis=1) <= FLAT * longest**2)
+    a, b, c = (points[facets[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    longest = np.max([np.einsum("ij,ij->i", edge, edge) for edge in (b - a, c - b, a - c)], axis=0)
+    (found,) = np.nonzero(np.einsum("ij,ij->i", normal, normal) <= (FLAT * longest) ** 2)
     return found
 
 
