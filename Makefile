@@ -84,8 +84,8 @@ plain-loop: setup ## a study as a plain FEniCSx script runs it, against this pro
 	$(PYTHON) -m benchmarks.plain_loop $(STUDY) $(LOOP_ARGS)
 
 realtime: setup ## the real-time evaluator: a shared library, and its tests in C, C++, Python and under sanitizers
-	$(CC) -std=c99 -O2 -Wall -Wextra -pedantic -fPIC -shared realtime/epsmesh.c -o realtime/libepsmesh.so -lm
-	$(CC) -std=c99 -O2 -Wall -Wextra -pedantic realtime/epsmesh.c realtime/latency.c -o realtime/latency -lm
+	$(CC) -std=c99 -O2 -Wall -Wextra -pedantic -fPIC -shared realtime/epsmesh_patch.c -o realtime/libepsmesh.so -lm
+	$(CC) -std=c99 -O2 -Wall -Wextra -pedantic realtime/epsmesh_patch.c realtime/latency.c -o realtime/latency -lm
 	$(PYTHON) -m pytest tests/realtime $(PYTEST_ARGS)
 
 resolution: setup ## what a file's resolution, noise and voxels change of F (a quarter of an hour): results/resolution.png

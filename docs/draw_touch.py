@@ -1,6 +1,6 @@
 """The picture of the page of a real-time model: ``python docs/draw_touch.py MODEL``, with Chromium.
 
-``MODEL`` is what ``epsmesh export docs/scenes/cylinder.toml`` or another study gave.
+``MODEL`` is what ``epsmesh export`` gives of a box of 80 × 60 × 40 mm, E = 10 kPa, ν = 0.45.
 """
 
 import json
@@ -13,8 +13,8 @@ from pipeline.touch.page import write_touch_page
 from tests.report.browser import Browser
 
 PICTURE = Path(__file__).parent / "figures" / "touch.png"
-# What the hand does: a ball beside the middle, two millimetres deep.
-ASKED = {"tool": "sphere", "x": 10, "y": -9, "radius": 6, "depth": 2.2}
+# What the hand does: a ball beside the middle, two millimetres deep, near a corner.
+ASKED = {"tool": "sphere", "x": 22, "y": -12, "radius": 7, "depth": 2.2}
 _WAIT = "new Promise(done => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(done)), 500))"
 
 

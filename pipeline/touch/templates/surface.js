@@ -15,6 +15,13 @@ class Surface {
     this.regular = new Float64Array(3 * SEEN.MOST);
     this.moved = new Float64Array(3 * SEEN.MOST);
     for (let a = 0; a < this.n; a++) for (let i = 0; i < 3; i++) this.rest[3 * a + i] = points[i * this.n + a];
+    this.spans = Float64Array.from({ length: this.m }, (_, t) => this.spanOf(t));
+  }
+  // The longest edge of a triangle.
+  spanOf(t) {
+    const corners = [0, 1, 2].map((j) => 3 * this.triangles[j * this.m + t]);
+    const edge = (p, q) => Math.hypot(...[0, 1, 2].map((i) => this.rest[p + i] - this.rest[q + i]));
+    return Math.max(...corners.map((p, j) => edge(p, corners[(j + 1) % 3])));
   }
   amountsAt(x, y, poisson, square) {
     const [rank, counts, rows, columns] = this.shape;
@@ -57,37 +64,46 @@ class Surface {
     this.far(x, y, poisson, square);
     const near = { ...query, poisson, x, y, a, force, square, plane: 1 / (1 - poisson ** 2) };
     const { triangles, count } = refine ? this.refined(x, y, a) : { triangles: null, count: n };
-    for (let v = 0; v < count; v++) this.move(v, near);
-    for (let v = 0; v < 3 * count; v++) if (!Number.isFinite(moved[v] + regular[v])) moved[v] = 0;
+    this.move(count, near);
     return triangles;
   }
-  move(v, { tool, x, y, a, force, square, plane, poisson, depth, radius, angle }) {
+  // Move the first `count` vertices; no arrays are made within.
+  move(count, { tool, x, y, a, force, square, plane, poisson, depth, radius, angle }) {
     const { rest, moved, regular, model } = this;
-    const [fx, fy, fz] = [rest[3 * v] - x, rest[3 * v + 1] - y, rest[3 * v + 2]];
     const soft = 1 - 2 * poisson;
-    let [aside, down] = [0, 0];
-    if (Math.abs(fz) <= SEEN.FACE * model.thickness) {
-      const rho = Math.max(Math.hypot(fx, fy), SEEN.AXIS * a);
-      const [sunk, share] = onFace(tool, rho, a, plane);
-      aside = ((-soft * (1 + poisson)) / (2 * Math.PI)) * (share / rho ** 2);
-      moved[3 * v + 2] = force * (regular[3 * v + 2] - sunk);
-      if (rho <= a) moved[3 * v + 2] = rise(tool, rho, radius, angle) - depth;
-    } else {
-      const under = Math.max(-fz, 0);
+    const unit = (1 + poisson) / (2 * Math.PI);
+    const onFace = SUNK[tool](a, plane);
+    const least = SEEN.AXIS * a;
+    const flatness = SEEN.FACE * model.thickness;
+    for (let v = 0; v < 3 * count; v += 3) {
+      const fx = rest[v] - x;
+      const fy = rest[v + 1] - y;
+      const fz = rest[v + 2];
       const flat = fx * fx + fy * fy;
-      const one = 1 / Math.sqrt(Math.max(flat + under ** 2, square));
-      const third = one ** 3;
-      const fifth = third * one ** 2;
-      const bend = 15 * flat * one ** 2;
-      const unit = (1 + poisson) / (2 * Math.PI);
-      aside = under * third - (soft * one) / (1 / one + under);
-      aside = unit * (aside + (square / 4) * fifth * under * (bend - 12 + 3 * soft));
-      down = under ** 2 * third + (1 + soft) * one;
-      down += (square / 4) * (under ** 2 * fifth * (bend - 6) + (1 + soft) * third * (1 - 3 * under ** 2 * one ** 2));
-      moved[3 * v + 2] = force * (regular[3 * v + 2] - unit * down);
+      let aside = 0;
+      if (Math.abs(fz) <= flatness) {
+        const rho = Math.max(Math.sqrt(flat), least);
+        const near = Math.min(rho / a, 1);
+        aside = (-soft * unit * WITHIN[tool](near, Math.sqrt(1 - near * near))) / (rho * rho);
+        if (rho <= a) moved[v + 2] = rise(tool, rho, radius, angle) - depth;
+        else moved[v + 2] = force * (regular[v + 2] - onFace(rho));
+      } else {
+        const under = Math.max(-fz, 0);
+        const one = 1 / Math.sqrt(Math.max(flat + under * under, square));
+        const third = one * one * one;
+        const fifth = third * one * one;
+        const bend = 15 * flat * one * one;
+        const quarter = square / 4;
+        aside = under * third - (soft * one) / (1 / one + under);
+        aside = unit * (aside + quarter * fifth * under * (bend - 12 + 3 * soft));
+        let down = under * under * third + (1 + soft) * one;
+        const turned = 1 - 3 * under * under * one * one;
+        down += quarter * (under * under * fifth * (bend - 6) + (1 + soft) * third * turned);
+        moved[v + 2] = force * (regular[v + 2] - unit * down);
+      }
+      moved[v] = force * (aside * fx + regular[v]);
+      moved[v + 1] = force * (aside * fy + regular[v + 1]);
     }
-    moved[3 * v] = force * (aside * fx + regular[3 * v]);
-    moved[3 * v + 1] = force * (aside * fy + regular[3 * v + 1]);
   }
   // Halve edges by their own length and place alone, so that neighbours agree.
   refined(x, y, a) {
@@ -110,8 +126,13 @@ class Surface {
       return found;
     };
     let now = [];
-    for (let t = 0; t < m; t++) now.push(this.triangles[t], this.triangles[m + t], this.triangles[2 * m + t]);
     const done = [];
+    for (let t = 0; t < m; t++) {
+      const [p, q, r] = [this.triangles[t], this.triangles[m + t], this.triangles[2 * m + t]];
+      // No edge of a triangle so far away is halved.
+      const away = Math.hypot(rest[3 * p] - x, rest[3 * p + 1] - y, rest[3 * p + 2]) - a - this.spans[t];
+      (this.spans[t] > 0.5 * away ? now : done).push(p, q, r);
+    }
     for (let level = 0; level < SEEN.LEVELS && now.length; level++) {
       const next = [];
       for (let t = 0; t < now.length; t += 3) {
@@ -135,16 +156,25 @@ class Surface {
   }
 }
 
-function onFace(tool, rho, a, plane) {
-  const [far, near] = [Math.max(rho, a), Math.min(rho / a, 1)];
-  const [angle, beside, left] = [Math.asin(a / far), Math.sqrt(far ** 2 - a ** 2), Math.sqrt(1 - near ** 2)];
-  if (tool === "disc") return [angle / (Math.PI * plane * a), 1 - left];
-  if (tool === "sphere") {
-    return [(0.75 / (Math.PI * plane * a ** 3)) * ((2 * a ** 2 - far ** 2) * angle + a * beside), 1 - left ** 3];
-  }
-  const sunk = (2 / (Math.PI * plane * a ** 2)) * (a * angle - a ** 2 / (far + beside));
-  return [sunk, 1 - left + near ** 2 * Math.acosh(1 / near)];
-}
+// w/F on the face of a half-space, beyond the contact.
+const SUNK = {
+  disc: (a, plane) => (rho) => Math.asin(a / rho) / (Math.PI * plane * a),
+  sphere: (a, plane) => (rho) => {
+    const beside = Math.sqrt(rho * rho - a * a);
+    return (0.75 / (Math.PI * plane * a ** 3)) * ((2 * a * a - rho * rho) * Math.asin(a / rho) + a * beside);
+  },
+  cone: (a, plane) => (rho) => {
+    const beside = Math.sqrt(rho * rho - a * a);
+    return (2 / (Math.PI * plane * a * a)) * (a * Math.asin(a / rho) - (a * a) / (rho + beside));
+  },
+};
+
+// P(ρ)/F at ρ = near·a, left = (1 - near²)^½.
+const WITHIN = {
+  disc: (near, left) => 1 - left,
+  sphere: (near, left) => 1 - left ** 3,
+  cone: (near, left) => 1 - left + near * near * Math.acosh(1 / near),
+};
 
 function rise(tool, rho, radius, angle) {
   if (tool === "disc") return 0;

@@ -1,0 +1,40 @@
+/* Any convex tip on a model of epsmesh.h, as pipeline/realtime/patch.py has it: C99, no allocation, locks, input, output.
+ *
+ * Build epsmesh_patch.c instead of epsmesh.c, which it holds. A patch is plain memory of about 150 kB; it begins where
+ * its last call ended: one for each tool and thread.
+ */
+#ifndef EPSMESH_PATCH_H
+#define EPSMESH_PATCH_H
+
+#include "epsmesh.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { EPSMESH_SIDE = 11, EPSMESH_CELLS = EPSMESH_SIDE * EPSMESH_SIDE, EPSMESH_DEPTHS = 40, EPSMESH_TOLD = 4 };
+
+/* Return how far (m) a convex tip is above its lowest point, which is at x = y = 0 (m, along the tip's own axes). */
+typedef double (*epsmesh_height)(double x, double y, void *user);
+
+typedef struct {
+    epsmesh_height height;
+    void *user;
+    double reach, depths[EPSMESH_DEPTHS], outlines[EPSMESH_DEPTHS][2], fills[EPSMESH_TOLD][2];
+    double aspect, kernel[2 * EPSMESH_SIDE - 1][2 * EPSMESH_SIDE - 1];
+    double matrix[EPSMESH_CELLS][EPSMESH_CELLS];
+    unsigned char pressed[EPSMESH_CELLS];
+    int is_made;
+} epsmesh_patch;
+
+/* Make the patch of a tip up to a `reach` (m): EPSMESH_OK, or EPSMESH_INPUT if it is no convex tip. */
+epsmesh_status epsmesh_patch_make(epsmesh_patch *patch, epsmesh_height height, void *user, double reach);
+
+/* Answer a query, whose shape and sizes do not count, for the tip turned by `turn` (rad) from the face's x to its y. */
+epsmesh_touch epsmesh_patch_touch(epsmesh_patch *patch, const epsmesh_model *model, const epsmesh_query *query,
+                                  double turn);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
