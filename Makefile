@@ -6,6 +6,7 @@ STUDY ?= studies/figure3.toml
 NP ?= 1
 PYTEST_ARGS ?=
 PEERS_ARGS ?=
+FUZZ ?= 5000
 LOOP_ARGS ?=
 SOAK_ARGS ?=
 FAULTS_ARGS ?=
@@ -28,7 +29,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's own mpirun: another one on PATH would not fit Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies docs test test-debian13 slurm-test verify benchmark peers plain-loop realtime resolution stress soak faults mutants lint format clean
+.PHONY: help setup study studies docs test test-debian13 slurm-test verify benchmark peers plain-loop realtime resolution stress fuzz soak faults mutants lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -93,6 +94,9 @@ resolution: setup ## what a file's resolution, noise and voxels change of F (a q
 
 stress: setup ## numerical stability: a matrix of extremes (10 minutes)
 	$(EPSMESH) stress
+
+fuzz: setup ## eight thousand study files, and damaged surfaces, datasets, stores and models (half an hour)
+	EPSMESH_FUZZ=$(FUZZ) $(MPI_ENV) $(PYTHON) -m pytest tests/fuzz -q $(PYTEST_ARGS)
 
 soak: setup ## 20,000 cases on 2,000 meshes in one run: memory and pace stay flat (half an hour; SOAK_ARGS=2000: a part)
 	$(MPI_ENV) $(PYTHON) -m benchmarks.soak $(SOAK_ARGS)

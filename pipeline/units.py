@@ -61,6 +61,9 @@ _PURE = {"": ("%", "percent"), "rad": ("deg", "degree", "°", "rad", "radian")}
 # Twelve digits: "3 mm" and "0.3 cm" must be one number wherever two cases are compared.
 _DIGITS = 12
 
+# Characters of a quantity; what is longer is none.
+_LONGEST = 80
+
 # What is written as something else by a keyboard, a word processor or a table that it was copied from.
 _SPELLINGS = str.maketrans({"\N{MINUS SIGN}": "-", "\N{GREEK SMALL LETTER MU}": "\N{MICRO SIGN}", "²": "^2", "³": "^3",
                             "·": "*", "⋅": "*", "\N{NO-BREAK SPACE}": " ", "\N{NARROW NO-BREAK SPACE}": " ",
@@ -98,6 +101,8 @@ def parse_quantity(text: Any, unit: str) -> float:
     """
     if not isinstance(text, str):
         raise _refusal(unit, "")
+    if len(text) > _LONGEST:
+        raise _refusal(unit, f"it has {len(text)} characters")
     plain = text.translate(_SPELLINGS).strip()
     if comma := _COMMA.match(plain):
         whole, fraction = comma.group().split(",")

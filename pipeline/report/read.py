@@ -36,8 +36,9 @@ def read(file: str | Path, output: str | Path = "results") -> xr.Dataset:
     path = dataset_path(file, output)
     try:
         dataset = xr.load_dataset(path)
-    except (OSError, ValueError) as error:
-        raise DatasetError(f"{path}: cannot be read as netCDF: {str(error).splitlines()[0]}") from None
+    except Exception as error:  # of a damaged file the libraries raise many kinds
+        why = next(iter(str(error).splitlines()), type(error).__name__)
+        raise DatasetError(f"{path}: cannot be read as netCDF: {why}") from None
     if missing := [name for name in _NEEDED if name not in {*dataset.data_vars, *dataset.attrs}]:
         raise DatasetError(f"{path}: not a study's dataset: it has no {', '.join(missing)}")
     return dataset

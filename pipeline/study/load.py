@@ -1,8 +1,9 @@
 """Read a study file: TOML to checked sections and axes, or every problem at once."""
 
 import itertools
-import tomllib
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +15,16 @@ from pipeline.study.check import check_sense
 from pipeline.study.check_loads import check_loads
 from pipeline.study.loads import Load
 from pipeline.study.path import Way, read_path
-from pipeline.study.problems import Problem, Problems, StudyError, nearest, nested_model
+from pipeline.study.problems import Problems, StudyError, nearest, nested_model
+from pipeline.study.read import check_text, read
 from pipeline.study.regions import check_regions, material_without_section
 from pipeline.study.schema import NESTED, SECTIONS, SINGLE, Mesh
 from pipeline.study.sweep import Axis, Study
 
-# A label needs its section's axes only; more combinations than this in one section is a slip of the pen.
-_MOST_VARIANTS = 1_000_000
+# More values in a list, or more cases of a study, are a slip of the pen, or work for several studies: every case is
+# planned and reported, each in a few hundred bytes and a tenth of a millisecond.
+_MOST_VALUES = 10_000
+_MOST_CASES = 200_000
 
 
 # Where a value stands within a section: keys, and numbers in arrays of tables, from 0.
@@ -33,16 +37,7 @@ def load(path: str | Path) -> Study:
     Raises:
         StudyError: with every problem of the file: key, value found, what is allowed.
     """
-    path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8-sig")  # some editors begin a file with the mark of its encoding
-        raw = tomllib.loads(text)
-    except OSError as error:
-        raise StudyError(str(path), [Problem("file", None, error.strerror or str(error))]) from None
-    except UnicodeDecodeError as error:
-        raise StudyError(str(path), [Problem("file", None, f"is not UTF-8 text: {error}")]) from None
-    except tomllib.TOMLDecodeError as error:
-        raise StudyError(str(path), [Problem("TOML syntax", None, str(error))]) from None
+    text, raw = read(Path(path))
     return parse(raw, file=str(path), text=text)
 
 
@@ -57,6 +52,10 @@ def parse(raw: dict[str, Any], *, file: str = "study", text: str = "") -> Study:
         own_axes, variants = _read_section(name, raw.get(name, {}), problems)
         axes += own_axes
         sections[name] = variants
+    cases = prod(map(len, axes))
+    if not problems.errors and cases > _MOST_CASES:
+        sweeps = " × ".join(f"{len(axis)} {axis.name}" for axis in axes)
+        problems.error("study", None, f"has {cases} cases ({sweeps}): at most {_MOST_CASES}; make several of it")
     if not problems.errors:
         check_regions(sections, tuple(axes), problems)
     if not problems.errors:
@@ -98,10 +97,13 @@ def _check_top(raw: dict[str, Any], problems: Problems) -> None:
             problems.error(key, None, f"unknown section; {nearest(key, [*SECTIONS, 'title'])}")
         elif key == "title" and not isinstance(value, str):
             problems.error(key, value, "must be text")
+        elif key == "title":
+            check_text(key, value, problems)
     bodies = raw.get("body")
-    layered = any("layers" in table for table in (bodies if isinstance(bodies, list) else [bodies]) if table)
+    tables = bodies if isinstance(bodies, list) else [bodies]
+    layered = any("layers" in table for table in tables if isinstance(table, dict))
     for name in ("body", *(() if layered else ("material",)), "probe", "mesh"):
-        if name not in raw:
+        if name not in raw or raw[name] == {}:
             problems.error(f"[{name}]", None, "this section is required")
     meshes = raw.get("mesh")
     for table in meshes if isinstance(meshes, list) else [meshes]:
@@ -163,7 +165,12 @@ def _read_tables(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], t
     for place, values in swept.items():
         if not values:
             problems.error(f"{name}.{written(place)}", values, "an empty list sweeps nothing; give at least one value")
-    if not all(swept.values()):
+        elif len(values) > _MOST_VALUES and place != ("at",):  # places are those of a path, which has its own limit
+            problems.error(f"{name}.{written(place)}", None, f"has {len(values)} values: at most {_MOST_VALUES}")
+    if not all(0 < len(values) <= _MOST_VALUES or place == ("at",) for place, values in swept.items()):
+        return [], ()
+    if prod(map(len, swept.values())) > _MOST_CASES:
+        problems.error(name, None, f"sweeps more than {_MOST_CASES} combinations")
         return [], ()
     singles = _validate_each(name, model, raw, swept, problems)
     if singles is None:
@@ -172,10 +179,7 @@ def _read_tables(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], t
         _axis(name, place, values, parsed, problems)
         for (place, values), parsed in zip(swept.items(), singles, strict=True)
     ]
-    combinations = list(itertools.islice(itertools.product(*swept.values()), _MOST_VARIANTS + 1))
-    if len(combinations) > _MOST_VARIANTS:
-        problems.error(name, None, f"sweeps more than {_MOST_VARIANTS} combinations")
-        return [], ()
+    combinations = itertools.product(*swept.values())
     variants = [_validate(model, _placed(raw, zip(swept, values, strict=True))) for values in combinations]
     return axes, tuple(variants)
 
@@ -187,6 +191,8 @@ def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[
     """
     variants: list[list[Section]] = []
     shared = _shared_sweeps(name, tables)
+    if not _is_sane(name, tables, shared, problems):
+        return [], ()
     for position, table in enumerate(tables, start=1):
         where = f"{name}[{position}]"
         if not isinstance(table, dict):
@@ -204,13 +210,15 @@ def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[
                     "value, or the same list in all tables",
                 )  # fmt: skip
         try:
-            combinations = itertools.islice(itertools.product(*shared.values()), _MOST_VARIANTS)
+            combinations = itertools.product(*shared.values())
             placed = [_placed(table, zip(shared, values, strict=True)) for values in combinations]
             variants.append([_validate(model, variant) for variant in placed])
         except ValidationError as error:
             problems.from_pydantic(where, error, model, table)
+    if len(variants) < len(tables):
+        return [], ()  # what is wrong with the others is reported
     names = [first.name for first, *_ in variants]
-    for label in sorted({n for n in names if names.count(n) > 1 and n}):
+    for label in sorted(name for name, count in Counter(names).items() if count > 1 and name):
         problems.error(
             f"{name}.name", label, "is the name of more than one table; names label the sweep and must differ"
         )
@@ -222,6 +230,19 @@ def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[
             parsed = [_validate(kind, _placed(table, [(place, value)])) for value in values]
             axes.append(_axis(name, place, values, parsed, problems))
     return axes, tuple(itertools.chain.from_iterable(variants))
+
+
+def _is_sane(name: str, tables: list[Any], shared: dict[Place, list[Any]], problems: Problems) -> bool:
+    """Tell whether there are tables, and no more of them and their sweeps than can be gone through."""
+    if not tables:
+        problems.error(name, tables, f"an empty list sweeps nothing; write [[{name}]] for each value")
+    elif len(tables) > _MOST_VALUES:
+        problems.error(name, None, f"has {len(tables)} tables: at most {_MOST_VALUES}")
+    elif len(tables) * prod(map(len, shared.values())) > _MOST_CASES:
+        problems.error(name, None, f"sweeps more than {_MOST_CASES} combinations")
+    else:
+        return True
+    return False
 
 
 def _shared_sweeps(name: str, tables: list[Any]) -> dict[Place, list[Any]]:
@@ -343,8 +364,8 @@ def _axis(section: str, place: Place, raw: list[Any], parsed: list[Section], pro
         labels = [_labelled(value) if isinstance(value, dict) else value for value in raw]
     else:
         labels = values
-    for label in dict.fromkeys(labels):
-        if labels.count(label) > 1:
+    for label, count in Counter(labels).items():
+        if count > 1:
             problems.error(f"{section}.{written(place)}", raw[labels.index(label)], "stands more than once in the list")
     if unit == "" and all(isinstance(label, float | int) for label in labels):
         unit = "1"

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise, product
-from math import cos, dist, pi, sin
+from math import cos, dist, pi, prod, sin
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, ValidationError
@@ -15,7 +15,7 @@ from pipeline.units import Coordinate, Length, canonical
 
 # Digits behind the point of a metre: what is less is rounding of sines and of shares of a line.
 _DIGITS = 12
-_MOST = 100_000  # places; more is a slip of the pen
+_MOST = 20_000  # places; more is a slip of the pen
 
 Point = tuple[float, ...]
 
@@ -147,6 +147,11 @@ def read_path(raw: Any, where: str, problems: Problems) -> Way | None:
     except ValidationError as error:
         _report(error, raw, where, problems)
         return None
+    if path.raster is not None:
+        count = prod(v.steps if isinstance(v, Range) else len(v) for v in (path.raster.x, path.raster.y))
+        if count > _MOST:
+            problems.error(f"{where}.{form}", None, f"has {count} places: at most {_MOST} are allowed")
+            return None
     way = _way_of(path, form)
     _check(way, raw[form], f"{where}.{form}", problems)
     return None if len(problems.errors) > before else way

@@ -2,11 +2,17 @@
 
 import difflib
 import json
+import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
+
+# Letters of a value, or of a key, that a message repeats.
+_QUOTED = 200
+# Problems of one table beyond these are counted only.
+_MOST_ERRORS = 50
 
 
 @dataclass(frozen=True)
@@ -18,8 +24,8 @@ class Problem:
     allowed: str
 
     def __str__(self) -> str:
-        found = "" if self.found is None else f" = {_toml(self.found)}"
-        return f"{self.key}{found}: {self.allowed}"
+        found = "" if self.found is None else f" = {shortened(_toml(self.found))}"
+        return visible(f"{shortened(self.key)}{found}: {self.allowed}")
 
 
 class StudyError(Exception):
@@ -48,8 +54,11 @@ class Problems:
 
     def from_pydantic(self, prefix: str, error: ValidationError, model: type[BaseModel], raw: dict[str, Any]) -> None:
         """Translate pydantic's errors of the section ``prefix``, read from ``raw``, for the study's author."""
-        for item in error.errors():
+        found = error.errors(include_url=False, include_context=True, include_input=False)
+        for item in found[:_MOST_ERRORS]:
             self._from_item(prefix, item, item["loc"], model, raw)
+        if len(found) > _MOST_ERRORS:
+            self.error(prefix, None, f"… and {len(found) - _MOST_ERRORS} more")
 
     def _from_item(self, where: str, item: Any, place: tuple[Any, ...], model: type[BaseModel], raw: Any) -> None:
         """Translate an error at a ``place`` within the table ``raw``, or within one of its own arrays of tables."""
@@ -123,6 +132,19 @@ class _Raw(str):
 
 def _hashable(value: Any) -> Any:
     return value if value is None or isinstance(value, str | int | float | bool) else _Raw(_toml(value))
+
+
+def shortened(text: str) -> str:
+    """Return a text of the file as a message quotes it: its beginning, if it is long."""
+    return text if len(text) <= _QUOTED else f"{text[:_QUOTED]}…"
+
+
+def visible(text: str) -> str:
+    """Return ``text`` with what one cannot see written out: it could move the cursor, or hide what is written."""
+    return "".join(
+        letter if letter.isprintable() or unicodedata.category(letter) == "Zs" else
+        letter.encode("unicode_escape").decode() for letter in text
+    )  # fmt: skip
 
 
 def _toml(value: Any) -> str:

@@ -5,8 +5,8 @@ import re
 from pipeline.shapes.arrays import FloatArray, np
 from pipeline.shapes.triangles import SurfaceError
 
-_ENTITY = re.compile(r"#(\d+)\s*=\s*((?:'(?:[^']|'')*'|[^';])*);")
-_REFERENCE = re.compile(r"#(\d+)")
+_ENTITY = re.compile(r"#(\d{1,18})\s*=\s*((?:'(?:[^']|'')*'|[^';])*);")
+_REFERENCE = re.compile(r"#(\d{1,18})")
 _NAME = re.compile(r"ADVANCED_FACE\s*\(\s*'((?:[^']|'')*)'")
 _PREFIXES = {"$": "m", ".CENTI.": "cm", ".MILLI.": "mm", ".MICRO.": "um"}
 # What programs write for faces that have no name.
@@ -65,7 +65,10 @@ def _vertices(entities: Entities, face: int) -> FloatArray:
         content = entities.get(left.pop(), "")
         kind = content.split("(")[0].strip()
         if kind == "CARTESIAN_POINT":
-            points.append([float(number) for number in content[content.rfind("(") :].strip("() \n").split(",")])
+            try:
+                points.append([float(number) for number in content[content.rfind("(") :].strip("() \n").split(",")])
+            except ValueError:
+                raise SurfaceError(f"is damaged: `{content[:60]!r}` is no point") from None
         if kind in _LEADING:
             found = [number for number in _referred(content) if number not in seen]
             # Of faces, the surface is the last; of edges, the curve.

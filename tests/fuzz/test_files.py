@@ -1,0 +1,137 @@
+"""Files beside a study that are cut short, flipped or filled with something else: read, or refused in words."""
+
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.plan.plan import make_plan
+from pipeline.realtime import ModelError
+from pipeline.realtime import load as load_model
+from pipeline.report.dataset import write
+from pipeline.report.guide import guide
+from pipeline.report.read import read
+from pipeline.report.table import DatasetError
+from pipeline.run.reading import known_of, read_rows
+from pipeline.run.record import Record
+from pipeline.run.store import Store, StoreError
+from pipeline.shapes.files.read import load_surface
+from pipeline.shapes.files.step import entities_of, named_faces, unit_of
+from pipeline.shapes.triangles import SurfaceError
+from tests.cases import study
+from tests.fuzz.profile import thrown
+from tests.organs import box, write_stl
+from tests.realtime.synthetic import write_random
+from tests.report.synthetic import dataset
+
+PLAN = make_plan(study(material={"young": "10 kPa", "poisson": [0.3, 0.4]}))
+STEP = b"""ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;
+#1=CARTESIAN_POINT('',(0.,0.,1.E1));\n#3=VERTEX_POINT('',#1);\n#4=EDGE_LOOP('',(#3));\n#5=ADVANCED_FACE('top',(#4),#1,.T.);
+#6=CLOSED_SHELL('',(#5));\n#2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\nENDSEC;\nEND-ISO-10303-21;\n"""
+
+
+@st.composite
+def damaged(draw: st.DrawFn, data: bytes) -> bytes:
+    """Draw bytes that are cut short, or of which bits are flipped, or numbers are none."""
+    changed = bytearray(data)
+    for _ in range(draw(st.integers(1, 4))):
+        at = draw(st.integers(0, max(len(changed) - 1, 0)))
+        match draw(st.integers(0, 3)):
+            case 0:
+                del changed[at:]
+            case 1 | 2 if changed:
+                changed[at] ^= 1 << draw(st.integers(0, 7))
+            case _:
+                special = st.sampled_from([np.nan, np.inf, 1e38, -0.0])
+                changed[at : at + 4] = draw(st.one_of(st.binary(min_size=4, max_size=4), special.map(_float)))
+    return bytes(changed)
+
+
+def _float(value: float) -> bytes:
+    return struct.pack("<f", value)
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("good")
+    write_stl(folder / "box.stl", *box(0.02, 0.02, 0.01))
+    write(dataset(), folder / "known.nc")
+    write_random(folder / "box.epsm.nc")
+    store = Store(folder / "cases.sqlite")
+    for key in PLAN.keys:
+        store.put(Record(key, "ok", force=1.0))
+    store.close()
+    return folder
+
+
+@pytest.fixture(scope="module")
+def thrown_at(tmp_path_factory):
+    return tmp_path_factory.mktemp("thrown")
+
+
+@given(data=st.data())
+@thrown(0.3)
+def test_surfaces(good, thrown_at, data):
+    file = thrown_at / "box.stl"
+    file.write_bytes(data.draw(damaged((good / "box.stl").read_bytes())))
+    try:
+        loaded = load_surface(file, 1e-3)
+    except SurfaceError as refused:
+        readable(refused)
+    else:
+        assert np.isfinite(loaded.triangles.points).all()
+
+
+@given(data=damaged(STEP))
+@thrown(0.3)
+def test_step_files_are_looked_through_before_the_kernel_reads_them(data):
+    try:
+        entities = entities_of(data)
+        assert unit_of(entities) in (None, "mm", "m", "cm", "um", "in")
+        named_faces(entities)
+    except SurfaceError as refused:
+        readable(refused)
+
+
+@given(data=st.data())
+@thrown(0.3)
+def test_models(good, thrown_at, data):
+    file = thrown_at / "box.epsm.nc"
+    file.write_bytes(data.draw(damaged((good / "box.epsm.nc").read_bytes())))
+    try:
+        load_model(file)
+    except ModelError as refused:
+        readable(refused)
+
+
+@given(data=st.data())
+@thrown(0.3)
+def test_stores(good, thrown_at, data):
+    file = thrown_at / "cases.sqlite"
+    file.write_bytes(bytes_ := data.draw(damaged((good / "cases.sqlite").read_bytes())))
+    for reader in (lambda: known_of(file, PLAN), lambda: read_rows(file)):
+        try:
+            reader()
+        except StoreError as refused:
+            readable(refused)
+    assert file.read_bytes() == bytes_  # whoever reads changes nothing
+
+
+@given(data=st.data())
+@thrown(0.1)
+def test_datasets(good, thrown_at, data):
+    file = thrown_at / "known.nc"
+    file.write_bytes(data.draw(damaged((good / "known.nc").read_bytes())))
+    try:
+        guide(read(file), "5%")
+    except DatasetError as refused:
+        readable(refused)
+
+
+def readable(refused: Exception) -> None:
+    """Assert that a message is one line that a person can read."""
+    assert str(refused).strip()
+    assert "\n" not in str(refused)
+    assert len(str(refused)) < 1000
