@@ -10,7 +10,7 @@ from pipeline.export.checks import Check, check_touches, columns, needed
 from pipeline.export.compliance import Region, coarse_mesh, compliances
 from pipeline.export.file import write_model
 from pipeline.export.scope import ExportError, Scope
-from pipeline.export.surface import tabulate_surface
+from pipeline.export.surface import has_surface, tabulate_surface
 from pipeline.export.tabulate import Places, tabulate
 from pipeline.realtime.model import Model
 from pipeline.realtime.surface import SurfaceTable
@@ -60,7 +60,7 @@ def export(
 ) -> Exported:  # fmt: skip
     """Return the model of a study to a relative ``accuracy``, with half of ``checks`` fitted to and half judged on.
 
-    With ``surface`` it holds what is seen of the body, too.
+    With ``surface`` it holds what is seen of the body, too, if that is a box or a cylinder of one material.
 
     Raises:
         ExportError: if the body leaves no region.
@@ -93,7 +93,8 @@ def export(
     fitted, judged = (
         [replace(check, bar=precise + factor * (check.bar - precise)) for check in half] for half in (fitted, judged)
     )
-    seen = tabulate_surface(mesh, region, scope.poissons, model.origin) if surface else None
+    is_seen = surface and has_surface(scope.body)
+    seen = tabulate_surface(mesh, region, scope.poissons, model.origin) if is_seen else None
     return Exported(model, fitted, judged, missed, len(solved), seen)
 
 

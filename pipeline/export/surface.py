@@ -17,6 +17,8 @@ from pipeline.arrays import FloatArray, IntArray
 from pipeline.export.compliance import Region
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.realtime.surface import SurfaceTable
+from pipeline.shapes.bodies.box import Box
+from pipeline.shapes.bodies.cylinder import Cylinder
 from pipeline.solve.far_field import PointForce
 from pipeline.solve.regular import OnBoundary, regular_on_boundary
 from pipeline.stages import stage
@@ -45,6 +47,11 @@ class Image:
     def of(self, values: FloatArray) -> FloatArray:
         """Return the field (n, 3) for the moved force, from that for the force itself."""
         return np.asarray(np.einsum("nk,nki->ni", self.weights, values[self.nodes]) @ self.motion.T)
+
+
+def has_surface(body: object) -> bool:
+    """Tell whether a body is one material and its own mirror image or turned one, which is what is made use of here."""
+    return isinstance(body, Box | Cylinder) and not body.regions
 
 
 @stage("far field")

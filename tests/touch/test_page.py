@@ -68,7 +68,7 @@ def queries(model, count):
 @pytest.mark.parametrize("kind", KINDS)
 def test_numbers_are_those_of_numpy(browser, tmp_path, kind):
     surface, path = opened(browser, tmp_path, **kind)
-    asked = list(queries(surface.model, 900))
+    asked = list(queries(surface.model, 600))
     plain = "({status, force, error, stiffness, radius}) => [status, ...force, error, stiffness, radius]"
     found = browser.ask(f"{json.dumps(asked)}.map(q => page.model.query(q)).map({plain})")
     seen = set()
@@ -146,6 +146,8 @@ def test_fits_a_phone_and_the_dark(browser, tmp_path):
     opened(browser, tmp_path)
     assert browser.ask("document.documentElement.scrollWidth") <= 375
     assert browser.ask("getComputedStyle(document.body).backgroundColor") == "rgb(20, 23, 27)"
+    assert browser.ask("document.getElementById('panel').open") is False
+    assert told(browser, "force") in told(browser, "reading")
     browser.look_like(1000, 700)
 
 
@@ -193,3 +195,27 @@ def test_the_command_writes_a_file_and_says_what_is_no_model(epsmesh, tmp_path):
         assert wrong.exit_code == 2
         assert word in wrong.output
     assert not (tmp_path / "x.html").exists()
+
+
+def test_the_command_opens_the_page_until_it_is_interrupted(epsmesh, tmp_path, monkeypatch):
+    def interrupted(server):
+        assert answer_of(server) == 404
+        raise KeyboardInterrupt
+
+    def answer_of(server):
+        thread = threading.Thread(target=server.handle_request)
+        thread.start()
+        status, _ = answer(server, "/", f"{HOST}:{server.server_port}")
+        thread.join()
+        return status
+
+    seen = []
+    monkeypatch.setattr("webbrowser.open", seen.append)
+    monkeypatch.setattr(PageServer, "serve_forever", interrupted)
+    write_surface(tmp_path / "model.nc")
+    done = epsmesh("touch", tmp_path / "model.nc")
+    assert done.exit_code == 0, done.output
+    assert seen[0] in done.output
+    assert seen[0].startswith("http://127.0.0.1:")
+    assert epsmesh("touch", tmp_path / "model.nc", "--no-open").exit_code == 0
+    assert len(seen) == 1

@@ -28,6 +28,7 @@ class Page {
     this.camera = new Camera(gl.canvas, told.eye, told.radius, 1e-3 * told.radius);
     this.camera.listen(() => this.redraw());
     this.camera.look(told.centre, 0);
+    if (innerWidth < 600) document.getElementById("panel").open = false;
     this.whole();
   }
   listen() {
@@ -179,6 +180,7 @@ class Page {
       whisker.style.width = `${(200 * normal * touch.error) / full}%`;
     }
     const known = touch.status === "ok" || touch.status === "lost";
+    say("reading", isIn ? `F = ${short(normal)} N ± ${short(100 * touch.error, 2)} %` : "");
     say("force", known ? `${short(normal)} N` : "–");
     say("error", isIn ? `± ${short(100 * touch.error, 2)} %` : "");
     say("aside", known ? `${short(1e3 * aside, 2)} mN` : "–");
