@@ -73,6 +73,7 @@ benchmark: setup ## every table of docs/performance.md, into results/ (an idle m
 	$(PYTHON) -m benchmarks.peers
 	$(PYTHON) -m benchmarks.plain_loop --sample 24
 	$(PYTHON) -m benchmarks.solvers
+	$(PYTHON) -m benchmarks.contact
 	$(PYTHON) -m benchmarks.scaling
 	$(EPSMESH) benchmark
 	$(PYTHON) -m benchmarks.reductions
