@@ -44,25 +44,30 @@ def far_field_of(case: Case) -> FarField:
     return BodyField(near, *_regular(case))
 
 
-def share_far_fields(cases: Iterable[Case]) -> None:
-    """Find what closes closed ``cases`` that differ in the place, by one mesh and one factorisation, if that is less.
+def share_far_fields(study: Iterable[Case], needed: Iterable[Case]) -> None:
+    """Find what closes the half balls of ``needed``, at several places, by one mesh and one factorisation for a body.
+
+    The mesh is made for all places of the cases of the ``study``, whichever of them are on record already: a run that
+    goes on finds the same. Where it is more than one for each place, that is left to be done when they are asked for.
 
     Raises:
         MeshError: if the body cannot be meshed.
         SolveError: if the regular parts cannot be solved.
     """
-    bodies: dict[Body, dict[float, dict[Place, Case]]] = {}
-    for case in cases:
+    places: dict[Body, dict[Place, Case]] = {}
+    for case in study:
+        if case.has_own_far_field:
+            places.setdefault(case.body, {})[case.frame.point] = case
+    wanted: dict[tuple[Body, float], dict[Place, Case]] = {}
+    for case in needed:
         if case.has_own_far_field and _key(case) not in _known:
-            bodies.setdefault(case.body, {}).setdefault(case.material.poisson, {})[case.frame.point] = case
-    for ratios in bodies.values():
-        places = {place: case for found in ratios.values() for place, case in found.items()}
-        if (coarse := _coarse_for_many(list(places.values()))) is None:
-            continue
-        mesh = None
-        for ratio, found in ratios.items():
-            mesh = mesh or distribute(MPI.COMM_SELF, mesh_arrays(coarse, ()))
-            _find(mesh, ratio, found)
+            wanted.setdefault((case.body, case.material.poisson), {})[case.frame.point] = case
+    meshes: dict[Body, BodyMesh] = {}
+    for (body, ratio), found in wanted.items():
+        if (coarse := _coarse_for_many(list(places[body].values()))) is not None:
+            if body not in meshes:
+                meshes[body] = distribute(MPI.COMM_SELF, mesh_arrays(coarse, ()))
+            _find(meshes[body], ratio, found)
 
 
 @stage("far field")

@@ -81,6 +81,7 @@ class StepRunner:
         self._provenance = provenance(ranks)
         self._free = FreeMemory(comm)
         self._attempts = Attempts()
+        self._has_far_fields = False
         self._records: dict[str, Record] = {}
 
     def run(self, step: MeshStep) -> None:
@@ -123,13 +124,23 @@ class StepRunner:
         if isinstance(problem, Failure):
             self._fail(step.solves, problem)
             return
-        self._caught(lambda: share_far_fields(solve.case for solve in step.solves))  # or each finds its own
+        if step.case.has_own_far_field:
+            self._share_far_fields()
         with problem:
             if step.solves[0].reduced and isinstance(problem, DisplacementProblem):
                 self._reduce(step, problem, ground)
             for solve in in_order(step, condensed=condense) if reuse or condense else step.solves:
                 if solve.key not in self._records:
                     self._record(solve, partial(self._solve, solve, problem, ground, _bar_of(solve)))
+
+    def _share_far_fields(self) -> None:
+        """Find the far fields of all places of the plan at once; if that fails, each finds its own. Collective."""
+        plan = self._plan
+        if plan.shared and not self._has_far_fields:
+            self._has_far_fields = True
+            # Images are not solved; which places are on record makes no difference.
+            places = [case for case in plan.study.cases() if not case.absence and case.index not in plan.images]
+            self._caught(lambda: share_far_fields(places, [solve.case for solve in plan.solves]))
 
     def _reduce(self, step: OperatorStep, problem: DisplacementProblem, ground: Ground) -> None:
         """Solve a few and finish the rest from their basis; without a basis those are left to be solved, too."""
