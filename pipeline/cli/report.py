@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipeline.cli.console import error
+from pipeline.cli.plan import find_case
+from pipeline.cli.view import MESHES, fields_of
 from pipeline.cli.words import DEFAULT_OUTPUT, Output, fail
 
 if TYPE_CHECKING:
@@ -46,20 +48,48 @@ def plot(
         print(picture)
 
 
-def report(file: Dataset, output: Output = DEFAULT_OUTPUT) -> None:
+def report(
+    file: Dataset,
+    output: Output = DEFAULT_OUTPUT,
+    scene: Annotated[
+        str | None,
+        typer.Option(
+            help='A case to turn round on the page, "poisson=0.3, epsilon=10 mm" or its number: meshed, not solved.',
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
     """Write the report of a dataset, one HTML page that needs nothing else, beside it: <study>.html.
 
     It holds the figures, a table of the cases to sort and filter, what failed or was skipped and why, the study file,
     and how to run it again.
 
     Example: epsmesh report results/figure3.nc
+
+    Example: epsmesh report results/figure3.nc --scene "epsilon=10 mm"
     """
     path, dataset = _read(file, output)
     if file.suffix != ".nc":
         _compare(file, path, dataset)
     from pipeline.report.page import write_page
 
-    print(write_page(dataset, path.with_suffix(".html")))
+    print(write_page(dataset, path.with_suffix(".html"), _scene(path, dataset, scene) if scene else ""))
+
+
+def _scene(path: Path, dataset: "xr.Dataset", text: str) -> str:
+    """Return the page of a case of ``dataset``, as its mesh; exit if there is none."""
+    from pipeline.report.table import study_of
+
+    study = study_of(dataset)
+    if study is None:
+        fail(f"{path}: --scene needs the study's text, as this version reads it")
+    chosen = find_case(study, text)
+    from pipeline.view.page import render
+    from pipeline.workflow import world
+
+    fields = fields_of(study, chosen, world(), mesh_only=True, bar=False, meshes=MESHES)
+    assert fields is not None  # one process
+    return render(fields, study.title)
 
 
 def _read(file: Path, output: Path) -> "tuple[Path, xr.Dataset]":

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
     from pipeline.view.fields import Fields
 
+MESHES = Path("meshes/cache")
+
 
 def view(
     file: File,
@@ -25,7 +27,7 @@ def view(
         Literal["html", "vtu", "xdmf"] | None,
         typer.Option(help="Write the page, or a file for ParaView, and no pictures."),
     ] = None,
-    meshes: Annotated[Path, typer.Option(help="Folder of the meshes that are kept.")] = Path("meshes/cache"),
+    meshes: Annotated[Path, typer.Option(help="Folder of the meshes that are kept.")] = MESHES,
 ) -> None:
     """Show one case: its mesh by element size, cut open, and the body as the probe deforms it.
 
@@ -47,13 +49,13 @@ def view(
         (error if comm.rank == 0 else _say_nothing)(f"a page instead of pictures: these need {missing}")
         export = "html"
     with abort_on_exception(comm):
-        fields = _fields(study, chosen, comm, mesh_only, export == "html", meshes)
+        fields = fields_of(study, chosen, comm, mesh_only, export == "html", meshes)
         if fields is not None:
             stem = output / f"{study.name}_{_number(study, chosen)}"
             _write(study, fields, stem, export)
 
 
-def _fields(study: Study, case: Case, comm: "MPI.Comm", mesh_only: bool, bar: bool, meshes: Path) -> "Fields | None":
+def fields_of(study: Study, case: Case, comm: "MPI.Comm", mesh_only: bool, bar: bool, meshes: Path) -> "Fields | None":
     """Return the case's fields, on the first rank; if it cannot be computed, exit on all of them."""
     from pipeline.mesh.generate import MeshError
     from pipeline.run.mesh_cache import MeshCache

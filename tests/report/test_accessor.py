@@ -43,7 +43,10 @@ def test_pareto_front_is_what_nothing_beats():
         assert (chosen["error"].diff().dropna() < 0).all()
         for case in group.itertuples():
             beaten = (chosen.time_total <= case.time_total) & (chosen.error <= case.error)
-            assert beaten.any()  # by itself, if by no other
+            finer = group[(group.outside == case.outside) & (group.epsilon > case.epsilon)]
+            by_chance = (finer.error > 1.5 * case.error).any()
+            assert beaten.any() or by_chance  # beaten by itself, if by no other
+            assert not (by_chance and (chosen.error == case.error).any())
 
 
 def test_ratio_is_drawn_against_epsilon_in_mm():

@@ -1,6 +1,8 @@
 """The report in a real browser: sorting, filtering, links, themes, phone, print; nothing loaded, no complaint."""
 
 import os
+from base64 import b64encode
+from hashlib import sha256
 
 import pytest
 from mpi4py import MPI
@@ -58,6 +60,22 @@ def test_the_page_cannot_load_or_run_anything_else(browser, path):
     browser.ask("new Promise(done => setTimeout(done, 200))")
     assert browser.ask("typeof hit") == "undefined"
     assert any("Content Security Policy" in message for message in browser.messages)
+
+
+def test_a_scene_stands_in_the_page_and_runs_its_own_script_alone(browser, tmp_path):
+    script = "top.postMessage('drawn', '*')"
+    mark = b64encode(sha256(script.encode()).digest()).decode()
+    scene = (
+        f'<meta http-equiv="Content-Security-Policy" content="script-src \'sha256-{mark}\'">'
+        f"<p>{NASTY}</p><script>top.postMessage('hit', '*')</script><script>{script}</script>"
+    )
+    path = write_page(dataset(), tmp_path / "b.html", scene)
+    heard = "window.heard = []; addEventListener('message', event => heard.push(event.data))"
+    browser.open(path)
+    # The frame is made anew, now that somebody listens.
+    browser.ask(f"{heard}; void (document.querySelector('iframe').srcdoc += ' ')")
+    browser.ask("new Promise(done => { const look = () => heard.length ? done() : setTimeout(look, 20); look() })")
+    assert browser.ask("heard") == ["drawn"]
 
 
 def test_address_sorts(browser, path):

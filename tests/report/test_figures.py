@@ -5,12 +5,13 @@ import warnings
 
 import numpy as np
 import pytest
+import xarray as xr
 
-from pipeline.report.figures import KINDS, choose, draw, lacks
+from pipeline.report.figures import FIGURES, KINDS, choose, draw, lacks
 from pipeline.report.figures.axis import horizontal
 from pipeline.report.figures.layout import arrange
 from pipeline.report.figures.style import COLOURS
-from pipeline.report.pareto import front
+from pipeline.report.pareto import front, is_by_chance
 from tests.report.synthetic import EPSILONS, FIGURE, dataset
 
 EXACT = {"exact": True}
@@ -154,6 +155,33 @@ def test_axes_are_in_units_people_use():
     assert epsilon.texts == ("4", "8", "full")
     assert (np.diff(epsilon.positions) > 0).all()
     assert horizontal(dataset(**SIZES)["rim"]).heading.endswith("(mm)")
+
+
+def test_an_error_that_a_finer_mesh_does_not_keep_is_one_of_chance():
+    """Along ε up to full order, where F passes F_exact, and along the rim, at which the finest is the smallest."""
+    error = xr.DataArray(
+        [[0.3, 0.2], [0.1, 0.001], [0.02, 0.01], [0.02, 0.012]], dims=("epsilon", "rim"),
+        coords={"epsilon": [4e-3, 6e-3, 8e-3, np.inf], "rim": [1e-3, 5e-4]},
+    )  # fmt: skip
+    chance = [[False, False], [False, True], [False, False], [False, False]]
+    for order in ([0, 1, 2, 3], [3, 1, 0, 2]):
+        shuffled = error.isel(epsilon=order, rim=[1, 0])
+        np.testing.assert_array_equal(is_by_chance(shuffled).sel(epsilon=error.epsilon, rim=error.rim), chance)
+    assert not is_by_chance(error.where(error > 0.005)).any()
+
+
+def test_errors_of_forces_below_the_exact_one_are_hollow(tmp_path):
+    data = dataset(solve=EXACT, mesh={"epsilon": EPSILONS, "outside": ["coarse", "free"]})
+    text = draw(data, tmp_path / "a", ["svg"], ["convergence"])[0].read_text()
+    assert "hollow: F below F_exact, dotted" in text
+
+
+def test_panels_of_the_same_quantity_share_its_scale():
+    figure = FIGURES["epsilon"](dataset(**FIGURE), "", "")
+    ratios, speedups = (np.array([[ax.get_ylim() for ax in figure.axes[3 * i : 3 * i + 3]] for i in rows])
+                        for rows in ((0, 2), (1, 3)))  # fmt: skip
+    assert (ratios[0] == ratios[1]).all()
+    assert (speedups == speedups[0, 0]).all()
 
 
 def test_front_holds_what_nothing_beats():

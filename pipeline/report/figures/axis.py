@@ -24,7 +24,7 @@ class Horizontal:
     joins: bool = True  # whether a line may join its points: numbers yes, words no
 
     def finish(self, ax: Axes, width: float, *, last: bool = True) -> None:
-        """Write as many values as fit ``width`` inches, first and last before the others."""
+        """Write as many values as fit ``width`` inches, the largest first; each has a tick."""
         x = self._even(self.positions)
         span = float(np.ptp(x)) or 1.0
         if self.is_log:
@@ -36,7 +36,7 @@ class Horizontal:
         labels = [self.texts[i] for i in chosen] if last else [""] * len(chosen)
         turned = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"} if slanted and last else {}
         ax.set_xticks(ticks, labels, **turned)
-        ax.set_xticks([], minor=True)
+        ax.set_xticks([x for i, x in enumerate(self.positions) if i not in chosen], [], minor=True)
         margin = 0.05 * span if self.joins else 0.5
         low, high = x.min() - margin, x.max() + margin
         ax.set_xlim(*((10**low, 10**high) if self.is_log else (low, high)))

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from pipeline.report.figures.axis import bounds, log_axis
 from pipeline.report.figures.dimensions import main_dimension, refinements, with_error
 from pipeline.report.figures.layout import Layout, arrange
-from pipeline.report.figures.panels import Panel, draw_curves, grid, panels
+from pipeline.report.figures.panels import Panel, draw_curves, draw_signed, grid, panels
 from pipeline.report.figures.style import QUIET, finish, look
 from pipeline.report.words import heading
 
@@ -31,7 +31,8 @@ def convergence(dataset: xr.Dataset, title: str, warning: str) -> Figure:
         if panel.is_first:
             panel.ax.set_ylabel(f"$|F/F_{{{reference}}}-1|$ (%)")
     log_axis(figure.axes[0], *bounds(100 * _shown(data, layout)))
-    finish(figure, title, notes(reference, layout.note), warning)
+    crossing = f"hollow: F below F_{reference}, dotted where it passes that" if data["is_below"].any() else ""
+    finish(figure, title, notes(reference, crossing, layout.note), warning)
     return figure
 
 
@@ -54,7 +55,8 @@ def _over_unknowns(panel: Panel, layout: Layout) -> None:
         x, y = np.atleast_1d(line["dofs"].values), 100 * np.atleast_1d(line["error"].values)
         known = np.flatnonzero((x > 0) & np.isfinite(y))
         known = known[np.argsort(x[known], kind="stable")]
-        panel.ax.plot(x[known], y[known], **look(position))
+        below = np.atleast_1d(line["is_below"].values)[known]
+        draw_signed(panel.ax, x[known], y[known], below, None, look(position))
     log_axis(panel.ax, *bounds(panel.data["dofs"].values), which="x")
     panel.ax.set_xlabel(heading(panel.data["dofs"]))
 

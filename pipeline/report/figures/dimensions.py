@@ -4,6 +4,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.quantities import MESH_DIMENSIONS
+from pipeline.report.pareto import is_by_chance
 from pipeline.report.words import is_numeric
 
 # What refines a mesh, the most telling first: the rim rules the error.
@@ -29,12 +30,14 @@ def main_dimension(dataset: xr.Dataset) -> str | None:
 def with_error(dataset: xr.Dataset) -> tuple[str, xr.Dataset]:
     """Add ``error``, the relative error of F against F_exact, or against F_max where there is no F_exact.
 
-    Returns the name of what it is against, "exact" or "max". A case that is its own reference has no error.
+    Beside it stand ``is_below``, whether F is less than that, and ``is_by_chance``. Returns the name of what the error
+    is against, "exact" or "max". A case that is its own reference has no error.
     """
-    if bool(np.isfinite(dataset["accuracy"]).any()):
-        return "exact", dataset.assign(error=abs(dataset["accuracy"] - 1))
-    error = abs(dataset["force_ratio"] - 1)
-    return "max", dataset.assign(error=error.where(error > 0))
+    is_exact = bool(np.isfinite(dataset["accuracy"]).any())
+    signed = dataset["accuracy" if is_exact else "force_ratio"] - 1
+    error = abs(signed) if is_exact else abs(signed).where(signed != 0)
+    data = dataset.assign(error=error, is_below=signed < 0, is_by_chance=is_by_chance(error))
+    return "exact" if is_exact else "max", data
 
 
 def _numeric_dimensions(dataset: xr.Dataset) -> list[str]:

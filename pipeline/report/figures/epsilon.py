@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from pipeline.report.figures.axis import log_axis
 from pipeline.report.figures.layout import arrange
-from pipeline.report.figures.panels import draw_curves, grid, panels
+from pipeline.report.figures.panels import draw_curves, grid, panels, share_heights
 from pipeline.report.figures.style import CLAIM, LINE, finish
 from pipeline.report.table import study_of
 from pipeline.report.times import doubts
@@ -21,7 +21,7 @@ CLAIM_EPSILON, CLAIM_RATIO, CLAIM_SPEEDUP = 10e-3, 0.8, 50.0
 
 
 def epsilon(dataset: xr.Dataset, title: str, warning: str) -> Figure:
-    """F/F_max, the same of what a slit's front releases, and below it the speed-up, against ε."""
+    """F/F_max, with a slit that of the energy released, and below it the speed-up, against ε."""
     released = [name for name in ("energy_release_ratio",) if name in dataset]
     return _against_epsilon(dataset, ("force_ratio", *released, "speedup"), title, warning)
 
@@ -39,10 +39,14 @@ def speedup(dataset: xr.Dataset, title: str, warning: str) -> Figure:
 def _against_epsilon(dataset: xr.Dataset, quantities: Sequence[str], title: str, warning: str) -> Figure:
     layout = arrange(dataset, quantities, "epsilon")
     figure = grid(layout, quantities)
-    for panel in panels(figure, dataset, layout, quantities):
-        x = draw_curves(panel, layout).positions
+    shown = list(panels(figure, dataset, layout, quantities))
+    x = [draw_curves(panel, layout).positions for panel in shown]
+    for panel in shown:
+        panel.ax.set_yscale("log" if panel.quantity == "speedup" else "linear")
+    share_heights(shown, lambda panel: panel.quantity == "speedup" or (panel.quantity, panel.column))
+    for panel, positions in zip(shown, x, strict=True):
         if panel.quantity == "force_ratio":
-            _mark_ratio(panel.ax, x, claimed=_shows_free(dataset, panel.data))
+            _mark_ratio(panel.ax, positions, claimed=_shows_free(dataset, panel.data))
         elif panel.quantity == "speedup":
             _mark_speedup(panel.ax)
         else:
@@ -89,7 +93,6 @@ def _mark_release(ax: Axes) -> None:
 
 def _mark_speedup(ax: Axes) -> None:
     """Mark the paper's 50-fold speed-up where the curves come near it."""
-    ax.set_yscale("log")
     low, high = ax.get_ylim()
     if high > CLAIM_SPEEDUP / 3:
         high = max(high, 1.6 * CLAIM_SPEEDUP)
@@ -97,4 +100,4 @@ def _mark_speedup(ax: Axes) -> None:
         place = {"xytext": (-2, 2), "textcoords": "offset points", "ha": "right"}
         spot = (1, CLAIM_SPEEDUP)
         ax.annotate("paper: 50 ×", spot, xycoords=("axes fraction", "data"), color=CLAIM, fontsize=7, **place)
-    log_axis(ax, max(low, 1e-3), high)
+    log_axis(ax, low, high)

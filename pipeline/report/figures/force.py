@@ -41,7 +41,7 @@ def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
 
 def _draw_against(ax: Axes, dataset: xr.Dataset, dim: str, width: float) -> None:
     layout = arrange(dataset, ("force",), dim, most=(_MOST_CURVES, 1, 1))
-    panel = Panel(ax, dataset.sel(layout.at), "force", "", width, is_first=True, is_last=True)
+    panel = Panel(ax, dataset.sel(layout.at), "force", "", width, column=0, is_last=True)
     draw_curves(panel, layout, factor=1e3, errors="force_error")
     if layout.fixed:
         words = f"at {choices(dataset, layout.fixed)}"

@@ -1,6 +1,7 @@
 """A grid of panels: a curve for each choice, an axis that all share."""
 
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from matplotlib.figure import Figure
 
 from pipeline.report.figures.axis import Horizontal, horizontal
 from pipeline.report.figures.layout import Layout, title_of
-from pipeline.report.figures.style import FAILED, PANEL_HEIGHT, WIDTH, look, new_figure
+from pipeline.report.figures.style import FAILED, PANEL_HEIGHT, PAPER, WIDTH, look, new_figure
 from pipeline.report.words import choices
 
 
@@ -23,8 +24,13 @@ class Panel:
     quantity: str
     title: str
     width: float
-    is_first: bool
+    column: int
     is_last: bool
+
+    @property
+    def is_first(self) -> bool:
+        """Whether it is the first of its row."""
+        return self.column == 0
 
 
 def grid(layout: Layout, quantities: Sequence[str], height: float = PANEL_HEIGHT, share: str = "x") -> Figure:
@@ -45,7 +51,18 @@ def panels(figure: Figure, dataset: xr.Dataset, layout: Layout, quantities: Sequ
         choice = layout.rows[row] | layout.columns[column]
         title = title_of(dataset, layout.rows[row], layout.columns[column]) if quantity == 0 else ""
         last = line == len(figure.axes) // columns - 1
-        yield Panel(ax, dataset.sel(layout.at | choice), quantities[quantity], title, width, column == 0, last)
+        yield Panel(ax, dataset.sel(layout.at | choice), quantities[quantity], title, width, column, last)
+
+
+def share_heights(shown: Iterable[Panel], group: Callable[[Panel], Hashable]) -> None:
+    """Give the panels of a ``group`` one scale, that holds the curves of all."""
+    together = defaultdict(list)
+    for panel in shown:
+        together[group(panel)].append(panel.ax)
+    for axes in together.values():
+        limits = np.array([ax.get_ylim() for ax in axes])
+        for ax in axes:
+            ax.set_ylim(limits[:, 0].min(), limits[:, 1].max())
 
 
 def draw_curves(panel: Panel, layout: Layout, factor: float = 1.0, errors: str = "") -> Horizontal:
@@ -62,6 +79,8 @@ def draw_curves(panel: Panel, layout: Layout, factor: float = 1.0, errors: str =
         if errors:
             bars = np.nan_to_num(np.abs(y * line[errors].values))[known]
             panel.ax.errorbar(x[known], y[known], bars, label=label, capsize=2, elinewidth=0.8, **style)
+        elif "is_below" in line:
+            draw_signed(panel.ax, x[known], y[known], line["is_below"].values[known], label, style)
         else:
             panel.ax.plot(x[known], y[known], label=label, **style)
         failed = line["status"].values == "failed"
@@ -72,6 +91,17 @@ def draw_curves(panel: Panel, layout: Layout, factor: float = 1.0, errors: str =
         panel.ax.set_title(panel.title)
     axis.finish(panel.ax, panel.width, last=panel.is_last)
     return axis
+
+
+def draw_signed(
+    ax: Axes, x: np.ndarray, y: np.ndarray, is_below: np.ndarray, label: str | None, style: dict[str, str]
+) -> None:
+    """Draw sizes of errors, hollow where F ``is_below`` what it is to be, and dotted where it passes that."""
+    ax.plot(x, np.where(is_below, np.nan, y), label=label, **style)
+    ax.plot(x, np.where(is_below, y, np.nan), **style, markerfacecolor=PAPER)
+    if style.get("linestyle") != "none":
+        for i in np.flatnonzero(is_below[1:] != is_below[:-1]):
+            ax.plot(x[i : i + 2], y[i : i + 2], color=style["color"], linestyle=":", linewidth=0.8, zorder=1)
 
 
 def _aside(axis: Horizontal, position: int, count: int) -> float:

@@ -1,5 +1,6 @@
 """The report of a study: one HTML page that holds all it needs, made from the dataset alone."""
 
+import re
 from base64 import b64encode
 from hashlib import sha256
 from pathlib import Path
@@ -18,18 +19,25 @@ from pipeline.report.page.inline import inline_svg
 from pipeline.report.page.skipped import origins, skipped, struck
 
 _TEMPLATES = Path(__file__).parent / "templates"
+_SCRIPT = re.compile(r"'sha256-[A-Za-z0-9+/=]+'")
 
 
-def write_page(dataset: xr.Dataset, path: Path) -> Path:
-    """Write the report of ``dataset`` to ``path``, in place of an earlier one only once it is whole."""
-    text = render(dataset, path.stem)
+def write_page(dataset: xr.Dataset, path: Path, scene: str = "") -> Path:
+    """Write the report of ``dataset`` to ``path``, in place of an earlier one only once it is whole.
+
+    ``scene`` is the page of one case, to stand in the report.
+    """
+    text = render(dataset, path.stem, scene)
     with atomic(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return path
 
 
-def render(dataset: xr.Dataset, name: str) -> str:
-    """Return the report of ``dataset`` as HTML; ``name`` is the study's, for files and commands."""
+def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
+    """Return the report of ``dataset`` as HTML; ``name`` is the study's, for files and commands.
+
+    A page in a page is bound by the policies of both: the report's must allow the scripts of the ``scene``.
+    """
     script = (_TEMPLATES / "page.js").read_text(encoding="utf-8")
     study = str(dataset.attrs.get("study", ""))
     table = case_table(dataset)
@@ -40,6 +48,7 @@ def render(dataset: xr.Dataset, name: str) -> str:
     return environment.get_template("page.html.j2").render(
         title=dataset.attrs.get("title", name), name=name, style=(_TEMPLATES / "page.css").read_text(encoding="utf-8"),
         script=script, script_hash=b64encode(sha256(script.encode()).digest()).decode(),
+        scene=scene, scene_scripts=_SCRIPT.findall(scene)[:1],
         facts=facts(dataset), failures=failures(dataset), without_exact=without_exact(dataset),
         figures=_figures(dataset), guide=guide_section(dataset), table=table, first_rows=FIRST_ROWS,
         struck=struck(dataset), origins=origins(dataset), skipped=skipped(dataset),
