@@ -10,6 +10,7 @@ from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import conditions_of, loads_of
 from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.mixed import MixedProblem
+from pipeline.solve.release import Release
 from pipeline.solve.spaces import Spaces
 from pipeline.verify.slits import strip
 from tests.cases import BLADE, solve, study
@@ -63,6 +64,20 @@ def test_change_of_energy():
     ]
     (before, _), (_, release), (after, _) = found
     assert release == pytest.approx((before - after) / (2 * step), rel=0.02)
+
+
+def test_what_pairs_of_motions_release_is_that_of_their_sums():
+    form = np.array([[2.0, 0.3, -0.7], [0.3, 1.0, 0.2], [-0.7, 0.2, 4.0]])
+
+    class Known(Release):
+        def __init__(self):
+            self.amounts = np.zeros(3)
+
+        def __call__(self):
+            return float(self.amounts @ form @ self.amounts)
+
+    release = Known()
+    assert release.matrix(3, lambda amounts: setattr(release, "amounts", amounts)) == pytest.approx(form)
 
 
 def test_flanks_that_slide():
