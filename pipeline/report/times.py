@@ -17,6 +17,11 @@ def doubts(dataset: xr.Dataset) -> list[str]:
     return [text for text in (_of_load(dataset), _of_spread(dataset), slower(dataset)) if text]
 
 
+def warned(warning: str, dataset: xr.Dataset) -> str:
+    """Return what a figure of times must say below it: its ``warning``, and what makes times doubtful."""
+    return "; ".join(filter(None, (warning, *doubts(dataset))))
+
+
 def slower(dataset: xr.Dataset) -> str:
     """Say which cases took longer than the full order in spite of fewer unknowns, if any did."""
     if not {"speedup", "dofs", "epsilon"} <= {str(name) for name in (*dataset.data_vars, *dataset.dims)}:

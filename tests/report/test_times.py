@@ -32,8 +32,10 @@ def test_a_loaded_machine_is_told_of(timed):
     assert doubts(timed)[0].startswith("all times were taken on a loaded machine")
     assert f"times        {doubts(timed)[0]}" in str(guide(timed, accuracy="50 %"))
     assert ("speed-ups", doubts(timed)[0]) in facts(timed)
-    words = " ".join(text.get_text() for text in figure(timed, "speedup").texts)
-    assert "loaded machine" in words.replace("\n", " ")
+    for kind in ("speedup", "epsilon", "accuracy"):
+        words = " ".join(text.get_text() for text in figure(timed, kind).texts)
+        assert "loaded machine" in words.replace("\n", " ")
+    assert not any("loaded" in text.get_text() for text in figure(timed, "ratio").texts)
 
 
 def test_repeats_that_are_far_apart_are_told_of(timed):

@@ -12,6 +12,7 @@ from pipeline.report.figures.layout import Selection, arrange
 from pipeline.report.figures.panels import grid, panels
 from pipeline.report.figures.style import PAPER, finish, look
 from pipeline.report.pareto import front
+from pipeline.report.times import warned
 from pipeline.report.words import choices, heading, number, symbol
 
 _MOST_NAMED = 6
@@ -42,7 +43,7 @@ def accuracy(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     log_axis(figure.axes[0], *bounds(100 * data["error"].values, 1.6))
     what = "lines: cases that no other beats in both, without errors that a finer mesh has 1.5 times as large"
     labels = f"their {', '.join(symbol(data[name]) for name in meshes)} at the points"
-    finish(figure, title, notes(reference, f"{what}, {labels}", layout.note), warning)
+    finish(figure, title, notes(reference, f"{what}, {labels}", layout.note), warned(warning, dataset))
     return figure
 
 

@@ -13,7 +13,7 @@ from pipeline.report.figures.layout import arrange
 from pipeline.report.figures.panels import draw_curves, grid, panels, share_heights
 from pipeline.report.figures.style import CLAIM, LINE, finish
 from pipeline.report.table import study_of
-from pipeline.report.times import doubts
+from pipeline.report.times import warned
 from pipeline.report.words import formula, heading
 
 # The paper's claims: 80 % of F_max at ε = 10 mm, 50 times faster.
@@ -54,8 +54,7 @@ def _against_epsilon(dataset: xr.Dataset, quantities: Sequence[str], title: str,
         if panel.is_first:
             is_speedup = panel.quantity == "speedup"
             panel.ax.set_ylabel(heading(dataset["speedup"]) if is_speedup else formula(panel.quantity))
-    timed = doubts(dataset) if "speedup" in quantities else []
-    finish(figure, title, layout.note, "; ".join(filter(None, (warning, *timed))))
+    finish(figure, title, layout.note, warned(warning, dataset) if "speedup" in quantities else warning)
     return figure
 
 
