@@ -4,10 +4,11 @@
 
 Ten cases on each mesh, each solved, their records in a store on disk. Prints, at each twentieth of the way, the
 resident memory of the first rank, the processor time it takes for a case (which other programs on the machine hardly
-change), and the median of what the store takes to write a record and to find one. Exit status 1 if a case fails, if
-memory grows by more than 30 kB a mesh (the types that ctypes keeps of gmsh's arrays take two thirds of it) and 4 kB a
-case (a record takes 3) after a fifth of the way, if the pace of the last three fifths differs by more than 10 %, or if the store takes more
-than 10 ms to find a record.
+change), and the median of what the store takes to write a record and to find one.
+
+Exit status 1 if a case fails; if memory grows, after a fifth of the way, by more than 30 kB a mesh (the types that
+ctypes keeps of gmsh's arrays take two thirds of it) and 4 kB a case (a record takes 3); if the pace of the last two
+fifths differs by more than 10 %; or if the store takes more than 10 ms to find a record.
 """
 
 import statistics
