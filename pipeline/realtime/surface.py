@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 _MOMENTS = {"disc": 2 / 3, "sphere": 2 / 5, "cone": 1 / 3}
 # What is nearer to the face than this, in units of the thickness, lies on it; nearer to the axis, in units of a, is it.
 _ON_FACE, _AXIS = 1e-6, 1e-6
+# Of the face or the thickness: no vertex is so far away.
+_FAR = 1e3
 PARTS = {"points": 2, "triangles": 2, "modes": 3, "amounts": 4, "error": 0}
 
 
@@ -113,6 +115,8 @@ class Surface:
         moved *= force
         within = rho <= a
         moved[face[within], 2] = _rise(tool, rho[within], radius, angle) - depth
+        if not np.isfinite(moved).all():
+            return Touch("damaged", np.full(3, nan)), np.full(moved.shape, nan)
         return touch, moved @ model.axes
 
 
@@ -184,6 +188,8 @@ def surface_of(data: bytes) -> Surface:
     fits = points.shape[1] == 3 and triangles.shape[1] == 3 and modes.shape == (count, 3, rank)
     if not fits or min(map(min, (points.shape, amounts.shape))) < 1 or float(parts["error"]) < 0:
         raise ModelError("the surface's lengths contradict each other")
+    if np.abs(points).max() > _FAR * max(*model.sides, model.thickness):
+        raise ModelError("the surface's points are not those of the model's body")
     if triangles.min(initial=0) < 0 or triangles.max(initial=0) >= count:
         raise ModelError("a triangle of the surface has a vertex that there is not")
     table = SurfaceTable(

@@ -93,13 +93,19 @@ def test_a_damaged_surface_is_refused(tmp_path):
     table = made.table
     damaged = (
         {"triangles": table.triangles + 1000}, {"error": -1.0}, {"points": np.full_like(table.points, np.nan)},
-        {"amounts": np.full_like(table.amounts, np.inf)}, {"triangles": table.triangles[:, :2]},
+        {"points": 1e9 * table.points}, {"amounts": np.full_like(table.amounts, np.inf)},
+        {"triangles": table.triangles[:, :2]},
     )  # fmt: skip
     for number, wrong in enumerate(damaged):
         path = tmp_path / f"{number}.nc"
         write_model(path, made.model, {}, {}, replace(table, **wrong))
         with pytest.raises(ModelError):
             surface_of(path.read_bytes())
+    wild = replace(made, table=replace(table, amounts=np.full_like(table.amounts, 1e38)))
+    with np.errstate(all="ignore"):
+        touch, moved = wild.press("disc", at=AT, depth=1e-4, radius=2e-3)
+    assert touch.status == "damaged"
+    assert np.isnan(moved).all()
     write_surface(tmp_path / "whole.nc")
     data = (tmp_path / "whole.nc").read_bytes()
     for size in range(0, len(data), 997):
