@@ -6,7 +6,7 @@
 #include <string.h>
 
 static const double PI = 3.14159265358979323846;
-static const double FORMAT = 2.0, TOUCHING = 1e-12, SMALLEST = 1e-6, SLENDER = 0.02, SOFT = 1e-12;
+static const double FORMAT = 2.0, TOUCHING = 1e-12, SMALLEST = 1e-6, SLENDER = 0.02, SOFT = 1e-12, STICKS = 0.1;
 static const double BALL_LIMIT = 0.6, NEGLIGIBLE = 1e-17, SAME = 4e-16;
 enum { STEPS = 60, TERMS = 40 };
 
@@ -164,7 +164,7 @@ static int is_sound(const epsmesh_model *m) {
     if (m->bar[3] < 0) return 0;
     for (i = 0; i < 2; i++)
         if (!(0 < m->reach[i] && m->reach[i] < m->sides[i])) return 0;
-    if (m->is_round && (m->counts[1] != 1 || m->face_counts[0] != 1)) return 0;
+    if (m->is_round && (m->counts[1] != 1 || m->face_counts[0] != 1 || !m->even[0] || !m->even[1])) return 0;
     if (!(m->off > 0 && m->aligned > 0 && m->aligned <= 0.5)) return 0;
     if (!(-1 < m->poisson_range[0] && m->poisson_range[0] <= m->poisson && m->poisson <= m->poisson_range[1])) return 0;
     if (m->poisson_range[1] > 0.5 || (m->counts[0] > 1 && m->poisson_range[0] == m->poisson_range[1])) return 0;
@@ -299,14 +299,16 @@ static value along(const epsmesh_model *m, const double *table, const terms *p, 
 /* What blades and bonded tools take: the factors of the seven tables are those of pipeline/realtime/table.py. */
 static void shape_at(const epsmesh_model *m, const terms *s, double x, double y, double t, const double slope_t[2],
                      place *p) {
-    double a = m->reach[0], b = m->reach[1], xi = x / a, eta = y / b, f[EPSMESH_TENSORS], g, own[2];
+    double xi = m->even[0] ? x / m->reach[0] : 1, eta = m->even[1] ? y / m->reach[1] : 1;
+    double of_x = m->even[0] ? 1 / m->reach[0] : 0, of_y = m->even[1] ? 1 / m->reach[1] : 0;
+    double f[EPSMESH_TENSORS], g, own[2];
     size_t whole = (size_t)m->counts[0] * (size_t)m->counts[1] * (size_t)m->counts[2];
     int i, k;
     for (k = 0; k < EPSMESH_TENSORS; k++) {
         value v = along(m, m->tensors + (size_t)k * whole, s, m->counts, x, y);
         g = 1, own[0] = own[1] = 0;
-        if ((k == 0 || k == 5) && m->is_round) g = xi * xi - eta * eta, own[0] = 2 * xi / a, own[1] = -2 * eta / b;
-        if (k == 1 || k == 6) g = 2 * xi * eta, own[0] = 2 * eta / a, own[1] = 2 * xi / b;
+        if ((k == 0 || k == 5) && m->is_round) g = xi * xi - eta * eta, own[0] = 2 * xi * of_x, own[1] = -2 * eta * of_y;
+        if (k == 1 || k == 6) g = 2 * xi * eta, own[0] = 2 * eta * of_x, own[1] = 2 * xi * of_y;
         if (k == 2) g = xi;
         if (k == 3) g = eta;
         f[k] = g * v.f;
@@ -634,7 +636,7 @@ epsmesh_query epsmesh_ask(const epsmesh_model *m) {
 }
 
 epsmesh_touch epsmesh_touch_at(const epsmesh_model *m, const epsmesh_query *q) {
-    double local[3], edge[2], force[3], room, share, bent;
+    double local[3], edge[2], force[3], room, share, bent, sticks;
     spot f;
     epsmesh_status status = misfit(m, q, local, edge, &f);
     epsmesh_touch t;
@@ -659,7 +661,8 @@ epsmesh_touch epsmesh_touch_at(const epsmesh_model *m, const epsmesh_query *q) {
     share = (k.radius / room) * (k.radius / room);
     bent = fabs(p.h) + 2 * sqrt(p.bent[0] * p.bent[0] + p.bent[1] * p.bent[1]);
     t.status = EPSMESH_OK, t.stiffness = q->young * k.stiffness, t.contact_radius = k.radius;
-    t.force_error = m->bar[3] + k.stiffness * ((m->bar[0] + m->bar[2] * share * share) / room +
+    sticks = q->shape == EPSMESH_BONDED_DISC ? STICKS * (1 - 2 * q->poisson) * k.radius / room : 0;
+    t.force_error = m->bar[3] + k.stiffness * ((m->bar[0] + m->bar[2] * share * share + sticks) / room +
                                                m->bar[1] * bent * k.mean_square);
     force_at(&f, k.force, k.aside, q->depth, force);
     for (i = 0; i < 3; i++)

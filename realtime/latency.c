@@ -1,7 +1,9 @@
-/* What a query takes, in microseconds: `latency MODEL [QUERIES]`. POSIX for its clock; epsmesh.c itself needs C99 alone. */
-#define _POSIX_C_SOURCE 199309L
+/* What a query takes, in microseconds: `latency MODEL [QUERIES [SECONDS]]`, and how many ticks of a
+ * loop at 1 kHz are late, with a query and without, each SECONDS long. POSIX for its clock; epsmesh.c itself needs C99 alone. */
+#define _POSIX_C_SOURCE 200112L
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <time.h>
 
 #include "epsmesh_patch.h"
@@ -21,6 +23,28 @@ static double now(void) {
 static double bowl(double x, double y, void *user) {
     double radius = *(const double *)user;
     return (x * x + 2 * y * y) / (2 * radius);
+}
+
+/* Run a loop at 1 kHz for so many ticks, each second one with a query, and count those that end after the next is due. */
+static double paced(const epsmesh_model *model, long ticks, long late[2]) {
+    struct timespec due;
+    double sum = 0;
+    long i;
+    clock_gettime(CLOCK_MONOTONIC, &due);
+    for (i = 0; i < ticks; i++) {
+        epsmesh_query query = epsmesh_ask(model);
+        double end;
+        due.tv_nsec += 1000000;
+        if (due.tv_nsec >= 1000000000) due.tv_nsec -= 1000000000, due.tv_sec++;
+        clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &due, NULL);
+        query.shape = EPSMESH_SPHERE, query.radius = 0.3 * model->thickness, query.depth = 0.002 * model->thickness;
+        memcpy(query.at, model->origin, sizeof query.at);
+        query.at[2] += model->height[0];
+        if (i % 2) sum += epsmesh_touch_at(model, &query).force[2];
+        end = now() - (1e6 * (double)due.tv_sec + 1e-3 * (double)due.tv_nsec);
+        late[i % 2] += end > 1000;
+    }
+    return sum;
 }
 
 int main(int count, char **words) {
@@ -56,5 +80,10 @@ int main(int count, char **words) {
         printf("%-8s p50 %.2f  p99 %.2f  largest %.1f us\n", names[shape], took[n / 2], took[n - 1 - n / 100], took[n - 1]);
     }
     free(took);
+    if (count > 3) {
+        long late[2] = {0, 0}, ticks = (long)(2000 * atof(words[3]));
+        sum += paced(&model, ticks, late);
+        printf("1 kHz    late by a tick: %ld of %ld with a query, %ld without\n", late[1], ticks / 2, late[0]);
+    }
     return sum > 0 ? 0 : 1;
 }

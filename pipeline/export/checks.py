@@ -1,31 +1,31 @@
 """Touches by full solves of the program: some that a model's bar is fitted to, others that it is judged on."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import isfinite
+from dataclasses import dataclass, field, replace
+from math import nan
 
 import numpy as np
-from mpi4py import MPI
 
 from pipeline.arrays import FloatArray
-from pipeline.export.compliance import Region
-from pipeline.plan.plan import make_plan
+from pipeline.export.full import Solver, Tool
 from pipeline.realtime.model import Model
-from pipeline.run.execute import compute
-from pipeline.shapes.bodies.box import Box
-from pipeline.shapes.bodies.cylinder import Cylinder
 from pipeline.stages import stage
-from pipeline.study.load import parse
 
-# Radii of the discs, in units of the largest that the model takes at the place; depth in units of the radius.
-_RADII, _DEPTH = (0.1, 0.99), 0.02
+# Half sizes of the tools, in units of the largest that the model takes at the place; depth in units of those.
+_SIZES, _DEPTH = (0.1, 0.99), 0.02
 # The bar is so much longer than the longest that the fit needs.
 _SAFETY = 1.3
+# Blades are so much longer than wide.
+_SLENDER = (1.0, 12.0)
+TOOLS = ("disc", "blade", "bonded")
 
 
 @dataclass(frozen=True)
 class Check:
-    """A touch of a disc: place and radius (m), ν, F (N) of a full solve with its relative bar, and of the model."""
+    """A touch: place and half size (m), ν, F (N) of a full solve with its relative bar, and of the model.
+
+    ``kind`` is a number of ``TOOLS``: a disc, a blade, whose half size is half its diagonal, or a bonded disc.
+    """
 
     x: float
     y: float
@@ -36,6 +36,8 @@ class Check:
     full_error: float
     force: float
     bar: float
+    kind: int = 0
+    tool: Tool = field(default_factory=lambda: Tool("disc"))
 
     @property
     def error(self) -> float:
@@ -49,62 +51,54 @@ class Check:
 
 
 @stage("checks")
-def check_touches(
-    model: Model, region: Region, body: Box | Cylinder, count: int, seed: int, accuracy: float
-) -> list[Check]:
-    """Return ``count`` random touches of a model, full solves to a relative ``accuracy``.
+def check_touches(model: Model, solver: Solver, count: int, seed: int, tools: Sequence[int] = (0,)) -> list[Check]:
+    """Return ``count`` random touches of a model, of ``tools`` in turn, with their full solves.
 
     Raises:
         RuntimeError: if a full solve failed.
     """
     rng = np.random.default_rng(seed)
-    return [_check(model, region, body, rng, accuracy) for _ in range(count)]
+    return [_check(model, solver, rng, tools[number % len(tools)]) for number in range(count)]
 
 
-def _check(model: Model, region: Region, body: Box | Cylinder, rng: np.random.Generator, accuracy: float) -> Check:
-    x, y = _place(region, rng)
-    smallest, largest = np.log(_RADII)
-    radius = model.largest * region.room(x, y) * float(np.exp(rng.uniform(smallest, largest)))
-    poisson, depth = float(rng.uniform(*model.table.poisson)), _DEPTH * radius
-    touch = model.query("disc", radius=radius, at=(x, y, 0.0), depth=depth, poisson=poisson)
+def _check(model: Model, solver: Solver, rng: np.random.Generator, kind: int) -> Check:
+    x, y = _place(model, rng)
+    smallest, largest = np.log(_SIZES)
+    size = model.largest * model.room(x, y) * float(np.exp(rng.uniform(smallest, largest)))
+    low, high = model.table.poisson
+    poisson, depth = float(rng.uniform(low, high)), _DEPTH * size
+    tool = Tool("disc", size, contact="bonded" if TOOLS[kind] == "bonded" else "frictionless")
+    if TOOLS[kind] == "blade":
+        slenderness, angle = float(np.exp(rng.uniform(*np.log(_SLENDER)))), rng.uniform(0, 2 * np.pi)
+        width = 2 * size / float(np.hypot(slenderness, 1))
+        along = (float(np.cos(angle)), float(np.sin(angle)), 0.0)
+        tool = Tool("blade", length=slenderness * width, width=width, along=along)
+    asked = with_bar(model, Check(x, y, size, depth, poisson, nan, nan, nan, nan, kind, tool))
+    at, _ = _on_face(model, x, y)
+    full = solver.press(tool, (float(at[0]), float(at[1])), depth, poisson if low < high else None)
+    return replace(asked, full=full.force, full_error=full.error)
+
+
+def with_bar(model: Model, check: Check) -> Check:
+    """Return a check with the force of a model, and its bar."""
+    at, normal = _on_face(model, check.x, check.y)
+    touch = model.query(check.tool.name, at=at.tolist(), depth=check.depth, poisson=check.poisson, **check.tool.sizes)
     assert touch.status == "ok", touch
-    full, bar = _full(body, (x, y, radius, depth), (model.young, poisson), accuracy)
-    return Check(x, y, radius, depth, poisson, full, bar, float(touch.force[2]), touch.force_error)
+    return replace(check, force=float(touch.force @ normal), bar=touch.force_error)
 
 
-def _place(region: Region, rng: np.random.Generator) -> tuple[float, float]:
-    a, b = region.reach
-    if not region.is_round:
+def _on_face(model: Model, x: float, y: float) -> tuple[FloatArray, FloatArray]:
+    """Return where a place of the region is in the body's coordinates (3,), in m, and the normal there."""
+    spot = model.face.at(model.table, x, y)
+    return model.origin + np.array([x, y, spot.height]) @ model.axes, spot.normal @ model.axes
+
+
+def _place(model: Model, rng: np.random.Generator) -> tuple[float, float]:
+    a, b = model.table.reach
+    if not model.table.is_round:
         return float(rng.uniform(-a, a)), float(rng.uniform(-b, b))
     r, angle = a * np.sqrt(rng.uniform()), rng.uniform(0, 2 * np.pi)
     return float(r * np.cos(angle)), float(r * np.sin(angle))
-
-
-def _full(
-    body: Box | Cylinder, touch: tuple[float, float, float, float], tissue: tuple[float, float], accuracy: float
-) -> tuple[float, float]:
-    """Return F (N) of a disc by the program, and its relative bar."""
-    x, y, radius, depth = (f"{1e3 * length:.12g} mm" for length in touch)
-    if isinstance(body, Box):
-        shape: dict[str, object] = {"shape": "box", "size": [_mm(size) for size in body.size]}
-    else:
-        shape = {"shape": "cylinder", "radius": _mm(body.radius), "height": _mm(body.height)}
-    young, poisson = tissue
-    study = parse({
-        "body": shape,
-        "material": {"young": f"{young:.12g} Pa", "poisson": poisson},
-        "probe": {"shape": "disc", "contact": "frictionless", "radius": radius, "depth": depth, "at": [x, y]},
-        "mesh": {"accuracy": f"{100 * accuracy:.6g} %"},
-        "solve": {"exact": False},
-    })  # fmt: skip
-    (record,) = compute(make_plan(study), MPI.COMM_SELF).values()
-    if not record.is_ok or not isfinite(record.force_error):
-        raise RuntimeError(f"a full solve of a disc of {radius} at {x}, {y} failed: {record.message}")
-    return record.force, record.force_error
-
-
-def _mm(length: float) -> str:
-    return f"{1e3 * length:.12g} mm"
 
 
 def needed(checks: Sequence[Check], floor: float) -> float:
@@ -115,7 +109,7 @@ def needed(checks: Sequence[Check], floor: float) -> float:
 def columns(fitted: Sequence[Check], judged: Sequence[Check]) -> dict[str, tuple[str, FloatArray]]:
     """Return all checks as units and values by name, those that are judged after those that were fitted."""
     units = {"x": "m", "y": "m", "radius": "m", "depth": "m", "poisson": "1", "full": "N", "full_error": "1"}
-    units |= {"force": "N", "bar": "1", "error": "1"}
+    units |= {"force": "N", "bar": "1", "error": "1", "kind": "1"}
     checks = [*fitted, *judged]
     found = {name: (unit, np.array([getattr(check, name) for check in checks])) for name, unit in units.items()}
     is_judged = np.array([0.0] * len(fitted) + [1.0] * len(judged))

@@ -1,7 +1,7 @@
 """c and h of a body, of E = 1, at any places of a region of its top: one coarse mesh and one factorisation for all."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import pi
 from typing import Any
 
@@ -9,56 +9,26 @@ import numpy as np
 from mpi4py import MPI
 
 from pipeline.arrays import FloatArray
+from pipeline.export.region import Region
 from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.mesh.generate import MeshArrays
 from pipeline.mesh.of_case import mesh_arrays
-from pipeline.shapes.bodies.box import Box
-from pipeline.shapes.bodies.cylinder import Cylinder
 from pipeline.shapes.probes.blade import Blade
 from pipeline.shapes.probes.disc import Disc
 from pipeline.solve.far_field import PointForce
+from pipeline.solve.material import MaterialLaw
 from pipeline.solve.regular import regular_parts
+from pipeline.solve.side_force import SideForce
 from pipeline.stages import stage
 from pipeline.study.schema import Mesh
 from pipeline.study.sweep import Case
 
-# Elements of the mesh: so many along the way from the region's edge to the sides, so many through the thickness; they
-# grow by so much in between.
-_NEAR, _THROUGH, _GROWTH = 2.5, 4, 0.4
+# Elements of the mesh: so many along the way from the region's edge to the sides, so many through the thickness, or on
+# the way to other tissue; they grow by so much in between.
+_NEAR, _THROUGH, _TO_TISSUE, _GROWTH = 2.5, 4, 2, 0.4
 # A mid node this far from the middle, in lengths of its edge, is a quarter point.
 _ASIDE = 0.2
-
-
-@dataclass(frozen=True)
-class Region:
-    """What is tabulated of a face: half extents (m) of both, or radii twice, and the thickness (m) below."""
-
-    reach: tuple[float, float]
-    sides: tuple[float, float]
-    thickness: float
-    is_round: bool
-
-    @staticmethod
-    def of(body: Box | Cylinder, share: float) -> "Region":
-        """Return the region that leaves out the ``share`` of the smaller of half the width and the thickness."""
-        if isinstance(body, Cylinder):
-            sides, thickness = (body.radius, body.radius), body.height
-        else:
-            sides, thickness = (body.size[0] / 2, body.size[1] / 2), body.size[2]
-        left = share * min(*sides, thickness)
-        return Region((sides[0] - left, sides[1] - left), sides, thickness, isinstance(body, Cylinder))
-
-    @property
-    def margin(self) -> float:
-        """The way (m) from the region to the sides."""
-        return self.sides[0] - self.reach[0]
-
-    def room(self, x: float, y: float) -> float:
-        """Return the way (m) from a place to the nearest side, or to the bottom."""
-        if self.is_round:
-            return min(self.sides[0] - float(np.hypot(x, y)), self.thickness)
-        return min(self.sides[0] - abs(x), self.sides[1] - abs(y), self.thickness)
 
 
 @stage("export mesh")
@@ -68,7 +38,9 @@ def coarse_mesh(case: Case, region: Region, finer: float = 1.0) -> BodyMesh:
     Raises:
         MeshError: if the body cannot be meshed.
     """
-    near, far = region.margin / (_NEAR * finer), region.thickness / (_THROUGH * finer)
+    through = _TO_TISSUE if case.body.regions else _THROUGH
+    near, far = region.margin / (_NEAR * finer), region.thickness / (through * finer)
+    near = min(near, far) if case.body.regions else near
     size: dict[str, Any] = {"depth": region.margin, "at": (0.0, 0.0), "axis": None}
     if region.is_round:
         probe: Any = Disc.model_construct(shape="disc", radius=region.reach[0], **size)
@@ -94,17 +66,34 @@ def _without_quarter_points(arrays: MeshArrays) -> MeshArrays:
 
 
 @stage("regular parts")
-def compliances(body: BodyMesh, region: Region, places: Sequence[tuple[float, float]], poisson: float) -> FloatArray:
-    """Return c (1/m) and h (1/m³), shape (places, 2), for a Poisson's ratio.
+def compliances(
+    body: BodyMesh,
+    region: Region,
+    places: Sequence[tuple[float, float]],
+    poisson: float,
+    law: MaterialLaw | None = None,
+) -> FloatArray:
+    """Return what tables are made of, shape (places, 9), with a ``law`` of several regions if there are any.
+
+    They are c (1/m), h, A₁, A_xy (1/m³), and of R (1/m) R_xz, R_yz, the mean of R_xx and R_yy, half their difference,
+    and R_xy: see ``pipeline.realtime.table``.
 
     Raises:
         SolveError: if they cannot be solved for, or if the mesh is too coarse.
     """
-    forces = [PointForce(poisson, (x, y, 0.0), region.room(x, y)) for x, y in places]
+    centres = [((x, y, 0.0), region.room(x, y)) for x, y in places]
+    down = [PointForce(poisson, *centre) for centre in centres]
+    aside = [SideForce(poisson, *centre, direction) for centre in centres for direction in (0, 1)]
+    parts = list(regular_parts(body, [*down, *aside], law))
     found = []
-    for force, regular in zip(forces, regular_parts(body, forces), strict=True):
-        (*_, up), (*_, bent) = regular.at_centre()
+    for number, force in enumerate(down):
         # Of a unit of the field, 4πμ times the radius newtons, and E = 2 (1 + ν) μ.
-        scale = -2 * (1 + poisson) / (4 * pi * force.radius)
-        found.append((scale * up, scale * bent))
+        scale = 2 * (1 + poisson) / (4 * pi * force.radius)
+        pressed, *pulled = parts[number], *parts[len(down) + 2 * number : len(down) + 2 * number + 2]
+        at, bent = pressed.at_centre()
+        apart, twist = pressed.bends()
+        x, y = (part.at_centre()[0] for part in pulled)
+        # The force that presses is downwards.
+        normal = (-at[2], -bent[2], -apart[2], -twist[2], -at[0], -at[1])
+        found.append(scale * np.array([*normal, (x[0] + y[1]) / 2, (x[0] - y[1]) / 2, (x[1] + y[0]) / 2]))
     return np.array(found)

@@ -6,15 +6,20 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.export.checks import Check, check_touches, columns, needed
-from pipeline.export.compliance import Region, coarse_mesh, compliances
+from pipeline.export.checks import TOOLS, Check, check_touches, columns, needed, with_bar
+from pipeline.export.compliance import coarse_mesh, compliances
+from pipeline.export.curved import curved_model
 from pipeline.export.file import write_model
+from pipeline.export.full import Solver
+from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, Scope
 from pipeline.export.surface import has_surface, tabulate_surface
 from pipeline.export.tabulate import Places, tabulate
 from pipeline.realtime.model import Model
 from pipeline.realtime.surface import SurfaceTable
 from pipeline.shapes.bodies.box import Box
+from pipeline.shapes.bodies.cylinder import Cylinder
+from pipeline.solve.material import MaterialLaw
 
 # What is left out beside the sides, of the smaller of half the width and the thickness; how large contact may be, in
 # units of the way to the nearest side or the bottom.
@@ -22,7 +27,7 @@ MARGIN, LARGEST = 0.15, 0.4
 # The table may miss c by this share of what the asked accuracy leaves for the largest disc; full solves are as much
 # more precise. Bars before they are fitted: of c, of h's part, and of the fourth power of what a contact measures;
 # besides, no bar is shorter than what full solves tell.
-_SHARE, _PRECISE, _BARS = 0.4, 0.25, (1e-3, 0.03, 0.1)
+_SHARE, _PRECISE, _PRECISE_CURVED, _BARS = 0.4, 0.25, 0.5, (1e-3, 0.03, 0.1)
 _SEEDS = (1, 2)
 # How far off a flat face a query may be, in units of the thickness.
 _OFF = 1e-6
@@ -66,48 +71,64 @@ def export(
         ExportError: if the body leaves no region.
         MeshError, SolveError, RuntimeError: if a mesh, a regular part or a full solve fails.
     """
+    precise = _PRECISE * accuracy if scope.is_flat else _PRECISE_CURVED * accuracy
+    solver = Solver(scope.sections, scope.file, scope.young, precise)
+    make = _flat if scope.is_flat else curved_model
+    bare, missed, places = make(scope, solver, accuracy, largest, (*_BARS, precise), margin)
+    tools = range(len(TOOLS)) if len(bare.table.tensors) else (0,)
+    halves = [checks - checks // 2, checks // 2]
+    fitted, judged = (
+        check_touches(bare, solver, count, seed, tools) for count, seed in zip(halves, _SEEDS, strict=True)
+    )
+    # What is beyond the bar of a bonded tool alone is no matter of the others.
+    factor = needed([check for check in fitted if TOOLS[check.kind] != "bonded"], precise)
+    first, second, third = _BARS
+    model = replace(bare, bar=(factor * first, factor * second, factor * third, precise))
+    fitted, judged = ([with_bar(model, check) for check in half] for half in (fitted, judged))
+    seen = _seen(scope, margin, model) if surface and has_surface(scope.body) else None
+    return Exported(model, fitted, judged, missed, places, seen)
+
+
+def _seen(scope: Scope, margin: float, model: Model) -> SurfaceTable:
+    assert isinstance(scope.body, Box | Cylinder)
+    region = Region.of(scope.body, margin)
+    return tabulate_surface(coarse_mesh(scope.case, region), region, scope.poissons, model.origin)
+
+
+def _flat(
+    scope: Scope, _: Solver, accuracy: float, largest: float, bar: tuple[float, float, float, float], margin: float
+) -> tuple[Model, float, int]:
+    """Return the model of a flat body, by how much its table missed, and how many places were solved for."""
+    assert isinstance(scope.body, Box | Cylinder)
     region = Region.of(scope.body, margin)
     if min(region.reach) <= 0:
         raise ExportError("the body leaves no region: ask for a smaller margin")
     mesh = coarse_mesh(scope.case, region)
+    law = MaterialLaw(*scope.tissues) if scope.tissues else None
     solved: list[tuple[float, float]] = []
 
     def counted(places: Places, poisson: float) -> FloatArray:
         solved.extend(places)
-        return compliances(mesh, region, places, poisson)
+        return compliances(mesh, region, places, poisson, law)
 
     table, missed = tabulate(region, scope.poissons, counted, _SHARE * accuracy)
-    top, precise = scope.body.heights[1], _PRECISE * accuracy
-    bare = Model(
-        table, np.array([0.0, 0.0, top]), np.eye(3), region.sides, region.thickness, scope.young, scope.poisson,
-        largest, (*_BARS, precise), off=_OFF * region.thickness,
+    model = Model(
+        table, np.array([0.0, 0.0, scope.body.heights[1]]), np.eye(3), region.sides, region.thickness, scope.young,
+        scope.poisson, largest, bar, off=_OFF * region.thickness,
     )  # fmt: skip
-    halves = [checks - checks // 2, checks // 2]
-    fitted, judged = (
-        check_touches(bare, region, scope.body, count, seed, precise)
-        for count, seed in zip(halves, _SEEDS, strict=True)
-    )
-    factor = needed(fitted, precise)
-    first, second, third = _BARS
-    model = replace(bare, bar=(factor * first, factor * second, factor * third, precise))
-    fitted, judged = (
-        [replace(check, bar=precise + factor * (check.bar - precise)) for check in half] for half in (fitted, judged)
-    )
-    is_seen = surface and has_surface(scope.body)
-    seen = tabulate_surface(mesh, region, scope.poissons, model.origin) if is_seen else None
-    return Exported(model, fitted, judged, missed, len(solved), seen)
+    return model, missed, len(solved)
 
 
 def write(exported: Exported, path: Path, scope: Scope, study: Path, version: str) -> None:
     """Write a model with its checks and where it comes from."""
     model, body = exported.model, scope.body
-    sizes = body.size if isinstance(body, Box) else (body.radius, body.height)
     attributes = {
-        "title": f"Real-time model of a {body.shape}, frictionless tools",
+        "title": f"Real-time model of a {body.shape}",
         "source": f"epsmesh {version}, {study.name}",
-        "body": f"{body.shape}, " + " x ".join(f"{1e3 * size:g}" for size in sizes) + " mm, held at its bottom",
-        "tools": "disc, sphere, sharp cone: frictionless, straight down, contact up to "
-        f"{model.largest:g} of the way to the nearest side or the bottom",
+        "body": f"{body.shape}, {body.face}, held at {body.fixed}",
+        "tools": "disc, sphere, sharp cone: frictionless"
+        + ("; blade; bonded disc" if len(model.table.tensors) else "")
+        + f"; along the normal, contact up to {model.largest:g} of the way to a side, the bottom or other tissue",
         "held": f"{sum(check.is_held for check in exported.judged)} of {len(exported.judged)} judged touches",
     }
     write_model(path, model, columns(exported.fitted, exported.judged), attributes, exported.surface)

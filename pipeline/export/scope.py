@@ -1,17 +1,29 @@
 """Which studies have a real-time model, and what of them it is made for."""
 
+import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
+from pipeline.export.region import half_sides, is_round, tissue_depth
 from pipeline.shapes.bodies.box import Box
 from pipeline.shapes.bodies.cylinder import Cylinder
+from pipeline.shapes.bodies.ellipsoid import Ellipsoid
+from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.probes.cone import Cone
+from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.support import Faces
+from pipeline.shapes.tissue import Tissue
 from pipeline.study.sweep import Case, Study
 
 # Poisson's ratios that a model holds at least, and at most: beyond, displacement elements lock.
 _USUAL, _MOST = (0.3, 0.49), 0.49
 
-_CONTACTS = {"disc": "frictionless", "sphere": "unilateral", "cone": "unilateral"}
+_CONTACTS = {
+    "disc": ("frictionless", "bonded"), "blade": ("frictionless",), "sphere": ("unilateral",), "cone": ("unilateral",),
+}  # fmt: skip
+# Depth of other tissue, at least, in units of half the smaller width: c varies over places as fast as that.
+_SHALLOWEST = 0.1
 
 
 class ExportError(Exception):
@@ -20,13 +32,34 @@ class ExportError(Exception):
 
 @dataclass(frozen=True)
 class Scope:
-    """A case with the body, E and ν where a query gives none, and the range of ν."""
+    """A case with the body, E and ν where a query gives none, and the range of ν.
+
+    ``sections`` are those of the study's ``file``, of which full solves are made.
+    """
 
     case: Case
-    body: Box | Cylinder
+    body: Body
     young: float
     poisson: float
     poissons: tuple[float, float]
+    sections: Mapping[str, Any]
+    file: str
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether the face is a plane: its regular part then gives the model, else full solves do."""
+        return isinstance(self.body, Box | Cylinder)
+
+    @property
+    def tissues(self) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
+        """λ and μ of all regions in units of μ at the face, or nothing if there is one material."""
+        if not self.body.regions:
+            return None
+        mu = surface_tissue(self.case).lame[1]
+        lambdas, shears = zip(
+            *((a / mu, b / mu) for a, b in (tissue.lame for tissue in self.case.tissues)), strict=True
+        )
+        return lambdas, shears
 
 
 def scope_of(study: Study) -> Scope:
@@ -40,10 +73,18 @@ def scope_of(study: Study) -> Scope:
     for case in cases:
         if reason := _refusal(case, first):
             raise ExportError(f"{study.file}: {reason}")
-    ratios = [case.material.poisson for case in cases]
-    assert isinstance(first.body, Box | Cylinder)
-    poissons = min(_USUAL[0], *ratios), max(_USUAL[1], *ratios)
-    return Scope(first, first.body, first.material.young, first.material.poisson, poissons)
+    tissue = surface_tissue(first)
+    ratios = [surface_tissue(case).poisson for case in cases]
+    is_simple = isinstance(first.body, Box | Cylinder) and not first.body.regions
+    poissons = (min(_USUAL[0], *ratios), max(_USUAL[1], *ratios)) if is_simple else (ratios[0], ratios[0])
+    sections = tomllib.loads(study.text) if study.text else {}
+    return Scope(first, first.body, tissue.young, tissue.poisson, poissons, sections, study.file)
+
+
+def surface_tissue(case: Case) -> Tissue:
+    """Return what the face of the body is made of."""
+    body = case.body
+    return body.layers[0] if isinstance(body, Layered) and body.layers else case.material
 
 
 def _refusal(case: Case, first: Case) -> str:
@@ -51,23 +92,42 @@ def _refusal(case: Case, first: Case) -> str:
     body, probe = case.body, case.probe
     if body != first.body:
         return "a model is of one body, and the study has several: export a study of each"
-    if not isinstance(body, Box | Cylinder):
-        return f'body.shape = "{body.shape}" has no real-time model yet: boxes and cylinders have'
-    if body.regions:
-        return "layers and inclusions have no real-time model yet: one material has"
-    if not isinstance(body.support, Faces) or set(body.support.names) != {"bottom"}:
-        return 'such a support has no real-time model yet: fixed = "bottom" has'
     if case.load.acts:
         return "gravity and tractions have no real-time model yet"
+    if case.poisson > _MOST:
+        return f"material.poisson = {case.poisson:g} is too near to 0.5 for a real-time model: at most {_MOST}"
+    if probe.action != "pierce" or probe.motion == "all" or probe.slit is not None:
+        return "a model is of tools that press straight down, and neither slide nor turn nor cut"
+    if isinstance(body, Box | Cylinder):
+        return _flat_refusal(case, first)
+    if not isinstance(body, Ellipsoid | Scanned):
+        return f'body.shape = "{body.shape}" has no real-time model yet: boxes, cylinders, ellipsoids and surfaces have'
+    if case.material != first.material:
+        return "a model of a curved body is of one material, and the study has several: export a study of each"
+    if (probe.shape, probe.contact) != ("disc", "frictionless"):
+        return (
+            "a model of a curved body is made with a frictionless disc, 2/3 as large as the largest tool: give that one"
+        )
+    if len(probe.at) != len("xy") or probe.axis is not None:
+        return "probe.at must be x and y, the middle of the region, and probe.axis left out"
+    return ""
+
+
+def _flat_refusal(case: Case, first: Case) -> str:
+    body, probe = case.body, case.probe
+    if body.regions and case.material != first.material:
+        return "a model of layers or inclusions is of one set of materials, and the study has several"
+    if isinstance(body, Cylinder) and not is_round(body):
+        return "a cylinder with an inclusion off its axis has no real-time model yet"
+    if body.regions and tissue_depth(body) < _SHALLOWEST * min(half_sides(body)):
+        return "other tissue so near to the surface has no real-time model: a tenth of half the width is the least"
+    if not isinstance(body.support, Faces) or set(body.support.names) != {"bottom"}:
+        return 'such a support has no real-time model yet: fixed = "bottom" has'
     if probe.shape not in _CONTACTS:
-        return f'probe.shape = "{probe.shape}" has no real-time model yet: disc, sphere and cone have'
-    if probe.contact != _CONTACTS[probe.shape]:
-        right = _CONTACTS[probe.shape]
+        return f'probe.shape = "{probe.shape}" has no real-time model yet: {", ".join(_CONTACTS)} have'
+    if probe.contact not in _CONTACTS[probe.shape]:
+        right = '" or "'.join(_CONTACTS[probe.shape])
         return f'probe.contact = "{probe.contact}" of a {probe.shape} has no real-time model yet: "{right}" has'
     if isinstance(probe, Cone) and probe.tip:
         return "a rounded cone has no real-time model yet: a sharp one has"
-    if probe.action != "pierce" or probe.motion == "all" or not case.frame.is_upright:
-        return "a model is of tools that press straight down, and neither slide nor turn nor cut"
-    if case.material.poisson > _MOST:
-        return f"material.poisson = {case.material.poisson:g} is too near to 0.5 for a real-time model: at most {_MOST}"
-    return ""
+    return "" if case.frame.is_upright else "a model is of tools that press straight down"

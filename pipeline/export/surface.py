@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.arrays import FloatArray, IntArray
-from pipeline.export.compliance import Region
+from pipeline.export.region import Region
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.realtime.surface import SurfaceTable
 from pipeline.shapes.bodies.box import Box

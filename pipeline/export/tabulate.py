@@ -1,15 +1,16 @@
 """Chebyshev tables of a body's compliance, as large as the asked accuracy takes, each place and its images once."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.export.compliance import Region
-from pipeline.realtime.table import Table
+from pipeline.export.region import Region
+from pipeline.realtime.table import Table, factors
 
 Places = Sequence[tuple[float, float]]
-# c and h (places, 2) at places, for a Poisson's ratio.
+# c, h and what blades and bonded tools take besides (places, 9) at places, for a Poisson's ratio; or c and h alone.
 Compliances = Callable[[Places, float], FloatArray]
 
 # Intervals between the nodes along one direction, each twice the last: what is known is used again. Nodes over ν.
@@ -17,20 +18,28 @@ _SIZES, _POISSONS = (4, 8, 16), 3
 # c_ref in units of 1/thickness, above the least c.
 _ABOVE = 1.0
 _DIGITS = 12
+# Of a place and its image where x and y are exchanged: c, h, A₁, A_xy, R_xz, R_yz, mean and half difference, R_xy.
+_SWAPPED, _SIGNS = [0, 1, 2, 3, 5, 4, 6, 7, 8], np.array([1, 1, -1, 1, 1, 1, 1, -1, 1])
+# Of the tables beyond c and h, so many are second derivatives; on a round body, along x, some are what others are.
+_BENDS, _TWINS = 2, {1: 0, 3: 2, 6: 5}
 
 
 def tabulate(
-    region: Region, poissons: tuple[float, float], compliances: Compliances, tolerance: float
+    region: Region,
+    poissons: tuple[float, float],
+    compliances: Compliances,
+    tolerance: float,
+    sizes: Sequence[int] = _SIZES,
 ) -> tuple[Table, float]:
     """Return a table, and by how much the last but one missed c × room at the new nodes of the last.
 
     It is the first whose forerunner missed less than ``tolerance``, or the largest.
     """
     low, high = poissons
-    ratios = (low + high) / 2 + (high - low) / 2 * _nodes(_POISSONS - 1)
+    ratios = (low + high) / 2 + (high - low) / 2 * (_nodes(_POISSONS - 1) if low < high else np.zeros(1))
     known: list[dict[tuple[float, float], FloatArray]] = [{} for _ in ratios]
     table, missed = None, np.inf
-    for size in _SIZES:
+    for size in sizes:
         places = _places(region, size)
         new = [place for place in dict.fromkeys(_image(region, p) for p in places) if place not in known[0]]
         for ratio, found in zip(ratios, known, strict=True):
@@ -41,7 +50,7 @@ def tabulate(
                 for ratio, found in zip(ratios, known, strict=True)
                 for x, y in new
             )
-        values = np.array([[found[_image(region, place)] for place in places] for found in known])
+        values = np.array([[_turned(region, place, found) for place in places] for found in known])
         table = _table(region, poissons, size, values)
         if missed <= tolerance:
             break
@@ -58,16 +67,43 @@ def _missed(table: Table, place: tuple[float, float], poisson: float, c: float) 
 
 
 def _table(region: Region, poissons: tuple[float, float], size: int, values: FloatArray) -> Table:
-    """Return the table through ``values`` (ν, places, 2)."""
-    c, h = np.moveaxis(values.reshape(_POISSONS, -1, size + 1, 2), -1, 0)
+    """Return the table through ``values`` (ν, places, 2 or 9)."""
+    c, h, *others = np.moveaxis(values.reshape(len(values), -1, size + 1, values.shape[-1]), -1, 0)
     c_ref = max(0.0, -float(c.min())) + _ABOVE / region.thickness
     t = 1 / (c + c_ref)
-    return Table(_coefficients(t), _coefficients(h * t**3), c_ref, region.reach, region.is_round, poissons)
+    tensors = _tensors(region, size, [f * t ** (3 if n < _BENDS else 1) for n, f in enumerate(others)])
+    table = Table(
+        _coefficients(t), _coefficients(h * t**3), c_ref, region.reach, region.is_round, poissons, region.even
+    )
+    return replace(table, tensors=tensors) if others else table
+
+
+def _tensors(region: Region, size: int, values: Sequence[FloatArray]) -> FloatArray:
+    """Return the coefficients of what the tables of blades and bonded tools are times known factors."""
+    xi, eta = (shares(size, even) for even in region.even)
+    eta = np.zeros(1) if region.is_round else eta
+    found: list[FloatArray] = []
+    for number, value in enumerate(values):
+        if region.is_round and number in _TWINS:
+            found.append(found[_TWINS[number]])
+            continue
+        known = [[factors((x, y), region.reach, region.even, region.is_round)[number][0] for x in xi] for y in eta]
+        found.append(_divided(value, np.array(known)))
+    return np.array(found)
+
+
+def _divided(values: FloatArray, factor: FloatArray) -> FloatArray:
+    """Return the coefficients of ``values`` (ν, v, u) over a ``factor`` that is 0 at the last nodes, or at none."""
+    kept = tuple(slice(None) if len(line) == 1 or line[-1] != 0 else slice(-1) for line in (factor[:, 0], factor[0]))
+    smooth = values[:, kept[0], kept[1]] / factor[kept]
+    found = np.zeros(values.shape)
+    found[:, kept[0], kept[1]] = _coefficients(smooth, values.shape)
+    return found
 
 
 def _places(region: Region, size: int) -> Places:
     """Return the places of the nodes, x fastest."""
-    x, y = (reach * np.sqrt((_nodes(size) + 1) / 2) for reach in region.reach)
+    x, y = (reach * shares(size, even) for reach, even in zip(region.reach, region.even, strict=True))
     ys = [0.0] if region.is_round else y.tolist()
     return [(round(a, _DIGITS), round(b, _DIGITS)) for b in ys for a in x.tolist()]
 
@@ -75,8 +111,21 @@ def _places(region: Region, size: int) -> Places:
 def _image(region: Region, place: tuple[float, float]) -> tuple[float, float]:
     """Return the place of which another is the image on a square face, or the same."""
     x, y = place
-    is_square = not region.is_round and region.sides[0] == region.sides[1]
-    return (max(x, y), min(x, y)) if is_square else place
+    return (max(x, y), min(x, y)) if region.is_square and not region.is_round else place
+
+
+def _turned(region: Region, place: tuple[float, float], found: Mapping[tuple[float, float], FloatArray]) -> FloatArray:
+    """Return what is known of a place, or what its image on a square face tells of it."""
+    image = _image(region, place)
+    values = found[image]
+    if image == place or len(values) < len(_SWAPPED):
+        return values
+    return values[_SWAPPED] * _SIGNS
+
+
+def shares(size: int, even: bool) -> FloatArray:
+    """Return the nodes along a direction, in units of the reach."""
+    return np.asarray(np.sqrt((_nodes(size) + 1) / 2)) if even else _nodes(size)
 
 
 def _nodes(size: int) -> FloatArray:
@@ -84,10 +133,10 @@ def _nodes(size: int) -> FloatArray:
     return np.asarray(np.cos(np.pi * np.arange(size + 1) / size))
 
 
-def _coefficients(values: FloatArray) -> FloatArray:
-    """Return the Chebyshev coefficients of values at the nodes along each direction."""
-    for axis, count in enumerate(values.shape):
+def _coefficients(values: FloatArray, nodes: tuple[int, ...] | None = None) -> FloatArray:
+    """Return the Chebyshev coefficients of values at the first of so many ``nodes`` along each direction, or at all."""
+    for axis, (count, of) in enumerate(zip(values.shape, nodes or values.shape, strict=True)):
         if count > 1:
-            matrix = np.polynomial.chebyshev.chebvander(_nodes(count - 1), count - 1)
+            matrix = np.polynomial.chebyshev.chebvander(_nodes(of - 1)[:count], count - 1)
             values = np.moveaxis(np.tensordot(np.linalg.inv(matrix), values, (1, axis)), 0, axis)
     return values

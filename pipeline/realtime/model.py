@@ -16,6 +16,8 @@ from pipeline.realtime.table import TENSORS, Table
 FORMAT = 2.0
 # A depth (m) below which nothing touches; the smallest tool (m).
 _TOUCHING, _SMALLEST = 1e-12, 1e-6
+# How far the regular part of a bonded tool may be off, in units of (1 - 2ν) a/room².
+_STICKS = 0.1
 # Coefficients along one direction, and in all: the C side holds as many.
 MOST, MOST_IN_ALL = 64, 4096
 
@@ -137,7 +139,7 @@ class Model:
         if found is None:
             return _refused("large")
         force *= modulus
-        error = found.stiffness * self._uncertain(place, room, found) + self.bar[3]
+        error = found.stiffness * self._uncertain(shape, place, room, found) + self.bar[3]
         if not (np.isfinite(force).all() and isfinite(error) and found.force > 0 and found.stiffness > 0):
             return _refused("damaged")
         return Touch("ok", force, error, modulus * found.stiffness, found.radius)
@@ -193,12 +195,14 @@ class Model:
             return "poisson"
         return "deep" if depth >= self.thickness else ""
 
-    def _uncertain(self, place: Place, room: float, contact: Contact) -> float:
+    def _uncertain(self, shape: "Tool", place: Place, room: float, contact: Contact) -> float:
         """Return how far c may be off (1/m), what is left out of it included."""
         of_c, of_h, beyond, _ = self.bar
         share = (contact.radius / room) ** 4
         bent = abs(place.h) + (2 * float(np.hypot(*place.shape.bent)) if place.shape else 0.0)
-        return (of_c + beyond * share) / room + of_h * bent * contact.mean_square
+        # Tissue that sticks is pulled inwards or outwards as well, more the more its volume changes.
+        sticks = _STICKS * (1 - 2 * place.poisson) * contact.radius / room if isinstance(shape, Bonded) else 0.0
+        return (of_c + beyond * share + sticks) / room + of_h * bent * contact.mean_square
 
 
 def load(path: str | Path) -> Model:
@@ -259,7 +263,8 @@ def _check(found: dict[str, NDArray[np.float64]]) -> None:
         "aligned": bool(0 < found["aligned"] <= 0.5),
         "tensors": tensors is None or tensors.shape == (TENSORS, *shape),
         "reciprocal": shape == found["curvature"].shape and max(shape) <= MOST and prod(shape) <= MOST_IN_ALL,
-        "is_round": bool(found["is_round"] == 0) or (bool(found["is_round"] == 1) and shape[1] == 1),
+        "is_round": bool(found["is_round"] == 0)
+        or (bool(found["is_round"] == 1) and shape[1] == 1 and bool((flags == 1).all())),
         "axes": bool(np.abs(axes @ axes.T - np.eye(3)).max() < 1e-9),
         "reach": bool((reach > 0).all() and (reach < sides).all()),
         "poisson_range": bool(-1 < low <= found["poisson"] <= high <= 0.5) and (shape[0] == 1 or bool(low < high)),

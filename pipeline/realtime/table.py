@@ -10,7 +10,7 @@ What tools take that are not round, or stick, are seven more, each t³ times the
 
 R the regular part of the Green's function at the place itself, A the second derivatives of R_zz with the place alone
 (h = A_xx + A_yy), but for what mirror images make of them: with ξ = x/X and η = y/Y the factors 1, 2ξη, ξ, η, 1, 1,
-2ξη, for a round body ξ² - η², 2ξη, ξ, η, 1, ξ² - η², 2ξη.
+2ξη, for a round body ξ² - η², 2ξη, ξ, η, 1, ξ² - η², 2ξη. Where there is no image, 1 is in the place of ξ or η.
 """
 
 from dataclasses import dataclass, field
@@ -115,7 +115,8 @@ class Table:
     def _shape(self, others: list[_Local], x: float, y: float, t: float, slope_t: Array) -> tuple[Array, Array, Array]:
         """Return A₁ and A_xy, their slopes, and R."""
         (a, b), values, slopes = self.reach, [], []
-        for (f, slope, _), (factor, own) in zip(others, factors(x / a, y / b, (a, b), self.is_round), strict=True):
+        known = factors((x / a, y / b), self.reach, self.even, self.is_round)
+        for (f, slope, _), (factor, own) in zip(others, known, strict=True):
             values.append(factor * f)
             slopes.append(factor * slope + f * own)
         bent, bent_slopes = np.array(values[:2]) / t**3, np.array(slopes[:2]) / t**3
@@ -125,13 +126,17 @@ class Table:
         return bent, bent_slopes, regular
 
 
-def factors(xi: float, eta: float, reach: tuple[float, float], is_round: bool) -> list[tuple[float, Array]]:
-    """Return what each of the seven tables is times, with its slope (1/m)."""
-    a, b = reach
+def factors(
+    at: tuple[float, float], reach: tuple[float, float], even: tuple[bool, bool], is_round: bool
+) -> list[tuple[float, Array]]:
+    """Return what each of the seven tables is times, with its slope (1/m), at ξ and η."""
+    (xi, of_x), (eta, of_y) = (
+        (share, 1 / size) if is_even else (1.0, 0.0) for share, size, is_even in zip(at, reach, even, strict=True)
+    )
     one, none = 1.0, np.zeros(2)
-    twist = (2 * xi * eta, np.array([2 * eta / a, 2 * xi / b]))
-    along, across = (xi, np.array([1 / a, 0.0])), (eta, np.array([0.0, 1 / b]))
-    apart = (xi**2 - eta**2, np.array([2 * xi / a, -2 * eta / b])) if is_round else (one, none)
+    twist = (2 * xi * eta, np.array([2 * eta * of_x, 2 * xi * of_y]))
+    along, across = (xi, np.array([of_x, 0.0])), (eta, np.array([0.0, of_y]))
+    apart = (xi**2 - eta**2, np.array([2 * xi * of_x, -2 * eta * of_y])) if is_round else (one, none)
     return [apart, twist, along, across, (one, none), apart, twist]
 
 

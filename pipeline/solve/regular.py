@@ -37,6 +37,8 @@ from pipeline.solve.vectors import vector
 # Of the elements that R is found with, and of the polynomials that it is kept as.
 DEGREE, _POWER = 2, 5
 _EXPONENTS = np.array([e for e in product(range(_POWER + 1), repeat=3) if sum(e) <= _POWER])
+# A node this near to a force, in units of the radius, is where it acts.
+_AT_CENTRE = 1e-9
 # Points of quadrature on the half sphere, from pole to rim and round it.
 _UP, _ROUND = 16, 24
 
@@ -64,6 +66,12 @@ class Smooth:
         places = {tuple(exponents): number for number, exponents in enumerate(_EXPONENTS.tolist())}
         flat, bent = places[0, 0, 0], [places[2, 0, 0], places[0, 2, 0]]
         return self.coefficients[flat], 2 * self.coefficients[bent].sum(axis=0) / self.unit**2
+
+    def bends(self) -> tuple[FloatArray, FloatArray]:
+        """Return (∂²/∂x² - ∂²/∂y²)/2 of the displacement (3,), in 1/m, at the centre, and ∂²/∂x∂y."""
+        places = {tuple(exponents): number for number, exponents in enumerate(_EXPONENTS.tolist())}
+        xx, yy, xy = (self.coefficients[places[powers]] for powers in ((2, 0, 0), (0, 2, 0), (1, 1, 0)))
+        return (xx - yy) / self.unit**2, xy / self.unit**2
 
     def traction(self, points: FloatArray, normals: FloatArray, ratio: float) -> FloatArray:
         """Return σn (n, 3) in units of μ, for a ``ratio`` λ/μ."""
@@ -124,8 +132,11 @@ def regular_part(body: BodyMesh, force: PointForce) -> Smooth:
     return next(regular_parts(body, [force]))
 
 
-def regular_parts(body: BodyMesh, forces: Sequence[PointForce]) -> Iterator[Smooth]:
+def regular_parts(body: BodyMesh, forces: Sequence[PointForce], law: MaterialLaw | None = None) -> Iterator[Smooth]:
     """Yield R for each of ``forces``, of one Poisson's ratio, as ``regular_part`` does: one factorisation for all.
+
+    A ``law`` of several regions is in units of μ where the forces act: the half-space is of that material, and R has
+    what other regions make of its field as loads.
 
     Raises:
         SolveError: if that cannot be solved, or if the mesh is too coarse for the radius of a force.
@@ -133,7 +144,7 @@ def regular_parts(body: BodyMesh, forces: Sequence[PointForce]) -> Iterator[Smoo
     with Spaces(body) as spaces:
         space = spaces.get(DEGREE, Conditions(unilateral=True))
         places = np.asarray(space.dofs.space.tabulate_dof_coordinates())
-        for force, values in zip(forces, _solved(space, forces, places), strict=True):
+        for force, values in zip(forces, _solved(space, forces, places, law), strict=True):
             yield _fitted(body, force, places, values.reshape(-1, 3))
 
 
@@ -148,8 +159,12 @@ def _fitted(body: BodyMesh, force: PointForce, places: FloatArray, values: Float
     return Smooth.fit(force.centre, force.radius, points, values)
 
 
-def _solved(space: ElasticSpace, forces: Sequence[PointForce], places: FloatArray) -> Iterator[FloatArray]:
-    law = MaterialLaw.of(_ratio(forces[0].poisson), 1.0)
+def _solved(
+    space: ElasticSpace, forces: Sequence[PointForce], places: FloatArray, law: MaterialLaw | None = None
+) -> Iterator[FloatArray]:
+    own = MaterialLaw.of(_ratio(forces[0].poisson), 1.0)
+    others = None if law is None else _beyond(law, own)
+    law = law or own
     pull, rows = _pull(space.dofs.space)
     with (
         vector(space.dofs.space) as rhs, vector(space.dofs.space) as unknown,
@@ -165,6 +180,8 @@ def _solved(space: ElasticSpace, forces: Sequence[PointForce], places: FloatArra
                 for row, values in zip(rows, force.stress(places).transpose(1, 0, 2), strict=True):
                     row.x.array[:] = values.ravel()
                 rhs.array[:] -= fem.assemble_vector(pull).array[: space.dofs.owned]
+                if others is not None:
+                    _load_others(space, rhs, force, places, others)
                 rhs.array[space.dofs.prescribed_owned] = 0.0
                 unknown.set(0.0)
                 solver.solve(rhs, unknown)
@@ -174,6 +191,24 @@ def _solved(space: ElasticSpace, forces: Sequence[PointForce], places: FloatArra
                 yield found
         finally:
             solver.close()
+
+
+def _beyond(law: MaterialLaw, own: MaterialLaw) -> MaterialLaw:
+    """Return by how much Lamé's constants of each region are more than a half-space's ``own``."""
+    lame_lambda, mu = own.lame
+    return MaterialLaw(tuple(x - lame_lambda for x in law.lame_lambda), tuple(x - mu for x in law.lame_mu))
+
+
+def _load_others(space: ElasticSpace, rhs: Any, force: PointForce, places: FloatArray, others: MaterialLaw) -> None:
+    """Take from ``rhs`` what the half-space's field makes in other tissue than its own, clear of its centre."""
+    away = np.linalg.norm(places - np.array(force.centre), axis=1) > _AT_CENTRE * force.radius
+    field = np.zeros_like(places)
+    field[away] = force.at(places[away])
+    space.forms.displacement.x.array[:] = field.reshape(-1)
+    with vector(space.dofs.space) as more:
+        more.set(0.0)
+        space.apply(more, others)
+        rhs.axpy(-1.0, more)
 
 
 def _pull(space: Any) -> tuple[Any, list[Any]]:

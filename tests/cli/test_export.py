@@ -25,7 +25,7 @@ accuracy = "1 %"
 @pytest.mark.parametrize(
     ("contact", "arguments", "word"),
     [
-        ("bonded", (), '"bonded" of a disc has no real-time model yet'),
+        ("unilateral", (), '"unilateral" of a disc has no real-time model yet'),
         ("frictionless", ("--accuracy", "0.01%"), "must be between 0.2% and 20%"),
         ("frictionless", ("--accuracy", "fine"), "--accuracy fine"),
     ],

@@ -7,7 +7,8 @@ import pytest
 
 from pipeline.compat import geometry_dofs
 from pipeline.export import surface
-from pipeline.export.compliance import Region, coarse_mesh, compliances
+from pipeline.export.compliance import coarse_mesh, compliances
+from pipeline.export.region import Region
 from pipeline.export.scope import scope_of
 from pipeline.mesh.curve import EDGES
 from pipeline.realtime.surface import _below

@@ -198,6 +198,28 @@ def test_no_part_of_a_file_is_a_model(tmp_path):
             model_of(foreign)
 
 
+@pytest.mark.parametrize("kind", [{}, {"curved": True}])
+def test_a_damaged_file_is_no_model_or_answers_with_a_status(tmp_path, kind):
+    write_random(tmp_path / "model.nc", **kind)
+    data, rng, loaded = (tmp_path / "model.nc").read_bytes(), np.random.default_rng(9), 0
+    for number in range(400):
+        bad = bytearray(data)
+        for place in rng.integers(0, len(data) if number % 2 else 2500, rng.integers(1, 4)):
+            bad[place] = rng.integers(256)
+        try:
+            model = model_of(bytes(bad))
+        except ModelError as problem:
+            assert str(problem)
+            continue
+        loaded += 1
+        for tool, sizes in TOOLS:
+            with np.errstate(all="ignore"):
+                touch = model.query(tool, at=model.origin, depth=1e-4, **sizes)
+            assert touch.message or touch.status == "ok"
+            assert np.isfinite(touch.force).all() == (touch.status in ("ok", "lost"))
+    assert loaded > 20
+
+
 def test_tables_that_make_no_sense_give_a_status():
     model = random_model()
     table = replace(model.table, reciprocal=-model.table.reciprocal)

@@ -1,0 +1,176 @@
+"""How near real-time models come to full solves, and how long an answer takes, at a thousand a second.
+
+    python -m benchmarks.realtime [--touches 200] [--models box,cylinder,...] [--seconds 60]
+
+A model that is missing is exported first. Its touches are random, of other seeds than what its bar was fitted to; those
+that were solved before are kept in results/realtime/: a run can be resumed. Half an hour to some hours, by the touches.
+Beside each model stand what a half-space gives, and the model at the nearest place that its table was made from.
+"""
+
+import argparse
+import json
+import subprocess
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, replace
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from pipeline.arrays import FloatArray
+from pipeline.export.checks import TOOLS, Check, check_touches, with_bar
+from pipeline.export.export import export, write
+from pipeline.export.full import Solver, Tool
+from pipeline.export.scope import scope_of
+from pipeline.export.tabulate import shares
+from pipeline.realtime import load
+from pipeline.realtime.model import Model
+from pipeline.study.load import load as load_study
+
+_FOLDER = Path("results/realtime")
+_ACCURACY, _PRECISE, _CHECKS, _SEED = 0.01, 0.0025, 24, 1000
+_FLAT = (
+    '\n[probe]\nshape = "disc"\ncontact = "frictionless"\nradius = "4 mm"\ndepth = "0.1 mm"\n[mesh]\naccuracy = "1 %"\n'
+)
+_SOFT = '[material]\nyoung = "10 kPa"\npoisson = 0.45\n'
+_TUMOUR = """[[body.inclusion]]
+name = "tumour"
+at = ["0 mm", "0 mm", "-14 mm"]
+radius = "6 mm"
+young = "50 kPa"
+poisson = 0.45
+"""
+STUDIES = MappingProxyType({
+    "box": '[body]\nshape = "box"\nsize = ["80 mm", "80 mm", "40 mm"]\n' + _SOFT + _FLAT,
+    "cylinder": '[body]\nshape = "cylinder"\nradius = "30 mm"\nheight = "25 mm"\n' + _SOFT + _FLAT,
+    "tumour": '[body]\nshape = "box"\nsize = ["60 mm", "60 mm", "30 mm"]\n' + _TUMOUR + _SOFT + _FLAT,
+    "ellipsoid": '[body]\nshape = "ellipsoid"\naxes = ["40 mm", "40 mm", "25 mm"]\nfixed = {below = "-6 mm"}\n'
+    + _SOFT + _FLAT,
+    "liver": '[body]\nshape = "surface"\nfile = "../../meshes/liver.stl"\nunit = "mm"\nfixed = {below = "-20 mm"}\n'
+    + _SOFT + _FLAT.replace('depth =', 'at = ["-25 mm", "0 mm"]\ndepth ='),
+})  # fmt: skip
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--touches", type=int, default=200, help="a model")
+    parser.add_argument("--models", default=",".join(STUDIES), help="some of them, by name")
+    parser.add_argument("--seconds", type=float, default=60.0, help="of a loop at 1 kHz")
+    asked = parser.parse_args()
+    _FOLDER.mkdir(parents=True, exist_ok=True)
+    names = asked.models.split(",")
+    print("| model | tool | touches | median error | largest | held | bar/error | half-space | nearest point |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    for name in names:
+        model, solver = _model(name)
+        checks = list(_touches(name, model, solver, asked.touches))
+        for line in _lines(name, model, checks):
+            print(line, flush=True)
+    print()
+    print(_latency(_FOLDER / f"{names[0]}.epsm.nc", asked.seconds))
+
+
+def _model(name: str) -> tuple[Model, Solver]:
+    """Return a model, made if there is none yet, and what solves its touches."""
+    study, path = _FOLDER / f"{name}.toml", _FOLDER / f"{name}.epsm.nc"
+    study.write_text(STUDIES[name], encoding="utf-8")
+    scope = scope_of(load_study(study))
+    if not path.exists():
+        write(export(scope, _ACCURACY, _CHECKS), path, scope, study, "benchmark")
+    return load(path), Solver(scope.sections, scope.file, scope.young, _PRECISE)
+
+
+def _touches(name: str, model: Model, solver: Solver, count: int) -> Iterator[Check]:
+    """Yield touches with their full solves, those that are on file first."""
+    path = _FOLDER / f"{name}.touches.jsonl"
+    kept = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    kinds = range(len(TOOLS)) if len(model.table.tensors) else (0,)
+    for number in range(count):
+        if number < len(kept):
+            found = json.loads(kept[number])
+            yield with_bar(model, Check(**found | {"tool": Tool(**found["tool"])}))
+            continue
+        (check,) = check_touches(model, solver, 1, _SEED + number, (kinds[number % len(kinds)],))
+        with path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(asdict(check)) + "\n")
+        yield check
+
+
+def _lines(name: str, model: Model, checks: list[Check]) -> Iterator[str]:
+    """Yield a line for each tool."""
+    for kind, tool in enumerate(TOOLS):
+        of = [check for check in checks if check.kind == kind]
+        if not of:
+            continue
+        errors = np.abs([check.error for check in of])
+        bars = np.array([check.bar for check in of])
+        plain, nearest = (
+            np.abs([force(model, check) / check.full - 1 for check in of]) for force in (_half_space, _nearest)
+        )
+        cells = [
+            name, tool, str(len(of)), _percent(np.median(errors)), _percent(errors.max()),
+            f"{sum(check.is_held for check in of)}", f"{np.median(bars / np.maximum(errors, 1e-6)):.2g}",
+            f"{_percent(np.median(plain))}, {_percent(plain.max())}",
+            f"{_percent(np.median(nearest))}, {_percent(nearest.max())}",
+        ]  # fmt: skip
+        yield "| " + " | ".join(cells) + " |"
+
+
+def _half_space(model: Model, check: Check) -> float:
+    """Return F (N) of a half-space."""
+    zero = replace(
+        model.table, reciprocal=np.ones((1, 1, 1)), curvature=np.zeros((1, 1, 1)), c_ref=1.0, leans=False,
+        tensors=np.zeros((len(model.table.tensors), 1, 1, 1)),
+    )  # fmt: skip
+    return with_bar(replace(model, table=zero), check).force
+
+
+def _nearest(model: Model, check: Check) -> float:
+    """Return F (N) of the same tool at the nearest place that the table was made from."""
+    _, rows, columns = model.table.reciprocal.shape
+    x = model.table.reach[0] * shares(columns - 1, model.table.even[0])
+    if model.table.is_round:
+        radius = float(np.hypot(check.x, check.y))
+        share = float(x[np.argmin(np.abs(x - radius))]) / max(radius, 1e-12)
+        at = (check.x * share, check.y * share)
+    else:
+        y = model.table.reach[1] * shares(rows - 1, model.table.even[1])
+        at = (_closest(x, check.x, model.table.even[0]), _closest(y, check.y, model.table.even[1]))
+    # The tool may be larger than what the model takes there.
+    wide = replace(model, sides=(1e3, 1e3), thickness=1e3, largest=1.0)
+    return with_bar(wide, replace(check, x=at[0], y=at[1])).force
+
+
+def _closest(nodes: FloatArray, value: float, is_even: bool) -> float:
+    if not is_even:
+        return float(nodes[np.argmin(np.abs(nodes - value))])
+    return float(np.copysign(nodes[np.argmin(np.abs(nodes - abs(value)))], value))
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.2g} %"
+
+
+def _latency(path: Path, seconds: float) -> str:
+    """Return what queries take in C and in numpy, and how many ticks of a loop at 1 kHz were late."""
+    program = _FOLDER / "latency"
+    sources = ["realtime/epsmesh.c", "realtime/latency.c"]
+    subprocess.run(["cc", "-std=c99", "-O2", *sources, "-o", str(program), "-lm"], check=True)
+    arguments = [str(program), str(path), "20000", f"{seconds:g}"]
+    in_c = subprocess.run(arguments, check=True, capture_output=True, text=True).stdout
+    model, took = load(path), []
+    radius = 0.05 * model.thickness
+    for number in range(2000):
+        x = 0.8 * model.table.reach[0] * ((number % 101) / 50 - 1)
+        at = model.origin + np.array([x, 0.0, model.face.at(model.table, x, 0.0).height]) @ model.axes
+        begin = time.perf_counter()
+        model.query("disc", radius=radius, at=at.tolist(), depth=0.02 * radius)
+        took.append(1e6 * (time.perf_counter() - begin))
+    p50, p99 = np.percentile(took, [50, 99])
+    return f"{in_c}numpy    p50 {p50:.0f}  p99 {p99:.0f}  largest {max(took):.0f} us"
+
+
+if __name__ == "__main__":
+    main()
