@@ -139,7 +139,7 @@ class Model:
         if found is None:
             return _refused("large")
         force *= modulus
-        error = found.stiffness * self._uncertain(shape, place, room, found) + self.bar[3]
+        error = found.stiffness * self._uncertain(place, room, found, sticks=isinstance(shape, Bonded)) + self.bar[3]
         if not (np.isfinite(force).all() and isfinite(error) and found.force > 0 and found.stiffness > 0):
             return _refused("damaged")
         return Touch("ok", force, error, modulus * found.stiffness, found.radius)
@@ -195,14 +195,14 @@ class Model:
             return "poisson"
         return "deep" if depth >= self.thickness else ""
 
-    def _uncertain(self, shape: "Tool", place: Place, room: float, contact: Contact) -> float:
+    def _uncertain(self, place: Place, room: float, contact: Contact, *, sticks: bool = False) -> float:
         """Return how far c may be off (1/m), what is left out of it included."""
         of_c, of_h, beyond, _ = self.bar
         share = (contact.radius / room) ** 4
         bent = abs(place.h) + (2 * float(np.hypot(*place.shape.bent)) if place.shape else 0.0)
         # Tissue that sticks is pulled inwards or outwards as well, more the more its volume changes.
-        sticks = _STICKS * (1 - 2 * place.poisson) * contact.radius / room if isinstance(shape, Bonded) else 0.0
-        return (of_c + beyond * share + sticks) / room + of_h * bent * contact.mean_square
+        pulled = _STICKS * (1 - 2 * place.poisson) * contact.radius / room if sticks else 0.0
+        return (of_c + beyond * share + pulled) / room + of_h * bent * contact.mean_square
 
 
 def load(path: str | Path) -> Model:
