@@ -96,7 +96,7 @@ def test_axisymmetric_agrees_to_the_error_bars():
     ],
 )
 def test_studies_of_the_mesh_and_scenes_that_are_not_round_stay_in_three_dimensions(changes):
-    plan = make_plan(parse(raw(body=ROUND, plan={}, **changes)))
+    plan = make_plan(parse(raw(body=ROUND, **changes) | {"plan": {}}))
     assert not any(solve.axisymmetric for solve in plan.solves)
 
 
