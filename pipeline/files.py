@@ -6,6 +6,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from secrets import token_hex
 
+# Bytes that a disk must have left for a file: less than a dataset and its figure take.
+_LEAST_ROOM = 200_000
+
 
 def cache_folder() -> Path:
     """Return the folder of what can be made again: $EPSMESH_CACHE, or one in the user's cache."""
@@ -46,6 +49,26 @@ def write_new(path: Path, text: str) -> None:
             if path.exists():
                 raise FileExistsError(path) from error
             os.replace(temporary, path)
+
+
+def why_not_writable(path: Path) -> str:
+    """Say why no file can be written at ``path``, "" if one can: tried beside it, folders made, nothing left behind."""
+    if path.is_dir():
+        return f"{path}: is a folder, and a file of that name is to be written"
+    if path.exists() and not path.is_file():
+        return f"{path}: is no plain file"
+    for folder in path.parents:
+        if folder.exists():
+            if not folder.is_dir():
+                return f"{path}: cannot be written: {folder} is a file, not a folder"
+            break
+    try:
+        with _beside(path) as temporary:
+            temporary.write_bytes(bytes(_LEAST_ROOM))
+            _to_disk(temporary)
+    except OSError as error:
+        return f"{path}: cannot be written: {error.strerror or error}"
+    return ""
 
 
 @contextmanager

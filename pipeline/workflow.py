@@ -1,6 +1,7 @@
 """A study from plan to dataset, on a communicator: store, execution, interruption, results."""
 
 import signal
+import threading
 import time
 import traceback
 from collections.abc import Collection, Iterator
@@ -27,6 +28,10 @@ from pipeline.study.sweep import Study
 
 # Seconds that the first rank has, when a parallel run is interrupted, to write what is finished.
 _GRACE = 15
+
+
+class ResultsError(Exception):
+    """Dataset or figure cannot be written; what was computed is in the case store."""
 
 
 @dataclass
@@ -103,26 +108,45 @@ def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Term
     """Carry out ``plan`` and write ``<study>.nc`` and its figure into ``output``, unless it is a shard's; collective.
 
     Ctrl-C, and the request to end that mpirun or a batch system sends, end it with what is finished written.
+
+    Raises:
+        ResultsError: if the results cannot be written.
     """
     start, interrupted = _now(), False
     # dolfinx loads only when something is solved, and before signals are handled: gmsh resets Ctrl-C as it loads.
     if plan.solves:
         import pipeline.run.execute  # noqa: F401, PLC0415
+
+        leave_broken_pipes()
     try:
         with _interruptible() as signals:
             _execute(plan, opened, comm, progress, signals)
     except KeyboardInterrupt:
         interrupted = True
     files: tuple[Path, ...] = ()
+    wrong = ""
     if opened.store is not None:
         opened.store.close()
         if plan.part is None:
-            with stage("results"):
-                files = publish(plan, opened.records, {"start": start, "end": _now()}, output)
+            try:
+                with stage("results"):
+                    files = publish(plan, opened.records, {"start": start, "end": _now()}, output)
+            except (OSError, RuntimeError) as error:  # of a full disk HDF5 tells the latter
+                wrong = (
+                    f"{output}: the results of {plan.study.file} cannot be written: {error}; all forces are on record"
+                )
     counts = count_states(plan, opened.records)
     if not interrupted:
-        counts = comm.bcast(counts)
+        counts, wrong = comm.bcast((counts, wrong))
+    if wrong:
+        raise ResultsError(wrong)
     return Outcome(counts, failures(plan, opened.records), files, interrupted)
+
+
+def leave_broken_pipes() -> None:
+    """Leave it to Python that nobody reads what is printed: PETSc, as it loads, takes that for a crash."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
 
 
 def end_ranks(comm: MPI.Comm, status: int) -> None:

@@ -1,11 +1,13 @@
 """The command line: parse, call, print. Everything below it raises; only this folder prints and exits."""
 
+import sys
 from collections.abc import Callable
 
 import typer
 
 from pipeline.cli import checks, export, guide, merge, new, plan, report, store, study, touch, view
-from pipeline.cli.console import make_patient
+from pipeline.cli.console import error, make_patient, what_was_not_written
+from pipeline.cli.words import BAD_INPUT
 
 _HELP = """How fine must a mesh be, and where, for the reaction force of a surgical tool?
 
@@ -33,4 +35,9 @@ app.add_typer(store.app, name="store")
 def main() -> None:
     """Run the command ``epsmesh``."""
     make_patient()
-    app(prog_name="epsmesh")
+    try:
+        app(prog_name="epsmesh")
+    finally:
+        if why := what_was_not_written():
+            error(f"standard output: {why}")
+            sys.exit(BAD_INPUT)

@@ -15,6 +15,7 @@ def load_solvers() -> None:
     import pipeline.run.execute  # noqa: F401
 
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # PETSc takes it for a crash
 
 
 def paint(text: str, colour: str, stream: TextIO) -> str:
@@ -50,27 +51,33 @@ def plain(value: Any, key: str = "") -> Any:
 
 
 class Patient:
-    """A stream whose reader may go away: what is then written is dropped, and the command goes on to its end."""
+    """A stream whose reader may go away: what is then written is dropped, and the command goes on to its end.
+
+    ``fault`` says why else it could not be written: a full disk.
+    """
 
     def __init__(self, stream: TextIO):
         self._stream = stream
+        self.fault = ""
 
     def write(self, text: str) -> int:
         """Write ``text``, or drop it."""
         try:
             return self._stream.write(text)
-        except BrokenPipeError:
-            self._drop()
+        except OSError as error:
+            self._drop(error)
             return len(text)
 
     def flush(self) -> None:
         """Flush, or drop what is left."""
         try:
             self._stream.flush()
-        except BrokenPipeError:
-            self._drop()
+        except OSError as error:
+            self._drop(error)
 
-    def _drop(self) -> None:
+    def _drop(self, error: OSError) -> None:
+        if not isinstance(error, BrokenPipeError):
+            self.fault = error.strerror or str(error)
         # What the buffer still holds must go somewhere when Python ends.
         os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
 
@@ -84,3 +91,11 @@ def make_patient() -> None:
         stream = getattr(sys, name)
         if stream is not None and not stream.isatty():
             setattr(sys, name, Patient(stream))
+
+
+def what_was_not_written() -> str:
+    """Flush standard output; say why it could not be written, "" if it was, or if nobody wanted it."""
+    if not isinstance(sys.stdout, Patient):
+        return ""
+    sys.stdout.flush()
+    return sys.stdout.fault

@@ -7,7 +7,7 @@ import typer
 
 from pipeline import __version__
 from pipeline.cli.console import error, load_solvers, print_json
-from pipeline.cli.words import DEFAULT_OUTPUT, DONE, SOME_FAILED, File, Json, fail, load_all
+from pipeline.cli.words import DEFAULT_OUTPUT, DONE, SOME_FAILED, File, Json, check_output, fail, load_all
 
 # Of --accuracy: less than the tables and the formulas are good for; more than is of use.
 _ACCURACIES = (0.002, 0.2)
@@ -50,6 +50,7 @@ def export(
         fail(f"--accuracy {accuracy}: must be between {100 * _ACCURACIES[0]:g}% and {100 * _ACCURACIES[1]:g}%")
     (study,) = load_all([file])
     path = output or DEFAULT_OUTPUT / f"{study.name}.epsm.nc"
+    check_output(path)
     try:
         scope = scope_of(study)
     except ExportError as problem:

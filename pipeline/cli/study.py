@@ -26,6 +26,7 @@ from pipeline.cli.words import (
     Without,
     axes_of,
     check_names,
+    check_output,
     check_shard,
     check_store,
     fail,
@@ -102,6 +103,10 @@ def run(
     if store:
         check_store(store)
     part = check_shard(shard, studies)
+    # Where nothing was said, meshes that cannot be kept are made again: that stops nobody.
+    check_output(store or output / "cases.sqlite", folder=None if meshes == DEFAULT_MESHES else meshes)
+    for study in () if part else studies:
+        check_output(*(output / f"{study.name}.{suffix}" for suffix in ("nc", "png", "svg")))
     from pipeline import workflow
     from pipeline.run.store import StoreError
 
@@ -129,7 +134,7 @@ def run(
             progress = _progress(plan, verbose=verbose) if speaks and not quiet else None
             with workflow.abort_on_exception(comm):
                 outcome = workflow.run(plan, opened, comm, output, progress)
-        except StoreError as wrong:
+        except (StoreError, workflow.ResultsError) as wrong:
             fail(str(wrong))
         if speaks:
             seconds = time.monotonic() - start

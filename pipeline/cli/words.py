@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 from pipeline.cli.console import error, warning
+from pipeline.files import why_not_writable
 from pipeline.plan.cost import CostModel
 from pipeline.plan.plan import Plan
 from pipeline.plan.shard import Shard, parse_shard, reason_against
@@ -103,6 +104,13 @@ def check_store(path: Path) -> None:
             start = file.read(len(_SQLITE))
         if start and start != _SQLITE:
             fail(f"--store {path}: is not a case store")
+
+
+def check_output(*files: Path, folder: Path | None = None) -> None:
+    """Exit if one of the files, or any file in a ``folder``, could not be written: before anything is computed."""
+    tried = [*files, *([folder / "tried"] if folder else [])]
+    if wrong := [why for file in tried if (why := why_not_writable(file))]:
+        fail("\n".join(dict.fromkeys(wrong)))
 
 
 def axes_of(study: Study) -> str:
