@@ -33,7 +33,7 @@ def export(
     ] = True,
     as_json: Json = False,
 ) -> None:
-    """Make a model that answers 1,000 times a second: forces of round tools anywhere on a box or a cylinder.
+    """Make a model that answers 1,000 times a second: forces of small tools on a box, a cylinder, or part of an organ.
 
     Exit status 1 if its bars do not hold what they must on the touches that they are judged on.
 

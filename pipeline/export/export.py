@@ -122,10 +122,11 @@ def _flat(
 def write(exported: Exported, path: Path, scope: Scope, study: Path, version: str) -> None:
     """Write a model with its checks and where it comes from."""
     model, body = exported.model, scope.body
+    height = body.heights[1] - body.heights[0]
     attributes = {
         "title": f"Real-time model of a {body.shape}",
         "source": f"epsmesh {version}, {study.name}",
-        "body": f"{body.shape}, {body.face}, held at {body.fixed}",
+        "body": f"{body.shape}, {body.face}, {1e3 * height:g} mm high, held at {body.fixed}",
         "tools": "disc, sphere, sharp cone: frictionless"
         + ("; blade; bonded disc" if len(model.table.tensors) else "")
         + f"; along the normal, contact up to {model.largest:g} of the way to a side, the bottom or other tissue",
