@@ -41,6 +41,8 @@ def new(
     path = Path(name) if name.endswith(".toml") else _FOLDER / f"{name}.toml"
     if path.stem != path.stem.strip() or not path.stem.replace("-", "").replace("_", "").replace(".", "").isalnum():
         fail(f"NAME = {name!r}: must be letters, digits, - and _: results are called after it")
+    if not name.endswith(".toml") and Path(name).name != name:
+        fail(f"NAME = {name!r}: a name has no folders: it stands for {_FOLDER}/NAME.toml; a path ends in .toml")
     text = starter(path.stem) if like is None else _copy_of(like)
     try:
         write_new(path, text)

@@ -103,7 +103,7 @@ def _tessellated(path: Path, unit: str, content: str) -> dict[str, Any]:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    with np.load(path) as arrays:
+    with np.load(path, allow_pickle=False) as arrays:
         return {name: arrays[name] for name in arrays.files}
 
 
