@@ -359,6 +359,13 @@ def test_a_force_that_is_proportional_to_nothing_is_of_its_own_depth():
     assert reference_key(deep, 1e-3) != reference_key(shallow, 1e-3)
 
 
+@pytest.mark.parametrize("edges", [8, 40])
+def test_the_polygon_of_the_disc_to_be_drawn_has_the_area_of_the_disc(edges):
+    disc = example(PROBES["disc"])
+    drawn = disc.inscribed(edges)
+    assert edges / 2 * drawn.radius**2 * np.sin(2 * np.pi / edges) == pytest.approx(np.pi * disc.radius**2)
+
+
 def test_what_f_is_proportional_to_moves_the_footprint_and_leaves_its_shape(a_probe, a_body):
     frame, keys = a_probe.frame_on(a_body), a_probe.PROPORTIONAL_TO or ("depth",)
     once, twice = (a_probe.model_copy(update=dict.fromkeys(keys, much)) for much in (1e-4, 2e-4))
