@@ -359,6 +359,16 @@ def test_a_force_that_is_proportional_to_nothing_is_of_its_own_depth():
     assert reference_key(deep, 1e-3) != reference_key(shallow, 1e-3)
 
 
+@pytest.mark.parametrize("shape", ["box", "cylinder"])
+def test_the_way_to_a_side_ends_at_the_edge_of_the_face(shape):
+    body, (x, y) = example(BODIES[shape]), (3e-3, -2e-3)
+    for angle in np.linspace(0.1, 6.2, 7):
+        along = (cos(angle), sin(angle))
+        way = body.to_side((x, y), along)
+        assert way > 0
+        assert body.gap((x + way * along[0], y + way * along[1], 0.0)) == pytest.approx(0, abs=1e-12)
+
+
 @pytest.mark.parametrize("edges", [8, 40])
 def test_the_polygon_of_the_disc_to_be_drawn_has_the_area_of_the_disc(edges):
     disc = example(PROBES["disc"])
