@@ -25,7 +25,7 @@ def open_to_read(path: Path) -> Iterator[Records]:
             yield Records(path, database)
     except sqlite3.OperationalError as error:
         raise StoreError(f"the case store {path} cannot be read: {error}") from error
-    except sqlite3.DatabaseError as error:
+    except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
         raise StoreError(damaged(path, error)) from error
     except OSError as error:
         raise StoreError(f"the case store {path} cannot be read: {error.strerror}") from error
@@ -53,8 +53,8 @@ def read_rows(path: Path) -> list[Row]:
             if state != "ok":
                 raise sqlite3.DatabaseError(state)
             return Records(path, database).rows()
-    except (sqlite3.Error, OSError) as error:
-        raise StoreError(f"{path}: damaged, left out: {error}") from error
+    except (sqlite3.Error, UnicodeDecodeError, OSError) as error:
+        raise StoreError(f"{path}: damaged, left out: {'; '.join(str(error).splitlines())}") from error
 
 
 @contextmanager
