@@ -1,0 +1,38 @@
+"""Which facets cross is decided exactly, whatever a search in floating point makes of those that share a corner."""
+
+import numpy as np
+import pytest
+
+from pipeline.shapes.files import crossings as module
+from pipeline.shapes.files.crossings import crossings
+from tests.organs import sphere
+
+FLAT = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+
+
+@pytest.mark.parametrize(
+    ("other", "cross"),
+    [
+        ([[-1, 0, 1], [0, -1, 1]], False),
+        ([[-2, 2, 0], [-2, 3, 0]], False),
+        ([[1, 1, -1], [1, 1, 1]], True),
+        ([[2, 2, 0], [2, 3, 0]], True),
+        ([[0.5, 0, 1], [0.5, 0, 0]], True),
+    ],
+    ids=["beside", "in the plane, beside", "through", "upon", "touching"],
+)
+def test_two_facets_with_a_corner_in_common(other, cross):
+    for size in (1.0, 0.1, 1e-3 / 3):
+        points = size * np.array([*FLAT, *other])
+        assert bool(len(crossings(points, np.array([[0, 1, 2], [0, 3, 4]])))) is cross
+
+
+def test_pairs_that_are_found_by_mistake_are_dropped(monkeypatch):
+    """All neighbours of a good surface are said to cross: those with one corner in common are seen not to."""
+    points, facets = sphere(4)
+    share = (facets[:, None, :, None] == facets[None, :, None, :]).any(axis=3).sum(axis=2)
+    pairs = np.argwhere(np.triu(share == 1, 1))
+    assert len(pairs) > 500
+    monkeypatch.setattr(module, "_make_exact", lambda: None)
+    monkeypatch.setattr(module, "_search", lambda *_: pairs)
+    assert not len(crossings(points, facets))
