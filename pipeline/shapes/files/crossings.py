@@ -14,14 +14,14 @@ _MOST = 2000
 def crossings(points: FloatArray, facets: IntArray) -> IntArray:
     """Return the pairs (n, 2) of facets that have more in common than the corners and edges they share.
 
-    Facets that touch count. Decided exactly for those that share nothing. Of those that share a corner, floating point
-    finds what may cross, of which exact numbers keep what does; those that share an edge cross if they are folded upon
-    each other, as far as floating point can tell.
+    Facets that touch count. Of what libigl finds, rational numbers keep what does cross; those that share an edge cross
+    if they are folded upon each other, as far as floating point can tell.
     """
     _make_exact()
     pairs = _search(points, facets)
-    # What libigl finds of two facets that share a corner is floating point's alone: good ones were seen to cross.
-    doubtful = np.array([len({*facets[i]} & {*facets[j]}) == 1 for i, j in pairs], dtype=bool)
+    # Its predicates hold with the constants, and in the rounding, that a process begins with: in one that other
+    # libraries had worked in, facets of a good surface were seen to cross.
+    doubtful = np.array([len({*facets[i]} & {*facets[j]}) < 2 for i, j in pairs], dtype=bool)
     again = np.flatnonzero(doubtful)[:_MOST]
     wrong = [number for number in again if not _cross(*points[facets[pairs[number]]])]
     return np.delete(pairs, wrong, axis=0)
