@@ -31,6 +31,17 @@ def atomic(path: Path) -> Iterator[Path]:
         os.replace(temporary, path)
 
 
+def write_whole(path: Path, text: str) -> Path:
+    """Write ``text`` to ``path``, in place of an earlier file only once it is whole, and return it.
+
+    Raises:
+        OSError: as :func:`atomic` does.
+    """
+    with atomic(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return path
+
+
 def write_new(path: Path, text: str) -> None:
     """Write a file that was not there before.
 

@@ -1,16 +1,13 @@
 """A real-time model as a page: one HTML file that holds the model, what evaluates it, and what draws it."""
 
-import json
-from base64 import b64encode
-from hashlib import sha256
 from math import hypot
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from pipeline.files import atomic
+from pipeline.files import write_whole
+from pipeline.html import joined, json_in_page, render_page
 from pipeline.realtime.model import SENTENCES
 from pipeline.realtime.surface import Surface
 from pipeline.view import palette
@@ -33,25 +30,16 @@ _ANGLES = (20.0, 85.0)
 
 def write_touch_page(surface: Surface, path: Path, title: str) -> Path:
     """Write the page of a model to ``path``, in place of an earlier one only once it is whole."""
-    text = render(surface, title)
-    with atomic(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    return path
+    return write_whole(path, render(surface, title))
 
 
 def render(surface: Surface, title: str) -> str:
     """Return the page of a model as HTML; it loads nothing else."""
-    script = "\n".join(path.read_text(encoding="utf-8") for path in _SCRIPTS)
     arrays = _arrays(surface)
-    environment = Environment(
-        loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
-    )  # fmt: skip
-    return environment.get_template("touch.html.j2").render(
-        title=title, facts=_facts(surface), sliders=_sliders(surface), script=script,
-        style="\n".join(path.read_text(encoding="utf-8") for path in _STYLES),
-        script_hash=b64encode(sha256(script.encode()).digest()).decode(),
-        told=json.dumps(_told(surface, arrays), allow_nan=False).replace("</", r"<\/"), numbers=packed(arrays),
+    return render_page(
+        _TEMPLATES / "touch.html.j2", joined(*_SCRIPTS),
+        title=title, facts=_facts(surface), sliders=_sliders(surface),
+        style=joined(*_STYLES), told=json_in_page(_told(surface, arrays)), numbers=packed(arrays),
     )  # fmt: skip
 
 

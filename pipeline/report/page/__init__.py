@@ -1,16 +1,14 @@
 """The report of a study: one HTML page that holds all it needs, made from the dataset alone."""
 
 import re
-from base64 import b64encode
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 import xarray as xr
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from pipeline.files import atomic
+from pipeline.files import write_whole
+from pipeline.html import joined, render_page
 from pipeline.report.figures import FIGURES, choose, figure
 from pipeline.report.page.cases import FIRST_ROWS, case_table
 from pipeline.report.page.facts import facts, failures, provenance, reproduce, without_exact
@@ -27,10 +25,7 @@ def write_page(dataset: xr.Dataset, path: Path, scene: str = "") -> Path:
 
     ``scene`` is the page of one case, to stand in the report.
     """
-    text = render(dataset, path.stem, scene)
-    with atomic(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    return path
+    return write_whole(path, render(dataset, path.stem, scene))
 
 
 def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
@@ -38,16 +33,11 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
 
     A page in a page is bound by the policies of both: the report's must allow the scripts of the ``scene``.
     """
-    script = (_TEMPLATES / "page.js").read_text(encoding="utf-8")
     study = str(dataset.attrs.get("study", ""))
     table = case_table(dataset)
-    environment = Environment(
-        loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
-    )  # fmt: skip
-    return environment.get_template("page.html.j2").render(
-        title=dataset.attrs.get("title", name), name=name, style=(_TEMPLATES / "page.css").read_text(encoding="utf-8"),
-        script=script, script_hash=b64encode(sha256(script.encode()).digest()).decode(),
+    return render_page(
+        _TEMPLATES / "page.html.j2", joined(_TEMPLATES / "page.js"),
+        title=dataset.attrs.get("title", name), name=name, style=joined(_TEMPLATES / "page.css"),
         scene=scene, scene_scripts=_SCRIPT.findall(scene)[:1],
         facts=facts(dataset), failures=failures(dataset), without_exact=without_exact(dataset),
         figures=_figures(dataset), guide=guide_section(dataset), table=table, first_rows=FIRST_ROWS,

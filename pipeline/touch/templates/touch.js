@@ -192,13 +192,8 @@ class Page {
 
 let page = null;
 (async () => {
-  const gl = document.querySelector("canvas").getContext("webgl2", { antialias: true });
-  if (!gl) {
-    const trouble = document.getElementById("trouble");
-    trouble.textContent = "This browser does not draw in three dimensions (WebGL 2), or has it switched off.";
-    trouble.hidden = false;
-    return;
-  }
+  const gl = openCanvas();
+  if (!gl) return;
   const told = JSON.parse(document.getElementById("told").textContent);
   page = new Page(told, await unpack(document.getElementById("numbers").textContent, told.arrays), gl);
 })();

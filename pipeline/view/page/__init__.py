@@ -1,15 +1,11 @@
 """One case as a page to turn round with the mouse or by touch: one HTML file that holds all it needs."""
 
-import json
-from base64 import b64encode
-from hashlib import sha256
 from math import isfinite, isnan
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-from pipeline.files import atomic
+from pipeline.files import write_whole
+from pipeline.html import joined, json_in_page, render_page
 from pipeline.quantities import write
 from pipeline.view import palette
 from pipeline.view.fields import Fields
@@ -23,24 +19,16 @@ _MM = 1e3
 
 def write_page(fields: Fields, path: Path, title: str) -> Path:
     """Write the page of a case to ``path``, in place of an earlier one only once it is whole."""
-    text = render(fields, title)
-    with atomic(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    return path
+    return write_whole(path, render(fields, title))
 
 
 def render(fields: Fields, title: str) -> str:
     """Return the page of a case as HTML; it loads nothing else."""
-    script = "\n".join((TEMPLATES / name).read_text(encoding="utf-8") for name in _SCRIPTS)
     numbers = mesh_numbers(fields)
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
-    )  # fmt: skip
-    return environment.get_template("view.html.j2").render(
-        title=title, facts=_facts(fields), style=(TEMPLATES / "view.css").read_text(encoding="utf-8"), script=script,
-        script_hash=b64encode(sha256(script.encode()).digest()).decode(),
-        told=json.dumps(_told(fields, numbers), allow_nan=False).replace("</", r"<\/"), numbers=numbers.text,
+    return render_page(
+        TEMPLATES / "view.html.j2", joined(*(TEMPLATES / name for name in _SCRIPTS)),
+        title=title, facts=_facts(fields), style=joined(TEMPLATES / "view.css"),
+        told=json_in_page(_told(fields, numbers)), numbers=numbers.text,
     )  # fmt: skip
 
 

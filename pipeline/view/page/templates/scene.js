@@ -131,3 +131,14 @@ class Scene {
     gl.disable(gl.BLEND);
   }
 }
+
+/** What draws on the canvas, or null once the reader is told that there is none. */
+function openCanvas() {
+  const gl = document.querySelector("canvas").getContext("webgl2", { antialias: true });
+  if (!gl) {
+    const trouble = document.getElementById("trouble");
+    trouble.textContent = "This browser does not draw in three dimensions (WebGL 2), or has it switched off.";
+    trouble.hidden = false;
+  }
+  return gl;
+}
