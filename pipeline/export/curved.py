@@ -12,7 +12,6 @@ from pipeline.export.tabulate import Places, tabulate
 from pipeline.realtime.face import Face
 from pipeline.realtime.model import Model
 from pipeline.realtime.table import Table
-from pipeline.shapes.bodies.ellipsoid import Ellipsoid
 from pipeline.shapes.frame import PlaceError
 
 # Radii of the two discs, in units of the study's; the larger one is nearly the largest that the model answers for.
@@ -61,9 +60,9 @@ def curved_model(
 def _region(scope: Scope, radius: float, room: float) -> Region:
     body = scope.body
     is_round, reach, even = False, (_REACH * radius,) * 2, (False, False)
-    if isinstance(body, Ellipsoid) and not any(scope.case.probe.at[:2]) and not body.inclusion:
-        is_round, even = body.axes[0] == body.axes[1], (True, True)
-        reach = (_OF_AXES * body.axes[0], _OF_AXES * body.axes[1])
+    if body.half_sides and not any(scope.case.probe.at[:2]) and not body.inclusion:
+        is_round, even = body.is_round, (True, True)
+        reach = (_OF_AXES * body.half_sides[0], _OF_AXES * body.half_sides[1])
     return Region(reach, (reach[0] + 2 * room, reach[1] + 2 * room), room, is_round, even)
 
 

@@ -17,8 +17,7 @@ from pipeline.export.surface import has_surface, tabulate_surface
 from pipeline.export.tabulate import Places, tabulate
 from pipeline.realtime.model import Model
 from pipeline.realtime.surface import SurfaceTable
-from pipeline.shapes.bodies.box import Box
-from pipeline.shapes.bodies.cylinder import Cylinder
+from pipeline.shapes.body import Layered
 from pipeline.solve.material import MaterialLaw
 
 # What is left out beside the sides, of the smaller of half the width and the thickness; how large contact may be, in
@@ -90,7 +89,7 @@ def export(
 
 
 def _seen(scope: Scope, margin: float, model: Model) -> SurfaceTable:
-    assert isinstance(scope.body, Box | Cylinder)
+    assert isinstance(scope.body, Layered)
     region = Region.of(scope.body, margin)
     return tabulate_surface(coarse_mesh(scope.case, region), region, scope.poissons, model.origin)
 
@@ -99,7 +98,7 @@ def _flat(
     scope: Scope, _: Solver, accuracy: float, largest: float, bar: tuple[float, float, float, float], margin: float
 ) -> tuple[Model, float, int]:
     """Return the model of a flat body, by how much its table missed, and how many places were solved for."""
-    assert isinstance(scope.body, Box | Cylinder)
+    assert isinstance(scope.body, Layered)
     region = Region.of(scope.body, margin)
     if min(region.reach) <= 0:
         raise ExportError("the body leaves no region: ask for a smaller margin")

@@ -5,13 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pipeline.export.region import half_sides, is_round, tissue_depth
-from pipeline.shapes.bodies.box import Box
-from pipeline.shapes.bodies.cylinder import Cylinder
-from pipeline.shapes.bodies.ellipsoid import Ellipsoid
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.probes.cone import Cone
-from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.support import Faces
 from pipeline.shapes.tissue import Tissue
 from pipeline.study.sweep import Case, Study
@@ -48,7 +43,7 @@ class Scope:
     @property
     def is_flat(self) -> bool:
         """Whether the face is a plane: its regular part then gives the model, else full solves do."""
-        return isinstance(self.body, Box | Cylinder)
+        return isinstance(self.body, Layered)
 
     @property
     def tissues(self) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
@@ -75,7 +70,7 @@ def scope_of(study: Study) -> Scope:
             raise ExportError(f"{study.file}: {reason}")
     tissue = surface_tissue(first)
     ratios = [surface_tissue(case).poisson for case in cases]
-    is_simple = isinstance(first.body, Box | Cylinder) and not first.body.regions
+    is_simple = isinstance(first.body, Layered) and not first.body.regions
     poissons = (min(_USUAL[0], *ratios), max(_USUAL[1], *ratios)) if is_simple else (ratios[0], ratios[0])
     sections = tomllib.loads(study.text) if study.text else {}
     return Scope(first, first.body, tissue.young, tissue.poisson, poissons, sections, study.file)
@@ -98,9 +93,9 @@ def _refusal(case: Case, first: Case) -> str:
         return f"material.poisson = {case.poisson:g} is too near to 0.5 for a real-time model: at most {_MOST}"
     if probe.action != "pierce" or probe.motion == "all" or probe.slit is not None:
         return "a model is of tools that press straight down, and neither slide nor turn nor cut"
-    if isinstance(body, Box | Cylinder):
-        return _flat_refusal(case, first)
-    if not isinstance(body, Ellipsoid | Scanned):
+    if isinstance(body, Layered):
+        return _flat_refusal(case, first, body)
+    if not body.is_smooth:
         return f'body.shape = "{body.shape}" has no real-time model yet: boxes, cylinders, ellipsoids and surfaces have'
     if case.material != first.material:
         return "a model of a curved body is of one material, and the study has several: export a study of each"
@@ -113,13 +108,13 @@ def _refusal(case: Case, first: Case) -> str:
     return ""
 
 
-def _flat_refusal(case: Case, first: Case) -> str:
-    body, probe = case.body, case.probe
+def _flat_refusal(case: Case, first: Case, body: Layered) -> str:
+    probe = case.probe
     if body.regions and case.material != first.material:
         return "a model of layers or inclusions is of one set of materials, and the study has several"
-    if isinstance(body, Cylinder) and not is_round(body):
-        return "a cylinder with an inclusion off its axis has no real-time model yet"
-    if body.regions and tissue_depth(body) < _SHALLOWEST * min(half_sides(body)):
+    if body.has_round_top and not body.is_round:
+        return f"a {body.shape} with an inclusion off its axis has no real-time model yet"
+    if body.regions and body.depth_of_tissue < _SHALLOWEST * min(body.half_sides):
         return "other tissue so near to the surface has no real-time model: a tenth of half the width is the least"
     if not isinstance(body.support, Faces) or set(body.support.names) != {"bottom"}:
         return 'such a support has no real-time model yet: fixed = "bottom" has'

@@ -17,8 +17,7 @@ from pipeline.arrays import FloatArray, IntArray
 from pipeline.export.region import Region
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.realtime.surface import SurfaceTable
-from pipeline.shapes.bodies.box import Box
-from pipeline.shapes.bodies.cylinder import Cylinder
+from pipeline.shapes.body import Layered
 from pipeline.solve.far_field import PointForce
 from pipeline.solve.regular import OnBoundary, regular_on_boundary
 from pipeline.stages import stage
@@ -51,7 +50,7 @@ class Image:
 
 def has_surface(body: object) -> bool:
     """Tell whether a body is one material and its own mirror image or turned one, which is what is made use of here."""
-    return isinstance(body, Box | Cylinder) and not body.regions
+    return isinstance(body, Layered) and not body.regions
 
 
 @stage("far field")

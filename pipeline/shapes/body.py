@@ -17,6 +17,8 @@ from pipeline.shapes.surface import Surface
 
 # Layers that miss the height by this share of it fill the body.
 _SAME = 1e-9
+# Of the extent: an inclusion so near to the z axis is centred on it.
+_ON_AXIS = 1e-9
 # Points on an inclusion, besides the ends of its axes, that are looked at.
 _POINTS = 2000
 
@@ -125,6 +127,11 @@ class Body(Section, ABC):
 
     @property
     @abstractmethod
+    def is_smooth(self) -> bool:
+        """Whether its surface has no edges, but for facets that stand for what is smooth."""
+
+    @property
+    @abstractmethod
     def face(self) -> str:
         """The size of the face that a probe touches, in words."""
 
@@ -133,6 +140,24 @@ class Body(Section, ABC):
     @abstractmethod
     def mirror_planes(self) -> tuple[str, ...]:
         """Return the planes, of x = 0 ("x") and y = 0 ("y"), in which its shape is its own image."""
+
+    @property
+    @abstractmethod
+    def is_round(self) -> bool:
+        """Whether its shape and what is in it, wherever it is held, are the same all round the z axis."""
+
+    @property
+    def holds_round(self) -> bool:
+        """Whether what is in it is the same all round the z axis."""
+        return all(
+            max(map(abs, piece.at[:2])) <= _ON_AXIS * self.extent and piece.surface.axes[0] == piece.surface.axes[1]
+            for piece in self.inclusion
+        )
+
+    @property
+    @abstractmethod
+    def half_sides(self) -> tuple[float, float] | None:
+        """Half extents (m) along x and y of a body whose middle is the z axis, of a round one its radius twice."""
 
     @abstractmethod
     def half_plane(self) -> HalfPlane | None:
@@ -188,6 +213,28 @@ class Layered(Drawn):
         low, high = self.heights
         ends = (high - total for total in accumulate(layer.thickness or inf for layer in self.layers))
         return tuple(end for end in ends if end - low > _SAME * (high - low))
+
+    @property
+    @abstractmethod
+    def half_sides(self) -> tuple[float, float]:
+        """Half extents (m) of the top along x and y, of a round one its radius twice."""
+
+    @property
+    @abstractmethod
+    def has_round_top(self) -> bool:
+        """Whether the top is a circle about the z axis."""
+
+    @property
+    def is_round(self) -> bool:
+        """Whether the top and what is in it are the same all round the z axis."""
+        return self.has_round_top and self.holds_round
+
+    @property
+    def depth_of_tissue(self) -> float:
+        """How far (m) below the top the first other tissue begins, or the bottom lies."""
+        low, top = self.heights
+        ends = [low, *self.interfaces, *(piece.at[2] + piece.surface.axes[2] for piece in self.inclusion)]
+        return top - max(ends)
 
     @abstractmethod
     def to_side(self, point: tuple[float, float], direction: tuple[float, float]) -> float:

@@ -92,6 +92,16 @@ class Facetted(Body):
         """Return none: what was measured or modelled is not looked at for symmetry."""
         return ()
 
+    @property
+    def is_round(self) -> bool:
+        """Return that nothing is known of an axis."""
+        return False
+
+    @property
+    def half_sides(self) -> None:
+        """None: nothing is known of an axis."""
+        return
+
     def half_plane(self) -> None:
         """Return none: see there."""
 

@@ -79,6 +79,11 @@ class Scanned(Facetted):
         """Return that there is no edge: how far a footprint reaches is told by where its edge can be lifted."""
         return inf
 
+    @property
+    def is_smooth(self) -> bool:
+        """Return that all edges are those of facets."""
+        return True
+
     # ---- geometry -------------------------------------------------------------------------------------
 
     def surfaces(self) -> dict[str, tuple[Surface, ...]]:

@@ -153,6 +153,18 @@ def test_mirror_planes_and_half_plane_are_true(shape, fixed):
             assert held == [found.support.holds(surfaces, point[None], 1e-9) for point in at]
 
 
+def test_the_middle_is_the_axis_and_what_is_round_has_no_corner(a_body):
+    for along, half in zip(np.eye(3)[:2], a_body.half_sides, strict=True):
+        just = np.array([0.0, 0.0, sum(a_body.heights) / 2]) + np.outer([0.999 * half, -0.999 * half], along)
+        assert np.all(a_body.inside(just) > 0)
+        assert np.all(a_body.inside(just + np.outer([0.002, -0.002], along * half)) < 0)
+    aslant = np.append(0.999 * np.array(a_body.half_sides) / np.sqrt(2), sum(a_body.heights) / 2)
+    beyond = aslant * (1.002, 1.002, 1.0)
+    is_circle = a_body.inside(np.array([aslant]))[0] > 0 > a_body.inside(np.array([beyond]))[0]
+    assert a_body.is_round == (is_circle and a_body.half_sides[0] == a_body.half_sides[1])
+    assert a_body.is_smooth != has_edges(a_body)
+
+
 def test_gap_is_the_distance_to_the_edge_of_the_top(a_body):
     if not has_edges(a_body):
         return

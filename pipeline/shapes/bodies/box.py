@@ -106,6 +106,11 @@ class Box(Layered):
         beside = [(c, sides) for n, (c, sides) in enumerate(zip(point, self._sides, strict=True)) if n != number]
         return min(min(c - low, high - c) for c, (low, high) in beside)
 
+    @property
+    def is_smooth(self) -> bool:
+        """Return that it has edges."""
+        return False
+
     def to_side(self, point: tuple[float, float], direction: tuple[float, float]) -> float:
         """Return the distance (m) to the first of the four sides."""
         sizes = zip(point, direction, self.size, strict=False)
@@ -133,6 +138,16 @@ class Box(Layered):
     def mirror_planes(self) -> tuple[str, ...]:
         """Return both planes."""
         return "x", "y"
+
+    @property
+    def has_round_top(self) -> bool:
+        """Return that it has corners."""
+        return False
+
+    @property
+    def half_sides(self) -> tuple[float, float]:
+        """Half the extents along x and y (m)."""
+        return self.size[0] / 2, self.size[1] / 2
 
     def half_plane(self) -> None:
         """Return none: it has corners."""

@@ -180,6 +180,11 @@ class FromCad(FromFile):
         off = float(skin.distance(at)[0])
         return -off if off > _NEAR * self.extent else _to_edge(self, facet, at[0])
 
+    @property
+    def is_smooth(self) -> bool:
+        """Return that it may have edges anywhere."""
+        return False
+
     # ---- geometry -------------------------------------------------------------------------------------
 
     def surfaces(self) -> dict[str, tuple[Surface, ...]]:

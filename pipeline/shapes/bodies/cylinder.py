@@ -106,6 +106,11 @@ class Cylinder(Layered):
             return min(-point[2], point[2] + self.height)
         return self.radius - hypot(point[0], point[1])
 
+    @property
+    def is_smooth(self) -> bool:
+        """Return that it has edges."""
+        return False
+
     def to_side(self, point: tuple[float, float], direction: tuple[float, float]) -> float:
         """Return the distance (m) to the circle."""
         (x, y), (a, b) = point, direction
@@ -133,6 +138,16 @@ class Cylinder(Layered):
     def mirror_planes(self) -> tuple[str, ...]:
         """Return both planes."""
         return "x", "y"
+
+    @property
+    def has_round_top(self) -> bool:
+        """Return that it is a circle."""
+        return True
+
+    @property
+    def half_sides(self) -> tuple[float, float]:
+        """The radius (m), twice."""
+        return self.radius, self.radius
 
     def half_plane(self) -> Rectangle | None:
         """Return radius, height and layers; inclusions have none."""

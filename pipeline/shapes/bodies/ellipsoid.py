@@ -133,6 +133,11 @@ class Ellipsoid(Drawn):
         return inf
 
     @property
+    def is_smooth(self) -> bool:
+        """Return that it has none."""
+        return True
+
+    @property
     def face(self) -> str:
         """Its semi-axes."""
         return "semi-axes " + " × ".join(map(in_mm, self.axes))
@@ -140,6 +145,16 @@ class Ellipsoid(Drawn):
     def mirror_planes(self) -> tuple[str, ...]:
         """Return both planes."""
         return "x", "y"
+
+    @property
+    def is_round(self) -> bool:
+        """Whether its semi-axes along x and y are equal, and its inclusions round."""
+        return self.axes[0] == self.axes[1] and self.holds_round
+
+    @property
+    def half_sides(self) -> tuple[float, float]:
+        """The semi-axes along x and y (m)."""
+        return self.axes[0], self.axes[1]
 
     def half_plane(self) -> HalfEllipse | None:
         """Return half of its ellipse if it is one of revolution; inclusions have none."""
