@@ -4,23 +4,20 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from pipeline.plan import estimate
+from pipeline.plan.basis import use_reduced_basis
 from pipeline.plan.deeper import Deeper, deeper_than, depth_key
 from pipeline.plan.images import NOWHERE, Image, image_key, moved_key
 from pipeline.plan.key import case_key, digest, mesh_key
 from pipeline.plan.steps import MOST_DOFS, MeshStep, OperatorStep, Solve, mesh_steps
 from pipeline.plan.symmetry import is_round, model_planes
-from pipeline.plan.work import Plan, Struck
+from pipeline.plan.work import Plan, Struck, reason_of
 from pipeline.shapes.arrays import FloatArray
 from pipeline.study.sweep import Case
 
-# Fewer Poisson's ratios than this are solved one by one: a basis needs about five solutions itself.
-_FEWEST_RATIOS = 8
 _OF_STRESS_ALONE = (
     "F is proportional to Young's modulus, and to the depth unless contact grows with it or the tool stands in a slit: "
     "cases that differ in them only are solved once."
 )
-_FOUND_CONTACT = "No reduced basis: the area of contact changes with Poisson's ratio, and each is solved."
-_CLOSED = "No reduced basis: the far field changes with Poisson's ratio, and each is solved."
 _LONE_DEPTHS = (
     "No start from neighbouring depths: each depth of this tool has a mesh of its own; probe.depth_range makes it one "
     "for all."
@@ -29,8 +26,6 @@ _LARGE = (
     "F is proportional to Young's modulus, and to the depth unless the body is neo-Hookean: cases that differ in them "
     "only are solved once."
 )
-_NOT_ADDED = "No reduced basis: large displacements are not sums of others, and each Poisson's ratio is solved."
-_SEVERAL_MATERIALS = "No reduced basis: a body of several materials has more parameters than one, and each is solved."
 
 
 def strike_past_body(plan: Plan) -> Plan:
@@ -40,7 +35,7 @@ def strike_past_body(plan: Plan) -> Plan:
 
 def strike_duplicates(plan: Plan) -> Plan:
     """The same case twice is solved once."""
-    return _merged(plan, "duplicates", _reason(strike_duplicates))
+    return _merged(plan, "duplicates", reason_of(strike_duplicates))
 
 
 def strike_scaled(plan: Plan) -> Plan:
@@ -79,7 +74,7 @@ def strike_images(plan: Plan) -> Plan:
             images |= dict.fromkeys(solve.serves, image)
     solves = tuple(replace(solve, key=key.get(solve.key, solve.key)) for solve in plan.solves)
     plan = replace(plan, solves=solves, keys=tuple(key.get(k, k) for k in plan.keys), images=images)
-    return _merged(plan, "images", _reason(strike_images))
+    return _merged(plan, "images", reason_of(strike_images))
 
 
 def strike_moved(plan: Plan) -> Plan:
@@ -95,7 +90,7 @@ def strike_moved(plan: Plan) -> Plan:
             images = dict.fromkeys(solve.serves, Image(other.case.index, of_scene=False)) | images
     solves = tuple(replace(solve, key=key.get(solve.key, solve.key)) for solve in plan.solves)
     plan = replace(plan, solves=solves, keys=tuple(key.get(k, k) for k in plan.keys), images=images)
-    return _merged(plan, "moved", _reason(strike_moved))
+    return _merged(plan, "moved", reason_of(strike_moved))
 
 
 def _sweeps_places(plan: Plan) -> bool:
@@ -112,14 +107,14 @@ def use_axisymmetry(plan: Plan) -> Plan:
     key = {old: digest(f"{old} axisymmetric") if not solve.goal else old for old, solve in solves.items()}
     changed = tuple(replace(s, axisymmetric=True, key=key[s.key]) if s.key in key else s for s in plan.solves)
     plan = replace(plan, solves=changed, keys=tuple(key.get(k, k) for k in plan.keys))
-    return plan.struck_by("axisymmetric", len(key), _reason(use_axisymmetry))
+    return plan.struck_by("axisymmetric", len(key), reason_of(use_axisymmetry))
 
 
 def use_symmetry(plan: Plan) -> Plan:
     """Body, support and probe are their own mirror image: half or a quarter of the body is solved."""
     solves = tuple(_mirrored(solve) for solve in plan.solves)
     count = sum(bool(solve.mirrors) for solve in solves)
-    return replace(plan, solves=solves).struck_by("symmetry", count, _reason(use_symmetry))
+    return replace(plan, solves=solves).struck_by("symmetry", count, reason_of(use_symmetry))
 
 
 def share_meshes(plan: Plan) -> Plan:
@@ -129,7 +124,7 @@ def share_meshes(plan: Plan) -> Plan:
     first: dict[str, tuple[float, ...]] = {}
     solves = tuple(_standing(solve, first) for solve in plan.solves)
     plan = replace(plan, solves=solves, shared=True)
-    return plan.struck_by("sharing", len(plan.solves) - len(mesh_steps(plan.solves)), _reason(share_meshes))
+    return plan.struck_by("sharing", len(plan.solves) - len(mesh_steps(plan.solves)), reason_of(share_meshes))
 
 
 def _standing(solve: Solve, first: dict[str, tuple[float, ...]]) -> Solve:
@@ -148,7 +143,7 @@ def reuse_solutions(plan: Plan) -> Plan:
     count = sum(len(operator.solves) - _fresh(operator) for operator in operators)
     if not count and _has_lone_depths(operators):
         return replace(plan, struck=(*plan.struck, Struck("reuse", 0, _LONE_DEPTHS)))
-    return plan.struck_by("reuse", count, _reason(reuse_solutions))
+    return plan.struck_by("reuse", count, reason_of(reuse_solutions))
 
 
 def condense_sweeps(plan: Plan) -> Plan:
@@ -160,31 +155,7 @@ def condense_sweeps(plan: Plan) -> Plan:
     plan = replace(plan, condensed=True)
     steps = [step for step in plan.meshes if not step.axisymmetric and _is_small(step)]
     count = sum(len(operator.solves) for step in steps for operator in step.operators if operator.is_condensed)
-    return plan.struck_by("condensed", count, _reason(condense_sweeps))
-
-
-def use_reduced_basis(plan: Plan) -> Plan:
-    """Many Poisson's ratios on one operator: a few are solved, and the rest follow with a bound on the error of F."""
-    if not plan.shared:
-        return plan
-    tolerance = plan.study.planning.tolerance
-    many = {
-        solve.key: digest(f"{solve.key} reduced {tolerance!r}")
-        for step in plan.meshes for operator in step.operators if _suits_a_basis(operator)
-        for solve in operator.solves
-    }  # fmt: skip
-    solves = tuple(replace(s, key=many[s.key], reduced=True) if s.key in many else s for s in plan.solves)
-    plan = replace(plan, solves=solves, keys=tuple(many.get(key, key) for key in plan.keys))
-    operators = [operator for step in plan.meshes for operator in step.operators]
-    if not many and any(_suits_a_basis(operator, of_regions=True) for operator in operators):
-        return replace(plan, struck=(*plan.struck, Struck("reduced", 0, _SEVERAL_MATERIALS)))
-    if not many and any(_suits_a_basis(operator, found=True) for operator in operators):
-        return replace(plan, struck=(*plan.struck, Struck("reduced", 0, _FOUND_CONTACT)))
-    if not many and any(_suits_a_basis(operator, closed=True) for operator in operators):
-        return replace(plan, struck=(*plan.struck, Struck("reduced", 0, _CLOSED)))
-    if not many and any(_suits_a_basis(operator, large=True) for operator in operators):
-        return replace(plan, struck=(*plan.struck, Struck("reduced", 0, _NOT_ADDED)))
-    return plan.struck_by("reduced", len(many), _reason(use_reduced_basis))
+    return plan.struck_by("condensed", count, reason_of(condense_sweeps))
 
 
 def strike_stored(plan: Plan, stored: frozenset[str]) -> Plan:
@@ -194,7 +165,7 @@ def strike_stored(plan: Plan, stored: frozenset[str]) -> Plan:
     kept = tuple(solve for solve in plan.solves if solve.key not in stored)
     found = frozenset(solve.key for solve in plan.solves) & stored
     plan = replace(plan, solves=kept, stored=found)
-    return plan.struck_by("stored", len(found), _reason(strike_stored))
+    return plan.struck_by("stored", len(found), reason_of(strike_stored))
 
 
 # In the order in which they are applied.
@@ -213,10 +184,6 @@ REDUCTIONS: dict[str, Callable[[Plan], Plan]] = {
 }
 
 
-def _reason(reduction: Callable[..., Plan]) -> str:
-    return " ".join((reduction.__doc__ or "").split())
-
-
 def _rekeyed(
     plan: Plan, name: str, reduction: Callable[[Plan], Plan], key: Callable[..., str], reason: str = ""
 ) -> Plan:
@@ -224,7 +191,7 @@ def _rekeyed(
     solves = tuple(replace(solve, key=key(solve.case)) for solve in plan.solves)
     new = dict(zip((solve.key for solve in plan.solves), (solve.key for solve in solves), strict=True))
     plan = replace(plan, solves=solves, keys=tuple(new.get(k, k) for k in plan.keys))
-    return _merged(plan, name, reason or _reason(reduction))
+    return _merged(plan, name, reason or reason_of(reduction))
 
 
 def _merged(plan: Plan, name: str, reason: str) -> Plan:
@@ -272,32 +239,6 @@ def _is_small(step: MeshStep) -> bool:
         case.element == "displacement"
         and case.solve.method != "iterative"
         and (estimate.dofs(cells, case.mesh.degree) <= MOST_DOFS)
-    )
-
-
-def _suits_a_basis(
-    operator: OperatorStep, *, of_regions: bool = False, found: bool = False, closed: bool = False, large: bool = False
-) -> bool:
-    """Displacement elements depend on one parameter; and the bound is on the work of one movement, not on forces that
-    several take. ``of_regions`` asks of bodies of several materials, whose parameters are too many, ``found`` of
-    contact whose area changes with that parameter, ``closed`` of what is prescribed on a cut face and changes with it,
-    ``large`` of large displacements, which are not the sum of any others. In a slit more is asked for than the work.
-    """
-    first = operator.solves[0]
-    if first.case.load.acts:
-        return False
-    if bool(first.case.body.regions) != of_regions or first.case.probe.is_unilateral != found:
-        return False
-    if first.case.material.is_large != large:
-        return False
-    values = {solve.key if of_regions else solve.case.material.poisson for solve in operator.solves}
-    plain = first.goal is None and not first.axisymmetric and first.case.element == "displacement"
-    return (
-        plain
-        and len(values) >= _FEWEST_RATIOS
-        and first.case.is_closed == closed
-        and first.case.probe.slit is None
-        and first.case.movements == 1 + closed
     )
 
 

@@ -1,6 +1,6 @@
 """The work that a study needs, as a value that reductions make smaller, each with its reason."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 from pipeline.plan.cost import CostModel
@@ -64,3 +64,8 @@ class Plan:
     def struck_by(self, name: str, count: int, reason: str) -> "Plan":
         """Return the plan with a note of what a reduction did, if it did anything."""
         return replace(self, struck=(*self.struck, Struck(name, count, reason))) if count else self
+
+
+def reason_of(reduction: Callable[..., Plan]) -> str:
+    """Return the reason that a reduction's docstring gives, on one line."""
+    return " ".join((reduction.__doc__ or "").split())

@@ -221,6 +221,29 @@ class Planning(Section):
     ] = None
 
 
+# Each is drawn by the module of its name in pipeline/report/figures.
+FIGURES = (
+    "epsilon", "ratio", "speedup", "exact", "convergence", "accuracy", "map", "force", "compliance", "linear",
+    "contact", "loads",
+)  # fmt: skip
+
+
+class Drawing(Section):
+    """What the study's main figure shows. Forces do not depend on it."""
+
+    kind: Annotated[
+        Literal["auto", *FIGURES],  # type: ignore[valid-type]
+        Words("The study's main figure; auto is the most telling one of what is swept.", '"compliance"'),
+    ] = "auto"
+    paper: Annotated[
+        bool,
+        Words(
+            "Whether the paper's claims are marked: 80 % of F_max at 10 mm, for bodies cut free, and 50 times faster.",
+            "true",
+        ),
+    ] = False
+
+
 SECTIONS: dict[str, type[Section] | Mapping[str, type[Section]]] = {
     "body": BODIES,
     "material": Material,
@@ -229,6 +252,7 @@ SECTIONS: dict[str, type[Section] | Mapping[str, type[Section]]] = {
     "solve": Solving,
     "plan": Planning,
     "load": Load,
+    "figure": Drawing,
 }
 # Arrays of tables within a section: pieces of it, each with keys that can be swept.
 NESTED: dict[str, dict[str, type[Section]]] = {
@@ -236,6 +260,6 @@ NESTED: dict[str, dict[str, type[Section]]] = {
     "load": {"traction": Traction},
 }
 # Sections that say how, not what: their lists are no sweeps.
-SINGLE = ("solve", "plan")
+SINGLE = ("solve", "plan", "figure")
 # Tables within a section that stand for one of its keys.
 TABLES: dict[str, dict[str, type[Section]]] = {"probe": {"path": Path}}

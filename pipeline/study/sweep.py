@@ -16,7 +16,7 @@ from pipeline.shapes.section import Section
 from pipeline.shapes.tissue import Tissue
 from pipeline.study.loads import Load
 from pipeline.study.place import CLEAR, is_clear, place_error
-from pipeline.study.schema import Material, Mesh, Planning, Solving, material_of
+from pipeline.study.schema import Drawing, Material, Mesh, Planning, Solving, material_of
 
 # Keys that both body and probe have, or a variable of the dataset: their dimension says whose it is.
 _AMBIGUOUS = ("radius", "shape", "accuracy", "axis")
@@ -231,6 +231,13 @@ class Study:
         (planning,) = self.sections["plan"]
         assert isinstance(planning, Planning)
         return planning
+
+    @cached_property
+    def drawing(self) -> Drawing:
+        """The section on the figure, which is not swept."""
+        (drawing,) = self.sections["figure"]
+        assert isinstance(drawing, Drawing)
+        return drawing
 
     def cases(self) -> Iterator[Case]:
         """Yield every case, the last axis fastest."""

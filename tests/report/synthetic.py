@@ -9,12 +9,13 @@ from pipeline.report.dataset import build
 from pipeline.run.record import Record
 from pipeline.study.load import parse
 from tests.cases import BLADE, raw
+from tests.fuzz.studies import toml
 
 
 def dataset(failed: int = 0, pending: int = 0, **changes):
     """Return the dataset of a study with forces that follow the curves that real ones have."""
     content = raw(**changes)
-    plan = make_plan(parse(content))
+    plan = make_plan(parse(content, text=toml(content)))
     records = {}
     for number, solve in enumerate(plan.solves):
         case = solve.case

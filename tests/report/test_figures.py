@@ -12,6 +12,7 @@ from pipeline.report.figures.axis import horizontal
 from pipeline.report.figures.layout import arrange
 from pipeline.report.figures.style import COLOURS
 from pipeline.report.pareto import front, is_by_chance
+from pipeline.study.problems import StudyError
 from tests.report.synthetic import EPSILONS, FIGURE, dataset
 
 EXACT = {"exact": True}
@@ -24,7 +25,7 @@ SIZES = {"solve": EXACT, "mesh": {"rim": ["1 mm", "0.5 mm", "0.02 mm"], "fine": 
 SMALLER = FIGURE | {"solve": EXACT, "material": {"poisson": [0.3, 0.4]}, "mesh": {"epsilon": ["4 mm", "8 mm", "full"]}}
 # name: study, its main figure, the others
 STUDIES = {
-    "with F_exact": (SMALLER, "epsilon", {"convergence", "accuracy", "force", "exact"}),
+    "with F_exact": (SMALLER, "epsilon", {"convergence", "accuracy", "force", "compliance", "exact"}),
     "one case": ({}, "force", set()),
     "one value": ({"mesh": {"epsilon": ["6 mm"]}}, "force", set()),
     "no full order": ({"mesh": {"epsilon": EPSILONS[:-1]}}, "force", set()),
@@ -57,7 +58,8 @@ def test_main_figure_is_written_by_default_as_png_and_svg(tmp_path):
 
 
 def test_words_on_the_figure(tmp_path):
-    text = draw(dataset(failed=3, **FIGURE), tmp_path / "a", ["svg"])[0].read_text()
+    data = dataset(failed=3, **FIGURE, figure={"paper": True})
+    text = draw(data, tmp_path / "a", ["svg"])[0].read_text()
     for word in ("ε-mesh radius ε (mm)", "full", "ν = 0.45", "disc, pierce, outside free", "blade, cut, outside fixed",
                  "paper: 80 %", "speed-up", "cases: 3 failed"):  # fmt: skip
         assert word in text
@@ -93,12 +95,23 @@ def test_where_contact_is_found_force_and_area_are_drawn_against_the_depth(tmp_p
     assert all(word in text for word in ("area in contact (mm²)", "reaction force F (mN)", "depth d (mm)"))
 
 
-def test_the_papers_claim_stands_beside_bodies_that_are_cut_free_alone(tmp_path):
-    def drawn(outside):
-        data = dataset(mesh={"epsilon": EPSILONS, "outside": outside})
+def test_the_papers_claim_stands_where_a_study_asks_for_it_beside_bodies_that_are_cut_free_alone(tmp_path):
+    def drawn(outside, **figure):
+        data = dataset(mesh={"epsilon": EPSILONS, "outside": outside}, figure=figure)
         return draw(data, tmp_path / "a", ["svg"])[0].read_text().count("paper: 80 %")
 
-    assert [drawn(outside) for outside in (["free", "fixed"], ["coarse", "fixed"])] == [1, 0]
+    both, others = ["free", "fixed"], ["coarse", "fixed"]
+    assert [drawn(both, paper=True), drawn("free", paper=True), drawn(others, paper=True), drawn(both)] == [1, 1, 0, 0]
+
+
+def test_a_study_chooses_its_main_figure_among_those_that_suit_it(tmp_path):
+    assert choose(dataset(**SMALLER, figure={"kind": "exact"}))[:2] == ["exact", "epsilon"]
+    assert choose(dataset(**SMALLER, figure={"kind": "ratio"}))[:2] == ["ratio", "epsilon"]
+    assert choose(dataset(**SMALLER, figure={"kind": "map"}))[0] == "epsilon"
+    data = dataset(**SMALLER, figure={"kind": "force"})
+    assert [path.name for path in draw(data, tmp_path / "a", ["svg"])] == ["a.svg"]
+    with pytest.raises(StudyError, match=r"figure.kind.*pie"):
+        dataset(figure={"kind": "pie"})
 
 
 def test_a_title_is_text_whatever_stands_in_it(tmp_path):

@@ -6,18 +6,27 @@ import xarray as xr
 from pipeline.report.compliance import tool_dimension
 from pipeline.report.figures.dimensions import mesh_dimensions, refinements
 from pipeline.report.figures.loads import dimension
+from pipeline.report.table import study_of
+from pipeline.study.schema import FIGURES
 
-# What can be drawn on request: the last two are parts of "epsilon".
-KINDS = (
-    "epsilon", "exact", "convergence", "accuracy", "map", "force", "compliance", "linear", "contact", "loads",
-    "nothing", "ratio", "speedup",
-)  # fmt: skip
+# What can be drawn on request.
+KINDS = (*FIGURES, "nothing")
+# Parts of "epsilon".
+_PARTS = ("ratio", "speedup")
 
 
 def choose(dataset: xr.Dataset) -> list[str]:
-    """Return the kinds of figures that suit ``dataset``, its main one first."""
+    """Return the kinds of figures that suit ``dataset``, its main one first: what its study asks for, if it suits."""
     if not _known(dataset, "force"):
         return ["nothing"]
+    kinds = _suiting(dataset)
+    study = study_of(dataset)
+    asked = study.drawing.kind if study else "auto"
+    return sorted(kinds, key=asked.__ne__) if asked in kinds or not _has(kinds, asked) else [asked, *kinds]
+
+
+def _suiting(dataset: xr.Dataset) -> list[str]:
+    """Return the kinds of figures that suit what ``dataset`` sweeps and knows, the most telling one first."""
     kinds = []
     if dataset.sizes.get("depth", 0) > 1 and _known(dataset, "linear_ratio"):
         kinds.append("linear")
@@ -45,7 +54,7 @@ def choose(dataset: xr.Dataset) -> list[str]:
 
 def lacks(dataset: xr.Dataset, kind: str) -> str:
     """Return what ``dataset`` lacks for a figure of this kind, '' if nothing."""
-    if kind in choose(dataset) or (kind in ("ratio", "speedup") and "epsilon" in choose(dataset)):
+    if _has(choose(dataset), kind):
         return ""
     needs = {
         "epsilon": "several ε, and the full order among them",
@@ -63,6 +72,10 @@ def lacks(dataset: xr.Dataset, kind: str) -> str:
         "nothing": "that no case has a force",
     }
     return f"needs {needs[kind]}"
+
+
+def _has(kinds: list[str], kind: str) -> bool:
+    return kind in kinds or (kind in _PARTS and "epsilon" in kinds)
 
 
 def _known(dataset: xr.Dataset, name: str) -> bool:
