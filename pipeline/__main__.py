@@ -1,16 +1,33 @@
 """``python -m pipeline`` is the command ``epsmesh``."""
 
+import os
+import signal
 import sys
+from typing import Any, NoReturn
+
+INTERRUPTED = 130
 
 
 def main() -> None:
-    """Run the command ``epsmesh``; Ctrl-C ends it quietly even while it is loading."""
-    try:
-        from pipeline.cli import main as run  # noqa: PLC0415 (what loads here can be interrupted)
+    """Run the command ``epsmesh``; Ctrl-C ends it quietly, even while it loads or is on its way out."""
+    listens = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # else it is ignored: nohup, or `&`
+    if listens:
+        signal.signal(signal.SIGINT, _leave)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # scripts/epsmesh keeps it back until now
+    from pipeline.cli import main as run  # noqa: PLC0415 (what takes time to load)
 
+    try:
+        if listens:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
         run()
     except KeyboardInterrupt:
-        sys.exit(130)
+        signal.signal(signal.SIGINT, _leave)
+        sys.exit(INTERRUPTED)
+
+
+def _leave(*_: Any) -> NoReturn:
+    """End at once: nothing is begun, or all is done; an exception may come out of an import as another one."""
+    os._exit(INTERRUPTED)
 
 
 if __name__ == "__main__":

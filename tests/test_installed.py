@@ -20,8 +20,9 @@ def installed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("installed")
     # Building leaves files beside the sources.
     shutil.copytree(ROOT / "pipeline", folder / "src" / "pipeline", ignore=shutil.ignore_patterns("__pycache__"))
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
-        shutil.copy(ROOT / name, folder / "src")
+    (folder / "src" / "scripts").mkdir()
+    for name in ("pyproject.toml", "README.md", "LICENSE", "scripts/epsmesh"):
+        shutil.copy(ROOT / name, folder / "src" / name)
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation"]
     subprocess.run([*pip, "--target", folder / "site", folder / "src"], check=True, capture_output=True, timeout=300)
     (folder / "away").mkdir()
@@ -43,6 +44,16 @@ def test_every_command_loads(installed, command):
     done = installed("-m", "pipeline", command, "--help")
     assert done.returncode == 0, done.stderr
     assert "Example" in done.stdout
+
+
+def test_the_command_is_installed_beside_its_packages(installed):
+    place = installed("-c", "import pipeline; print(pipeline.__path__[0])").stdout.strip()
+    command = Path(place).parent / "bin" / "epsmesh"
+    path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
+    environment = os.environ | {"PYTHONPATH": str(Path(place).parent), "PATH": path}
+    done = subprocess.run([command, "version"], capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 0, done.stderr
+    assert "dolfinx" in done.stdout
 
 
 def test_what_measures_the_program_is_part_of_it(installed):

@@ -1,0 +1,39 @@
+"""Ctrl-C ends the command quietly at any moment of its start: also while Python itself starts."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.commands import ENVIRONMENT, ROOT
+
+LAUNCHER = ROOT / "scripts" / "epsmesh"
+PATHS = {"PYTHONPATH": str(ROOT), "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+# Seconds after which Ctrl-C comes: in the shell's part of the command, in Python's start, in ours, and later.
+MOMENTS = (0.0, 0.005, 0.01, 0.02, 0.03, 0.05, 0.1, 0.3)
+
+
+@pytest.mark.parametrize("after", MOMENTS)
+def test_an_interrupt_ends_it_with_130_and_without_a_word(after):
+    command = subprocess.Popen(
+        [LAUNCHER, "plan", "studies/quick.toml"], cwd=ROOT, env=ENVIRONMENT | PATHS, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    time.sleep(after)
+    command.send_signal(signal.SIGINT)
+    said, errors = command.communicate(timeout=60)
+    assert errors == ""
+    assert command.returncode in (130, -signal.SIGINT) or (command.returncode, bool(said)) == (0, True)
+
+
+def test_the_launcher_hands_on_arguments_and_status():
+    done = subprocess.run(
+        [LAUNCHER, "validate", "a b'c.toml"], cwd=ROOT, env=ENVIRONMENT | PATHS, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "a b'c.toml" in done.stderr
