@@ -9,7 +9,7 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from mpi4py import MPI
 
@@ -18,6 +18,7 @@ from pipeline.plan.plan import Plan, make_plan
 from pipeline.plan.shard import Shard
 from pipeline.report.publish import publish
 from pipeline.run.deadline import watched
+from pipeline.run.guard import Guard, Guarded
 from pipeline.run.outcome import count_states, failures
 from pipeline.run.progress import Silent, Terminal
 from pipeline.run.reading import read_rows
@@ -28,6 +29,8 @@ from pipeline.study.sweep import Study
 
 # Seconds that the first rank has, when a parallel run is interrupted, to write what is finished.
 _GRACE = 15
+# Within so many seconds a second signal is the first one again: sent to a group of processes, and passed on by one.
+_ECHO = 0.5
 
 
 class ResultsError(Exception):
@@ -41,6 +44,7 @@ class Opened:
     store: Store | None = None
     meshes: Path | None = None
     records: dict[str, Record] = field(default_factory=dict)
+    guard: Guard = field(default_factory=Guard)
 
     @property
     def notice(self) -> str:
@@ -73,29 +77,32 @@ def prepare(
     meshes: Path | None = None,
     shard: Shard | None = None,
     beside: Path | None = None,
+    guard: Guard | None = None,
 ) -> tuple[Plan, Opened]:
     """Open the case store and plan, on every rank alike, what is not on record; collective.
 
     ``fresh`` computes again what is stored; a timing study always does, but for F_exact. ``without`` names reductions
     that are not to be used. A ``shard`` plans its own part only, and reads, but never writes, the store ``beside``
-    its own, too.
+    its own, too. A ``guard`` knows what this run came to before it lost its process: that is on record, whatever
+    ``fresh`` says.
 
     Raises:
         StoreError: on every rank, if the store cannot be used.
     """
-    opened, message, cost = Opened(meshes=meshes), "", CostModel()
+    opened, message, cost = Opened(meshes=meshes, guard=guard or Guard()), "", CostModel()
     if comm.rank == 0:
         try:
             opened.store = Store(store_path)
             cost = opened.store.cost_model()
+            declared = make_plan(study, without=without, shard=shard)
             if not fresh:
-                declared = make_plan(study, without=without, shard=shard)
                 keys = () if study.solve.timing else declared.keys
                 wanted = {*keys, *declared.reference_keys}
                 found = opened.store.get(wanted)
                 opened.records = {key: record for key, record in found.items() if record.is_ok}
                 if shard is not None:
                     opened.records = _known_beside(beside, wanted) | opened.records
+            opened.records |= opened.guard.records(opened.store, {*declared.keys, *declared.reference_keys})
         except StoreError as error:
             message = str(error)
     message, stored, cost = comm.bcast((message, sorted(opened.records), cost))
@@ -180,6 +187,7 @@ def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | No
 
     def keep(record: Record) -> None:
         assert opened.store is not None
+        opened.guard.keep(record.key)  # before it is: one that the process ends with is computed again, not blamed
         if record.status != SKIPPED:  # why it was depends on this study
             opened.store.put(record)
         opened.records[record.key] = record
@@ -187,7 +195,7 @@ def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | No
             raise KeyboardInterrupt
 
     with progress or nullcontext():
-        execute(plan, comm, keep, progress or Silent(), opened.records, cache)
+        execute(plan, comm, keep, Guarded(progress or Silent(), opened.guard), opened.records, cache)
 
 
 @contextmanager
@@ -197,8 +205,13 @@ def _interruptible() -> Iterator[list[int]]:
     An exception raised while Python frees an object is lost: whoever has time looks at the list.
     """
     received: list[int] = []
+    first = 0.0
 
-    def interrupt(number: int, _: Any) -> NoReturn:
+    def interrupt(number: int, _: Any) -> None:
+        nonlocal first
+        if received and time.monotonic() - first < _ECHO:
+            return
+        first = time.monotonic()
         received.append(number)
         watch.answer()
         raise KeyboardInterrupt

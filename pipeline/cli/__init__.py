@@ -7,7 +7,7 @@ import typer
 
 from pipeline.cli import checks, export, guide, merge, new, plan, report, store, study, touch, view
 from pipeline.cli.console import error, make_patient, what_was_not_written
-from pipeline.cli.words import BAD_INPUT
+from pipeline.cli.words import BAD_INPUT, OWN_PROCESS
 
 _HELP = """How fine must a mesh be, and where, for the reaction force of a surgical tool?
 
@@ -36,7 +36,7 @@ def main() -> None:
     """Run the command ``epsmesh``."""
     make_patient()
     try:
-        app(prog_name="epsmesh")
+        app(prog_name="epsmesh", obj=OWN_PROCESS)
     finally:
         if why := what_was_not_written():
             error(f"standard output: {why}")

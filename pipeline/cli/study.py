@@ -1,6 +1,7 @@
 """The commands that run studies and show what came of them."""
 
 import time
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,6 +16,7 @@ from pipeline.cli.words import (
     DEFAULT_OUTPUT,
     DONE,
     INTERRUPTED,
+    OWN_PROCESS,
     SOME_FAILED,
     File,
     Files,
@@ -70,6 +72,7 @@ def validate(files: Files, as_json: Json = False) -> None:
 
 
 def run(
+    context: typer.Context,
     files: Files,
     output: Annotated[Path, typer.Option(metavar="DIR", help="Folder for <study>.nc and the figure.")] = DEFAULT_OUTPUT,
     store: StoreFile = None,
@@ -107,50 +110,48 @@ def run(
     check_output(store or output / "cases.sqlite", folder=None if meshes == DEFAULT_MESHES else meshes)
     for study in () if part else studies:
         check_output(*(output / f"{study.name}.{suffix}" for suffix in ("nc", "png", "svg")))
-    from pipeline import workflow
-    from pipeline.run.store import StoreError
+    from pipeline.run.guard import Guard, guarded
 
-    comm, found = workflow.world(), list[dict[str, Any]]()
-    speaks, failed = comm.rank == 0, False
-    for study in studies:
-        start = time.monotonic()
-        try:
-            main = output / "cases.sqlite"
-            path = store or (part.store(output, study) if part else main)
-            plan, opened = workflow.prepare(
-                study,
-                comm,
-                path,
-                fresh=fresh,
-                without=left_out,
-                meshes=meshes,
-                shard=part,
-                beside=main if part else None,
-            )
+    # Memory that runs out ends one case: another process waits, where this one is the command's own.
+    with guarded(error) if context.obj == OWN_PROCESS else nullcontext(Guard()) as guard:
+        from pipeline import workflow
+        from pipeline.run.store import StoreError
+
+        comm, found = workflow.world(), list[dict[str, Any]]()
+        speaks, failed = comm.rank == 0, False
+        for study in studies:
+            start = time.monotonic()
+            try:
+                main = output / "cases.sqlite"
+                path = store or (part.store(output, study) if part else main)
+                plan, opened = workflow.prepare(
+                    study, comm, path, fresh=fresh, without=left_out, meshes=meshes, shard=part,
+                    beside=main if part else None, guard=guard,
+                )  # fmt: skip
+                if speaks:
+                    announce(plan, opened, quiet=quiet or as_json, verbose=verbose)
+                    if as_json and not quiet:
+                        warn(study)
+                progress = _progress(plan, verbose=verbose) if speaks and not quiet else None
+                with workflow.abort_on_exception(comm):
+                    outcome = workflow.run(plan, opened, comm, output, progress)
+            except (StoreError, workflow.ResultsError) as wrong:
+                fail(str(wrong))
             if speaks:
-                announce(plan, opened, quiet=quiet or as_json, verbose=verbose)
-                if as_json and not quiet:
-                    warn(study)
-            progress = _progress(plan, verbose=verbose) if speaks and not quiet else None
-            with workflow.abort_on_exception(comm):
-                outcome = workflow.run(plan, opened, comm, output, progress)
-        except (StoreError, workflow.ResultsError) as wrong:
-            fail(str(wrong))
-        if speaks:
-            seconds = time.monotonic() - start
-            conclude(plan, opened, outcome, seconds, part, quiet=quiet or as_json)
-            found.append(as_data(plan, opened, outcome, seconds))
-        failed = failed or outcome.counts["failed"] > 0
+                seconds = time.monotonic() - start
+                conclude(plan, opened, outcome, seconds, part, quiet=quiet or as_json)
+                found.append(as_data(plan, opened, outcome, seconds))
+            failed = failed or outcome.counts["failed"] > 0
+            if outcome.interrupted:
+                break
+        ended = INTERRUPTED if outcome.interrupted else SOME_FAILED if failed else DONE
+        if speaks and profile:
+            print_stages()
+        if speaks and as_json:
+            print_json({"status": ended, "studies": found})
         if outcome.interrupted:
-            break
-    ended = INTERRUPTED if outcome.interrupted else SOME_FAILED if failed else DONE
-    if speaks and profile:
-        print_stages()
-    if speaks and as_json:
-        print_json({"status": ended, "studies": found})
-    if outcome.interrupted:
-        workflow.end_ranks(comm, INTERRUPTED)
-    raise typer.Exit(ended)
+            workflow.end_ranks(comm, INTERRUPTED)
+        raise typer.Exit(ended)
 
 
 def status(

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from pipeline.run.record import Record
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+# What a command finds as its context's object where it was started as a program, and not by a test.
+OWN_PROCESS = "own process"
 _PATIENCE = 5.0  # seconds
 _SQLITE = b"SQLite format 3\0"
 DEFAULT_OUTPUT, DEFAULT_MESHES = Path("results"), Path("meshes/cache")

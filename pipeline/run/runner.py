@@ -105,6 +105,7 @@ class StepRunner:
 
     def _on_mesh(self, step: MeshStep, memory: PeakMemory) -> None:
         """Mesh once, and solve every operator on it."""
+        self._begin(*step.solves)
         meshed = self._caught(lambda: self._mesh(step.solves[0]))
         if isinstance(meshed, Failure):
             self._fail(step.solves, meshed)
@@ -116,6 +117,7 @@ class StepRunner:
 
     def _operate(self, step: OperatorStep, ground: Ground) -> None:
         """Solve every material of an operator, or a few of them and the rest from these."""
+        self._begin(*step.solves)
         shared = self._assembles_parts(step, ground.mesh)
         condense, reuse = self._condenses(step, ground.mesh), self._plan.reuse
         problem = self._caught(
@@ -253,11 +255,15 @@ class StepRunner:
     def _record(self, solve: Solve, compute: Callable[[], Record]) -> None:
         """Compute and keep a record; if that fails, keep a record of the failure."""
         self._progress.note(solve.label)
+        self._begin(solve)
         found = self._caught(compute)
         if isinstance(found, Failure):
             self._fail((solve,), found)
         else:
             self._finish(solve, found)
+
+    def _begin(self, *solves: Solve) -> None:
+        self._progress.begin([solve.key for solve in solves if solve.key not in self._records])
 
     def _fail(self, solves: tuple[Solve, ...], failure: Failure) -> None:
         for solve in solves:
