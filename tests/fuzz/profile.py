@@ -7,6 +7,7 @@ from hypothesis import HealthCheck, Phase, settings
 # In the suite always the same ones: a new find is for `make fuzz` to make.
 IN_SUITE = 100
 _ASKED = int(os.environ.get("EPSMESH_FUZZ", "0"))
+IS_CAMPAIGN = _ASKED > 0
 
 
 def thrown(share: float = 1.0) -> settings:

@@ -2,6 +2,9 @@
 
 import struct
 
+import meshio
+import nibabel
+import nrrd
 import numpy as np
 import pytest
 from hypothesis import given
@@ -17,6 +20,7 @@ from pipeline.report.table import DatasetError
 from pipeline.run.reading import known_of, read_rows
 from pipeline.run.record import Record
 from pipeline.run.store import Store, StoreError
+from pipeline.shapes.files.image import load_image
 from pipeline.shapes.files.read import load_surface
 from pipeline.shapes.files.step import entities_of, named_faces, unit_of
 from pipeline.shapes.triangles import SurfaceError
@@ -56,7 +60,18 @@ def _float(value: float) -> bytes:
 @pytest.fixture(scope="module")
 def good(tmp_path_factory):
     folder = tmp_path_factory.mktemp("good")
-    write_stl(folder / "box.stl", *box(0.02, 0.02, 0.01))
+    points, facets = box(0.02, 0.02, 0.01)
+    write_stl(folder / "box.stl", points, facets)
+    meshio.write_points_cells(folder / "box.ply", 1e3 * points, [("triangle", facets)])
+    meshio.write_points_cells(folder / "box.obj", 1e3 * points, [("triangle", facets)])
+    places = np.stack(np.meshgrid(*3 * [np.arange(12)], indexing="ij"), -1)
+    ball = (((places - 5.5) ** 2).sum(-1) < 16).astype(np.uint8)
+    for ending in ("nii", "nii.gz"):
+        image = nibabel.Nifti1Image(ball, np.diag([2.0, 2.0, 2.0, 1.0]))
+        image.header.set_xyzt_units("mm")
+        nibabel.save(image, folder / f"ball.{ending}")
+    nrrd.write(str(folder / "ball.nrrd"), ball, {"space directions": 2 * np.eye(3), "space origin": np.zeros(3),
+               "space": "right-anterior-superior", "space units": ["mm"] * 3})  # fmt: skip
     write(dataset(), folder / "known.nc")
     write_random(folder / "box.epsm.nc")
     store = Store(folder / "cases.sqlite")
@@ -71,13 +86,26 @@ def thrown_at(tmp_path_factory):
     return tmp_path_factory.mktemp("thrown")
 
 
-@given(data=st.data())
+@given(data=st.data(), ending=st.sampled_from(["stl", "ply", "obj"]))
 @thrown(0.3)
-def test_surfaces(good, thrown_at, data):
-    file = thrown_at / "box.stl"
-    file.write_bytes(data.draw(damaged((good / "box.stl").read_bytes())))
+def test_surfaces(good, thrown_at, data, ending):
+    file = thrown_at / f"box.{ending}"
+    file.write_bytes(data.draw(damaged((good / file.name).read_bytes())))
     try:
         loaded = load_surface(file, 1e-3)
+    except SurfaceError as refused:
+        readable(refused)
+    else:
+        assert np.isfinite(loaded.triangles.points).all()
+
+
+@given(data=st.data(), ending=st.sampled_from(["nii", "nii.gz", "nrrd"]))
+@thrown(0.2)
+def test_label_maps(good, thrown_at, data, ending):
+    file = thrown_at / f"ball.{ending}"
+    file.write_bytes(data.draw(damaged((good / file.name).read_bytes())))
+    try:
+        loaded = load_image(file, 1)
     except SurfaceError as refused:
         readable(refused)
     else:
