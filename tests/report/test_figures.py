@@ -33,7 +33,7 @@ STUDIES = {
     "no epsilon": ({"material": {"poisson": [0.1, 0.2, 0.3]}}, "force", set()),
     "words only": ({"mesh": {"outside": ["coarse", "free"], "epsilon": "8 mm"}}, "force", set()),
     "sizes": (SIZES, "convergence", {"accuracy", "force", "exact"}),
-    "large": (LARGE, "epsilon", {"convergence", "accuracy", "force"}),
+    "large": (LARGE, "epsilon", {"convergence", "accuracy", "force", "compliance"}),
 }
 
 
