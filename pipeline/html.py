@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
 
 
 def render_page(template: Path, script: str, **content: Any) -> str:
@@ -25,6 +26,12 @@ def joined(*files: Path) -> str:
     return "\n".join(path.read_text(encoding="utf-8") for path in files)
 
 
-def json_in_page(told: Mapping[str, Any]) -> str:
-    """Return what a script is told as JSON that does not end the element that holds it."""
-    return json.dumps(told, allow_nan=False).replace("</", r"<\/")
+def json_in_page(told: Mapping[str, Any]) -> Markup:
+    """Return what a script is told as JSON that can stand in any element: it has no sign that HTML knows.
+
+    `</script>` is not all that ends a script's element, or keeps it from ending: `<!--<script>` does so, too.
+    """
+    text = json.dumps(told, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    for sign in "<>&\u2028\u2029":
+        text = text.replace(sign, f"\\u{ord(sign):04x}")
+    return Markup(text)

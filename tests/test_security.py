@@ -1,21 +1,64 @@
-"""Nothing that stands in a file is run: the code has no means to."""
+"""Nothing that stands in a file is run, and no file leads out of its project: the code has no means to."""
 
 import ast
+import gzip
+import os
+import re
+import sqlite3
+import tomllib
 from pathlib import Path
+from struct import pack
 
+import numpy as np
 import pytest
 
-FILES = sorted(Path("pipeline").rglob("*.py"))
+from pipeline.plan.plan import make_plan
+from pipeline.realtime import ModelError
+from pipeline.realtime.classic import read_doubles
+from pipeline.report.page import render
+from pipeline.report.read import read
+from pipeline.report.table import DatasetError, study_of
+from pipeline.run.reading import known_of
+from pipeline.run.store import Store, StoreError
+from pipeline.shapes.files.image import load_image
+from pipeline.shapes.files.read import Loaded
+from pipeline.shapes.triangles import SurfaceError
+from pipeline.study.load import load
+from pipeline.study.problems import StudyError
+from pipeline.within import folders_of, outside
+from tests.cases import raw, study
+from tests.organs import box, write_stl
+from tests.report.synthetic import dataset
+
+FILES = sorted(file for folder in ("pipeline", "benchmarks", "scripts", "docs") for file in Path(folder).rglob("*.py"))
+SCRIPTS = sorted(Path("pipeline").rglob("*.js"))
 UNPICKLERS = {"pickle", "cPickle", "dill", "marshal", "shelve", "joblib", "yaml"}
 RUNNERS = {"eval", "exec", "compile", "__import__", "system", "popen"}
+STUDY = """
+[body]
+shape = "surface"
+file = {file}
+unit = "mm"
+fixed = {{below = "-5 mm"}}
+[material]
+young = "5 kPa"
+poisson = 0.45
+[probe]
+shape = "disc"
+radius = "2 mm"
+depth = "0.2 mm"
+at = ["0 mm", "0 mm"]
+[mesh]
+accuracy = "5 %"
+"""
 
 
-@pytest.mark.parametrize("name", ["../mine", "a/b", "/tmp/mine"])
+@pytest.mark.parametrize("name", ["../mine", "a/b", "/tmp/mine", "..", "."])
 def test_a_new_study_stays_where_studies_are(name, epsmesh, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     done = epsmesh("new", name)
     assert done.exit_code == 2
-    assert "a name has no folders" in done.stderr
+    assert "a name has no folders" in done.stderr or "must be letters" in done.stderr
     assert not list(tmp_path.rglob("*.toml"))
 
 
@@ -42,3 +85,217 @@ def check(call: ast.Call, where: str) -> None:
     assert not (isinstance(shell := given.get("shell"), ast.Constant) and shell.value), where
     if (owner, attribute) == ("np", "load"):
         assert isinstance(given.get("allow_pickle"), ast.Constant) and not given["allow_pickle"].value, where
+
+
+def test_no_page_makes_elements_of_text():
+    assert len(SCRIPTS) > 8
+    for script in SCRIPTS:
+        text = script.read_text(encoding="utf-8")
+        assert not re.search(
+            r"\beval\(|new Function|document\.write|insertAdjacentHTML|outerHTML|fetch\(|import\(", text
+        )
+        assert re.findall(r"(\S+)\.innerHTML", text) in ([], ["axes"])  # of numbers
+
+
+@pytest.fixture
+def folders(tmp_path):
+    """A project with studies, and beside it what none of them may name."""
+    project, strange = tmp_path / "project", tmp_path / "strange"
+    for folder in (project / "studies", project / "meshes", strange):
+        folder.mkdir(parents=True)
+    for folder in (project / "studies", project / "meshes", strange):
+        write_stl(folder / "box.stl", *box(0.02, 0.02, 0.01))
+    (project / "meshes" / "away.stl").symlink_to(strange / "box.stl")
+    (project / "meshes" / "near.stl").symlink_to(project / "studies" / "box.stl")
+    return project, strange
+
+
+def written(project, *files):
+    path = project / "studies" / "mine.toml"
+    text = ", ".join(f"'{file}'" for file in files)
+    path.write_text(STUDY.format(file=text if len(files) == 1 else f"[{text}]"))
+    return path
+
+
+def test_a_study_names_files_of_its_project(folders):
+    project, _ = folders
+    for file in ("box.stl", "../meshes/box.stl", "../meshes/near.stl", project / "meshes" / "box.stl"):
+        assert load(written(project, file)).shape == ()
+
+
+@pytest.mark.parametrize(
+    "file", ["../../strange/box.stl", "../meshes/away.stl", "{strange}/box.stl", "/dev/zero", "/etc/passwd", "~/x.stl"]
+)
+def test_a_study_names_no_others(folders, file):
+    project, strange = folders
+    path = written(project, "box.stl", file.format(strange=strange))
+    with pytest.raises(StudyError) as refused:
+        load(path)
+    (line,) = str(refused.value).splitlines()
+    if file.startswith("~"):  # no home is meant
+        assert "cannot be read" in line
+        return
+    assert line.startswith(f"{path}: body.file = ")
+    assert f"outside {project}" in line
+    assert "EPSMESH_FILES=" in line
+
+
+def test_other_mistakes_are_told_in_the_same_breath(folders):
+    project, strange = folders
+    path = written(project, strange / "box.stl")
+    path.write_text(path.read_text().replace("0.45", "0.6"))
+    with pytest.raises(StudyError, match=r"(?s)outside.*poisson|poisson.*outside"):
+        load(path)
+
+
+def test_names_are_shown_as_they_are():
+    tables = [raw()["probe"] | {"name": name} for name in ("a\x1b[2J", "b")]
+    with pytest.raises(StudyError, match=r"probe\[1\].name.*control characters"):
+        study(probe=tables)
+
+
+def test_a_folder_can_be_allowed(folders, monkeypatch, epsmesh):
+    project, strange = folders
+    path = written(project, "../../strange/box.stl")
+    done = epsmesh("validate", path)
+    assert done.exit_code == 2
+    assert "outside" in done.stderr
+    monkeypatch.setenv("EPSMESH_FILES", f"/none{os.pathsep}{strange}")
+    assert epsmesh("validate", path).exit_code == 0
+
+
+def test_the_studies_of_the_project_name_what_is_allowed():
+    named = [
+        (file.parent, file.parent / body["file"])
+        for file in (*Path("studies").glob("*.toml"), *Path("docs/scenes").glob("*.toml"))
+        if "file" in (body := tomllib.loads(file.read_text())["body"])
+    ]
+    assert len(named) >= 7
+    assert not any(outside(path, folders_of(folder)) for folder, path in named)
+
+
+def test_a_folder_without_marks_is_a_project_of_its_own(folders):
+    _, strange = folders
+    (strange / "deep").mkdir()
+    path = strange / "deep" / "mine.toml"
+    path.write_text(STUDY.format(file="'../box.stl'"))
+    with pytest.raises(StudyError, match=f"outside {strange / 'deep'}"):
+        load(path)
+
+
+def test_the_study_in_a_dataset_names_no_files_of_others(folders, monkeypatch):
+    project, strange = folders
+    monkeypatch.chdir(project)
+    for file, is_read in (("meshes/box.stl", True), (strange / "box.stl", False)):
+        found = study_of(dataset().assign_attrs(study=STUDY.format(file=f"'{file}'")))
+        assert (found is not None) is is_read
+    for text in ("a" + ".a" * 30 + " = 1", "x = " + "[" * 5000, "x = 1" + "0" * 5000, "x =" + " " * 2_000_000):
+        assert study_of(dataset().assign_attrs(study=text)) is None
+
+
+def test_commands_to_be_pasted_hold_one_command_each():
+    hostile = dataset().assign_attrs(study_file="x; rm -rf ~.toml", git_commit="$(reboot)", ranks="2; reboot")
+    page = render(hostile, "a b")
+    assert "epsmesh run &#39;x; rm -rf ~.toml&#39; --fresh" in page
+    assert "epsmesh report &#39;results/a b.nc&#39;" in page
+    assert "git checkout" not in page
+    assert "mpirun" not in page
+
+
+def test_a_dataset_moves_no_cursor_and_fills_no_memory(tmp_path):
+    from netCDF4 import Dataset
+
+    path = tmp_path / "known.nc"
+    hostile = dataset(failed=1).assign_attrs(title="a\x1b[2Jb")
+    hostile["message"] = hostile["message"].where(hostile["message"] == "", "\x1b]0;c\x07\nd")
+    hostile.to_netcdf(path)
+    found = read(path)
+    assert found.attrs["title"] == r"a\x1b[2Jb"
+    assert r"\x1b]0;c\x07" + "\nd" in found["message"].values
+    assert found["message"].dims == hostile["message"].dims
+    np.testing.assert_array_equal(found["force"], hostile["force"])
+    with Dataset(path, "a") as file:
+        file.createDimension("many", 10**10)
+        file.createVariable("nothing", "f8", ("many",), zlib=True, chunksizes=(10**6,))
+    assert path.stat().st_size < 10**6
+    with pytest.raises(DatasetError, match="would take 80 GB"):
+        read(path)
+
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        "CREATE VIEW more AS SELECT 1",
+        "CREATE TRIGGER more AFTER INSERT ON records BEGIN DELETE FROM records; END",
+        "DROP TABLE records; CREATE VIEW records AS WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n) "
+        "SELECT k AS key, k AS record, 0 AS stored FROM n",
+    ],
+)
+def test_a_store_is_data(tmp_path, program):
+    path = tmp_path / "cases.sqlite"
+    Store(path).close()
+    database = sqlite3.connect(path)
+    database.executescript(program)
+    database.close()
+    with pytest.raises(StoreError, match="no case store"):
+        known_of(path, make_plan(study()))
+    opened = Store(path)
+    assert "was moved to" in opened.notice
+    opened.close()
+
+
+def test_records_that_nest_without_end_are_none(tmp_path):
+    plan = make_plan(study())
+    with sqlite3.connect(path := tmp_path / "cases.sqlite") as database:
+        database.execute("CREATE TABLE records (key TEXT PRIMARY KEY, record TEXT NOT NULL, stored REAL NOT NULL)")
+        database.execute("INSERT INTO records VALUES (?, ?, 0)", (plan.keys[0], "[" * 200_000))
+    database.close()
+    with pytest.raises(StoreError, match="cannot be read"):
+        known_of(path, plan)
+
+
+def test_the_parts_of_a_model_do_not_overlap():
+    def name(text: str) -> bytes:
+        return pack(">I", len(text)) + text.encode() + bytes(-len(text) % 4)
+
+    nothing, values = bytes(8), np.ones(1000, dtype=">f8").tobytes()
+    head = b"CDF\2" + pack(">III", 0, 10, 1) + name("n") + pack(">I", 1000) + nothing
+    parts = [name(f"v{k}") + pack(">II", 1, 0) + nothing + pack(">IIQ", 6, 8000, 2000) for k in range(20)]
+
+    def model(count: int) -> bytes:
+        return (head + pack(">II", 11, count) + b"".join(parts[:count])).ljust(2000, b"\0") + values
+
+    assert set(read_doubles(model(1))) == {"v0"}
+    with pytest.raises(ModelError, match="overlap"):
+        read_doubles(model(20))
+
+
+def nrrd(path: Path, data: bytes, *lines: str) -> Path:
+    """Write an NRRD file of 20 × 20 × 20 voxels of a byte, with more lines in its header, and its data behind it."""
+    head = ["NRRD0004", "type: uint8", "dimension: 3", "sizes: 20 20 20", "spacings: 1 1 1"]
+    path.write_bytes("\n".join([*head, *lines, "", ""]).encode() + data)
+    return path
+
+
+def test_the_data_of_an_image_lie_in_its_project(folders, monkeypatch):
+    project, strange = folders
+    voxels = np.zeros((20, 20, 20), dtype=np.uint8)
+    voxels[4:16, 4:16, 4:16] = 1
+    packed = gzip.compress(voxels.tobytes())
+    for folder in (project / "meshes", strange):
+        (folder / "data.gz").write_bytes(packed)
+
+    def image(*lines: str, data: bytes = b"") -> Loaded:
+        return load_image(nrrd(project / "meshes" / "box.nhdr", data, "encoding: gzip", *lines), 1, 1e-3)
+
+    own = image(data=packed).triangles.points
+    np.testing.assert_array_equal(own, image("data file: data.gz").triangles.points)
+    for file in (strange / "data.gz", "../../strange/data.gz", "/dev/zero"):
+        with pytest.raises(SurfaceError, match=r"file of its data.*outside"):
+            image(f"data file: {file}")
+    monkeypatch.setenv("EPSMESH_FILES", str(strange))
+    np.testing.assert_array_equal(own, image(f"data file: {strange / 'data.gz'} ").triangles.points)
+    with pytest.raises(SurfaceError, match="become more than its header says"):
+        image(data=gzip.compress(bytes(200_000)))
+    with pytest.raises(SurfaceError, match="skips 1,000,000,000,000 lines"):
+        image("line skip: 1000000000000", data=packed)

@@ -43,7 +43,7 @@ def _read(data: bytes, kinds: tuple[int, ...]) -> dict[str, NDArray[np.float64]]
     reader.count()  # records, which models have none of
     lengths = [(reader.name(), reader.number())[1] for _ in range(reader.listed(_DIMENSION))]
     reader.skip_attributes()
-    found = {}
+    found, taken = {}, 0
     for _ in range(reader.listed(_VARIABLE)):
         name = reader.name()
         rank = reader.count(_MOST_RANK)
@@ -55,6 +55,9 @@ def _read(data: bytes, kinds: tuple[int, ...]) -> dict[str, NDArray[np.float64]]
         shape = [lengths[number] for number in numbers]
         if kind in kinds and 0 not in shape:
             found[name] = reader.numbers(_TYPES[kind], begin, shape)
+            taken += found[name].size * _BYTES[kind]
+        if taken > len(data):  # each a copy: a small file would fill the memory
+            raise ModelError("parts of the file overlap")
     return found
 
 

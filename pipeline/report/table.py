@@ -1,7 +1,6 @@
 """A dataset as a table: a row for each mesh setting, a column for each scene, and why a cell cannot be judged."""
 
 import itertools
-import tomllib
 from dataclasses import dataclass
 from functools import cached_property
 from math import isinf
@@ -14,6 +13,7 @@ from pipeline.quantities import MESH_DIMENSIONS, symbol, write
 from pipeline.report.sinking import LOADS, PLACES, Sinking
 from pipeline.study.load import parse
 from pipeline.study.problems import StudyError
+from pipeline.study.read import toml_of
 from pipeline.study.sweep import Case, Study
 
 Labels = dict[str, Any]
@@ -109,11 +109,14 @@ def arrange(dataset: xr.Dataset) -> Table:
 
 
 def study_of(dataset: xr.Dataset) -> Study | None:
-    """Return the study whose text the dataset carries, or None if this version does not read it."""
+    """Return the study whose text the dataset carries, or None if this version does not read it.
+
+    The text may be a stranger's: it is held to all that a file is held to.
+    """
     text = str(dataset.attrs.get("study", ""))
     try:
-        return parse(tomllib.loads(text), text=text)
-    except (StudyError, tomllib.TOMLDecodeError):
+        return parse(toml_of(text, "study"), text=text, trusted=False)
+    except StudyError:
         return None
 
 

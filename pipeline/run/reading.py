@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 from pipeline.plan.cost import CostModel
 from pipeline.plan.work import Plan
 from pipeline.run.record import Record
-from pipeline.run.store import PATIENCE, SCHEMA, Records, Row, StoreError, damaged
+from pipeline.run.store import PATIENCE, SCHEMA, Records, Row, StoreError, damaged, guard
 
 
 @contextmanager
@@ -72,6 +72,7 @@ def _connection(path: Path) -> Iterator[sqlite3.Connection]:
                 shutil.copy(_journal(path), folder)
             database = sqlite3.connect(Path(folder) / path.name, isolation_level=None)
         with closing(database):
+            guard(database)
             # A job may end between making the file and its table.
             if database.execute("SELECT 1 FROM sqlite_master WHERE name = 'records'").fetchone():
                 yield database

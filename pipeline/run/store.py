@@ -18,6 +18,9 @@ PATIENCE = 30.0
 # Records that the cost model is fitted to: the newest.
 _RECENT = 500
 
+# The longest text of a record (bytes): ten times that of a hundred motions' stiffness.
+_LONGEST = 16_000_000
+
 Row = tuple[str, str, float]  # key, record as text, seconds since 1970 at which it was stored
 
 
@@ -156,9 +159,23 @@ class Store(Records):
         return len(gone)
 
 
+def guard(database: sqlite3.Connection) -> None:
+    """Let a file that a stranger made be data only.
+
+    Raises:
+        sqlite3.DatabaseError: if it holds views, triggers or tables that are programs: a case store has none.
+    """
+    database.execute("PRAGMA trusted_schema = OFF")
+    database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LONGEST)
+    programs = "SELECT name FROM sqlite_master WHERE type IN ('view', 'trigger') OR sql LIKE 'CREATE VIRTUAL%'"
+    if found := database.execute(programs).fetchone():
+        raise sqlite3.DatabaseError(f"it has a view, a trigger or a virtual table, {found[0]!r}: it is no case store")
+
+
 def _open(path: Path) -> sqlite3.Connection:
     database = sqlite3.connect(path, timeout=PATIENCE, isolation_level=None)
     try:
+        guard(database)
         database.execute("PRAGMA synchronous = FULL")
         database.execute(SCHEMA)
         database.execute("SELECT count(*) FROM records").fetchone()
@@ -191,7 +208,7 @@ def _readable(text: str) -> Record | None:
     """Return the record that ``text`` is, None if it is none."""
     try:
         return Record.from_json(text)
-    except (ValueError, TypeError, KeyError):
+    except (ValueError, TypeError, KeyError, RecursionError):
         return None
 
 

@@ -20,6 +20,7 @@ from pipeline.study.read import check_text, read
 from pipeline.study.regions import check_regions, material_without_section
 from pipeline.study.schema import NESTED, SECTIONS, SINGLE, Mesh
 from pipeline.study.sweep import Axis, Study
+from pipeline.within import Outside, folders_of, outside
 
 # More values in a list, or more cases of a study, are a slip of the pen, or work for several studies: every case is
 # planned and reported, each in a few hundred bytes and a tenth of a millisecond.
@@ -38,13 +39,16 @@ def load(path: str | Path) -> Study:
         StudyError: with every problem of the file: key, value found, what is allowed.
     """
     text, raw = read(Path(path))
-    return parse(raw, file=str(path), text=text)
+    return parse(raw, file=str(path), text=text, trusted=False)
 
 
-def parse(raw: dict[str, Any], *, file: str = "study", text: str = "") -> Study:
-    """Turn a study, read from TOML into ``raw``, into a :class:`Study`; ``file`` is for messages."""
+def parse(raw: dict[str, Any], *, file: str = "study", text: str = "", trusted: bool = True) -> Study:
+    """Turn a study, read from TOML into ``raw``, into a :class:`Study`; ``file`` is for messages.
+
+    One that is not ``trusted``, as it comes from a file, may name files of its own project only.
+    """
     problems = Problems()
-    raw = _beside(raw, Path(file).parent)
+    raw = _beside(raw, Path(file).parent, trusted=trusted)
     _check_top(raw, problems)
     axes: list[Axis] = []
     sections: dict[str, tuple[Section, ...]] = {}
@@ -76,13 +80,17 @@ def written(place: Place) -> str:
     return "".join(f"[{step + 1}]" if isinstance(step, int) else f".{step}" for step in place).removeprefix(".")
 
 
-def _beside(raw: dict[str, Any], folder: Path) -> dict[str, Any]:
+def _beside(raw: dict[str, Any], folder: Path, *, trusted: bool) -> dict[str, Any]:
     """Return the study with the files that bodies name found from the ``folder`` of the study."""
+    folders = () if trusted else folders_of(folder)
 
     def found(value: Any) -> Any:
         if isinstance(value, list):
             return [found(v) for v in value]
-        return str(folder / value) if isinstance(value, str) else value
+        if not isinstance(value, str):
+            return value
+        path = folder / value
+        return Outside(str(path), why) if folders and (why := outside(path, folders)) else str(path)
 
     def table(body: Any) -> Any:
         return body | {"file": found(body["file"])} if isinstance(body, dict) and "file" in body else body
@@ -198,8 +206,7 @@ def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[
         if not isinstance(table, dict):
             problems.error(where, table, f"must be a table: write [[{name}]]")
             continue
-        if not isinstance(table.get("name"), str) or not table["name"]:
-            problems.error(f"{where}.name", table.get("name"), "is required in an array of tables: it labels the sweep")
+        _check_name(f"{where}.name", table.get("name"), problems)
         model = _model(name, table, problems, where)
         if model is None:
             continue
@@ -230,6 +237,13 @@ def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[
             parsed = [_validate(kind, _placed(table, [(place, value)])) for value in values]
             axes.append(_axis(name, place, values, parsed, problems))
     return axes, tuple(itertools.chain.from_iterable(variants))
+
+
+def _check_name(key: str, name: Any, problems: Problems) -> None:
+    if not isinstance(name, str) or not name:
+        problems.error(key, name, "is required in an array of tables: it labels the sweep")
+    else:
+        check_text(key, name, problems)
 
 
 def _is_sane(name: str, tables: list[Any], shared: dict[Place, list[Any]], problems: Problems) -> bool:

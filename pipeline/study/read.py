@@ -28,37 +28,52 @@ def read(path: Path) -> tuple[str, dict[str, Any]]:
     Raises:
         StudyError: if it cannot be read, or is no study of a sane size.
     """
-
-    def refuse(what: str, why: str) -> StudyError:
-        return StudyError(str(path), [Problem(what, None, why)])
-
     try:
         with path.open("rb") as file:
             data = file.read(_MOST_BYTES + 1)
     except (OSError, ValueError) as error:  # a name with a NUL is a ValueError
-        raise refuse("file", getattr(error, "strerror", None) or str(error)) from None
-    if len(data) > _MOST_BYTES:
-        raise refuse("file", f"is larger than {_MOST_BYTES / 1e6:g} MB: no study is")
+        raise _refused(str(path), "file", getattr(error, "strerror", None) or str(error)) from None
+    _check_size(len(data), str(path))
     try:
         text = data.decode("utf-8-sig")  # some editors begin a file with the mark of its encoding
-        text = text.replace("\r\n", "\n").replace("\r", "\n")
-        if _LONG_KEY.search(text):
-            raise refuse("TOML", f"is nested more than {_DEEPEST} levels deep: no study is")
-        raw = tomllib.loads(text)
     except UnicodeDecodeError as error:
-        raise refuse("file", f"is not UTF-8 text: {error}") from None
+        raise _refused(str(path), "file", f"is not UTF-8 text: {error}") from None
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    return text, toml_of(text, str(path))
+
+
+def toml_of(text: str, file: str) -> dict[str, Any]:
+    """Return the TOML in the ``text`` of a study; ``file`` is for messages.
+
+    Raises:
+        StudyError: if it is none, or no study of a sane size.
+    """
+    _check_size(len(text), file)
+    try:
+        if _LONG_KEY.search(text):
+            raise _refused(file, "TOML", f"is nested more than {_DEEPEST} levels deep: no study is")
+        raw = tomllib.loads(text)
     except RecursionError:
-        raise refuse("TOML syntax", "is nested too deeply") from None
+        raise _refused(file, "TOML syntax", "is nested too deeply") from None
     except ValueError as error:  # besides its own, those of numbers with thousands of digits and of days that are none
-        raise refuse("TOML syntax", str(error)) from None
+        raise _refused(file, "TOML syntax", str(error)) from None
     layer: list[Any] = [raw]
     for _ in range(_DEEPEST):
         if any(isinstance(value, int) and not -_LARGEST <= value < _LARGEST for value in layer):
-            raise refuse("TOML", "has an integer of more than 64 bits: write 1e30 for a large number")
+            raise _refused(file, "TOML", "has an integer of more than 64 bits: write 1e30 for a large number")
         layer = list(_inside(layer))
     if layer:
-        raise refuse("TOML", f"is nested more than {_DEEPEST} levels deep: no study is")
-    return text, raw
+        raise _refused(file, "TOML", f"is nested more than {_DEEPEST} levels deep: no study is")
+    return raw
+
+
+def _check_size(size: int, file: str) -> None:
+    if size > _MOST_BYTES:
+        raise _refused(file, "file", f"is larger than {_MOST_BYTES / 1e6:g} MB: no study is")
+
+
+def _refused(file: str, what: str, why: str) -> StudyError:
+    return StudyError(file, [Problem(what, None, why)])
 
 
 def check_text(key: str, text: str, problems: Problems) -> None:

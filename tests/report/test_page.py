@@ -9,17 +9,22 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from pipeline.html import json_in_page
 from pipeline.report import page
 from pipeline.report.dataset import write
+from pipeline.report.figures import draw
 from pipeline.report.guide import guide
 from pipeline.report.page import render, write_page
 from pipeline.report.page.cases import case_table
 from pipeline.report.page.guideline import ACCURACY, Section, guide_section
+from tests.cases import BLADE, raw
 from tests.commands import epsmesh
 from tests.report import chosen
 from tests.report.synthetic import dataset
 
 NASTY = """</script><script>alert(1)</script><b onclick="x">&amp; "quoted" 'text' \u2028"""
+# As a name may be: a formula that is none, ends of elements, and what keeps a script's element from ending.
+NAME = r"""$\nonsense{$ </text></select><script>alert(1)</script><b onclick="x">& 'a' <!--<script>"""
 SWEEP = {
     "material": {"poisson": [0.3, 0.4]},
     "mesh": {"epsilon": ["4 mm", "10 mm", "full"], "outside": ["coarse", "free"]},
@@ -33,12 +38,17 @@ class Reader(HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.tags, self.texts, self.ids = [], [], []
+        self.tags, self.texts, self.ids, self.places = [], [], [], []
         self.feed(text)
 
     def handle_starttag(self, tag, attributes):
         self.tags.append((tag, dict(attributes)))
+        self.places.append((tag, len(self.texts)))
         self.ids += [value for name, value in attributes if name == "id"]
+
+    def tags_at(self, tag):
+        """Return where, among the texts, that of each such element begins."""
+        return [place for name, place in self.places if name == tag]
 
     def handle_data(self, data):
         self.texts.append(data)
@@ -68,6 +78,29 @@ def test_what_comes_from_the_study_stays_text(nasty):
     assert not any(tag == "b" for tag, _ in read.tags)
     text = "".join(read.texts)
     assert text.count(NASTY) >= 4  # heading, title, failure, study
+
+
+def test_names_of_tables_stay_text_in_figures_and_table(tmp_path):
+    data = dataset(failed=1, probe=[{"name": NAME, **raw()["probe"]}, {"name": "blade", **BLADE}], **SWEEP)
+    found = render(data, NAME)
+    read = Reader(found)
+    assert [attributes for tag, attributes in read.tags if tag == "script"] == [
+        {"type": "application/json", "id": "data"}, {}
+    ]  # fmt: skip
+    assert not any(tag == "b" or name.startswith("on") for tag, given in read.tags for name in given or [""])
+    assert found.count("<!--") == 0
+    assert "".join(read.texts).count(NAME) >= 4  # heading, failure, filter, legends
+    shown = json.loads(read.texts[read.tags_at("script")[0]])
+    assert NAME in next(column for column in shown["columns"] if column["name"] == "probe")["words"]
+    for path in draw(data, tmp_path / "known"):
+        assert path.stat().st_size > 1000
+
+
+def test_json_in_a_page_has_no_sign_that_html_knows():
+    told = {"a": NAME + NASTY, "b": [1.5, None]}
+    text = json_in_page(told)
+    assert not set("<>&\u2028\u2029") & set(text)
+    assert json.loads(text) == told
 
 
 def test_page_needs_nothing_else(nasty):

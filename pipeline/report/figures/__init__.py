@@ -48,10 +48,18 @@ def draw(
 
 def figure(dataset: xr.Dataset, kind: str, *, titled: bool = True) -> Figure:
     """Draw the figure of one ``kind``, with the study's title or without."""
-    # A title is no formula, whatever stands in it.
-    title = str(dataset.attrs.get("title", "")).replace("$", r"\$") if titled else ""
+    title = _plain(str(dataset.attrs.get("title", ""))) if titled else ""
+    named = {dim: values for dim, values in dataset.indexes.items() if any("$" in str(value) for value in values)}
+    if named:
+        plain = {dim: (dim, [_plain(str(v)) for v in values], dataset[dim].attrs) for dim, values in named.items()}
+        dataset = dataset.assign_coords(plain)
     with mpl.rc_context(STYLE):
         return FIGURES[kind](dataset, title, _missing(dataset))
+
+
+def _plain(text: str) -> str:
+    """Return ``text`` so that it is no formula, whatever stands in it."""
+    return text.replace("$", r"\$")
 
 
 def _missing(dataset: xr.Dataset) -> str:

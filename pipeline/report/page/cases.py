@@ -1,6 +1,5 @@
 """The table of cases: columns in the units people read, rows in the order in which a reader needs them."""
 
-import json
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,6 +7,7 @@ import numpy as np
 import xarray as xr
 from markupsafe import Markup
 
+from pipeline.html import json_in_page
 from pipeline.quantities import QUANTITIES
 from pipeline.report.words import is_numeric, number, scale, symbol
 
@@ -58,11 +58,8 @@ class Table:
     @property
     def json(self) -> Markup:
         """The table as JSON that can stand in a ``<script>`` element."""
-        content = {"columns": [vars(column) for column in self.columns], "order": self.order, "rows": FIRST_ROWS}
-        text = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-        for sign in "<>&\u2028\u2029":
-            text = text.replace(sign, f"\\u{ord(sign):04x}")
-        return Markup(text)
+        columns = [vars(column) for column in self.columns]
+        return json_in_page({"columns": columns, "order": self.order, "rows": FIRST_ROWS})
 
     @property
     def filters(self) -> list[Column]:

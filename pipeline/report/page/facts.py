@@ -1,7 +1,9 @@
 """What a report says first: how many cases, what failed, where it was computed, how to run it again."""
 
+import re
 from collections import defaultdict
 from datetime import datetime
+from shlex import quote
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,8 @@ import xarray as xr
 from pipeline.report.times import doubts
 from pipeline.report.words import choices
 
+# Of git, with a sign for changes that were not committed.
+_COMMIT = re.compile(r"[0-9a-f]{7,64}\+?")
 # Cases that a message names; the table shows all of them.
 _MOST_NAMED = 5
 _STATES = {"ok": "with a force", "failed": "failed", "skipped": "skipped", "lost": "without contact",
@@ -67,14 +71,15 @@ def reproduce(dataset: xr.Dataset, name: str) -> list[str]:
     """Return the commands that make the dataset and this page again."""
     commit = str(dataset.attrs.get("git_commit", ""))
     ranks = str(dataset.attrs.get("ranks", "1"))
-    file = str(dataset.attrs.get("study_file", f"{name}.toml"))
+    # These lines are to be pasted into a shell, and the dataset may be a stranger's.
+    file = quote(str(dataset.attrs.get("study_file", f"{name}.toml")))
     lines = []
-    if commit and "," not in commit:
+    if _COMMIT.fullmatch(commit):
         changed = "  # and changes that were not committed" if commit.endswith("+") else ""
         lines.append(f"git checkout {commit.rstrip('+')}{changed}")
     launcher = f"mpirun -n {ranks} " if ranks.isdigit() and int(ranks) > 1 else ""
     return [*lines, "make setup", f"{launcher}.venv/bin/epsmesh run {file} --fresh",
-            f".venv/bin/epsmesh report results/{name}.nc"]  # fmt: skip
+            f".venv/bin/epsmesh report {quote(f'results/{name}.nc')}"]  # fmt: skip
 
 
 def _by_message(dataset: xr.Dataset, status: str, variable: str) -> list[dict[str, Any]]:

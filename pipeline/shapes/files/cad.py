@@ -111,7 +111,8 @@ def _run(path: Path, unit: str, target: Path) -> None:
     environment = {key: value for key, value in os.environ.items() if not key.startswith(_OF_MPI)}
     root = str(Path(__file__).resolve().parents[3])
     environment["PYTHONPATH"] = os.pathsep.join(filter(None, [root, environment.get("PYTHONPATH")]))
-    command = [sys.executable, "-m", _PROGRAM, str(path), unit, str(target)]
+    # -P: nothing is imported from the folder that one happens to be in.
+    command = [sys.executable, "-P", "-m", _PROGRAM, str(path), unit, str(target)]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST, env=environment, check=False)
     except subprocess.TimeoutExpired:

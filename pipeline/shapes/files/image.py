@@ -12,7 +12,7 @@ from typing import Any
 
 from pipeline.shapes.arrays import FloatArray, IntArray, np
 from pipeline.shapes.files.checked import kept_image
-from pipeline.shapes.files.labels import LabelMap, files_of, of_label, read_labels
+from pipeline.shapes.files.labels import LARGEST_IMAGE, LabelMap, files_of, of_label, read_labels
 from pipeline.shapes.files.raw import Raw
 from pipeline.shapes.files.read import Loaded, state_of
 from pipeline.shapes.files.shells import largest_shell
@@ -60,6 +60,8 @@ def _load(
     path = files[0]
     if not all(size for _, size in states):
         raise SurfaceError("is empty: copy or export it again")
+    if (largest := max(size for _, size in states)) > LARGEST_IMAGE:
+        raise SurfaceError(f"has {largest / 1e9:.2g} GB, more than {LARGEST_IMAGE / 1e9:g}: crop or resample it")
 
     def make() -> tuple[Triangles, tuple[str, ...]]:
         found = surface_of(read_labels(path, unit), label, smooth)

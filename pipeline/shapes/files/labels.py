@@ -1,11 +1,17 @@
 """Label maps, NIfTI and NRRD: a number for each voxel, and where the voxels are."""
 
+import bz2
+import gzip
+import zlib
+from contextlib import suppress
 from dataclasses import dataclass
+from math import prod
 from pathlib import Path
 from typing import Any
 
 from pipeline.shapes.arrays import FloatArray, np
 from pipeline.shapes.triangles import SurfaceError
+from pipeline.within import folders_of, outside
 
 ENDINGS = (".nii", ".nii.gz", ".nrrd", ".nhdr")
 _UNITS = {"m": 1.0, "meter": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "micron": 1e-6}
@@ -16,6 +22,10 @@ _SPACES = {
     "left-posterior-superior": (-1, -1, 1), "lps": (-1, -1, 1),
 }  # fmt: skip
 _MOST_VOXELS = 1_000_000_000
+# Of the values, and of what a packed file may become: what is larger is no label map that fits into memory.
+LARGEST_IMAGE = 4_000_000_000
+_MOST_SKIPPED = 1000  # lines before the data of a NRRD file
+_CHUNK, _LARGEST_VALUE = 1_000_000, 8  # bytes
 _SINGULAR = 1e-9
 _SHOWN = 20
 
@@ -44,7 +54,11 @@ def is_image(path: Path) -> bool:
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
-    """Return the files that hold a label map: its own, and the one of the data where a NRRD header names another."""
+    """Return the files that hold a label map: its own, and the one of the data where a NRRD header names another.
+
+    Raises:
+        SurfaceError: if a header names a file outside its own project.
+    """
     if not is_image(path) or path.name.lower().endswith(ENDINGS[:2]):
         return (path,)
     import nrrd  # noqa: PLC0415
@@ -54,7 +68,12 @@ def files_of(path: Path) -> tuple[Path, ...]:
     except Exception:  # what is wrong with it is told as it is read
         return (path,)
     data = header.get("datafile", header.get("data file"))
-    return (path,) if data is None else (path, path.parent / str(data))
+    if data is None:
+        return (path,)
+    beside = path.parent / str(data)
+    if why := outside(beside, folders_of(path.parent)):
+        raise SurfaceError(f"the file of its data, `{data}`, {why}")
+    return (path, beside)
 
 
 def read_labels(path: Path, unit: float | None) -> LabelMap:
@@ -85,7 +104,7 @@ def _nifti(path: Path, unit: float | None) -> LabelMap:
     import nibabel  # noqa: PLC0415 (a quarter of a second, which studies without images do without)
 
     image: Any = nibabel.load(path)
-    _check_shape(image.shape)
+    _check_shape(image.shape, image.header.get_data_dtype().itemsize)
     named = image.header.get_xyzt_units()[0]
     size = _unit(named if named in _UNITS else None, unit)
     notices = []
@@ -101,7 +120,10 @@ def _nrrd(path: Path, unit: float | None) -> LabelMap:
     import nrrd  # noqa: PLC0415
 
     header = nrrd.read_header(str(path))
-    _check_shape(tuple(int(k) for k in header["sizes"]))
+    shape = tuple(int(k) for k in header["sizes"])
+    _check_shape(shape)
+    skipped = max(0, int(header.get("byteskip", header.get("byte skip", 0))))
+    _check_packed(path, header, min(LARGEST_IMAGE, prod(shape) * _LARGEST_VALUE + skipped))
     space = str(header.get("space", "")).lower()
     if space and space not in _SPACES:
         raise SurfaceError(f'its space is "{space}"; known are {", ".join(name for name in _SPACES if "-" in name)}')
@@ -127,14 +149,52 @@ def _nrrd(path: Path, unit: float | None) -> LabelMap:
     return LabelMap(_whole(values), affine * size, notices)
 
 
-def _check_shape(shape: tuple[int, ...]) -> None:
+def _check_packed(path: Path, header: Any, most: int) -> None:
+    """Unpack the data of a NRRD file, keeping nothing: a few bytes may have been made to become any number of them.
+
+    Raises:
+        SurfaceError: if they become more than ``most``, or lines without end are to be skipped before them.
+    """
+    import nrrd  # noqa: PLC0415
+
+    lines = int(header.get("lineskip", header.get("line skip", 0)))
+    if lines > _MOST_SKIPPED:
+        raise SurfaceError(f"its header skips {lines:,} lines before the data: export it again")
+    packed: dict[str, Any] = dict.fromkeys(("gzip", "gz"), gzip.open) | dict.fromkeys(("bzip2", "bz2"), bz2.open)
+    if (encoding := str(header.get("encoding"))) not in packed:
+        return
+    _, *data = files_of(path)
+    with (data or [path])[0].open("rb") as file:
+        if not data:
+            nrrd.read_header(file)
+        for _ in range(lines):
+            file.readline()
+        left = most
+        # What is broken is told as it is read.
+        with suppress(OSError, EOFError, zlib.error), packed[encoding](file) as unpacked:
+            while left >= 0 and (made := len(unpacked.read(_CHUNK))):
+                left -= made
+        if left < 0:
+            raise SurfaceError("its data become more than its header says: export it again")
+
+
+def _check_shape(shape: tuple[int, ...], size: int = 1) -> None:
+    """Refuse what is no map of three dimensions, or too large; a voxel's value has a ``size`` (bytes)."""
     if len(shape) < 3 or any(k != 1 for k in shape[3:]):
         sizes = " × ".join(map(str, shape))
         raise SurfaceError(
             f"has {len(shape)} dimensions, {sizes}: wanted is one label map of 3; export one segment or time"
         )
-    if shape[0] * shape[1] * shape[2] > _MOST_VOXELS:
+    if min(shape) < 1:
+        raise SurfaceError(f"has {' × '.join(map(str, shape))} voxels: export it again")
+    voxels = shape[0] * shape[1] * shape[2]
+    if voxels > _MOST_VOXELS:
         raise SurfaceError(f"has {' × '.join(map(str, shape))} voxels, more than {_MOST_VOXELS:,}: crop or resample it")
+    if voxels * size > LARGEST_IMAGE:
+        raise SurfaceError(
+            f"has {voxels * size / 1e9:.2g} GB of values, more than {LARGEST_IMAGE / 1e9:g}: export it with whole "
+            "numbers of 8 or 16 bits, or crop it"
+        )
 
 
 def _unit(named: str | None, given: float | None) -> float:
