@@ -7,7 +7,7 @@ from math import nan
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.export.full import Solver, Tool
+from pipeline.export.full import Full, Solver, Tool
 from pipeline.realtime.model import Model
 from pipeline.stages import stage
 
@@ -25,6 +25,8 @@ class Check:
     """A touch: place and half size (m), ν, F (N) of a full solve with its relative bar, and of the model.
 
     ``kind`` is a number of ``TOOLS``: a disc, a blade, whose half size is half its diagonal, or a bonded disc.
+    ``vector`` is what the tissue does to the tool by the full solve (N), ``aside`` by how much the model's force aside
+    is off it, in units of ``full``, if tissue sticks: the bar holds for both.
     """
 
     x: float
@@ -38,6 +40,8 @@ class Check:
     bar: float
     kind: int = 0
     tool: Tool = field(default_factory=lambda: Tool("disc"))
+    vector: tuple[float, ...] = ()
+    aside: float = 0.0
 
     @property
     def error(self) -> float:
@@ -46,8 +50,8 @@ class Check:
 
     @property
     def is_held(self) -> bool:
-        """Whether the model's bar holds the difference."""
-        return abs(self.error) <= self.bar
+        """Whether the model's bar holds the difference, aside as well."""
+        return max(abs(self.error), self.aside) <= self.bar
 
 
 @stage("checks")
@@ -62,7 +66,15 @@ def check_touches(model: Model, solver: Solver, count: int, seed: int, tools: Se
 
 
 def _check(model: Model, solver: Solver, rng: np.random.Generator, kind: int) -> Check:
-    x, y = _place(model, rng)
+    asked = random_touch(model, rng, kind)
+    low, high = model.table.poisson
+    (found,) = solved(model, solver, asked, [asked.poisson] if low < high else None)
+    return found
+
+
+def random_touch(model: Model, rng: np.random.Generator, kind: int) -> Check:
+    """Return a touch of a tool of ``TOOLS``, not solved yet, of which a model tells the force."""
+    x, y = random_place(model, rng)
     smallest, largest = np.log(_SIZES)
     size = model.largest * model.room(x, y) * float(np.exp(rng.uniform(smallest, largest)))
     low, high = model.table.poisson
@@ -73,27 +85,49 @@ def _check(model: Model, solver: Solver, rng: np.random.Generator, kind: int) ->
         width = 2 * size / float(np.hypot(slenderness, 1))
         along = (float(np.cos(angle)), float(np.sin(angle)), 0.0)
         tool = Tool("blade", length=slenderness * width, width=width, along=along)
-    asked = with_bar(model, Check(x, y, size, depth, poisson, nan, nan, nan, nan, kind, tool))
-    at, _ = _on_face(model, x, y)
-    full = solver.press(tool, (float(at[0]), float(at[1])), depth, poisson if low < high else None)
-    return replace(asked, full=full.force, full_error=full.error)
+    return with_bar(model, Check(x, y, size, depth, poisson, nan, nan, nan, nan, kind, tool))
+
+
+def solved(model: Model, solver: Solver, asked: Check, poissons: Sequence[float] | None) -> list[Check]:
+    """Return a touch with its full solve, for each of ``poissons`` on one mesh, or of the study's own materials.
+
+    Raises:
+        RuntimeError: if a full solve failed.
+    """
+    at, _ = on_face(model, asked.x, asked.y)
+    fulls = solver.press_all(asked.tool, (float(at[0]), float(at[1])), [asked.depth], poissons)
+    return [
+        with_full(model, replace(asked, poisson=poisson), full)
+        for poisson, full in zip(poissons or [asked.poisson], fulls, strict=True)
+    ]
+
+
+def with_full(model: Model, asked: Check, full: Full) -> Check:
+    """Return a touch with what a full solve tells of it."""
+    vector = tuple(float(part) for part in full.vector)
+    return with_bar(model, replace(asked, full=full.force, full_error=full.error, vector=vector))
 
 
 def with_bar(model: Model, check: Check) -> Check:
     """Return a check with the force of a model, and its bar."""
-    at, normal = _on_face(model, check.x, check.y)
+    at, normal = on_face(model, check.x, check.y)
     touch = model.query(check.tool.name, at=at.tolist(), depth=check.depth, poisson=check.poisson, **check.tool.sizes)
     assert touch.status == "ok", touch
-    return replace(check, force=float(touch.force @ normal), bar=touch.force_error)
+    aside = 0.0
+    if check.tool.contact == "bonded" and check.vector:
+        off = touch.force - np.array(check.vector)
+        aside = float(np.linalg.norm(off - (off @ normal) * normal)) / check.full
+    return replace(check, force=float(touch.force @ normal), bar=touch.force_error, aside=aside)
 
 
-def _on_face(model: Model, x: float, y: float) -> tuple[FloatArray, FloatArray]:
+def on_face(model: Model, x: float, y: float) -> tuple[FloatArray, FloatArray]:
     """Return where a place of the region is in the body's coordinates (3,), in m, and the normal there."""
     spot = model.face.at(model.table, x, y)
     return model.origin + np.array([x, y, spot.height]) @ model.axes, spot.normal @ model.axes
 
 
-def _place(model: Model, rng: np.random.Generator) -> tuple[float, float]:
+def random_place(model: Model, rng: np.random.Generator) -> tuple[float, float]:
+    """Return x and y (m), anywhere in the region alike."""
     a, b = model.table.reach
     if not model.table.is_round:
         return float(rng.uniform(-a, a)), float(rng.uniform(-b, b))
@@ -109,7 +143,7 @@ def needed(checks: Sequence[Check], floor: float) -> float:
 def columns(fitted: Sequence[Check], judged: Sequence[Check]) -> dict[str, tuple[str, FloatArray]]:
     """Return all checks as units and values by name, those that are judged after those that were fitted."""
     units = {"x": "m", "y": "m", "radius": "m", "depth": "m", "poisson": "1", "full": "N", "full_error": "1"}
-    units |= {"force": "N", "bar": "1", "error": "1", "kind": "1"}
+    units |= {"force": "N", "bar": "1", "error": "1", "kind": "1", "aside": "1"}
     checks = [*fitted, *judged]
     found = {name: (unit, np.array([getattr(check, name) for check in checks])) for name, unit in units.items()}
     is_judged = np.array([0.0] * len(fitted) + [1.0] * len(judged))

@@ -1,5 +1,6 @@
 """Models of bodies that are not flat: c and h at each place are what full solves of two discs tell."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ from pipeline.arrays import FloatArray
 from pipeline.export.full import Solver, Tool
 from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, Scope
-from pipeline.export.tabulate import Places, tabulate
+from pipeline.export.tabulate import Places, ratios_of, tabulate
 from pipeline.realtime.face import Face
 from pipeline.realtime.model import Model
 from pipeline.realtime.table import Table
@@ -41,11 +42,14 @@ def curved_model(
     room = _LARGER * RADII[1] * radius / largest
     middle = scope.case.probe.at[:2]
     region = _region(scope, radius, room)
-    solved: list[tuple[float, float]] = []
+    ratios = ratios_of(scope.poissons).tolist()
+    known: dict[tuple[float, float], FloatArray] = {}
 
     def found(places: Places, poisson: float) -> FloatArray:
-        solved.extend(places)
-        return np.array([_regular(solver, (x + middle[0], y + middle[1]), radius, scope, poisson) for x, y in places])
+        for x, y in places:
+            if (x, y) not in known:
+                known[x, y] = _regular(solver, (x + middle[0], y + middle[1]), radius, scope, ratios)
+        return np.array([known[place][ratios.index(poisson)] for place in places])
 
     table, missed = tabulate(region, scope.poissons, found, _SHARE * accuracy, _SIZES)
     table = replace(table, leans=False)
@@ -54,7 +58,7 @@ def curved_model(
         table, np.array([*middle, 0.0]), np.eye(3), region.sides, room, scope.young, scope.poisson, largest, bar,
         face, max(_OFF * off, _LEAST_OFF * room), _ALIGNED,
     )  # fmt: skip
-    return model, missed, len(solved)
+    return model, missed, len(known) * len(ratios)
 
 
 def _region(scope: Scope, radius: float, room: float) -> Region:
@@ -67,19 +71,20 @@ def _region(scope: Scope, radius: float, room: float) -> Region:
 
 
 def _regular(
-    solver: Solver, at: tuple[float, float], radius: float, scope: Scope, poisson: float
-) -> tuple[float, float]:
-    """Return c and h: d/F = 1/(2aE*) + c + a²h/3 - 2E*h²a⁵/45 for both radii."""
-    plane = 1 / (1 - poisson**2)
+    solver: Solver, at: tuple[float, float], radius: float, scope: Scope, ratios: Sequence[float]
+) -> FloatArray:
+    """Return c and h for each Poisson's ratio (ratios, 2): d/F = 1/(2aE*) + c + a²h/3 - 2E*h²a⁵/45 for both radii."""
     radii, rests = [share * radius for share in RADII], []
+    planes = 1 / (1 - np.square(ratios))
     for a in radii:
-        full = solver.press(Tool("disc", a), at, _DEPTH * a, None)
-        rests.append(scope.young * _DEPTH * a / full.force - 0.5 / (plane * a))
-    (a, b), h = radii, 0.0
+        # The study's own materials, or all ratios on one mesh.
+        fulls = solver.press_all(Tool("disc", a), at, [_DEPTH * a], ratios if len(ratios) > 1 else None)
+        rests.append(scope.young * _DEPTH * a / np.array([full.force for full in fulls]) - 0.5 / (planes * a))
+    (a, b), h = radii, np.zeros(len(ratios))
     for _ in range(_STEPS):
-        bent = [rest + 2 / 45 * plane * h**2 * r**5 for rest, r in zip(rests, radii, strict=True)]
+        bent = [rest + 2 / 45 * planes * h**2 * r**5 for rest, r in zip(rests, radii, strict=True)]
         h = 3 * (bent[1] - bent[0]) / (b**2 - a**2)
-    return bent[0] - a**2 * h / 3, h
+    return np.stack([bent[0] - a**2 * h / 3, h], axis=-1)
 
 
 def _face(scope: Scope, table: Table, middle: tuple[float, ...]) -> tuple[Face, float]:

@@ -103,12 +103,12 @@ def _flat(
     if min(region.reach) <= 0:
         raise ExportError("the body leaves no region: ask for a smaller margin")
     mesh = coarse_mesh(scope.case, region)
-    law = MaterialLaw(*scope.tissues) if scope.tissues else None
     solved: list[tuple[float, float]] = []
 
     def counted(places: Places, poisson: float) -> FloatArray:
         solved.extend(places)
-        return compliances(mesh, region, places, poisson, law)
+        tissues = scope.tissues_at(poisson)
+        return compliances(mesh, region, places, poisson, MaterialLaw(*tissues) if tissues else None)
 
     table, missed = tabulate(region, scope.poissons, counted, _SHARE * accuracy)
     model = Model(

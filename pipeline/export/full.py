@@ -1,6 +1,6 @@
 """Full solves of the program: one touch of a tool on a study's body, with the bar of its force."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import degrees, isfinite
 from typing import Any
@@ -64,21 +64,44 @@ class Solver:
     def press(self, tool: Tool, at: tuple[float, ...], depth: float, poisson: float | None) -> Full:
         """Return the force of a tool at x and y, or x, y and z (m), at a ``depth`` (m).
 
-        Without ``poisson`` the study's own materials count, else all is of one material with that ratio.
+        Without ``poisson`` the study's own materials count, else the tissue at the face has that ratio.
 
         Raises:
             RuntimeError: if it failed.
         """
+        (found,) = self.press_all(tool, at, [depth], None if poisson is None else [poisson])
+        return found
+
+    def press_all(
+        self,
+        tool: Tool,
+        at: tuple[float, ...],
+        depths: Sequence[float],
+        poissons: Sequence[float] | None = None,
+        mesh: Mapping[str, Any] | None = None,
+    ) -> list[Full]:
+        """Return the forces for all of ``poissons``, and for each at all ``depths`` (m), on one mesh.
+
+        Without a ``mesh``, the keys of the study's section, it is one for the accuracy.
+
+        Raises:
+            RuntimeError: if one of them failed.
+        """
         own = {name: value for name, value in self.sections.items() if name in ("body", "material")}
-        if poisson is not None:
-            own["material"] = {"young": f"{self.young:.12g} Pa", "poisson": poisson}
-        place = {"at": [_mm(x) for x in at], "depth": _mm(depth)}
-        mesh = {"accuracy": f"{100 * self.accuracy:.6g} %"}
-        raw = own | {"probe": tool.section | place, "mesh": mesh, "solve": {"exact": False}}
-        (record,) = compute(make_plan(parse(raw, file=self.file)), MPI.COMM_SELF).values()
-        if not record.is_ok or not isfinite(record.force_error):
-            raise RuntimeError(f"a full solve of a {tool.name} at {place['at']} failed: {record.message}")
-        return Full(record.force, record.force_error, np.array(record.force_vector))
+        if poissons is not None:
+            own["material"] = {"young": f"{self.young:.12g} Pa", "poisson": list(poissons)}
+        place: dict[str, Any] = {"at": [_mm(x) for x in at], "depth": [_mm(depth) for depth in depths]}
+        if mesh is not None and len(depths) > 1:
+            place["depth_range"] = [_mm(min(depths)), _mm(max(depths))]
+        sizes = mesh or {"accuracy": f"{100 * self.accuracy:.6g} %"}
+        raw = own | {"probe": tool.section | place, "mesh": dict(sizes), "solve": {"exact": False}}
+        plan = make_plan(parse(raw, file=self.file))
+        records = compute(plan, MPI.COMM_SELF)
+        found = [records[key] for key in plan.keys]
+        for record in found:
+            if not record.is_ok or not isfinite(record.force_error):
+                raise RuntimeError(f"a full solve of a {tool.name} at {place['at']} failed: {record.message}")
+        return [Full(record.force, record.force_error, np.array(record.force_vector)) for record in found]
 
 
 def _mm(length: float) -> str:

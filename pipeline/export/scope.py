@@ -2,7 +2,7 @@
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pipeline.shapes.body import Body, Layered
@@ -48,12 +48,20 @@ class Scope:
     @property
     def tissues(self) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
         """λ and μ of all regions in units of μ at the face, or nothing if there is one material."""
+        return self.tissues_at(self.poisson)
+
+    def tissues_at(self, poisson: float) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
+        """Return the same with another Poisson's ratio at the face: all else is as the study has it.
+
+        Below layers there is none but the study's own.
+        """
         if not self.body.regions:
             return None
-        mu = surface_tissue(self.case).lame[1]
-        lambdas, shears = zip(
-            *((a / mu, b / mu) for a, b in (tissue.lame for tissue in self.case.tissues)), strict=True
-        )
+        case = self.case
+        if poisson != self.poisson:
+            case = replace(case, material=case.material.model_copy(update={"poisson": poisson}))
+        mu = surface_tissue(case).lame[1]
+        lambdas, shears = zip(*((a / mu, b / mu) for a, b in (tissue.lame for tissue in case.tissues)), strict=True)
         return lambdas, shears
 
 
@@ -71,7 +79,8 @@ def scope_of(study: Study) -> Scope:
     tissue = surface_tissue(first)
     ratios = [surface_tissue(case).poisson for case in cases]
     is_simple = isinstance(first.body, Layered) and not first.body.regions
-    poissons = (min(_USUAL[0], *ratios), max(_USUAL[1], *ratios)) if is_simple else (ratios[0], ratios[0])
+    wanted = [*_USUAL, *ratios] if is_simple else ratios
+    poissons = min(wanted), max(wanted)
     sections = tomllib.loads(study.text) if study.text else {}
     return Scope(first, first.body, tissue.young, tissue.poisson, poissons, sections, study.file)
 
@@ -82,6 +91,11 @@ def surface_tissue(case: Case) -> Tissue:
     return body.layers[0] if isinstance(body, Layered) and body.layers else case.material
 
 
+def _is_same_but_for_poisson(case: Case, first: Case) -> bool:
+    """Tell whether materials are the same, Poisson's ratio apart, which a model has a range of."""
+    return case.material.model_copy(update={"poisson": first.material.poisson}) == first.material
+
+
 def _refusal(case: Case, first: Case) -> str:
     """Return why a case has no model, or the first one's is not its, or nothing."""
     body, probe = case.body, case.probe
@@ -89,6 +103,8 @@ def _refusal(case: Case, first: Case) -> str:
         return "a model is of one body, and the study has several: export a study of each"
     if case.load.acts:
         return "gravity and tractions have no real-time model yet"
+    if case.material.is_large:
+        return 'material.law = "neo-hookean" has no real-time model: its force is not in proportion to anything'
     if case.poisson > _MOST:
         return f"material.poisson = {case.poisson:g} is too near to 0.5 for a real-time model: at most {_MOST}"
     if probe.action != "pierce" or probe.motion == "all" or probe.slit is not None:
@@ -97,7 +113,7 @@ def _refusal(case: Case, first: Case) -> str:
         return _flat_refusal(case, first, body)
     if not body.is_smooth:
         return f'body.shape = "{body.shape}" has no real-time model yet: boxes, cylinders, ellipsoids and surfaces have'
-    if case.material != first.material:
+    if not _is_same_but_for_poisson(case, first):
         return "a model of a curved body is of one material, and the study has several: export a study of each"
     if (probe.shape, probe.contact) != ("disc", "frictionless"):
         return (
@@ -111,7 +127,10 @@ def _refusal(case: Case, first: Case) -> str:
 def _flat_refusal(case: Case, first: Case, body: Layered) -> str:
     probe = case.probe
     if body.regions and case.material != first.material:
-        return "a model of layers or inclusions is of one set of materials, and the study has several"
+        if body.layers:
+            return "a model of layers is of one set of materials, material.poisson too, and the study has several"
+        if not _is_same_but_for_poisson(case, first):
+            return "a model of inclusions is of one set of materials, and the study has several: export each"
     if body.has_round_top and not body.is_round:
         return f"a {body.shape} with an inclusion off its axis has no real-time model yet"
     if body.regions and body.depth_of_tissue < _SHALLOWEST * min(body.half_sides):

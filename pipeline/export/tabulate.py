@@ -35,15 +35,20 @@ def tabulate(
 
     It is the first whose forerunner missed less than ``tolerance``, or the largest.
     """
-    low, high = poissons
-    ratios = (low + high) / 2 + (high - low) / 2 * (_nodes(_POISSONS - 1) if low < high else np.zeros(1))
+    ratios = ratios_of(poissons)
     known: list[dict[tuple[float, float], FloatArray]] = [{} for _ in ratios]
     table, missed = None, np.inf
-    for size in sizes:
+    used: set[tuple[float, float]] = set()
+    for number, size in enumerate(sizes):
         places = _places(region, size)
-        new = [place for place in dict.fromkeys(_image(region, p) for p in places) if place not in known[0]]
+        # The first table is never the last: what the second one takes is solved for together with it.
+        wanted = _places(region, sizes[1]) if number == 0 and len(sizes) > 1 else places
+        unknown = [place for place in dict.fromkeys(_image(region, p) for p in wanted) if place not in known[0]]
         for ratio, found in zip(ratios, known, strict=True):
-            found.update(zip(new, compliances(new, float(ratio)), strict=True))
+            if unknown:
+                found.update(zip(unknown, compliances(unknown, float(ratio)), strict=True))
+        new = [place for place in dict.fromkeys(_image(region, p) for p in places) if place not in used]
+        used.update(new)
         if table is not None:
             missed = max(
                 _missed(table, (x, y), float(ratio), found[x, y][0]) * region.room(x, y)
@@ -56,6 +61,12 @@ def tabulate(
             break
     assert table is not None
     return table, float(missed)
+
+
+def ratios_of(poissons: tuple[float, float]) -> FloatArray:
+    """Return the Poisson's ratios of the nodes of a range, one if it is one."""
+    low, high = poissons
+    return np.asarray((low + high) / 2 + (high - low) / 2 * (_nodes(_POISSONS - 1) if low < high else np.zeros(1)))
 
 
 def _missed(table: Table, place: tuple[float, float], poisson: float, c: float) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline import compat
+from pipeline.arrays import FloatArray
 from pipeline.solve.single.cycle import SingleCycle, SmoothedLevel, SymmetricProduct, interpolation, masks, suits
 from pipeline.solve.transfer import transfer
 from pipeline.stages import stage
@@ -142,6 +143,25 @@ class LinearSolver:
         if reason <= 0:
             raise SolveError(f"the linear solver did not converge: {reason_name(reason)} after {its} iterations")
         return its
+
+    @stage("iterations")
+    def solve_many(self, loads: FloatArray) -> FloatArray:
+        """Return the solutions (m, n) for the columns of ``loads`` (m, n), of a direct solver on one process.
+
+        Raises:
+            SolveError: if the factorisation fails.
+        """
+        right = PETSc.Mat().createDense(loads.shape, array=loads, comm=PETSc.COMM_SELF)
+        left = PETSc.Mat().createDense(loads.shape, comm=PETSc.COMM_SELF)
+        left.setUp()
+        try:
+            self.ksp.pc.getFactorMatrix().matSolve(right, left)
+            return np.array(left.getDenseArray())
+        except PETSc.Error as error:
+            raise SolveError(f"the factorisation failed (PETSc error {error.ierr})") from error
+        finally:
+            right.destroy()
+            left.destroy()
 
     def _iterate(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> int:
         try:

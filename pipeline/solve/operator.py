@@ -3,11 +3,13 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any, Protocol
 
 from petsc4py import PETSc
 
 from pipeline import compat
-from pipeline.solve.conditions import ConstrainedSpace
+from pipeline.arrays import Int32Array
+from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.forms import ElasticForms, curved_cells
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.straight import suits
@@ -17,6 +19,26 @@ from pipeline.stages import stage
 _SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
 
 
+class Constrained(Protocol):
+    """A space of displacements on a mesh, its prescribed dofs (unrolled), and the conditions that dolfinx takes."""
+
+    @property
+    def body(self) -> BodyMesh:
+        """The mesh."""
+
+    @property
+    def space(self) -> Any:
+        """Of dolfinx."""
+
+    @property
+    def prescribed(self) -> Int32Array:
+        """Rows and columns that the operator does not have."""
+
+    @property
+    def dirichlet(self) -> list[Any]:
+        """The same, for dolfinx."""
+
+
 class Operators:
     """Makes operators of one space, and lends them: a matrix is its borrower's until it is given back.
 
@@ -24,7 +46,7 @@ class Operators:
     ``close`` frees what is kept.
     """
 
-    def __init__(self, space: ConstrainedSpace, forms: ElasticForms):
+    def __init__(self, space: Constrained, forms: ElasticForms):
         self._space, self._forms = space, forms
         self._idle: dict[str, list[PETSc.Mat]] = {}
         self._parts: dict[str, tuple[PETSc.Mat, PETSc.Mat]] = {}

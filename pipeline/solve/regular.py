@@ -10,8 +10,9 @@ ball that the body holds it is kept as polynomials, by least squares. Beyond a h
 by Betti's theorem within, where the force P of u acts and R has none.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 from typing import Any
@@ -22,7 +23,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from pipeline import compat
-from pipeline.arrays import FloatArray, IntArray
+from pipeline.arrays import FloatArray, Int32Array, IntArray
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve.compiled import form, vector_space
 from pipeline.solve.conditions import Conditions
@@ -31,6 +32,7 @@ from pipeline.solve.forms import compile_elastic, one_cell
 from pipeline.solve.linear import Level, LinearSolver, SolveError
 from pipeline.solve.loads import Motion
 from pipeline.solve.material import MaterialLaw
+from pipeline.solve.operator import Operators
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.vectors import vector
 
@@ -39,6 +41,10 @@ DEGREE, _POWER = 2, 5
 _EXPONENTS = np.array([e for e in product(range(_POWER + 1), repeat=3) if sum(e) <= _POWER])
 # A node this near to a force, in units of the radius, is where it acts.
 _AT_CENTRE = 1e-9
+# From so many forces on an operator without conditions is assembled: its products take a tenth of an integration.
+_MANY = 8
+# Right-hand sides that are solved for together.
+_TOGETHER = 24
 # Points of quadrature on the half sphere, from pole to rim and round it.
 _UP, _ROUND = 16, 24
 
@@ -165,30 +171,26 @@ def _solved(
     own = MaterialLaw.of(_ratio(forces[0].poisson), 1.0)
     others = None if law is None else _beyond(law, own)
     law = law or own
-    pull, rows = _pull(space.dofs.space)
-    with (
-        vector(space.dofs.space) as rhs, vector(space.dofs.space) as unknown,
-        space.operators.lend(law, blocked=False) as (matrix, _),
-    ):  # fmt: skip
+    pull = _Pull(space.dofs.space, places)
+    free = np.ones(len(places) * 3)
+    free[space.dofs.prescribed] = 0.0
+    with space.operators.lend(law, blocked=False) as (matrix, _), _products(space, len(forces)) as product:
         level = Level(space.dofs.space, matrix, space.dofs.prescribed)
         solver = LinearSolver([level], direct=True, tolerance=0.5)
         try:
-            for force in forces:
-                held = space.dofs.held(Motion(far=force, share=-1.0))
-                rhs.set(0.0)
-                space.lift(rhs, held, law)
-                for row, values in zip(rows, force.stress(places).transpose(1, 0, 2), strict=True):
-                    row.x.array[:] = values.ravel()
-                rhs.array[:] -= fem.assemble_vector(pull).array[: space.dofs.owned]
-                if others is not None:
-                    _load_others(space, rhs, force, places, others)
-                rhs.array[space.dofs.prescribed_owned] = 0.0
-                unknown.set(0.0)
-                solver.solve(rhs, unknown)
-                found = np.asarray(unknown.array + held)
+            for first in range(0, len(forces), _TOGETHER):
+                some = forces[first : first + _TOGETHER]
+                held = np.array([space.dofs.held(Motion(far=force, share=-1.0)) for force in some])
+                loads = np.zeros((len(free), len(some)), order="F")
+                for column, (force, values) in enumerate(zip(some, held, strict=True)):
+                    load = product(values, law) + pull.of(force)
+                    if others is not None:
+                        load += product(_field(force, places), others)
+                    loads[:, column] = -free * load
+                found = solver.solve_many(loads).T + held
                 if not np.isfinite(found).all():
-                    raise SolveError(f"the regular part at {force.centre} is not finite")
-                yield found
+                    raise SolveError(f"the regular parts at {[force.centre for force in some]} are not finite")
+                yield from found
         finally:
             solver.close()
 
@@ -199,30 +201,75 @@ def _beyond(law: MaterialLaw, own: MaterialLaw) -> MaterialLaw:
     return MaterialLaw(tuple(x - lame_lambda for x in law.lame_lambda), tuple(x - mu for x in law.lame_mu))
 
 
-def _load_others(space: ElasticSpace, rhs: Any, force: PointForce, places: FloatArray, others: MaterialLaw) -> None:
-    """Take from ``rhs`` what the half-space's field makes in other tissue than its own, clear of its centre."""
+def _field(force: PointForce, places: FloatArray) -> FloatArray:
+    """Return the half-space's field at all places, 0 where the force acts."""
     away = np.linalg.norm(places - np.array(force.centre), axis=1) > _AT_CENTRE * force.radius
-    field = np.zeros_like(places)
-    field[away] = force.at(places[away])
-    space.forms.displacement.x.array[:] = field.reshape(-1)
-    with vector(space.dofs.space) as more:
-        more.set(0.0)
-        space.apply(more, others)
-        rhs.axpy(-1.0, more)
+    found = np.zeros_like(places)
+    found[away] = force.at(places[away])
+    return found.reshape(-1)
 
 
-def _pull(space: Any) -> tuple[Any, list[Any]]:
-    """Return the form of ∫ σn·v on the whole boundary, and the three functions that hold the rows of σ."""
-    rows, normal = [fem.Function(space) for _ in range(3)], ufl.FacetNormal(space.mesh)
-    test = ufl.TestFunction(space)
-    measure = ufl.ds(domain=space.mesh, metadata={"quadrature_degree": 2 * DEGREE + 2})
-    return form(sum(ufl.inner(row, normal) * test[i] for i, row in enumerate(rows)) * measure), rows
+@contextmanager
+def _products(space: ElasticSpace, forces: int) -> Iterator[Callable[[FloatArray, MaterialLaw], FloatArray]]:
+    """Lend what makes K u of u on all dofs, none held, for any law: if it is for many forces, by a matrix for each."""
+    with vector(space.dofs.space) as result, ExitStack() as stack:
+        if forces < _MANY:
+
+            def by_form(values: FloatArray, law: MaterialLaw) -> FloatArray:
+                space.forms.displacement.x.array[:] = values
+                result.set(0.0)
+                space.apply(result, law)
+                return np.array(result.array)
+
+            yield by_form
+            return
+        whole = stack.enter_context(vector(space.dofs.space))
+        operators, made = Operators(_Free(space.dofs.body, space.dofs.space), space.forms), {}
+        stack.callback(operators.close)
+
+        def by_matrix(values: FloatArray, law: MaterialLaw) -> FloatArray:
+            if law not in made:
+                made[law], _ = stack.enter_context(operators.lend(law, blocked=False))
+            whole.array[:] = values
+            made[law].mult(whole, result)
+            return np.array(result.array)
+
+        yield by_matrix
+
+
+@dataclass(frozen=True, eq=False)
+class _Free:
+    """A space of displacements of which none is prescribed."""
+
+    body: BodyMesh
+    space: Any
+    prescribed: Int32Array = field(default_factory=lambda: np.empty(0, dtype=np.int32))
+    dirichlet: list[Any] = field(default_factory=list)
+
+
+class _Pull:
+    """∫ σn·v on the whole boundary for the stress of a force's half-space: the rows of σ as functions of a space."""
+
+    def __init__(self, space: Any, places: FloatArray):
+        self._rows, normal = [fem.Function(space) for _ in range(3)], ufl.FacetNormal(space.mesh)
+        test = ufl.TestFunction(space)
+        measure = ufl.ds(domain=space.mesh, metadata={"quadrature_degree": 2 * DEGREE + 2})
+        self._form = form(sum(ufl.inner(row, normal) * test[i] for i, row in enumerate(self._rows)) * measure)
+        self._outer = np.unique(_outer_triangles(compat.cell_dofs(space), places))
+        self._points = places[self._outer]
+
+    def of(self, force: PointForce) -> FloatArray:
+        """Return it on all dofs."""
+        for row, values in zip(self._rows, force.stress(self._points).transpose(1, 0, 2), strict=True):
+            row.x.array.reshape(-1, 3)[self._outer] = values
+        return np.asarray(fem.assemble_vector(self._form).array)
 
 
 def compile_regular() -> None:
     """Compile the forms that the regular part takes."""
     compile_elastic(DEGREE, straight=False, of_regions=False)
-    _pull(vector_space(distribute(MPI.COMM_SELF, one_cell(straight=False)).mesh, DEGREE))
+    space = vector_space(distribute(MPI.COMM_SELF, one_cell(straight=False)).mesh, DEGREE)
+    _Pull(space, np.asarray(space.tabulate_dof_coordinates()))
 
 
 def _ratio(poisson: float) -> float:

@@ -106,12 +106,25 @@ def test_tables_of_tensors_know_their_images(shape):
         ({"probe": BLADE}, "bonded"),
         ({"body": DOME, "probe": BALL}, "frictionless disc"),
         ({"body": DOME, "probe": DISC | {"axis": [0.1, 0.0, -1.0]}}, "axis"),
-        ({"body": DOME, "material": SOFT | {"poisson": [0.3, 0.4]}}, "several"),
+        ({"body": DOME, "material": SOFT | {"young": ["10 kPa", "20 kPa"]}}, "several"),
+        ({"body": BOX | {"inclusion": [TUMOUR]}, "material": SOFT | {"young": ["10 kPa", "20 kPa"]}}, "several"),
+        (
+            {"body": CYLINDER | {"layers": [SKIN | {"thickness": "6 mm"}]}, "material": SOFT | {"poisson": [0.3, 0.4]}},
+            "material.poisson too",
+        ),
         ({"body": CYLINDER | {"inclusion": [TUMOUR | {"at": ["3 mm", "0 mm", "-10 mm"]}]}}, "off its axis"),
         ({"body": CYLINDER | {"layers": [SKIN | {"thickness": "1 mm"}]}}, "so near"),
         ({"body": CYLINDER | {"inclusion": [TUMOUR | {"poisson": 0.5}]}}, "0.5"),
         ({"body": CYLINDER | {"fixed": "bottom+sides"}}, "support"),
         ({"material": SOFT | {"poisson": 0.5}}, "0.5"),
+        (
+            {
+                "material": SOFT | {"law": "neo-hookean"},
+                "probe": DISC | {"contact": "bonded"},
+                "mesh": {"epsilon": "full", "fine": "2 mm", "coarse": "8 mm", "degree": 2},
+            },
+            "neo-hookean",
+        ),
         ({"body": [CYLINDER | {"name": "a"}, BOX | {"name": "b"}]}, "several"),
         ({"probe": BLADE | {"incision": "4 mm", "action": "cut"}}, "cut"),
     ],
@@ -123,6 +136,26 @@ def test_what_has_no_model_yet_is_refused_by_name(sections, word):
 
 def test_the_range_of_poissons_ratio_holds_that_of_the_study():
     assert scope_of(study(material=SOFT | {"poisson": [0.2, 0.4]})).poissons == (0.2, 0.49)
+
+
+def test_a_study_of_several_ratios_makes_a_model_of_their_range():
+    ratios = {"material": SOFT | {"poisson": [0.4, 0.3, 0.45]}}
+    scope = scope_of(study(body=BOX | {"inclusion": [TUMOUR]}, **ratios))
+    assert (scope.poisson, scope.poissons) == (0.4, (0.3, 0.45))
+    # What is inside keeps its own: λ and μ in units of μ at the face.
+    for ratio in (0.3, 0.4, 0.45):
+        (_, own), (_, stiff) = lames = list(zip(*scope.tissues_at(ratio), strict=True))
+        assert own == 1.0
+        assert stiff == pytest.approx(5 * (1 + ratio) / 1.45)
+        assert lames[0][0] == pytest.approx(2 * ratio / (1 - 2 * ratio))
+        assert lames[1][0] == pytest.approx(9 * stiff)
+    scope, solver = scope_of(study(body=DOME, **ratios)), Known(10e3)
+    assert scope.poissons == (0.3, 0.45)
+    model, *_ = curved_model(scope, solver, 0.01, 0.4, (1e-3, 0.03, 0.1, 1e-3), 0.0)
+    for ratio in (0.3, 0.33, 0.42, 0.45):
+        found = model.table.at(2e-3, 1e-3, ratio)
+        assert (found.c, found.h) == pytest.approx(solver.regular(2e-3, 1e-3, ratio), rel=1e-3)
+    assert model.query("disc", radius=2e-3, at=(0, 0, 0.015), depth=1e-5, poisson=0.46).status == "poisson"
 
 
 @pytest.fixture(scope="module")
@@ -167,15 +200,17 @@ class Known:
 
     young: float
 
-    def press(self, tool: Tool, at: tuple[float, ...], depth: float, poisson: float | None) -> Full:
-        assert poisson is None
-        c, h = self.regular(*at)
-        nothing = np.zeros(2)
-        place = Place(c, h, 0.0, nothing, nothing, nothing, 1 / (1 - 0.45**2))
-        return Full(self.young * depth / tangent(tool.radius, place), 0.0, np.zeros(3))
+    def press_all(self, tool: Tool, at: tuple[float, ...], depths: Sequence[float], poissons=None) -> list[Full]:
+        ((depth,), nothing) = depths, np.zeros(2)
+        found = []
+        for poisson in poissons or [0.45]:
+            place = Place(*self.regular(*at, poisson), 0.0, nothing, nothing, nothing, 1 / (1 - poisson**2))
+            found.append(Full(self.young * depth / tangent(tool.radius, place), 0.0, np.zeros(3)))
+        return found
 
-    def regular(self, x: float, y: float) -> tuple[float, float]:
-        return -9.0 + 300 * (x**2 + y**2), 6e3 + 1e6 * (x**2 + y**2)
+    def regular(self, x: float, y: float, poisson: float = 0.45) -> tuple[float, float]:
+        share = (1 - poisson**2) / (1 - 0.45**2)
+        return share * (-9.0 + 300 * (x**2 + y**2)), share * (6e3 + 1e6 * (x**2 + y**2))
 
 
 @pytest.mark.parametrize("axes", [(30, 30, 15), (40, 30, 15)])
@@ -197,7 +232,7 @@ def test_a_curved_body_is_what_two_discs_tell(axes):
     assert top.bend == pytest.approx((c / a**2 + c / b**2) / 2, rel=1e-3)
     at, depth = (0.0, 0.0, c), 2e-5
     touch = model.query("disc", radius=2e-3, at=at, depth=depth, young=20e3)
-    assert touch.force == pytest.approx([0, 0, 2 * solver.press(Tool("disc", 2e-3), (0, 0), depth, None).force])
+    assert touch.force == pytest.approx([0, 0, 2 * solver.press_all(Tool("disc", 2e-3), (0, 0), [depth])[0].force])
     # A dome meets a ball as a flat face meets a sharper one (H. Hertz, 1882), but for what is far away.
     sharp = 1 / (1 / 6e-3 + (c / a**2 + c / b**2) / 2)
     radius = model.query("sphere", radius=6e-3, at=at, depth=depth).contact_radius

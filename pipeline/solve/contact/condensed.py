@@ -9,7 +9,6 @@ import time
 from contextlib import ExitStack
 
 import numpy as np
-from petsc4py import PETSc
 from scipy.linalg import cho_factor, cho_solve
 
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
@@ -68,12 +67,11 @@ class CondensedElements(DisplacementElements):
         """Return C (n, n), in m/N, symmetric."""
         count, size = len(self._dofs), self.space.dofs.owned
         compliance = np.empty((count, count))
-        factor = self._free.ksp.pc.getFactorMatrix()
         for first in range(0, count, _TOGETHER):
             here = self._dofs[first : first + _TOGETHER]
             loads = np.zeros((size, len(here)), order="F")
             loads[here, np.arange(len(here))] = 1.0
-            compliance[:, first : first + len(here)] = _solve_many(factor, loads)[self._dofs]
+            compliance[:, first : first + len(here)] = self._free.solve_many(loads)[self._dofs]
         compliance = compliance[np.ix_(self._place, self._place)]
         return (compliance + compliance.T) / 2
 
@@ -115,18 +113,3 @@ class CondensedElements(DisplacementElements):
                 self._spaces, self.space.degree, self._law, self._candidates, self._stack, direct=False
             )
         return self._multigrid.hold_facets(facets)
-
-
-def _solve_many(factor: PETSc.Mat, loads: FloatArray) -> FloatArray:
-    """Return the solutions (m, n) for the columns of ``loads`` (m, n)."""
-    right = PETSc.Mat().createDense(loads.shape, array=loads, comm=PETSc.COMM_SELF)
-    left = PETSc.Mat().createDense(loads.shape, comm=PETSc.COMM_SELF)
-    left.setUp()
-    try:
-        factor.matSolve(right, left)
-        return np.array(left.getDenseArray())
-    except PETSc.Error as error:
-        raise SolveError(f"the factorisation failed (PETSc error {error.ierr})") from error
-    finally:
-        right.destroy()
-        left.destroy()
