@@ -58,6 +58,7 @@ _SCENE = (
     Quantity("law", "", "law of the material"),
     Quantity("probe", "", "probe"),
     Quantity("body", "", "body"),
+    Quantity("at", "", "where the probe's axis meets the body, as it is given", "at", "place of the probe"),
     Quantity("path", "m", "length along the path of the probe, as it is given", axis="length along the path"),
     Quantity("x", "m", "x of the raster's places", axis="x"),
     Quantity("y", "m", "y of the raster's places", axis="y"),
@@ -164,7 +165,7 @@ _OF_PIECES = (
     Quantity("on", "", "place", "place"),
     Quantity("thickness", "m", "thickness"),
     Quantity("radius", "m", "radius"),
-    Quantity("at", "", "centre"),
+    Quantity("at", "", "centre", "centre", "centre"),
     Quantity("axes", "", "semi-axes"),
 )
 QUANTITIES = {quantity.name: quantity for quantity in (*_MESH, *_SCENE, *_RESULTS)}

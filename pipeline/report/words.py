@@ -8,6 +8,9 @@ import xarray as xr
 
 from pipeline import quantities
 
+_NUMBER = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
+_POINT = re.compile(rf"{_NUMBER} (?P<unit>[a-zµ]+)(?: {_NUMBER} (?P=unit))+\b")
+
 
 def scale(array: xr.DataArray) -> tuple[float, str]:
     """Return the factor from the array's unit to the one that people read, and that one's name ('': none)."""
@@ -22,13 +25,23 @@ def number(array: xr.DataArray, value: Any) -> str:
 def choice(coordinate: xr.DataArray, value: Any) -> str:
     """Write a choice along a dimension: ``ν = 0.45``, ``ε = full``, ``outside free``, or a table's own name."""
     if isinstance(value, str):
-        return value if coordinate.name in ("probe", "body") else f"{symbol(coordinate)} {value}"
+        return value if coordinate.name in ("probe", "body") else f"{symbol(coordinate)} {points(value)}"
     return f"{symbol(coordinate)} = {number(coordinate, value)}"
 
 
 def choices(dataset: xr.Dataset, selection: dict[str, Any]) -> str:
     """Write a choice along several dimensions."""
     return ", ".join(choice(dataset[name], value) for name, value in selection.items())
+
+
+def points(text: str) -> str:
+    """Return ``text`` with its points as people write them: ``at 0 mm 2 mm -7 mm`` is ``at (0, 2, −7) mm``."""
+
+    def written(found: re.Match[str]) -> str:
+        numbers = ", ".join(found[0].split()[::2]).replace("-", "−")
+        return f"({numbers}) {found['unit']}"
+
+    return _POINT.sub(written, text)
 
 
 def symbol(coordinate: xr.DataArray) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from pipeline.report.words import heading, is_numeric, number, scale
+from pipeline.report.words import heading, is_numeric, number, points, scale
 
 # Values that span more than this are shown on a logarithmic axis.
 _LONG = 30.0
@@ -61,7 +61,11 @@ def horizontal(coordinate: xr.DataArray) -> Horizontal:
     values = coordinate.values
     if not is_numeric(coordinate):
         row = np.arange(len(values), dtype=float)
-        return Horizontal(row, tuple(map(str, values)), heading(coordinate), joins=False)
+        head = heading(coordinate)
+        written = [points(str(value)) for value in values]
+        if head.endswith(" (mm)") and all(text.endswith(") mm") for text in written):
+            written = [text.removesuffix(" mm") for text in written]
+        return Horizontal(row, tuple(written), head, joins=False)
     factor, unit = scale(coordinate)
     finite = values[np.isfinite(values)].astype(float) * factor
     if not finite.size:

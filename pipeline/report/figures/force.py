@@ -14,7 +14,8 @@ from pipeline.report.figures.style import FAILED, QUIET, finish, look, new_figur
 from pipeline.report.words import choices, heading
 
 _COLUMNS, _MOST_PANELS, _MOST_CURVES = 3, 6, 4
-_LEGEND_ROOM = 0.25  # of a panel's height, above the points
+_LEGEND_ROW = 0.1  # of a panel's height
+_HANDLE, _LETTER = 0.35, 0.05  # inches
 
 
 def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
@@ -30,6 +31,10 @@ def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     width = figure.get_figwidth() / columns - 0.6
     for dim, ax in zip(dims, axes.ravel(), strict=False):
         _draw_against(ax, dataset, dim, width)
+    drawn = axes.ravel()[: len(dims)]
+    top = max((ax.get_ylim()[1] for ax in drawn), default=0.0)
+    for ax in drawn:  # a glance compares panels
+        ax.set_ylim(min(ax.get_ylim()[0] for ax in drawn), top)
     if not dims:
         _draw_one(axes[0, 0], dataset)
     for ax in axes[:, 0]:
@@ -48,9 +53,17 @@ def _draw_against(ax: Axes, dataset: xr.Dataset, dim: str, width: float) -> None
         ax.set_title(textwrap.fill(words, max(16, int(17 * width))), fontsize=7, color=QUIET)
     _from_zero(ax)
     if len(layout.curves) > 1:
-        low, high = ax.get_ylim()
-        ax.set_ylim(low, high + _LEGEND_ROOM * (high - low))
-        ax.legend(loc="upper center", ncol=2, fontsize=6.5, frameon=False, handlelength=1.6, columnspacing=1.0)
+        _write_legend(ax, width)
+
+
+def _write_legend(ax: Axes, width: float) -> None:
+    """Name the curves above them, in two columns where two fit ``width`` inches."""
+    texts = ax.get_legend_handles_labels()[1]
+    columns = 2 if 2 * (_HANDLE + _LETTER * max(map(len, texts), default=0)) < width else 1
+    rows = -(-len(texts) // columns)
+    low, high = ax.get_ylim()
+    ax.set_ylim(low, high + (high - low) * _LEGEND_ROW * rows / (1 - _LEGEND_ROW * rows))
+    ax.legend(loc="upper center", ncol=columns, fontsize=6.5, frameon=False, handlelength=1.6, columnspacing=1.0)
 
 
 def _draw_one(ax: Axes, dataset: xr.Dataset) -> None:
