@@ -72,6 +72,7 @@ benchmark: setup ## every table of docs/performance.md, into results/ (an idle m
 	$(PYTHON) -m benchmarks.ranks
 	$(PYTHON) -m benchmarks.peers
 	$(PYTHON) -m benchmarks.plain_loop --sample 24
+	$(PYTHON) -m benchmarks.products
 	$(PYTHON) -m benchmarks.solvers
 	$(PYTHON) -m benchmarks.contact
 	$(PYTHON) -m benchmarks.scaling

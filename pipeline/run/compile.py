@@ -14,6 +14,7 @@ from pipeline.solve.mixed_forms import compile_mixed
 from pipeline.solve.regular import compile_regular
 from pipeline.solve.release import compile_release
 from pipeline.solve.single.cycle import compiles
+from pipeline.solve.straight import product
 from pipeline.solve.straight.pattern import library
 from pipeline.stages import stage
 
@@ -59,6 +60,7 @@ def _compile(element: str, degree: int, *, of_regions: bool, of_slit: bool) -> N
         return
     library()
     compiles()
+    product.compiles()
     compile_elastic(degree, straight=degree == 1, of_regions=of_regions)
     if element == "mixed":
         compile_mixed(degree)

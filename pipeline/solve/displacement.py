@@ -32,6 +32,7 @@ from pipeline.solve.material import MaterialLaw
 from pipeline.solve.reaction import Response, reaction, sums
 from pipeline.solve.release import Front, Release, Released
 from pipeline.solve.rim import plain_share
+from pipeline.solve.single.cycle import takes_product
 from pipeline.solve.solution import BALANCE_LIMIT, MOST_ROUNDS, TOLERANCE, Solution, rest
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.strain import largest_strain, principal_strains
@@ -136,9 +137,10 @@ class DisplacementProblem:
             )  # fmt: skip
             if not estimate:
                 return solution
-            solver.close()  # what the next degree takes is the most memory of all
+            if not solver.is_single and fine.degree > 1:
+                solver.close()  # what the next degree takes is the most memory of all
             start = time.perf_counter()
-            found, (released_finer, pushed_finer), more = self._decrements(law, levels, held, loads, stack)
+            found, (released_finer, pushed_finer), more = self._decrements(law, levels, held, loads, solver, stack)
             plain = plain_share(self._body)
         form = response.stiffness if carried is None else carried.form
         relative = np.array([error_bar(share, fine.degree, plain=plain) for share in shares(found, form)])
@@ -157,16 +159,16 @@ class DisplacementProblem:
         return response.loads.closed(share), [held[0] + share * held[1]]
 
     @contextmanager
-    def solver(self, law: MaterialLaw, method: str = "auto") -> Iterator[LinearSolver]:
-        """Lend the solver for a material, whose preconditioner is linear to the last digit; collective.
+    def solver(self, law: MaterialLaw, method: str = "auto", *, linear: bool = True) -> Iterator[LinearSolver]:
+        """Lend a solver for a material; collective. ``linear``: its preconditioner is, to the last digit.
 
         Raises:
             SolveError: if it cannot be set up.
         """
         direct = is_direct(method, self.dofs, self._fine.degree)
         with ExitStack() as stack:
-            levels, _ = self._hierarchy(law, stack, direct=direct)
-            solver = LinearSolver(levels, direct=direct, tolerance=0.5, linear=True)
+            levels, _ = self._hierarchy(law, stack, direct=direct, entries=linear)
+            solver = LinearSolver(levels, direct=direct, tolerance=0.5, linear=linear)
             stack.callback(solver.close)
             yield solver
 
@@ -182,32 +184,47 @@ class DisplacementProblem:
     def _largest_strain(self) -> float:
         return largest_strain(self._strain, self._body, self._conditions.front)
 
-    def _hierarchy(self, law: MaterialLaw, stack: ExitStack, *, direct: bool) -> tuple[list[Level], float]:
+    def _hierarchy(
+        self, law: MaterialLaw, stack: ExitStack, *, direct: bool, entries: bool = False
+    ) -> tuple[list[Level], float]:
         """Return the levels of multigrid, or the one of a direct solve, and the seconds that one assembly takes.
 
-        Their operators are given back with the ``stack``.
+        Their operators are given back with the ``stack``; all of them have ``entries``, or maybe the lowest alone.
         """
         spaces = [self._fine] if direct else [*self._coarser(), self._fine]
-        found = [self._level(space, law, stack, blocked=not direct) for space in spaces]
+        found = [self._level(space, law, stack, blocked=not direct, entries=entries) for space in spaces]
         return [level for level, _ in found], sum(seconds for _, seconds in found)
 
     def _coarser(self) -> list[ElasticSpace]:
         """Return the spaces of lower degree; collective."""
         return [self._spaces.get(degree, self._conditions) for degree in range(1, self._fine.degree)]
 
-    def _finer(self, law: MaterialLaw, levels: list[Level], stack: ExitStack) -> tuple[ElasticSpace, LinearSolver]:
-        """Return the space of one degree more and a solver in it above ``levels``, freed with the stack; collective."""
+    def _finer(
+        self, law: MaterialLaw, levels: list[Level], stack: ExitStack, below: LinearSolver | None = None
+    ) -> tuple[ElasticSpace, LinearSolver]:
+        """Return the space of one degree more and a solver in it above ``levels``, freed with the stack; collective.
+
+        ``below`` is the solver of ``levels``, if it is still there.
+        """
         finer = self._spaces.get(self._fine.degree + 1, self._conditions)
         if len(levels) == 1:
-            levels = [*(self._level(space, law, stack, blocked=True)[0] for space in self._coarser()), *levels]
-        level, _ = self._level(finer, law, stack, blocked=True)
-        solver = LinearSolver([*levels, level], direct=False, tolerance=0.5)
+            coarser = (self._level(space, law, stack, blocked=True, entries=True)[0] for space in self._coarser())
+            levels = [*coarser, *levels]
+        entries = not takes_product([level.matrix for level in levels])
+        level, _ = self._level(finer, law, stack, blocked=True, entries=entries)
+        solver = LinearSolver([*levels, level], direct=False, tolerance=0.5, below=below)
         stack.callback(solver.close)
         return finer, solver
 
-    def _level(self, space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, blocked: bool) -> tuple[Level, float]:
-        blocked = blocked and space.degree > 1
-        matrix, seconds = stack.enter_context(space.operators.lend(law, blocked=blocked, shared=self._shared))
+    def _level(
+        self, space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, blocked: bool, entries: bool
+    ) -> tuple[Level, float]:
+        blocked, operators = blocked and space.degree > 1, space.operators
+        if blocked and not entries:
+            lent = operators.lend_for_cycles(law, shared=self._shared)
+        else:
+            lent = operators.lend(law, blocked=blocked, shared=self._shared)
+        matrix, seconds = stack.enter_context(lent)
         return Level(space.dofs.space, matrix, space.dofs.prescribed, not law.is_uniform), seconds
 
     def _unit(self, motion: Motion, held: FloatArray) -> FloatArray:
@@ -225,14 +242,15 @@ class DisplacementProblem:
 
     @stage("error bar")
     def _decrements(
-        self, law: MaterialLaw, levels: list[Level], held: list[FloatArray], loads: Loads, stack: ExitStack
-    ) -> tuple[FloatArray, Released, int]:
+        self, law: MaterialLaw, levels: list[Level], held: list[FloatArray], loads: Loads, below: LinearSolver,
+        stack: ExitStack,
+    ) -> tuple[FloatArray, Released, int]:  # fmt: skip
         """Return what one degree more takes away from the last stiffness of the whole body, and the iterations.
 
         Between them is what it makes of the energy that a slit's front, and the blade's tip, release.
         """
         fine = self._fine
-        finer, solver = self._finer(law, levels, stack)
+        finer, solver = self._finer(law, levels, stack, below)
         moved = fine.forms.displacement.x.array.copy()
         applied = finer.applied(loads.dead)
         units = [([values], Loads((motion,), (1.0,))) for motion, values in zip(loads.motions, held, strict=True)]

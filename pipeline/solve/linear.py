@@ -5,6 +5,7 @@ Every solver has its own options prefix.
 """
 
 import itertools
+import operator
 import time
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +15,17 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.arrays import FloatArray
-from pipeline.solve.single.cycle import SingleCycle, SmoothedLevel, SymmetricProduct, interpolation, masks, suits
+from pipeline.solve.single.cycle import (
+    SingleCycle,
+    SmoothedLevel,
+    SymmetricOperator,
+    SymmetricProduct,
+    UpperBlocks,
+    interpolation,
+    masks,
+    suits,
+)
+from pipeline.solve.straight.product import is_product
 from pipeline.solve.transfer import transfer
 from pipeline.stages import stage
 
@@ -78,13 +89,20 @@ class LinearSolver:
     """A KSP for one operator, with everything that it needs; ``close`` frees it."""
 
     @stage("set-up")
-    def __init__(self, levels: list[Level], *, direct: bool, tolerance: float, linear: bool = False):
+    def __init__(
+        self, levels: list[Level], *, direct: bool, tolerance: float, linear: bool = False,
+        below: "LinearSolver | None" = None,
+    ):  # fmt: skip
         """Set up; collective. ``linear``: the preconditioner is a linear map to the last digit, in double throughout.
+
+        ``below`` is a solver of all levels but the last, if there is one: what it has set up serves on where it can,
+        and it must then live as long.
 
         Raises:
             SolveError: if that fails.
         """
-        self._levels = levels
+        self._levels, self._is_direct = levels, direct
+        self._below = below if below is not None and below.carries(levels) else None
         self._is_single = not direct and not linear and suits(self._matrices)
         self._looked_closer = False
         self._owned: list[Any] = []
@@ -94,7 +112,7 @@ class LinearSolver:
         self._options: set[str] = set()
         self.ksp = self._own(PETSc.KSP().create(matrix.comm))
         self.ksp.setOptionsPrefix(self._prefix)
-        self._operator = self._symmetric_product(matrix) if self._is_single else matrix
+        self._operator = self._symmetric_product(matrix) if self._is_single and not is_product(matrix) else matrix
         self.ksp.setOperators(self._operator, matrix)
         if direct:
             self.ksp.setType("preonly")
@@ -182,9 +200,20 @@ class LinearSolver:
         return True
 
     @property
-    def can_hold(self) -> bool:
-        """Whether it may serve on with other dofs held."""
+    def is_single(self) -> bool:
+        """Whether it cycles in single precision: it may then serve on with other dofs held."""
         return self._is_single
+
+    @property
+    def cycle(self) -> SingleCycle:
+        """The cycle in single precision."""
+        return self._cycle
+
+    def carries(self, levels: list[Level]) -> bool:
+        """Tell whether what is set up serves a cycle in single precision of ``levels``, one more than its own."""
+        same = len(levels) == len(self._levels) + 1 and all(map(operator.is_, levels, self._levels))
+        serves = self._is_single or (len(self._levels) == 1 and not self._is_direct)
+        return same and serves and all(level.held is None for level in levels)
 
     @stage("set-up")
     def hold(self, levels: list[Level]) -> None:
@@ -268,11 +297,18 @@ class LinearSolver:
         return self._own(product)
 
     def _single_precision(self, pc: PETSc.PC) -> None:
-        levels, coarse = self._levels, self._coarse()
-        smoothed = [SmoothedLevel(level.matrix, jumps=level.jumps) for level in levels[1:]]
-        self._cycle = SingleCycle(smoothed, list(map(interpolation, levels, levels[1:])), coarse)
+        levels = self._levels
+        known = 1 if self._below is None else len(levels) - 1
+        smoothed = [SmoothedLevel(_in_single(level.matrix), jumps=level.jumps) for level in levels[known:]]
+        between = list(map(interpolation, levels[known - 1 :], levels[known:]))
+        if self._below is None:
+            self._cycle = SingleCycle(smoothed, between, self._coarse())
+        elif self._below.is_single:
+            self._cycle = self._below.cycle.above(smoothed, between)
+        else:
+            self._cycle = SingleCycle(smoothed, between, self._below.ksp.pc)
         if any(level.held is not None for level in levels):
-            self._hold(coarse)
+            self._hold(self._coarse())
         pc.setType("python")
         pc.setPythonContext(self._cycle)
 
@@ -312,6 +348,11 @@ class LinearSolver:
         pc.setHYPREType("boomeramg")
         chosen = _BOOMERAMG | (_BOOMERAMG_OF_RANKS if pc.comm.size > 1 else {})
         self._option(prefix, **{f"pc_hypre_boomeramg_{name}": value for name, value in chosen.items()})
+
+
+def _in_single(matrix: PETSc.Mat) -> SymmetricOperator:
+    operator: SymmetricOperator = matrix.getPythonContext() if is_product(matrix) else UpperBlocks(matrix)
+    return operator
 
 
 def reason_name(reason: int) -> str:

@@ -322,7 +322,9 @@ class MixedProblem:
         """Return the solver for elements of ``degree``, and the seconds that its assembly took; collective."""
         saddle, seconds = self.saddle(direct=direct, degree=degree)
         if (degree, direct) not in self._solvers:
-            self._solvers[degree, direct] = self._set_up.enter_context(SaddleSolver(saddle, direct=direct))
+            below = self._solvers.get((degree - 1, False))
+            solver = SaddleSolver(saddle, direct=direct, below=below)
+            self._solvers[degree, direct] = self._set_up.enter_context(solver)
         return self._solvers[degree, direct], seconds
 
     def _use(self, elastic: MaterialLaw) -> None:
@@ -337,7 +339,10 @@ class MixedProblem:
         """Return K₀ in displacements of ``degree``, and the seconds that its assembly took; collective."""
         if (degree, blocked) not in self._levels:
             space = self._spaces.get(degree, self._conditions)
-            matrix, seconds = self._set_up.enter_context(space.operators.lend(self._elastic, blocked=blocked))
+            operators = space.operators
+            law = self._elastic
+            lent = operators.lend_for_cycles(law) if blocked else operators.lend(law, blocked=False)
+            matrix, seconds = self._set_up.enter_context(lent)
             jumps = not self._elastic.is_uniform
             self._levels[degree, blocked] = Level(space.dofs.space, matrix, space.dofs.prescribed, jumps), seconds
         return self._levels[degree, blocked]

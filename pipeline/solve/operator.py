@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any, Protocol
 
 from petsc4py import PETSc
@@ -12,7 +12,9 @@ from pipeline.arrays import Int32Array
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.forms import ElasticForms, curved_cells
 from pipeline.solve.material import MaterialLaw
-from pipeline.solve.straight import suits
+from pipeline.solve.single.cycle import takes_product
+from pipeline.solve.straight import product, suits
+from pipeline.solve.straight.product import CellOperator, CellStiffness
 from pipeline.solve.straight.stiffness import StraightStiffness
 from pipeline.stages import stage
 
@@ -52,6 +54,7 @@ class Operators:
         self._parts: dict[str, tuple[PETSc.Mat, PETSc.Mat]] = {}
         self._part_seconds = 0.0
         self._straight: StraightStiffness | None = None
+        self._cells: CellStiffness | None = None
         self._closed = False
 
     def close(self) -> None:
@@ -79,6 +82,45 @@ class Operators:
                 matrix.destroy()
             else:
                 idle.append(matrix)
+
+    @property
+    def multiplies(self) -> bool:
+        """Tell whether :meth:`lend_product` can: on one process, where C can be compiled."""
+        degree = compat.degree(self._space.space)
+        return suits(self._space.space) and degree in product.DEGREES and product.compiles() and takes_product([])
+
+    @contextmanager
+    def lend_product(self, law: MaterialLaw) -> Iterator[tuple[PETSc.Mat, float]]:
+        """Lend K as a product, without entries, and the seconds that it takes to make one.
+
+        Cycles in single precision alone take it. Rows of prescribed dofs are those of the identity.
+        """
+        start = time.perf_counter()
+        matrix = self._product(law)
+        try:
+            yield matrix, time.perf_counter() - start
+        finally:
+            matrix.destroy()
+
+    def lend_for_cycles(
+        self, law: MaterialLaw, *, shared: bool = False
+    ) -> AbstractContextManager[tuple[PETSc.Mat, float]]:
+        """Lend K as a product where that is possible, else as a matrix of blocks; collective."""
+        return self.lend_product(law) if self.multiplies else self.lend(law, blocked=True, shared=shared)
+
+    @stage("assembly")
+    def _product(self, law: MaterialLaw) -> PETSc.Mat:
+        if self._cells is None:
+            regions, curved = self._space.body.regions, curved_cells(self._space.body.mesh)
+            self._cells = CellStiffness(self._space.space, curved, self._space.prescribed, regions)
+        curved_part = self._cells.curved_matrix()
+        if curved_part is not None:
+            self._forms.set_law(law)
+            compat.add_matrix(curved_part, self._forms.curved_stiffness, [], 0.0)
+        context = CellOperator(self._cells, law, curved_part)
+        if curved_part is not None:
+            curved_part.destroy()
+        return context.matrix()
 
     @stage("assembly")
     def _make(

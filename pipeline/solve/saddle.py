@@ -62,14 +62,16 @@ class SaddleSolver:
     preconditioner sees them, one for each right-hand side.
     """
 
-    def __init__(self, saddle: Saddle, *, direct: bool):
+    def __init__(self, saddle: Saddle, *, direct: bool, below: "SaddleSolver | None" = None):
+        """Set up; collective. ``below`` is one for elements of one degree less, if there is: see ``LinearSolver``."""
         self._saddle, self._direct = saddle, direct
         self.setup_seconds = 0.0
         self.first_energies: list[float] = []
         start = time.perf_counter()
         with ExitStack() as stack:
             if not direct:
-                self._multigrid = LinearSolver(saddle.levels, direct=False, tolerance=0.5)
+                known = None if below is None else below.multigrid
+                self._multigrid = LinearSolver(saddle.levels, direct=False, tolerance=0.5, below=known)
                 stack.callback(self._multigrid.close)
                 self._mass = self._mass_solver(stack)
             self._stack = stack.pop_all()
@@ -115,6 +117,11 @@ class SaddleSolver:
             except PETSc.Error as error:
                 raise SolveError(explain(error)) from error
         return iterations
+
+    @property
+    def multigrid(self) -> LinearSolver | None:
+        """The solver for K₀, None where factors are."""
+        return None if self._direct else self._multigrid
 
     def _matrix(self, c: Weight, stack: ExitStack) -> PETSc.Mat:
         saddle = self._saddle

@@ -57,7 +57,7 @@ class DisplacementElements:
         self._active, self._held = active, self.numbering.normal_dofs(active, owned=True)
         start = time.perf_counter()
         levels = self.hierarchy.hold(active)
-        if self._solver is not None and self._solver.can_hold:
+        if self._solver is not None and self._solver.is_single:
             self._solver.hold(levels)
         else:
             self.close()

@@ -17,7 +17,7 @@ from pipeline.solve.contact.surface import Candidates
 from pipeline.solve.enrich import energy_decrements
 from pipeline.solve.linear import LinearSolver
 from pipeline.solve.material import MaterialLaw
-from pipeline.solve.single.cycle import suits
+from pipeline.solve.single.cycle import suits, takes_product
 from pipeline.solve.spaces import Spaces
 from pipeline.solve.vectors import vector
 from pipeline.stages import stage
@@ -38,9 +38,12 @@ def displacement_decrement(
     finer = spaces.get(elements.space.degree + 1, CONDITIONS)
     with ExitStack() as stack, vector(finer.dofs.space) as residual:
         levels = elements.held_levels(facets, stack)
-        matrix, _ = stack.enter_context(finer.operators.lend(law, blocked=True))
+        below = [level.matrix for level in levels]
+        operators = finer.operators
+        lent = operators.lend_for_cycles(law) if takes_product(below) else operators.lend(law, blocked=True)
+        matrix, _ = stack.enter_context(lent)
         # Where cycles in single precision serve, they hold what is to be held: see :class:`Hierarchy`.
-        level = mask if suits([*(level.matrix for level in levels), matrix]) else hold
+        level = mask if suits([*below, matrix]) else hold
         levels.append(level(finer, matrix, law, normal_dofs(finer, facets)))
         solver = LinearSolver(levels, direct=False, tolerance=0.5)
         stack.callback(solver.close)

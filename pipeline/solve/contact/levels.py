@@ -13,6 +13,7 @@ from pipeline.solve.linear import Level
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.single.cycle import suits
 from pipeline.solve.spaces import ElasticSpace, Spaces
+from pipeline.solve.straight.product import is_product
 
 # What is held is the contact set's alone; of the footprint as such nothing is.
 CONDITIONS = Conditions(bonded=False, unilateral=True)
@@ -34,7 +35,8 @@ class Hierarchy:
         self._candidates = candidates
         degrees = [degree] if direct else range(1, degree + 1)
         found = [spaces.get(d, CONDITIONS) for d in degrees]
-        matrices = [stack.enter_context(s.operators.lend(law, blocked=s.degree > 1 and not direct)) for s in found]
+        matrices = [stack.enter_context(s.operators.lend_for_cycles(law) if s.degree > 1 and not direct else
+                                        s.operators.lend(law, blocked=False)) for s in found]  # fmt: skip
         is_masked = masks and not direct and suits([matrix for matrix, _ in matrices])
         self.seconds = sum(seconds for _, seconds in matrices)
         self._operators = [
@@ -75,8 +77,8 @@ class HeldOperator:
     def __init__(self, space: ElasticSpace, matrix: PETSc.Mat, law: MaterialLaw, stack: ExitStack, *, masked: bool):
         """Take over a ``matrix``, which is changed; collective. What is made is freed with the ``stack``."""
         self.space, self._matrix, self._law, self._is_masked = space, matrix, law, masked
-        self.free, self._is_held = matrix, False
-        if not masked:
+        self.free, self._is_held, self._stack = matrix, False, stack
+        if not masked and not is_product(matrix):
             # A matrix of PETSc multiplies faster than its copy: the copy is what others are made from.
             self.free = matrix.copy()
             stack.callback(self.free.destroy)
@@ -88,6 +90,11 @@ class HeldOperator:
         """
         if self._is_masked:
             return mask(self.space, self._matrix, self._law, dofs)
+        if is_product(self._matrix):
+            matrix = self._matrix.getPythonContext().holding(dofs).matrix()
+            self._stack.callback(matrix.destroy)
+            held = np.union1d(self.space.dofs.prescribed, dofs)
+            return Level(self.space.dofs.space, matrix, held, not self._law.is_uniform)
         if self._is_held:
             self.free.copy(self._matrix, structure=_SAME)
         self._is_held = True

@@ -8,6 +8,7 @@ quarter as long. The residual is brought to magnitude 1 first, so that nothing r
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +17,7 @@ from petsc4py import PETSc
 from pipeline.arrays import Int32Array
 from pipeline.solve.straight.arrays import available, entries, entries_to_read
 from pipeline.solve.straight.native import Library
+from pipeline.solve.straight.product import is_product
 from pipeline.solve.transfer import Side, free, point_weights
 
 Single = npt.NDArray[np.float32]
@@ -52,7 +54,12 @@ _LANCZOS_CLOSER = 40
 
 def suits(matrices: list[PETSc.Mat]) -> bool:
     """Tell whether a cycle over operators of degrees 1, 2, … can be made: of one process, where C can be compiled."""
-    if len(matrices) < 2 or any(matrix.getType() != "seqbaij" for matrix in matrices[1:]):
+    return len(matrices) > 1 and takes_product(matrices)
+
+
+def takes_product(matrices: list[PETSc.Mat]) -> bool:
+    """Tell whether a cycle could be made over these operators and one of the next degree, maybe without entries."""
+    if not all(matrix.getType() == "seqbaij" or is_product(matrix) for matrix in matrices[1:]):
         return False
     return available() and compiles()
 
@@ -108,52 +115,90 @@ def masks(coarse: Side, fine: Side) -> tuple[Single, Single]:
     return free(coarse).astype(np.float32), free(fine).astype(np.float32)
 
 
-class SmoothedLevel:
-    """An operator in single precision, upper blocks only, and its smoother."""
+class SymmetricOperator(Protocol):
+    """A positive definite operator in single precision, of ``rows`` points.
 
-    def __init__(self, matrix: PETSc.Mat, *, jumps: bool = False):
-        """Take the entries of a matrix, of type seqbaij and symmetric; ``jumps``: the material does.
+    ``prescribed`` are dofs (unrolled) of which it knows nothing: what multiplies is nought there, the product anything.
+    """
 
-        Raises:
-            ArithmeticError: if a block of the diagonal is not positive.
-        """
+    @property
+    def rows(self) -> int: ...  # noqa: D102
+
+    @property
+    def prescribed(self) -> Int32Array: ...  # noqa: D102
+
+    def multiply(self, x: Single, y: Single) -> None: ...  # noqa: D102
+
+    def diagonal(self) -> Single: ...  # noqa: D102
+
+
+class UpperBlocks:
+    """The operator of a matrix, of which the blocks from the diagonal on are kept."""
+
+    prescribed: Int32Array = np.empty(0, dtype=np.int32)
+
+    def __init__(self, matrix: PETSc.Mat):
+        """Take the entries of a matrix, of type seqbaij and symmetric."""
         offsets, columns = (index.astype(np.int32, copy=False) for index in matrix.getRowIJ(compressed=True)[:2])
-        rows = self._rows = len(offsets) - 1
-        upper = np.add.reduceat(columns >= np.repeat(np.arange(rows, dtype=np.int32), np.diff(offsets)), offsets[:-1])
+        self.rows = len(offsets) - 1
+        row = np.repeat(np.arange(self.rows, dtype=np.int32), np.diff(offsets))
+        upper = np.add.reduceat(columns >= row, offsets[:-1])
         self._offsets = np.concatenate([[0], np.cumsum(upper)]).astype(np.int32)
         self._columns = np.empty(self._offsets[-1], dtype=np.int32)
         self._values = np.empty((self._offsets[-1], 9), dtype=np.float32)
         with entries(matrix, 9 * len(columns)) as values:
-            library()("take_upper", rows, offsets, columns, values, self._offsets, self._columns, self._values)
+            library()("take_upper", self.rows, offsets, columns, values, self._offsets, self._columns, self._values)
+
+    def multiply(self, x: Single, y: Single) -> None:
+        """Write A x into ``y``."""
+        library()("multiply", self.rows, self._offsets, self._offsets, self._columns, self._values, x, y)
+
+    def diagonal(self) -> Single:
+        """Return the blocks on the diagonal, shape (rows, 9)."""
+        return self._values[self._offsets[:-1]]
+
+
+class SmoothedLevel:
+    """An operator in single precision and its smoother."""
+
+    def __init__(self, operator: SymmetricOperator, *, jumps: bool = False):
+        """Set up; ``jumps``: the material does.
+
+        Raises:
+            ArithmeticError: if a block of the diagonal is not positive.
+        """
+        self._operator, rows = operator, operator.rows
+        self._rows, self._blocks = rows, operator.diagonal()
         self._inverse = np.empty((rows, 9), dtype=np.float32)
-        if library()("invert_diagonal", rows, self._offsets, self._values, self._inverse):
+        if library()("invert_diagonal", rows, np.arange(rows, dtype=np.int32), self._blocks, self._inverse):
             raise ArithmeticError("the operator is not positive definite")
         self.size, self._held = 3 * rows, np.empty(0, dtype=np.int32)
         self._product, self._direction, self.scratch = (np.zeros(self.size, dtype=np.float32) for _ in range(3))
+        self.hold(self._held)
         self._most = _RAISED * self._largest_eigenvalue(_LANCZOS_JUMPS if jumps else _LANCZOS)
 
     def look_closer(self) -> None:
         """Find the largest eigenvalue by many more steps, for the smoother from now on."""
         held = self._held
-        self.hold(np.empty(0, dtype=np.int32))  # the matrix knows nothing of what is held
+        self.hold(np.empty(0, dtype=np.int32))  # the operator knows nothing of what is held
         self._most = max(self._most, _RAISED * self._largest_eigenvalue(_LANCZOS_CLOSER))
         self.hold(held)
 
     def hold(self, dofs: Int32Array) -> None:
-        """Let the smoother alone hold ``dofs`` from now on, which the matrix knows nothing of, and no others.
+        """Let the smoother alone hold ``dofs`` from now on, which the operator knows nothing of, and no others.
 
-        Where it neither reads nor writes, it smooths for the matrix without those rows and columns.
+        Where it neither reads nor writes, it smooths for the operator without those rows and columns.
         """
         self._invert(np.unique(self._held // 3), np.zeros(0, dtype=np.int32))
-        self._held = dofs
-        self._invert(np.unique(dofs // 3), dofs)
+        self._held = np.union1d(self._operator.prescribed, dofs).astype(np.int32)
+        self._invert(np.unique(self._held // 3), self._held)
 
     def _invert(self, rows: Int32Array, held: Int32Array) -> None:
         """Invert blocks of the diagonal without the rows and columns of ``held`` dofs, where the inverse is nought."""
         free = np.ones((len(rows), 3), dtype=bool)
         free[np.searchsorted(rows, held // 3), held % 3] = False
         both = free[:, :, None] & free[:, None, :]
-        blocks = self._values[self._offsets[rows]].reshape(-1, 3, 3).astype(np.float64)
+        blocks = self._blocks[rows].reshape(-1, 3, 3).astype(np.float64)
         inverse = np.linalg.inv(np.where(both, blocks, np.eye(3)))
         self._inverse[rows] = np.where(both, inverse, 0.0).reshape(-1, 9)
 
@@ -179,7 +224,7 @@ class SmoothedLevel:
 
     def _multiply(self, x: Single) -> None:
         """Write A x into the product."""
-        library()("multiply", self._rows, self._offsets, self._offsets, self._columns, self._values, x, self._product)
+        self._operator.multiply(x, self._product)
 
     def _largest_eigenvalue(self, steps: int) -> float:
         """Return the largest eigenvalue of D⁻¹ A, from below, by Lanczos' method from noise."""
@@ -242,6 +287,10 @@ class SingleCycle:
             for between, (below, above) in zip(self._interpolations, masks, strict=True)
         ]
         self._coarse = coarse
+
+    def above(self, levels: list[SmoothedLevel], interpolations: list[Interpolation]) -> "SingleCycle":
+        """Return the cycle with more levels on top, which shares those that are there."""
+        return SingleCycle([*self._levels, *levels], [*self._interpolations, *interpolations], self._coarse)
 
     def look_closer(self) -> None:
         """Let each level's smoother find its largest eigenvalue by many more steps."""

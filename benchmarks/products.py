@@ -1,0 +1,118 @@
+"""A product with the operator, by who makes it: PETSc's matrix, upper blocks, cells: ``python -m benchmarks.products``.
+
+A disc on a box, a quarter of it, graded to the probe's edge, degrees 2 to 4. Milliseconds are those of the processor,
+medians; ways take turns, so that each has its share of what else the machine does. What it takes before the first
+product stands beside it: pattern and assembly of a matrix, or the layout of cells; and the bytes that are then kept.
+"""
+
+import argparse
+import json
+import statistics
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.solvers import YOUNG, _case
+
+# Element size far from the probe and at its edge, mm.
+SIZES = ((3.0, 0.5), (1.7, 0.2), (1.0, 0.2))
+ROUNDS = 9
+COLUMNS = {
+    "degree": "d", "dofs": "d", "cells": "d", "assemble": ".2f", "lay_out": ".2f", "petsc": ".2f",
+    "upper_double": ".2f", "upper_single": ".2f", "cells_double": ".2f", "cells_single": ".2f", "ratio": ".1f",
+    "matrix_bytes": ".0f", "cells_bytes": ".0f",
+}  # fmt: skip
+
+
+def measure(size: tuple[float, float], degrees: list[int]) -> list[dict[str, Any]]:
+    """Return a row for each degree on one mesh."""
+    from mpi4py import MPI
+    from threadpoolctl import threadpool_limits
+
+    from pipeline.run.meshing import mesh_case
+    from pipeline.solve.conditions import Conditions
+    from pipeline.solve.material import MaterialLaw
+    from pipeline.solve.spaces import Spaces
+
+    law = MaterialLaw.of_moduli(YOUNG, 0.3)
+    with threadpool_limits(limits=1):
+        mesh, _ = mesh_case(_case(2, size), ("x", "y"), MPI.COMM_SELF)
+        rows = []
+        for degree in degrees:
+            with Spaces(mesh) as spaces:
+                rows.append(_row(spaces.get(degree, Conditions()), law) | {"cells": mesh.cells})
+    return rows
+
+
+def _row(space: Any, law: Any) -> dict[str, Any]:
+    from pipeline.solve.single.cycle import SymmetricProduct, UpperBlocks
+    from pipeline.solve.straight.product import library
+
+    library()
+    with ExitStack() as stack:
+        start = time.process_time()
+        operator, _ = stack.enter_context(space.operators.lend_product(law))
+        laid_out = time.process_time()
+        matrix, _ = stack.enter_context(space.operators.lend(law, blocked=True))
+        assembled = time.process_time()
+        x, y = matrix.createVecs()
+        x.array[:] = np.random.default_rng(0).standard_normal(x.getSize())
+        x.array[space.dofs.prescribed] = 0.0
+        upper, doubled, cells = UpperBlocks(matrix), SymmetricProduct(matrix), operator.getPythonContext()
+        single = x.array.astype(np.float32), np.empty(x.getSize(), dtype=np.float32)
+        found = _medians(
+            {
+                "petsc": lambda: matrix.mult(x, y),
+                "upper_double": lambda: doubled.mult(matrix, x, y),
+                "upper_single": lambda: upper.multiply(*single),
+                "cells_double": lambda: operator.mult(x, y),
+                "cells_single": lambda: cells.multiply(*single),
+            }
+        )
+        # Both triangles in double, and one in single precision, with their columns; or all that cells are laid out in.
+        blocks = matrix.getInfo()["nz_used"] / 9
+        return {
+            "degree": space.degree, "dofs": space.dofs.dofs, "assemble": assembled - laid_out,
+            "lay_out": laid_out - start, **found, "ratio": found["petsc"] / found["cells_single"],
+            "matrix_bytes": blocks * (76 + 40 / 2) / space.dofs.dofs, "cells_bytes": cells.nbytes / space.dofs.dofs,
+        }  # fmt: skip
+
+
+def _medians(ways: dict[str, Callable[[], Any]]) -> dict[str, float]:
+    """Return the milliseconds that each way takes, which take turns."""
+    taken: dict[str, list[float]] = {name: [] for name in ways}
+    for _ in range(ROUNDS):
+        for name, way in ways.items():
+            start = time.process_time()
+            way()
+            taken[name].append(1e3 * (time.process_time() - start))
+    return {name: statistics.median(values) for name, values in taken.items()}
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """Return the rows as a table of Markdown."""
+    lines = ["| " + " | ".join(COLUMNS) + " |", "|---" * len(COLUMNS) + "|"]
+    lines += ["| " + " | ".join(format(row[name], how) for name, how in COLUMNS.items()) + " |" for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Measure, and write ``products.json`` and ``products.md``."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--largest", type=int, default=len(SIZES), help="how many of the sizes")
+    parser.add_argument("--degrees", type=int, nargs="+", default=[2, 3], choices=(2, 3, 4))
+    parser.add_argument("--output", type=Path, default=Path("results"))
+    arguments = parser.parse_args()
+    rows = [row for size in SIZES[: arguments.largest] for row in measure(size, arguments.degrees)]
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    (arguments.output / "products.json").write_text(json.dumps(rows, indent=1))
+    (arguments.output / "products.md").write_text(table(rows))
+    print(table(rows))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,79 @@
+"""The stiffness as a product, cell by cell, is that of the matrix, and what is made of it is what that gives."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from pipeline.solve.conditions import Conditions
+from pipeline.solve.displacement import DisplacementProblem
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.mixed import MixedProblem
+from pipeline.solve.single import cycle
+from pipeline.solve.single.cycle import UpperBlocks
+from pipeline.solve.spaces import ElasticSpace, Spaces
+from pipeline.solve.straight import product
+from tests.solve.test_mixed import PRESS, law, make_mesh
+
+pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="for one process")
+LAYERS = {"body": {"layers": [{"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.48}]}}
+
+
+@pytest.mark.parametrize(
+    ("degree", "material", "changes"),
+    [
+        (2, MaterialLaw.of(3.0, 1.0), {}),
+        (3, MaterialLaw.of(3.0, 1.0), {}),
+        (4, MaterialLaw.of(0.0, 1.0), {}),
+        (2, MaterialLaw((3.0, 50.0), (1.0, 20.0)), LAYERS),
+    ],
+)
+def test_it_is_the_product_of_the_matrix(degree, material, changes):
+    """On straight cells and on those with curved edges and quarter points, of one material and of two."""
+    space = ElasticSpace(make_mesh(**changes), degree, Conditions())
+    free = np.setdiff1d(np.arange(space.dofs.owned), space.dofs.prescribed)
+    with (
+        space.operators.lend(material, blocked=True) as (matrix, _),
+        space.operators.lend_product(material) as (operator, _),
+    ):
+        x, y = matrix.createVecs()
+        z = y.duplicate()
+        x.array[:] = np.random.default_rng(3).standard_normal(x.getSize())
+        held = x.array[space.dofs.prescribed].copy()
+        operator.mult(x, z)
+        assert np.array_equal(z.array[space.dofs.prescribed], held)
+        x.array[space.dofs.prescribed] = 0.0
+        matrix.mult(x, y)
+        assert np.abs(z.array - y.array)[free].max() < 1e-12 * np.abs(y.array).max()
+        single, taken = operator.getPythonContext(), UpperBlocks(matrix)
+        found = np.empty(x.getSize(), dtype=np.float32)
+        single.multiply(x.array.astype(np.float32), found)
+        assert np.abs(found - y.array)[free].max() < 2e-5 * np.abs(y.array).max()
+        inside = np.setdiff1d(np.arange(single.rows), space.dofs.prescribed // 3)
+        blocks, wanted = single.diagonal()[inside], taken.diagonal()[inside]
+        assert np.abs(blocks - wanted).max() < 1e-5 * np.abs(wanted).max()
+        for item in (x, y, z):
+            item.destroy()
+    space.operators.close()
+
+
+@pytest.mark.parametrize(
+    ("kind", "degree", "poisson"),
+    [(DisplacementProblem, 1, 0.3), (DisplacementProblem, 2, 0.49), (MixedProblem, 2, 0.5)],
+)
+def test_forces_and_bars_are_those_of_matrices(kind, degree, poisson, monkeypatch):
+    found = solved(kind, degree, poisson)
+    monkeypatch.setattr(product, "compiles", lambda: False)
+    wanted = solved(kind, degree, poisson)
+    assert found.reaction[2] == pytest.approx(wanted.reaction[2], rel=1e-10)
+    assert found.decrements == pytest.approx(wanted.decrements, rel=1e-4)
+    assert found.estimate_iterations <= wanted.estimate_iterations + 1
+    monkeypatch.setattr(cycle, "available", lambda: False)
+    assert solved(kind, degree, poisson).reaction[2] == pytest.approx(wanted.reaction[2], rel=1e-9)
+
+
+def solved(kind, degree, poisson):
+    with (
+        Spaces(make_mesh(mesh={"rim": "0.5 mm", "fine": "3 mm"})) as spaces,
+        kind(spaces, degree, Conditions()) as problem,
+    ):
+        return problem.solve(law(poisson), PRESS, method="iterative", estimate=True)
