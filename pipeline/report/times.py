@@ -22,6 +22,21 @@ def warned(warning: str, dataset: xr.Dataset) -> str:
     return "; ".join(filter(None, (warning, *doubts(dataset))))
 
 
+def spreads(dataset: xr.Dataset, name: str) -> xr.DataArray | None:
+    """Return the factor by which bars reach above and below ``time_total`` or ``speedup``: how far repeats are apart.
+
+    That of a speed-up holds the full order's repeats as well, but for the full order itself. None where no case was
+    repeated.
+    """
+    if "time_spread" not in dataset or not (dataset["time_spread"] > 0).any():
+        return None
+    factor = 1 + dataset["time_spread"].fillna(0.0) / 2
+    if name == "time_total":
+        return factor
+    is_full = np.isinf(dataset["epsilon"])
+    return (factor * factor.where(is_full).max("epsilon").fillna(1.0)).where(~is_full, 1.0)
+
+
 def slower(dataset: xr.Dataset) -> str:
     """Say which cases took longer than the full order in spite of fewer unknowns, if any did."""
     if not {"speedup", "dofs", "epsilon"} <= {str(name) for name in (*dataset.data_vars, *dataset.dims)}:

@@ -43,6 +43,22 @@ def test_repeats_that_are_far_apart_are_told_of(timed):
     assert doubts(timed) == ["repeats of a case are up to 43 % apart"]
 
 
+def test_how_far_repeats_are_apart_is_drawn(timed):
+    """A case's bar holds its repeats and the full order's, which has none: it is what the others are measured by."""
+    timed["time_spread"][:] = 0.2
+    timed["time_spread"].loc[{"epsilon": np.inf}] = 0.1
+    speed = timed["speedup"].sel(epsilon=3e-3, outside="free").item()
+    drawn = figure(timed, "speedup")
+    bars = [line.get_segments() for ax in drawn.axes for line in ax.collections]
+    spans = np.array([segment[:, 1] for segments in bars for segment in segments])
+    assert len(spans) == timed.sizes["epsilon"] - 1  # what is outside makes no difference to these times
+    assert np.isclose(spans, [speed / (1.1 * 1.05), speed * 1.1 * 1.05]).all(axis=1).any()
+    for kind in ("speedup", "accuracy"):
+        assert any("how far repeats are apart" in text.get_text() for text in figure(timed, kind).texts)
+    once = timed.drop_vars("time_spread")
+    assert not [line for ax in figure(once, "speedup").axes for line in ax.collections]
+
+
 def test_fewer_unknowns_that_were_slower_are_named(timed):
     timed["dofs"] = timed["dofs"].where(np.isinf(timed["epsilon"]), 900)
     assert doubts(timed) == []

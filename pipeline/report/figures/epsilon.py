@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 
 from pipeline.report.figures.axis import log_axis
 from pipeline.report.figures.layout import arrange
-from pipeline.report.figures.panels import draw_curves, grid, panels, share_heights
+from pipeline.report.figures.panels import draw_curves, draw_spread, grid, panels, share_heights
 from pipeline.report.figures.style import CLAIM, LINE, finish
 from pipeline.report.table import study_of
-from pipeline.report.times import warned
+from pipeline.report.times import spreads, warned
 from pipeline.report.words import formula, heading
 from pipeline.study.sweep import Study
 
@@ -40,10 +40,14 @@ def speedup(dataset: xr.Dataset, title: str, warning: str) -> Figure:
 def _against_epsilon(dataset: xr.Dataset, quantities: Sequence[str], title: str, warning: str) -> Figure:
     layout = arrange(dataset, quantities, "epsilon")
     figure = grid(layout, quantities)
+    if (factor := spreads(dataset, "speedup") if "speedup" in quantities else None) is not None:
+        dataset = dataset.assign(spread=factor)
     shown = list(panels(figure, dataset, layout, quantities))
     x = [draw_curves(panel, layout).positions for panel in shown]
     for panel in shown:
         panel.ax.set_yscale("log" if panel.quantity == "speedup" else "linear")
+        if panel.quantity == "speedup" and "spread" in dataset:
+            draw_spread(panel, layout)
     share_heights(shown, lambda panel: panel.quantity == "speedup" or (panel.quantity, panel.column))
     study = study_of(dataset)
     asking = study if study and study.drawing.paper else None
@@ -57,7 +61,8 @@ def _against_epsilon(dataset: xr.Dataset, quantities: Sequence[str], title: str,
         if panel.is_first:
             is_speedup = panel.quantity == "speedup"
             panel.ax.set_ylabel(heading(dataset["speedup"]) if is_speedup else formula(panel.quantity))
-    finish(figure, title, layout.note, warned(warning, dataset) if "speedup" in quantities else warning)
+    note = "; ".join(filter(None, (layout.note, "bars: how far repeats are apart" if "spread" in dataset else "")))
+    finish(figure, title, note, warned(warning, dataset) if "speedup" in quantities else warning)
     return figure
 
 

@@ -1,5 +1,6 @@
 """A grid of panels: a curve for each choice, an axis that all share."""
 
+import textwrap
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -13,6 +14,11 @@ from pipeline.report.figures.axis import Horizontal, horizontal
 from pipeline.report.figures.layout import Layout, title_of
 from pipeline.report.figures.style import FAILED, PANEL_HEIGHT, PAPER, WIDTH, look, new_figure
 from pipeline.report.words import choices
+
+# How bars of errors and of repeats look.
+BARS = {"capsize": 2, "elinewidth": 0.8}
+# Letters of a title for each inch of a panel; and on one line of the narrowest.
+_LETTERS, _NARROWEST = 19, 16
 
 
 @dataclass(frozen=True)
@@ -50,6 +56,7 @@ def panels(figure: Figure, dataset: xr.Dataset, layout: Layout, quantities: Sequ
         row, quantity = divmod(line, len(quantities))
         choice = layout.rows[row] | layout.columns[column]
         title = title_of(dataset, layout.rows[row], layout.columns[column]) if quantity == 0 else ""
+        title = textwrap.fill(title, max(_NARROWEST, int(_LETTERS * width)))
         last = line == len(figure.axes) // columns - 1
         yield Panel(ax, dataset.sel(layout.at | choice), quantities[quantity], title, width, column, last)
 
@@ -78,7 +85,7 @@ def draw_curves(panel: Panel, layout: Layout, factor: float = 1.0, errors: str =
         x = axis.positions + _aside(axis, position, len(layout.curves))
         if errors:
             bars = np.nan_to_num(np.abs(y * line[errors].values))[known]
-            panel.ax.errorbar(x[known], y[known], bars, label=label, capsize=2, elinewidth=0.8, **style)
+            panel.ax.errorbar(x[known], y[known], bars, label=label, **BARS, **style)
         elif "is_below" in line:
             draw_signed(panel.ax, x[known], y[known], line["is_below"].values[known], label, style)
         else:
@@ -91,6 +98,18 @@ def draw_curves(panel: Panel, layout: Layout, factor: float = 1.0, errors: str =
         panel.ax.set_title(panel.title)
     axis.finish(panel.ax, panel.width, last=panel.is_last)
     return axis
+
+
+def draw_spread(panel: Panel, layout: Layout) -> None:
+    """Draw, over the curves of a quantity, bars that reach above and below it by the factor ``spread``."""
+    axis = horizontal(panel.data[layout.x])
+    for position, curve in enumerate(layout.curves):
+        line = panel.data.sel(curve)
+        y, factor = line[panel.quantity].values, line["spread"].values
+        x = axis.positions + _aside(axis, position, len(layout.curves))
+        bars = np.abs(np.stack([y / factor - y, y * factor - y]))
+        known = np.isfinite(y) & (bars.max(axis=0) > 0)
+        panel.ax.errorbar(x[known], y[known], bars[:, known], fmt="none", ecolor=look(position)["color"], **BARS)
 
 
 def draw_signed(
