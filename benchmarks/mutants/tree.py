@@ -15,6 +15,7 @@ from benchmarks.mutants.changes import Change
 
 ROOT = Path(__file__).parents[2]
 _COPIED, _LINKED = ("pipeline", "tests", "realtime", "benchmarks", "pyproject.toml"), ("studies", "meshes", "docs")
+_SOURCES = {".py", ".c", ".h", ".toml", ".js", ".j2", ".css"}
 # Seconds after which what runs has been brought to a halt by the change: ranks that wait for each other, as a rule.
 _LONGEST = {1: 600, 2: 90}
 _MPI = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMP_NUM_THREADS": "1"}
@@ -49,6 +50,13 @@ def stale(changes: tuple[Change, ...], root: Path = ROOT) -> list[str]:
             elif names and f"def {names[-1].split('[')[0]}(" not in (root / path).read_text():
                 found.append(f"{test} is not there ({change.name})")
     return found
+
+
+def copied(root: Path = ROOT) -> list[Path]:
+    """Return, in order, the files that a tree has copies of, but for the list of changes and what runs it."""
+    places = [root / name for name in _COPIED if name != "benchmarks"]
+    files = [file for place in places for file in (place.rglob("*") if place.is_dir() else [place])]
+    return sorted(file for file in files if file.suffix in _SOURCES and file.is_file())
 
 
 class Tree:

@@ -64,13 +64,16 @@ def test_an_exact_force_and_all_stiffnesses_are_of_one_depth():
     np.testing.assert_allclose([scale.length for scale in scales], [1, 2.5, 1, 2.5], rtol=1e-12)
 
 
-@pytest.mark.parametrize("kind", ["curved", "tilted"])
+@pytest.mark.parametrize("kind", ["curved", "tilted", "ball"])
 def test_what_is_not_in_proportion_is_solved_at_each_depth(kind):
-    """On a curved surface, and where the tool is tilted, contact grows with depth."""
+    """On a curved surface, where the tool is tilted, and under one that is not flat, contact grows with depth."""
     ball = {"shape": "ellipsoid", "axes": ["20 mm", "20 mm", "20 mm"], "fixed": {"below": "-10 mm"}}
-    curved = {"body": ball, "probe": LIFTS["probe"]}
-    tilted = {"probe": LIFTS["probe"] | {"axis": [0.002, 0.0, -1.0]}}
-    plan = make_plan(parse(raw(**(curved if kind == "curved" else tilted))))
+    changes = {
+        "curved": {"body": ball, "probe": LIFTS["probe"]},
+        "tilted": {"probe": LIFTS["probe"] | {"axis": [0.002, 0.0, -1.0]}},
+        "ball": {"probe": LIFTS["probe"] | {"shape": "sphere"}},
+    }
+    plan = make_plan(parse(raw(**changes[kind])))
     assert not plan.deeper
     assert len(plan.solves) == 2
 
