@@ -4,6 +4,7 @@ From Python: :func:`load` a study, plan and run it; :func:`open` a dataset (docs
 before it is needed.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,15 +23,19 @@ _ERRORS = {
 }
 
 
-def load(path: str | Path) -> "RunnableStudy":
-    """Return the study of the file at ``path``, which plans and runs itself.
+def load(study: str | Path | Mapping[str, Any], name: str = "study", folder: str | Path = ".") -> "RunnableStudy":
+    """Return the study of a file, or of a dictionary with what stands in such a file; it plans and runs itself.
+
+    That of a dictionary is called ``name``, as its dataset will be; files that bodies name are looked for in
+    ``folder``. Its dataset holds it as TOML, like that of a file.
 
     Raises:
-        StudyError: with every problem of the file: key, value found, what is allowed.
+        StudyError: with every problem of the study: key, value found, what is allowed.
+        ValueError: if ``name`` cannot be that of files.
     """
     from pipeline.api import RunnableStudy  # noqa: PLC0415
 
-    return RunnableStudy.load(path)
+    return RunnableStudy.load(study, name, folder)
 
 
 def open(path: str | Path, output: str | Path = "results") -> "xr.Dataset":

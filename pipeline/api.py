@@ -1,7 +1,7 @@
 """The program from Python: a study that plans and runs itself. What `import pipeline` offers; see docs/python.md."""
 
 import warnings
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 from pipeline.plan.describe import summary
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.run.progress import Terminal
-from pipeline.study.load import load
+from pipeline.study.load import load, load_mapping
+from pipeline.study.starter import is_name
 from pipeline.study.sweep import Study
 
 if TYPE_CHECKING:
@@ -19,18 +20,23 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RunnableStudy:
-    """A study file that was found to make sense; ``declared`` holds its axes, cases and sections."""
+    """A study that was found to make sense; ``declared`` holds its axes, cases and sections."""
 
     declared: Study
 
     @staticmethod
-    def load(path: str | Path) -> "RunnableStudy":
-        """Read the study file at ``path``.
+    def load(study: str | Path | Mapping[str, Any], name: str = "study", folder: str | Path = ".") -> "RunnableStudy":
+        """Read the study file at a path, or the study that stands in a dictionary: see :func:`pipeline.load`.
 
         Raises:
-            StudyError: with every problem of the file.
+            StudyError: with every problem of the study.
+            ValueError: if ``name`` cannot be that of files.
         """
-        return RunnableStudy(load(path))
+        if not isinstance(study, Mapping):
+            return RunnableStudy(load(study))
+        if not is_name(name):
+            raise ValueError(f"name = {name!r}: must be letters, digits, - and _: results are called after it")
+        return RunnableStudy(load_mapping(study, name, folder))
 
     @property
     def name(self) -> str:

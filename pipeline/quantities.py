@@ -151,7 +151,7 @@ _RESULTS = (
     Quantity("status", "", "ok, failed, skipped, lost where a path leaves the body, or pending where not yet run",
              "status"),
     Quantity("message", "", "why a case failed or was skipped", "message"),
-    Quantity("origin", "", "how the force was obtained", "origin"),
+    Quantity("origin", "", 'how the force was obtained; "stored" follows where that was in an earlier run', "origin"),
     Quantity("force_exact_message", "", "why there is no force_exact"),
     Quantity("body_message", "", "what was done to the file of the body: repaired, smoothed, left out"),
 )  # fmt: skip

@@ -44,7 +44,7 @@ def test_study_runs_and_every_rank_has_the_dataset(folder):
     assert (folder / "out" / "small.nc").exists()
     assert not (folder / "out" / "cases.sqlite").exists()
     again = study.run(WORLD, output=folder / "out", store=folder / "kept.sqlite")
-    assert set(np.unique(again["origin"])) == {"stored"}
+    assert set(np.unique(again["origin"])) == {f"{origin}, stored" for origin in np.unique(data["origin"])}
     np.testing.assert_array_equal(again["force"], data["force"])
     assert not study.plan(store=folder / "kept.sqlite").solves
     opened = pipeline.open(folder / "small.toml", folder / "out")

@@ -50,7 +50,7 @@ def test_second_run_reads_back_and_two_ranks_agree(spawn, small, tmp_path):
     assert first.returncode == again.returncode == parallel.returncode == 0, parallel.stderr
     assert "A case whose record is stored is read back." in again.stdout
     one, two = (xr.load_dataset(tmp_path / folder / "small.nc") for folder in "ab")
-    assert set(np.unique(one["origin"])) == {"stored"}
+    assert {name.rpartition(", ")[::2] for name in np.unique(one["origin"])} == {("symmetric", "stored")}
     np.testing.assert_allclose(one["force"], two["force"], rtol=1e-8)
     assert parallel.stdout.count("wrote") == 1
 
@@ -177,7 +177,9 @@ def test_plan_explain_and_store(spawn, small, tmp_path):
     listed = json.loads(spawn("store", "list", "--store", store, "--json").stdout)
     assert listed["records"] == planned["solves"]
     assert spawn("store", "verify", "--store", store).returncode == 0
-    assert "records removed" in spawn("store", "prune", "--days", "0", "--store", store).stdout
+    assert "would be removed: --yes does it" in spawn("store", "prune", "--days", "0", "--store", store).stdout
+    assert json.loads(spawn("store", "list", "--store", store, "--json").stdout)["records"] == planned["solves"]
+    assert "kB: removed" in spawn("store", "prune", "--days", "0", "--store", store, "--yes").stdout
     assert json.loads(spawn("store", "list", "--store", store, "--json").stdout)["records"] == 0
 
 

@@ -2,12 +2,16 @@
 
 import sys
 from collections.abc import Callable
+from typing import Annotated
 
 import typer
 
-from pipeline.cli import checks, export, guide, merge, new, plan, report, store, study, touch, view
+from pipeline import __version__
+from pipeline.cli import checks, compare, export, guide, merge, new, plan, report, store, study, touch, view
 from pipeline.cli.console import error, make_patient, what_was_not_written
-from pipeline.cli.words import BAD_INPUT, OWN_PROCESS
+from pipeline.cli.faults import BAD_INPUT
+from pipeline.cli.group import Commands
+from pipeline.cli.words import OWN_PROCESS
 
 _HELP = """How fine must a mesh be, and where, for the reaction force of a surgical tool?
 
@@ -16,6 +20,8 @@ Example: epsmesh new mine && epsmesh run studies/mine.toml
 Exit status: 0 done, 1 some cases failed, 2 the input is wrong, 130 interrupted."""
 
 app = typer.Typer(
+    cls=Commands,
+    context_settings={"help_option_names": ["-h", "--help"]},
     help=_HELP,
     no_args_is_help=True,
     add_completion=True,
@@ -24,12 +30,29 @@ app = typer.Typer(
 )
 _COMMANDS: tuple[Callable[..., None], ...] = (
     new.new, study.validate, plan.plan, study.run, merge.merge, study.status, plan.explain, report.plot, report.report,
-    guide.guide, view.view, export.export, touch.touch,
+    guide.guide, compare.compare, view.view, export.export, touch.touch,
     checks.verify, checks.stress, checks.benchmark, study.version,
 )  # fmt: skip
 for _command in _COMMANDS:
     app.command()(_command)
 app.add_typer(store.app, name="store")
+
+
+def _print_version(is_wanted: bool) -> None:
+    if is_wanted:
+        print(f"epsmesh {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", is_eager=True, callback=_print_version, help="Print the version; `epsmesh version` prints all."
+        ),
+    ] = False,
+) -> None: ...
 
 
 def main() -> None:

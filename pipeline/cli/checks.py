@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipeline.cli.console import load_solvers, print_json
-from pipeline.cli.words import DEFAULT_OUTPUT, DONE, SOME_FAILED, Json, Output, fail
+from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_option
+from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output
 
 if TYPE_CHECKING:
     from pipeline.verify.coverage import Trial
@@ -50,7 +51,7 @@ def verify(
         from pipeline.verify.coverage import FAMILIES, Coverage, trials
 
         if family not in FAMILIES:
-            fail(f"there is no family of scenes {family}; there are {', '.join(FAMILIES)}")
+            fail(of_option("--family", family, f"there is no such family of scenes; there are {', '.join(FAMILIES)}"))
         load_solvers()
         told = tuple(_told(trials(comm, count, seed, family), _trial, speaks and not as_json))
         found = Coverage(told, FAMILIES[family].idle)
@@ -86,6 +87,7 @@ def benchmark(
     output: Output = DEFAULT_OUTPUT,
     repeats: Annotated[int, typer.Option(metavar="N", help="Runs of each point; the median counts.", min=1)] = 3,
     quick: Quick = False,
+    as_json: Json = False,
 ) -> None:
     """Measure the error of F against run time and unknowns.
 
@@ -97,13 +99,22 @@ def benchmark(
     from pipeline.verify.work_precision import main
 
     load_solvers()
-    for path in main(output, repeats, quick=quick):
+    files = main(output, repeats, quick=quick)
+    if as_json:
+        print_json({"files": [str(path) for path in files]})
+        return
+    for path in files:
         print(path)
 
 
 def stress(
     names: Annotated[
-        list[str] | None, typer.Argument(metavar="ROW...", help="Rows to run [default: all].", show_default=False)
+        list[str] | None,
+        typer.Argument(
+            metavar="ROW...",
+            help="Rows to run: each takes all rows whose name holds the word [default: all].",
+            show_default=False,
+        ),
     ] = None,
     quick: Quick = False,
     as_json: Json = False,
@@ -129,7 +140,7 @@ def stress(
     try:
         results = list(_told(run(comm, names, quick=quick), line, speaks and not as_json))
     except ValueError as wrong:
-        fail(str(wrong))
+        fail(Fault(str(wrong), key="ROW", value=names))
     if speaks and as_json:
         print_json([asdict(result) for result in results])
     elif speaks:

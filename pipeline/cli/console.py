@@ -4,9 +4,12 @@ import json
 import os
 import signal
 import sys
+from contextvars import ContextVar
 from math import inf, isfinite
 from typing import Any, TextIO
 
+# Of the command that runs: whether JSON was asked for, and whether any has been printed.
+JSON: ContextVar[dict[str, bool]] = ContextVar("JSON")
 _COLOURS = {"red": "31", "yellow": "33"}
 
 
@@ -34,8 +37,20 @@ def warning(text: str) -> None:
     print(paint(f"warning: {text}", "yellow", sys.stderr), file=sys.stderr, flush=True)
 
 
+def is_json_wanted() -> bool:
+    """Tell whether the command was asked for JSON: standard output is for that alone then."""
+    return JSON.get({}).get("wanted", False)
+
+
+def has_printed_json() -> bool:
+    """Tell whether nothing more is to be said in JSON: none was asked for, or the command has spoken."""
+    return not is_json_wanted() or JSON.get()["printed"]
+
+
 def print_json(value: Any) -> None:
     """Print ``value`` as JSON: an infinite ε is "full", as in a study file, and null is what JSON has no number for."""
+    if is_json_wanted():
+        JSON.get()["printed"] = True
     print(json.dumps(plain(value), indent=2, ensure_ascii=False, allow_nan=False), flush=True)
 
 

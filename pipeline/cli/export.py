@@ -6,9 +6,12 @@ from typing import Annotated
 import typer
 
 from pipeline import __version__
-from pipeline.cli.console import error, load_solvers, print_json
-from pipeline.cli.words import DEFAULT_OUTPUT, DONE, SOME_FAILED, File, Json, check_output, fail, load_all
+from pipeline.cli.console import load_solvers, print_json
+from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_file, of_option
+from pipeline.cli.words import DEFAULT_OUTPUT, File, Json, check_output, load_all
 
+# What can be exported, and how: told with a refusal.
+_HOWTO = "docs/realtime.md"
 # Of --accuracy: less than the tables and the formulas are good for; more than is of use.
 _ACCURACIES = (0.002, 0.2)
 _MOST_CHECKS = 1000
@@ -45,16 +48,17 @@ def export(
     try:
         wanted = parse_quantity(accuracy, "")
     except ValueError as wrong:
-        fail(f"--accuracy {accuracy}: must be {wrong}")
+        fail(of_option("--accuracy", accuracy, f"must be {wrong}"))
     if not _ACCURACIES[0] <= wanted <= _ACCURACIES[1]:
-        fail(f"--accuracy {accuracy}: must be between {100 * _ACCURACIES[0]:g}% and {100 * _ACCURACIES[1]:g}%")
+        least, most = (f"{100 * share:g}%" for share in _ACCURACIES)
+        fail(of_option("--accuracy", accuracy, f"must be between {least} and {most}"))
     (study,) = load_all([file])
     path = output or DEFAULT_OUTPUT / f"{study.name}.epsm.nc"
     check_output(path)
     try:
         scope = scope_of(study)
     except ExportError as problem:
-        fail(str(problem))
+        fail(Fault(str(problem), file=str(file), howto=_HOWTO))
     load_solvers()
     from mpi4py import MPI
 
@@ -69,10 +73,9 @@ def export(
         exported = make_model(scope, wanted, checks, surface=surface)
         write(exported, path, scope, file, __version__)
     except (ExportError, OSError) as problem:
-        fail(str(problem))
+        fail(Fault(str(problem), file=str(file), howto=_HOWTO))
     except (MeshError, SolveError, RuntimeError) as problem:
-        error(f"{file}: {problem}")
-        raise typer.Exit(SOME_FAILED) from None
+        fail(of_file(file, str(problem)), status=SOME_FAILED)
     found = exported.summary(wanted) | {"file": str(path)}
     if as_json:
         print_json(found)

@@ -6,7 +6,11 @@ from typing import Annotated
 import typer
 
 from pipeline.cli.console import print_json
-from pipeline.cli.words import DEFAULT_OUTPUT, DONE, SOME_FAILED, Json, Output, fail
+from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail
+from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output
+
+# What it asks and answers.
+_HOWTO = "docs/guideline.md"
 
 
 def guide(
@@ -25,7 +29,7 @@ def guide(
     Example: epsmesh guide results/figure3.nc --budget 500ms --json
     """
     if accuracy is None and budget is None:
-        fail("give --accuracy, such as 5%, or --budget, such as 10ms, or both")
+        fail(Fault("give --accuracy, such as 5%, or --budget, such as 10ms, or both", key="--accuracy", howto=_HOWTO))
     from pipeline.report.guide import guide as make_guide
     from pipeline.report.guide import quantity
     from pipeline.report.read import read
@@ -36,11 +40,13 @@ def guide(
             if value is not None:
                 quantity(name, value, unit)
         except ValueError as wrong:
-            fail(str(wrong))
+            fail(Fault(str(wrong), key=name, value=value, allowed=str(wrong).rpartition(": ")[2], howto=_HOWTO))
     try:
         found = make_guide(read(file, output), accuracy, budget)
     except DatasetError as wrong:
-        fail(str(wrong) if str(wrong).startswith(str(file)) else f"{file}: {wrong}")
+        fail(
+            Fault(str(wrong) if str(wrong).startswith(str(file)) else f"{file}: {wrong}", file=str(file), howto=_HOWTO)
+        )
     if as_json:
         print_json(found.to_dict())
     else:

@@ -7,17 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipeline.cli.console import error, print_json
+from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_file
 from pipeline.cli.words import (
+    CLUSTER,
     DEFAULT_OUTPUT,
-    DONE,
-    SOME_FAILED,
     File,
     Json,
     Output,
     StoreFile,
     Without,
     check_names,
-    fail,
     load_all,
 )
 from pipeline.plan.plan import Plan, make_plan
@@ -87,11 +86,12 @@ def _stores(study: Study, given: list[Path] | None, output: Path) -> list[Path]:
     """Return the stores to be merged, or exit if one is not there, or none."""
     absent = [path for path in given or () if not path.is_file()]
     if absent:
-        fail("\n".join(f"{path}: there is no such store" for path in absent))
+        fail(*(of_file(path, "there is no such store") for path in absent))
     found = given or stores_of(output, study)
     if not found:
         folder = output / "shards"
-        fail(f"{folder}: no stores of {study.file}; `epsmesh run {study.file} --shard 1/4` and so on make them")
+        made = f"`epsmesh run {study.file} --shard 1/4` and so on make them"
+        fail(of_file(folder, f"no stores of {study.file}; {made}", CLUSTER))
     return found
 
 
@@ -102,7 +102,7 @@ def _merged(paths: list[Path], path: Path, plan: Plan) -> tuple[tuple["Source", 
     from pipeline.run.store import Store, StoreError
 
     if path.resolve() in [source.resolve() for source in paths]:
-        fail(f"{path}: this store is what the others are merged into; it cannot be one of them")
+        fail(of_file(path, "this store is what the others are merged into; it cannot be one of them"))
     try:
         store = Store(path)
         if store.notice:
@@ -111,7 +111,7 @@ def _merged(paths: list[Path], path: Path, plan: Plan) -> tuple[tuple["Source", 
         records = store.get({*plan.keys, *plan.reference_keys})
         store.close()
     except StoreError as problem:
-        fail(str(problem))
+        fail(Fault(str(problem), file=str(path)))
     return sources, records | skipped(plan, records)
 
 

@@ -5,10 +5,12 @@ from typing import Annotated
 
 import typer
 
-from pipeline.cli.words import fail
+from pipeline.cli.console import print_json
+from pipeline.cli.faults import Fault, fail, of_file, of_option
+from pipeline.cli.words import Json
 from pipeline.files import write_new
 from pipeline.study.problems import nearest
-from pipeline.study.starter import examples, starter
+from pipeline.study.starter import examples, is_name, starter
 
 _FOLDER = Path("studies")
 
@@ -29,6 +31,7 @@ def new(
             autocompletion=_names,
         ),
     ] = None,
+    as_json: Json = False,
 ) -> None:
     """Begin a study file: studies/NAME.toml. An existing file is left alone.
 
@@ -39,18 +42,25 @@ def new(
     Example: epsmesh new mine --like figure3
     """
     path = Path(name) if name.endswith(".toml") else _FOLDER / f"{name}.toml"
-    if path.stem != path.stem.strip() or not path.stem.replace("-", "").replace("_", "").replace(".", "").isalnum():
-        fail(f"NAME = {name!r}: must be letters, digits, - and _: results are called after it")
+    if not is_name(path.stem):
+        fail(_of_name(name, "must be letters, digits, - and _: results are called after it"))
     if not name.endswith(".toml") and Path(name).name != name:
-        fail(f"NAME = {name!r}: a name has no folders: it stands for {_FOLDER}/NAME.toml; a path ends in .toml")
+        fail(_of_name(name, f"a name has no folders: it stands for {_FOLDER}/NAME.toml; a path ends in .toml"))
     text = starter(path.stem) if like is None else _copy_of(like)
     try:
         write_new(path, text)
     except FileExistsError:
-        fail(f"{path}: exists already, and is left alone; give another name")
+        fail(of_file(path, "exists already, and is left alone; give another name"))
     except OSError as problem:
-        fail(f"{path}: {problem.strerror or problem}")
-    print(f"{path}: edit it, then `epsmesh plan {path}` and `epsmesh run {path}`")
+        fail(of_file(path, problem.strerror or str(problem)))
+    if as_json:
+        print_json({"file": str(path)})
+    else:
+        print(f"{path}: edit it, then `epsmesh plan {path}` and `epsmesh run {path}`")
+
+
+def _of_name(name: str, allowed: str) -> Fault:
+    return Fault(f"NAME = {name!r}: {allowed}", key="NAME", value=name, allowed=allowed)
 
 
 def _copy_of(like: str) -> str:
@@ -62,8 +72,8 @@ def _copy_of(like: str) -> str:
     except (OSError, UnicodeDecodeError) as problem:
         if path.suffix == ".toml" or len(path.parts) > 1:
             reason = getattr(problem, "strerror", None) or "is not UTF-8 text"
-            fail(f"--like {like}: {reason}")
-        fail(f"--like {like}: there is no study of that name; {nearest(like, known)}")
+            fail(of_option("--like", like, reason))
+        fail(of_option("--like", like, f"there is no study of that name; {nearest(like, known)}"))
 
 
 def _known() -> dict[str, Path]:

@@ -1,7 +1,7 @@
 """What ``run`` says before and after: what is to be done, and what came of it."""
 
 from collections import Counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from pipeline import stages
 from pipeline.cli.console import error
@@ -72,10 +72,10 @@ def conclude(
         error(f"interrupted: {done} of {cases} cases are on record; {again}")
 
 
-def print_stages() -> None:
+def print_stages(stream: TextIO) -> None:
     """Print where the time of this process went."""
     for name, seconds, share in stages.table():
-        print(f"{seconds:10.2f} s  {100 * share:5.1f} %  {name}")
+        print(f"{seconds:10.2f} s  {100 * share:5.1f} %  {name}", file=stream)
 
 
 def _line(plan: Plan, opened: "Opened", outcome: "Outcome", seconds: float, shard: Shard | None) -> str:

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipeline.cli.console import print_json, warning
+from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail
 from pipeline.cli.words import (
     DEFAULT_OUTPUT,
-    DONE,
-    SOME_FAILED,
     File,
     Json,
     Output,
@@ -21,7 +20,6 @@ from pipeline.cli.words import (
     Without,
     axes_of,
     check_names,
-    fail,
     load_all,
     stored_records,
     warn,
@@ -176,7 +174,7 @@ def find_case(study: Study, text: str) -> Case:
     if text.strip().isdecimal():
         number = int(text)
         if number >= len(cases):
-            fail(f"case {number}: there are {len(cases)} cases, counted from 0")
+            fail(_of_case(text, f"there are {len(cases)} cases, counted from 0"))
         return cases[number]
     wanted: dict[str, str] = {}
     names = [axis.name for axis in study.axes]
@@ -184,14 +182,19 @@ def find_case(study: Study, text: str) -> Case:
     for part in re.split(r",(?=\s*\w+\s*=)", text):
         name, _, value = (word.strip() for word in part.partition("="))
         if name not in names:
-            fail(f"case {text!r}: nothing called {name!r} is swept; swept are {', '.join(names) or 'no keys'}")
+            fail(_of_case(text, f"nothing called {name!r} is swept; swept are {', '.join(names) or 'no keys'}"))
         wanted[name] = _squeezed(value)
     found = [case for case in cases if _matches(case, wanted)]
     if not found:
         choices = {axis.name: [axis.write(label) for label in axis.labels] for axis in study.axes}
         listed = "; ".join(f"{name} = {', '.join(choices[name])}" for name in wanted)
-        fail(f"case {text!r}: there is none; there are {listed}")
+        fail(_of_case(text, f"there is none; there are {listed}"))
     return found[0]
+
+
+def _of_case(text: str, allowed: str) -> Fault:
+    shown = text if text.strip().isdecimal() else repr(text)
+    return Fault(f"case {shown}: {allowed}", key="CASE", value=text, allowed=allowed)
 
 
 def _matches(case: Case, wanted: dict[str, str]) -> bool:

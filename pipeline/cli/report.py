@@ -5,10 +5,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipeline.cli.console import error
+from pipeline.cli.console import print_json, warning
+from pipeline.cli.faults import Fault, fail, of_file, of_option
 from pipeline.cli.plan import find_case
 from pipeline.cli.view import MESHES, fields_of
-from pipeline.cli.words import DEFAULT_OUTPUT, Output, fail
+from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,11 +23,12 @@ def plot(
     kind: Annotated[
         list[str] | None,
         typer.Option(
-            help="A figure to draw; may be repeated: epsilon, ratio, speedup, exact, convergence, accuracy, force. "
-            "Default: all that suit the study.",
+            help="A figure to draw; may be repeated: epsilon (ratio and speedup), exact, convergence, accuracy, map, "
+            "force, compliance, linear, contact, loads. Default: all that suit the study.",
             show_default=False,
         ),
     ] = None,
+    as_json: Json = False,
 ) -> None:
     """Draw the figures of a dataset, as PNG and SVG, beside it.
 
@@ -41,10 +43,15 @@ def plot(
 
     for name in kind or ():
         if name not in KINDS:
-            fail(f"--kind {name}: no figure is called so; there are {', '.join(KINDS)}")
+            fail(of_option("--kind", name, f"no figure is called so; there are {', '.join(KINDS)}"))
         if lack := lacks(dataset, name):
-            fail(f"{path}: --kind {name} {lack}; its figures are {', '.join(choose(dataset))}")
-    for picture in draw(dataset, path.with_suffix(""), kinds=kind or choose(dataset)):
+            allowed = f"{lack}; its figures are {', '.join(choose(dataset))}"
+            fail(Fault(f"{path}: --kind {name} {allowed}", str(path), "--kind", name, allowed))
+    pictures = draw(dataset, path.with_suffix(""), kinds=kind or choose(dataset))
+    if as_json:
+        print_json({"file": str(path), "files": [str(picture) for picture in pictures]})
+        return
+    for picture in pictures:
         print(picture)
 
 
@@ -58,6 +65,7 @@ def report(
             show_default=False,
         ),
     ] = None,
+    as_json: Json = False,
 ) -> None:
     """Write the report of a dataset, one HTML page that needs nothing else, beside it: <study>.html.
 
@@ -73,7 +81,11 @@ def report(
         _compare(file, path, dataset)
     from pipeline.report.page import write_page
 
-    print(write_page(dataset, path.with_suffix(".html"), _scene(path, dataset, scene) if scene else ""))
+    page = write_page(dataset, path.with_suffix(".html"), _scene(path, dataset, scene) if scene else "")
+    if as_json:
+        print_json({"file": str(path), "page": str(page)})
+    else:
+        print(page)
 
 
 def _scene(path: Path, dataset: "xr.Dataset", text: str) -> str:
@@ -82,7 +94,7 @@ def _scene(path: Path, dataset: "xr.Dataset", text: str) -> str:
 
     study = study_of(dataset)
     if study is None:
-        fail(f"{path}: --scene needs the study's text, as this version reads it")
+        fail(of_file(path, "--scene needs the study's text, as this version reads it"))
     chosen = find_case(study, text)
     from pipeline.view.page import render
     from pipeline.workflow import world
@@ -100,10 +112,10 @@ def _read(file: Path, output: Path) -> "tuple[Path, xr.Dataset]":
     try:
         return dataset_path(file, output), read(file, output)
     except DatasetError as wrong:
-        fail(str(wrong))
+        fail(Fault(str(wrong), file=str(file)))
 
 
 def _compare(file: Path, path: Path, dataset: "xr.Dataset") -> None:
     """Warn if the study file is not the one that the dataset was made from."""
     if file.is_file() and file.read_text(encoding="utf-8", errors="replace") != dataset.attrs.get("study"):
-        error(f"warning: {file} has changed since {path} was made; the report shows the study as it was run")
+        warning(f"{file} has changed since {path} was made; the report shows the study as it was run")

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipeline.cli.console import print_json, warning
-from pipeline.cli.words import DEFAULT_OUTPUT, SOME_FAILED, Json, check_store, fail
+from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_file
+from pipeline.cli.words import DEFAULT_OUTPUT, Json, check_store
 
 if TYPE_CHECKING:
     from pipeline.run.store import Records
@@ -52,29 +53,76 @@ def prune(
         float | None, typer.Option(metavar="DAYS", help="Remove what was stored longer ago.", min=0)
     ] = None,
     failed: Annotated[bool, typer.Option("--failed", help="Remove failed cases.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do it: without this, only say what would go.")] = False,
+    as_json: Json = False,
 ) -> None:
-    """Remove records that are old or failed, and those that cannot be read.
+    """Remove records that are old or failed, and those that cannot be read; without --yes, say which.
 
     A file that is damaged as a whole is moved aside, and a new store begun.
 
     Example: epsmesh store prune --days 90 --failed
+
+    Example: epsmesh store prune --days 90 --failed --yes
     """
-    from pipeline.run.store import Store, StoreError
+    from pipeline.run.store import DamagedStoreError, StoreError
 
     _check(store)
+    older_than = None if days is None else 86400 * days
+    try:
+        found = _found(store, older_than, failed=failed)
+    except DamagedStoreError as wrong:
+        found = {"file": str(store), "records": None, "remove": None, "bytes": store.stat().st_size, "reasons": {},
+                 "damaged": str(wrong)}  # fmt: skip
+    except StoreError as wrong:
+        fail(Fault(str(wrong), file=str(store)))
+    moved = _prune(store, older_than, failed=failed) if yes else ""
+    if as_json:
+        print_json(found | {"done": yes, "notice": moved})
+        return
+    print(f"{store}: {_said(found, done=yes)}")
+
+
+def _said(found: dict[str, Any], *, done: bool) -> str:
+    """Say what was done, or would be."""
+    if found["damaged"]:
+        aside = "moved aside, and a new one begun" if done else "--yes moves it aside and begins a new one"
+        return f"is damaged as a whole, {found['bytes'] / 1e6:.3g} MB: {aside}"
+    if not found["remove"]:
+        return f"none of {found['records']} records {'removed' if done else 'would be removed'}"
+    why = ", ".join(f"{count} {word}" for word, count in found["reasons"].items())
+    what = f"{found['remove']} of {found['records']} records ({why}), {found['bytes'] / 1e3:.3g} kB"
+    return f"{what}: removed" if done else f"{what}, would be removed: --yes does it"
+
+
+def _found(store: Path, older_than: float | None, *, failed: bool) -> dict[str, Any]:
+    """Return what is to be removed, as data; the store is left as it is."""
+    from pipeline.run.reading import open_to_read
+
+    with open_to_read(store) as opened:
+        doomed, count = opened.doomed(older_than=older_than, failed=failed), len(opened.rows())
+    return {
+        "file": str(store), "records": count, "remove": len(doomed), "bytes": sum(one.size for one in doomed),
+        "reasons": dict(Counter(one.why for one in doomed)), "damaged": "",
+    }  # fmt: skip
+
+
+def _prune(store: Path, older_than: float | None, *, failed: bool) -> str:
+    """Remove it; return what became of a store that is damaged as a whole."""
+    from pipeline.run.store import Store, StoreError
+
     try:
         opened = Store(store)
+        if opened.notice:
+            warning(opened.notice)
+        opened.prune(older_than=older_than, failed=failed)
+        opened.close()
     except StoreError as wrong:
-        fail(str(wrong))
-    if opened.notice:
-        warning(opened.notice)
-    count = opened.prune(older_than=None if days is None else 86400 * days, failed=failed)
-    opened.close()
-    print(f"{store}: {count} records removed")
+        fail(Fault(str(wrong), file=str(store)))
+    return opened.notice
 
 
 @app.command()
-def verify(store: StoreFile = DEFAULT_STORE) -> None:
+def verify(store: StoreFile = DEFAULT_STORE, as_json: Json = False) -> None:
     """Check that every record can be read and makes sense.
 
     Exit status 1 if one does not.
@@ -83,10 +131,13 @@ def verify(store: StoreFile = DEFAULT_STORE) -> None:
     """
     with _read(store) as opened:
         problems = list(opened.problems())
-    for problem in problems:
-        print(problem)
-    print(f"{store}: {f'{len(problems)} problems' if problems else 'sound'}")
-    raise typer.Exit(SOME_FAILED if problems else 0)
+    if as_json:
+        print_json({"file": str(store), "sound": not problems, "problems": problems})
+    else:
+        for problem in problems:
+            print(problem)
+        print(f"{store}: {f'{len(problems)} problems' if problems else 'sound'}")
+    raise typer.Exit(SOME_FAILED if problems else DONE)
 
 
 @contextmanager
@@ -100,12 +151,12 @@ def _read(path: Path) -> Iterator["Records"]:
         with open_to_read(path) as opened:
             yield opened
     except StoreError as wrong:
-        fail(str(wrong))
+        fail(Fault(str(wrong), file=str(path)))
 
 
 def _check(path: Path) -> None:
     if not path.exists():
-        fail(f"{path}: there is no such store")
+        fail(of_file(path, "there is no such store"))
     check_store(path)
 
 

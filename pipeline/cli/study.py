@@ -1,5 +1,6 @@
 """The commands that run studies and show what came of them."""
 
+import sys
 import time
 from contextlib import nullcontext
 from pathlib import Path
@@ -9,15 +10,13 @@ import typer
 
 from pipeline import __version__
 from pipeline.cli.console import error, print_json
-from pipeline.cli.outcome import announce, as_data, conclude, print_stages
+from pipeline.cli.faults import BAD_INPUT, DONE, INTERRUPTED, SOME_FAILED, Fault, as_data, fail, of_study, tell
+from pipeline.cli.outcome import announce, conclude, print_stages
+from pipeline.cli.outcome import as_data as outcome_data
 from pipeline.cli.words import (
-    BAD_INPUT,
     DEFAULT_MESHES,
     DEFAULT_OUTPUT,
-    DONE,
-    INTERRUPTED,
     OWN_PROCESS,
-    SOME_FAILED,
     File,
     Files,
     Json,
@@ -31,7 +30,6 @@ from pipeline.cli.words import (
     check_output,
     check_shard,
     check_store,
-    fail,
     load_all,
     meant,
     stored_records,
@@ -57,9 +55,9 @@ def validate(files: Files, as_json: Json = False) -> None:
             study = load(file)
         except StudyError as wrong:
             failed = True
-            report.append({"file": str(file), "errors": [str(p) for p in wrong.problems], "warnings": []})
-            if not as_json:
-                error(f"{wrong}{meant(file)}")
+            faults = of_study(wrong, meant(file))
+            report.append({"file": str(file), "errors": as_data(faults, BAD_INPUT)["errors"], "warnings": []})
+            tell(faults)
             continue
         cases = len(make_plan(study).keys)
         report.append({"file": str(file), "errors": [], "warnings": list(study.warnings), "cases": cases})
@@ -136,17 +134,17 @@ def run(
                 with workflow.abort_on_exception(comm):
                     outcome = workflow.run(plan, opened, comm, output, progress)
             except (StoreError, workflow.ResultsError) as wrong:
-                fail(str(wrong))
+                fail(Fault(str(wrong), file=study.file))
             if speaks:
                 seconds = time.monotonic() - start
                 conclude(plan, opened, outcome, seconds, part, quiet=quiet or as_json)
-                found.append(as_data(plan, opened, outcome, seconds))
+                found.append(outcome_data(plan, opened, outcome, seconds))
             failed = failed or outcome.counts["failed"] > 0
             if outcome.interrupted:
                 break
         ended = INTERRUPTED if outcome.interrupted else SOME_FAILED if failed else DONE
         if speaks and profile:
-            print_stages()
+            print_stages(sys.stderr if as_json else sys.stdout)
         if speaks and as_json:
             print_json({"status": ended, "studies": found})
         if outcome.interrupted:

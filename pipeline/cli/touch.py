@@ -1,11 +1,14 @@
 """The command that opens a real-time model as a page."""
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from pipeline.cli.words import DONE, fail
+from pipeline.cli.console import print_json
+from pipeline.cli.faults import fail, of_file
+from pipeline.cli.words import Json
 
 
 def touch(
@@ -21,6 +24,7 @@ def touch(
         ),
     ] = None,
     open_it: Annotated[bool, typer.Option("--open/--no-open", help="Open it in the browser.")] = True,
+    as_json: Json = False,
 ) -> None:
     """Drag a tool over a body in a browser: its surface, the force, and its error bar, at once.
 
@@ -37,25 +41,32 @@ def touch(
         surface = load_surface(model)
         if output is not None:
             path = write_touch_page(surface, output, model.name)
-            print(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB), to be opened in a browser")
-            raise typer.Exit(DONE)
+            size = path.stat().st_size
+            if as_json:
+                print_json({"file": str(path), "bytes": size})
+            else:
+                print(f"wrote {path} ({size / 1e6:.1f} MB), to be opened in a browser")
+            return
         text = render(surface, model.name)
     except (ModelError, OSError) as problem:
-        fail(f"{model}: {problem}")
-    _serve(text, open_it=open_it)
+        fail(of_file(model, str(problem), "docs/howto/touch.md"))
+    _serve(text, open_it=open_it, as_json=as_json)
 
 
-def _serve(text: str, *, open_it: bool) -> None:
+def _serve(text: str, *, open_it: bool, as_json: bool) -> None:
     """Serve the page until Ctrl-C."""
     import webbrowser
 
     from pipeline.touch.server import PageServer
 
     with PageServer(text) as server:
-        print(f"{server.address} (Ctrl-C ends it)", flush=True)
+        if as_json:
+            print_json({"address": server.address})
+        else:
+            print(f"{server.address} (Ctrl-C ends it)", flush=True)
         if open_it:
             webbrowser.open(server.address)
         try:
             server.serve_forever()
         except KeyboardInterrupt:
-            print()
+            print(file=sys.stderr)

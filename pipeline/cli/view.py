@@ -5,9 +5,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from pipeline.cli.console import error
+from pipeline.cli.console import error, print_json
+from pipeline.cli.faults import SOME_FAILED, Fault, fail
 from pipeline.cli.plan import find_case
-from pipeline.cli.words import DEFAULT_OUTPUT, SOME_FAILED, File, Output, fail, load_all
+from pipeline.cli.words import DEFAULT_OUTPUT, File, Json, Output, load_all
 from pipeline.study.sweep import Case, Study
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ def view(
         typer.Option(help="Write the page, or a file for ParaView, and no pictures."),
     ] = None,
     meshes: Annotated[Path, typer.Option(help="Folder of the meshes that are kept.")] = MESHES,
+    as_json: Json = False,
 ) -> None:
     """Show one case: its mesh by element size, cut open, and the body as the probe deforms it.
 
@@ -52,7 +54,7 @@ def view(
         fields = fields_of(study, chosen, comm, mesh_only, export == "html", meshes)
         if fields is not None:
             stem = output / f"{study.name}_{_number(study, chosen)}"
-            _write(study, fields, stem, export)
+            _write(study, fields, stem, export, as_json=as_json)
 
 
 def fields_of(study: Study, case: Case, comm: "MPI.Comm", mesh_only: bool, bar: bool, meshes: Path) -> "Fields | None":
@@ -64,43 +66,58 @@ def fields_of(study: Study, case: Case, comm: "MPI.Comm", mesh_only: bool, bar: 
     from pipeline.view.compute import compute_fields, solve_to_view
 
     if case.absence:
-        fail(f"{case}: {case.absence}")
+        fail(
+            Fault(
+                f"{case}: {case.absence}", key="CASE", value=str(case), allowed=case.absence, howto="docs/howto/path.md"
+            )
+        )
     note = error if comm.rank == 0 else _say_nothing
     note(str(case))
     try:
         solve = solve_to_view(study, case)
         return compute_fields(solve, comm, mesh_only=mesh_only, bar=bar, cache=MeshCache(meshes), note=note)
     except (CaseFailure, MeshError, SolveError) as failure:
-        note(f"failed: {failure}")
+        why = f"failed: {failure}"
     except (MemoryError, RuntimeError) as failure:
         if comm.size > 1:
             raise
-        note(f"failed: {type(failure).__name__}: {failure}")
-    raise typer.Exit(SOME_FAILED)
+        why = f"failed: {type(failure).__name__}: {failure}"
+    if comm.rank > 0:
+        raise typer.Exit(SOME_FAILED)
+    fail(Fault(why, file=study.file, key="CASE", value=str(case)), status=SOME_FAILED)
 
 
-def _write(study: Study, fields: "Fields", stem: Path, export: str | None) -> None:
+def _write(study: Study, fields: "Fields", stem: Path, export: str | None, *, as_json: bool) -> None:
     """Write what was asked for, and say what is in it."""
+    written = _written(study, fields, stem, export)
+    if as_json:
+        print_json({"cells": len(fields.cells), "dofs": fields.dofs, "files": [str(path) for path in written]})
+        return
     unknowns = f", {fields.dofs:,} unknowns" if fields.dofs else ""
     print(f"{len(fields.cells):,} elements{unknowns}")
+    for path, remark in written.items():
+        print(f"wrote {path}{remark}")
+
+
+def _written(study: Study, fields: "Fields", stem: Path, export: str | None) -> dict[Path, str]:
+    """Write what was asked for; return the files, with what is to be said of each."""
     title = str(fields.case) if study.axes else study.title
     if export == "html":
         from pipeline.view.page import write_page
 
         path = write_page(fields, stem.with_name(f"{stem.name}.html"), study.title)
-        print(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB), to be opened in a browser")
-        return
+        return {path: f" ({path.stat().st_size / 1e6:.1f} MB), to be opened in a browser"}
     if export:
         from pipeline.view.export import write_fields
 
-        print(f"wrote {write_fields(fields, stem.with_name(f'{stem.name}.{export}'))}")
-        return
+        return {write_fields(fields, stem.with_name(f"{stem.name}.{export}")): ""}
     from pipeline.view.picture import draw_deformed, draw_mesh
 
-    print(f"wrote {draw_mesh(fields, stem.with_name(f'{stem.name}_mesh.png'), title)}")
+    files = {draw_mesh(fields, stem.with_name(f"{stem.name}_mesh.png"), title): ""}
     if fields.displacement is not None:
         path, factor = draw_deformed(fields, stem.with_name(f"{stem.name}_deformed.png"), title)
-        print(f"wrote {path} (displacement {factor:,.0f} × as large)")
+        files[path] = f" (displacement {factor:,.0f} × as large)"
+    return files
 
 
 def _number(study: Study, case: Case) -> int:

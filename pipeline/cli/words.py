@@ -1,14 +1,13 @@
-"""What every command says and takes: options, errors, exit statuses. Only the command line prints and exits."""
+"""What every command takes and says: options, checks of what they hold, words. Only the command line prints."""
 
 import difflib
-import os
-import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipeline.cli.console import error, warning
+from pipeline.cli.console import warning
+from pipeline.cli.faults import Fault, fail, of_file, of_option, of_study
 from pipeline.files import why_not_writable
 from pipeline.plan.cost import CostModel
 from pipeline.plan.plan import Plan
@@ -21,10 +20,9 @@ from pipeline.study.sweep import Study
 if TYPE_CHECKING:
     from pipeline.run.record import Record
 
-DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 # What a command finds as its context's object where it was started as a program, and not by a test.
 OWN_PROCESS = "own process"
-_PATIENCE = 5.0  # seconds
+_SKIPPING, CLUSTER = "docs/skipping.md", "docs/cluster.md"  # what tells more
 _SQLITE = b"SQLite format 3\0"
 DEFAULT_OUTPUT, DEFAULT_MESHES = Path("results"), Path("meshes/cache")
 
@@ -34,7 +32,7 @@ Output = Annotated[Path, typer.Option(metavar="DIR", help="Folder of the results
 StoreFile = Annotated[
     Path | None, typer.Option("--store", metavar="FILE", help="Case store [default: DIR/cases.sqlite].")
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts, and nothing else on standard output.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the least: errors, and what was asked for.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print more: every step, every case.")]
 
@@ -57,20 +55,20 @@ Without = Annotated[
 
 def load_all(files: list[Path]) -> list[Study]:
     """Load studies, or exit with every problem of every file; on several ranks only the first one speaks."""
-    studies, messages = [], []
+    studies, faults = [], list[Fault]()
     for file in files:
         try:
             studies.append(load(file))
-        except StudyError as problem:
-            messages.append(f"{problem}{meant(file)}")
+        except StudyError as wrong:
+            faults += of_study(wrong, meant(file))
     names = [study.name for study in studies]
-    messages += [
-        f"{s.file}: another study given is called {s.name}, too: both would write {s.name}.nc"
+    faults += [
+        of_file(s.file, f"another study given is called {s.name}, too: both would write {s.name}.nc")
         for s in studies
         if names.count(s.name) > 1
     ]
-    if messages:
-        fail("\n".join(messages))
+    if faults:
+        fail(*faults)
     return studies
 
 
@@ -94,25 +92,26 @@ def stored_records(path: Path, plan: Plan) -> tuple[dict[str, "Record"], CostMod
     try:
         return known_of(path, plan)
     except StoreError as problem:
-        fail(str(problem))
+        fail(Fault(str(problem), file=str(path)))
 
 
 def check_store(path: Path) -> None:
     """Exit if the file at ``path`` is plainly something else than a case store: a damaged one is moved aside."""
     if path.is_dir():
-        fail(f"--store {path}: is a folder; a case store is a file, such as {path / 'cases.sqlite'}")
+        fail(of_option("--store", path, f"is a folder; a case store is a file, such as {path / 'cases.sqlite'}"))
     if path.is_file() and path.suffix not in (".sqlite", ".db"):
         with path.open("rb") as file:
             start = file.read(len(_SQLITE))
         if start and start != _SQLITE:
-            fail(f"--store {path}: is not a case store")
+            fail(of_option("--store", path, "is not a case store"))
 
 
 def check_output(*files: Path, folder: Path | None = None) -> None:
     """Exit if one of the files, or any file in a ``folder``, could not be written: before anything is computed."""
     tried = [*files, *([folder / "tried"] if folder else [])]
-    if wrong := [why for file in tried if (why := why_not_writable(file))]:
-        fail("\n".join(dict.fromkeys(wrong)))
+    found = {why: Fault(why, file=str(file)) for file in tried if (why := why_not_writable(file))}
+    if found:
+        fail(*found.values())
 
 
 def axes_of(study: Study) -> str:
@@ -127,27 +126,12 @@ def warn(study: Study) -> None:
         warning(text)
 
 
-def fail(text: str) -> NoReturn:
-    """Exit for bad input, with one voice if there are several ranks: the first one's, if it came to the same."""
-    if not is_first_rank():
-        # All ranks are ended as soon as one leaves with a bad status: the first one must have spoken by then. Who is
-        # still here after that is alone in what it found.
-        time.sleep(_PATIENCE)
-    error(text)
-    raise typer.Exit(BAD_INPUT)
-
-
-def is_first_rank() -> bool:
-    """Tell, before MPI is started, whether this is the rank that speaks."""
-    ranks = (os.environ.get(name) for name in ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"))
-    return next((rank for rank in ranks if rank is not None), "0") == "0"
-
-
 def check_names(without: list[str] | None) -> tuple[str, ...]:
     """Return the names of reductions, or exit if there is none of such a name."""
     unknown = [name for name in without or () if name not in REDUCTIONS]
     if unknown:
-        fail(f"--without {unknown[0]}: no reduction is called so; {nearest(unknown[0], REDUCTIONS)}")
+        meant_one = nearest(unknown[0], REDUCTIONS)
+        fail(of_option("--without", unknown[0], f"no reduction is called so; {meant_one}", _SKIPPING))
     return tuple(without or ())
 
 
@@ -158,8 +142,8 @@ def check_shard(text: str | None, studies: list[Study]) -> Shard | None:
     try:
         shard = parse_shard(text)
     except ValueError as problem:
-        fail(f"--shard: {problem}")
-    reasons = [f"{study.file}: {reason}" for study in studies if (reason := reason_against(study))]
+        fail(Fault(f"--shard: {problem}", key="--shard", value=text, allowed=str(problem), howto=CLUSTER))
+    reasons = [of_file(study.file, reason, CLUSTER) for study in studies if (reason := reason_against(study))]
     if reasons:
-        fail("\n".join(reasons))
+        fail(*reasons)
     return shard

@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.quantities import MESH_DIMENSIONS
+from pipeline.report.compare import Comparison, compare
 from pipeline.report.compliance import Against, compliance
 from pipeline.report.guide import Guide, guide
 from pipeline.report.locate import Located, locate
@@ -62,6 +63,13 @@ class Accessor:
         See :func:`pipeline.report.guide.guide`; printed, the guide is the text of ``epsmesh guide``.
         """
         return guide(self._dataset, accuracy, budget)
+
+    def compare(self, other: xr.Dataset) -> Comparison:
+        """Return case by case whether the forces agree with those of ``other`` within the error bars.
+
+        See :func:`pipeline.report.compare.compare`.
+        """
+        return compare(self._dataset, other)
 
     def compliance(self, against: Against = "exact") -> xr.Dataset:
         """Return what each mesh adds to the compliance of the body, c (1/m), with its error bar and, where there is

@@ -220,9 +220,10 @@ def _frame(case: Case) -> Frame | None:
 
 
 def _origin(plan: Plan, key: str, record: Record | None) -> str:
+    """Return how the force was obtained, and whether that was in an earlier run."""
     if record is None or record.status != "ok":
         return ""
-    return "stored" if key in plan.stored else record.origin
+    return f"{record.origin}, stored" if key in plan.stored else record.origin
 
 
 def _coordinate(axis: Axis) -> Any:

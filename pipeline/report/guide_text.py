@@ -5,6 +5,18 @@ from math import isfinite
 from pipeline.quantities import symbol
 from pipeline.report.correction import Correction
 from pipeline.report.guide_laws import carried, comparison
+from pipeline.report.guide_settings import (
+    ERROR,
+    LEFT_OUT,
+    RATIO,
+    RESIDUAL,
+    TIME,
+    UNKNOWNS,
+    UNSEEN,
+    USUAL,
+    range_of,
+    settings,
+)  # fmt: skip
 from pipeline.report.guide_words import (
     cells_of,
     cost,
@@ -14,6 +26,7 @@ from pipeline.report.guide_words import (
     newton,
     number,
     percent,
+    ratio,
     table,
     time,
 )  # fmt: skip
@@ -24,12 +37,13 @@ from pipeline.report.verdict import Verdict
 
 def text(guide: Guideline) -> str:
     """Return the answer, the settings, the law of correction and what is left out, as lines."""
-    parts = [[guide.title], _question(guide), answer(guide), _per_outside(guide), _settings(guide)]
+    parts = [[guide.title], question(guide), answer(guide), _per_outside(guide), _settings(guide)]
     parts += [_constancy(guide), comparison(guide), _left_out(guide)]
     return "\n\n".join("\n".join(part) for part in parts if part and part[0])
 
 
-def _question(guide: Guideline) -> list[str]:
+def question(guide: Guideline) -> list[str]:
+    """Return what was asked for, and of how many scenes."""
     axes = " × ".join(f"{length} {name}" for name, length in guide.axes)
     wanted = [f"F within {percent(guide.accuracy)} of F_exact, error bars included"] if isfinite(guide.accuracy) else []
     wanted += [f"at most {time(guide.budget)} a case"] if isfinite(guide.budget) else []
@@ -54,8 +68,8 @@ def answer(guide: Guideline) -> list[str]:
         law = corrected.correction
         found = "" if guide.corrected else "no setting does that either; best reached: "
         lines.append(
-            f"With the correction F_exact ≈ F / r: {found}{words(corrected.labels)}, r = {law.r:.4g}; off by at most "
-            f"{percent(law.error)} on scenes that r was not taken from, {cost(corrected)}"
+            f"With the correction F_exact ≈ F / r: {found}{words(corrected.labels)}, r = {ratio(law.r)}; off by at "
+            f"most {percent(law.error)} on scenes that r was not taken from, {cost(corrected)}"
         )
     else:
         few = "nothing can be said: it takes more than one scene"
@@ -96,21 +110,15 @@ def _per_outside(guide: Guideline) -> list[str]:
     for name, (plain, corrected) in answers.items():
         row = [name, _short(plain), percent(plain.error) if plain else ""]
         law = corrected.correction if corrected else Correction()
-        rows.append([*row, _short(corrected), *((f"{law.r:.4g}", percent(law.error)) if corrected else ("", ""))])
+        rows.append([*row, _short(corrected), *((ratio(law.r), percent(law.error)) if corrected else ("", ""))])
     return table(rows)
 
 
 def _settings(guide: Guideline) -> list[str]:
     """Return the table of all settings: error, cost, and the law of correction."""
-    rows = [[*heads(guide), "worst error", "usual", "time", "unknowns", "r", "residual", "left out", "unseen"]]
-    for v in in_order(guide):
-        row = cells_of(v)
-        if not v.is_judged:
-            rows.append([*row, f"not judged: {v.missing} of {guide.scenes} scenes not computed"])
-            continue
-        law = v.correction
-        row += [percent(v.error), time(v.usual), time(v.seconds), f"{v.dofs:,.0f}"]
-        rows.append([*row, f"{law.r:.4f}", percent(law.residual), percent(law.left_out), percent(law.unseen)])
+    columns = [*heads(guide), ERROR, USUAL, TIME, UNKNOWNS, RATIO, RESIDUAL, LEFT_OUT, UNSEEN]
+    # What is not judged ends with its reason.
+    rows = [columns, *([row[name] for name in columns if name in row] for row in settings(guide))]
     legend = [
         "Largest over the scenes (usual: median of the time); error with, the last three without error bars.",
         "r: F_exact ≈ F / r; residual: on the scenes that r is taken from; left out: on each scene, r taken from the",
@@ -124,7 +132,6 @@ def _constancy(guide: Guideline) -> list[str]:
     names = [name for name, length in guide.axes if length > 1]
     if not names:
         return []
-    ratio = "F/F_max" if guide.has_full else "F/F_exact"
     names_of = heads(guide)
     rows = [[*names_of, "least", "most", "most - least", "relative", *(f"by {symbol(name)}" for name in names)]]
     for v in in_order(guide):
@@ -132,7 +139,8 @@ def _constancy(guide: Guideline) -> list[str]:
             over = dict(v.spread.over)
             row = [number(v.spread.least), number(v.spread.most), number(v.spread.width), percent(v.spread.relative)]
             rows.append([*cells_of(v), *row, *(number(over[name]) for name in names)])
-    title = f"How constant is {ratio} over the scenes? By a parameter: the largest change it makes, all else held."
+    what = f"How constant is {range_of(guide)} over the scenes?"
+    title = f"{what} By a parameter: the largest change it makes, all else held."
     return [title, *table(rows, len(names_of))] if len(rows) > 1 else []
 
 

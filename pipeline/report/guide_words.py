@@ -78,6 +78,11 @@ def newton(force: float) -> str:
     return f"{1e3 * force:.4g} mN"
 
 
+def ratio(value: float) -> str:
+    """Write the r of a law of correction; nothing for what is not known."""
+    return f"{value:.4g}" if isfinite(value) else ""
+
+
 def number(value: float) -> str:
     """Write a ratio or a difference of ratios."""
     return f"{value:.3f}" if isfinite(value) else ""

@@ -6,7 +6,7 @@ from typing import Any
 
 from pipeline.report.laws import Laws
 from pipeline.report.table import Labels
-from pipeline.report.verdict import Verdict, choose
+from pipeline.report.verdict import Verdict, choose, keeps
 
 
 @dataclass(frozen=True)
@@ -87,9 +87,9 @@ def _row(verdict: Verdict, guideline: Guideline) -> dict[str, Any]:
         if k not in ("labels", "mesh", "spread", "correction", "laws", "laws_of_full")
     }
     spread = verdict.spread
-    keeps = verdict.is_judged and verdict.error <= guideline.accuracy and verdict.seconds <= guideline.budget
+    kept = keeps(verdict, guideline.verdicts, guideline.accuracy, "force") and verdict.seconds <= guideline.budget
     return {
-        **verdict.labels, "mesh": verdict.mesh, **plain, "judged": verdict.is_judged, "keeps": bool(keeps),
+        **verdict.labels, "mesh": verdict.mesh, **plain, "judged": verdict.is_judged, "keeps": bool(kept),
         "ratio_min": spread.least, "ratio_max": spread.most, "ratio_spread": spread.width,
         "ratio_spread_relative": spread.relative, "ratio_spread_over": dict(spread.over),
         "correction": asdict(verdict.correction), "laws": _laws(verdict.laws),

@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 from pipeline.plan.cost import CostModel
 from pipeline.plan.work import Plan
 from pipeline.run.record import Record
-from pipeline.run.store import PATIENCE, SCHEMA, Records, Row, StoreError, damaged, guard
+from pipeline.run.store import PATIENCE, SCHEMA, DamagedStoreError, Records, Row, StoreError, damaged, guard
 
 
 @contextmanager
@@ -26,7 +26,7 @@ def open_to_read(path: Path) -> Iterator[Records]:
     except sqlite3.OperationalError as error:
         raise StoreError(f"the case store {path} cannot be read: {error}") from error
     except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
-        raise StoreError(damaged(path, error)) from error
+        raise DamagedStoreError(damaged(path, error)) from error
     except OSError as error:
         raise StoreError(f"the case store {path} cannot be read: {error.strerror}") from error
 

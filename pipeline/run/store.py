@@ -5,6 +5,7 @@ import sqlite3
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 
@@ -26,6 +27,19 @@ Row = tuple[str, str, float]  # key, record as text, seconds since 1970 at which
 
 class StoreError(Exception):
     """The case store cannot be used."""
+
+
+class DamagedStoreError(StoreError):
+    """The file of a case store is damaged as a whole."""
+
+
+@dataclass(frozen=True)
+class Doomed:
+    """A record that is to be removed, and why; ``size`` is its length in bytes."""
+
+    key: str
+    why: str
+    size: int
 
 
 class Records:
@@ -79,6 +93,21 @@ class Records:
                 yield f"record {key}: {fault}"
             elif record and record.status == "ok" and not (isfinite(record.force) and record.force > 0):
                 yield f"record {key}: is ok, and its force {record.force}"
+
+    def doomed(self, *, older_than: float | None = None, failed: bool = False) -> list[Doomed]:
+        """Return records stored ``older_than`` seconds ago or before, failed ones, and what is no record of its key."""
+        found = []
+        for key, text, stored in self.rows():
+            record = _readable(text)
+            why = "cannot be read" if _fault(key, record) else ""
+            if failed and record and not record.is_ok:
+                why = why or "failed"
+            # A clock that has gone back leaves records of a time to come.
+            if older_than is not None and max(time.time() - stored, 0.0) >= older_than:
+                why = why or "old"
+            if why:
+                found.append(Doomed(key, why, len(key) + len(text.encode())))
+        return found
 
     def close(self) -> None:
         """Close the file."""
@@ -143,18 +172,9 @@ class Store(Records):
         self._database.executemany("INSERT OR REPLACE INTO records VALUES (?, ?, ?)", rows)
 
     def prune(self, *, older_than: float | None = None, failed: bool = False) -> int:
-        """Remove records stored ``older_than`` seconds ago or before, failed ones, and what is no record of its key.
-
-        Returns their number.
-        """
-        gone = []
-        for key, text, stored in self.rows():
-            record = _readable(text)
-            # A clock that has gone back leaves records of a time to come.
-            is_old = older_than is not None and max(time.time() - stored, 0.0) >= older_than
-            if is_old or _fault(key, record) or (failed and record and not record.is_ok):
-                gone.append(key)
-        self._database.executemany("DELETE FROM records WHERE key = ?", [(key,) for key in gone])
+        """Remove what is :meth:`doomed`, and return how many records that were."""
+        gone = self.doomed(older_than=older_than, failed=failed)
+        self._database.executemany("DELETE FROM records WHERE key = ?", [(one.key,) for one in gone])
         self._database.execute("VACUUM")
         return len(gone)
 
@@ -201,7 +221,7 @@ def damaged(path: Path, error: Exception) -> str:
 
 
 def _mend(path: Path) -> str:
-    return f"`epsmesh store prune --store {path}`"
+    return f"`epsmesh store prune --store {path} --yes`"
 
 
 def _readable(text: str) -> Record | None:

@@ -40,41 +40,63 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     materials, meshes = cast(Sequence[Material], sections["material"]), cast(Sequence[Mesh], sections["mesh"])
     for body in bodies:
         if isinstance(body, FromFile):
-            for notice in body.notices:
-                problems.warn("body.file", body.file, notice)
+            with problems.about(body=body):
+                for notice in body.notices:
+                    problems.warn("body.file", body.file, notice)
     linear = [material for material in materials if not material.is_large]
-    for probe in probes if linear else ():
-        _check_depth(probe, problems)
     for probe in probes:
-        _check_motion(probe, problems)
-        probe.check(problems)
+        with problems.about(probe=probe):
+            if linear:
+                _check_depth(probe, problems)
+            _check_motion(probe, problems)
+            probe.check(problems)
     for mesh in meshes:
-        _check_mesh(mesh, problems)
+        with problems.about(mesh=mesh):
+            _check_mesh(mesh, problems)
     for mesh, probe in itertools.product(meshes, probes):
-        _check_epsilon(mesh, probe, problems)
-        _check_depth_range(mesh, probe, problems)
+        with problems.about(mesh=mesh, probe=probe):
+            _check_epsilon(mesh, probe, problems)
+            _check_depth_range(mesh, probe, problems)
     for body, mesh in itertools.product(bodies, meshes):
-        body.support.check(body.heights, mesh.fine, problems)
-        _check_outside(body, mesh, problems)
-    sane = [probe for probe in probes if _has_place(probe, problems)]
+        with problems.about(body=body, mesh=mesh):
+            body.support.check(body.heights, mesh.fine, problems)
+            _check_outside(body, mesh, problems)
     way = next((axis for axis in axes if axis.off), None)
-    placed = [pair for pair in itertools.product(bodies, sane) if _check_place(*pair, way, problems)]
-    _check_way(way, probes, placed, problems)
-    placed = [pair for pair in placed if _check_thickness(*pair, problems) and check_slit(*pair, problems)]
+    placed = _placed(bodies, probes, way, problems)
     for (body, probe), mesh in itertools.product(placed, meshes):
-        _check_column(body, probe, mesh, problems)
-        check_closure(body, probe, mesh, problems)
-        _check_gap(body, probe, mesh, problems)
-        _check_straight(body, probe, mesh, problems)
-        check_slit_in(body, probe, mesh, problems)
+        with problems.about(body=body, probe=probe, mesh=mesh):
+            _check_column(body, probe, mesh, problems)
+            check_closure(body, probe, mesh, problems)
+            _check_gap(body, probe, mesh, problems)
+            _check_straight(body, probe, mesh, problems)
+            check_slit_in(body, probe, mesh, problems)
     check_large(bodies, materials, probes, meshes, problems)
     for body, material, mesh in itertools.product(bodies, linear, meshes):
-        _check_locking(dict(tissues_of(body, material)), mesh, problems)
-        check_far_field(material, mesh, problems)
+        with problems.about(body=body, material=material, mesh=mesh):
+            _check_locking(dict(tissues_of(body, material)), mesh, problems)
+            check_far_field(material, mesh, problems)
     _check_reference(meshes, axes, problems)
     for solve in cast(Sequence[Solving], sections["solve"]):
         if "repeats" in solve.model_fields_set and not solve.timing:
             problems.error("solve.repeats", solve.repeats, "only a timing study repeats its cases: add `timing = true`")
+
+
+def _placed(
+    bodies: Sequence[Body], probes: Sequence[Probe], way: Axis | None, problems: Problems
+) -> list[tuple[Body, Probe]]:
+    """Return the bodies with the probes that have a place on them, and report those that have none."""
+    sane = [probe for probe in probes if _has_place(probe, problems)]
+    placed, fitting = [], []
+    for body, probe in itertools.product(bodies, sane):
+        with problems.about(body=body, probe=probe):
+            if _check_place(body, probe, way, problems):
+                placed.append((body, probe))
+    _check_way(way, probes, placed, problems)
+    for body, probe in placed:
+        with problems.about(body=body, probe=probe):
+            if _check_thickness(body, probe, problems) and check_slit(body, probe, problems):
+                fitting.append((body, probe))
+    return fitting
 
 
 def _check_depth(probe: Probe, problems: Problems) -> None:
@@ -121,11 +143,12 @@ def _check_motion(probe: Probe, problems: Problems) -> None:
 def _has_place(probe: Probe, problems: Problems) -> bool:
     """Report directions that are none; what has one has no place."""
     sane = True
-    for key in ("axis", "direction"):
-        vector = getattr(probe, key, None)
-        if vector is not None and not is_direction(vector):
-            problems.error(f"probe.{key}", list(vector), "must be a vector of three finite numbers, not all zero")
-            sane = False
+    with problems.about(probe=probe):
+        for key in ("axis", "direction"):
+            vector = getattr(probe, key, None)
+            if vector is not None and not is_direction(vector):
+                problems.error(f"probe.{key}", list(vector), "must be a vector of three finite numbers, not all zero")
+                sane = False
     return sane
 
 

@@ -34,12 +34,19 @@ def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     _check_combinations(probes, meshes, materials, problems)
     if any(any(load.gravity) for load in acting):
         for body, material in product(bodies, materials):
-            _check_densities(body, material, problems)
+            with problems.about(body=body, material=material):
+                _check_densities(body, material, problems)
     for body, load in product(bodies, acting):
         for number, traction in enumerate(load.traction, start=1):
-            if _check_place(body, traction, f"load.traction[{number}].on", problems) and isinstance(traction.on, Cap):
-                for probe in probes:
-                    _check_beside(body, probe, traction.on, f"load.traction[{number}].on", problems)
+            with problems.about(body=body):
+                _check_traction(body, probes, traction, f"load.traction[{number}].on", problems)
+
+
+def _check_traction(body: Body, probes: Sequence[Probe], traction: Traction, key: str, problems: Problems) -> None:
+    if _check_place(body, traction, key, problems) and isinstance(traction.on, Cap):
+        for probe in probes:
+            with problems.about(probe=probe):
+                _check_beside(body, probe, traction.on, key, problems)
 
 
 def _check_combinations(
@@ -47,7 +54,8 @@ def _check_combinations(
 ) -> None:
     """Report what is not computed together with loads."""
     for probe in probes:
-        _check_probe(probe, problems)
+        with problems.about(probe=probe):
+            _check_probe(probe, problems)
     for mesh in meshes:
         if mesh.outside != "coarse" and isfinite(mesh.epsilon):
             problems.error(

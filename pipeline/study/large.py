@@ -34,9 +34,11 @@ def check_large(
         if body.regions:
             problems.error("material.law", large[0].law, "takes bodies of one material: no layers, no inclusions")
     for probe in probes:
-        _check_probe(probe, problems)
+        with problems.about(probe=probe):
+            _check_probe(probe, problems)
     for mesh in meshes:
-        _check_mesh(mesh, problems)
+        with problems.about(mesh=mesh):
+            _check_mesh(mesh, problems)
 
 
 def _check_probe(probe: Probe, problems: Problems) -> None:

@@ -1,35 +1,23 @@
 """Read a study file: TOML to checked sections and axes, or every problem at once."""
 
-import itertools
-from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+import difflib
+from collections.abc import Mapping
 from math import prod
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
-
-from pipeline.shapes.registry import LATER
 from pipeline.shapes.section import Section
 from pipeline.study.check import check_sense
 from pipeline.study.check_loads import check_loads
 from pipeline.study.loads import Load
-from pipeline.study.path import Way, read_path
-from pipeline.study.problems import Problems, StudyError, nearest, nested_model
-from pipeline.study.read import check_text, read
+from pipeline.study.problems import Problem, Problems, StudyError, nearest
+from pipeline.study.read import check_text, read, toml_of
 from pipeline.study.regions import check_regions, material_without_section
-from pipeline.study.schema import NESTED, SECTIONS, SINGLE, Mesh
+from pipeline.study.schema import NESTED, SECTIONS, Mesh
 from pipeline.study.sweep import Axis, Study
+from pipeline.study.tables import MOST_CASES, read_section
+from pipeline.study.toml import to_toml
 from pipeline.within import Outside, folders_of, outside
-
-# More values in a list, or more cases of a study, are a slip of the pen, or work for several studies: every case is
-# planned and reported, each in a few hundred bytes and a tenth of a millisecond.
-_MOST_VALUES = 10_000
-_MOST_CASES = 200_000
-
-
-# Where a value stands within a section: keys, and numbers in arrays of tables, from 0.
-Place = tuple[str | int, ...]
 
 
 def load(path: str | Path) -> Study:
@@ -42,42 +30,71 @@ def load(path: str | Path) -> Study:
     return parse(raw, file=str(path), text=text, trusted=False)
 
 
+def load_mapping(study: Mapping[str, Any], name: str, folder: str | Path = ".") -> Study:
+    """Read the study that stands in a dictionary, as the file ``name``.toml in ``folder`` with its text would be.
+
+    Raises:
+        StudyError: with every problem of it.
+    """
+    path = Path(folder) / f"{name}.toml"
+    try:
+        text = to_toml(study, str(path))
+        text.encode()  # a dataset holds it as UTF-8
+        raw = toml_of(text, str(path))
+    except (RecursionError, UnicodeEncodeError) as error:
+        why = "is nested too deeply" if isinstance(error, RecursionError) else "has text that is not Unicode"
+        raise StudyError(str(path), [Problem("study", None, why)]) from None
+    return parse(raw, file=str(path), text=text)
+
+
 def parse(raw: dict[str, Any], *, file: str = "study", text: str = "", trusted: bool = True) -> Study:
     """Turn a study, read from TOML into ``raw``, into a :class:`Study`; ``file`` is for messages.
 
     One that is not ``trusted``, as it comes from a file, may name files of its own project only.
     """
-    problems = Problems()
+    problems = Problems(tables=_names_of(raw))
     raw = _beside(raw, Path(file).parent, trusted=trusted)
     _check_top(raw, problems)
     axes: list[Axis] = []
     sections: dict[str, tuple[Section, ...]] = {}
     for name in [*(n for n in raw if n in SECTIONS), *(n for n in SECTIONS if n not in raw)]:
-        own_axes, variants = _read_section(name, raw.get(name, {}), problems)
+        own_axes, variants = read_section(name, raw.get(name, {}), problems)
         axes += own_axes
         sections[name] = variants
     cases = prod(map(len, axes))
-    if not problems.errors and cases > _MOST_CASES:
+    if not problems.errors and cases > MOST_CASES:
         sweeps = " × ".join(f"{len(axis)} {axis.name}" for axis in axes)
-        problems.error("study", None, f"has {cases} cases ({sweeps}): at most {_MOST_CASES}; make several of it")
-    if not problems.errors:
-        check_regions(sections, tuple(axes), problems)
-    if not problems.errors:
-        sections["material"] = sections["material"] or (material_without_section(sections["body"]),)
-        sections["load"] = sections["load"] or (Load(),)
-        check_sense(sections, tuple(axes), problems)
-    if not problems.errors:
-        check_loads(sections, tuple(axes), problems)
+        problems.error("study", None, f"has {cases} cases ({sweeps}): at most {MOST_CASES}; make several of it")
+    if all(problem.key != "study" for problem in problems.errors):
+        _check_together(sections, tuple(axes), problems)
     if problems.errors:
-        raise StudyError(file, problems.errors)
-    warnings = tuple(f"{file}: {warning}" for warning in problems.warnings)
+        raise StudyError(file, problems.named(problems.errors))
+    warnings = tuple(f"{file}: {warning}" for warning in problems.told_once())
     title = str(raw.get("title", Path(file).stem))
     return Study(file, Path(file).stem, title, text, tuple(axes), sections, warnings)
 
 
-def written(place: Place) -> str:
-    """Write a place as messages do: ``layers[2].young``."""
-    return "".join(f"[{step + 1}]" if isinstance(step, int) else f".{step}" for step in place).removeprefix(".")
+def _check_together(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
+    """Check what must fit together.
+
+    A section that holds an error is left out, so that those of the others are told at once. Only now does a section
+    that the file leaves out get what stands for it.
+    """
+    check_regions(problems.sound(sections), axes, problems)
+    if not problems.errors:
+        sections["material"] = sections["material"] or (material_without_section(sections["body"]),)
+    sections["load"] = sections["load"] or (Load(),)
+    check_sense(problems.sound(sections), axes, problems)
+    check_loads(problems.sound(sections), axes, problems)
+
+
+def _names_of(raw: dict[str, Any]) -> dict[str, tuple[str, ...]]:
+    """Return the names of the tables of each section that is an array of them, "" where one has none."""
+    return {
+        section: tuple(str(table.get("name", "")) if isinstance(table, dict) else "" for table in tables)
+        for section, tables in raw.items()
+        if section in SECTIONS and isinstance(tables, list)
+    }
 
 
 def _beside(raw: dict[str, Any], folder: Path, *, trusted: bool) -> dict[str, Any]:
@@ -102,7 +119,7 @@ def _beside(raw: dict[str, Any], folder: Path, *, trusted: bool) -> dict[str, An
 def _check_top(raw: dict[str, Any], problems: Problems) -> None:
     for key, value in raw.items():
         if key not in (*SECTIONS, "title"):
-            problems.error(key, None, f"unknown section; {nearest(key, [*SECTIONS, 'title'])}")
+            problems.error(key, None, f"unknown section; {_meant(key)}")
         elif key == "title" and not isinstance(value, str):
             problems.error(key, value, "must be text")
         elif key == "title":
@@ -121,287 +138,9 @@ def _check_top(raw: dict[str, Any], problems: Problems) -> None:
                     problems.error(f"mesh.{key}", None, "is required, unless an accuracy is asked for")
 
 
-def _read_section(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], tuple[Section, ...]]:
-    """Return the axes of a section and every combination of their values."""
-    if name == "probe":
-        raw, way = _walked(raw, problems)
-        axes, variants = _read_tables(name, raw, problems)
-        return (_axes_of(way, axes) if way else axes), variants
-    return _read_tables(name, raw, problems)
-
-
-def _walked(raw: Any, problems: Problems) -> tuple[Any, Way | None]:
-    """Return the probe's tables with the places of their path in its stead, and that path, if there is one."""
-    tables = raw if isinstance(raw, list) else [raw]
-    having = [table for table in tables if isinstance(table, dict) and "path" in table]
-    if not having:
-        return raw, None
-    where = "probe.path" if isinstance(raw, dict) else "probe[1].path"
-    if any("at" in table for table in having):
-        problems.error(where, None, "stands beside `at`: give one of both")
-    if len(having) < len(tables) or any(table["path"] != having[0]["path"] for table in having):
-        problems.error("probe.path", None, "must be the same in all [[probe]] tables: it is one sweep of all of them")
-    way = read_path(having[0]["path"], where, problems)
-
-    def walked(table: Any) -> Any:
-        if not isinstance(table, dict):
-            return table
-        # The sweep's place among the others is the path's.
-        return {("at" if k == "path" else k): (way.texts if k == "path" and way else v) for k, v in table.items()
-                if k != "at" and (k != "path" or way)}  # fmt: skip
-
-    return ([walked(table) for table in raw] if isinstance(raw, list) else walked(raw)), way
-
-
-def _axes_of(way: Way, axes: list[Axis]) -> list[Axis]:
-    """Return the axes with those of a path for that of its places."""
-    own = [Axis("probe", name, labels, "m", off=way.off) for name, labels in way.axes]
-    return [new for axis in axes for new in (own if axis.key == "at" else [axis])]
-
-
-def _read_tables(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], tuple[Section, ...]]:
-    """Return the axes of a section as it is written, and every combination of their values."""
-    if isinstance(raw, list) and name not in SINGLE:
-        return _read_array(name, raw, problems)
-    if not isinstance(raw, dict):
-        problems.error(name, raw, f"must be a table: write [{name}]")
-        return [], ()
-    model = _model(name, raw, problems)
-    if model is None or (not raw and name not in SINGLE):
-        return [], ()
-    swept = {} if name in SINGLE else dict(_sweeps(model, raw))
-    for place, values in swept.items():
-        if not values:
-            problems.error(f"{name}.{written(place)}", values, "an empty list sweeps nothing; give at least one value")
-        elif len(values) > _MOST_VALUES and place != ("at",):  # places are those of a path, which has its own limit
-            problems.error(f"{name}.{written(place)}", None, f"has {len(values)} values: at most {_MOST_VALUES}")
-    if not all(0 < len(values) <= _MOST_VALUES or place == ("at",) for place, values in swept.items()):
-        return [], ()
-    if prod(map(len, swept.values())) > _MOST_CASES:
-        problems.error(name, None, f"sweeps more than {_MOST_CASES} combinations")
-        return [], ()
-    singles = _validate_each(name, model, raw, swept, problems)
-    if singles is None:
-        return [], ()
-    axes = [
-        _axis(name, place, values, parsed, problems)
-        for (place, values), parsed in zip(swept.items(), singles, strict=True)
-    ]
-    combinations = itertools.product(*swept.values())
-    variants = [_validate(model, _placed(raw, zip(swept, values, strict=True))) for values in combinations]
-    return axes, tuple(variants)
-
-
-def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[Axis], tuple[Section, ...]]:
-    """Read ``[[name]]`` tables: a sweep over the section as a whole, labelled by the tables' names.
-
-    A list that all of them have of a key sweeps it in each of them.
-    """
-    variants: list[list[Section]] = []
-    shared = _shared_sweeps(name, tables)
-    if not _is_sane(name, tables, shared, problems):
-        return [], ()
-    for position, table in enumerate(tables, start=1):
-        where = f"{name}[{position}]"
-        if not isinstance(table, dict):
-            problems.error(where, table, f"must be a table: write [[{name}]]")
-            continue
-        _check_name(f"{where}.name", table.get("name"), problems)
-        model = _model(name, table, problems, where)
-        if model is None:
-            continue
-        for place, value in _sweeps(model, table):
-            if place not in shared:
-                problems.error(
-                    f"{where}.{written(place)}", value, "a list inside an array of tables: write one table for each "
-                    "value, or the same list in all tables",
-                )  # fmt: skip
-        try:
-            combinations = itertools.product(*shared.values())
-            placed = [_placed(table, zip(shared, values, strict=True)) for values in combinations]
-            variants.append([_validate(model, variant) for variant in placed])
-        except ValidationError as error:
-            problems.from_pydantic(where, error, model, table)
-    if len(variants) < len(tables):
-        return [], ()  # what is wrong with the others is reported
-    names = [first.name for first, *_ in variants]
-    for label in sorted(name for name, count in Counter(names).items() if count > 1 and name):
-        problems.error(
-            f"{name}.name", label, "is the name of more than one table; names label the sweep and must differ"
-        )
-    axes = [Axis(name, "", tuple(names), "")]
-    if variants and shared:
-        # What each of their values is does not depend on the table: the first one tells.
-        kind, table = type(variants[0][0]), _placed(tables[0], ((place, given[0]) for place, given in shared.items()))
-        for place, values in shared.items():
-            parsed = [_validate(kind, _placed(table, [(place, value)])) for value in values]
-            axes.append(_axis(name, place, values, parsed, problems))
-    return axes, tuple(itertools.chain.from_iterable(variants))
-
-
-def _check_name(key: str, name: Any, problems: Problems) -> None:
-    if not isinstance(name, str) or not name:
-        problems.error(key, name, "is required in an array of tables: it labels the sweep")
-    else:
-        check_text(key, name, problems)
-
-
-def _is_sane(name: str, tables: list[Any], shared: dict[Place, list[Any]], problems: Problems) -> bool:
-    """Tell whether there are tables, and no more of them and their sweeps than can be gone through."""
-    if not tables:
-        problems.error(name, tables, f"an empty list sweeps nothing; write [[{name}]] for each value")
-    elif len(tables) > _MOST_VALUES:
-        problems.error(name, None, f"has {len(tables)} tables: at most {_MOST_VALUES}")
-    elif len(tables) * prod(map(len, shared.values())) > _MOST_CASES:
-        problems.error(name, None, f"sweeps more than {_MOST_CASES} combinations")
-    else:
-        return True
-    return False
-
-
-def _shared_sweeps(name: str, tables: list[Any]) -> dict[Place, list[Any]]:
-    """Return the lists of values that all of an array's tables have of a key of their own, alike."""
-    found: list[dict[Place, list[Any]]] = []
-    for table in tables:
-        model = SECTIONS[name]
-        if isinstance(table, dict) and isinstance(model, Mapping):
-            model = model.get(str(table.get("shape")), model)
-        if isinstance(model, Mapping) or not isinstance(table, dict):
-            return {}
-        found.append(dict(_sweeps(model, table)))
-    first, *others = found or [{}]
-    return {
-        place: values
-        for place, values in first.items()
-        if len(place) == 1 and values and all(other.get(place) == values for other in others)
-    }
-
-
-def _model(name: str, raw: dict[str, Any], problems: Problems, where: str = "") -> type[Section] | None:
-    """Return the model of a section, chosen by its shape where it has one."""
-    where = where or name
-    model = SECTIONS[name]
-    if not isinstance(model, Mapping):
-        return model
-    shape = raw.get("shape")
-    if isinstance(shape, str) and shape in model:
-        for key in NESTED.get(name, {}):
-            if key in raw and key not in model[shape].model_fields:
-                having = " and ".join(other for other, kind in model.items() if key in kind.model_fields)
-                problems.error(f"{where}.{key}", None, f"a {shape} has no {key}: {having} have")
-                return None
-        return model[shape]
-    supported = ", ".join(model)
-    if shape is None:
-        if raw:
-            problems.error(f"{where}.shape", None, f"is required; supported are {supported}")
-    elif isinstance(shape, list):
-        problems.error(f"{where}.shape", shape, f"shapes are swept with an array of tables: write [[{name}]] for each")
-    elif shape in LATER[name]:
-        problems.error(f"{where}.shape", shape, f"not supported; supported are {supported}")
-    else:
-        problems.error(f"{where}.shape", shape, f"unknown shape; {nearest(str(shape), model)}")
-    return None
-
-
-def _sweeps(model: type[BaseModel], raw: dict[str, Any], where: Place = ()) -> Iterator[tuple[Place, list[Any]]]:
-    """Yield place and values of every sweep of a section, those of the pieces in its own arrays of tables, too."""
-    for key, value in raw.items():
-        inner = nested_model(model, key)
-        if inner is not None:
-            for number, table in enumerate(value if isinstance(value, list) else ()):
-                if isinstance(table, dict):
-                    yield from _sweeps(inner, table, (*where, key, number))
-        elif _is_sweep(model, key, value):
-            yield (*where, key), value
-
-
-def _placed(raw: Any, values: Iterable[tuple[Place, Any]]) -> Any:
-    """Return ``raw`` with each value put where it belongs."""
-    for (key, *rest), value in values:
-        inner = _placed(raw[key], [(tuple(rest), value)]) if rest else value
-        raw = raw.copy()
-        raw[key] = inner
-    return raw
-
-
-def _is_sweep(model: type[BaseModel], key: str, value: Any) -> bool:
-    """Tell a list of values from a list that is one value (a point, a size)."""
-    if not isinstance(value, list):
-        return False
-    info = model.model_fields.get(key)
-    kinds = () if info is None else (info.annotation, *getattr(info.annotation, "__args__", ()))
-    if any(getattr(kind, "__origin__", None) is tuple for kind in kinds):
-        return bool(value) and isinstance(value[0], list)
-    return info is not None and key not in ("name", "shape")
-
-
-def _validate_each(
-    name: str, model: type[Section], raw: dict[str, Any], swept: dict[Place, list[Any]], problems: Problems
-) -> list[list[Section]] | None:
-    """Validate each value of each sweep once, so that an error is reported once however many cases it meets."""
-    before = len(problems.errors)
-    first = _placed(raw, ((place, values[0]) for place, values in swept.items()))
-    singles: list[list[Section]] = []
-    for place, values in swept.items() or {(): [None]}.items():
-        singles.append([])
-        for value in values:
-            candidate = _placed(first, [(place, value)]) if place else first
-            try:
-                singles[-1].append(_validate(model, candidate))
-            except ValidationError as error:
-                problems.from_pydantic(name, error, model, candidate)
-    if len(problems.errors) > before:
-        return None
-    return singles if swept else []
-
-
-def _validate(model: type[Section], raw: dict[str, Any]) -> Section:
-    return model.model_validate({key: _tuples(value) for key, value in raw.items()})
-
-
-def _tuples(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _tuples(v) for key, v in value.items()}
-    return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
-
-
-def _axis(section: str, place: Place, raw: list[Any], parsed: list[Section], problems: Problems) -> Axis:
-    *outer, key = place
-    owners = [_at(item, outer) for item in parsed]
-    values = [getattr(owner, str(key)) for owner in owners]
-    extra: Any = type(owners[0]).model_fields[str(key)].json_schema_extra or {}
-    unit = extra.get("unit", "") or _unit_of(type(owners[0]), str(key))
-    if isinstance(values[0], tuple):
-        labels = [" ".join(str(part) for part in value) for value in raw]
-    elif any(isinstance(value, dict) for value in raw):
-        labels = [_labelled(value) if isinstance(value, dict) else value for value in raw]
-    else:
-        labels = values
-    for label, count in Counter(labels).items():
-        if count > 1:
-            problems.error(f"{section}.{written(place)}", raw[labels.index(label)], "stands more than once in the list")
-    if unit == "" and all(isinstance(label, float | int) for label in labels):
-        unit = "1"
-    if not outer:
-        return Axis(section, str(key), tuple(labels), unit)
-    return Axis(section, str(key), tuple(labels), unit, written(tuple(outer)), owners[0].name)
-
-
-def _labelled(table: dict[str, Any]) -> str:
-    """Write a table as a label: its keys and values, lists as their parts."""
-    return " ".join(f"{k} {' '.join(map(str, v)) if isinstance(v, list) else v}" for k, v in table.items())
-
-
-def _at(section: Any, place: list[str | int]) -> Any:
-    """Return what stands at a place within a section."""
-    for step in place:
-        section = section[step] if isinstance(step, int) else getattr(section, step)
-    return section
-
-
-def _unit_of(model: type[BaseModel], key: str) -> str:
-    """Return the unit of a number that may be left out."""
-    parts = getattr(model.model_fields[key].annotation, "__args__", ())
-    extras = [getattr(m, "json_schema_extra", None) for part in parts for m in getattr(part, "__metadata__", ())]
-    return next((str(extra["unit"]) for extra in extras if isinstance(extra, dict) and "unit" in extra), "")
+def _meant(key: str) -> str:
+    """Return what may have been meant by an unknown section: one of them, or the piece of one."""
+    pieces = {piece: section for section, inner in NESTED.items() for piece in inner}
+    if close := difflib.get_close_matches(key, pieces, n=1, cutoff=0.6):
+        return f"pieces of a section stand in it: write [[{pieces[close[0]]}.{close[0]}]]"
+    return nearest(key, [*SECTIONS, "title"])

@@ -2,55 +2,138 @@
 
 import difflib
 import json
+import re
 import unicodedata
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
+
+from pipeline.shapes.section import Section
+from pipeline.study.howto import page_of
 
 # Letters of a value, or of a key, that a message repeats.
 _QUOTED = 200
 # Problems of one table beyond these are counted only.
 _MOST_ERRORS = 50
+# Values of a sweep beyond these are not listed in a warning.
+_MOST_VALUES = 4
+# A number and its unit: warnings that differ in nothing else are one.
+_NUMBER = re.compile(r"-?\d+(\.\d+)?(e[+-]?\d+)?\s?(%|mm\b)?")
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing wrong (or, as a warning, doubtful) in a study file."""
+    """One thing wrong (or, as a warning, doubtful) in a study file.
+
+    ``tables`` are those of arrays that it is about, by section and name: none where it is about all of them.
+    """
 
     key: str
     found: Any
     allowed: str
+    tables: tuple[tuple[str, str], ...] = ()
 
     def __str__(self) -> str:
         found = "" if self.found is None else f" = {shortened(_toml(self.found))}"
-        return visible(f"{shortened(self.key)}{found}: {self.allowed}")
+        names = ", ".join(f'{section} "{name}"' for section, name in self.tables)
+        return visible(f"{shortened(self.key)}{found}: {self.allowed}{f' ({shortened(names)})' if names else ''}")
+
+    @property
+    def value(self) -> Any:
+        """What was found, as plain data."""
+        return json.loads(self.found) if isinstance(self.found, _Raw) else self.found
+
+    @property
+    def howto(self) -> str:
+        """The page of the documentation that tells how it is done; "" where none does."""
+        return page_of(self.key)
 
 
 class StudyError(Exception):
-    """A study file that cannot be run, with every problem found in it."""
+    """A study file that cannot be run, with every problem found in it; the last line names what tells how to."""
 
     def __init__(self, file: str, problems: Iterable[Problem]):
         self.file = file
         self.problems = tuple(dict.fromkeys(problems))
-        super().__init__("\n".join(f"{file}: {problem}" for problem in self.problems))
+        lines = [f"{file}: {problem}" for problem in self.problems]
+        if pages := dict.fromkeys(problem.howto for problem in self.problems if problem.howto):
+            lines.append(f"{file}: how to: {', '.join(pages)}")
+        super().__init__("\n".join(lines))
 
 
 @dataclass
 class Problems:
-    """A growing list of errors and warnings; the same one twice counts once."""
+    """A growing list of errors and warnings; the same one twice counts once.
+
+    ``tables`` holds the names of the tables of each section that is an array of them.
+    """
 
     errors: list[Problem] = field(default_factory=list)
     warnings: list[Problem] = field(default_factory=list)
+    tables: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    _about: dict[str, str] = field(default_factory=dict)
+    _places: dict[tuple[bool, str, Any, str], int] = field(default_factory=dict)
+
+    @contextmanager
+    def about(self, **sections: Section) -> Iterator[None]:
+        """Name, in all that is reported within, the tables of arrays that ``sections`` are."""
+        before = self._about
+        named = {kind: one.name for kind, one in sections.items() if one.name in self.tables.get(kind, ())}
+        self._about = before | named
+        try:
+            yield
+        finally:
+            self._about = before
 
     def error(self, key: str, found: Any, allowed: str) -> None:
         """Add an error."""
-        self._add(self.errors, Problem(key, _hashable(found), allowed))
+        self._add(self.errors, self._problem(key, found, allowed))
 
     def warn(self, key: str, found: Any, allowed: str) -> None:
         """Add a warning."""
-        self._add(self.warnings, Problem(key, _hashable(found), allowed))
+        self._add(self.warnings, self._problem(key, found, allowed))
+
+    def told_once(self) -> Iterator[str]:
+        """Yield the warnings; of those of a sweep, which differ in numbers only, the first one for all."""
+        groups: dict[tuple[str, str, tuple[tuple[str, str], ...]], list[Problem]] = {}
+        for problem in self.named(self.warnings):
+            groups.setdefault((problem.key, _NUMBER.sub("#", problem.allowed), problem.tables), []).append(problem)
+        for first, *others in groups.values():
+            values = [shortened(_toml(other.found)) for other in others if other.found != first.found]
+            listed = ", ".join(dict.fromkeys(values)) if len(values) <= _MOST_VALUES else (
+                f"{len(values)} more values up to {values[-1]}"
+            )  # fmt: skip
+            yield f"{first}; so for {visible(listed)}" if listed else str(first)
+
+    def named(self, problems: Iterable[Problem]) -> list[Problem]:
+        """Return ``problems`` without the names of tables where they are about all of an array."""
+        found = []
+        for problem in problems:
+            sections = [section for section, _ in problem.tables]
+            some = {section for section in sections if sections.count(section) < len(self.tables[section])}
+            found.append(replace(problem, tables=tuple(pair for pair in problem.tables if pair[0] in some)))
+        return found
+
+    def sound(self, sections: dict[str, tuple[Section, ...]]) -> dict[str, tuple[Section, ...]]:
+        """Return ``sections`` without those that hold an error: what goes with them cannot be told yet.
+
+        Of an array of tables, the others are left.
+        """
+        found = dict(sections)
+        for section, number in {_section_of(error.key) for error in self.errors}:
+            names = self.tables.get(section, ())
+            bad = names[number - 1] if 0 < number <= len(names) else None
+            found[section] = tuple(one for one in found.get(section, ()) if bad is not None and one.name != bad)
+        return {name: found[name] for name in sections}
+
+    def _problem(self, key: str, found: Any, allowed: str) -> Problem:
+        section, dot, rest = key.partition(".")
+        if dot and section in self._about:
+            key = f"{section}[{self.tables[section].index(self._about[section]) + 1}].{rest}"
+        return Problem(key, _hashable(found), allowed, tuple(self._about.items()))
 
     def from_pydantic(self, prefix: str, error: ValidationError, model: type[BaseModel], raw: dict[str, Any]) -> None:
         """Translate pydantic's errors of the section ``prefix``, read from ``raw``, for the study's author."""
@@ -73,10 +156,15 @@ class Problems:
         else:
             self.error(f"{where}.{key}".rstrip("."), found, _allowed({**item, "loc": place}, model))
 
-    @staticmethod
-    def _add(problems: list[Problem], problem: Problem) -> None:
-        if problem not in problems:
+    def _add(self, problems: list[Problem], problem: Problem) -> None:
+        """Add a problem; if it is there already, of other tables, it is of these, too."""
+        same = (problems is self.errors, problem.key, problem.found, problem.allowed)
+        place = self._places.setdefault(same, len(problems))
+        if place == len(problems):
             problems.append(problem)
+        else:
+            tables = dict.fromkeys((*problems[place].tables, *problem.tables))
+            problems[place] = replace(problems[place], tables=tuple(tables))
 
 
 def nested_model(model: type[BaseModel], key: str) -> type[BaseModel] | None:
@@ -124,6 +212,12 @@ def _values(annotation: Any) -> str:
     parts = (annotation, *getattr(annotation, "__args__", ()))
     items = next((part.__args__ for part in parts if getattr(part, "__origin__", None) is tuple), ())
     return "2 or 3" if ... in items else str(len(items))
+
+
+def _section_of(key: str) -> tuple[str, int]:
+    """Return the section that a key stands in, and the number of the table if that is an array of them, else 0."""
+    match = re.match(r"\[*(\w+)(?:\[(\d+)\])?", key)
+    return (match[1], int(match[2] or 0)) if match else ("", 0)
 
 
 class _Raw(str):

@@ -1,12 +1,14 @@
 """Layers and inclusions of a study: do they fit into the body, and is what they are made of all that it needs?"""
 
 import itertools
+import re
 from collections.abc import Iterator, Sequence
 from typing import cast
 
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.regions import Inclusion
 from pipeline.shapes.section import Section, in_mm
+from pipeline.study.howto import page_of
 from pipeline.study.problems import Problems
 from pipeline.study.schema import Material, material_of
 from pipeline.study.sweep import Axis
@@ -15,24 +17,31 @@ from pipeline.study.sweep import Axis
 GAP = 0.1
 # Points on an inclusion, besides the ends of its axes, that are looked at.
 _POINTS = 2000
+# Names of tissues that lie on one another: two of them in a sweep were probably meant as layers.
+_LIE_ON_ONE_ANOTHER = {
+    "skin", "epidermis", "dermis", "subcutis", "hypodermis", "fat", "adipose", "fascia", "muscle", "bone", "capsule",
+    "mucosa", "serosa", "cortex", "medulla", "parenchyma",
+}  # fmt: skip
 # Layers that are thicker than the body by this share of it: the rest is rounding.
 _SAME = 1e-9
 
 
 def check_regions(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
     """Check layers and inclusions of every body, and whether there is a material for what they leave."""
-    bodies = cast(Sequence[Body], sections["body"])
+    bodies, before = cast(Sequence[Body], sections["body"]), len(problems.errors)
     for body in bodies:
-        _check_names(body, problems)
-        if isinstance(body, Layered):
-            _check_layers(body, problems)
-        for number, inclusion in enumerate(body.inclusion, start=1):
-            if (inclusion.radius is None) == (inclusion.axes is None):
-                problems.error(f"body.inclusion[{number}]", None, "needs a radius (a ball) or axes (an ellipsoid)")
-    if not problems.errors:
-        for body in bodies:
+        with problems.about(body=body):
+            _check_names(body, problems)
+            if isinstance(body, Layered):
+                _check_layers(body, problems)
+            for number, inclusion in enumerate(body.inclusion, start=1):
+                if (inclusion.radius is None) == (inclusion.axes is None):
+                    problems.error(f"body.inclusion[{number}]", None, "needs a radius (a ball) or axes (an ellipsoid)")
+    for body in bodies if len(problems.errors) == before else ():
+        with problems.about(body=body):
             _check_inclusions(body, problems)
     _check_axes(axes, problems)
+    _check_sweep(bodies, axes, problems)
     _check_material(bodies, cast(Sequence[Material], sections["material"]), axes, problems)
 
 
@@ -125,6 +134,19 @@ def _check_axes(axes: tuple[Axis, ...], problems: Problems) -> None:
             )
 
 
+def _check_sweep(bodies: Sequence[Body], axes: tuple[Axis, ...], problems: Problems) -> None:
+    """Warn of materials in an array of tables that were probably meant as layers of one body."""
+    for axis in (axis for axis in axes if axis.section == "material" and not axis.key):
+        names = [str(label) for label in axis.labels]
+        tissues = [name for name in names if set(re.split(r"\W+|_", name.lower())) & _LIE_ON_ONE_ANOTHER]
+        if len(tissues) > 1 and not any(body.regions for body in bodies):
+            problems.warn(
+                "[[material]]", None,
+                f"is a sweep: the whole body is made of {', then of '.join(names)}; layers of one body are "
+                f"[[body.layers]]: {page_of('body.layers')}",
+            )  # fmt: skip
+
+
 def _check_material(
     bodies: Sequence[Body], materials: Sequence[Material], axes: tuple[Axis, ...], problems: Problems
 ) -> None:
@@ -132,7 +154,7 @@ def _check_material(
     if not bodies:
         return
     if not all(body.is_filled for body in bodies):
-        if not materials and not any(p.key.startswith("material") for p in problems.errors):
+        if not materials and not any(p.key.lstrip("[").startswith("material") for p in problems.errors):
             problems.error("[material]", None, "this section is required: it is what no layer or inclusion is made of")
         return
     for axis in (axis for axis in axes if axis.section == "material"):

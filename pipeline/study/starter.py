@@ -28,6 +28,11 @@ def starter(name: str) -> str:
     return "\n".join(lines) + "\n"
 
 
+def is_name(name: str) -> bool:
+    """Tell whether a study may be called so: results are called after it."""
+    return name == name.strip() and name.replace("-", "").replace("_", "").replace(".", "").isalnum()
+
+
 def examples() -> dict[str, Path]:
     """Return the studies that come with the program, by name."""
     return {path.stem: path for path in sorted(EXAMPLES.glob("*.toml"))}

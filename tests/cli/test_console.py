@@ -3,6 +3,7 @@
 import json
 import os
 import pty
+import re
 import subprocess
 import sys
 from math import inf, nan
@@ -11,8 +12,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from pipeline import __version__
 from pipeline.cli import app
 from pipeline.cli.console import print_json
+from pipeline.report.figures.choose import KINDS
 from tests.commands import ENVIRONMENT, ROOT
 from tests.conftest import SMALL
 
@@ -51,6 +54,16 @@ def test_every_command_has_help_with_an_example(epsmesh, command):
     assert shown.exit_code == 0
     assert "Example: " in shown.stdout
     assert f"epsmesh {command}" in shown.stdout
+
+
+def test_version_and_short_help(epsmesh):
+    assert epsmesh("--version").stdout == f"epsmesh {__version__}\n"
+    assert epsmesh("plan", "-h").stdout == epsmesh("plan", "--help").stdout
+
+
+def test_help_of_plot_names_every_figure(epsmesh):
+    shown = set(re.findall(r"\w+", epsmesh("plot", "--help").stdout))
+    assert set(KINDS) - {"nothing"} <= shown
 
 
 def test_help_imports_neither_solvers_nor_what_is_slow():

@@ -41,9 +41,11 @@ def test_a_damaged_store_is_named_and_left_where_it_is(epsmesh, small, tmp_path,
     done = epsmesh(*(small if word == "FILE" else word for word in words), "--store", store)
     assert done.exit_code == 2
     assert f"the case store {store} is damaged" in done.stderr
-    assert f"`epsmesh store prune --store {store}` moves it aside" in done.stderr
+    assert f"`epsmesh store prune --store {store} --yes` moves it aside" in done.stderr
+    preview = epsmesh("store", "prune", "--store", store)
+    assert "is damaged as a whole" in preview.stdout
     assert contents(tmp_path) == before
-    mended = epsmesh("store", "prune", "--store", store)
+    mended = epsmesh("store", "prune", "--store", store, "--yes")
     assert mended.exit_code == 0
     assert "it was moved to" in mended.stderr
     assert epsmesh(*(small if word == "FILE" else word for word in words), "--store", store).exit_code == 0
@@ -62,9 +64,11 @@ def test_an_unreadable_record_is_told_with_what_removes_it(epsmesh, small, tmp_p
     done = epsmesh(command, small, "--store", store)
     assert (done.exit_code, done.exception is None or isinstance(done.exception, SystemExit)) == (2, True)
     assert f"record {plan.keys[0]} cannot be read" in done.stderr
-    assert f"`epsmesh store prune --store {store}` removes it" in done.stderr
+    assert f"`epsmesh store prune --store {store} --yes` removes it" in done.stderr
+    preview = json.loads(epsmesh("store", "prune", "--store", store, "--json").stdout)
+    assert (preview["remove"], preview["reasons"], preview["done"]) == (1, {"cannot be read": 1}, False)
     assert contents(tmp_path) == before
-    assert epsmesh("store", "prune", "--store", store).exit_code == 0
+    assert epsmesh("store", "prune", "--store", store, "--yes").exit_code == 0
     assert epsmesh(command, small, "--store", store).exit_code == 0
 
 

@@ -178,10 +178,10 @@ def test_a_mistake_of_one_probe_hides_none_of_another():
     with pytest.raises(StudyError) as caught:
         parse(raw() | {"probe": probes})
     assert [problem.key for problem in caught.value.problems] == [
-        "probe.slice",
-        "probe.direction",
-        "probe.at",
-        "probe.at",
+        "probe[2].slice",
+        "probe[1].direction",
+        "probe[2].at",
+        "probe[3].at",
     ]
 
 

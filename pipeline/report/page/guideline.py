@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import xarray as xr
 
 from pipeline.report.guide import guide
-from pipeline.report.guide_text import answer
-from pipeline.report.guide_words import cells_of, heads, in_order, number, percent, time
+from pipeline.report.guide_settings import ERROR, OFF, RATIO, TIME, UNKNOWNS, USUAL, range_of, settings
+from pipeline.report.guide_text import answer, question
+from pipeline.report.guide_words import heads
 from pipeline.report.table import DatasetError
-from pipeline.report.verdict import Verdict
 
 # The accuracy that the report asks for; `epsmesh guide` answers for any.
 ACCURACY = "5 %"
@@ -16,7 +16,7 @@ ACCURACY = "5 %"
 
 @dataclass(frozen=True)
 class Section:
-    """The answer in lines, and a row for each mesh setting: heading to text."""
+    """What is asked and the answer, in lines, and a row for each mesh setting: heading to text."""
 
     lines: tuple[str, ...]
     rows: tuple[dict[str, str], ...]
@@ -28,16 +28,6 @@ def guide_section(dataset: xr.Dataset) -> Section | None:
         found = guide(dataset, ACCURACY)
     except DatasetError:
         return None
-    rows = [dict(zip(heads(found), cells_of(v), strict=True)) | _row(v, found.scenes) for v in in_order(found)]
-    return Section(tuple(answer(found)), tuple(rows))
-
-
-def _row(verdict: Verdict, scenes: int) -> dict[str, str]:
-    law, spread = verdict.correction, verdict.spread
-    if not verdict.is_judged:
-        return {"worst error": f"not judged: {verdict.missing} of {scenes} scenes not computed"}
-    return {
-        "worst error": percent(verdict.error), "unknowns": f"{verdict.dofs:,.0f}", "time": time(verdict.usual),
-        "F/F_max": f"{number(spread.least)} … {number(spread.most)}" if spread.most == spread.most else "",
-        "r": number(law.r), "F/r is off by": percent(law.error),
-    }  # fmt: skip
+    columns = [*heads(found), ERROR, UNKNOWNS, USUAL, TIME, range_of(found), RATIO, OFF]
+    rows = [{name: row.get(name, "") for name in columns} for row in settings(found)]
+    return Section((*question(found), *answer(found)), tuple(rows))

@@ -27,8 +27,12 @@ def struck(dataset: xr.Dataset) -> list[dict[str, Any]]:
 def origins(dataset: xr.Dataset) -> list[tuple[int, str, str]]:
     """Return how forces were obtained: number of cases, word, what it means."""
     names, counts = np.unique([name for name in dataset["origin"].values.ravel() if name], return_counts=True)
-    found = [(int(count), str(name), _ORIGINS.get(str(name), "")) for name, count in zip(names, counts, strict=True)]
+    found = [(int(count), str(name), _meaning(str(name))) for name, count in zip(names, counts, strict=True)]
     return sorted(found, reverse=True)
+
+
+def _meaning(origin: str) -> str:
+    return "; ".join(meaning for word in origin.split(", ") if (meaning := _ORIGINS.get(word, "")))
 
 
 def skipped(dataset: xr.Dataset) -> list[dict[str, Any]]:

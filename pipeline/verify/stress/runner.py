@@ -24,16 +24,28 @@ def run(comm: MPI.Comm, names: Collection[str] | None = None, *, quick: bool = F
     ``quick`` leaves one or a few cells of most rows.
 
     Raises:
-        ValueError: if a row of that name does not exist.
+        ValueError: as :func:`rows_of` does.
     """
     chosen = cells()
-    known = tuple(dict.fromkeys(cell.row for cell in chosen))
-    if unknown := set(names or ()) - set(known):
-        raise ValueError(f"no row {', '.join(sorted(unknown))}; there are: {'; '.join(known)}")
+    rows = rows_of(names, tuple(dict.fromkeys(cell.row for cell in chosen)))
     matrix = _Matrix(comm)
     for cell in chosen:
-        if (names is None or cell.row in names) and (cell.quick or not quick):
+        if cell.row in rows and (cell.quick or not quick):
             yield matrix.result(cell)
+
+
+def rows_of(names: Collection[str] | None, known: Collection[str]) -> set[str]:
+    """Return the ``known`` rows that are meant by ``names``: the row of that name, or all whose name holds it.
+
+    Raises:
+        ValueError: if there is none of a name.
+    """
+    found: dict[str, set[str]] = {}
+    for name in names or known:
+        found[name] = {name} if name in known else {row for row in known if name.lower() in row.lower()}
+    if unknown := sorted(name for name, rows in found.items() if not rows):
+        raise ValueError(f"no row {', '.join(unknown)}; there are: {'; '.join(known)}")
+    return set().union(*found.values())
 
 
 class _Matrix:

@@ -1,0 +1,54 @@
+"""The command that holds the results of two runs against each other."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pipeline.cli.console import print_json
+from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail
+from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output
+
+# What is compared, and what is refused.
+_HOWTO = "docs/howto/compare.md"
+
+Dataset = Annotated[Path, typer.Argument(help="A dataset (.nc), or a study file whose dataset exists.")]
+
+
+def compare(a: Dataset, b: Dataset, output: Output = DEFAULT_OUTPUT, as_json: Json = False) -> None:
+    """Say whether the forces of two datasets agree within their error bars, case by case, and which took longer.
+
+    Cases are matched by the values of the study's keys, and not by their names: other meshes, machines, or versions may
+    have computed them. Two studies of different scenes are not compared.
+
+    Exit status 1 if some do not agree, or if one cannot tell.
+
+    Example: epsmesh compare results/figure3.nc elsewhere/figure3.nc
+
+    Example: epsmesh compare studies/coarse.toml studies/fine.toml --json
+    """
+    from pipeline.report.compare import compare as hold
+    from pipeline.report.compare_text import text, to_dict
+    from pipeline.report.read import dataset_path, read
+    from pipeline.report.table import DatasetError
+    from pipeline.report.times import doubts
+
+    paths, datasets, faults = [], [], []
+    for file in (a, b):
+        try:
+            datasets.append(read(file, output))
+            paths.append(str(dataset_path(file, output)))
+        except DatasetError as wrong:
+            faults.append(Fault(str(wrong), file=str(file)))
+    if faults:
+        fail(*faults)
+    try:
+        found = hold(*datasets)
+    except DatasetError as wrong:
+        fail(Fault(f"{a} and {b} cannot be compared: {wrong}", file=str(b), allowed=str(wrong), howto=_HOWTO))
+    names, doubtful = (paths[0], paths[1]), {x: doubts(data) for x, data in zip("AB", datasets, strict=True)}
+    if as_json:
+        print_json(to_dict(found, names, doubtful))
+    else:
+        print(text(found, names, doubtful))
+    raise typer.Exit(DONE if found.agrees else SOME_FAILED)

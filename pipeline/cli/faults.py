@@ -1,0 +1,86 @@
+"""How a command ends that cannot go on: told to people on standard error, and to scripts as JSON where they asked."""
+
+import os
+import time
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, NoReturn
+
+import typer
+
+from pipeline.cli.console import error, is_json_wanted, print_json
+from pipeline.study.problems import StudyError
+
+DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+_PATIENCE = 5.0  # seconds
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing that is wrong: ``message`` is what people read; the rest is None where it has no place.
+
+    ``key`` is that of a study file or an option, ``value`` what was found there, ``allowed`` what is; ``howto`` names
+    the page of the documentation that tells how it is done.
+    """
+
+    message: str
+    file: str | None = None
+    key: str | None = None
+    value: Any = None
+    allowed: str | None = None
+    howto: str | None = None
+
+
+def of_option(name: str, value: Any, allowed: str, howto: str | None = None) -> Fault:
+    """Return what is wrong with the ``value`` of an option, and what is allowed."""
+    return Fault(f"{name} {value}: {allowed}", key=name, value=str(value), allowed=allowed, howto=howto)
+
+
+def of_file(path: str | Path, why: str, howto: str | None = None) -> Fault:
+    """Return what is wrong with a file."""
+    return Fault(f"{path}: {why}", file=str(path), howto=howto)
+
+
+def of_study(wrong: StudyError, hint: str = "") -> list[Fault]:
+    """Return what is wrong with a study file, each problem by itself; ``hint`` goes with what people read."""
+    return [
+        Fault(f"{wrong.file}: {one}{hint}", wrong.file, one.key, one.value, one.allowed, one.howto or None)
+        for one in wrong.problems
+    ]
+
+
+def fail(*faults: Fault | str, status: int = BAD_INPUT) -> NoReturn:
+    """Exit, by default for bad input, with one voice if there are several ranks: the first one's, where it agrees.
+
+    Where JSON was asked for, standard output gets an object with the status and the errors.
+    """
+    if not is_first_rank():
+        # All ranks are ended as soon as one leaves with a bad status: the first one must have spoken by then. Who is
+        # still here after that is alone in what it found.
+        time.sleep(_PATIENCE)
+    found = [fault if isinstance(fault, Fault) else Fault(fault) for fault in faults]
+    tell(found)
+    if is_json_wanted():
+        print_json(as_data(found, status))
+    raise typer.Exit(status)
+
+
+def tell(faults: Iterable[Fault]) -> None:
+    """Print faults for people, and the pages that tell how it is done."""
+    faults = list(faults)
+    for fault in faults:
+        error(fault.message)
+    if howto := dict.fromkeys(fault.howto for fault in faults if fault.howto):
+        error(f"how to: {', '.join(map(str, howto))}")
+
+
+def as_data(faults: Iterable[Fault], status: int) -> dict[str, Any]:
+    """Return faults as scripts get them."""
+    return {"status": status, "errors": [asdict(fault) for fault in faults]}
+
+
+def is_first_rank() -> bool:
+    """Tell, before MPI is started, whether this is the rank that speaks."""
+    ranks = (os.environ.get(name) for name in ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"))
+    return next((rank for rank in ranks if rank is not None), "0") == "0"

@@ -1,0 +1,55 @@
+"""The commands as a whole: where scripts asked for JSON, whatever ends one is told in JSON, too."""
+
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from pipeline.cli.console import JSON, has_printed_json, print_json
+from pipeline.cli.faults import INTERRUPTED, SOME_FAILED, Fault, as_data, is_first_rank
+
+
+class Commands(TyperGroup):
+    """A group of commands that knows before any of them begins whether its words ask for JSON."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the words of the command line."""
+        words = args[: args.index("--")] if "--" in args else args
+        JSON.set({"wanted": "--json" in words, "printed": False})
+        try:
+            return super().parse_args(ctx, args)
+        except Exception as wrong:
+            _tell(wrong)
+            raise
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command that was asked for; what it raises goes on from here."""
+        try:
+            return super().invoke(ctx)
+        except (Exception, KeyboardInterrupt) as wrong:
+            _tell(wrong)
+            raise
+
+
+def _tell(wrong: BaseException) -> None:
+    """Print what ended a command as JSON, if that was asked for and the command itself has not printed any."""
+    # An exit tells its reason before; help is no error.
+    if isinstance(wrong, typer.Exit) or has_printed_json() or not is_first_rank():
+        return
+    usage = getattr(wrong, "format_message", None)  # of words that make no command, in every version of the library
+    if isinstance(wrong, KeyboardInterrupt):
+        found, status = Fault("interrupted"), INTERRUPTED
+    elif usage is not None:
+        found, status = _of_usage(wrong, usage()), int(getattr(wrong, "exit_code", 2))
+    else:
+        found, status = Fault(f"{type(wrong).__name__}: {wrong}"), SOME_FAILED
+    print_json(as_data([found], status))
+
+
+def _of_usage(wrong: Any, message: str) -> Fault:
+    """Return words that make no command as a fault."""
+    parameter = getattr(wrong, "param", None)
+    options = [word for word in getattr(parameter, "opts", ()) if word.startswith("--")]
+    argument = getattr(parameter, "metavar", None) or str(getattr(parameter, "name", None) or "").upper()
+    names = (*options, getattr(wrong, "option_name", None), argument)
+    return Fault(message, key=next((name for name in names if name), None))

@@ -1,0 +1,92 @@
+"""What a case is, as values of the study's keys: for telling which cases of two studies are the same."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from math import isfinite
+from typing import Any
+
+from pydantic import BaseModel
+
+from pipeline.study.sweep import Case
+
+# Values by key, as mesh.fine or body.layers[1].young. A key that a shape does not have is not there.
+Parameters = dict[str, Any]
+
+# Digits of a number that are told apart: "3 mm" and "0.3 cm" are one length.
+_DIGITS = 9
+# Where a file lies is not what is in it: bodies of files are compared by their heights, volume and extent.
+_FILE = "body.file"
+
+
+def parameters_of(case: Case) -> Parameters:
+    """Return the values of all keys of a case, in SI units.
+
+    Where all of the body is kept, it does not matter what would have become of the rest: ``mesh.outside`` is then
+    "coarse". Where it is not, ε is a key of the scene, ``kept.epsilon``.
+    """
+    parts = {"body": case.body, "material": case.material, "probe": case.probe, "mesh": case.mesh, "load": case.load}
+    found = {key: value for name, part in parts.items() for key, value in _flat(name, part)}
+    if _FILE in found:
+        found[_FILE] = (*_rounded(case.body.heights), *_rounded((case.body.volume, case.body.extent)))
+    if case.absence:
+        return found  # off the body there is no frame to tell what is kept
+    if case.is_truncated or case.is_closed:
+        found["kept.epsilon"] = found["mesh.epsilon"]
+    else:
+        found["mesh.outside"] = "coarse"
+    if case.is_full:
+        found["mesh.epsilon"] = "full"
+    return found
+
+
+def varied(ours: Sequence[Parameters], theirs: Sequence[Parameters]) -> list[str]:
+    """Return the keys that vary within one of two studies, or that only some of its cases have."""
+    return [key for key in _keys(ours, theirs) if any(len(_values(cases, key)) > 1 for cases in (ours, theirs))]
+
+
+def differing(
+    ours: Sequence[Parameters], theirs: Sequence[Parameters]
+) -> tuple[list[tuple[str, Any, Any]], list[tuple[str, Any, Any]]]:
+    """Return the keys that have one value in each of two studies, and not the same: of the scene, and the others."""
+    scene, settings = list[tuple[str, Any, Any]](), list[tuple[str, Any, Any]]()
+    for key in _keys(ours, theirs):
+        one, other = _values(ours, key), _values(theirs, key)
+        if len(one) == len(other) == 1 and one != other:
+            is_setting = key.startswith("mesh.") and key != "mesh.outside"
+            (settings if is_setting else scene).append((key, *one, *other))
+    return scene, settings
+
+
+def _keys(*studies: Iterable[Parameters]) -> list[str]:
+    return list(dict.fromkeys(key for cases in studies for parameters in cases for key in parameters))
+
+
+def _values(cases: Iterable[Parameters], key: str) -> set[Any]:
+    return {parameters.get(key) for parameters in cases}
+
+
+def _flat(where: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Yield key and value of all that a section holds, down to numbers, texts and lists of these; names are none."""
+    if isinstance(value, BaseModel):
+        for name in type(value).model_fields:
+            if name != "name":
+                yield from _flat(f"{where}.{name}", getattr(value, name))
+    elif isinstance(value, tuple | list) and any(isinstance(one, BaseModel) for one in value):
+        for number, one in enumerate(value, start=1):
+            yield from _flat(f"{where}[{number}]", one)
+    else:
+        yield where, _plain(value)
+
+
+def _plain(value: Any) -> Any:
+    """Return a value that can be compared: numbers to so many digits, lists as tuples."""
+    if isinstance(value, tuple | list):
+        return tuple(_plain(one) for one in value)
+    if isinstance(value, dict):
+        return tuple((key, _plain(one)) for key, one in sorted(value.items()))
+    if isinstance(value, float):
+        return _rounded((value,))[0]
+    return value
+
+
+def _rounded(values: Iterable[float]) -> tuple[Any, ...]:
+    return tuple(float(f"{value:.{_DIGITS}g}") if isfinite(value) else str(value) for value in values)

@@ -1,0 +1,174 @@
+"""`--json` on every command, whatever comes of it: standard output is JSON alone, and failures are objects."""
+
+import json
+import re
+
+import pytest
+
+from pipeline.cli import app, store
+from pipeline.report.dataset import write
+from pipeline.report.guide import guide
+from pipeline.report.guide_settings import settings
+from pipeline.report.guide_text import text
+from pipeline.report.page.guideline import ACCURACY, guide_section
+from pipeline.run.record import Record
+from pipeline.run.store import Store
+from pipeline.shapes.probes.blade import Blade
+from pipeline.verify.stress import cells
+from pipeline.verify.stress.runner import rows_of
+from tests.commands import ROOT
+from tests.report.chosen import dataset
+
+NAMES = sorted(
+    f"{group}{command.name or command.callback.__name__}"
+    for group, commands in (("", app), ("store ", store.app)) for command in commands.registered_commands
+)  # fmt: skip
+
+
+def failed(done, status=2):
+    """Return the errors of a command that failed, each with all its fields."""
+    assert done.exit_code == status, done.output
+    told = json.loads(done.stdout)
+    assert told["status"] == status
+    for error in told["errors"]:
+        assert set(error) == {"message", "file", "key", "value", "allowed", "howto"}
+    return told["errors"]
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """A folder with a small dataset, in which commands are called."""
+    monkeypatch.chdir(tmp_path)
+    write(dataset(), tmp_path / "known.nc")
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_command_takes_json_and_words_that_make_no_command_are_told_in_it(epsmesh, name):
+    assert "--json" in epsmesh(*name.split(), "--help").stdout
+    (error,) = failed(epsmesh(*name.split(), "--json", "--jsn"))
+    assert "--jsn" in error["message"]
+
+
+def test_unknown_commands_and_missing_words_are_told(epsmesh):
+    (error,) = failed(epsmesh("pln", "--json"))
+    assert "pln" in error["message"]
+    (error,) = failed(epsmesh("plan", "--json"))
+    assert error["key"] == "FILE"
+    (error,) = failed(epsmesh("verify", "--count", "many", "--json"))
+    assert error["key"] == "--count"
+
+
+@pytest.mark.parametrize("command", ["plan", "run", "status", "explain", "merge", "view", "export"])
+def test_a_bad_study_is_told_problem_by_problem(epsmesh, small, command):
+    small.write_text(small.read_text().replace('"2 mm"', "2").replace("0.4", "0.9"))
+    done = epsmesh(command, small, "--json")
+    errors = {error["key"]: error for error in failed(done)}
+    assert errors["material.poisson"]["value"] == 0.9
+    assert errors["material.poisson"]["allowed"] == "must be at most 0.5"
+    assert errors["probe.radius"]["howto"] == "docs/howto/own-study.md"
+    assert {error["file"] for error in errors.values()} == {str(small)}
+    assert "material.poisson = 0.9: must be at most 0.5" in done.stderr
+    (report,) = json.loads(epsmesh("validate", small, "--json").stdout)
+    assert report["errors"] == list(errors.values())
+
+
+@pytest.mark.parametrize(
+    ("words", "key"),
+    [
+        ("guide known.nc --json", "--accuracy"),
+        ("guide known.nc --accuracy 5 --json", "--accuracy"),
+        ("plot known.nc --kind pie --json", "--kind"),
+        ("report absent.nc --json", None),
+        ("new ../x --json", "NAME"),
+        ("new x --like nothing --json", "--like"),
+        ("explain SMALL colour=3 --json", "CASE"),
+        ("plan SMALL --without magic --json", "--without"),
+        ("run SMALL --shard 9/3 --json", "--shard"),
+        ("run SMALL --output known.nc --json", None),
+        ("store list --store absent --json", None),
+        ("store prune --store known.nc --json", "--store"),
+        ("stress Laplace --json", "ROW"),
+        ("verify --coverage --family none --json", "--family"),
+        ("touch known.nc --json", None),
+        ("export SMALL --accuracy 90% --json", "--accuracy"),
+    ],
+)
+def test_what_else_is_wrong_is_told(epsmesh, small, here, words, key):
+    done = epsmesh(*(small if word == "SMALL" else word for word in words.split()))
+    errors = failed(done)
+    assert [error["key"] for error in errors] == [key]
+    assert all(error["message"] in done.stderr for error in errors)
+    assert key is not None or all(error["file"] for error in errors)
+
+
+def test_an_exception_is_told_and_goes_on(epsmesh, small, monkeypatch):
+    monkeypatch.setattr("pipeline.cli.plan.make_plan", lambda *_, **__: 1 / 0)
+    done = epsmesh("plan", small, "--json")
+    assert failed(done, status=1)[0]["message"] == "ZeroDivisionError: division by zero"
+    assert isinstance(done.exception, ZeroDivisionError)
+
+
+def test_what_is_written_is_told(epsmesh, small, here):
+    assert json.loads(epsmesh("new", "mine", "--json").stdout) == {"file": "studies/mine.toml"}
+    assert json.loads(epsmesh("plot", "known.nc", "--kind", "accuracy", "--json").stdout)["files"] != []
+    page = json.loads(epsmesh("report", "known.nc", "--json").stdout)["page"]
+    assert (here / page).is_file()
+    seen = json.loads(epsmesh("view", small, "--mesh-only", "--export", "html", "--output", here, "--json").stdout)
+    assert seen["cells"] > 100
+    assert all((here / file).is_file() for file in seen["files"])
+
+
+def test_pruning_says_first_what_would_go(epsmesh, tmp_path):
+    path = tmp_path / "cases.sqlite"
+    opened = Store(path)
+    for number in range(5):
+        opened.put(Record(f"k{number}", "failed" if number < 2 else "ok", force=1.0))
+    opened.close()
+    before = path.read_bytes()
+    words = ("store", "prune", "--store", path, "--failed", "--json")
+    told = json.loads(epsmesh(*words).stdout)
+    assert (told["remove"], told["records"], told["reasons"], told["done"]) == (2, 5, {"failed": 2}, False)
+    assert 500 < told["bytes"] < 10_000
+    assert path.read_bytes() == before
+    assert json.loads(epsmesh(*words, "--yes").stdout)["done"]
+    assert json.loads(epsmesh("store", "verify", "--store", path, "--json").stdout)["sound"]
+    assert json.loads(epsmesh("store", "list", "--store", path, "--json").stdout)["records"] == 3
+    assert "none of 3 records would be removed" in epsmesh(*words[:-1]).stdout
+
+
+def test_report_and_guide_agree_on_every_number():
+    data = dataset()
+    found, section = guide(data, ACCURACY), guide_section(data)
+    known = settings(found)
+    assert list(section.rows) == [
+        {name: one.get(name, "") for name in row} for row, one in zip(section.rows, known, strict=True)
+    ]
+    words = text(found)
+    assert all(line in words for line in section.lines)
+    told = {tuple(re.split(r"\s{2,}", line.strip())[:6]) for line in words.splitlines()}
+    names = ("outside", "ε", "worst error", "usual", "time", "unknowns")
+    assert {tuple(row[name] for name in names) for row in section.rows} < told
+    # What takes longest in one scene is not what it usually takes: neither stands for the other.
+    slow = dataset(seconds=lambda case: 1 + 9 * (case.material.poisson > 0.35) * isinstance(case.probe, Blade))
+    assert all(row["time"] != row["usual"] for row in guide_section(slow).rows)
+
+
+def test_the_examples_of_stress_name_rows(epsmesh):
+    known = tuple(dict.fromkeys(cell.row for cell in cells()))
+    examples = re.findall(r"epsmesh stress (\w.*)", epsmesh("stress", "--help").stdout)
+    assert examples
+    for words in examples:
+        assert rows_of(words.split(), known) < set(known)
+    assert rows_of(["corners"], known) == {"corners"}
+    assert rows_of(None, known) == set(known)
+
+
+def test_the_how_to_of_a_refusal_is_a_page(epsmesh, small, here):
+    pages = set()
+    for words in ("guide known.nc", "plan SMALL --without x", "run SMALL --shard 9/3", "touch known.nc"):
+        done = epsmesh(*(small if word == "SMALL" else word for word in words.split()), "--json")
+        (error,) = failed(done)
+        assert f"how to: {error['howto']}" in done.stderr
+        pages.add(error["howto"])
+    assert all((ROOT / page).is_file() for page in pages)

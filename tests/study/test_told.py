@@ -1,0 +1,101 @@
+"""What a study's author is told: all errors at once, warnings once and with names, and where to read on."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from pipeline.study.howto import page_of, pages
+from pipeline.study.keys import all_sections, keys_of
+from pipeline.study.load import parse
+from pipeline.study.problems import StudyError
+from tests.cases import BLADE, raw, study
+
+
+def told(content):
+    with pytest.raises(StudyError) as caught:
+        parse(content, file="my.toml")
+    return caught.value
+
+
+def needles(**changes):
+    """Return three probes, of which the second one has the changes."""
+    return [{"name": name, **raw()["probe"], **(changes if name == "long" else {})} for name in ("thin", "long", "old")]
+
+
+def test_what_a_shape_lacks_hides_neither_unknown_keys_nor_wrong_values():
+    body = {"shape": "ellipsoid", "axes": ["9 mm"] * 3, "fixed": "top", "colour": 3, "layers": [{"name": "skin"}]}
+    content = raw() | {"body": body, "probe": {"shape": "disk", "deth": "1 mm"}}
+    assert {problem.key for problem in told(content).problems} == {
+        "body.layers", "body.fixed", "body.colour", "probe.shape", "probe.deth",
+    }  # fmt: skip
+
+
+def test_what_does_not_fit_together_is_told_beside_what_cannot_be_read():
+    content = raw(mesh={"fine": "9 mm"}, material={"poisson": 0.7}) | {
+        "probe": [*needles(), {"name": "bad", "shap": 1}]
+    }
+    content["probe"][1] |= {"contact": "frictionless", "motion": "all"}
+    content["load"] = {"traction": [{"on": "lid", "pressure": "1 kPa"}]}
+    assert {problem.key for problem in told(content).problems} == {
+        "mesh.fine", "material.poisson", "probe[4].shape", "probe[4].shap", "probe[2].motion", "load.traction[1].on",
+    }  # fmt: skip
+
+
+def test_errors_and_warnings_name_the_table():
+    error = str(told(raw() | {"probe": needles(at=["19 mm", "0 mm"])}))
+    assert re.search(r'my\.toml: probe\[2\]\.at = .*\(probe "long"\)', error)
+    (warning,) = parse(raw() | {"probe": needles(depth="1 mm")}).warnings
+    assert re.search(r'probe\[2\]\.depth = "1 mm": is 33% .*\(probe "long"\)$', warning)
+    (warning,) = parse(raw(mesh={"epsilon": ["4 mm", "full"]}) | {"probe": needles(radius="5 mm")}).warnings
+    assert re.search(r'mesh\.epsilon = "4 mm": is less than the probe\'s radius 5 mm.*\(probe "long"\)$', warning)
+
+
+def test_a_warning_of_all_tables_names_none_and_stands_once():
+    content = raw(mesh={"epsilon": ["2.9 mm", "full"]}) | {"probe": needles()}
+    (warning,) = parse(content).warnings
+    assert "probe's radius 3 mm" in warning
+    assert "(probe" not in warning
+
+
+def test_warnings_of_a_sweep_are_one():
+    depths = [f"0.{number} mm" for number in range(1, 10)]
+    (warning,) = study(probe={"depth": depths}).warnings
+    assert 'probe.depth = "0.4 mm": is 13% of' in warning
+    assert warning.endswith('; so for 5 more values up to "0.9 mm"')
+    (warning,) = study(probe={"depth": depths[2:5]}).warnings
+    assert warning.endswith('; so for "0.5 mm"')
+
+
+def test_materials_named_like_layers_are_said_to_be_a_sweep():
+    def materials(*names):
+        return raw() | {"material": [{"name": name, "young": "10 kPa", "poisson": 0.3} for name in names]}
+
+    (warning,) = parse(materials("skin", "fat")).warnings
+    assert "[[material]]: is a sweep: the whole body is made of skin, then of fat" in warning
+    assert "[[body.layers]]: docs/howto/layers.md" in warning
+    assert not parse(materials("liver", "muscle")).warnings
+    assert "write [[body.layers]]" in str(told(raw() | {"layers": [{"name": "skin"}]}))
+
+
+@pytest.mark.parametrize(
+    ("content", "page"),
+    [
+        (raw(body={"layers": 3}), "layers"),
+        (raw() | {"probe": BLADE | {"incision": "1 m"}}, "cut"),
+        (raw(load={"gravity": 1}), "loads"),
+        (raw(solve={"repeats": 2}), "timing"),
+        (raw(material={"colour": 1}), "own-study"),
+    ],
+)
+def test_a_refusal_names_the_how_to(content, page):
+    error = told(content)
+    assert str(error).splitlines()[-1].startswith("my.toml: how to: docs/")
+    assert f"docs/howto/{page}.md" in str(error)
+
+
+def test_pages_are_there_and_keys_are_those_of_studies():
+    assert [page for page in pages() if not Path(page).is_file()] == []
+    used = {page_of(f"{section}.{key.name}") for section in all_sections() for key in keys_of(section)}
+    assert used >= set(pages()) - {"docs/howto/timing.md"}
+    assert page_of("file") == ""
