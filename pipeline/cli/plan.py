@@ -1,6 +1,7 @@
 """The commands that tell what a run would do, before it is begun."""
 
 import re
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -8,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipeline.cli.console import print_json, warning
-from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail
+from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, is_first_rank
 from pipeline.cli.words import (
     DEFAULT_OUTPUT,
     File,
@@ -169,7 +170,7 @@ def _planned(
 
 
 def find_case(study: Study, text: str) -> Case:
-    """Return the case of a number, or of labels; fail with what there is to choose from."""
+    """Return the case of a number, or of labels, the first of several; fail with what there is to choose from."""
     cases = list(study.cases())
     if text.strip().isdecimal():
         number = int(text)
@@ -189,6 +190,9 @@ def find_case(study: Study, text: str) -> Case:
         choices = {axis.name: [axis.write(label) for label in axis.labels] for axis in study.axes}
         listed = "; ".join(f"{name} = {', '.join(choices[name])}" for name in wanted)
         fail(_of_case(text, f"there is none; there are {listed}"))
+    if len(found) > 1 and is_first_rank():
+        left = ", ".join(axis.name for axis in study.axes if axis.name not in wanted and len(axis) > 1)
+        print(f"{found[0]}: the first of {len(found)} such cases, which differ in {left}", file=sys.stderr)
     return found[0]
 
 

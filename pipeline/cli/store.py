@@ -156,7 +156,7 @@ def _read(path: Path) -> Iterator["Records"]:
 
 def _check(path: Path) -> None:
     if not path.exists():
-        fail(of_file(path, "there is no such store"))
+        fail(of_file(path, "there is no such store; `epsmesh run` makes one in its results"))
     check_store(path)
 
 

@@ -49,7 +49,7 @@ def touch(
             return
         text = render(surface, model.name)
     except (ModelError, OSError) as problem:
-        fail(of_file(model, str(problem), "docs/howto/touch.md"))
+        fail(of_file(model, getattr(problem, "strerror", None) or str(problem), "docs/howto/touch.md"))
     _serve(text, open_it=open_it, as_json=as_json)
 
 

@@ -73,7 +73,9 @@ def load_all(files: list[Path]) -> list[Study]:
 
 
 def meant(file: Path) -> str:
-    """Return ``; did you mean …?`` for a study file that is not there, if one like it is."""
+    """Return ``; did you mean …?`` for a study file that is not there, and of a folder what to give instead."""
+    if file.is_dir():
+        return f": give its files, such as {file / '*.toml'}"
     if file.exists():
         return ""
     known = {path.stem: path for path in (*file.parent.glob("*.toml"), *Path("studies").glob("*.toml"))}

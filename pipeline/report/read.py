@@ -26,6 +26,8 @@ def dataset_path(file: str | Path, output: str | Path = "results") -> Path:
         DatasetError: if there is none.
     """
     file = Path(file)
+    if file.suffix not in (".nc", ".toml"):
+        raise DatasetError(f"{file}: must be a dataset (.nc) or a study file (.toml)")
     path = file if file.suffix == ".nc" else Path(output) / f"{file.stem}.nc"
     if not path.is_file():
         study = file.with_suffix(".toml").name if file.suffix == ".nc" else file
