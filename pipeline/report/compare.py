@@ -60,6 +60,7 @@ class Pair:
 class Comparison:
     """What came of it: all pairs of cases that were compared, and those that were not, by reason.
 
+    ``again_a`` and ``again_b`` count cases that are others again, such as the full order for every outside.
     ``settings`` are the keys that are not of the scene and differ: key, value in A, value in B.
     """
 
@@ -67,6 +68,8 @@ class Comparison:
     cases: int
     only_a: tuple[str, ...]
     only_b: tuple[str, ...]
+    again_a: int
+    again_b: int
     not_compared: tuple[tuple[str, str], ...]
     settings: tuple[tuple[str, Any, Any], ...]
 
@@ -120,8 +123,12 @@ def compare(a: xr.Dataset, b: xr.Dataset) -> Comparison:
     if not found:
         reasons = "; ".join(dict.fromkeys(why for _, why in not_compared))
         raise DatasetError(f"none of the {len(common)} cases that they have in common can be compared: {reasons}")
-    only = [tuple(mine[v].words for v in mine if v not in rest) for mine, rest in ((left, right), (right, left))]
-    return Comparison(tuple(found), len(common), only[0], only[1], tuple(not_compared), tuple(settings))
+    return Comparison(
+        tuple(found), len(common),
+        tuple(case.words for values, case in left.items() if values not in right),
+        tuple(case.words for values, case in right.items() if values not in left),
+        len(ours) - len(left), len(theirs) - len(right), tuple(not_compared), tuple(settings),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,10 @@ def text(found: Comparison, names: tuple[str, str], doubts: dict[str, list[str]]
     lines = [f"{letter}: {name}" for letter, name in zip("AB", names, strict=True)]
     lines += [f"  {key} differs: {one} in A, {other} in B" for key, one, other in found.settings]
     lines.append(f"{found.cases} cases in both, {len(found.only_a)} in A only, {len(found.only_b)} in B only")
+    if found.again_a or found.again_b:
+        lines.append(
+            f"  {found.again_a} of A, {found.again_b} of B are others again: the full order is one, whatever is outside"
+        )
     lines += _listed([f"  not compared: {case}: {why}" for case, why in found.not_compared])
     if found.apart:
         lines += _apart(found)
@@ -45,7 +49,7 @@ def to_dict(found: Comparison, names: tuple[str, str], doubts: dict[str, list[st
     times = dict(zip(("median", "least", "most"), found.times, strict=True)) if found.times else None
     return {
         "a": names[0], "b": names[1], "agree": found.agrees, "verdict": verdict(found), "cases": found.cases,
-        "only_a": list(found.only_a), "only_b": list(found.only_b),
+        "only_a": list(found.only_a), "only_b": list(found.only_b), "again_a": found.again_a, "again_b": found.again_b,
         "not_compared": [{"case": case, "why": why} for case, why in found.not_compared],
         "settings": [{"key": key, "a": one, "b": other} for key, one, other in found.settings],
         "times": times, "doubts": doubts, "values": rows,

@@ -23,6 +23,7 @@ _PAGES = {
     "solve.timing": "howto/timing",
     "solve.repeats": "howto/timing",
     "plan": "skipping",
+    "figure": "report",
     "mesh.accuracy": "accuracy",
 }
 # What all keys are, with what each takes.

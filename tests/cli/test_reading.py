@@ -119,6 +119,13 @@ def test_explain_tells_what_the_plan_used(epsmesh, small):
         assert words in told["changes"]["young, depth"]
 
 
+def test_a_case_that_some_labels_name_is_said_to_be_the_first_of_several(epsmesh, small):
+    done = epsmesh("explain", small, "poisson=0.4")
+    assert done.stdout.startswith("poisson = 0.4, epsilon = 4 mm, outside = coarse")
+    assert "the first of 6 such cases, which differ in epsilon, outside" in done.stderr
+    assert epsmesh("explain", small, "poisson=0.4, epsilon=4 mm, outside=free").stderr == ""
+
+
 def test_a_force_on_record_that_is_no_number_is_computed_again(epsmesh, small, tmp_path):
     store, plan = tmp_path / "cases.sqlite", make_plan(load(small))
     fill(store, plan, at_4="ok", at_6="ok", at_inf="ok")

@@ -19,6 +19,7 @@ def other(old="", new="", **changes):
 def test_a_dataset_agrees_with_itself():
     found = compare(dataset(), dataset())
     assert (found.agrees, found.cases, found.only_a, found.only_b) == (True, 28, (), ())
+    assert (found.again_a, found.again_b) == (4, 4)
     assert {pair.difference for pair in found.pairs} == {0.0}
     assert found.times == (1.0, 1.0, 1.0)
 

@@ -210,6 +210,7 @@ def test_commands_take_a_study_file(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        (["report", "README.md"], "README.md: must be a dataset (.nc) or a study file (.toml)"),
         (["report", "none.nc"], "no such dataset; make it with `epsmesh run none.toml`"),
         (["report", "pyproject.toml", "--output", "/nowhere"], "no such dataset"),
         (["report", "{bad}"], "cannot be read as netCDF"),
