@@ -44,7 +44,9 @@ class Problem:
     @property
     def value(self) -> Any:
         """What was found, as plain data."""
-        return json.loads(self.found) if isinstance(self.found, _Raw) else self.found
+        if isinstance(self.found, _Raw):
+            return json.loads(self.found)
+        return str(self.found) if isinstance(self.found, str) else self.found
 
     @property
     def howto(self) -> str:
@@ -53,15 +55,12 @@ class Problem:
 
 
 class StudyError(Exception):
-    """A study file that cannot be run, with every problem found in it; the last line names what tells how to."""
+    """A study file that cannot be run, with every problem found in it."""
 
     def __init__(self, file: str, problems: Iterable[Problem]):
         self.file = file
         self.problems = tuple(dict.fromkeys(problems))
-        lines = [f"{file}: {problem}" for problem in self.problems]
-        if pages := dict.fromkeys(problem.howto for problem in self.problems if problem.howto):
-            lines.append(f"{file}: how to: {', '.join(pages)}")
-        super().__init__("\n".join(lines))
+        super().__init__("\n".join(f"{file}: {problem}" for problem in self.problems))
 
 
 @dataclass

@@ -69,6 +69,7 @@ def test_a_bad_study_is_told_problem_by_problem(epsmesh, small, command):
     assert errors["probe.radius"]["howto"] == "docs/howto/own-study.md"
     assert {error["file"] for error in errors.values()} == {str(small)}
     assert "material.poisson = 0.9: must be at most 0.5" in done.stderr
+    assert done.stderr.splitlines()[-1] == "how to: docs/howto/own-study.md"
     (report,) = json.loads(epsmesh("validate", small, "--json").stdout)
     assert report["errors"] == list(errors.values())
 
