@@ -5,6 +5,8 @@ SHELL := /bin/bash
 STUDY ?= studies/figure3.toml
 NP ?= 1
 PYTEST_ARGS ?=
+SUITE ?= trixie
+GOALS ?= setup
 PEERS_ARGS ?=
 FUZZ ?= 5000
 LOOP_ARGS ?=
@@ -29,7 +31,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's own mpirun: another one on PATH would not fit Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies docs test test-debian13 slurm-test verify benchmark peers plain-loop realtime resolution stress fuzz soak faults mutants lint format clean
+.PHONY: help setup study studies docs test test-debian13 debian release slurm-test verify benchmark peers plain-loop realtime resolution stress fuzz soak faults mutants lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -59,6 +61,13 @@ test: ## run the tests, by themselves and on 2 ranks
 
 test-debian13: ## run the tests on Debian 13, in a root of its own (needs root)
 	@scripts/test-debian13.sh
+
+debian: ## run other targets on another Debian, in a root of its own (needs root): make debian SUITE=sid GOALS=realtime
+	@DEBIAN_SUITE=$(SUITE) GOALS="$(GOALS)" scripts/test-debian13.sh
+
+release: ## build sdist and wheel into dist/, install both, and run a study from there
+	@scripts/setup.sh
+	@scripts/release.sh
 
 slurm-test: setup ## run the job scripts on a Slurm of two virtual nodes, installed and started here (needs root)
 	$(PYTHON) -m pytest -m slurm $(PYTEST_ARGS) </dev/null

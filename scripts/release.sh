@@ -1,0 +1,87 @@
+#!/bin/bash
+# Build sdist and wheel into dist/, install both into a fresh venv, and run a study from there, away from the checkout.
+# dolfinx, PETSc and gmsh are Debian's (scripts/setup.sh): the venv sees them, and pip leaves them alone.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+python=/usr/bin/python3
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+fail() { echo "release: $*" >&2; exit 1; }
+quiet=(--quiet --disable-pip-version-check --no-input)
+
+# Building leaves files beside the sources; and what is not theirs must not get in.
+mkdir "$work/source"
+tar -cf - --exclude-vcs --exclude='./.*' --exclude=./results --exclude=./dist --exclude='*.egg-info' \
+    --exclude=./realtime/libepsmesh.so --exclude=./realtime/latency --exclude=./meshes/cache --exclude=__pycache__ --exclude=./docs/_build --exclude=./docs/reference . |
+    tar -xf - -C "$work/source"
+
+# ---- build: the wheel is made from the sdist, and has what that has ------------------------------------
+"$python" -m venv "$work/build"
+"$work/build/bin/python" -m pip install "${quiet[@]}" build
+rm -rf dist
+"$work/build/bin/python" -m build --outdir dist "$work/source" >"$work/log" 2>&1 || { tail -n 30 "$work/log" >&2; fail "cannot be built"; }
+version=$(sed -nE 's/^__version__ = "(.*)"$/\1/p' pipeline/__init__.py)
+[[ -f dist/epsmesh-$version.tar.gz && -f dist/epsmesh-$version-py3-none-any.whl ]] || fail "dist/ has $(ls dist), not version $version"
+
+# Templates, C sources, studies to begin with: all that a package folder holds.
+"$python" - "$work/source" dist/*.whl dist/*.tar.gz <<'PYTHON'
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+source, wheel, sdist = Path(sys.argv[1]), *sys.argv[2:]
+held = set(zipfile.ZipFile(wheel).namelist())
+sent = {name.split("/", 1)[-1] for name in tarfile.open(sdist).getnames()}
+files = {path.relative_to(source) for path in source.rglob("*") if path.is_file()}
+examples = {Path("pipeline/study/examples") / path.name for path in files if path.parent == Path("studies")}
+package = {str(path) for path in files | examples if path.parts[0] == "pipeline"}
+if missing := sorted(package - held):
+    sys.exit(f"release: the wheel lacks {', '.join(missing)}")
+if missing := sorted({str(path) for path in files} - sent):
+    sys.exit(f"release: the sdist lacks {', '.join(missing)}")
+print(f"release: {len(held)} files in the wheel, {len(sent)} in the sdist")
+PYTHON
+
+# ---- install -------------------------------------------------------------------------------------------
+"$python" -m venv --system-site-packages "$work/venv"
+"$python" - >"$work/constraints" <<'PYTHON'
+from importlib.metadata import PackageNotFoundError, version
+
+for name in ("numpy", "scipy", "matplotlib", "netCDF4", "mpi4py", "petsc4py", "pandas"):
+    try:
+        print(f"{name}=={version(name)}")
+    except PackageNotFoundError:
+        pass
+PYTHON
+install=("$work/venv/bin/python" -m pip install "${quiet[@]}" -c "$work/constraints")
+export PIP_USER=0
+
+try() { # from the file $1: version, a new study, its run, its report
+    rm -rf "$work/away"
+    mkdir "$work/away"
+    (
+        cd "$work/away"
+        export EPSMESH_CACHE="$work/cache" OMP_NUM_THREADS=1
+        epsmesh=$work/venv/bin/epsmesh
+        [[ $("$epsmesh" --version) == "epsmesh $version" ]] || fail "$1: says $("$epsmesh" --version), not $version"
+        where=$("$work/venv/bin/python" -c 'import pipeline; print(pipeline.__file__)')
+        [[ $where == "$work/venv"/* ]] || fail "$1: is run from $where"
+        "$epsmesh" new mine --like quick >/dev/null
+        "$epsmesh" run studies/mine.toml --quiet
+        "$epsmesh" report studies/mine.toml >/dev/null
+        "$work/venv/bin/python" - <<'PYTHON'
+import pipeline
+
+dataset = pipeline.open("studies/mine.toml")
+assert (dataset["status"] == "ok").all() and (dataset["force_error"] < 0.1).all(), dataset
+assert "<svg" in open("results/mine.html", encoding="utf-8").read()
+print(f"release: {dataset['status'].size} cases, F = {float(dataset['force'].max()):.6g} N at most")
+PYTHON
+    )
+}
+"${install[@]}" dist/*.whl
+try wheel
+"${install[@]}" --force-reinstall --no-deps dist/*.tar.gz
+try sdist
+echo "release: dist/epsmesh-$version.tar.gz and .whl install and run on Debian $(cat /etc/debian_version)"
