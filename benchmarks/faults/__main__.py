@@ -1,11 +1,12 @@
 """Runs are killed at random moments: what is finished stays, and the next run ends as if nothing had happened.
 
-    python -m benchmarks.faults [MOMENTS] [--seed N]
+    python -m benchmarks.faults [MOMENTS] [--seed N] [--first N]
 
 Each moment has a signal (SIGKILL, SIGTERM, SIGINT), one rank or two, of which one alone may be struck, and a phase:
 while forms are compiled, while gmsh meshes, while it is solved, while records or results are written. After it all
 processes must be gone within 30 s, the store must be sound and hold every record that it held, no file be torn; and a
 run on the same store must end with the dataset of one that nobody disturbed. Ends with 1 if anything is wrong.
+``--first`` leaves the moments before it out: a hundred may be gone through in parts.
 """
 
 import argparse
@@ -34,11 +35,12 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.faults")
     parser.add_argument("moments", nargs="?", type=int, default=MOMENTS)
     parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--first", type=int, default=0)
     options = parser.parse_args(arguments)
     wrong, struck, longest, start = 0, Counter[str](), 0.0, time.monotonic()
     with TemporaryDirectory(prefix="epsmesh-faults-") as folder:
         whole = undisturbed(Path(folder))
-        for number in range(options.moments):
+        for number in range(options.first, options.moments):
             moment = draw(number, options.seed)
             left, after = one(Path(folder) / str(number), whole, moment, random.Random(f"{options.seed} {number}"))
             faults = (*left.faults, *after)
@@ -47,10 +49,8 @@ def main(arguments: list[str]) -> int:
             longest = max(longest, left.seconds if left.stage else 0.0)
             told = f"{number:4} {moment} -> {left.stage or '-'}, status {left.status}, quiet in {left.seconds:.1f} s"
             print(told, *faults, sep="\n     WRONG: ", flush=True)
-    seconds = time.monotonic() - start
-    print(
-        f"{options.moments} moments in {seconds:.0f} s, {wrong} with faults, quiet in {longest:.1f} s at most; struck"
-    )
+    seconds, count = time.monotonic() - start, options.moments - options.first
+    print(f"{count} moments in {seconds:.0f} s, {wrong} with faults, quiet in {longest:.1f} s at most; struck")
     print(*(f"  {name} {count}" for name, count in sorted(struck.items())), sep="\n")
     return int(wrong > 0)
 

@@ -117,7 +117,8 @@ def _can_fork() -> bool:
 def _fork(guard: Guard, say: Callable[[str], None]) -> None:
     """Return in a child; end with its status in this process."""
     guard._file = os.memfd_create("epsmesh")
-    heard = {n for n in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(n) != signal.SIG_IGN} | {signal.SIGCHLD}
+    # Also where the shell has SIGINT ignored, as it does for `&` in a script: a run answers it all the same.
+    heard = {signal.SIGINT, signal.SIGTERM, signal.SIGCHLD}
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     while True:
         before = signal.pthread_sigmask(signal.SIG_BLOCK, heard)
