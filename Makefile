@@ -79,6 +79,7 @@ benchmark: setup ## every table of docs/performance.md, into results/ (an idle m
 	@scripts/peers.sh
 	$(PYTHON) -m benchmarks.start_up
 	$(PYTHON) -m benchmarks.ranks
+	$(PYTHON) -m benchmarks.communication
 	$(PYTHON) -m benchmarks.peers
 	$(PYTHON) -m benchmarks.plain_loop --sample 24
 	$(PYTHON) -m benchmarks.products

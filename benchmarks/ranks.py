@@ -24,7 +24,7 @@ from pipeline.study.load import parse
 from pipeline.verify.machine import MPI_ENVIRONMENT
 
 _REPEATS, _CASES = 3, 60
-_LARGE = {
+LARGE = {
     "body": {"shape": "box", "size": ["60 mm", "60 mm", "20 mm"], "fixed": "bottom"},
     "material": {"young": "10 kPa", "poisson": 0.3},
     "probe": {"action": "pierce", "shape": "disc", "radius": "2 mm", "depth": "0.2 mm", "at": ["3 mm", "5 mm"]},
@@ -35,7 +35,7 @@ _LARGE = {
 
 def plans() -> dict[str, Plan]:
     """Return what is run: many small cases; one of half a million unknowns."""
-    return {"many": make_plan(parse(soak.study(_CASES))), "large": make_plan(parse(_LARGE))}
+    return {"many": make_plan(parse(soak.study(_CASES))), "large": make_plan(parse(LARGE))}
 
 
 def measure(name: str) -> dict[str, Any]:

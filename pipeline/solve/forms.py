@@ -20,7 +20,7 @@ from pipeline.mesh.distribute import distribute
 from pipeline.mesh.generate import MeshArrays
 from pipeline.solve.compiled import cellwise_space, form, vector_space
 from pipeline.solve.material import MaterialLaw
-from pipeline.solve.straight import has_kernel, suits
+from pipeline.solve.straight import assembles, has_kernel
 from pipeline.solve.straight.stiffness import cell_kernel
 
 # Marks of cells, and the bulge of an edge, in units of its length, that rounding may leave.
@@ -80,7 +80,7 @@ class ElasticForms:
     def _kernels(self) -> dict[int, int]:
         """Return a kernel for the straight cells, which takes a twelfth of the time of the generated one."""
         degree, mesh = compat.degree(self._space), self._space.mesh
-        if suits(self._space) or not has_kernel(degree):
+        if assembles(self._space) or not has_kernel(degree):
             return {}
         kernel = cell_kernel(degree, of_regions=self._regions is not None)
         return {compat.EVERYWHERE if curved_cells(mesh) is None else _STRAIGHT: kernel}

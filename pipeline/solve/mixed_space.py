@@ -9,6 +9,7 @@ from contextlib import ExitStack, contextmanager
 
 import numpy as np
 from dolfinx.fem import petsc as fem_petsc
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline import compat
@@ -21,8 +22,8 @@ from pipeline.solve.mixed_forms import MixedForms
 from pipeline.solve.region_space import region_wise_space
 from pipeline.solve.saddle import Pair
 from pipeline.solve.spaces import ElasticSpace
+from pipeline.solve.straight import assembles
 from pipeline.solve.straight import mixed as straight
-from pipeline.solve.straight import suits
 from pipeline.solve.vectors import add_from_ghosts, fill, vector
 
 
@@ -102,12 +103,13 @@ class MixedSpace:
 
     def _matrices(self, body: BodyMesh) -> tuple[PETSc.Mat, PETSc.Mat]:
         """Return M and B, without conditions; collective."""
-        if not suits(self.displacements.dofs.space):
+        if not assembles(self.displacements.dofs.space):
             return _assemble(self.forms.mass), _assemble(self.forms.coupling)
         curved = curved_cells(body.mesh)
+        is_curved = self.comm.allreduce(curved is not None and bool(curved.any()), op=MPI.LOR)
         mass = straight.mass(self.pressures, curved)
         coupling = straight.coupling(self.pressures, self.displacements.dofs.space, curved)
-        if curved is not None and curved.any():
+        if is_curved:
             compat.add_matrix(mass, self.forms.curved_mass, [], 1.0)
             compat.add_matrix(coupling, self.forms.curved_coupling, [], 1.0)
         return mass, coupling

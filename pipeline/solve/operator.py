@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Any, Protocol
 
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline import compat
@@ -13,7 +14,7 @@ from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.forms import ElasticForms, curved_cells
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.single.cycle import takes_product
-from pipeline.solve.straight import product, suits
+from pipeline.solve.straight import assembles, product, suits
 from pipeline.solve.straight.product import CellOperator, CellStiffness
 from pipeline.solve.straight.stiffness import StraightStiffness
 from pipeline.stages import stage
@@ -55,6 +56,7 @@ class Operators:
         self._part_seconds = 0.0
         self._straight: StraightStiffness | None = None
         self._cells: CellStiffness | None = None
+        self._is_curved = False
         self._closed = False
 
     def close(self) -> None:
@@ -153,22 +155,22 @@ class Operators:
 
     def _assemble(self, law: MaterialLaw, diagonal: float, mat_type: str, into: PETSc.Mat | None) -> PETSc.Mat:
         self._forms.set_law(law)
-        if suits(self._space.space):
-            matrix = self._assemble_alone(law, diagonal, mat_type, into)
+        if assembles(self._space.space):
+            matrix = self._assemble_straight(law, diagonal, mat_type, into)
         else:
             matrix = compat.assemble_matrix(self._forms.stiffness, self._space.dirichlet, diagonal, mat_type, into)
         _mark(matrix)
         return matrix
 
-    def _assemble_alone(self, law: MaterialLaw, diagonal: float, mat_type: str, into: PETSc.Mat | None) -> PETSc.Mat:
-        """Assemble on one process: the straight cells, which are most, the fast way, and dolfinx the others."""
-        curved = curved_cells(self._space.body.mesh)
+    def _assemble_straight(self, law: MaterialLaw, diagonal: float, mat_type: str, into: PETSc.Mat | None) -> PETSc.Mat:
+        """Assemble the straight cells, which are most, the fast way, and let dolfinx add the others; collective."""
         if self._straight is None:
-            regions = self._space.body.regions
+            curved, regions = curved_cells(self._space.body.mesh), self._space.body.regions
+            self._is_curved = self._space.body.comm.allreduce(curved is not None and bool(curved.any()), op=MPI.LOR)
             self._straight = StraightStiffness(self._space.space, curved, self._space.prescribed, regions)
         matrix = self._straight.matrix(mat_type) if into is None else into
         matrix.zeroEntries()
-        if curved is not None and curved.any():
+        if self._is_curved:
             compat.add_matrix(matrix, self._forms.curved_stiffness, self._space.dirichlet, diagonal)
         self._straight.add(matrix, law, diagonal)
         return matrix

@@ -1,5 +1,6 @@
 """What is solved with operators made of tensors of the reference cell is what dolfinx's forms give."""
 
+from contextlib import ExitStack
 from functools import partial
 
 import numpy as np
@@ -9,6 +10,7 @@ from mpi4py import MPI
 from pipeline import compat
 from pipeline.mesh.distribute import distribute
 from pipeline.mesh.generate import MeshArrays
+from pipeline.solve import forms, operator
 from pipeline.solve.compiled import vector_space
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.displacement import DisplacementProblem
@@ -18,6 +20,7 @@ from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.straight.pattern import pattern
 from pipeline.solve.vectors import vector
 from tests.solve.test_mixed import PRESS, law, make_mesh
+from tests.solve.test_regions import SKIN
 
 
 @pytest.mark.mpi
@@ -74,7 +77,42 @@ def test_a_point_of_very_many_cells():
 
 
 @pytest.mark.mpi
-@pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="several processes leave the assembly to dolfinx")
+@pytest.mark.parametrize("kernel", [True, False])
+@pytest.mark.parametrize(
+    ("degree", "mirrors", "changes"),
+    [
+        (1, ("x", "y"), {}),
+        (2, (), {}),
+        (3, ("x", "y"), {}),
+        (2, ("x", "y"), {"mesh": {"degree": 1}}),  # without curved cells
+        (2, ("x", "y"), {"body": {"layers": [SKIN]}}),
+    ],
+)
+def test_operators_are_those_that_dolfinx_assembles(degree, mirrors, changes, kernel, monkeypatch):
+    """On one rank and on several, whose cells add to rows of others; with the same kernel, and with forms alone."""
+    mesh = make_mesh(MPI.COMM_WORLD, mirrors, **changes)
+    space, other = (ElasticSpace(mesh, degree, Conditions(bonded=False)) for _ in range(2))
+    material = MaterialLaw((2.0, 5.0), (1.0, 0.7)) if mesh.regions is not None else MaterialLaw.of(2.0, 1.0)
+    lend = {"law": material, "blocked": degree > 1}
+    with ExitStack() as stack:
+        ours, _ = stack.enter_context(space.operators.lend(**lend))
+        monkeypatch.setattr(operator, "assembles", lambda space: False)
+        monkeypatch.setattr(forms, "assembles", lambda space: False)
+        if not kernel:
+            monkeypatch.setattr(forms, "has_kernel", lambda degree: False)
+        theirs, _ = stack.enter_context(other.operators.lend(**lend))
+        x, y, z = (stack.enter_context(vector(space.dofs.space)) for _ in range(3))
+        x.array[:] = np.sin(np.arange(*x.getOwnershipRange()))
+        ours.mult(x, y)
+        theirs.mult(x, z)
+        assert (y - z).norm() < 1e-12 * z.norm()
+        assert ours.getType() == theirs.getType()
+    for made in (space, other):
+        made.operators.close()
+
+
+@pytest.mark.mpi
+@pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="for several processes")
 @pytest.mark.parametrize("method", ["direct", "iterative"])
 @pytest.mark.parametrize(
     ("kind", "degree", "poisson", "bonded", "mirrors", "changes"),
@@ -90,8 +128,8 @@ def test_a_point_of_very_many_cells():
         (MixedProblem, 3, 0.5, True, ("x", "y"), {}),
     ],
 )
-def test_solutions_are_those_of_the_forms(kind, degree, poisson, bonded, mirrors, changes, method):
-    """Force, energy and the error bar, which is made of one degree more, on curved and on straight cells."""
+def test_solutions_of_several_ranks_are_those_of_one(kind, degree, poisson, bonded, mirrors, changes, method):
+    """Of one process: force, energy and the error bar, made of one degree more, on curved and on straight cells."""
     found = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
         mesh = make_mesh(comm, mirrors, **changes)

@@ -86,6 +86,27 @@ void NAME(int rows, const int* restrict first, const int* restrict offsets, cons
 DEFINE_MULTIPLY(multiply, float, BY_ROWS)
 DEFINE_MULTIPLY(multiply_double, double, BY_COLUMNS)
 
+/* y += B z for the few rows that have blocks whose columns are other ranks': those of row which[i] are offsets[i] to
+ * before offsets[i + 1], as PETSc has them. */
+#define DEFINE_MULTIPLY_BEYOND(NAME, TYPE)                                                                             \
+void NAME(int rows, const int* restrict which, const int* restrict offsets, const int* restrict columns,               \
+          const TYPE* restrict blocks, const TYPE* restrict z, TYPE* restrict y)                                       \
+{                                                                                                                      \
+  for (int i = 0; i < rows; ++i)                                                                                       \
+  {                                                                                                                    \
+    TYPE s[3] = {0, 0, 0};                                                                                             \
+    for (int k = offsets[i]; k < offsets[i + 1]; ++k)                                                                  \
+      for (int c = 0; c < 3; ++c)                                                                                      \
+        for (int r = 0; r < 3; ++r)                                                                                    \
+          s[r] += blocks[9 * (size_t)k + BY_COLUMNS(r, c)] * z[3 * columns[k] + c];                                    \
+    for (int r = 0; r < 3; ++r)                                                                                        \
+      y[3 * which[i] + r] += s[r];                                                                                     \
+  }                                                                                                                    \
+}
+
+DEFINE_MULTIPLY_BEYOND(multiply_beyond, float)
+DEFINE_MULTIPLY_BEYOND(multiply_beyond_double, double)
+
 /* d = a d + b D^-1 r, and x += d: a step of Chebyshev's iteration. */
 void advance(int rows, const float* restrict inverse, float a, float b, const float* restrict r, float* restrict d,
              float* restrict x)
@@ -163,16 +184,20 @@ void restrict_to(int rows, const int* offsets, const int* points, const float* w
     g[j] *= coarse_free[j];
 }
 
-/* y = x / s with the largest magnitude s of x, which is returned; nought if x is. */
-double to_single(int count, const double* x, float* y)
+/* The largest magnitude of x. */
+double largest(int count, const double* x)
 {
   double most = 0.0;
   for (int i = 0; i < count; ++i)
     most = fabs(x[i]) > most ? fabs(x[i]) : most;
-  const double scale = most > 0.0 ? 1.0 / most : 0.0;
+  return most;
+}
+
+/* y = s x */
+void to_single(int count, double scale, const double* x, float* y)
+{
   for (int i = 0; i < count; ++i)
     y[i] = (float)(scale * x[i]);
-  return most;
 }
 
 /* y = s x */

@@ -3,19 +3,24 @@
 The smoother is Chebyshev's iteration with the blocks of the diagonal, the same as PETSc's. What an iteration takes is
 the time to read its matrices: in single precision, and of a symmetric matrix the upper blocks alone, they are a
 quarter as long. The residual is brought to magnitude 1 first, so that nothing runs out of the exponents of a float.
+
+On several ranks each smooths the rows that it owns; what it needs of others' points is sent in single precision, too.
 """
 
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline.arrays import Int32Array
-from pipeline.solve.straight.arrays import available, entries, entries_to_read
+from pipeline.solve.parcels import Shared
+from pipeline.solve.single.beyond import beyond, summed
+from pipeline.solve.straight.arrays import available, blocks_to_read
 from pipeline.solve.straight.native import Library
 from pipeline.solve.straight.product import is_product
 from pipeline.solve.transfer import Side, free, point_weights
@@ -30,6 +35,10 @@ void multiply(int rows, const int* first, const int* offsets, const int* columns
               float* y);
 void multiply_double(int rows, const int* first, const int* offsets, const int* columns, const double* blocks,
                      const double* x, double* y);
+void multiply_beyond(int rows, const int* which, const int* offsets, const int* columns, const float* blocks,
+                     const float* z, float* y);
+void multiply_beyond_double(int rows, const int* which, const int* offsets, const int* columns, const double* blocks,
+                            const double* z, double* y);
 void advance(int rows, const float* inverse, float a, float b, const float* r, float* d, float* x);
 void subtract(int count, const float* q, float* r);
 double dot(int count, const float* x, const float* y);
@@ -37,7 +46,8 @@ void prolong(int rows, const int* offsets, const int* points, const float* weigh
              const float* fine_free, const float* e, float* x);
 void restrict_to(int rows, const int* offsets, const int* points, const float* weights, int coarse_count,
                  const float* coarse_free, const float* fine_free, const float* r, float* g);
-double to_single(int count, const double* x, float* y);
+double largest(int count, const double* x);
+void to_single(int count, double scale, const double* x, float* y);
 void to_double(int count, double scale, const float* x, double* y);
 """
 
@@ -51,17 +61,23 @@ _LANCZOS_JUMPS = 12
 # which noise has little; so many steps find it.
 _LANCZOS_CLOSER = 40
 
+_BLOCKED = ("seqbaij", "mpibaij")
+
 
 def suits(matrices: list[PETSc.Mat]) -> bool:
-    """Tell whether a cycle over operators of degrees 1, 2, … can be made: of one process, where C can be compiled."""
+    """Tell whether a cycle over operators of degrees 1, 2, … can be made: where C can be compiled; collective."""
     return len(matrices) > 1 and takes_product(matrices)
 
 
 def takes_product(matrices: list[PETSc.Mat]) -> bool:
-    """Tell whether a cycle could be made over these operators and one of the next degree, maybe without entries."""
-    if not all(matrix.getType() == "seqbaij" or is_product(matrix) for matrix in matrices[1:]):
+    """Tell whether a cycle could be made over these operators and one of the next degree, maybe without entries.
+
+    Collective.
+    """
+    if not all(matrix.getType() in _BLOCKED or is_product(matrix) for matrix in matrices[1:]):
         return False
-    return available() and compiles()
+    works = available() and compiles()
+    return bool(summed(matrices[0].comm.tompi4py(), works, MPI.MIN)) if matrices else works
 
 
 @cache
@@ -84,7 +100,8 @@ def library() -> Library:
 class Interpolation:
     """From the points of a coarse space to those of a fine one: sparse rows with the same weight for all components.
 
-    ``coarse_free`` and ``fine_free`` are 0 for numbers that are prescribed, else 1.
+    ``coarse_free`` and ``fine_free`` are 0 for numbers that are prescribed, else 1. Rows are of the points that this
+    rank owns; those of the coarse space that others own are ``shared``, None on one process. Both maps are collective.
     """
 
     offsets: Int32Array
@@ -92,22 +109,35 @@ class Interpolation:
     weights: Single
     coarse_free: Single
     fine_free: Single
+    shared: Shared | None = None
 
     def prolong(self, coarse: Single, fine: Single) -> None:
         """Add the interpolation of ``coarse`` to ``fine``."""
+        if self.shared is not None:
+            coarse = np.concatenate([coarse, self.shared.read(coarse.reshape(-1, 3)).reshape(-1)])
         library()("prolong", len(self.offsets) - 1, self.offsets, self.points, self.weights, self.coarse_free,
                   self.fine_free, coarse, fine)  # fmt: skip
 
     def restrict(self, fine: Single, coarse: Single) -> None:
         """Write the transposed interpolation of ``fine`` into ``coarse``."""
-        library()("restrict_to", len(self.offsets) - 1, self.offsets, self.points, self.weights, len(coarse),
-                  self.coarse_free, self.fine_free, fine, coarse)  # fmt: skip
+        owned = len(coarse)
+        found = coarse if self.shared is None else np.empty(len(self.coarse_free), dtype=np.float32)
+        library()("restrict_to", len(self.offsets) - 1, self.offsets, self.points, self.weights, len(found),
+                  self.coarse_free, self.fine_free, fine, found)  # fmt: skip
+        if self.shared is not None:
+            coarse[:] = found[:owned]
+            self.shared.add(found[owned:].reshape(-1, 3), coarse.reshape(-1, 3))
 
 
 def interpolation(coarse: Side, fine: Side) -> Interpolation:
-    """Return the interpolation between two spaces of one process."""
+    """Return the interpolation between two spaces; collective."""
     offsets, points, weights = point_weights(coarse.space, fine.space)
-    return Interpolation(offsets.astype(np.int32), points, weights.astype(np.float32), *masks(coarse, fine))
+    comm, index_map, shared = coarse.space.mesh.comm, coarse.space.dofmap.index_map, None
+    if comm.size > 1:
+        shared = Shared(comm, index_map.local_range, np.asarray(index_map.ghosts, dtype=np.int64))
+    return Interpolation(
+        offsets.astype(np.int32), points, weights.astype(np.float32), *masks(coarse, fine), shared=shared
+    )
 
 
 def masks(coarse: Side, fine: Side) -> tuple[Single, Single]:
@@ -119,7 +149,11 @@ class SymmetricOperator(Protocol):
     """A positive definite operator in single precision, of ``rows`` points.
 
     ``prescribed`` are dofs (unrolled) of which it knows nothing: what multiplies is nought there, the product anything.
+    On several ranks points are those that a rank owns, and products and diagonals are collective.
     """
+
+    @property
+    def comm(self) -> MPI.Comm: ...  # noqa: D102
 
     @property
     def rows(self) -> int: ...  # noqa: D102
@@ -133,25 +167,30 @@ class SymmetricOperator(Protocol):
 
 
 class UpperBlocks:
-    """The operator of a matrix, of which the blocks from the diagonal on are kept."""
+    """The operator of a matrix: its blocks from the diagonal on, and those beyond the columns of this rank."""
 
     prescribed: Int32Array = np.empty(0, dtype=np.int32)
 
     def __init__(self, matrix: PETSc.Mat):
-        """Take the entries of a matrix, of type seqbaij and symmetric."""
-        offsets, columns = (index.astype(np.int32, copy=False) for index in matrix.getRowIJ(compressed=True)[:2])
+        """Take the entries of a matrix, in blocks and symmetric; collective."""
+        self.comm = matrix.comm.tompi4py()
+        inside, _, _ = blocks_to_read(matrix)
+        offsets, columns = inside.offsets, inside.columns
         self.rows = len(offsets) - 1
         row = np.repeat(np.arange(self.rows, dtype=np.int32), np.diff(offsets))
         upper = np.add.reduceat(columns >= row, offsets[:-1])
         self._offsets = np.concatenate([[0], np.cumsum(upper)]).astype(np.int32)
         self._columns = np.empty(self._offsets[-1], dtype=np.int32)
         self._values = np.empty((self._offsets[-1], 9), dtype=np.float32)
-        with entries(matrix, 9 * len(columns)) as values:
-            library()("take_upper", self.rows, offsets, columns, values, self._offsets, self._columns, self._values)
+        library()("take_upper", self.rows, offsets, columns, inside.values, self._offsets, self._columns, self._values)
+        self._beyond = beyond(matrix, np.float32, partial(library(), "multiply_beyond"))
 
     def multiply(self, x: Single, y: Single) -> None:
-        """Write A x into ``y``."""
+        """Write A x into ``y``; collective."""
+        begun = self._beyond and self._beyond.begin(x)
         library()("multiply", self.rows, self._offsets, self._offsets, self._columns, self._values, x, y)
+        if self._beyond and begun:
+            self._beyond.add(begun, y)
 
     def diagonal(self) -> Single:
         """Return the blocks on the diagonal, shape (rows, 9)."""
@@ -162,15 +201,16 @@ class SmoothedLevel:
     """An operator in single precision and its smoother."""
 
     def __init__(self, operator: SymmetricOperator, *, jumps: bool = False):
-        """Set up; ``jumps``: the material does.
+        """Set up; ``jumps``: the material does. Collective.
 
         Raises:
             ArithmeticError: if a block of the diagonal is not positive.
         """
-        self._operator, rows = operator, operator.rows
+        self._operator, self._comm, rows = operator, operator.comm, operator.rows
         self._rows, self._blocks = rows, operator.diagonal()
         self._inverse = np.empty((rows, 9), dtype=np.float32)
-        if library()("invert_diagonal", rows, np.arange(rows, dtype=np.int32), self._blocks, self._inverse):
+        singular = library()("invert_diagonal", rows, np.arange(rows, dtype=np.int32), self._blocks, self._inverse)
+        if summed(self._comm, singular):
             raise ArithmeticError("the operator is not positive definite")
         self.size, self._held = 3 * rows, np.empty(0, dtype=np.int32)
         self._product, self._direction, self.scratch = (np.zeros(self.size, dtype=np.float32) for _ in range(3))
@@ -187,10 +227,12 @@ class SmoothedLevel:
     def hold(self, dofs: Int32Array) -> None:
         """Let the smoother alone hold ``dofs`` from now on, which the operator knows nothing of, and no others.
 
-        Where it neither reads nor writes, it smooths for the operator without those rows and columns.
+        They are local ones; ghosts are left to their owners. Where it neither reads nor writes, it smooths for the
+        operator without those rows and columns.
         """
         self._invert(np.unique(self._held // 3), np.zeros(0, dtype=np.int32))
-        self._held = np.union1d(self._operator.prescribed, dofs).astype(np.int32)
+        held = np.union1d(self._operator.prescribed, dofs).astype(np.int32)
+        self._held = held[held < self.size]
         self._invert(np.unique(self._held // 3), self._held)
 
     def _invert(self, rows: Int32Array, held: Int32Array) -> None:
@@ -228,24 +270,27 @@ class SmoothedLevel:
 
     def _largest_eigenvalue(self, steps: int) -> float:
         """Return the largest eigenvalue of D⁻¹ A, from below, by Lanczos' method from noise."""
-        r = np.random.default_rng(0).standard_normal(self.size, dtype=np.float32)
+        r = np.random.default_rng(self._comm.rank).standard_normal(self.size, dtype=np.float32)
         z, p, diagonal, beside = np.empty_like(r), np.zeros_like(r), [], []
         previous = step = 0.0
         for _ in range(steps):
             z[:] = 0.0
             library()("advance", self._rows, self._inverse, 0.0, 1.0, r, self._direction, z)
-            rz = library()("dot", self.size, r, z)
+            rz = self._dot(r, z)
             ratio = rz / previous if previous else 0.0
             p *= ratio
             p += z
             self._multiply(p)
-            before, step = step, rz / library()("dot", self.size, p, self._product)
+            before, step = step, rz / self._dot(p, self._product)
             diagonal.append(1 / step + (ratio / before if before else 0.0))
             beside.append(ratio**0.5 / before if before else 0.0)
             self._product *= step
             library()("subtract", self.size, self._product, r)
             previous = rz
         return float(np.linalg.eigvalsh(np.diag(diagonal) + np.diag(beside[1:], 1) + np.diag(beside[1:], -1))[-1])
+
+    def _dot(self, x: Single, y: Single) -> float:
+        return summed(self._comm, library()("dot", self.size, x, y))
 
 
 class SymmetricProduct:
@@ -255,16 +300,21 @@ class SymmetricProduct:
     """
 
     def __init__(self, matrix: PETSc.Mat):
-        """Refer to the entries of a matrix, of type seqbaij, which must live as long."""
-        self._offsets, self._columns = (i.astype(np.int32, copy=False) for i in matrix.getRowIJ(compressed=True)[:2])
+        """Refer to the entries of a matrix, in blocks, which must live as long; collective."""
+        inside, _, _ = blocks_to_read(matrix)
+        self._offsets, self._columns, self._blocks = inside.offsets, inside.columns, inside.values
+        self._beyond = beyond(matrix, np.float64, partial(library(), "multiply_beyond_double"))
         rows = np.repeat(np.arange(len(self._offsets) - 1, dtype=np.int32), np.diff(self._offsets))
         self._diagonal = np.flatnonzero(self._columns == rows).astype(np.int32)
-        self._blocks = entries_to_read(matrix, 9 * len(self._columns))
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write A x into ``y``."""
+        given, result = x.array_r, y.array_w
+        begun = self._beyond and self._beyond.begin(given)
         library()("multiply_double", len(self._diagonal), self._diagonal, self._offsets, self._columns, self._blocks,
-                  x.array_r, y.array_w)  # fmt: skip
+                  given, result)  # fmt: skip
+        if self._beyond and begun:
+            self._beyond.add(begun, result)
 
 
 class SingleCycle:
@@ -274,6 +324,7 @@ class SingleCycle:
         """``levels`` go up from degree 2, ``interpolations`` lead to each; ``coarse`` is the solver of degree 1."""
         self._levels, self._interpolations, self._coarse = levels, interpolations, coarse
         bottom, _ = coarse.getOperators()
+        self._comm = bottom.comm.tompi4py()
         sizes = [bottom.getLocalSize()[0], *(level.size for level in levels)]
         self._x, self._r = ([np.zeros(size, dtype=np.float32) for size in sizes] for _ in range(2))
         self._bottom = bottom.createVecs()
@@ -298,9 +349,10 @@ class SingleCycle:
             level.look_closer()
 
     def apply(self, _: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
-        """Write one cycle's correction for ``residual`` into ``result``."""
-        top = len(self._levels)
-        scale = library()("to_single", len(self._r[top]), residual.array_r, self._r[top])
+        """Write one cycle's correction for ``residual`` into ``result``; collective."""
+        top, given = len(self._levels), residual.array_r
+        scale = summed(self._comm, library()("largest", len(given), given), MPI.MAX)
+        library()("to_single", len(given), 1 / scale if scale else 0.0, given, self._r[top])
         self._cycle(top)
         library()("to_double", len(self._x[top]), scale, self._x[top], result.array_w)
 

@@ -1,8 +1,8 @@
 """Operators on cells without curved edges, which are most: no quadrature, and every entry knows its place.
 
-``kernels.c`` has the formulas. On one process they take a sixth of the time of dolfinx's general kernels and PETSc's
-insertion, entry by entry (docs/solvers.md). dolfinx assembles the curved cells, and everything on several processes,
-or where this PETSc does not lend the arrays of its matrices.
+``kernels.c`` has the formulas. They take a sixth of the time of dolfinx's general kernels and PETSc's insertion, entry
+by entry (docs/solvers.md). On several ranks each adds its own cells; what they add to rows of others is sent there.
+dolfinx assembles the curved cells, and everything where this PETSc does not lend the arrays of its matrices.
 """
 
 from typing import Any
@@ -22,5 +22,10 @@ def has_kernel(degree: int) -> bool:
 
 
 def suits(displacements: Any) -> bool:
-    """Tell whether operators on a space of displacements can be put together here: on one process."""
-    return displacements.mesh.comm.size == 1 and has_kernel(compat.degree(displacements)) and arrays.available()
+    """Tell whether all operators on a space of displacements can be put together here: on one process."""
+    return displacements.mesh.comm.size == 1 and assembles(displacements)
+
+
+def assembles(displacements: Any) -> bool:
+    """Tell whether the stiffness on a space of displacements can be put together here, on any number of ranks."""
+    return has_kernel(compat.degree(displacements)) and arrays.available()

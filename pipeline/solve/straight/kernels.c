@@ -94,25 +94,32 @@ static void hold(int points, const int* dofs, const double* free, double B[restr
           B[3 * s + r][p] *= free[3 * (size_t)dofs[i] + r] * free[3 * (size_t)dofs[j] + s];
 }
 
+/* The block of an entry: entries are counted through, first those in `blocks`, then those in `rest`. */
+static inline double* block(int entry, int inside, double* blocks, double* rest)
+{
+  return entry < inside ? blocks + 9 * (size_t)entry : rest + 9 * (size_t)(entry - inside);
+}
+
 /* Add the blocks of all pairs, and their transposes, where they belong. */
-static void scatter(int points, const int* places, const double B[restrict 9][MOST_PAIRS], double* blocks)
+static void scatter(int points, const int* places, const double B[restrict 9][MOST_PAIRS], int inside, double* blocks,
+                    double* rest)
 {
   for (int i = 0, p = 0; i < points; ++i)
     for (int j = i; j < points; ++j, ++p)
     {
-      double* here = blocks + 9 * (size_t)places[i * points + j];
+      double* here = block(places[i * points + j], inside, blocks, rest);
       for (int q = 0; q < 9; ++q)
         here[q] += B[q][p];
       if (i == j)
         continue;
-      double* there = blocks + 9 * (size_t)places[j * points + i];
+      double* there = block(places[j * points + i], inside, blocks, rest);
       for (int s = 0; s < 3; ++s)
         for (int r = 0; r < 3; ++r)
           there[3 * r + s] += B[3 * s + r][p];
     }
 }
 
-/* Add the stiffness of some cells to the blocks of a matrix.
+/* Add the stiffness of some cells to the blocks of a matrix: to `inside` of them, `blocks`, and to the `rest`.
  *
  * corners (cells, 4, 3); dofs (cells, points); places (cells, points, points) from find_entries; S (3, 3, pairs);
  * free (dofs, 3): 1, or 0 where a displacement is prescribed; `which` are the `count` cells to add; region (cells)
@@ -120,7 +127,7 @@ static void scatter(int points, const int* places, const double B[restrict 9][MO
  */
 void add_stiffness(int count, const int* which, int points, const double* corners, const int* dofs, const int* places,
                    const double* S, const double* free, const int* region, const double* lambda, const double* mu,
-                   double* blocks)
+                   int inside, double* blocks, double* rest)
 {
   const int pairs = points * (points + 1) / 2, places_each = points * points;
   for (int k = 0; k < count; ++k)
@@ -128,7 +135,7 @@ void add_stiffness(int count, const int* which, int points, const double* corner
     if (k + 1 < count) /* memory is far: ask for the next cell's blocks, two cache lines each, while at this one's */
       for (int q = 0; q < places_each; ++q)
       {
-        const double* next = blocks + 9 * (size_t)places[which[k + 1] * (size_t)places_each + q];
+        const double* next = block(places[which[k + 1] * (size_t)places_each + q], inside, blocks, rest);
         __builtin_prefetch(next, 1);
         __builtin_prefetch(next + 8, 1);
       }
@@ -137,7 +144,7 @@ void add_stiffness(int count, const int* which, int points, const double* corner
     mapping((const double(*)[3])(corners + 12 * cell), K);
     stiffness(pairs, S, K, lambda[region[cell]], mu[region[cell]], B);
     hold(points, dofs + points * cell, free, B);
-    scatter(points, places + places_each * cell, B, blocks);
+    scatter(points, places + places_each * cell, B, inside, blocks, rest);
   }
 }
 

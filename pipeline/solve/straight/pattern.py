@@ -18,7 +18,7 @@ void find_entries(int rows, int height, int width, const int* dofs, const int* o
                   const int* first_visit, const int* visits, int* entry, int* places);
 void add_stiffness(int count, const int* which, int points, const double* corners, const int* dofs, const int* places,
                    const double* S, const double* free, const int* region, const double* lambda, const double* mu,
-                   double* blocks);
+                   int inside, double* blocks, double* rest);
 void add_products(int count, const int* which, int pairs, int terms, int size, const double* factors, const double* R,
                   const int* places, double* values);
 extern const double *tensors_1, *tensors_2, *tensors_3, *tensors_4;
@@ -43,7 +43,8 @@ def library() -> Library:
 class Pattern:
     """Sparse rows of points (``offsets``, ``columns``), and ``places``, the entry of each pair of each cell's points.
 
-    ``places`` has the shape (cells, points of the rows' space, points of the columns' space).
+    Points are the local ones, owned and ghosts, and cells those of this rank. ``places`` has the shape (cells, points
+    of the rows' space, points of the columns' space).
     """
 
     offsets: Int32Array
@@ -52,7 +53,7 @@ class Pattern:
 
 
 def pattern(rows: Any, columns: Any) -> Pattern:
-    """Return the pattern of an operator between two spaces of one process: points couple that share a cell."""
+    """Return the pattern of an operator between two spaces on the cells of this rank: points couple that share one."""
     (row_dofs, visited), (column_dofs, touched) = (_cells_and_points(space) for space in (rows, columns))
     # A product's columns come in no order; those of a transposed matrix do, for less than they take to sort.
     graph = (touched.T.tocsr() @ visited).T.tocsr()
@@ -68,9 +69,15 @@ def pattern(rows: Any, columns: Any) -> Pattern:
 
 
 def straight_cells(curved: BoolArray | None, count: int) -> Int32Array:
-    """Return the numbers of those of ``count`` cells that are not ``curved``, None if none is."""
+    """Return the numbers of those of the first ``count`` cells that are not ``curved``, None if none is."""
     every = np.arange(count, dtype=np.int32)
-    return every if curved is None else every[~curved]
+    return every if curved is None else every[~curved[:count]]
+
+
+def owned_cells(space: Any) -> Int32Array:
+    """Return the points of each cell that this rank owns, shape (cells, points of a cell)."""
+    topology = space.mesh.topology
+    return np.ascontiguousarray(compat.cell_dofs(space)[: topology.index_map(topology.dim).size_local])
 
 
 def corners(mesh: Any) -> FloatArray:
@@ -90,8 +97,8 @@ def reference(degree: int, quadrature: int) -> tuple[FloatArray, FloatArray, Flo
 
 def _cells_and_points(space: Any) -> tuple[Int32Array, Any]:
     """Return the points of each cell, as an array and as a sparse matrix of cells × points."""
-    dofs = np.ascontiguousarray(compat.cell_dofs(space))
+    dofs, index_map = owned_cells(space), space.dofmap.index_map
     count, width = dofs.shape
     offsets = np.arange(0, dofs.size + 1, width, dtype=np.int32)
-    shape = count, space.dofmap.index_map.size_local
+    shape = count, index_map.size_local + index_map.num_ghosts
     return dofs, sp.csr_matrix((np.ones(dofs.size, dtype=np.bool_), dofs.reshape(-1), offsets), shape=shape)

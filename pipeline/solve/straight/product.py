@@ -169,7 +169,7 @@ class CellOperator:
 
     def __init__(self, cells: CellStiffness, law: MaterialLaw, curved: PETSc.Mat | None):
         """Take the entries of the matrix of the ``curved`` cells, without conditions, if there are any."""
-        self._cells, self.rows, self.prescribed = cells, cells.points, cells.prescribed
+        self._cells, self.rows, self.prescribed, self.comm = cells, cells.points, cells.prescribed, MPI.COMM_SELF
         lame = cells.lame(law)
         self._lame: dict[str, np.ndarray] = {"float64": lame, "float32": lame.astype(np.float32)}
         self._few = {kind: None if curved is None else Blocks.of(curved, kind) for kind in self._lame}
@@ -183,7 +183,7 @@ class CellOperator:
     def matrix(self) -> PETSc.Mat:
         """Return it as a matrix of PETSc; the caller destroys it."""
         size = 3 * self.rows, None
-        matrix = PETSc.Mat().createPython((size, size), self, comm=MPI.COMM_SELF)
+        matrix = PETSc.Mat().createPython((size, size), self, comm=self.comm)
         matrix.setUp()
         return matrix
 
