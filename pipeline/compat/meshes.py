@@ -13,20 +13,37 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 
+# What gmsh's session, one a process, is left open for, and what its user remembers of the model in it.
+_left_open: list[tuple[Any, dict[str, Any]]] = []
+
 
 @contextmanager
-def gmsh_session() -> Iterator[None]:
+def gmsh_session(keep: Any = None) -> Iterator[dict[str, Any]]:
     """Start and end gmsh, leaving Python's handling of Ctrl-C as it was.
 
-    gmsh 4.8 changes it when imported and when finalized, later versions when initialized.
+    Where there is something to ``keep``, the session is left open until the next one: if that one is to keep an equal
+    thing, it finds the model as it was left, and what it lends, a dictionary, with what was put there. An exception
+    ends it.
+
+    gmsh 4.8 changes the handling when imported and when finalized, later versions when initialized.
     """
     handler = signal.getsignal(signal.SIGINT)
-    gmsh.initialize([""], readConfigFiles=False)
+    kept, memory = _left_open.pop() if _left_open else (None, {})
+    if kept is None or kept != keep:
+        if kept is not None:
+            gmsh.finalize()
+        memory = {}
+        gmsh.initialize([""], readConfigFiles=False)
     signal.signal(signal.SIGINT, handler)
+    stays = False
     try:
-        yield
+        yield memory
+        stays = keep is not None
     finally:
-        gmsh.finalize()
+        if stays:
+            _left_open.append((keep, memory))
+        else:
+            gmsh.finalize()
         signal.signal(signal.SIGINT, handler)
 
 

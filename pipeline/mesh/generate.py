@@ -4,6 +4,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from typing import Any
 
 import gmsh
 import numpy as np
@@ -16,6 +17,7 @@ from pipeline.mesh.regions import region_sizes
 from pipeline.mesh.size import Sizes, set_size_field
 from pipeline.scene.model import CUT, FIXED, FREE, MIRROR, PROBE, SLIT, TISSUE, Scene, SceneError, build
 from pipeline.shapes.bodies.cad import FromCad
+from pipeline.shapes.body import Drawn
 from pipeline.stages import stage
 
 # gmsh's HXT is 3 to 6 times faster, but numbers its points by memory address: no two runs give the same mesh,
@@ -77,19 +79,30 @@ def generate(scene: Scene, sizes: Sizes) -> MeshArrays:
 
 
 def _generate(scene: Scene, sizes: Sizes, start: float) -> MeshArrays:
-    with _model():
-        rim_curves = _built(scene)
+    with _model(scene) as kept:
+        if "rim" not in kept:
+            kept["rim"] = _built(scene)
+        rim_curves = kept["rim"]
         try:
             if scene.rim_segments and len(rim_curves) == 1 and scene.is_flat:
                 edges = scene.rim_segments // 2 ** len(scene.mirrors)
                 gmsh.model.mesh.setTransfiniteCurve(rim_curves[0], edges + 1)
             more = [*region_sizes(scene, sizes.growth), *rounded_sizes(scene, sizes.growth)]
             lifted = [] if scene.is_flat else rim_curves
-            set_size_field(sizes, scene.probe, scene.frame, scene.scale, more, lifted)
+            last = set_size_field(sizes, scene.probe, scene.frame, scene.scale, more, lifted)
             gmsh.model.mesh.generate(3)
         except Exception as error:  # gmsh raises bare Exception
             raise MeshError(f"gmsh: {reason(error)}") from error
-        return _collect(scene, rim_curves, start)
+        arrays = _collect(scene, rim_curves, start)
+        _clear(last)
+        return arrays
+
+
+def _clear(last: int) -> None:
+    """Leave the model without its mesh and the fields up to the ``last``."""
+    gmsh.model.mesh.clear()
+    for field in range(1, last + 1):
+        gmsh.model.mesh.field.remove(field)
 
 
 def _built(scene: Scene) -> list[int]:
@@ -103,10 +116,15 @@ def _built(scene: Scene) -> list[int]:
 
 
 @contextmanager
-def _model() -> Iterator[None]:
-    with gmsh_session():
+def _model(scene: Scene) -> Iterator[dict[str, Any]]:
+    """Open gmsh; the next mesh of the same drawn ``scene`` finds the model that was built, and what is kept with it.
+
+    Elements of other sizes on it are those of a model of their own, to the last bit.
+    """
+    drawn = scene if scene.straight else replace(scene, rim_segments=0)  # along curved edges segments are sizes
+    with gmsh_session(drawn if isinstance(scene.body, Drawn) else None) as kept:
         model_options()
-        yield
+        yield kept
 
 
 def model_options() -> None:

@@ -46,8 +46,8 @@ class Sizes:
 
 def set_size_field(
     sizes: Sizes, probe: Probe, frame: Frame, scale: float, more: Iterable[str] = (), rim: Sequence[int] = ()
-) -> None:
-    """Make ``sizes`` the background field of gmsh's current model, whose unit is ``scale`` metres.
+) -> int:
+    """Make ``sizes`` the background field of gmsh's current model, whose unit is ``scale`` metres; return its number.
 
     ``more`` are sizes that elements must not be above either, written in that unit; ``rim`` are the curves of the
     probe's edge where that is not plane. Where contact ends elsewhere, elements are small there.
@@ -78,3 +78,4 @@ def set_size_field(
     smallest = field.add("Min")
     field.setNumbers(smallest, "FieldsList", tags)
     field.setAsBackgroundMesh(smallest)
+    return int(smallest)

@@ -9,6 +9,7 @@ import gmsh
 import numpy as np
 import pytest
 
+from pipeline.compat import gmsh_session
 from pipeline.mesh.curve import curve
 from pipeline.mesh.generate import MeshArrays, MeshError, generate
 from pipeline.mesh.reflect import reflect
@@ -17,6 +18,8 @@ from pipeline.scene.model import Scene
 from tests.cases import BLADE, study
 
 SIZES = Sizes(epsilon=8e-3, fine=2e-3, coarse=8e-3, rim=0.4e-3, growth=0.5)
+
+BALL = {"name": "ball", "at": ["0 mm", "0 mm", "-9 mm"], "radius": "3 mm", "young": "1 kPa", "poisson": 0.3}
 
 
 def scene(column: float = inf, held: bool = False, straight: bool = False, **changes) -> Scene:
@@ -48,6 +51,28 @@ def test_same_input_same_mesh_in_this_process_and_in_another():
     assert len(outputs) == 1
     assert np.array_equal(here[0].points, here[1].points)
     assert np.array_equal(here[0].cells, here[1].cells)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {}, {"column": 6e-3}, {"straight": True}, {"probe": BLADE},
+        {"body": {"shape": "ellipsoid", "axes": ["15 mm", "14 mm", "12 mm"], "fixed": {"below": "-2 mm"}}},
+        {"body": {"inclusion": [BALL]}},
+    ],
+)  # fmt: skip
+def test_elements_of_other_sizes_on_a_model_that_is_kept_are_those_of_one_of_its_own(changes):
+    """Whatever was meshed on it before, to the last bit."""
+    sizes = [SIZES, replace(SIZES, rim=0.7e-3), replace(SIZES, fine=4e-3, epsilon=inf)]
+    found = [generate(scene(**changes), sizes[number]) for number in (0, 1, 2, 0)]
+    for number, mesh in zip((0, 1, 2, 0), found, strict=True):
+        with gmsh_session():
+            pass  # nothing is kept now
+        alone = generate(scene(**changes), sizes[number])
+        assert np.array_equal(alone.points, mesh.points)
+        assert np.array_equal(alone.cells, mesh.cells)
+        assert np.array_equal(alone.rim, mesh.rim)
+        assert all(np.array_equal(alone.facets[name], mesh.facets[name]) for name in alone.facets | mesh.facets)
 
 
 @pytest.mark.parametrize("probe", [None, BLADE | {"direction": [1.0, 2.0, 0.0], "at": ["3 mm", "-2 mm"]}])
