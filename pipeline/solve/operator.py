@@ -9,12 +9,12 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline import compat
-from pipeline.arrays import Int32Array
+from pipeline.arrays import BoolArray, Int32Array
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.forms import ElasticForms, curved_cells
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.single.cycle import takes_product
-from pipeline.solve.straight import assembles, product, suits
+from pipeline.solve.straight import assembles, product
 from pipeline.solve.straight.product import CellOperator, CellStiffness
 from pipeline.solve.straight.stiffness import StraightStiffness
 from pipeline.stages import stage
@@ -87,9 +87,10 @@ class Operators:
 
     @property
     def multiplies(self) -> bool:
-        """Tell whether :meth:`lend_product` can: on one process, where C can be compiled."""
+        """Tell whether :meth:`lend_product` can: where C can be compiled; collective."""
         degree = compat.degree(self._space.space)
-        return suits(self._space.space) and degree in product.DEGREES and product.compiles() and takes_product([])
+        can = assembles(self._space.space) and degree in product.DEGREES and product.compiles() and takes_product([])
+        return bool(self._space.body.comm.allreduce(can, op=MPI.LAND))
 
     @contextmanager
     def lend_product(self, law: MaterialLaw) -> Iterator[tuple[PETSc.Mat, float]]:
@@ -110,15 +111,23 @@ class Operators:
         """Lend K as a product where that is possible, else as a matrix of blocks; collective."""
         return self.lend_product(law) if self.multiplies else self.lend(law, blocked=True, shared=shared)
 
+    def _curved(self) -> BoolArray | None:
+        """Return which local cells are curved, and remember whether any of all ranks is; collective."""
+        curved = curved_cells(self._space.body.mesh)
+        self._is_curved = self._space.body.comm.allreduce(curved is not None and bool(curved.any()), op=MPI.LOR)
+        return curved
+
     @stage("assembly")
     def _product(self, law: MaterialLaw) -> PETSc.Mat:
         if self._cells is None:
-            regions, curved = self._space.body.regions, curved_cells(self._space.body.mesh)
+            curved, regions = self._curved(), self._space.body.regions
             self._cells = CellStiffness(self._space.space, curved, self._space.prescribed, regions)
         curved_part = self._cells.curved_matrix()
-        if curved_part is not None:
+        if self._is_curved:
             self._forms.set_law(law)
-            compat.add_matrix(curved_part, self._forms.curved_stiffness, [], 0.0)
+            form = self._forms.curved_stiffness  # collective
+            if curved_part is not None:
+                compat.add_matrix(curved_part, form, [], 0.0)
         context = CellOperator(self._cells, law, curved_part)
         if curved_part is not None:
             curved_part.destroy()
@@ -165,8 +174,7 @@ class Operators:
     def _assemble_straight(self, law: MaterialLaw, diagonal: float, mat_type: str, into: PETSc.Mat | None) -> PETSc.Mat:
         """Assemble the straight cells, which are most, the fast way, and let dolfinx add the others; collective."""
         if self._straight is None:
-            curved, regions = curved_cells(self._space.body.mesh), self._space.body.regions
-            self._is_curved = self._space.body.comm.allreduce(curved is not None and bool(curved.any()), op=MPI.LOR)
+            curved, regions = self._curved(), self._space.body.regions
             self._straight = StraightStiffness(self._space.space, curved, self._space.prescribed, regions)
         matrix = self._straight.matrix(mat_type) if into is None else into
         matrix.zeroEntries()

@@ -16,15 +16,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
 from pipeline.solve.material import MaterialLaw
+from pipeline.solve.parcels import Shared
 from pipeline.solve.straight import arrays
 from pipeline.solve.straight.native import Library
-from pipeline.solve.straight.pattern import corners, reference, straight_cells
+from pipeline.solve.straight.pattern import corners, owned_cells, reference, straight_cells
 
 Single = npt.NDArray[np.float32]
 
@@ -112,16 +112,22 @@ def bernstein(degree: int, kind: str) -> Bernstein:
 
 
 class CellStiffness:
-    """The cells of a space of displacements of one process, laid out for products: the straight ones, and the others.
+    """The cells of this rank, laid out for products: the straight ones, and the others.
 
-    ``curved`` tells for each cell whether it is, None if none is; ``prescribed`` are the dofs (unrolled) whose rows
-    and columns the operator does not have; ``regions`` number what cells are made of.
+    ``curved`` tells for each local cell whether it is, None if none is; ``prescribed`` are the local dofs (unrolled)
+    whose rows and columns the operator does not have; ``regions`` number what cells are made of. Of its ``local``
+    points a rank owns the first ``points``; others own those that are ``shared``, None on one process.
     """
 
     def __init__(self, space: Any, curved: BoolArray | None, prescribed: Int32Array, regions: Int32Array | None = None):
-        self.degree, self.prescribed = compat.degree(space), prescribed
-        self.points = space.dofmap.index_map.size_local
-        dofs = np.ascontiguousarray(compat.cell_dofs(space))
+        """Collective."""
+        index_map, self.comm, self.degree = space.dofmap.index_map, space.mesh.comm, compat.degree(space)
+        self.points, self.local = index_map.size_local, index_map.size_local + index_map.num_ghosts
+        self.prescribed, self.shared = prescribed[prescribed < 3 * self.points], None
+        if self.comm.size > 1:
+            ghosts = np.asarray(index_map.ghosts, dtype=np.int64)
+            self.shared = Shared(self.comm, index_map.local_range, ghosts)
+        dofs = owned_cells(space)
         self._which = straight_cells(curved, len(dofs))
         self._regions = np.zeros(len(dofs), dtype=np.int32) if regions is None else regions
         self.batches = -(-len(self._which) // _LANES)
@@ -132,14 +138,15 @@ class CellStiffness:
         maps = np.zeros((self.batches, 9, _LANES))
         library()("map_cells", len(self._which), self._which, corners(space.mesh), maps)
         self.maps: dict[str, np.ndarray] = {"float64": maps, "float32": maps.astype(np.float32)}
-        self._bent = None if curved is None or not curved.any() else dofs[curved]
+        bent = np.empty(0, dtype=np.int64) if curved is None else np.flatnonzero(curved[: len(dofs)])
+        self._bent = dofs[bent] if len(bent) else None
 
     def curved_matrix(self) -> PETSc.Mat | None:
         """Return a matrix of zeros for the curved cells, of type seqbaij, None if there are none; to be destroyed."""
         if self._bent is None:
             return None
         offsets = np.arange(0, self._bent.size + 1, self._bent.shape[1], dtype=np.int32)
-        shape = len(self._bent), self.points
+        shape = len(self._bent), self.local
         visited = sp.csr_matrix((np.ones(self._bent.size, dtype=np.bool_), self._bent.reshape(-1), offsets), shape)
         graph = (visited.T @ visited).tocsr()
         graph.sort_indices()
@@ -154,7 +161,7 @@ class CellStiffness:
         return np.ascontiguousarray(values.reshape(2, self.batches, _LANES).transpose(1, 0, 2))
 
     def add_diagonal(self, lame: FloatArray, blocks: Single) -> None:
-        """Add the blocks on the diagonal, of the straight cells, to ``blocks`` (points, 9)."""
+        """Add the blocks on the diagonal, of the straight cells, to ``blocks`` (local, 9)."""
         weights, _, gradients = reference(self.degree, 2 * self.degree - 2)
         tensors = np.einsum("q,aqi,bqi->abi", weights, gradients, gradients)
         library()("add_diagonal", len(self._which), self.dofs.shape[1], self.dofs, self.maps["float64"], lame,
@@ -164,12 +171,14 @@ class CellStiffness:
 class CellOperator:
     """The stiffness of a material as a product: a context for PETSc, without entries.
 
-    Prescribed dofs are left as they are. In double precision, or, by :meth:`multiply`, in single precision.
+    Prescribed dofs are left as they are. In double precision, or, by :meth:`multiply`, in single precision. On several
+    ranks each multiplies with its own cells, what others' points have is read first, and what they get added last:
+    products and diagonals are collective.
     """
 
     def __init__(self, cells: CellStiffness, law: MaterialLaw, curved: PETSc.Mat | None):
         """Take the entries of the matrix of the ``curved`` cells, without conditions, if there are any."""
-        self._cells, self.rows, self.prescribed, self.comm = cells, cells.points, cells.prescribed, MPI.COMM_SELF
+        self._cells, self.rows, self.prescribed, self.comm = cells, cells.points, cells.prescribed, cells.comm
         lame = cells.lame(law)
         self._lame: dict[str, np.ndarray] = {"float64": lame, "float32": lame.astype(np.float32)}
         self._few = {kind: None if curved is None else Blocks.of(curved, kind) for kind in self._lame}
@@ -177,7 +186,7 @@ class CellOperator:
     def holding(self, dofs: Int32Array) -> "CellOperator":
         """Return the operator in which ``dofs`` (unrolled) are prescribed, too; it shares everything else."""
         other = copy(self)
-        other.prescribed = np.union1d(self.prescribed, dofs).astype(np.int32)
+        other.prescribed = np.union1d(self.prescribed, dofs[dofs < 3 * self.rows]).astype(np.int32)
         return other
 
     def matrix(self) -> PETSc.Mat:
@@ -213,13 +222,25 @@ class CellOperator:
 
     def diagonal(self) -> Single:
         """Return the blocks on the diagonal, shape (points, 9), as if nothing was prescribed."""
-        blocks = np.zeros((self.rows, 9), dtype=np.float32)
+        blocks = np.zeros((self._cells.local, 9), dtype=np.float32)
         self._cells.add_diagonal(self._lame["float64"], blocks)
         if (few := self._few["float32"]) is not None:
             blocks[few.rows] += few.blocks[few.offsets[:-1]]
-        return blocks
+        if self._cells.shared is not None:
+            self._cells.shared.add(blocks[self.rows :], blocks[: self.rows])
+        return blocks[: self.rows]
 
     def _add(self, x: np.ndarray, y: np.ndarray, kind: str) -> None:
+        if (shared := self._cells.shared) is None:
+            self._add_cells(x, y, kind)
+            return
+        given = np.concatenate([x, shared.read(x.reshape(-1, 3)).reshape(-1)])
+        found = np.zeros_like(given)
+        self._add_cells(given, found, kind)
+        y += found[: len(y)]
+        shared.add(found[len(y) :].reshape(-1, 3), y.reshape(-1, 3))
+
+    def _add_cells(self, x: np.ndarray, y: np.ndarray, kind: str) -> None:
         end, cells, table = "" if kind == "float32" else "_double", self._cells, bernstein(self._cells.degree, kind)
         by = table.transform
         library()(
