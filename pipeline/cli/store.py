@@ -40,7 +40,7 @@ def list_records(store: StoreFile = DEFAULT_STORE, as_json: Json = False) -> Non
     if as_json:
         print_json(content)
         return
-    print(f"{store}: {len(rows)} records, {content['bytes'] / 1e6:.1f} MB, {content['seconds']:.0f} s of work")
+    print(f"{store}: {len(rows)} records, {content['bytes'] / 1e6:.2g} MB, {content['seconds']:.0f} s of work")
     for name in ("status", "origin", "versions"):
         for value, count in content[name].items():
             print(f"  {count:6} {value}")

@@ -43,6 +43,7 @@ SECTION_TEXTS = {
     "load.traction": "Forces on parts of the boundary, one table each. Optional; the values of one with a name can be "
     "swept.",
     "plan": "What may be left out of the work. Optional; lists are no sweeps here.",
+    "figure": "What the study's main figure shows: forces do not depend on it. Optional; lists are no sweeps here.",
 }
 _QUANTITIES = {
     "m": ("length", "lengths"),
