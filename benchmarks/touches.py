@@ -1,7 +1,7 @@
 """Held-out touches of a real-time model by full solves of the program: groups on one mesh each, kept on file.
 
 A group is one place and one tool, a disc, a blade or a bonded disc, at four of the Poisson's ratios that the model
-takes. Depths, and moduli, are no touches of their own: force is proportional to both.
+takes, or at the one. Depths, and moduli, are no touches of their own: force is proportional to both.
 """
 
 import json

@@ -49,7 +49,8 @@ class Touch:
     """What a query found; all numbers are NaN unless ``status`` is "ok" or "lost", and ``message`` says why.
 
     ``force`` (3,), in N, is what the tissue does to the tool, in the body's coordinates; ``force_error`` is relative,
-    of its length along the normal; ``stiffness`` (N/m) is dF/dd at fixed place; ``contact_radius`` is in m.
+    of its length along the normal, and holds for the force aside on a bonded disc, too; ``stiffness`` (N/m) is dF/dd at
+    fixed place; ``contact_radius`` is in m.
     """
 
     status: str
