@@ -17,7 +17,7 @@ from pipeline.run.progress import Progress
 from pipeline.run.record import Record
 from pipeline.run.store import Store
 
-# Signals that end a process from outside, or from below Python.
+# Signals that end a process from outside, or from below Python. Others mean the run: its time is up, its terminal gone.
 _FATAL = {signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.SIGILL}
 # An MPI launcher's ranks end together.
 _LAUNCHED = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "MPI_LOCALNRANKS")
@@ -130,10 +130,12 @@ def _fork(guard: Guard, say: Callable[[str], None]) -> None:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
             return
         status, interrupted = _await(child, heard)
-        ended_by = signal.Signals(os.WTERMSIG(status)).name if os.WIFSIGNALED(status) else f"status {status >> 8}"
-        count = guard.lose(f"the process ended by {ended_by} while this case was computed: out of memory, as a rule")
-        if interrupted or not count:
-            os._exit(128 + os.WTERMSIG(status) if os.WIFSIGNALED(status) else os.WEXITSTATUS(status))
+        number = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
+        ended_by = signal.Signals(number).name if number else f"status {os.WEXITSTATUS(status)}"
+        why = "out of memory, as a rule" if number == signal.SIGKILL else "a library failed, perhaps for want of memory"
+        count = guard.lose(f"the process ended by {ended_by} while this case was computed: {why}")
+        if interrupted or not count or (number and number not in _FATAL):
+            os._exit(128 + number if number else os.WEXITSTATUS(status))
         say(f"the process of the run ended by {ended_by}: {_what_failed(count)}; the others go on in a new one")
 
 

@@ -79,6 +79,12 @@ def test_a_process_that_ends_before_any_case_is_not_begun_again():
     assert (run.returncode, told) == (59, "")
 
 
+def test_a_run_whose_time_is_up_is_not_begun_again():
+    run = start(RUN.format(ends="os.kill(os.getpid(), 24)"))
+    told, _ = run.communicate(timeout=60)
+    assert (run.returncode, told) == (128 + signal.SIGXCPU, "")
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_whoever_asks_the_process_that_waits_to_end_reaches_the_other(number):
     run = start(RUN.format(ends="print('here', flush=True); time.sleep(60)"))
