@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from pipeline import __version__
-from pipeline.cli.console import load_solvers, print_json
+from pipeline.cli.console import load_solvers, print_json, warning
 from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_file, of_option
 from pipeline.cli.words import DEFAULT_OUTPUT, File, Json, check_output, load_all
 
@@ -76,6 +76,8 @@ def export(
         fail(Fault(str(problem), file=str(file), howto=_HOWTO))
     except (MeshError, SolveError, RuntimeError) as problem:
         fail(of_file(file, str(problem)), status=SOME_FAILED)
+    if exported.unseen:
+        warning(f"{path} holds no visible surface: {exported.unseen}")
     found = exported.summary(wanted) | {"file": str(path)}
     if as_json:
         print_json(found)

@@ -41,7 +41,7 @@ def curved_model(
     radius = scope.case.probe.circumradius
     room = _LARGER * RADII[1] * radius / largest
     middle = scope.case.probe.at[:2]
-    region = _region(scope, radius, room)
+    region = curved_region(scope, room)
     ratios = ratios_of(scope.poissons).tolist()
     known: dict[tuple[float, float], FloatArray] = {}
 
@@ -61,8 +61,9 @@ def curved_model(
     return model, missed, len(known) * len(ratios)
 
 
-def _region(scope: Scope, radius: float, room: float) -> Region:
-    body = scope.body
+def curved_region(scope: Scope, room: float) -> Region:
+    """Return the region of a body that is not flat, round the study's place; a model answers for ``room`` (m)."""
+    body, radius = scope.body, scope.case.probe.circumradius
     is_round, reach, even = False, (_REACH * radius,) * 2, (False, False)
     if body.half_sides and not any(scope.case.probe.at[:2]) and not body.inclusion:
         is_round, even = body.is_round, (True, True)

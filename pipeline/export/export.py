@@ -13,7 +13,8 @@ from pipeline.export.file import write_model
 from pipeline.export.full import Solver
 from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, Scope
-from pipeline.export.surface import has_surface, tabulate_surface
+from pipeline.export.seen import seen_body
+from pipeline.export.surface import tabulate_surface
 from pipeline.export.tabulate import Places, tabulate
 from pipeline.realtime.model import Model
 from pipeline.realtime.surface import SurfaceTable
@@ -34,7 +35,10 @@ _OFF = 1e-6
 
 @dataclass(frozen=True)
 class Exported:
-    """A model with the touches that its bar was fitted to and those that it was judged on; places solved for."""
+    """A model with the touches that its bar was fitted to and those that it was judged on; places solved for.
+
+    ``unseen`` says why it has no visible surface, where one was asked for.
+    """
 
     model: Model
     fitted: list[Check]
@@ -42,6 +46,7 @@ class Exported:
     missed: float
     places: int
     surface: SurfaceTable | None = None
+    unseen: str = ""
 
     @property
     def held(self) -> float:
@@ -64,7 +69,7 @@ def export(
 ) -> Exported:  # fmt: skip
     """Return the model of a study to a relative ``accuracy``, with half of ``checks`` fitted to and half judged on.
 
-    With ``surface`` it holds what is seen of the body, too, if that is a box or a cylinder of one material.
+    With ``surface`` it holds what is seen of the body, too.
 
     Raises:
         ExportError: if the body leaves no region.
@@ -84,14 +89,13 @@ def export(
     first, second, third = _BARS
     model = replace(bare, bar=(factor * first, factor * second, factor * third, precise))
     fitted, judged = ([with_bar(model, check) for check in half] for half in (fitted, judged))
-    seen = _seen(scope, margin, model) if surface and has_surface(scope.body) else None
-    return Exported(model, fitted, judged, missed, places, seen)
-
-
-def _seen(scope: Scope, margin: float, model: Model) -> SurfaceTable:
-    assert isinstance(scope.body, Layered)
-    region = Region.of(scope.body, margin)
-    return tabulate_surface(coarse_mesh(scope.case, region), region, scope.poissons, model.origin)
+    seen, unseen = None, ""
+    if surface:
+        try:
+            seen = tabulate_surface(seen_body(scope, model, margin), scope.poissons, model.origin)
+        except ExportError as reason:
+            unseen = str(reason)
+    return Exported(model, fitted, judged, missed, places, seen, unseen)
 
 
 def _flat(

@@ -5,7 +5,7 @@ images: mirror images of a box, turned ones of a round body. What remains is of 
 amounts are polynomials of the place and of ν.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from math import pi
@@ -17,8 +17,8 @@ from pipeline.arrays import FloatArray, IntArray
 from pipeline.export.region import Region
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.realtime.surface import SurfaceTable
-from pipeline.shapes.body import Layered
 from pipeline.solve.far_field import PointForce
+from pipeline.solve.material import MaterialLaw
 from pipeline.solve.regular import OnBoundary, regular_on_boundary
 from pipeline.stages import stage
 
@@ -48,22 +48,40 @@ class Image:
         return np.asarray(np.einsum("nk,nki->ni", self.weights, values[self.nodes]) @ self.motion.T)
 
 
-def has_surface(body: object) -> bool:
-    """Tell whether a body is one material and its own mirror image or turned one, which is what is made use of here."""
-    return isinstance(body, Layered) and not body.regions
+@dataclass(frozen=True, eq=False)
+class Pressed:
+    """A meshed body whose ``region`` of the face is pressed on, and the forces that do so, of a Poisson's ratio.
+
+    ``law`` tells the tissues in units of μ at the face, where they are several, for its Poisson's ratio. R is not
+    judged ``next`` (m) to a force.
+    """
+
+    mesh: BodyMesh
+    region: Region
+    force: Callable[[Place, float], PointForce]
+    law: Callable[[float], MaterialLaw | None] = lambda _: None
+    next: float = 0.0
+
+    def solve(self, places: Sequence[Place], poisson: float) -> OnBoundary:
+        """Return R (m/N, E = 1) for a force at each place."""
+        forces = [self.force(place, poisson) for place in places]
+        found = regular_on_boundary(self.mesh, forces, self.law(poisson))
+        # Of a unit of the field, 4πμ times the radius newtons, and E = 2 (1 + ν) μ.
+        scales = np.array([2 * (1 + poisson) / (4 * pi * force.radius) for force in forces])
+        return OnBoundary(found.nodes, found.triangles, scales[:, None, None] * found.values)
 
 
 @stage("far field")
-def tabulate_surface(mesh: BodyMesh, region: Region, poissons: tuple[float, float], origin: FloatArray) -> SurfaceTable:
+def tabulate_surface(body: Pressed, poissons: tuple[float, float], origin: FloatArray) -> SurfaceTable:
     """Return the modes of the whole boundary, and by how much of the depth they may be off at places held out.
 
     Raises:
         SolveError: if R cannot be solved for.
     """
-    low, high = poissons
-    ratios = (low + high) / 2 + (high - low) / 2 * np.cos(pi * np.arange(_POISSONS) / (_POISSONS - 1))
+    region, (low, high) = body.region, poissons
+    ratios = (low + high) / 2 + (high - low) / 2 * (_ends(_POISSONS - 1) if low < high else np.zeros(1))
     sources = _sources(region)
-    solved = [_solve(mesh, region, sources, float(ratio)) for ratio in ratios]
+    solved = [body.solve(sources, float(ratio)) for ratio in ratios]
     boundary = solved[0]
     images = [_image(boundary, motion) for motion in _motions(region)]
     places = np.array([image.motion[:2, :2] @ source for source in sources for image in images])
@@ -75,29 +93,24 @@ def tabulate_surface(mesh: BodyMesh, region: Region, poissons: tuple[float, floa
     basis = _basis(region, places)
     amounts = np.array([np.linalg.lstsq(basis, found @ modes, rcond=None)[0] for found in fields])
     table = _table(region, boundary, modes, amounts, poissons, origin)
-    return _judged(table, mesh, region, float(ratios.mean()))
-
-
-def _solve(mesh: BodyMesh, region: Region, places: Sequence[Place], poisson: float) -> OnBoundary:
-    """Return R (m/N, E = 1) for a force at each place."""
-    forces = [PointForce(poisson, (x, y, 0.0), region.room(x, y)) for x, y in places]
-    found = regular_on_boundary(mesh, forces)
-    # Of a unit of the field, 4πμ times the radius newtons, and E = 2 (1 + ν) μ.
-    scales = np.array([2 * (1 + poisson) / (4 * pi * force.radius) for force in forces])
-    return OnBoundary(found.nodes, found.triangles, scales[:, None, None] * found.values)
+    return _judged(table, body, float(ratios.mean()))
 
 
 def _sources(region: Region) -> list[Place]:
     """Return the places that are solved for: the others are their images."""
-    x, y = (reach * np.cos(pi * np.arange(_SIZE + 1) / (2 * _SIZE)) for reach in region.reach)
+    lines = [
+        reach * _ends(2 * _SIZE)[: _SIZE + 1 if even else None]
+        for reach, even in zip(region.reach, region.even, strict=True)
+    ]
     if region.is_round:
-        return [(float(r), 0.0) for r in x]
-    pairs = [(float(a), float(b)) for a, b in product(x, y)]
-    return [(a, b) for a, b in pairs if a >= b] if _is_square(region) else pairs
+        return [(float(r), 0.0) for r in lines[0]]
+    pairs = [(float(a), float(b)) for a, b in product(*lines)]
+    return [(a, b) for a, b in pairs if a >= b] if region.is_square else pairs
 
 
-def _is_square(region: Region) -> bool:
-    return not region.is_round and region.sides[0] == region.sides[1]
+def _ends(size: int) -> FloatArray:
+    """Return the extrema of T_size, from 1 to -1."""
+    return np.asarray(np.cos(pi * np.arange(size + 1) / size))
 
 
 def _motions(region: Region) -> list[FloatArray]:
@@ -105,9 +118,10 @@ def _motions(region: Region) -> list[FloatArray]:
     if region.is_round:
         angles = 2 * pi * np.arange(4 * _SIZE + 1) / (4 * _SIZE + 1)
         return [np.array([[np.cos(t), -np.sin(t), 0], [np.sin(t), np.cos(t), 0], [0, 0, 1]]) for t in angles]
-    signs = [np.diag([a, b, 1.0]) for a, b in product((1.0, -1.0), repeat=2)]
+    x, y = ((1.0, -1.0) if even else (1.0,) for even in region.even)
+    signs = [np.diag([a, b, 1.0]) for a, b in product(x, y)]
     swap = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, 1]])
-    return [*signs, *(sign @ swap for sign in signs)] if _is_square(region) else signs
+    return [*signs, *(sign @ swap for sign in signs)] if region.is_square else signs
 
 
 def _image(boundary: OnBoundary, motion: FloatArray) -> Image:
@@ -165,10 +179,10 @@ def _table(
     region: Region, boundary: OnBoundary, modes: FloatArray, amounts: FloatArray, poissons: tuple[float, float],
     origin: FloatArray,
 ) -> SurfaceTable:  # fmt: skip
-    size, rank = 2 * _SIZE + 1, modes.shape[1]
-    nodes = np.cos(pi * np.arange(_POISSONS) / (_POISSONS - 1))
-    inverse = np.linalg.inv(np.polynomial.chebyshev.chebvander(nodes, _POISSONS - 1))
-    coefficients = np.einsum("pq,qtr->rpt", inverse, amounts).reshape(rank, _POISSONS, size, size)
+    size, rank, count = 2 * _SIZE + 1, modes.shape[1], len(amounts)
+    nodes = _ends(count - 1) if count > 1 else np.zeros(1)
+    inverse = np.linalg.inv(np.polynomial.chebyshev.chebvander(nodes, count - 1))
+    coefficients = np.einsum("pq,qtr->rpt", inverse, amounts).reshape(rank, count, size, size)
     units = np.abs(modes).max(axis=0) / _WHOLE
     quarters = boundary.triangles[:, _QUARTERS].reshape(-1, 3)
     whole = np.round(modes / units).astype(np.float32).reshape(-1, 3, rank)
@@ -178,14 +192,16 @@ def _table(
     )  # fmt: skip
 
 
-def _judged(table: SurfaceTable, mesh: BodyMesh, region: Region, poisson: float) -> SurfaceTable:
+def _judged(table: SurfaceTable, body: Pressed, poisson: float) -> SurfaceTable:
     """Return the table with what it misses R × room by at places that it was not made of."""
-    rng = np.random.default_rng(0)
+    region, rng = body.region, np.random.default_rng(0)
     shares = rng.uniform(-1, 1, (_HELD_OUT, 2)) / (np.sqrt(2) if region.is_round else 1)
     places = [(float(x), float(y)) for x, y in shares * region.reach]
-    found = _solve(mesh, region, places, poisson)
+    found = body.solve(places, poisson)
     missed = 0.0
     for (x, y), values in zip(places, found.values, strict=True):
-        difference = table.far(x, y, poisson, 0.0) - values
+        centre = np.array(body.force((x, y), poisson).centre)
+        clear = np.linalg.norm(found.nodes - centre, axis=1) >= body.next
+        difference = (table.far(x, y, poisson) - values)[clear]
         missed = max(missed, region.room(x, y) * float(np.linalg.norm(difference, axis=1).max()))
     return replace(table, error=missed)

@@ -13,6 +13,7 @@ the force aside is ∂U/∂x, and a closed path does no work.
 """
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from math import cos, hypot, log, log1p, nan, pi, sin, sqrt, tan
 from typing import NamedTuple
 
@@ -218,15 +219,20 @@ class Blade:
     width: float
     turn: float
 
+    @property
+    def spread(self) -> tuple[float, float]:
+        """The second moments (m²) of its pressure along the edge and across, for a force of one."""
+        _, along, across, *_ = _rectangle(self.width / self.length)
+        return along * self.length**2, across * self.width**2
+
     def press(self, depth: float, place: Place, most: float) -> Contact | None:
         """Return the contact at a ``depth`` (m), or nothing if half its diagonal is more than ``most`` (m)."""
         long, short = self.length, self.width
         if hypot(long, short) > most or place.shape is None:
             return None
-        at = 1 - 2 * log(short / long) / log(_SLENDER)
-        force, along, across, lean_along, lean_across = np.polynomial.chebyshev.chebval(at, _RECTANGLE).tolist()
+        force, _, _, lean_along, lean_across = _rectangle(short / long)
         stiff = place.plane
-        along, across = along * long**2, across * short**2
+        along, across = self.spread
         edge = np.array([cos(self.turn), sin(self.turn)])
         side = np.array([-edge[1], edge[0]])
         leans = stiff * lean_along * long**2.5 * short**0.5, stiff * lean_across * short**2 * long
@@ -245,10 +251,17 @@ class Blade:
         return Contact(push, 0.5 * push**2 * of_place, 1 / soft, hypot(long, short), along + across)
 
 
+@lru_cache(64)
+def _rectangle(share: float) -> tuple[float, ...]:
+    """Return the five numbers of a rectangle whose ``share`` is w/l."""
+    at = 1 - 2 * log(share) / log(_SLENDER)
+    return tuple(np.polynomial.chebyshev.chebval(at, RECTANGLE).tolist())
+
+
 # Of a rectangle, half sides l ≥ w, E* = 1, in Chebyshev polynomials of 1 - 2 log(w/l)/log(1/50): F/d in units of
 # 2 √(l w), <x²>/l² and <y²>/w² of its pressure, and moment per tilt about its short and long axis in l^2.5 w^0.5, l w².
 _SLENDER = 0.02
-_RECTANGLE = np.array([
+RECTANGLE = np.array([
     [1.5467288, -0.5389724, 0.154788, -0.0121522, 0.0020102, -0.0001257, 6e-06, -1.4e-06],
     [0.4134192, 0.0443058, 0.0039289, -0.0011234, -0.0003526, 1.7e-06, 2.01e-05, 4.2e-06],
     [0.484368, -0.0181444, -0.0053293, -0.0007768, 1.19e-05, 3.22e-05, 7.5e-06, 8e-07],

@@ -30,6 +30,14 @@ class Spot:
         steep = np.array([-self.slope[0], -self.slope[1], 1.0])
         return np.asarray(steep / np.sqrt(steep @ steep))
 
+    @property
+    def turn(self) -> Array:
+        """Two unit vectors along the face, the first one above x, and the outward normal, a row each."""
+        normal = self.normal
+        first = np.array([normal[2], 0.0, -normal[0]])
+        first /= np.sqrt(first @ first)
+        return np.array([first, _cross(normal, first), normal])
+
     def force(self, contact: Contact, depth: float) -> Array:
         """Return the force (3,) on a tool whose tip is at p - d n: its work is what the energy W(x, y, d) loses.
 
@@ -61,3 +69,8 @@ class Face:
             return Spot(0.0, np.zeros(2), np.zeros((2, 2)), 0.0, np.zeros(2))
         (z, slope, (xx, xy, yy)), (bend, slope_bend, _) = table.local(np.stack([self.height, self.bend]), x, y)
         return Spot(z, slope, np.array([[xx, xy], [xy, yy]]), bend, slope_bend)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """np.cross takes 30 µs."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

@@ -151,6 +151,19 @@ class Model:
             return min(self.sides[0] - float(np.hypot(x, y)), self.thickness)
         return min(self.sides[0] - abs(x), self.sides[1] - abs(y), self.thickness)
 
+    def tool(
+        self, name: str, contact: str | None, sizes: tuple[float, float, float, float], along: Sequence[float] | None
+    ) -> Tool:
+        """Return a tool of radius, angle, length and width ``sizes`` as a query has it.
+
+        Raises:
+            ValueError: if it is none, or the model has no tables for it.
+        """
+        found = self._tool(name, contact, sizes, along)
+        if isinstance(found, str):
+            raise ValueError(SENTENCES[found])
+        return found
+
     def _tool(
         self, name: str, contact: str | None, sizes: tuple[float, float, float, float], along: Sequence[float] | None
     ) -> "Tool | str":

@@ -33,6 +33,7 @@ from pipeline.solve.linear import Level, LinearSolver, SolveError
 from pipeline.solve.loads import Motion
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.operator import Operators
+from pipeline.solve.placed_force import PlacedForce, PlacedPull
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.vectors import vector
 
@@ -171,7 +172,8 @@ def _solved(
     own = MaterialLaw.of(_ratio(forces[0].poisson), 1.0)
     others = None if law is None else _beyond(law, own)
     law = law or own
-    pull = _Pull(space.dofs.space, places)
+    is_placed = isinstance(forces[0], PlacedForce)
+    pull: Any = PlacedPull(space.dofs.space) if is_placed else _Pull(space.dofs.space, places)
     free = np.ones(len(places) * 3)
     free[space.dofs.prescribed] = 0.0
     with space.operators.lend(law, blocked=False) as (matrix, _), _products(space, len(forces)) as product:
@@ -308,8 +310,10 @@ class OnBoundary:
     values: FloatArray
 
 
-def regular_on_boundary(body: BodyMesh, forces: Sequence[PointForce]) -> OnBoundary:
-    """Return R on the whole boundary for each of ``forces``, of one Poisson's ratio, as ``regular_part`` finds it.
+def regular_on_boundary(body: BodyMesh, forces: Sequence[PointForce], law: MaterialLaw | None = None) -> OnBoundary:
+    """Return R on the whole boundary for each of ``forces``, of one Poisson's ratio, as ``regular_parts`` finds it.
+
+    On a curved boundary, where all are ``PlacedForce``, R grows like the logarithm of the distance towards the force.
 
     Raises:
         SolveError: if that cannot be solved.
@@ -318,7 +322,7 @@ def regular_on_boundary(body: BodyMesh, forces: Sequence[PointForce]) -> OnBound
         space = spaces.get(DEGREE, Conditions(unilateral=True))
         places = np.asarray(space.dofs.space.tabulate_dof_coordinates())
         used, triangles = np.unique(_outer_triangles(compat.cell_dofs(space.dofs.space), places), return_inverse=True)
-        values = [found.reshape(-1, 3)[used] for found in _solved(space, forces, places)]
+        values = [found.reshape(-1, 3)[used] for found in _solved(space, forces, places, law)]
     return OnBoundary(places[used], triangles.reshape(-1, 6), np.array(values))
 
 

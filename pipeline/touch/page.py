@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.files import write_whole
 from pipeline.html import joined, json_in_page, render_page
+from pipeline.realtime.contact import RECTANGLE
 from pipeline.realtime.model import SENTENCES
 from pipeline.realtime.surface import Surface
 from pipeline.view import palette
@@ -17,8 +18,9 @@ from pipeline.view.page.numbers import layout, packed
 _TEMPLATES = Path(__file__).parent / "templates"
 # Each knows those before it.
 _SCRIPTS = (
-    _TEMPLATES / "evaluate.js", OF_VIEW / "mesh.js", OF_VIEW / "scene.js", OF_VIEW / "camera.js",
-    _TEMPLATES / "surface.js", _TEMPLATES / "tool.js", _TEMPLATES / "touch.js",
+    _TEMPLATES / "tools.js", _TEMPLATES / "evaluate.js",
+    OF_VIEW / "mesh.js", OF_VIEW / "scene.js", OF_VIEW / "camera.js",
+    _TEMPLATES / "near.js", _TEMPLATES / "surface.js", _TEMPLATES / "tool.js", _TEMPLATES / "touch.js",
 )  # fmt: skip
 _STYLES = (OF_VIEW / "view.css", _TEMPLATES / "touch.css")
 _MM = 1e3
@@ -26,6 +28,8 @@ _MM = 1e3
 _RADIUS, _RADII, _DEPTH, _DEPTHS = 0.12, (0.02, 0.4), 0.04, (-0.02, 0.15)
 _YOUNG = (0.1, 10.0)
 _ANGLES = (20.0, 85.0)
+# A blade's length and width, least, most and at first, and its turn from x.
+_LENGTH, _WIDTH, _TURN = (0.06, 0.7, 0.3), (0.015, 0.2, 0.03), (-90.0, 90.0, 20.0)
 
 
 def write_touch_page(surface: Surface, path: Path, title: str) -> Path:
@@ -38,9 +42,15 @@ def render(surface: Surface, title: str) -> str:
     arrays = _arrays(surface)
     return render_page(
         _TEMPLATES / "touch.html.j2", joined(*_SCRIPTS),
-        title=title, facts=_facts(surface), sliders=_sliders(surface),
+        title=title, facts=_facts(surface), sliders=_sliders(surface), tools=_tools(surface),
         style=joined(*_STYLES), told=json_in_page(_told(surface, arrays)), numbers=packed(arrays),
     )  # fmt: skip
+
+
+def _tools(surface: Surface) -> list[str]:
+    """Return the tools that the model has tables for, as the page names them."""
+    has_all = len(surface.model.table.tensors) > 0
+    return ["disc", "sphere", "cone", *(("blade", "bonded disc") if has_all else ())]
 
 
 def _facts(surface: Surface) -> list[str]:
@@ -49,8 +59,10 @@ def _facts(surface: Surface) -> list[str]:
     region = (
         f"places up to {x:.3g} mm from the middle" if model.table.is_round else f"x to ±{x:.3g} mm and y to ±{y:.3g} mm"
     )
+    friction = "but for the bonded disc without friction" if "bonded disc" in _tools(surface) else "without friction"
+    along = "straight down" if model.face.is_flat else "along the normal"
     return [
-        f"Good for {region}; frictionless tools, straight down.",
+        f"Good for {region}, the grey line; tools {friction}, {along}.",
         "Drag on the face to move the tool, beside it to turn the body; scroll to zoom.",
     ]
 
@@ -59,7 +71,7 @@ def _sliders(surface: Surface) -> list[dict[str, Any]]:
     """Return what can be changed, in the units of the page."""
     model = surface.model
     size = _MM * min(*model.sides, model.thickness)
-    x, y = (_MM * side for side in model.sides)
+    x, y = (_MM * side for side in (model.sides if model.face.is_flat else model.table.reach))
     low, high = model.table.poisson
     rows: list[tuple[str, str, float, float, float]] = [
         ("x", "x, mm", -x, x, 0.0),
@@ -67,6 +79,9 @@ def _sliders(surface: Surface) -> list[dict[str, Any]]:
         ("depth", "depth, mm", size * _DEPTHS[0], size * _DEPTHS[1], size * _DEPTH),
         ("radius", "radius, mm", size * _RADII[0], size * _RADII[1], size * _RADIUS),
         ("angle", "angle to the axis, °", *_ANGLES, 60.0),
+        ("length", "length, mm", size * _LENGTH[0], size * _LENGTH[1], size * _LENGTH[2]),
+        ("width", "width, mm", size * _WIDTH[0], size * _WIDTH[1], size * _WIDTH[2]),
+        ("turn", "turn, °", *_TURN),
         ("young", "E, kPa", _YOUNG[0] * model.young / 1e3, _YOUNG[1] * model.young / 1e3, model.young / 1e3),
         ("poisson", "ν", low, high, model.poisson),
     ]
@@ -91,6 +106,8 @@ def _told(surface: Surface, arrays: dict[str, Any]) -> dict[str, Any]:
         "reach": model.table.reach, "even": model.table.even,
         "leans": model.table.leans, "is_round": model.table.is_round, "poisson_range": model.table.poisson,
         "reciprocal": model.table.reciprocal.tolist(), "curvature": model.table.curvature.tolist(),
+        "tensors": model.table.tensors.tolist(), "height": model.face.height.tolist(),
+        "bend": model.face.bend.tolist(), "rectangle": RECTANGLE.tolist(),
     }  # fmt: skip
     return {
         "model": numbers,

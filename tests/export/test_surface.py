@@ -6,42 +6,106 @@ import numpy as np
 import pytest
 
 from pipeline.compat import geometry_dofs
-from pipeline.export import surface
-from pipeline.export.compliance import coarse_mesh, compliances
-from pipeline.export.region import Region
+from pipeline.export import compliance, surface
+from pipeline.export.compliance import compliances
+from pipeline.export.curved import curved_model
 from pipeline.export.scope import scope_of
+from pipeline.export.seen import seen_body
 from pipeline.mesh.curve import EDGES
-from pipeline.realtime.surface import _below
-from tests.export.test_export import CYLINDER, study
+from pipeline.realtime.near import boussinesq
+from pipeline.realtime.surface import SurfaceTable
+from pipeline.solve.placed_force import PlacedForce
+from tests.export.test_export import CYLINDER, DISC, DOME, SKIN, Known, study
 
 POISSON = 0.4
 BOX = {"shape": "box", "size": ["40 mm", "50 mm", "20 mm"]}
 
 
-@pytest.mark.parametrize(("body", "volume"), [(CYLINDER, pi * 20**2 * 20e-9), (BOX, 40 * 50 * 20e-9)])
-def test_the_far_field_is_that_of_the_body(body, volume, monkeypatch):
+@pytest.fixture(autouse=True)
+def few(monkeypatch):
+    """Few places are solved for."""
     monkeypatch.setattr(surface, "_SIZE", 2)
     monkeypatch.setattr(surface, "_HELD_OUT", 1)
     monkeypatch.setattr(surface, "_POISSONS", 2)
+
+
+def volume_within(table: SurfaceTable) -> float:
+    """Return the volume (m³) that triangles hold which all face outwards."""
+    a, b, c = (table.points[table.triangles[:, i]].astype(float) for i in range(3))
+    return float(np.einsum("ni,ni->n", a, np.cross(b, c)).sum() / 6)
+
+
+@pytest.mark.parametrize(("body", "volume"), [(CYLINDER, pi * 20**2 * 20e-9), (BOX, 40 * 50 * 20e-9)])
+def test_the_far_field_is_that_of_the_body(body, volume):
     scope = scope_of(study(body=body))
-    region = Region.of(scope.body, 0.5)
-    mesh = coarse_mesh(scope.case, region)
+    pressed = seen_body(scope, None, 0.5)
+    mesh, region = pressed.mesh, pressed.region
     corners, middles = np.split(mesh.mesh.geometry.x[geometry_dofs(mesh.mesh)], [4], axis=1)
     ends = corners[:, EDGES]
     assert np.abs(middles - ends.mean(axis=2)).max() < 0.1 * np.ptp(ends, axis=2).max()  # no quarter points
-    table = surface.tabulate_surface(mesh, region, (POISSON, POISSON + 1e-9), np.zeros(3))
+    table = surface.tabulate_surface(pressed, (POISSON, POISSON + 1e-9), np.zeros(3))
     assert table.modes.shape[2] < 40
-    # Triangles close the body, and all face outwards.
-    a, b, c = (table.points[table.triangles[:, i]].astype(float) for i in range(3))
-    assert np.einsum("ni,ni->n", a, np.cross(b, c)).sum() / 6 == pytest.approx(volume, rel=5e-3)
+    assert volume_within(table) == pytest.approx(volume, rel=5e-3)
     held = np.flatnonzero(table.points[:, 2] < -region.thickness + 1e-6)
     for place in ((0.0, 0.0), (-0.004, 0.007)):
-        regular = table.far(*place, POISSON, 0.0)
-        near = _below(table.points - np.array([*place, 0.0]), POISSON, 1e-30)
+        regular = table.far(*place, POISSON)
+        near = boussinesq(table.points - np.array([*place, 0.0]), POISSON, 1e-30)
         room = region.room(*place)
         assert room * np.abs(near[held] + regular[held]).max() < 0.03
     under = np.argmin(np.linalg.norm(table.points - np.array([*place, 0.0]), axis=1))
     x, y = table.points[under, :2].tolist()
     ((known, *_),) = compliances(mesh, region, [(x, y)], POISSON)
-    assert room * abs(-table.far(x, y, POISSON, 0.0)[under, 2] - known) < 0.03
+    assert room * abs(-table.far(x, y, POISSON)[under, 2] - known) < 0.03
     assert table.error < 0.1
+
+
+def test_a_skin_has_a_far_field_of_its_own(monkeypatch):
+    monkeypatch.setattr(compliance, "_TO_TISSUE", 1)
+    scope = scope_of(study(body=CYLINDER | {"layers": [SKIN | {"thickness": "6 mm"}]}))
+    pressed = seen_body(scope, None, 0.5)
+    table = surface.tabulate_surface(pressed, scope.poissons, np.zeros(3))
+    middle = np.argmin(np.linalg.norm(table.points, axis=1))
+    # Tissue a fourth as stiff below it yields more than a half-space of skin; were it all skin, its support less.
+    assert 0.4 < -pressed.region.thickness * table.far(0.0, 0.0, scope.poisson)[middle, 2] < 0.55
+
+
+def test_what_a_force_on_a_dome_does_elsewhere_a_force_there_does_here():
+    """E. Betti, 1872: of the field next to a force, and of what the body's own shape and support add to it."""
+    scope = scope_of(study(body=DOME, probe=DISC | {"radius": "4 mm"}))
+    model, *_ = curved_model(scope, Known(10e3), 0.01, 0.4, (1e-3, 0.03, 0.1, 1e-3), 0.0)
+    pressed = seen_body(scope, model, 0.0)
+    table = surface.tabulate_surface(pressed, scope.poissons, model.origin)
+    a, c, below = 30e-3, 15e-3, -5e-3
+    # Of the ellipsoid, points that are below the support are part of the body, too.
+    assert volume_within(table) == pytest.approx(4 / 3 * pi * a**2 * c, rel=0.02)
+    near = np.flatnonzero((np.hypot(*table.points[:, :2].T) < 0.25 * a) & (table.points[:, 2] > 0))
+    here = near[np.argmin(np.linalg.norm(table.points[near, :2], axis=1))]
+    there = near[np.argmin(np.linalg.norm(table.points[near, :2] - (6e-3, 3e-3), axis=1))]
+
+    def moved(force: int, point: int) -> float:
+        x, y = table.points[force, :2].tolist()
+        turns = [model.face.at(model.table, *table.points[n, :2].tolist()).turn for n in (force, point)]
+        away = (table.points[[point]] - table.points[force]).astype(float) @ turns[0].T
+        own = boussinesq(away, scope.poisson, 1e-30)[0] @ turns[0]
+        return float((own + table.far(x, y, scope.poisson)[point]) @ turns[1][2])
+
+    assert moved(here, there) == pytest.approx(moved(there, here), rel=0.03)
+    x, y = table.points[here, :2].tolist()
+    held = np.flatnonzero(table.points[:, 2] < below - 1e-6)
+    turn = model.face.at(model.table, x, y).turn
+    own = boussinesq((table.points[held] - table.points[here]).astype(float) @ turn.T, scope.poisson, 1e-30) @ turn
+    assert model.thickness * np.abs(own + table.far(x, y, scope.poisson)[held]).max() < 0.03
+    assert table.error < 0.1
+
+
+def test_the_field_of_a_force_turns_with_it():
+    turn = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    centre, points = np.array([0.01, -0.02, 0.03]), np.random.default_rng(4).standard_normal((20, 3))
+    points[:, 2] = -np.abs(points[:, 2])
+    rows = tuple(tuple(row) for row in turn.tolist())
+    placed, plain = PlacedForce(0.4, tuple(centre), 0.01, rows), PlacedForce(0.4, (0.0, 0.0, 0.0), 0.01)
+    world = centre + points @ turn
+    np.testing.assert_allclose(placed.at(world), plain.at(points) @ turn, rtol=1e-9)
+    np.testing.assert_allclose(placed.stress(world), turn.T @ plain.stress(points) @ turn, rtol=1e-8, atol=1e-12)
+    assert placed.above(world) <= 0 < placed.above(centre + turn[2:])

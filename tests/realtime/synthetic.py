@@ -43,7 +43,8 @@ def random_surface(*, rank: int = 5, **kind: bool) -> Surface:
     model, rng = random_model(**kind), np.random.default_rng(5)
     x, y = (np.linspace(-side, side, 9) for side in model.sides)
     flat = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    points = np.vstack([np.column_stack([flat, np.full(len(flat), z)]) for z in (0.0, -model.thickness)])
+    heights = np.array([model.face.at(model.table, x, y).height for x, y in flat.tolist()])
+    points = np.vstack([np.column_stack([flat, heights + z]) for z in (0.0, -model.thickness)])
     corner = np.add.outer(9 * np.arange(8), np.arange(8)).ravel()
     face = np.vstack(
         [np.column_stack([corner, corner + 1, corner + 10]), np.column_stack([corner, corner + 10, corner + 9])]

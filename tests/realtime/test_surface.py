@@ -8,13 +8,16 @@ import pytest
 
 from pipeline.export.file import write_model
 from pipeline.realtime import ModelError, load
-from pipeline.realtime.contact import Disc, Place, ball, cone
-from pipeline.realtime.surface import _MOMENTS, _below, _on_face, surface_of
+from pipeline.realtime.contact import Bonded, Disc, Place, ball, blade, cone
+from pipeline.realtime.near import _MOMENTS, Footprint, boussinesq, on_face
+from pipeline.realtime.surface import surface_of
 from tests.realtime.synthetic import random_surface, write_random, write_surface
 
 POISSON = 0.4
 PLANE = 1 / (1 - POISSON**2)
 SHAPES = {"disc": Disc(2e-3), "sphere": ball(0.4), "cone": cone(1.2, 5e-3)}
+# F/(E* d) of a frictionless rectangle six times as long as wide, in units of 2 (l w)^½ (half sides).
+RECTANGLE_6 = 1.354
 AT = (0.011, 0.007, 0.0)
 
 
@@ -24,7 +27,7 @@ def test_the_face_leaves_the_tool_without_a_step(name):
     depth = 2e-6 if name == "sphere" else 2e-4  # of a large ball, which Hertz's paraboloid is
     contact = SHAPES[name].press(depth, Place(0.0, 0.0, 0.0, none, none, none, PLANE), 1.0)
     a = contact.radius
-    sunk, share = _on_face(name, np.array([a]), a, PLANE)
+    sunk, share = on_face(name, np.array([a]), a, PLANE)
     rise = {"disc": 0.0, "sphere": a**2 / 0.8, "cone": a / tan(1.2)}[name]
     assert contact.force * sunk[0] == pytest.approx(depth - rise, rel=1e-4)
     assert share[0] == pytest.approx(1.0)
@@ -34,9 +37,9 @@ def test_the_face_leaves_the_tool_without_a_step(name):
 @pytest.mark.parametrize("name", SHAPES)
 def test_far_from_a_contact_its_force_and_second_moment_are_what_is_seen(name):
     a, rho = 1e-3, np.array([4e-3, 8e-3])
-    sunk, share = _on_face(name, rho, a, PLANE)
+    sunk, share = on_face(name, rho, a, PLANE)
     away = np.column_stack([rho, 0 * rho, 0 * rho])
-    found = _below(away, POISSON, _MOMENTS[name] * a**2)
+    found = boussinesq(away, POISSON, _MOMENTS[name] * a**2)
     aside = (1 - 2 * POISSON) * (1 + POISSON) / (2 * pi) * share / rho
     np.testing.assert_array_less(np.abs(found[:, 2] + sunk) / sunk, 0.4 * (a / rho) ** 4)
     np.testing.assert_allclose(-found[:, 0], aside, rtol=1e-9)
@@ -46,8 +49,8 @@ def test_below_the_face_a_ring_of_forces_does_what_its_second_moment_tells():
     away, a = np.array([[0.02, 0.01, -0.015], [0.004, -0.02, -0.02]]), 2e-3
     angle = 2 * pi * np.arange(24) / 24
     ring = np.stack([a * np.cos(angle), a * np.sin(angle), 0 * angle], axis=1)
-    known = np.mean([_below(away - place, POISSON, 1e-30) for place in ring], axis=0)
-    point, found = (_below(away, POISSON, square) for square in (1e-30, a**2))
+    known = np.mean([boussinesq(away - place, POISSON, 1e-30) for place in ring], axis=0)
+    point, found = (boussinesq(away, POISSON, square) for square in (1e-30, a**2))
     assert np.abs(found - known).max() < 0.03 * np.abs(point - known).max()
 
 
@@ -65,6 +68,69 @@ def test_the_contact_has_the_shape_of_the_tool_in_any_frame(turned):
     local = model.axes @ (at - model.origin)
     _, other = plain.press("sphere", at=local, depth=3e-4, radius=6e-3)
     np.testing.assert_allclose(moved @ model.axes.T, other, atol=1e-9)
+
+
+def test_a_blade_is_seen_as_what_presses_along_its_edge():
+    foot = Footprint.of(blade(6e-3, 1e-3, 0.4), 0.0)
+    along, across = np.array([np.cos(0.4), np.sin(0.4)]), np.array([-np.sin(0.4), np.cos(0.4)])
+    own = foot.centres @ along
+    assert np.abs(foot.centres @ across).max() < 1e-15
+    assert own.mean() == pytest.approx(0.0, abs=1e-15)
+    assert (own**2).mean() + foot.a**2 / 3 == pytest.approx(along @ foot.spread @ along)
+    assert foot.a == pytest.approx(0.5e-3)
+    # On the edge's line, and across it, the sum of discs goes over into a force and its second moments.
+    for direction in (along, across):
+        away = np.append(3.99 * foot.reach * direction, 0.0)
+        near, far = (foot.field(np.array([scale * away]), POISSON, 0.0)[0, 2] for scale in (1.0, 1.01))
+        assert 1.01 * far == pytest.approx(near, rel=0.03)
+    # Beside its long edge the face is nearly as deep as it is below, by the force of a rectangle (E = 1, d = 1).
+    force = 2 * np.sqrt(3e-3 * 0.5e-3) * PLANE * RECTANGLE_6
+    beside = np.outer([-1.5e-3, 0.0, 1.5e-3], along) + 0.55e-3 * across
+    sunk = -foot.field(np.column_stack([beside, np.zeros(3)]), POISSON, 1e-9)[:, 2] * force
+    assert np.all((sunk > 0.7) & (sunk < 1.0)), sunk
+    inside = np.append(np.outer(np.linspace(-0.8, 0.8, 9) * 3e-3, along), np.zeros((9, 1)), axis=1)
+    assert list(foot.within(np.vstack([inside, [[0.0, 2e-3, 0.0]]]))) == list(range(9))
+
+
+def test_tissue_that_sticks_is_not_drawn_to_the_edge_and_is_far_away_like_any_other():
+    a = 2e-3
+    plain, bonded = (Footprint.of(tool(a), a) for tool in (Disc, Bonded))
+    rho = np.array([a, 1.5 * a, 40 * a])
+    away = np.column_stack([rho, 0 * rho, 0 * rho])
+    slides, sticks = (foot.field(away, POISSON, 1e-9) for foot in (plain, bonded))
+    assert sticks[0, 0] == 0.0
+    np.testing.assert_array_less(np.abs(sticks[:, 0]), np.abs(slides[:, 0]))
+    np.testing.assert_allclose(sticks[2], slides[2], rtol=1e-3)
+
+
+def test_a_bent_face_has_the_plane_next_to_the_tool_and_the_half_space_far_away():
+    a = 2e-3
+    foot = Footprint.of(Disc(a), a)
+    rho = np.array([1.2 * a, 2 * a])
+    bent = np.column_stack([rho, 0 * rho, -(rho**2) / 0.08])
+    flat = bent * (1, 1, 0)
+    less = boussinesq(bent, POISSON, 2 / 3 * a**2) - boussinesq(flat, POISSON, 2 / 3 * a**2)
+    np.testing.assert_allclose(foot.field(bent, POISSON, 1e-9), foot.field(flat, POISSON, 1e-9) + less)
+    edge = np.array([[4 * a - 1e-9, 0, -1e-4], [4 * a + 1e-9, 0, -1e-4]])
+    near, far = foot.field(edge, POISSON, 1e-9)
+    np.testing.assert_allclose(near, far, rtol=5e-3)
+    assert np.isfinite(foot.field(np.array([[0, 0, 0.01], [0, 0, -0.01], [1e-3, 0, 0.01]]), POISSON, 1e-9)).all()
+
+
+@pytest.mark.parametrize(("tool", "sizes"), [("disc", {"radius": 2e-3}), ("sphere", {"radius": 6e-3})])
+def test_what_is_seen_of_a_curved_face_follows_the_tool(tool, sizes):
+    surface = random_surface(curved=True)
+    model, depth = surface.model, 3e-4
+    inside = np.flatnonzero(np.hypot(*surface.points[:81, :2].T) < 0.01)
+    for number in inside[:3]:
+        at = surface.points[number]
+        spot = model.face.at(model.table, *at[:2].tolist())
+        at = np.array([*at[:2], spot.height])  # of single precision
+        touch, moved = surface.press(tool, at=at, depth=depth, **sizes)
+        assert touch.status == "ok"
+        assert moved[number] @ spot.normal == pytest.approx(-depth, rel=1e-3)
+    touch, moved = surface.press(tool, at=at + 1e-3 * spot.normal, depth=depth, **sizes)
+    assert (touch.status, np.isnan(moved).all()) == ("off", True)
 
 
 def test_no_touch_moves_nothing_and_a_refusal_shows_nothing():

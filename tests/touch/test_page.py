@@ -15,8 +15,9 @@ from tests.realtime.synthetic import random_surface, write_random, write_surface
 from tests.report.browser import CHROMIUM, Browser
 
 in_browser = pytest.mark.skipif(CHROMIUM is None and not os.environ.get("CI"), reason="chromium is not installed")
-KINDS = ({}, {"is_round": True}, {"turned": True})
-SHAPES = ("disc", "sphere", "cone")
+KINDS = ({}, {"is_round": True}, {"turned": True}, {"curved": True}, {"curved": True, "turned": True, "is_even": False})
+SIZES = ("radius", "angle", "width", "turn")
+SHAPES = ("disc", "sphere", "cone", "blade", "bonded")
 
 
 @pytest.fixture(scope="module")
@@ -54,12 +55,16 @@ def told(browser, name):
 def queries(model, count):
     rng = np.random.default_rng(8)
     for number in range(count):
-        tool = SHAPES[number % 3]
+        tool = SHAPES[number % 5]
         x, y = rng.uniform(-1.05, 1.05, 2) * model.table.reach
-        at = model.origin + x * model.axes[0] + y * model.axes[1]
+        at = model.origin + np.array([x, y, model.face.at(model.table, x, y).height]) @ model.axes
+        turn, size = rng.uniform(0, 7), float(rng.uniform(0.5, 2))
         yield {
-            "tool": tool, "at": at.tolist(), "depth": float(rng.uniform(-5e-5, 1e-3)), "angle": 1.1,
-            "radius": {"disc": 2e-3, "sphere": 6e-3, "cone": 5e-3}[tool] * float(rng.uniform(0.5, 2)),
+            "tool": "disc" if tool == "bonded" else tool, **({"contact": tool} if tool == "bonded" else {}),
+            "at": at.tolist(), "depth": float(rng.uniform(-5e-5, 1e-3)), "angle": 1.1,
+            "radius": {"sphere": 6e-3, "cone": 5e-3}.get(tool, 2e-3) * size,
+            "length": 4e-3 * size, "width": 4e-3 * float(rng.uniform(0.015, 1)),
+            "along": [np.cos(turn), np.sin(turn), 0.1],
             "young": float(rng.uniform(1e3, 1e5)), "poisson": float(rng.uniform(0.29, 0.5)),
         }  # fmt: skip
 
@@ -69,6 +74,9 @@ def queries(model, count):
 def test_numbers_are_those_of_numpy(browser, tmp_path, kind):
     surface, path = opened(browser, tmp_path, **kind)
     asked = list(queries(surface.model, 600))
+    wild = [asked[0] | {name: value} for name in ("radius", "depth", "young", "poisson") for value in (0.0, -1.0, 1e9)]
+    wild += [asked[3] | change for change in ({"length": 0.0}, {"width": 1e-9}, {"along": [0.0, 0.0, 0.0]})]
+    asked += [*wild, asked[0] | {"tool": "wedge"}, asked[0] | {"contact": "glued"}]
     plain = "({status, force, error, stiffness, radius}) => [status, ...force, error, stiffness, radius]"
     found = browser.ask(f"{json.dumps(asked)}.map(q => page.model.query(q)).map({plain})")
     seen = set()
@@ -81,7 +89,7 @@ def test_numbers_are_those_of_numpy(browser, tmp_path, kind):
             scale = [*[np.linalg.norm(touch.force)] * 3, *known[3:]]
             assert np.all(np.abs(np.array(numbers) - known) <= 1e-10 * np.array(scale))
     assert seen >= {"ok", "lost", "outside", "poisson", "large"}
-    for query in [q for q in asked if surface.model.query(**q).status == "ok"][:6]:
+    for query in [q for q in asked if surface.model.query(**q).status == "ok"][:7]:
         moved = browser.ask(
             f"(q => {{ page.surface.press(q, page.model.query(q), false); const {{moved, n}} = page.surface; "
             f"return Array.from(moved.subarray(0, 3 * n)); }})({json.dumps(query)})"
@@ -94,25 +102,30 @@ def test_numbers_are_those_of_numpy(browser, tmp_path, kind):
 
 
 @in_browser
-def test_a_mouse_moves_the_tool_on_the_face_and_turns_the_body_beside_it(browser, tmp_path):
-    surface, _ = opened(browser, tmp_path)
+@pytest.mark.parametrize("kind", [{}, {"curved": True}])
+def test_a_mouse_moves_the_tool_on_the_face_and_turns_the_body_beside_it(browser, tmp_path, kind):
+    surface, _ = opened(browser, tmp_path, **kind)
+    model = surface.model
     assert browser.ask("document.title") == "a < b"
     change(browser, x=0, y=0, depth=0.3, radius=2)
     place = browser.ask(
-        "(([right, up, back], c) => { const at = [0, 0, 0].map((v, i) => v - c.target[i]); const s = 1 / c.scale();"
-        "return [c.canvas.clientWidth / 2 + s * dot(at, right), c.canvas.clientHeight / 2 - s * dot(at, up)]; })"
+        "(([right, up, back], c) => { const at = [0, 0, page.heightAt(0, 0)].map((v, i) => v - c.target[i]);"
+        "const [s, {canvas}] = [1 / c.scale(), c];"
+        "return [canvas.clientWidth / 2 + s * dot(at, right), canvas.clientHeight / 2 - s * dot(at, up)]; })"
         "(page.camera.basis(), page.camera)"
     )
     drag(browser, place, (place[0] + 40, place[1]))
     x, y = (browser.ask(f"document.querySelector('[name={name}]').valueAsNumber") for name in "xy")
     assert np.hypot(x, y) == pytest.approx(40 * browser.ask("page.camera.scale()"), rel=0.3)
-    touch = surface.model.query("disc", radius=2e-3, depth=3e-4, at=(1e-3 * x, 1e-3 * y, 0.0))
-    assert told(browser, "force") == f"{touch.force[2]:.3g} N"
+    spot = model.face.at(model.table, 1e-3 * x, 1e-3 * y)
+    touch = model.query("disc", radius=2e-3, depth=3e-4, at=(1e-3 * x, 1e-3 * y, spot.height))
+    force = float(told(browser, "force").removesuffix(" N"))
+    assert force == pytest.approx(touch.force @ spot.normal, rel=6e-3)  # of three digits
     assert told(browser, "error") == f"± {100 * touch.force_error:.2g} %"
     angle = browser.ask("page.camera.azimuth")
     drag(browser, (40, 600), (100, 600))
     assert browser.ask("page.camera.azimuth") != angle
-    assert told(browser, "force") == f"{touch.force[2]:.3g} N"
+    assert float(told(browser, "force").removesuffix(" N")) == force
     assert browser.messages == []
 
 
@@ -135,9 +148,16 @@ def test_the_dent_is_seen_and_outside_the_region_no_number_is(browser, tmp_path)
     change(browser, x=33)
     assert "outside" in told(browser, "status")
     assert [told(browser, name) for name in ("force", "error", "stiffness", "contact")] == ["–", "", "–", "–"]
-    change(browser, x=0, tool="cone")
-    assert told(browser, "status") == ""
-    assert told(browser, "force").endswith(" N")
+    for depth, tool in enumerate(("sphere", "cone", "blade", "bonded disc"), 4):
+        change(browser, x=0, tool=tool, depth=depth / 10)
+        assert told(browser, "force") != "–"
+        label = browser.ask("document.querySelector('[name=depth]').previousElementSibling.textContent")
+        assert label == f"{depth / 10:g}"
+        assert told(browser, "status") == ""
+        assert told(browser, "force").endswith(" N")
+        sizes = [browser.ask(f"document.querySelector('[name={name}]').parentElement.hidden") for name in SIZES]
+        assert sizes == [tool == "blade", tool != "cone", tool != "blade", tool != "blade"]
+    assert browser.messages == []
 
 
 @in_browser

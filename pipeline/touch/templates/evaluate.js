@@ -1,7 +1,9 @@
 "use strict";
 // The forces of pipeline/realtime/, in the same order and under the same names; SI units, E = 1 within.
 
-const LEAST = { TOUCHING: 1e-12, SMALLEST: 1e-6, STEPS: 60, SAME: 4e-16, TERMS: 40, NEGLIGIBLE: 1e-17 };
+const LEAST = {
+  TOUCHING: 1e-12, SMALLEST: 1e-6, STEPS: 60, SAME: 4e-16, TERMS: 40, NEGLIGIBLE: 1e-17, SLENDER: 0.02, SOFT: 1e-12, STICKS: 0.1,
+};
 
 // T_n, T_n' and T_n''.
 function polynomials(at, count) {
@@ -17,29 +19,32 @@ function polynomials(at, count) {
 const inner = (a, b) => a.reduce((sum, value, i) => sum + value * b[i], 0);
 const middleOf = ([low, high], poisson) => (high === low ? 0 : (2 * poisson - low - high) / (high - low));
 
-// c, h and g² at a place, with their slopes.
+// c, h and g² at a place, with their slopes; and the face.
 class Table {
   constructor(told) {
-    Object.assign(this, told); // reciprocal, curvature (ν, v, u), c_ref, reach, is_round, even, leans, poisson_range
+    // reciprocal, curvature (ν, v, u), tensors (7, ν, v, u), c_ref, reach, is_round, even, leans, poisson_range
+    Object.assign(this, told);
   }
   holds(x, y) {
     const [a, b] = this.reach;
     return this.is_round ? x ** 2 + y ** 2 <= a ** 2 : Math.abs(x) <= a && Math.abs(y) <= b;
   }
-  at(x, y, poisson) {
+  // Of coefficients (v, u): the value, its slope, and its second derivatives xx, xy, yy.
+  local(flat, x, y) {
     const [a, b] = this.reach;
     const [evenX, evenY] = this.even;
     const u = this.is_round ? (2 * (x ** 2 + y ** 2)) / a ** 2 - 1 : evenX ? 2 * (x / a) ** 2 - 1 : x / a;
     const v = this.is_round ? 0 : evenY ? 2 * (y / b) ** 2 - 1 : y / b;
-    const [counts, rows, columns] = [this.reciprocal.length, this.reciprocal[0].length, this.reciprocal[0][0].length];
-    const [across] = polynomials(middleOf(this.poisson_range, poisson), counts);
-    const [left, right] = [polynomials(v, rows), polynomials(u, columns)];
-    const along = (values) => {
-      const flat = left.map((row) =>
-        right.map((column) =>
-          inner(across, values.map((of) => inner(row, of.map((line) => inner(line, column)))))));
-      return this.slopes(flat, x, y);
-    };
+    const [left, right] = [polynomials(v, flat.length), polynomials(u, flat[0].length)];
+    return this.slopes(left.map((row) => {
+      const sums = flat[0].map((_, i) => row.reduce((sum, value, j) => sum + value * flat[j][i], 0));
+      return right.map((column) => inner(column, sums));
+    }), x, y);
+  }
+  at(x, y, poisson, whole) {
+    const [across] = polynomials(middleOf(this.poisson_range, poisson), this.reciprocal.length);
+    const along = (values) =>
+      this.local(values[0].map((line, j) => line.map((_, i) => inner(across, values.map((of) => of[j][i])))), x, y);
     const [t, [tx, ty], [txx, txy, tyy]] = along(this.reciprocal);
     const [q, [qx, qy]] = along(this.curvature);
     if (!(t > 0)) return null;
@@ -48,11 +53,13 @@ class Table {
     const cxy = (2 * tx * ty) / t ** 3 - txy / t ** 2;
     const cyy = (2 * ty ** 2) / t ** 3 - tyy / t ** 2;
     const lean = this.leans ? 1 : 0;
+    const hessian = [[cxx, cxy], [cxy, cyy]].map((row) => row.map((value) => lean * value));
     return {
-      c: 1 / t - this.c_ref, h: q / t ** 3, tilt: lean * 0.25 * (slopeC[0] ** 2 + slopeC[1] ** 2), slopeC,
+      c: 1 / t - this.c_ref, h: q / t ** 3, tilt: lean * 0.25 * (slopeC[0] ** 2 + slopeC[1] ** 2), slopeC, poisson,
       slopeH: [qx / t ** 3 - (3 * q * tx) / t ** 4, qy / t ** 3 - (3 * q * ty) / t ** 4],
-      slopeTilt: [cxx * slopeC[0] + cxy * slopeC[1], cxy * slopeC[0] + cyy * slopeC[1]].map((s) => lean * 0.5 * s),
-      plane: 1 / (1 - poisson ** 2),
+      slopeTilt: hessian.map((row) => 0.5 * inner(row, slopeC)), hessian, lean: slopeC.map((value) => lean * value),
+      plane: 1 / (1 - poisson ** 2), bend: 0, slopeBend: [0, 0],
+      ...(whole ? this.shape(this.tensors.map(along), x, y, t, [tx, ty]) : {}),
     };
   }
   slopes([[f, fu, fuu], [fv, fuv], [fvv]], x, y) {
@@ -66,126 +73,60 @@ class Table {
     const [vy, vyy] = this.even[1] ? [(4 / b ** 2) * y, 4 / b ** 2] : [1 / b, 0];
     return [f, [fu * ux, fv * vy], [fuu * ux ** 2 + fu * uxx, fuv * ux * vy, fvv * vy ** 2 + fv * vyy]];
   }
-}
-
-function tangent(a, { c, h, plane }) {
-  return 0.5 / (plane * a) + c + (a ** 2 / 3) * h - (2 / 45) * plane * h ** 2 * a ** 5;
-}
-
-// Each presses to a depth: force, aside, stiffness, radius and the mean of ρ², or nothing if the contact is too large.
-class Disc {
-  constructor(radius) {
-    this.radius = radius;
+  // A₁ and A_xy, their slopes, and R.
+  shape(others, x, y, t, slopeT) {
+    const known = this.factors(x, y);
+    const values = others.map(([f], i) => known[i][0] * f);
+    const slopes = others.map(([f, slope], i) => slope.map((value, k) => known[i][0] * value + f * known[i][1][k]));
+    const bent = [0, 1].map((i) => values[i] / t ** 3);
+    const bentSlopes = [0, 1].map((i) => slopes[i].map((value, k) => value / t ** 3 - (3 * bent[i] * slopeT[k]) / t));
+    const [xz, yz, mean, half, xy] = values.slice(2).map((value) => value / t);
+    return { bent, bentSlopes, regular: [[mean + half, xy, xz], [xy, mean - half, yz], [xz, yz, 1 / t - this.c_ref]] };
   }
-  press(depth, place, most) {
-    const { radius: a } = this;
-    const { h, plane } = place;
-    if (a > most) return null;
-    const force = depth / (tangent(a, place) - (4 / 3) * plane * a ** 3 * place.tilt);
-    const aside = [0, 1].map((i) => {
-      const slope = place.slopeC[i] + place.slopeH[i] * (a ** 2 / 3 - (4 / 45) * plane * h * a ** 5);
-      return 0.5 * force ** 2 * (slope - (4 / 3) * plane * a ** 3 * place.slopeTilt[i]);
-    });
-    const square = (2 / 3) * a ** 2 - (8 / 45) * plane * h * a ** 5;
-    return { force, aside, stiffness: force / depth, radius: a, square };
+  // What each of the seven tables is times, with its slope.
+  factors(x, y) {
+    const [a, b] = this.reach;
+    const [xi, ofX] = this.even[0] ? [x / a, 1 / a] : [1, 0];
+    const [eta, ofY] = this.even[1] ? [y / b, 1 / b] : [1, 0];
+    const one = [1, [0, 0]];
+    const twist = [2 * xi * eta, [2 * eta * ofX, 2 * xi * ofY]];
+    const apart = this.is_round ? [xi ** 2 - eta ** 2, [2 * xi * ofX, -2 * eta * ofY]] : one;
+    return [apart, twist, [xi, [ofX, 0]], [eta, [0, ofY]], one, apart, twist];
   }
 }
 
-const NONE = { depth: -1, slope: 0 };
-
-class Round {
-  press(depth, place, most) {
-    let [low, high] = [0, Math.min(most, this.limit)];
-    if (!(this.at(high, place).depth >= depth)) return null;
-    let a = Math.min(this.first(depth), 0.5 * high);
-    for (let i = 0; i < LEAST.STEPS; i++) {
-      const found = this.at(a, place);
-      if (found.depth < depth) low = a;
-      else high = a;
-      let step = found.slope > 0 ? a - (found.depth - depth) / found.slope : low;
-      if (!(low < step && step < high)) step = 0.5 * (low + high);
-      if (Math.abs(step - a) <= LEAST.SAME * a) break;
-      a = step;
-    }
-    return this.contact(a, this.at(a, place), place);
+// The face at a place: height, slope, second derivatives, mean curvature; and its own directions, the normal last.
+class Spot {
+  constructor(height, slope, [xx, xy, yy], bend, slopeBend) {
+    const steep = Math.hypot(1, ...slope);
+    const normal = [-slope[0] / steep, -slope[1] / steep, 1 / steep];
+    const size = Math.hypot(normal[2], normal[0]);
+    const first = [normal[2] / size, 0, -normal[0] / size];
+    const second = [
+      normal[1] * first[2] - normal[2] * first[1], normal[2] * first[0] - normal[0] * first[2],
+      normal[0] * first[1] - normal[1] * first[0],
+    ];
+    Object.assign(this, { height, slope, steep, bend, slopeBend, bends: [[xx, xy], [xy, yy]], turn: [first, second, normal] });
   }
-  at(a, { plane, h, c, tilt, ...rest }) {
-    const [sunk, steep, area, moment] = this.profile(a);
-    const own = 1 - (2 / 3) * plane * h * a ** 3;
-    if (own <= 0) return NONE;
-    const force = (2 * plane * (a * sunk - area)) / own;
-    const square = 4 * plane * ((a ** 3 / 3) * sunk - moment) + (4 / 15) * plane * h * force * a ** 5;
-    const growth = 2 * plane * a * steep + 2 * plane * h * force * a ** 2;
-    if (growth <= 0 || force <= 0) return NONE;
-    const power = ((own / growth) * force) / a;
-    const effect = (-2 / 3) * plane * tilt * a ** 3 * force * (2 + 3 * power);
-    const depth = sunk + 0.5 * h * force * a ** 2 + c * force + 0.25 * h * square + effect;
-    const compliance = tangent(a, { c, h, plane, ...rest }) + (effect * (1 + 3 * power)) / force;
-    return { depth, slope: (compliance * growth) / own, force, square, growth, compliance };
+  // On a tool whose tip is at p - d n.
+  force({ force, aside }, depth) {
+    const { slope, steep, bends } = this;
+    const metric = [0, 1].map((i) =>
+      [0, 1].map((j) => (i === j ? 1 : 0) + slope[i] * slope[j] + (depth / steep) * bends[i][j]));
+    const apart = metric[0][0] * metric[1][1] - metric[0][1] * metric[1][0];
+    const [x, y] = [0, 1].map((i) => (metric[1 - i][1 - i] * aside[i] - metric[i][1 - i] * aside[1 - i]) / apart);
+    return this.turn[2].map((value, i) => force * value + [x, y, slope[0] * x + slope[1] * y][i]);
   }
-  contact(a, { force, square: moment, growth, compliance }, { plane, tilt, slopeC, slopeH, slopeTilt }) {
-    const square = moment / force;
-    const ofH = 0.25 * force ** 2 * square + ((4 / 3) * plane ** 2 * tilt * a ** 5 * force ** 3) / growth;
-    const ofTilt = (-2 / 3) * plane * a ** 3 * force ** 2;
-    const aside = [0, 1].map((i) => 0.5 * force ** 2 * slopeC[i] + ofH * slopeH[i] + ofTilt * slopeTilt[i]);
-    return { force, aside, stiffness: 1 / compliance, radius: a, square };
-  }
-}
-
-class Ball extends Round {
-  constructor(radius) {
-    super();
-    Object.assign(this, { radius, limit: 0.6 * radius });
-  }
-  profile(s) {
-    const t = (s / this.radius) ** 2;
-    let power = t;
-    const sums = [0, 0, 0, 0];
-    for (let k = 0; k < LEAST.TERMS; k++) {
-      const term = power / (2 * k + 1);
-      sums[0] += term;
-      sums[1] += (2 * k + 2) * term;
-      sums[2] += term / (2 * k + 3);
-      sums[3] += term / (2 * k + 5);
-      if (term <= LEAST.NEGLIGIBLE * sums[0]) break;
-      power *= t;
-    }
-    const { radius } = this;
-    return [radius * sums[0], (radius / s) * sums[1], radius * s * sums[2], radius * s ** 3 * sums[3]];
-  }
-  first(depth) {
-    return Math.sqrt(this.radius * depth);
-  }
-}
-
-class Cone extends Round {
-  constructor(angle, radius) {
-    super();
-    Object.assign(this, { limit: radius, rise: 1 / Math.tan(angle) });
-  }
-  profile(s) {
-    const steep = 0.5 * Math.PI * this.rise;
-    return [steep * s, steep, (steep * s ** 2) / 2, (steep * s ** 4) / 4];
-  }
-  first(depth) {
-    return ((2 / Math.PI) * depth) / this.rise;
-  }
-}
-
-// The tool of a query, or the status of one that is none.
-function toolOf(name, radius, angle) {
-  if (!["disc", "sphere", "cone"].includes(name)) return "tool";
-  if (!Number.isFinite(radius) || (name === "cone" && !Number.isFinite(angle))) return "tool";
-  if (radius < LEAST.SMALLEST || (name === "cone" && !(0.01 <= angle && angle <= Math.PI / 2 - 0.001))) return "input";
-  return name === "disc" ? new Disc(radius) : name === "sphere" ? new Ball(radius) : new Cone(angle, radius);
 }
 
 const NOTHING = { force: [NaN, NaN, NaN], error: NaN, stiffness: NaN, radius: NaN };
 
 class Model {
   constructor(told) {
-    Object.assign(this, told); // origin, axes (rows x, y, outward), sides, thickness, young, poisson, largest, bar, off
+    // origin, axes (rows x, y, outward), sides, thickness, young, poisson, largest, bar, off, height, bend
+    Object.assign(this, told);
     this.table = new Table(told);
+    this.isFlat = ![told.height, told.bend].flat(2).some((value) => value !== 0);
   }
   local(at) {
     return this.axes.map((axis) => inner(axis, at.map((value, i) => value - this.origin[i])));
@@ -193,32 +134,45 @@ class Model {
   body(local) {
     return [0, 1, 2].map((i) => local.reduce((sum, value, row) => sum + value * this.axes[row][i], 0));
   }
+  spot(x, y) {
+    if (this.isFlat) return new Spot(0, [0, 0], [0, 0, 0], 0, [0, 0]);
+    const [bend, slopeBend] = this.table.local(this.bend, x, y);
+    return new Spot(...this.table.local(this.height, x, y), bend, slopeBend);
+  }
   room(x, y) {
     const [a, b] = this.sides;
     if (this.is_round) return Math.min(a - Math.hypot(x, y), this.thickness);
     return Math.min(a - Math.abs(x), b - Math.abs(y), this.thickness);
   }
-  query({ tool, radius = NaN, angle = NaN, at, depth, young = this.young, poisson = this.poisson }) {
+  query(asked) {
+    const { at, depth, young = this.young, poisson = this.poisson } = asked;
     const refused = (status) => ({ status, ...NOTHING });
-    const shape = toolOf(tool, radius, angle);
+    const shape = toolOf(asked, this);
     if (typeof shape === "string") return refused(shape);
     const [x, y, z] = this.local(at);
     if (![x, y, z, depth, poisson].every(Number.isFinite) || !(young > 0 && young < Infinity)) return refused("input");
     if (!this.table.holds(x, y)) return refused("outside");
-    if (Math.abs(z) > this.off) return refused("off");
+    const spot = this.spot(x, y);
+    if (Math.abs(z - spot.height) > this.off) return refused("off");
     if (!(this.poisson_range[0] <= poisson && poisson <= this.poisson_range[1])) return refused("poisson");
     if (depth >= this.thickness) return refused("deep");
     if (depth <= LEAST.TOUCHING) return { status: "lost", force: [0, 0, 0], error: 0, stiffness: 0, radius: 0 };
-    const [room, place] = [this.room(x, y), this.table.at(x, y, poisson)];
+    const [room, place] = [this.room(x, y), this.table.at(x, y, poisson, shape.isWhole)];
     if (!place) return refused("damaged");
+    if (!this.isFlat) Object.assign(place, { bend: spot.bend, slopeBend: spot.slopeBend });
     const contact = shape.press(depth, place, this.largest * room);
     if (!contact) return refused("large");
-    const [ofC, ofH, beyond, ofF] = this.bar;
-    const uncertain = (ofC + beyond * (contact.radius / room) ** 4) / room + ofH * Math.abs(place.h) * contact.square;
-    const error = contact.stiffness * uncertain + ofF;
-    const force = this.body([...contact.aside, contact.force].map((value) => young * value));
+    const error = contact.stiffness * this.uncertain(place, room, contact, shape) + this.bar[3];
+    const force = this.body(spot.force(contact, depth).map((value) => young * value));
     const isRight = [...force, error].every(Number.isFinite) && contact.force > 0 && contact.stiffness > 0;
     if (!isRight) return refused("damaged");
-    return { status: "ok", force, error, stiffness: young * contact.stiffness, radius: contact.radius };
+    return { status: "ok", force, error, stiffness: young * contact.stiffness, radius: contact.radius, spot, shape };
+  }
+  // How far c may be off, what is left out of it included.
+  uncertain(place, room, { radius, square }, shape) {
+    const [ofC, ofH, beyond] = this.bar;
+    const bent = Math.abs(place.h) + (place.bent ? 2 * Math.hypot(...place.bent) : 0);
+    const pulled = shape instanceof Bonded ? (LEAST.STICKS * (1 - 2 * place.poisson) * radius) / room : 0;
+    return (ofC + beyond * (radius / room) ** 4 + pulled) / room + ofH * bent * square;
   }
 }

@@ -12,6 +12,14 @@ const ARROW = 0.35;
 const THICK = 0.008;
 // The error bar that fills its gauge.
 const DOUBT = 0.05;
+// Steps along the eye's ray, and halvings of the last one, that find where it meets a face that is not flat.
+const STEPS = 60;
+const HALVINGS = 30;
+// Points along the border of the region, so far above the face, in units of the body's size.
+const BORDER = 200;
+const ABOVE = 0.002;
+// What is asked for by one tool, or by all but one.
+const OF_ONE = { angle: "cone", length: "blade", width: "blade", turn: "blade" };
 
 class Page {
   constructor(told, arrays, gl) {
@@ -20,10 +28,12 @@ class Page {
     this.surface = new Surface(this.model, arrays, told.shape);
     this.canvas = gl.canvas;
     this.made = new Vertices();
+    this.heights = this.findHeights();
     this.scene = new Scene(gl, told.ink);
     this.scene.colour({ stops: told.stops, labels: null });
     this.largest = 0;
     this.size = told.radius;
+    this.scene.outline.fill(linesOf([this.border()]));
     this.listen();
     this.camera = new Camera(gl.canvas, told.eye, told.radius, 1e-3 * told.radius);
     this.camera.listen(() => this.redraw());
@@ -51,7 +61,7 @@ class Page {
     canvas.addEventListener("pointermove", (event) => {
       if (event.pointerId !== held) return;
       event.stopImmediatePropagation();
-      const place = this.onPlane(event);
+      const place = this.onFace(event);
       if (place) this.moveTo(place);
     });
     for (const end of ["pointerup", "pointercancel"]) {
@@ -60,20 +70,64 @@ class Page {
       });
     }
   }
-  // Where the eye's ray meets the plane of the face (mm), or nothing.
-  onPlane({ clientX, clientY }) {
-    const { camera, canvas } = this;
+  // Where the eye's ray meets the face (x and y, mm), or the plane of its lowest point; or nothing.
+  onFace({ clientX, clientY }) {
+    const { camera, canvas, heights: [low, high] } = this;
     const [right, up, back] = camera.basis();
     if (back[2] < 0.05) return null;
     const [dx, dy] = [clientX - canvas.clientWidth / 2, canvas.clientHeight / 2 - clientY].map((d) => d * camera.scale());
     const from = along(along(camera.target, dx, right), dy, up);
-    const hit = along(from, -from[2] / back[2], back);
-    return [hit[0], hit[1]];
+    const at = (z) => along(from, (z - from[2]) / back[2], back);
+    const isAbove = (z) => {
+      const [x, y] = at(z);
+      return z > this.heightAt(x, y);
+    };
+    let [last, z] = [high, high];
+    for (let i = 1; i <= STEPS && isAbove(z); i++) [last, z] = [z, high - ((high - low) * i) / STEPS];
+    for (let i = 0; i < HALVINGS && z < last; i++) {
+      const middle = (z + last) / 2;
+      if (isAbove(middle)) last = middle;
+      else z = middle;
+    }
+    return at(z).slice(0, 2);
+  }
+  // The height (mm) of the face at x and y (mm), beyond the region that of its border.
+  heightAt(x, y) {
+    const { model } = this;
+    return model.isFlat ? 0 : MM * model.spot(...this.inRegion(x, y)).height;
+  }
+  // The nearest place (m) of the region, but for rounding.
+  inRegion(x, y) {
+    const [a, b] = this.model.reach;
+    if (!this.model.is_round) return [between(-a, x / MM, a), between(-b, y / MM, b)];
+    const share = Math.min(1, (a * MM) / Math.max(Math.hypot(x, y), 1e-9));
+    return [(share * x) / MM, (share * y) / MM];
+  }
+  // The lowest and the highest point (mm) of the face.
+  findHeights() {
+    if (this.model.isFlat) return [0, 0];
+    const shares = Array.from({ length: 33 }, (_, i) => (i - 16) / 16);
+    const [a, b] = this.model.reach;
+    const found = shares.flatMap((x) => shares.map((y) => this.heightAt(MM * a * x, MM * b * y)));
+    return [Math.min(...found) - 1e-9, Math.max(...found) + 1e-9];
+  }
+  // The border of the region, a little above the face.
+  border() {
+    const { model } = this;
+    const [a, b] = model.reach;
+    return Array.from({ length: BORDER + 1 }, (_, i) => {
+      const angle = (2 * Math.PI * i) / BORDER;
+      const [c, s] = [Math.cos(angle), Math.sin(angle)];
+      const out = model.is_round ? 1 : 1 / Math.max(Math.abs(c), Math.abs(s));
+      const [x, y] = [0.9999 * a * c * out, 0.9999 * b * s * out];
+      const spot = model.spot(x, y);
+      return along([MM * x, MM * y, MM * spot.height], ABOVE * this.size, spot.turn[2]);
+    });
   }
   under(event) {
-    const place = this.onPlane(event);
+    const place = this.onFace(event);
     if (!place) return null;
-    const [a, b] = this.model.sides.map((side) => MM * side);
+    const [a, b] = (this.model.isFlat ? this.model.sides : this.model.reach).map((side) => MM * side);
     const [x, y] = place;
     const isOn = this.model.is_round ? Math.hypot(x, y) <= a : Math.abs(x) <= a && Math.abs(y) <= b;
     return isOn ? place : null;
@@ -95,10 +149,14 @@ class Page {
   get query() {
     const value = (name) => field(name).valueAsNumber;
     const { model } = this;
-    const place = model.body([value("x") / MM, value("y") / MM, 0]).map((part, i) => part + model.origin[i]);
+    const [x, y] = [value("x"), value("y")];
+    const place = model.body([x / MM, y / MM, this.heightAt(x, y) / MM]).map((part, i) => part + model.origin[i]);
+    const turn = value("turn") * DEGREE;
+    const [tool, contact] = field("tool").value.split(" ").reverse();
     return {
-      tool: field("tool").value, at: place, depth: value("depth") / MM, radius: value("radius") / MM,
-      angle: value("angle") * DEGREE, young: value("young") * 1e3, poisson: value("poisson"),
+      tool, ...(contact ? { contact } : {}), at: place, depth: value("depth") / MM, radius: value("radius") / MM,
+      angle: value("angle") * DEGREE, length: value("length") / MM, width: value("width") / MM,
+      along: model.body([Math.cos(turn), Math.sin(turn), 0]), young: value("young") * 1e3, poisson: value("poisson"),
     };
   }
   redraw() {
@@ -108,7 +166,8 @@ class Page {
   draw() {
     this.asked = false;
     const { query, model } = this;
-    field("angle").parentElement.hidden = query.tool !== "cone";
+    for (const [name, tool] of Object.entries(OF_ONE)) field(name).parentElement.hidden = query.tool !== tool;
+    field("radius").parentElement.hidden = query.tool === "blade";
     const began = performance.now();
     const touch = model.query(query);
     const isIn = touch.status === "ok";
@@ -144,31 +203,41 @@ class Page {
       data[first + 7] = FREE;
     }
   }
-  fillArrow({ at, depth }, { force, error }) {
-    const [x, y] = this.model.local(at).map((value) => MM * value);
+  // The face below the tool, and where its axis meets it (mm).
+  get foothold() {
+    const [x, y] = [field("x").valueAsNumber, field("y").valueAsNumber];
+    return { spot: this.model.spot(...this.inRegion(x, y)), at: [x, y, this.heightAt(x, y)] };
+  }
+  fillArrow({ depth }, { force, error }) {
+    const { spot, at } = this.foothold;
     const local = this.model.axes.map((axis) => inner(axis, force));
     const size = Math.hypot(...local);
     this.largest = Math.max(this.largest, size);
     const length = (ARROW * this.size * size) / this.largest;
-    arrow(this.made, [x, y, -MM * depth], local.map((value) => value / size), length, error, THICK * this.size);
+    const foot = along(at, -MM * depth, spot.turn[2]);
+    arrow(this.made, foot, local.map((value) => value / size), length, error, THICK * this.size);
   }
-  fillTool({ tool, at, depth, radius, angle }, isIn) {
+  fillTool(query, isIn) {
     const made = new Vertices();
-    const place = this.model.local(at).map((value) => MM * value);
-    const down = isIn || depth <= 0 ? -MM * depth : 0;
-    turned(made, profileOf(tool, MM * radius, angle), place, down, TOOL);
+    const { spot, at } = this.foothold;
+    const down = isIn || query.depth <= 0 ? -MM * query.depth : 0;
+    const [radius, length, width] = [query.radius, query.length, query.width].map((size) => MM * size);
+    const place = { at, turn: spot.turn, down };
+    if (query.tool === "blade") block(made, [length / 2, width / 2], field("turn").valueAsNumber * DEGREE, place);
+    else turned(made, profileOf(query.tool, radius, query.angle, spot.bend / MM), place);
     this.scene.gl.uniform3fv(this.scene.at("probe"), rgb(isIn ? this.told.ink.probe : this.told.ink.footprint));
     this.scene.tool.fill(made);
   }
   tell(query, touch, took) {
-    for (const name of ["x", "y", "depth", "radius", "angle", "young", "poisson"]) {
+    for (const { name } of document.querySelectorAll("#panel input[type=range]")) {
       field(name).previousElementSibling.textContent = short(field(name).valueAsNumber);
     }
     const isIn = touch.status === "ok";
     say("status", isIn ? "" : this.told.sentences[touch.status]);
     document.body.dataset.status = touch.status;
     const local = this.model.axes.map((axis) => inner(axis, touch.force));
-    const [normal, aside] = [local[2], Math.hypot(local[0], local[1])];
+    const normal = inner(this.foothold.spot.turn[2], local);
+    const aside = Math.sqrt(Math.max(inner(local, local) - normal ** 2, 0));
     const bar = document.querySelector("#gauge .bar");
     const whisker = document.querySelector("#gauge .whisker");
     const full = this.largest * 1.1 || 1;

@@ -1,0 +1,78 @@
+"""The meshed body of a model, with the forces that its visible surface is tabulated for."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from mpi4py import MPI
+
+from pipeline.export.compliance import coarse_mesh
+from pipeline.export.curved import curved_region
+from pipeline.export.region import Region
+from pipeline.export.scope import ExportError, Scope
+from pipeline.export.surface import Pressed
+from pipeline.mesh.distribute import BodyMesh, distribute
+from pipeline.mesh.of_case import mesh_arrays
+from pipeline.realtime.model import Model
+from pipeline.shapes.body import Layered
+from pipeline.solve.far_field import PointForce
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.placed_force import PlacedForce
+from pipeline.study.schema import Mesh
+
+Law = Callable[[float], MaterialLaw | None]
+# Elements of a curved body: in the region, in units of the study's radius, and elsewhere, of the cube root of the
+# volume; how far round the region's middle they are small, in units of half the region, and how they grow.
+_IN_REGION, _ELSEWHERE, _AROUND, _GROWTH = 0.9, 0.095, 1.2, 0.4
+# Next to a force, in units of the study's radius: where its loads are left out, and where R is not judged.
+_BLUNT, _NEXT = 0.1, 0.5
+# No part of a body may lie so straight above a place of its region (cosine of the angle to the normal).
+_STRAIGHT_ABOVE = 0.9
+
+
+def seen_body(scope: Scope, model: Model, margin: float) -> Pressed:
+    """Return the body of a model, with the forces on its face.
+
+    Raises:
+        ExportError: if part of it lies above its own region.
+        MeshError: if it cannot be meshed.
+    """
+
+    def law(poisson: float) -> MaterialLaw | None:
+        tissues = scope.tissues_at(poisson)
+        return MaterialLaw(*tissues) if tissues else None
+
+    if isinstance(scope.body, Layered):
+        region = Region.of(scope.body, margin)
+
+        def on_plane(place: tuple[float, float], poisson: float) -> PointForce:
+            return PointForce(poisson, (*place, 0.0), region.room(*place))
+
+        return Pressed(coarse_mesh(scope.case, region), region, on_plane, law)
+    return _curved(scope, model, law)
+
+
+def _curved(scope: Scope, model: Model, law: Law) -> Pressed:
+    radius = scope.case.probe.circumradius
+    region = curved_region(scope, model.thickness)
+
+    def on_face(place: tuple[float, float], poisson: float) -> PlacedForce:
+        spot = model.face.at(model.table, *place)
+        x, y, z = np.add(model.origin, [*place, spot.height]).tolist()
+        first, second, third = ((float(a), float(b), float(c)) for a, b, c in spot.turn)
+        return PlacedForce(poisson, (x, y, z), region.room(*place), (first, second, third), _BLUNT * radius)
+
+    mesh = _mesh(scope, region, radius)
+    points = np.asarray(mesh.mesh.geometry.x)
+    corners = [(x * region.reach[0], y * region.reach[1]) for x in (-0.7, 0.0, 0.7) for y in (-0.7, 0.0, 0.7)]
+    if max(on_face(place, scope.poisson).above(points) for place in corners) > _STRAIGHT_ABOVE:
+        raise ExportError("part of the body lies above its own region, so that what is seen of it is not known")
+    return Pressed(mesh, region, on_face, law, _NEXT * radius)
+
+
+def _mesh(scope: Scope, region: Region, radius: float) -> BodyMesh:
+    """Return a mesh that is fine enough in the region for loads that grow towards a force, and to be looked at."""
+    around, fine = _AROUND * max(region.reach), _IN_REGION * radius
+    coarse = max(fine, _ELSEWHERE * scope.body.volume ** (1 / 3))
+    mesh = Mesh.model_construct(epsilon=around, fine=fine, coarse=coarse, rim=fine, growth=_GROWTH)
+    return distribute(MPI.COMM_SELF, mesh_arrays(replace(scope.case, mesh=mesh), ()))

@@ -1,0 +1,177 @@
+"""What is seen next to a tool: the displacement of a half-space under it, for a force of one, in closed forms.
+
+On the face, ρ from the axis of a contact of radius a under a force F, E = 1 (K. L. Johnson, Contact Mechanics, ch. 3
+and 5; I. N. Sneddon, 1965):
+
+    disc    w = F/(πE*a)·asin(a/ρ),                                  P(ρ)/F = 1 - (1 - ρ²/a²)^½
+    ball    w = 3F/(4πE*a³)·((2a² - ρ²) asin(a/ρ) + a (ρ² - a²)^½),  P(ρ)/F = 1 - (1 - ρ²/a²)^(3/2)
+    cone    w = 2F/(πE*a²)·(a asin(a/ρ) + (ρ² - a²)^½ - ρ),          P(ρ)/F = 1 - (1 - ρ²/a²)^½ + ρ²/a² arcosh(a/ρ)
+
+beyond the contact, within which the face has the tool's shape; aside it moves by (1 - 2ν)(1 + ν) P(ρ)/(2πρ) towards
+the axis, P the force within ρ. Below the face, a contact is its force and its second moment; what of a curved face is
+next to a tool has the closed form of the plane that touches it there, and as much less as a point force tells for the
+way below that plane. A blade presses like discs along its edge, whose second moments are its own; tissue that sticks to
+a disc is not drawn towards it at its edge.
+"""
+
+from dataclasses import dataclass
+from math import ceil, cos, inf, pi, sin, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.realtime.contact import Ball, Blade, Bonded, Cone, Disc, Round
+
+Array = NDArray[np.float64]
+Tool = Disc | Round | Blade | Bonded
+# ∫ p ρ² of a contact, in units of F a².
+_MOMENTS = {"disc": 2 / 3, "sphere": 2 / 5, "cone": 1 / 3}
+# What is nearer to the axis than this, in units of a, is it.
+_AXIS = 1e-6
+# Up to so many radii of the contact, and no steeper below its plane, a curved face is next to a tool.
+_NEXT, _STEEP = 4.0, 1.0
+# Of the distance to the force: so far above the plane through it the field of a half-space goes, and no farther.
+_OVER = 0.95
+# A contact reaches no farther from its plane than this, in units of its radius.
+_BOWED = 0.7
+# A blade's discs are so many half widths apart, and so many at least and at most.
+_APART, _FEWEST, _MOST = 1.2, 4, 24
+
+
+@dataclass(frozen=True, eq=False)
+class Footprint:
+    """Where a tool presses: ``kind`` of pressure and its radius ``a`` (m), at ``centres`` (k, 2), in equal parts.
+
+    ``spread`` is the second moment ((xx, xy), (xy, yy)) of all of it (m²), for a force of one; ``half`` are the half
+    extents (m) of a blade, along ``edge`` and across, of another tool none. Lengths lie in the plane of contact.
+    """
+
+    kind: str
+    a: float
+    centres: Array
+    spread: Array
+    half: tuple[float, float] = (inf, inf)
+    edge: tuple[float, float] = (1.0, 0.0)
+    sticks: bool = False
+    rises: Tool | None = None
+
+    @staticmethod
+    def of(tool: Tool, radius: float) -> "Footprint":
+        """Return that of a tool whose radius of contact is ``radius`` (m)."""
+        if isinstance(tool, Blade):
+            return _of_blade(tool)
+        kind = "sphere" if isinstance(tool, Ball) else "cone" if isinstance(tool, Cone) else "disc"
+        spread = 0.5 * _MOMENTS[kind] * radius**2 * np.eye(2)
+        rises = tool if isinstance(tool, Ball | Cone) else None
+        return Footprint(kind, radius, np.zeros((1, 2)), spread, sticks=isinstance(tool, Bonded), rises=rises)
+
+    @property
+    def reach(self) -> float:
+        """The farthest (m) from the axis that it presses."""
+        return self.a if len(self.centres) == 1 else float(np.hypot(*self.half))
+
+    def within(self, away: Array) -> NDArray[np.intp]:
+        """Return which of the points (n, 3), in m from the axis and its plane, lie below it."""
+        flat = away[:, 0] ** 2 + away[:, 1] ** 2
+        near = np.flatnonzero((flat <= self.reach**2) & (np.abs(away[:, 2]) <= _BOWED * self.reach))
+        if len(self.centres) > 1:
+            (c, s), (x, y) = self.edge, away[near, :2].T
+            near = near[(np.abs(c * x + s * y) <= self.half[0]) & (np.abs(c * y - s * x) <= self.half[1])]
+        return near
+
+    def lifted(self, away: Array) -> Array:
+        """Return by how much (m) more than its lowest point a tool moves what lies below it up, of points (n, 3)."""
+        if self.rises is None:
+            return np.zeros(len(away))
+        square = away[:, 0] ** 2 + away[:, 1] ** 2
+        if isinstance(self.rises, Ball):
+            own = self.rises.radius - np.sqrt(np.maximum(self.rises.radius**2 - square, 0.0))
+        else:
+            assert isinstance(self.rises, Cone)
+            own = self.rises.slope * np.sqrt(square)
+        return np.asarray(own - away[:, 2])
+
+    def field(self, away: Array, poisson: float, flat: float) -> Array:
+        """Return the displacement (n, 3), E = 1, at points (n, 3), in m; what is within ``flat`` of the plane is on it.
+
+        Below the tool it is that of its edge.
+        """
+        square = float(np.trace(self.spread))
+        is_face = np.abs(away[:, 2]) <= flat
+        moved = np.empty_like(away)
+        face, other = np.flatnonzero(is_face), np.flatnonzero(~is_face)
+        moved[face] = self._on_plane(away[face], poisson, square)
+        below = away[other]
+        moved[other] = found = boussinesq(below, poisson, square)
+        across = below[:, 0] ** 2 + below[:, 1] ** 2
+        height = below[:, 2] ** 2
+        bent = np.flatnonzero((across + height <= (_NEXT * self.reach) ** 2) & (height <= _STEEP**2 * across))
+        if len(bent):
+            level = below[bent] * (1.0, 1.0, 0.0)
+            less = found[bent] - boussinesq(level, poisson, square)
+            moved[other[bent]] = self._on_plane(level, poisson, square) + less
+        return moved
+
+    def _on_plane(self, away: Array, poisson: float, square: float) -> Array:
+        if len(self.centres) == 1:
+            return self._on_face(away[:, :2], poisson)
+        moved = boussinesq(away, poisson, square)
+        near = np.flatnonzero(away[:, 0] ** 2 + away[:, 1] ** 2 <= (_NEXT * self.reach) ** 2)
+        at = away[near, :2]
+        moved[near] = sum(self._on_face(at - centre, poisson) for centre in self.centres) / len(self.centres)
+        return moved
+
+    def _on_face(self, at: Array, poisson: float) -> Array:
+        """Return the displacement (n, 3) at points (n, 2) of the plane, from the middle of the contact."""
+        rho = np.maximum(np.sqrt(at[:, 0] ** 2 + at[:, 1] ** 2), _AXIS * self.a)
+        sunk, share = on_face(self.kind, rho, self.a, 1 / (1 - poisson**2))
+        if self.sticks:
+            share = share * np.maximum(1 - (self.a / rho) ** 2, 0.0)
+        aside = -(1 - 2 * poisson) * (1 + poisson) / (2 * pi) * share / rho**2
+        return np.column_stack([aside * at[:, 0], aside * at[:, 1], -sunk])
+
+
+def _of_blade(tool: Blade) -> Footprint:
+    """Return discs along the edge, at the abscissae of a pressure that grows like 1/√ towards its ends."""
+    along, across = tool.spread
+    # Of a disc, the second moment in one direction is a²/3.
+    a = min(sqrt(3 * across), tool.width)
+    count = min(max(ceil(2 * tool.length / (_APART * tool.width)), _FEWEST), _MOST)
+    reach = sqrt(2 * max(along - a**2 / 3, 0.0))
+    edge = np.array([cos(tool.turn), sin(tool.turn)])
+    side = np.array([-edge[1], edge[0]])
+    places = reach * np.cos(pi * (np.arange(count) + 0.5) / count)
+    spread = along * np.outer(edge, edge) + across * np.outer(side, side)
+    half = (tool.length, tool.width)
+    return Footprint("disc", a, np.outer(places, edge), spread, half, (float(edge[0]), float(edge[1])))
+
+
+def on_face(tool: str, rho: Array, a: float, plane: float) -> tuple[Array, Array]:
+    """Return w/F of a half-space beyond the contact, and P(ρ)/F; within, w is that of its edge."""
+    far, near = np.maximum(rho, a), np.minimum(rho / a, 1.0)
+    angle, beside, left = np.arcsin(a / far), np.sqrt(far**2 - a**2), np.sqrt(1 - near**2)
+    if tool == "disc":
+        return angle / (pi * plane * a), 1 - left
+    if tool == "sphere":
+        return 0.75 / (pi * plane * a**3) * ((2 * a**2 - far**2) * angle + a * beside), 1 - left**3
+    sunk = 2 / (pi * plane * a**2) * (a * angle - a**2 / (far + beside))
+    return sunk, 1 - left + near**2 * np.arccosh(1 / near)
+
+
+def boussinesq(away: Array, poisson: float, square: float) -> Array:
+    """Return the displacement (n, 3) of a half-space under a newton, E = 1, whose mean of ρ² is ``square`` (m²).
+
+    J. Boussinesq, 1885; the second moment is Δ of it along the face times a quarter of the mean of ρ².
+    """
+    flat = away[:, :2]
+    across = (flat**2).sum(axis=1)
+    one = 1 / np.sqrt(np.maximum(across + away[:, 2] ** 2, square))
+    depth = np.maximum(-away[:, 2], -_OVER / one)
+    third, soft = one**3, 1 - 2 * poisson
+    fifth, quarter = third * one**2, square / 4
+    bend = 15 * across * one**2
+    aside = depth * third - soft * one / (1 / one + depth)
+    aside += quarter * fifth * depth * (bend - 12 + 3 * soft)
+    down = depth**2 * third + (1 + soft) * one
+    down += quarter * (depth**2 * fifth * (bend - 6) + (1 + soft) * third * (1 - 3 * depth**2 * one**2))
+    return (1 + poisson) / (2 * pi) * np.column_stack([aside[:, None] * flat, -down])
