@@ -82,6 +82,7 @@ benchmark: setup ## every table of docs/performance.md, into results/ (an idle m
 	$(PYTHON) -m benchmarks.communication
 	$(PYTHON) -m benchmarks.peers
 	$(PYTHON) -m benchmarks.plain_loop --sample 24
+	$(PYTHON) -m benchmarks.shares
 	$(PYTHON) -m benchmarks.products
 	$(PYTHON) -m benchmarks.solvers
 	$(PYTHON) -m benchmarks.contact
