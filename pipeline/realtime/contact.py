@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 Pair = NDArray[np.float64]
 
 # Steps of Newton's method, which is kept within a bracket; the radius is then exact to rounding.
-_STEPS, _SAME = 60, 4e-16
+# A step of it that is this small leaves its square.
+_STEPS, _SAME, _NEXT = 60, 4e-16, 1e-8
 # Of terms in the series of a ball, the last is below rounding for contact up to 0.6 of its radius.
 _TERMS, _NEGLIGIBLE = 40, 1e-17
 # Of 1 - 2ν, below which a logarithm over it is its limit.
@@ -117,10 +118,11 @@ class Round:
             found = self._at(a, place)
             low, high = (a, high) if found.depth < depth else (low, a)
             step = a - (found.depth - depth) / found.slope if found.slope > 0 else low
-            step = step if low < step < high else 0.5 * (low + high)
-            if abs(step - a) <= _SAME * a:
+            is_newton = low < step < high
+            step = step if is_newton else 0.5 * (low + high)
+            change, a = abs(step - a), step
+            if change <= (_NEXT if is_newton else _SAME) * a:
                 break
-            a = step
         return _contact(a, self._at(a, place), place)
 
     def _at(self, a: float, place: Place) -> "_Pressed":
@@ -174,17 +176,17 @@ class Ball(Round):
     def profile(self, s: float) -> tuple[float, float, float, float]:
         """D(s) = s artanh(s/R), by its series, which does not cancel."""
         t = (s / self.radius) ** 2
-        power, sums = t, [0.0, 0.0, 0.0, 0.0]
-        for k in range(_TERMS):
-            term = power / (2 * k + 1)
-            sums[0] += term
-            sums[1] += (2 * k + 2) * term
-            sums[2] += term / (2 * k + 3)
-            sums[3] += term / (2 * k + 5)
-            if term <= _NEGLIGIBLE * sums[0]:
+        power, sunk, steep, area, moment = t, 0.0, 0.0, 0.0, 0.0
+        for odd in range(1, 2 * _TERMS, 2):
+            term = power / odd
+            sunk += term
+            steep += (odd + 1) * term
+            area += term / (odd + 2)
+            moment += term / (odd + 4)
+            if term <= _NEGLIGIBLE * sunk:
                 break
             power *= t
-        return self.radius * sums[0], self.radius / s * sums[1], self.radius * s * sums[2], self.radius * s**3 * sums[3]
+        return self.radius * sunk, self.radius / s * steep, self.radius * s * area, self.radius * s**3 * moment
 
     def first(self, depth: float) -> float:
         """H. Hertz, 1882."""
