@@ -3,7 +3,7 @@
 A disc on a box, the whole of it without the error bar, and, as a study does by itself, a quarter with it; elements of
 degree 2, on two ranks. Dofs are those of the whole. Memory is the sum of the ranks' peaks; the slope is that
 of its logarithm over the logarithm of the dofs. From this come the bytes per dof in ``pipeline/plan/estimate.py``. Two
-million dofs, all of them modelled, want 5 GB of free memory without the error bar and 12 GB with it.
+million dofs, all of them modelled, want 1.6 GB of free memory without the error bar and 3.1 GB with it.
 """
 
 import argparse

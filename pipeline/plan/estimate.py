@@ -6,12 +6,17 @@ from pipeline.study.sweep import Case
 
 # Volume of gmsh's mean tetrahedron in units of the cube of the size asked for: measured, docs/performance.md.
 _TETRAHEDRON = 0.21
-# Bytes for each dof at the peak of a solve: the operator and multigrid, or the factor of a system of 50,000 dofs; and
-# what two more matrices take. Measured: docs/solvers.md.
-_BYTES_PER_DOF = {"iterative": {1: 2500, 2: 1900, 3: 2000, 4: 2800}, "direct": {1: 9000, 2: 9000, 3: 10_000}}
+# Bytes for each dof at the peak of a solve, degree by degree: multigrid, whose operators are products or, where nothing
+# multiplies cell by cell, matrices; the factor of a system of 50,000 dofs; and what two more matrices take. Measured:
+# docs/solvers.md.
+_BYTES_PER_DOF = {
+    "displacement": {1: 3000, 2: 700, 3: 420, 4: 420},
+    "mixed": {2: 1800, 3: 1800, 4: 2200},
+    "displacement, matrices": {1: 3000, 2: 1900, 3: 2000, 4: 2800},
+    "mixed, matrices": {2: 3800, 3: 4000, 4: 5600},
+    "direct": {1: 9000, 2: 9000, 3: 10_000},
+}
 _BYTES_OF_PARTS = {1: 1000, 2: 1500, 3: 2200, 4: 3300}
-# So many times that for the error bar of a mixed element; measured on organs, degrees 2 and 3.
-_MIXED_BAR = 2.0
 _BASE = 200e6
 # What a process holds besides once it has meshed and solved: programs, compiled forms.
 _LOADED = 100e6
@@ -95,18 +100,26 @@ def dofs(count: float, degree: int) -> float:
     return _DOFS_PER_CELL[degree] * count
 
 
-def solving_memory(dofs: float, degree: int, *, direct: bool, parts: bool = False) -> float:
-    """Estimate the bytes that a solve takes, all ranks together; ``parts`` keeps A_λ and A_μ for the next ν."""
-    per_dof = _BYTES_PER_DOF["direct" if direct else "iterative"][degree] + parts * _BYTES_OF_PARTS[degree]
+def solving_memory(
+    dofs: float, degree: int, *, direct: bool, mixed: bool = False, matrices: bool = False, parts: bool = False
+) -> float:
+    """Estimate the bytes that a solve takes, all ranks together.
+
+    ``matrices`` says that nothing multiplies cell by cell here; ``parts`` keeps A_λ and A_μ for the next ν.
+    """
+    kind = "direct" if direct else ("mixed" if mixed else "displacement") + ", matrices" * matrices
+    per_dof = _BYTES_PER_DOF[kind][degree] + parts * _BYTES_OF_PARTS[degree]
     # Fill of a factorisation in 3D grows like dofs^(4/3); the figure above is for 50,000.
     growth = (dofs / 50_000) ** (1 / 3) if direct else 1.0
     return _BASE + per_dof * growth * dofs
 
 
-def enriched_memory(dofs: float, degree: int, *, mixed: bool = False, parts: bool = False) -> float:
+def enriched_memory(
+    dofs: float, degree: int, *, mixed: bool = False, matrices: bool = False, parts: bool = False
+) -> float:
     """Estimate the bytes that an error bar takes: a solve of one degree more than that of ``dofs`` unknowns."""
-    growth = _DOFS_PER_CELL[degree + 1] / _DOFS_PER_CELL[degree] * (_MIXED_BAR if mixed else 1.0)
-    return solving_memory(growth * dofs, degree + 1, direct=False, parts=parts)
+    growth = _DOFS_PER_CELL[degree + 1] / _DOFS_PER_CELL[degree]
+    return solving_memory(growth * dofs, degree + 1, direct=False, mixed=mixed, matrices=matrices, parts=parts)
 
 
 def peak_memory(case: Case, share: float = 1.0) -> float:
@@ -121,6 +134,7 @@ def case_memory(case: Case, share: float = 1.0) -> float:
 
     ``share`` is the part of the body that is modelled.
     """
-    count = share * cells(case)
-    solving = solving_memory(dofs(count, case.mesh.degree), case.mesh.degree, direct=case.solve.method == "direct")
+    count, degree = share * cells(case), case.mesh.degree
+    direct, mixed = case.solve.method == "direct", case.element == "mixed"
+    solving = solving_memory(dofs(count, degree), degree, direct=direct, mixed=mixed)
     return max(_BASE + _BYTES_PER_CELL * count, solving)

@@ -36,6 +36,7 @@ from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.linear import SolveError, is_direct
 from pipeline.solve.solution import FieldProblem
 from pipeline.solve.spaces import Spaces
+from pipeline.solve.straight.product import compiles
 
 T = TypeVar("T")
 Keep = Callable[[Record], None]
@@ -196,14 +197,15 @@ class StepRunner:
     def _solve(self, solve: Solve, problem: FieldProblem, ground: Ground, bar: Bar) -> Record:
         case, degree = solve.case, solve.case.mesh.degree
         direct = is_direct(case.solve.method, problem.dofs, degree)
-        check_memory(self._free, estimate.solving_memory(problem.dofs, degree, direct=direct), "solving")
-        missing = self._lacks_room(bar, problem.dofs, degree, case.element)
+        kind = {"mixed": case.element == "mixed", "matrices": case.material.is_large or not compiles()}
+        check_memory(self._free, estimate.solving_memory(problem.dofs, degree, direct=direct, **kind), "solving")
+        missing = self._lacks_room(bar, estimate.enriched_memory(problem.dofs, degree, **kind))
         estimate_it = bar is not Bar.NONE and not missing
         solution = solve_problem(case, problem, estimate=estimate_it, meshed=solve.ground)
         record = record_of(solve, solution, ground.seconds)
         return replace(self._stamp(record, ground.memory), message=missing)
 
-    def _lacks_room(self, bar: Bar, dofs: int, degree: int, element: str) -> str:
+    def _lacks_room(self, bar: Bar, needed: float) -> str:
         """Return what to say if there is no memory for an error bar that may be left out; collective.
 
         Raises:
@@ -211,7 +213,6 @@ class StepRunner:
         """
         if bar is Bar.NONE:
             return ""
-        needed = estimate.enriched_memory(dofs, degree, mixed=element == "mixed")
         if bar is Bar.NEEDED:
             check_memory(self._free, needed, "the error bar that proves the accuracy")
         return lacks_memory(self._free, needed, "the error bar")
@@ -235,7 +236,7 @@ class StepRunner:
         it is never worth it.
         """
         degree = step.case.mesh.degree
-        needed = estimate.enriched_memory(estimate.dofs(mesh.cells, degree), degree, parts=True)
+        needed = estimate.enriched_memory(estimate.dofs(mesh.cells, degree), degree, matrices=True, parts=True)
         return self._comm.size > 1 and len(step.solves) > 2 and not lacks_memory(self._free, needed, "")
 
     def _condenses(self, step: OperatorStep, mesh: BodyMesh) -> bool:

@@ -29,6 +29,7 @@ from pipeline.solve.compiled import vector_space
 from pipeline.solve.linear import is_direct
 from pipeline.solve.solution import FieldProblem
 from pipeline.solve.spaces import Spaces
+from pipeline.solve.straight.product import compiles
 from pipeline.study.sweep import Case, Study
 from pipeline.view.fields import Fields
 
@@ -77,8 +78,10 @@ def _attempt(
     mesh = distribute(comm, arrays and upright(case, arrays))
     with Spaces(mesh) as spaces, problem_of(spaces, case, shared=False) as problem:
         direct = is_direct(case.solve.method, problem.dofs, degree)
-        check_memory(FreeMemory(comm), estimate.solving_memory(problem.dofs, degree, direct=direct), "solving")
-        needed = estimate.enriched_memory(problem.dofs, degree, mixed=case.element == "mixed")
+        kind = {"mixed": case.element == "mixed", "matrices": case.material.is_large or not compiles()}
+        needed = estimate.solving_memory(problem.dofs, degree, direct=direct, **kind)
+        check_memory(FreeMemory(comm), needed, "solving")
+        needed = estimate.enriched_memory(problem.dofs, degree, **kind)
         room = bar and not lacks_memory(FreeMemory(comm), needed, "")
         note(f"solving for {problem.dofs} unknowns")
         solution = solve_problem(case, problem, estimate=room or solve.goal is not None)
