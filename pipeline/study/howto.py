@@ -11,7 +11,7 @@ _PAGES = {
     "body.fixed": "howto/own-body",
     "body": "howto/own-body",
     "material.density": "howto/loads",
-    "material.law": "reference/study",
+    "material.law": "accuracy",
     "probe.path": "howto/path",
     "probe.incision": "howto/cut",
     "probe.ahead": "howto/cut",

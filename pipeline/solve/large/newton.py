@@ -79,7 +79,10 @@ class Equilibrium:
             load.scale(-1.0)
             load.array[self._held] = prescribed.array[self._held]
             self.tangent.zeroRowsColumns(self._rows, 1.0)
+            # What is prescribed is there from the beginning: a preconditioner may know nothing of it.
             result.set(0.0)
+            result.array[self._held] = prescribed.array[self._held]
+            ksp.setInitialGuessNonzero(True)
             ksp.setOperators(self.tangent)
             self._checked(ksp, lambda: ksp.solve(load, result))
             self.iterations += ksp.its

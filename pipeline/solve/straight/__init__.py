@@ -21,11 +21,6 @@ def has_kernel(degree: int) -> bool:
     return degree in DEGREES and PETSc.ScalarType == np.float64
 
 
-def suits(displacements: Any) -> bool:
-    """Tell whether all operators on a space of displacements can be put together here: on one process."""
-    return displacements.mesh.comm.size == 1 and assembles(displacements)
-
-
 def assembles(displacements: Any) -> bool:
     """Tell whether the stiffness on a space of displacements can be put together here, on any number of ranks."""
     return has_kernel(compat.degree(displacements)) and arrays.available()
