@@ -492,7 +492,7 @@ static int press_round(const epsmesh_query *tool, const place *p, double most, c
     return 1;
 }
 
-/* A rectangle's stiffness, where it presses, and how it resists to be tilted: pipeline/realtime/contact.py */
+/* A rectangle's stiffness, where it presses, and how it resists to be tilted: pipeline/realtime/blade.py */
 static const double RECTANGLE[5][8] = {
     {1.5467288, -0.5389724, 0.154788, -0.0121522, 0.0020102, -0.0001257, 6e-06, -1.4e-06},
     {0.4134192, 0.0443058, 0.0039289, -0.0011234, -0.0003526, 1.7e-06, 2.01e-05, 4.2e-06},

@@ -1,7 +1,8 @@
 /* Forces of tools on a body from a model file of `epsmesh export`: C99, no allocation, no locks, no input or output.
  *
  * SI units throughout. A model is plain memory: fill it once with epsmesh_load from the bytes of the file, then any
- * number of threads may query it. The formulas are those of pipeline/realtime/contact.py, where they are derived.
+ * number of threads may query it. The formulas are those of pipeline/realtime/contact.py and blade.py, where they are
+ * derived.
  */
 #ifndef EPSMESH_H
 #define EPSMESH_H

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.realtime.blade import Blade, blade
 from pipeline.realtime.classic import ModelError, read_doubles
-from pipeline.realtime.contact import Blade, Bonded, Contact, Disc, Place, Round, ball, blade, cone
+from pipeline.realtime.contact import Bonded, Contact, Disc, Place, Round, ball, cone
 from pipeline.realtime.face import Face
 from pipeline.realtime.table import TENSORS, Table
 

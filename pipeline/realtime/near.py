@@ -20,7 +20,8 @@ from math import ceil, cos, inf, pi, sin, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.realtime.contact import Ball, Blade, Bonded, Cone, Disc, Round
+from pipeline.realtime.blade import Blade
+from pipeline.realtime.contact import Ball, Bonded, Cone, Disc, Round
 
 Array = NDArray[np.float64]
 Tool = Disc | Round | Blade | Bonded
@@ -53,7 +54,7 @@ class Footprint:
     half: tuple[float, float] = (inf, inf)
     edge: tuple[float, float] = (1.0, 0.0)
     sticks: bool = False
-    rises: Tool | None = None
+    rises: Round | None = None
 
     @staticmethod
     def of(tool: Tool, radius: float) -> "Footprint":
@@ -62,7 +63,7 @@ class Footprint:
             return _of_blade(tool)
         kind = "sphere" if isinstance(tool, Ball) else "cone" if isinstance(tool, Cone) else "disc"
         spread = 0.5 * _MOMENTS[kind] * radius**2 * np.eye(2)
-        rises = tool if isinstance(tool, Ball | Cone) else None
+        rises = tool if isinstance(tool, Round) else None
         return Footprint(kind, radius, np.zeros((1, 2)), spread, sticks=isinstance(tool, Bonded), rises=rises)
 
     @property
@@ -84,12 +85,7 @@ class Footprint:
         if self.rises is None:
             return np.zeros(len(away))
         square = away[:, 0] ** 2 + away[:, 1] ** 2
-        if isinstance(self.rises, Ball):
-            own = self.rises.radius - np.sqrt(np.maximum(self.rises.radius**2 - square, 0.0))
-        else:
-            assert isinstance(self.rises, Cone)
-            own = self.rises.slope * np.sqrt(square)
-        return np.asarray(own - away[:, 2])
+        return np.asarray(self.rises.rise(square) - away[:, 2])
 
     def field(self, away: Array, poisson: float, flat: float) -> Array:
         """Return the displacement (n, 3), E = 1, at points (n, 3), in m; what is within ``flat`` of the plane is on it.

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.files import write_whole
 from pipeline.html import joined, json_in_page, render_page
-from pipeline.realtime.contact import RECTANGLE
+from pipeline.realtime.blade import RECTANGLE
 from pipeline.realtime.model import SENTENCES
 from pipeline.realtime.surface import Surface
 from pipeline.view import palette

@@ -8,7 +8,8 @@ import pytest
 from scipy.special import ellipe, ellipk
 
 from pipeline.realtime import Model, ModelError
-from pipeline.realtime.contact import Disc, Place, Shape, ball, blade, cone
+from pipeline.realtime.blade import blade
+from pipeline.realtime.contact import Disc, Place, Shape, ball, cone
 from pipeline.realtime.model import model_of
 from tests.realtime.synthetic import random_model, write_random
 

@@ -8,7 +8,8 @@ import pytest
 
 from pipeline.export.file import write_model
 from pipeline.realtime import ModelError, load
-from pipeline.realtime.contact import Bonded, Disc, Place, ball, blade, cone
+from pipeline.realtime.blade import blade
+from pipeline.realtime.contact import Bonded, Disc, Place, ball, cone
 from pipeline.realtime.near import _MOMENTS, Footprint, boussinesq, on_face
 from pipeline.realtime.surface import surface_of
 from tests.realtime.synthetic import random_surface, write_random, write_surface
