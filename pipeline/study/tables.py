@@ -2,27 +2,25 @@
 
 import itertools
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from math import prod
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from pipeline.shapes.registry import LATER
 from pipeline.shapes.section import Section
 from pipeline.study.path import Way, read_path
-from pipeline.study.problems import Problems, nearest, nested_model
+from pipeline.study.problems import Problems, nearest
 from pipeline.study.read import check_text
 from pipeline.study.schema import NESTED, SECTIONS, SINGLE
 from pipeline.study.sweep import Axis
+from pipeline.study.swept import Place, axis_of, placed, sweeps, written
 
 # More values in a list, or more cases of a study, are a slip of the pen, or work for several studies: every case is
 # planned and reported, each in a few hundred bytes and a tenth of a millisecond.
 _MOST_VALUES = 10_000
 MOST_CASES = 200_000
-
-# Where a value stands within a section: keys, and numbers in arrays of tables, from 0.
-Place = tuple[str | int, ...]
 
 
 def read_section(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], tuple[Section, ...]]:
@@ -74,7 +72,7 @@ def _read_tables(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], t
     model = _model(name, raw, problems)
     if model is None or (not raw and name not in SINGLE):
         return [], ()
-    swept = {} if name in SINGLE else dict(_sweeps(model, raw))
+    swept = {} if name in SINGLE else dict(sweeps(model, raw))
     for place, values in swept.items():
         if not values:
             problems.error(f"{name}.{written(place)}", values, "an empty list sweeps nothing; give at least one value")
@@ -89,11 +87,11 @@ def _read_tables(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], t
     if singles is None:
         return [], ()
     axes = [
-        _axis(name, place, values, parsed, problems)
+        axis_of(name, place, values, parsed, problems)
         for (place, values), parsed in zip(swept.items(), singles, strict=True)
     ]
     combinations = itertools.product(*swept.values())
-    variants = [_validate(model, _placed(raw, zip(swept, values, strict=True))) for values in combinations]
+    variants = [_validate(model, placed(raw, zip(swept, values, strict=True))) for values in combinations]
     return axes, tuple(variants)
 
 
@@ -116,7 +114,7 @@ def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[
         model = _model(name, table, problems, where)
         if model is None:
             continue
-        for place, value in _sweeps(model, table):
+        for place, value in sweeps(model, table):
             if place not in shared:
                 problems.error(
                     f"{where}.{written(place)}", value, "a list inside an array of tables: write one table for each "
@@ -124,8 +122,8 @@ def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[
                 )  # fmt: skip
         try:
             combinations = itertools.product(*shared.values())
-            placed = [_placed(table, zip(shared, values, strict=True)) for values in combinations]
-            variants.append([_validate(model, variant) for variant in placed])
+            filled = [placed(table, zip(shared, values, strict=True)) for values in combinations]
+            variants.append([_validate(model, variant) for variant in filled])
         except ValidationError as error:
             problems.from_pydantic(where, error, model, table)
     if len(variants) < len(tables):
@@ -138,10 +136,10 @@ def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[
     axes = [Axis(name, "", tuple(names), "")]
     if variants and shared:
         # What each of their values is does not depend on the table: the first one tells.
-        kind, table = type(variants[0][0]), _placed(tables[0], ((place, given[0]) for place, given in shared.items()))
+        kind, table = type(variants[0][0]), placed(tables[0], ((place, given[0]) for place, given in shared.items()))
         for place, values in shared.items():
-            parsed = [_validate(kind, _placed(table, [(place, value)])) for value in values]
-            axes.append(_axis(name, place, values, parsed, problems))
+            parsed = [_validate(kind, placed(table, [(place, value)])) for value in values]
+            axes.append(axis_of(name, place, values, parsed, problems))
     return axes, tuple(itertools.chain.from_iterable(variants))
 
 
@@ -174,7 +172,7 @@ def _shared_sweeps(name: str, tables: list[Any]) -> dict[Place, list[Any]]:
             model = model.get(str(table.get("shape")), model)
         if isinstance(model, Mapping) or not isinstance(table, dict):
             return {}
-        found.append(dict(_sweeps(model, table)))
+        found.append(dict(sweeps(model, table)))
     first, *others = found or [{}]
     return {
         place: values
@@ -224,49 +222,17 @@ def _model(name: str, raw: dict[str, Any], problems: Problems, where: str = "") 
     return None
 
 
-def _sweeps(model: type[BaseModel], raw: dict[str, Any], where: Place = ()) -> Iterator[tuple[Place, list[Any]]]:
-    """Yield place and values of every sweep of a section, those of the pieces in its own arrays of tables, too."""
-    for key, value in raw.items():
-        inner = nested_model(model, key)
-        if inner is not None:
-            for number, table in enumerate(value if isinstance(value, list) else ()):
-                if isinstance(table, dict):
-                    yield from _sweeps(inner, table, (*where, key, number))
-        elif _is_sweep(model, key, value):
-            yield (*where, key), value
-
-
-def _placed(raw: Any, values: Iterable[tuple[Place, Any]]) -> Any:
-    """Return ``raw`` with each value put where it belongs."""
-    for (key, *rest), value in values:
-        inner = _placed(raw[key], [(tuple(rest), value)]) if rest else value
-        raw = raw.copy()
-        raw[key] = inner
-    return raw
-
-
-def _is_sweep(model: type[BaseModel], key: str, value: Any) -> bool:
-    """Tell a list of values from a list that is one value (a point, a size)."""
-    if not isinstance(value, list):
-        return False
-    info = model.model_fields.get(key)
-    kinds = () if info is None else (info.annotation, *getattr(info.annotation, "__args__", ()))
-    if any(getattr(kind, "__origin__", None) is tuple for kind in kinds):
-        return bool(value) and isinstance(value[0], list)
-    return info is not None and key not in ("name", "shape")
-
-
 def _validate_each(
     name: str, model: type[Section], raw: dict[str, Any], swept: dict[Place, list[Any]], problems: Problems
 ) -> list[list[Section]] | None:
     """Validate each value of each sweep once, so that an error is reported once however many cases it meets."""
     before = len(problems.errors)
-    first = _placed(raw, ((place, values[0]) for place, values in swept.items()))
+    first = placed(raw, ((place, values[0]) for place, values in swept.items()))
     singles: list[list[Section]] = []
     for place, values in swept.items() or {(): [None]}.items():
         singles.append([])
         for value in values:
-            candidate = _placed(first, [(place, value)]) if place else first
+            candidate = placed(first, [(place, value)]) if place else first
             try:
                 singles[-1].append(_validate(model, candidate))
             except ValidationError as error:
@@ -284,49 +250,3 @@ def _tuples(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _tuples(v) for key, v in value.items()}
     return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
-
-
-def _axis(section: str, place: Place, raw: list[Any], parsed: list[Section], problems: Problems) -> Axis:
-    *outer, key = place
-    owners = [_at(item, outer) for item in parsed]
-    values = [getattr(owner, str(key)) for owner in owners]
-    extra: Any = type(owners[0]).model_fields[str(key)].json_schema_extra or {}
-    unit = extra.get("unit", "") or _unit_of(type(owners[0]), str(key))
-    if isinstance(values[0], tuple):
-        labels = [" ".join(str(part) for part in value) for value in raw]
-    elif any(isinstance(value, dict) for value in raw):
-        labels = [_labelled(value) if isinstance(value, dict) else value for value in raw]
-    else:
-        labels = values
-    for label, count in Counter(labels).items():
-        if count > 1:
-            problems.error(f"{section}.{written(place)}", raw[labels.index(label)], "stands more than once in the list")
-    if unit == "" and all(isinstance(label, float | int) for label in labels):
-        unit = "1"
-    if not outer:
-        return Axis(section, str(key), tuple(labels), unit)
-    return Axis(section, str(key), tuple(labels), unit, written(tuple(outer)), owners[0].name)
-
-
-def _labelled(table: dict[str, Any]) -> str:
-    """Write a table as a label: its keys and values, lists as their parts."""
-    return " ".join(f"{k} {' '.join(map(str, v)) if isinstance(v, list) else v}" for k, v in table.items())
-
-
-def _at(section: Any, place: list[str | int]) -> Any:
-    """Return what stands at a place within a section."""
-    for step in place:
-        section = section[step] if isinstance(step, int) else getattr(section, step)
-    return section
-
-
-def _unit_of(model: type[BaseModel], key: str) -> str:
-    """Return the unit of a number that may be left out."""
-    parts = getattr(model.model_fields[key].annotation, "__args__", ())
-    extras = [getattr(m, "json_schema_extra", None) for part in parts for m in getattr(part, "__metadata__", ())]
-    return next((str(extra["unit"]) for extra in extras if isinstance(extra, dict) and "unit" in extra), "")
-
-
-def written(place: Place) -> str:
-    """Write a place as messages do: ``layers[2].young``."""
-    return "".join(f"[{step + 1}]" if isinstance(step, int) else f".{step}" for step in place).removeprefix(".")
