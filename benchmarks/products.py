@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.solvers import YOUNG, _case
+from benchmarks.tables import markdown
 
 # Element size far from the probe and at its edge, mm.
 SIZES = ((3.0, 0.5), (1.7, 0.2), (1.0, 0.2))
@@ -49,7 +50,7 @@ def measure(size: tuple[float, float], degrees: list[int]) -> list[dict[str, Any
 
 
 def _row(space: Any, law: Any) -> dict[str, Any]:
-    from pipeline.solve.single.cycle import SymmetricProduct, UpperBlocks
+    from pipeline.solve.single.blocks import SymmetricProduct, UpperBlocks
     from pipeline.solve.straight.product import library
 
     library()
@@ -93,13 +94,6 @@ def _medians(ways: dict[str, Callable[[], Any]]) -> dict[str, float]:
     return {name: statistics.median(values) for name, values in taken.items()}
 
 
-def table(rows: list[dict[str, Any]]) -> str:
-    """Return the rows as a table of Markdown."""
-    lines = ["| " + " | ".join(COLUMNS) + " |", "|---" * len(COLUMNS) + "|"]
-    lines += ["| " + " | ".join(format(row[name], how) for name, how in COLUMNS.items()) + " |" for row in rows]
-    return "\n".join(lines) + "\n"
-
-
 def main() -> None:
     """Measure, and write ``products.json`` and ``products.md``."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
@@ -110,8 +104,8 @@ def main() -> None:
     rows = [row for size in SIZES[: arguments.largest] for row in measure(size, arguments.degrees)]
     arguments.output.mkdir(parents=True, exist_ok=True)
     (arguments.output / "products.json").write_text(json.dumps(rows, indent=1))
-    (arguments.output / "products.md").write_text(table(rows))
-    print(table(rows))
+    (arguments.output / "products.md").write_text(markdown(rows, COLUMNS))
+    print(markdown(rows, COLUMNS))
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from math import inf, log
 from pathlib import Path
 from typing import Any
 
+from benchmarks.tables import markdown
 from pipeline.verify.machine import MPI_ENVIRONMENT
 
 # Element size far from the probe (mm), for about 100,000, 500,000 and 2,000,000 dofs.
@@ -106,13 +107,6 @@ def with_slopes(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return rows
 
 
-def table(rows: list[dict[str, Any]]) -> str:
-    """Return the rows as a table of Markdown."""
-    lines = ["| " + " | ".join(COLUMNS) + " |", "|---" * len(COLUMNS) + "|"]
-    lines += ["| " + " | ".join(format(row[name], how) for name, how in COLUMNS.items()) + " |" for row in rows]
-    return "\n".join(lines) + "\n"
-
-
 def main() -> None:
     """Measure, and write ``scaling.json`` and ``scaling.md``."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
@@ -137,10 +131,10 @@ def main() -> None:
                     case = size, arguments.degree, arguments.poisson, model, ranks
                     bar = arguments.bar == "yes" if arguments.bar else _MODELS[model]
                     rows.append(measure(*case, bar=bar, output=Path(folder)))
-                    print(table(with_slopes(rows)[-1:]).splitlines()[-1], flush=True)
+                    print(markdown(with_slopes(rows)[-1:], COLUMNS).splitlines()[-1], flush=True)
     arguments.output.mkdir(parents=True, exist_ok=True)
     (arguments.output / "scaling.json").write_text(json.dumps(rows, indent=1))
-    (arguments.output / "scaling.md").write_text(table(rows))
+    (arguments.output / "scaling.md").write_text(markdown(rows, COLUMNS))
 
 
 if __name__ == "__main__":

@@ -78,13 +78,6 @@ def measure(name: str) -> None:
     print(json.dumps(row), flush=True)
 
 
-def table(rows: list[dict[str, Any]]) -> str:
-    """Return the rows as a table of Markdown."""
-    lines = ["| " + " | ".join(COLUMNS) + " |", "|---" * len(COLUMNS) + "|"]
-    lines += ["| " + " | ".join(format(row[name], how) for name, how in COLUMNS.items()) + " |" for row in rows]
-    return "\n".join(lines) + "\n"
-
-
 def main() -> None:
     """Measure, and write ``shares.json`` and ``shares.md``."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
@@ -96,6 +89,8 @@ def main() -> None:
     if arguments.one:
         measure(arguments.one)
         return
+    from benchmarks.tables import markdown  # a case may be run on the code of a checkout that lacks it
+
     rows = []
     for name in arguments.cases:
         for tree in arguments.trees:
@@ -103,10 +98,10 @@ def main() -> None:
             command = [sys.executable, __file__, "--one", name]
             done = subprocess.run(command, stdout=subprocess.PIPE, check=True, cwd=tree, env=paths)
             rows.append(json.loads(done.stdout) | {"tree": tree.resolve().name})
-            print(table(rows[-1:]).splitlines()[-1], flush=True)
+            print(markdown(rows[-1:], COLUMNS).splitlines()[-1], flush=True)
     arguments.output.mkdir(parents=True, exist_ok=True)
     (arguments.output / "shares.json").write_text(json.dumps(rows, indent=1))
-    (arguments.output / "shares.md").write_text(table(rows))
+    (arguments.output / "shares.md").write_text(markdown(rows, COLUMNS))
 
 
 if __name__ == "__main__":

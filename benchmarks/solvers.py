@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.tables import markdown
 from pipeline.solve.loads import Motion
 
 # Element size far from the probe and at its edge, mm.
@@ -184,13 +185,6 @@ def crossovers(rows: list[dict[str, Any]]) -> dict[str, int]:
     return found
 
 
-def table(rows: list[dict[str, Any]]) -> str:
-    """Return the rows as a table of Markdown."""
-    lines = ["| " + " | ".join(COLUMNS) + " |", "|---" * len(COLUMNS) + "|"]
-    lines += ["| " + " | ".join(format(row[name], how) for name, how in COLUMNS.items()) + " |" for row in rows]
-    return "\n".join(lines) + "\n"
-
-
 def plan(largest: int) -> list[tuple[str, int, float, tuple[float, float], str]]:
     """Return the rows to measure: element, degree, ratio, sizes, method; ``largest`` sizes of each element."""
     todo = []
@@ -227,12 +221,13 @@ def main() -> None:
             print(f"failed: {case}", file=sys.stderr)
             continue
         rows.append(json.loads(done.stdout))
-        print(table(rows[-1:]).splitlines()[-1], flush=True)
+        print(markdown(rows[-1:], COLUMNS).splitlines()[-1], flush=True)
     arguments.output.mkdir(parents=True, exist_ok=True)
     crossed = crossovers(rows)
     (arguments.output / "solvers.json").write_text(json.dumps({"rows": rows, "crossover": crossed}, indent=1))
     said = "".join(f"- {name}: {dofs} dofs\n" for name, dofs in crossed.items())
-    (arguments.output / "solvers.md").write_text(f"{table(rows)}\nDirect and iterative take the same time at\n\n{said}")
+    text = f"{markdown(rows, COLUMNS)}\nDirect and iterative take the same time at\n\n{said}"
+    (arguments.output / "solvers.md").write_text(text)
 
 
 if __name__ == "__main__":
