@@ -1,6 +1,5 @@
 """How a command ends that cannot go on: told to people on standard error, and to scripts as JSON where they asked."""
 
-import os
 import time
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
@@ -10,6 +9,7 @@ from typing import Any, NoReturn
 import typer
 
 from pipeline.cli.console import error, is_json_wanted, print_json
+from pipeline.launcher import is_first_rank
 from pipeline.study.problems import StudyError
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -78,9 +78,3 @@ def tell(faults: Iterable[Fault]) -> None:
 def as_data(faults: Iterable[Fault], status: int) -> dict[str, Any]:
     """Return faults as scripts get them."""
     return {"status": status, "errors": [asdict(fault) for fault in faults]}
-
-
-def is_first_rank() -> bool:
-    """Tell, before MPI is started, whether this is the rank that speaks."""
-    ranks = (os.environ.get(name) for name in ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"))
-    return next((rank for rank in ranks if rank is not None), "0") == "0"

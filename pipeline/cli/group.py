@@ -6,7 +6,8 @@ import typer
 from typer.core import TyperGroup
 
 from pipeline.cli.console import JSON, has_printed_json, print_json
-from pipeline.cli.faults import INTERRUPTED, SOME_FAILED, Fault, as_data, is_first_rank
+from pipeline.cli.faults import INTERRUPTED, SOME_FAILED, Fault, as_data
+from pipeline.launcher import is_first_rank
 
 
 class Commands(TyperGroup):

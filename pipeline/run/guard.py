@@ -13,14 +13,13 @@ import threading
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, suppress
 
+from pipeline.launcher import is_launched
 from pipeline.run.progress import Progress
 from pipeline.run.record import Record
 from pipeline.run.store import Store
 
 # Signals that end a process from outside, or from below Python. Others mean the run: its time is up, its terminal gone.
 _FATAL = {signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.SIGILL}
-# An MPI launcher's ranks end together.
-_LAUNCHED = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "MPI_LOCALNRANKS")
 _PR_SET_PDEATHSIG = 1
 _BEGUN, _KEPT, _OVER = "begun", "kept", "over"
 
@@ -109,9 +108,8 @@ def guarded(say: Callable[[str], None]) -> Iterator[Guard]:
 
 
 def _can_fork() -> bool:
-    launched = any(name in os.environ for name in _LAUNCHED)
     alone = threading.current_thread() is threading.main_thread() and threading.active_count() == 1
-    return hasattr(os, "memfd_create") and alone and not launched and "mpi4py.MPI" not in sys.modules
+    return hasattr(os, "memfd_create") and alone and not is_launched() and "mpi4py.MPI" not in sys.modules
 
 
 def _fork(guard: Guard, say: Callable[[str], None]) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 from zipfile import BadZipFile
 
 from pipeline.files import atomic, cache_folder
+from pipeline.launcher import environment_alone
 from pipeline.shapes.arrays import BoolArray, FloatArray, IntArray, np
 from pipeline.shapes.files import check
 from pipeline.shapes.files.edges import Edges, oriented
@@ -25,8 +26,6 @@ _PROGRAM = "pipeline.scene.tessellate"
 _LONGEST = 600  # s
 # Of the solid's volume, triangles may miss this much; of its extent, vertices in the file may be off by that.
 _MISSED, _OFF = 0.03, 1e-5
-# What would make the program a part of this run under MPI.
-_OF_MPI = ("OMPI_", "PMIX_", "PMI_", "MPI_", "PRTE_")
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +107,7 @@ def _read(path: Path) -> dict[str, Any]:
 
 
 def _run(path: Path, unit: str, target: Path) -> None:
-    environment = {key: value for key, value in os.environ.items() if not key.startswith(_OF_MPI)}
+    environment = environment_alone()
     root = str(Path(__file__).resolve().parents[3])
     environment["PYTHONPATH"] = os.pathsep.join(filter(None, [root, environment.get("PYTHONPATH")]))
     # -P: nothing is imported from the folder that one happens to be in.
