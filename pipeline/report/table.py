@@ -2,7 +2,7 @@
 
 import itertools
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import isinf
 from typing import Any
 
@@ -113,7 +113,11 @@ def study_of(dataset: xr.Dataset) -> Study | None:
 
     The text may be a stranger's: it is held to all that a file is held to.
     """
-    text = str(dataset.attrs.get("study", ""))
+    return _study(str(dataset.attrs.get("study", "")))
+
+
+@lru_cache(4)  # figures, report and guide of a dataset ask for it again and again
+def _study(text: str) -> Study | None:
     try:
         return parse(toml_of(text, "study"), text=text, trusted=False)
     except StudyError:

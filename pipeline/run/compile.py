@@ -13,7 +13,7 @@ from pipeline.solve.meridian_trials import TRIAL_DEGREE
 from pipeline.solve.mixed_forms import compile_mixed
 from pipeline.solve.regular import compile_regular
 from pipeline.solve.release import compile_release
-from pipeline.solve.single.cycle import compiles
+from pipeline.solve.single.code import compiles
 from pipeline.solve.straight import product
 from pipeline.solve.straight.pattern import library
 from pipeline.stages import stage

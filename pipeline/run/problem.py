@@ -6,6 +6,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.mesh.of_case import meridian_of
+from pipeline.plan import estimate
 from pipeline.plan.symmetry import mirror_planes, movement_planes
 from pipeline.run.dead_loads import dead_loads_of
 from pipeline.run.far_field import far_field_of
@@ -19,7 +20,7 @@ from pipeline.solve.contact.sets import ContactError
 from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.large.newton import LargeError
 from pipeline.solve.large.problem import LargeProblem
-from pipeline.solve.linear import SolveError
+from pipeline.solve.linear import SolveError, is_direct
 from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.meridian_contact import MeridianContact
@@ -28,6 +29,7 @@ from pipeline.solve.mixed import MixedProblem
 from pipeline.solve.release import Front
 from pipeline.solve.solution import FieldProblem, Problem, Solution
 from pipeline.solve.spaces import Spaces
+from pipeline.solve.straight.product import compiles
 from pipeline.study.sweep import Case
 
 # Unknowns up to which a direct solve is a way out where iterations do not converge.
@@ -58,6 +60,16 @@ def problem_of(
     if case.element == "mixed":
         return MixedProblem(spaces, case.mesh.degree, conditions_of(case))
     return DisplacementProblem(spaces, case.mesh.degree, conditions_of(case), shared=shared, reuse=reuse)
+
+
+def memory_of(case: Case, dofs: int) -> tuple[float, float]:
+    """Return the bytes that a solve of ``case`` with so many ``dofs`` takes, and its error bar."""
+    degree, direct = case.mesh.degree, is_direct(case.solve.method, dofs, case.mesh.degree)
+    kind = {"mixed": case.element == "mixed", "matrices": case.material.is_large or not compiles()}
+    return (
+        estimate.solving_memory(dofs, degree, direct=direct, **kind),
+        estimate.enriched_memory(dofs, degree, **kind),
+    )
 
 
 def meridian_problem(case: Case) -> Problem:

@@ -26,17 +26,24 @@ from pipeline.run.measure import TIMES, record_of
 from pipeline.run.memory import FreeMemory, PeakMemory, give_back
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import mesh_case, on_first_rank
-from pipeline.run.problem import CaseFailure, check_memory, lacks_memory, meridian_problem, problem_of, solve_problem
+from pipeline.run.problem import (
+    CaseFailure,
+    check_memory,
+    lacks_memory,
+    memory_of,
+    meridian_problem,
+    problem_of,
+    solve_problem,
+)
 from pipeline.run.progress import Progress
 from pipeline.run.provenance import provenance
 from pipeline.run.record import Record
 from pipeline.run.room import machine_load
 from pipeline.run.sweeping import in_order
 from pipeline.solve.displacement import DisplacementProblem
-from pipeline.solve.linear import SolveError, is_direct
+from pipeline.solve.linear import SolveError
 from pipeline.solve.solution import FieldProblem
 from pipeline.solve.spaces import Spaces
-from pipeline.solve.straight.product import compiles
 
 T = TypeVar("T")
 Keep = Callable[[Record], None]
@@ -195,13 +202,11 @@ class StepRunner:
         return record
 
     def _solve(self, solve: Solve, problem: FieldProblem, ground: Ground, bar: Bar) -> Record:
-        case, degree = solve.case, solve.case.mesh.degree
-        direct = is_direct(case.solve.method, problem.dofs, degree)
-        kind = {"mixed": case.element == "mixed", "matrices": case.material.is_large or not compiles()}
-        check_memory(self._free, estimate.solving_memory(problem.dofs, degree, direct=direct, **kind), "solving")
-        missing = self._lacks_room(bar, estimate.enriched_memory(problem.dofs, degree, **kind))
+        needed, with_bar = memory_of(solve.case, problem.dofs)
+        check_memory(self._free, needed, "solving")
+        missing = self._lacks_room(bar, with_bar)
         estimate_it = bar is not Bar.NONE and not missing
-        solution = solve_problem(case, problem, estimate=estimate_it, meshed=solve.ground)
+        solution = solve_problem(solve.case, problem, estimate=estimate_it, meshed=solve.ground)
         record = record_of(solve, solution, ground.seconds)
         return replace(self._stamp(record, ground.memory), message=missing)
 

@@ -15,16 +15,9 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.arrays import FloatArray
-from pipeline.solve.single.cycle import (
-    SingleCycle,
-    SmoothedLevel,
-    SymmetricOperator,
-    SymmetricProduct,
-    UpperBlocks,
-    interpolation,
-    masks,
-    suits,
-)
+from pipeline.solve.single.blocks import SymmetricOperator, SymmetricProduct, UpperBlocks
+from pipeline.solve.single.cycle import SingleCycle, SmoothedLevel, suits
+from pipeline.solve.single.interpolation import interpolation, masks
 from pipeline.solve.straight.product import is_product
 from pipeline.solve.transfer import transfer
 from pipeline.stages import stage
@@ -251,7 +244,7 @@ class LinearSolver:
         self._operator.mult(x, y)
 
     def precondition(self, residual: PETSc.Vec, result: PETSc.Vec) -> None:
-        """Apply the preconditioner alone; collective.
+        """Apply the preconditioner alone; collective. ``residual`` must be nought where dofs are prescribed.
 
         Raises:
             SolveError: if PETSc fails.

@@ -87,11 +87,28 @@ class Shared:
         """Return the values of the points that are wanted (n, …), given those of this rank's own; collective."""
         return self.end_read(self.begin_read(values))
 
+    def extend(self, x: np.ndarray) -> np.ndarray:
+        """Return ``x``, three numbers for each point of this rank, and behind it the points wanted; collective."""
+        return np.concatenate([x, self.read(x.reshape(-1, 3)).reshape(-1)])
+
+    def fold(self, whole: np.ndarray, y: np.ndarray) -> None:
+        """Add ``whole``, which goes on behind this rank's points as :meth:`extend` has it, to all ``y``; collective."""
+        y += whole[: len(y)]
+        self.add(whole[len(y) :].reshape(-1, 3), y.reshape(-1, 3))
+
     def add(self, more: np.ndarray, values: np.ndarray) -> None:
         """Add ``more`` (n, …) for the points that are wanted to the ``values`` of their owners; collective."""
         came = self._parcels.send(more)
         for part in self._parcels.sources:  # a rank sends no point twice
             values[self._given[part]] += came[part]
+
+
+def ghosts_of(space: Any) -> Shared | None:
+    """Return the points of a space that other ranks own and this one's cells have, None on one process; collective."""
+    comm, index_map = space.mesh.comm, space.dofmap.index_map
+    if comm.size == 1:
+        return None
+    return Shared(comm, index_map.local_range, np.asarray(index_map.ghosts, dtype=np.int64))
 
 
 def owners(comm: MPI.Comm, owned: tuple[int, int], points: IntArray) -> IntArray:

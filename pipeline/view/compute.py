@@ -24,12 +24,10 @@ from pipeline.run.measure import record_of
 from pipeline.run.memory import FreeMemory
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import cached_arrays, on_first_rank
-from pipeline.run.problem import check_memory, lacks_memory, problem_of, solve_problem
+from pipeline.run.problem import check_memory, lacks_memory, memory_of, problem_of, solve_problem
 from pipeline.solve.compiled import vector_space
-from pipeline.solve.linear import is_direct
 from pipeline.solve.solution import FieldProblem
 from pipeline.solve.spaces import Spaces
-from pipeline.solve.straight.product import compiles
 from pipeline.study.sweep import Case, Study
 from pipeline.view.fields import Fields
 
@@ -72,17 +70,14 @@ def _attempt(
     solve: Solve, comm: MPI.Comm, bar: bool, cache: MeshCache | None, note: Note
 ) -> tuple[Fields | None, float]:
     """Solve on one mesh; return the fields on rank 0, and the error bar of F."""
-    case, degree = solve.case, solve.case.mesh.degree
+    case = solve.case
     arrays = _arrays(solve, comm, cache, note)
     prepare(comm, [solve])
     mesh = distribute(comm, arrays and upright(case, arrays))
     with Spaces(mesh) as spaces, problem_of(spaces, case, shared=False) as problem:
-        direct = is_direct(case.solve.method, problem.dofs, degree)
-        kind = {"mixed": case.element == "mixed", "matrices": case.material.is_large or not compiles()}
-        needed = estimate.solving_memory(problem.dofs, degree, direct=direct, **kind)
+        needed, with_bar = memory_of(case, problem.dofs)
         check_memory(FreeMemory(comm), needed, "solving")
-        needed = estimate.enriched_memory(problem.dofs, degree, **kind)
-        room = bar and not lacks_memory(FreeMemory(comm), needed, "")
+        room = bar and not lacks_memory(FreeMemory(comm), with_bar, "")
         note(f"solving for {problem.dofs} unknowns")
         solution = solve_problem(case, problem, estimate=room or solve.goal is not None)
         points = comm.bcast(len(arrays.points) if arrays is not None else 0)

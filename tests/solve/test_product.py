@@ -9,7 +9,7 @@ from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.mixed import MixedProblem
 from pipeline.solve.single import cycle
-from pipeline.solve.single.cycle import UpperBlocks
+from pipeline.solve.single.blocks import UpperBlocks
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.straight import product
 from tests.solve.test_mixed import PRESS, law, make_mesh

@@ -10,7 +10,7 @@ from pipeline.solve.linear import Level, LinearSolver, SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.mixed import MixedProblem
-from pipeline.solve.single import cycle
+from pipeline.solve.single import code, cycle
 from pipeline.solve.spaces import Spaces
 from tests.solve.test_mixed import PRESS, law, make_mesh
 
@@ -115,12 +115,12 @@ def test_what_a_bound_is_made_of_is_linear_to_the_last_digit():
 
 def test_without_a_compiler_petsc_s_own_cycle_serves(monkeypatch):
     wanted = solved(DisplacementProblem, 2, law(0.3))
-    monkeypatch.setattr(cycle, "library", lambda: (_ for _ in ()).throw(RuntimeError("no compiler")))
-    cycle.compiles.cache_clear()
+    monkeypatch.setattr(code, "library", lambda: (_ for _ in ()).throw(RuntimeError("no compiler")))
+    code.compiles.cache_clear()
     try:
         assert solved(DisplacementProblem, 2, law(0.3)).reaction[2] == pytest.approx(wanted.reaction[2], rel=1e-9)
     finally:
-        cycle.compiles.cache_clear()
+        code.compiles.cache_clear()
 
 
 def test_an_operator_that_is_not_positive_is_refused():

@@ -7,50 +7,19 @@ quarter as long. The residual is brought to magnitude 1 first, so that nothing r
 On several ranks each smooths the rows that it owns; what it needs of others' points is sent in single precision, too.
 """
 
-from dataclasses import dataclass, replace
-from functools import cache, partial
-from pathlib import Path
-from typing import Protocol
+from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline.arrays import Int32Array
-from pipeline.solve.parcels import Shared
-from pipeline.solve.single.beyond import beyond, summed
-from pipeline.solve.straight.arrays import available, blocks_to_read
-from pipeline.solve.straight.native import Library
+from pipeline.solve.single.beyond import summed
+from pipeline.solve.single.blocks import SymmetricOperator
+from pipeline.solve.single.code import Single, compiles, library
+from pipeline.solve.single.interpolation import Interpolation
+from pipeline.solve.straight.arrays import available
 from pipeline.solve.straight.product import is_product
-from pipeline.solve.transfer import Side, free, point_weights
-
-Single = npt.NDArray[np.float32]
-
-_DECLARATIONS = """
-void take_upper(int rows, const int* offsets, const int* columns, const double* blocks, const int* upper_offsets,
-                int* upper_columns, float* upper);
-int invert_diagonal(int rows, const int* offsets, const float* values, float* inverse);
-void multiply(int rows, const int* first, const int* offsets, const int* columns, const float* blocks, const float* x,
-              float* y);
-void multiply_double(int rows, const int* first, const int* offsets, const int* columns, const double* blocks,
-                     const double* x, double* y);
-void multiply_beyond(int rows, const int* which, const int* offsets, const int* columns, const float* blocks,
-                     const float* z, float* y);
-void multiply_beyond_double(int rows, const int* which, const int* offsets, const int* columns, const double* blocks,
-                            const double* z, double* y);
-void advance(int rows, const float* inverse, float a, float b, const float* r, float* d, float* x);
-void subtract(int count, const float* q, float* r);
-double dot(int count, const float* x, const float* y);
-void prolong(int rows, const int* offsets, const int* points, const float* weights, const float* coarse_free,
-             const float* fine_free, const float* e, float* x);
-void restrict_to(int rows, const int* offsets, const int* points, const float* weights, int coarse_count,
-                 const float* coarse_free, const float* fine_free, const float* r, float* g);
-double largest(int count, const double* x);
-void to_single(int count, double scale, const double* x, float* y);
-void to_double(int count, double scale, const float* x, double* y);
-"""
-
 
 # Chebyshev's iteration: steps, the share of the spectrum that is left to the coarser level, and by how much the
 # largest eigenvalue that so many of Lanczos' steps find is raised. Measured: docs/solvers.md.
@@ -78,123 +47,6 @@ def takes_product(matrices: list[PETSc.Mat]) -> bool:
         return False
     works = available() and compiles()
     return bool(summed(matrices[0].comm.tompi4py(), works, MPI.MIN)) if matrices else works
-
-
-@cache
-def compiles() -> bool:
-    """Tell whether C can be compiled here."""
-    try:
-        library()
-    except Exception:  # distutils raises many kinds
-        return False
-    return True
-
-
-@cache
-def library() -> Library:
-    """Return the functions of ``cycle.c``, compiled if they are not yet."""
-    return Library(Path(__file__).with_name("cycle.c"), _DECLARATIONS)
-
-
-@dataclass(frozen=True)
-class Interpolation:
-    """From the points of a coarse space to those of a fine one: sparse rows with the same weight for all components.
-
-    ``coarse_free`` and ``fine_free`` are 0 for numbers that are prescribed, else 1. Rows are of the points that this
-    rank owns; those of the coarse space that others own are ``shared``, None on one process. Both maps are collective.
-    """
-
-    offsets: Int32Array
-    points: Int32Array
-    weights: Single
-    coarse_free: Single
-    fine_free: Single
-    shared: Shared | None = None
-
-    def prolong(self, coarse: Single, fine: Single) -> None:
-        """Add the interpolation of ``coarse`` to ``fine``."""
-        if self.shared is not None:
-            coarse = np.concatenate([coarse, self.shared.read(coarse.reshape(-1, 3)).reshape(-1)])
-        library()("prolong", len(self.offsets) - 1, self.offsets, self.points, self.weights, self.coarse_free,
-                  self.fine_free, coarse, fine)  # fmt: skip
-
-    def restrict(self, fine: Single, coarse: Single) -> None:
-        """Write the transposed interpolation of ``fine`` into ``coarse``."""
-        owned = len(coarse)
-        found = coarse if self.shared is None else np.empty(len(self.coarse_free), dtype=np.float32)
-        library()("restrict_to", len(self.offsets) - 1, self.offsets, self.points, self.weights, len(found),
-                  self.coarse_free, self.fine_free, fine, found)  # fmt: skip
-        if self.shared is not None:
-            coarse[:] = found[:owned]
-            self.shared.add(found[owned:].reshape(-1, 3), coarse.reshape(-1, 3))
-
-
-def interpolation(coarse: Side, fine: Side) -> Interpolation:
-    """Return the interpolation between two spaces; collective."""
-    offsets, points, weights = point_weights(coarse.space, fine.space)
-    comm, index_map, shared = coarse.space.mesh.comm, coarse.space.dofmap.index_map, None
-    if comm.size > 1:
-        shared = Shared(comm, index_map.local_range, np.asarray(index_map.ghosts, dtype=np.int64))
-    return Interpolation(
-        offsets.astype(np.int32), points, weights.astype(np.float32), *masks(coarse, fine), shared=shared
-    )
-
-
-def masks(coarse: Side, fine: Side) -> tuple[Single, Single]:
-    """Return 0 for each number of the two spaces that is prescribed, else 1."""
-    return free(coarse).astype(np.float32), free(fine).astype(np.float32)
-
-
-class SymmetricOperator(Protocol):
-    """A positive definite operator in single precision, of ``rows`` points.
-
-    ``prescribed`` are dofs (unrolled) of which it knows nothing: what multiplies is nought there, the product anything.
-    On several ranks points are those that a rank owns, and products and diagonals are collective.
-    """
-
-    @property
-    def comm(self) -> MPI.Comm: ...  # noqa: D102
-
-    @property
-    def rows(self) -> int: ...  # noqa: D102
-
-    @property
-    def prescribed(self) -> Int32Array: ...  # noqa: D102
-
-    def multiply(self, x: Single, y: Single) -> None: ...  # noqa: D102
-
-    def diagonal(self) -> Single: ...  # noqa: D102
-
-
-class UpperBlocks:
-    """The operator of a matrix: its blocks from the diagonal on, and those beyond the columns of this rank."""
-
-    prescribed: Int32Array = np.empty(0, dtype=np.int32)
-
-    def __init__(self, matrix: PETSc.Mat):
-        """Take the entries of a matrix, in blocks and symmetric; collective."""
-        self.comm = matrix.comm.tompi4py()
-        inside, _, _ = blocks_to_read(matrix)
-        offsets, columns = inside.offsets, inside.columns
-        self.rows = len(offsets) - 1
-        row = np.repeat(np.arange(self.rows, dtype=np.int32), np.diff(offsets))
-        upper = np.add.reduceat(columns >= row, offsets[:-1])
-        self._offsets = np.concatenate([[0], np.cumsum(upper)]).astype(np.int32)
-        self._columns = np.empty(self._offsets[-1], dtype=np.int32)
-        self._values = np.empty((self._offsets[-1], 9), dtype=np.float32)
-        library()("take_upper", self.rows, offsets, columns, inside.values, self._offsets, self._columns, self._values)
-        self._beyond = beyond(matrix, np.float32, partial(library(), "multiply_beyond"))
-
-    def multiply(self, x: Single, y: Single) -> None:
-        """Write A x into ``y``; collective."""
-        begun = self._beyond and self._beyond.begin(x)
-        library()("multiply", self.rows, self._offsets, self._offsets, self._columns, self._values, x, y)
-        if self._beyond and begun:
-            self._beyond.add(begun, y)
-
-    def diagonal(self) -> Single:
-        """Return the blocks on the diagonal, shape (rows, 9)."""
-        return self._values[self._offsets[:-1]]
 
 
 class SmoothedLevel:
@@ -291,30 +143,6 @@ class SmoothedLevel:
 
     def _dot(self, x: Single, y: Single) -> float:
         return summed(self._comm, library()("dot", self.size, x, y))
-
-
-class SymmetricProduct:
-    """A symmetric operator in double, of which the blocks from the diagonal on are read: a context for PETSc.
-
-    Its own product reads all of them, and no faster.
-    """
-
-    def __init__(self, matrix: PETSc.Mat):
-        """Refer to the entries of a matrix, in blocks, which must live as long; collective."""
-        inside, _, _ = blocks_to_read(matrix)
-        self._offsets, self._columns, self._blocks = inside.offsets, inside.columns, inside.values
-        self._beyond = beyond(matrix, np.float64, partial(library(), "multiply_beyond_double"))
-        rows = np.repeat(np.arange(len(self._offsets) - 1, dtype=np.int32), np.diff(self._offsets))
-        self._diagonal = np.flatnonzero(self._columns == rows).astype(np.int32)
-
-    def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Write A x into ``y``."""
-        given, result = x.array_r, y.array_w
-        begun = self._beyond and self._beyond.begin(given)
-        library()("multiply_double", len(self._diagonal), self._diagonal, self._offsets, self._columns, self._blocks,
-                  given, result)  # fmt: skip
-        if self._beyond and begun:
-            self._beyond.add(begun, result)
 
 
 class SingleCycle:

@@ -6,6 +6,7 @@ The compiler is the one that dolfinx compiles its forms with.
 import hashlib
 import importlib.util
 import sysconfig
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -46,6 +47,15 @@ class Library:
         """Let a pointer point at ``values``, which are kept."""
         self._kept.append(values)
         setattr(self._functions.lib, name, self._functions.ffi.from_buffer("double[]", values))
+
+
+def compiles(library: Callable[[], Library]) -> bool:
+    """Tell whether the C of a ``library`` can be compiled here."""
+    try:
+        library()
+    except Exception:  # distutils raises many kinds
+        return False
+    return True
 
 
 @cache

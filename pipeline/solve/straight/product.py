@@ -21,8 +21,8 @@ from petsc4py import PETSc
 from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
 from pipeline.solve.material import MaterialLaw
-from pipeline.solve.parcels import Shared
-from pipeline.solve.straight import arrays
+from pipeline.solve.parcels import ghosts_of
+from pipeline.solve.straight import arrays, native
 from pipeline.solve.straight.native import Library
 from pipeline.solve.straight.pattern import corners, owned_cells, reference, straight_cells
 
@@ -63,11 +63,7 @@ def library() -> Library:
 @cache
 def compiles() -> bool:
     """Tell whether C with vectors can be compiled here."""
-    try:
-        library()
-    except Exception:  # distutils raises many kinds
-        return False
-    return True
+    return native.compiles(library)
 
 
 @dataclass(frozen=True)
@@ -123,10 +119,7 @@ class CellStiffness:
         """Collective."""
         index_map, self.comm, self.degree = space.dofmap.index_map, space.mesh.comm, compat.degree(space)
         self.points, self.local = index_map.size_local, index_map.size_local + index_map.num_ghosts
-        self.prescribed, self.shared = prescribed[prescribed < 3 * self.points], None
-        if self.comm.size > 1:
-            ghosts = np.asarray(index_map.ghosts, dtype=np.int64)
-            self.shared = Shared(self.comm, index_map.local_range, ghosts)
+        self.prescribed, self.shared = prescribed[prescribed < 3 * self.points], ghosts_of(space)
         dofs = owned_cells(space)
         self._which = straight_cells(curved, len(dofs))
         self._regions = np.zeros(len(dofs), dtype=np.int32) if regions is None else regions
@@ -234,11 +227,10 @@ class CellOperator:
         if (shared := self._cells.shared) is None:
             self._add_cells(x, y, kind)
             return
-        given = np.concatenate([x, shared.read(x.reshape(-1, 3)).reshape(-1)])
+        given = shared.extend(x)
         found = np.zeros_like(given)
         self._add_cells(given, found, kind)
-        y += found[: len(y)]
-        shared.add(found[len(y) :].reshape(-1, 3), y.reshape(-1, 3))
+        shared.fold(found, y)
 
     def _add_cells(self, x: np.ndarray, y: np.ndarray, kind: str) -> None:
         end, cells, table = "" if kind == "float32" else "_double", self._cells, bernstein(self._cells.degree, kind)
