@@ -11,7 +11,7 @@ from typing import Any
 
 from pipeline.plan.symmetry import mirror_planes, movement_planes
 from pipeline.shapes.indenter import Indenter
-from pipeline.study.check import held_gaps
+from pipeline.study.check_mesh import held_gaps
 from pipeline.study.schema import Mesh
 from pipeline.study.sweep import Case
 

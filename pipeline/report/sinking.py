@@ -7,7 +7,8 @@ from operator import mul
 
 from pipeline.plan.symmetry import mirror_planes
 from pipeline.shapes.frame import Vector
-from pipeline.shapes.probe import PLANES, Punch
+from pipeline.shapes.probe import PLANES
+from pipeline.shapes.punch import Punch
 from pipeline.study.sweep import Case
 
 # Of the axes of a probe, those that say how far it moves, and those that say where it is: the others say what it is.

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import AfterValidator
 from pydantic_core import PydanticCustomError
 
-from pipeline.shapes.arrays import BoolArray, FloatArray, np
+from pipeline.shapes.arrays import BoolArray, FloatArray
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.section import Problems, Section, Words
@@ -268,60 +268,6 @@ class Probe(Section, ABC):
     @abstractmethod
     def check(self, problems: Problems) -> None:
         """Report what makes no sense in its keys."""
-
-
-class Punch(Probe):
-    """A tool with a flat face, whose edge is where contact ends, unless it lifts off."""
-
-    NOT_DRAWN = ("action", "depth", "contact", "slice", "motion")
-
-    @property
-    def force_exponent(self) -> float | None:
-        """F is proportional to the depth, unless it holds a slit's faces apart, too."""
-        return None if self.slit else 1.0
-
-    @abstractmethod
-    def covers(self, points: FloatArray) -> BoolArray:
-        """Tell which ``points`` (n, 2) of its own coordinates (m) are below its face, edge and all."""
-
-    def profile(self, points: FloatArray) -> FloatArray:
-        """Return nought below the face."""
-        return np.where(self.covers(points), 0.0, inf)
-
-    def ends_at(self, points: FloatArray) -> BoolArray:
-        """Tell that the tool ends wherever the footprint does."""
-        return np.ones(len(points), dtype=bool)
-
-    @property
-    def has_singular_edge(self) -> bool:
-        """It has one."""
-        return True
-
-    @property
-    def rim_size(self) -> tuple[float, float]:
-        """Length (m) of the edge, and no area."""
-        return self.perimeter, 0.0
-
-    @property
-    def rim_offset(self) -> float:
-        """None (m): contact is expected to end at the edge of the face."""
-        return 0.0
-
-    def rim_distance(self, along: str, across: str, height: str, unit: float) -> str:
-        """Write the distance to the edge of the face."""
-        return self.edge_distance(along, across, height, unit)
-
-
-class Straight(Punch):
-    """A punch that is only pushed in, along its axis."""
-
-    PROPORTIONAL_TO = ("depth",)
-
-    action: Literal["pierce"] = "pierce"
-
-    def travel(self, frame: Frame) -> Vector:
-        """Return the depth along the axis."""
-        return frame.inward(self.depth)
 
 
 @lru_cache(_MANY)

@@ -20,7 +20,8 @@ from pipeline.scene.model import Scene
 from pipeline.shapes.body import Body, Drawn
 from pipeline.shapes.frame import Frame
 from pipeline.shapes.indenter import Indenter
-from pipeline.shapes.probe import PLANES, Probe, Straight
+from pipeline.shapes.probe import PLANES, Probe
+from pipeline.shapes.punch import Straight
 from pipeline.shapes.registry import BODIES, PROBES
 from pipeline.study.keys import words_of
 from tests.cases import study

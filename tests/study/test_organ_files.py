@@ -6,7 +6,7 @@ import pytest
 
 from pipeline.plan.key import case_key
 from pipeline.shapes.contact import lifted_edge
-from pipeline.study.check import held_gaps
+from pipeline.study.check_mesh import held_gaps
 from pipeline.study.problems import StudyError
 from tests.cases import study
 from tests.shapes.files.solids import ball, both, stl

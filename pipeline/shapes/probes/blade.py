@@ -9,7 +9,8 @@ from pydantic import Field
 from pipeline.shapes.arrays import BoolArray, FloatArray, np
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
-from pipeline.shapes.probe import ON_EDGE, Punch
+from pipeline.shapes.probe import ON_EDGE
+from pipeline.shapes.punch import Punch
 from pipeline.shapes.section import Problems, Words, in_mm
 from pipeline.shapes.slit import Slit
 from pipeline.units import Length, Travel

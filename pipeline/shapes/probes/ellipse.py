@@ -6,7 +6,8 @@ from typing import Annotated, Any, Literal, Self
 from pipeline.shapes.arrays import BoolArray, FloatArray, np
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
-from pipeline.shapes.probe import ON_EDGE, Straight
+from pipeline.shapes.probe import ON_EDGE
+from pipeline.shapes.punch import Straight
 from pipeline.shapes.round import closed_ellipse, draw_ellipse, points_of_ellipse
 from pipeline.shapes.section import Problems, Words
 from pipeline.units import Length
