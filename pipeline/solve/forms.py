@@ -21,6 +21,7 @@ from pipeline.mesh.generate import MeshArrays
 from pipeline.solve.compiled import cellwise_space, form, vector_space
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.straight import assembles, has_kernel
+from pipeline.solve.straight.curved import quadrature_degree
 from pipeline.solve.straight.stiffness import cell_kernel
 
 # Marks of cells, and the bulge of an edge, in units of its length, that rounding may leave.
@@ -95,12 +96,11 @@ class ElasticForms:
 def dx(space: Any, *, curved_only: bool = False, more: int = 0) -> Any:
     """Return the measure for forms of elasticity on ``space``, with its quadrature; of straight cells, too, or not.
 
-    On straight cells 2p - 2 is exact. The map of a quarter-point element varies within the cell, and 2p reads F up to
-    0.07 % low there; at p = 2, degree 4 has points at which the map is singular. Few cells of a curved mesh are curved.
-    On straight cells degrees are ``more`` than that, where integrands are no polynomials of degree 2p - 2.
+    On straight cells 2p - 2 is exact; few cells of a curved mesh are curved. On straight cells degrees are ``more``
+    than that, where integrands are no polynomials of degree 2p - 2.
     """
     degree, mesh = compat.degree(space), space.mesh
-    exact, enough = ({"quadrature_degree": d} for d in (2 * degree - 2 + more, max(6, 2 * degree)))
+    exact, enough = ({"quadrature_degree": d} for d in (2 * degree - 2 + more, quadrature_degree(degree)))
     curved = curved_cells(mesh)
     if curved is None:
         return ufl.dx(metadata=exact)

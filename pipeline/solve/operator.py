@@ -120,18 +120,9 @@ class Operators:
     @stage("assembly")
     def _product(self, law: MaterialLaw) -> PETSc.Mat:
         if self._cells is None:
-            curved, regions = self._curved(), self._space.body.regions
+            curved, regions = curved_cells(self._space.body.mesh), self._space.body.regions
             self._cells = CellStiffness(self._space.space, curved, self._space.prescribed, regions)
-        curved_part = self._cells.curved_matrix()
-        if self._is_curved:
-            self._forms.set_law(law)
-            form = self._forms.curved_stiffness  # collective
-            if curved_part is not None:
-                compat.add_matrix(curved_part, form, [], 0.0)
-        context = CellOperator(self._cells, law, curved_part)
-        if curved_part is not None:
-            curved_part.destroy()
-        return context.matrix()
+        return CellOperator(self._cells, law).matrix()
 
     @stage("assembly")
     def _make(

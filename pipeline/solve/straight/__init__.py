@@ -1,8 +1,9 @@
-"""Operators on cells without curved edges, which are most: no quadrature, and every entry knows its place.
+"""Operators cell by cell. Without curved edges, as most are, they need no quadrature, and every entry knows its place.
 
 ``kernels.c`` has the formulas. They take a sixth of the time of dolfinx's general kernels and PETSc's insertion, entry
 by entry (docs/solvers.md). On several ranks each adds its own cells; what they add to rows of others is sent there.
-dolfinx assembles the curved cells, and everything where this PETSc does not lend the arrays of its matrices.
+dolfinx assembles the curved cells of matrices, and everything where this PETSc does not lend the arrays of its
+matrices; for products (``product.py``, ``curved.py``) nothing is assembled.
 """
 
 from typing import Any

@@ -202,29 +202,3 @@ void NAME(int degree, int batches, const int* dofs, const TYPE* maps, const TYPE
 
 DEFINE_PRODUCT(add_product, float, floats)
 DEFINE_PRODUCT(add_product_double, double, doubles)
-
-/* y += B x with a symmetric B of few rows, of which the blocks from the diagonal on are there. */
-#define DEFINE_BLOCKS(NAME, TYPE)                                                                                      \
-void NAME(int count, const int* restrict rows, const int* restrict offsets, const int* restrict columns,               \
-          const TYPE* restrict blocks, const TYPE* restrict x, TYPE* restrict y)                                       \
-{                                                                                                                      \
-  for (int n = 0; n < count; ++n)                                                                                      \
-  {                                                                                                                    \
-    const size_t i = 3 * (size_t)rows[n];                                                                              \
-    for (int k = offsets[n]; k < offsets[n + 1]; ++k)                                                                  \
-    {                                                                                                                  \
-      const TYPE* b = blocks + 9 * (size_t)k;                                                                          \
-      const size_t j = 3 * (size_t)columns[k];                                                                         \
-      for (int r = 0; r < 3; ++r)                                                                                      \
-        for (int s = 0; s < 3; ++s)                                                                                    \
-        {                                                                                                              \
-          y[i + r] += b[3 * r + s] * x[j + s];                                                                         \
-          if (i != j)                                                                                                  \
-            y[j + s] += b[3 * r + s] * x[i + r];                                                                       \
-        }                                                                                                              \
-    }                                                                                                                  \
-  }                                                                                                                    \
-}
-
-DEFINE_BLOCKS(add_blocks, float)
-DEFINE_BLOCKS(add_blocks_double, double)

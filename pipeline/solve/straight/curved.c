@@ -1,0 +1,156 @@
+/* Products with the stiffness of curved tetrahedra, cell by cell, by quadrature: there is no matrix to read.
+ *
+ * Cells are stored as in product.c, LANES at a time; in double precision half of them are taken at once.
+ */
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+enum { LANES = 16, MOST_POINTS = 35 }; /* of degree 4 */
+
+typedef float floats __attribute__((vector_size(64)));
+typedef double doubles __attribute__((vector_size(64)));
+
+/* The mapping of gradients at each point of a quadrature, times the root of its weight's size and of how volume grows
+ * there, lane by lane: maps (batches, quadrature, 3, 3, LANES). roots (batches, quadrature, LANES) are these roots, with
+ * the sign of the determinant. nodes (count, width, 3) are those of the geometry, gradients (quadrature, width, 3) of its
+ * functions. */
+void map_curved(int count, int width, int quadrature, const double* nodes, const double* gradients,
+                const double* weights, double* maps, double* roots)
+{
+  for (int k = 0; k < count; ++k)
+    for (int q = 0; q < quadrature; ++q)
+    {
+      const double* x = nodes + 3 * (size_t)width * k;
+      const double* D = gradients + 3 * (size_t)width * q;
+      double J[3][3] = {{0}}, K[3][3];
+      for (int n = 0; n < width; ++n)
+        for (int a = 0; a < 3; ++a)
+          for (int r = 0; r < 3; ++r)
+            J[a][r] += D[3 * n + a] * x[3 * n + r];
+      for (int a = 0; a < 3; ++a)
+        for (int r = 0; r < 3; ++r)
+        {
+          const int b = (a + 1) % 3, c = (a + 2) % 3, s = (r + 1) % 3, t = (r + 2) % 3;
+          K[a][r] = J[b][s] * J[c][t] - J[b][t] * J[c][s];
+        }
+      const double volume = J[0][0] * K[0][0] + J[0][1] * K[0][1] + J[0][2] * K[0][2];
+      const double scale = sqrt(fabs(weights[q] / volume));
+      const size_t point = (size_t)(k / LANES) * quadrature + q;
+      double* map = maps + point * 9 * LANES + k % LANES;
+      roots[point * LANES + k % LANES] = scale * volume;
+      for (int a = 0; a < 3; ++a)
+        for (int r = 0; r < 3; ++r)
+          map[(3 * a + r) * LANES] = scale * K[a][r];
+    }
+}
+
+/* Add the blocks on the diagonal: gradients (quadrature, points, 3) are of the space's functions. A weight may be
+ * negative: signs (quadrature) has 1 or -1. */
+void add_curved_diagonal(int points, int quadrature, int batches, const int* restrict dofs,
+                         const double* restrict maps, const double* restrict lame, const double* restrict signs,
+                         const double* restrict gradients, float* restrict diagonal)
+{
+  enum { WIDTH = 8 };
+  for (int part = 0; part < batches * (LANES / WIDTH); ++part)
+  {
+    const size_t batch = part / (LANES / WIDTH), begin = part % (LANES / WIDTH) * WIDTH;
+    doubles P[MOST_POINTS][6], lambda, mu;
+    memset(P, 0, sizeof P);
+    memcpy(&lambda, lame + 2 * LANES * batch + begin, sizeof lambda);
+    memcpy(&mu, lame + 2 * LANES * batch + LANES + begin, sizeof mu);
+    for (int q = 0; q < quadrature; ++q)
+    {
+      doubles K[9];
+      for (int n = 0; n < 9; ++n)
+        memcpy(&K[n], maps + ((batch * quadrature + q) * 9 + n) * LANES + begin, sizeof K[n]);
+      for (int i = 0; i < points; ++i)
+      {
+        const double* D = gradients + 3 * ((size_t)points * q + i);
+        doubles g[3];
+        for (int s = 0; s < 3; ++s)
+          g[s] = D[0] * K[s] + D[1] * K[3 + s] + D[2] * K[6 + s];
+        for (int r = 0, n = 0; r < 3; ++r)
+          for (int s = r; s < 3; ++s, ++n)
+            P[i][n] += signs[q] * g[r] * g[s];
+      }
+    }
+    for (int i = 0; i < points; ++i)
+    {
+      const doubles trace = mu * (P[i][0] + P[i][3] + P[i][5]), both = lambda + mu;
+      const doubles blocks[9] = {both * P[i][0] + trace, both * P[i][1], both * P[i][2],
+                                 both * P[i][1], both * P[i][3] + trace, both * P[i][4],
+                                 both * P[i][2], both * P[i][4], both * P[i][5] + trace};
+      for (int lane = 0; lane < WIDTH; ++lane)
+      {
+        float* block = diagonal + 9 * (size_t)dofs[(batch * points + i) * LANES + begin + lane];
+        for (int n = 0; n < 9; ++n)
+          block[n] += (float)blocks[n][lane];
+      }
+    }
+  }
+}
+
+/* y += A x over whole batches of cells: dofs (batches, points, LANES), maps (batches, quadrature, 3, 3, LANES), lame
+ * (batches, 2, LANES); cells that fill up the last batch have maps of nought. */
+#define DEFINE_PRODUCT(NAME, TYPE, VECTOR)                                                                             \
+void NAME(int points, int quadrature, int batches, const int* restrict dofs, const TYPE* restrict maps,                \
+          const TYPE* restrict lame, const TYPE* restrict signs, const TYPE* restrict gradients,                       \
+          const TYPE* restrict x, TYPE* restrict y)                                                                    \
+{                                                                                                                      \
+  enum { WIDTH = sizeof(VECTOR) / sizeof(TYPE) };                                                                      \
+  for (int part = 0; part < batches * (LANES / WIDTH); ++part)                                                         \
+  {                                                                                                                    \
+    const size_t batch = part / (LANES / WIDTH), begin = part % (LANES / WIDTH) * WIDTH;                               \
+    const int* restrict at = dofs + batch * points * LANES + begin;                                                    \
+    VECTOR u[MOST_POINTS][3], f[MOST_POINTS][3], lambda, mu;                                                           \
+    memcpy(&lambda, lame + 2 * LANES * batch + begin, sizeof lambda);                                                  \
+    memcpy(&mu, lame + 2 * LANES * batch + LANES + begin, sizeof mu);                                                  \
+    memset(f, 0, 3 * points * sizeof(VECTOR));                                                                         \
+    for (int i = 0; i < points; ++i)                                                                                   \
+    {                                                                                                                  \
+      TYPE* row = (TYPE*)u[i];                                                                                         \
+      for (int lane = 0; lane < WIDTH; ++lane)                                                                         \
+        for (int r = 0; r < 3; ++r)                                                                                    \
+          row[r * WIDTH + lane] = x[3 * (size_t)at[i * LANES + lane] + r];                                             \
+    }                                                                                                                  \
+    for (int q = 0; q < quadrature; ++q)                                                                               \
+    {                                                                                                                  \
+      const TYPE* restrict D = gradients + 3 * (size_t)points * q;                                                     \
+      VECTOR G[3][3] = {{{0}}}, K[3][3], H[3][3], F[3][3];                                                             \
+      for (int i = 0; i < points; ++i)                                                                                 \
+        for (int a = 0; a < 3; ++a)                                                                                    \
+          for (int r = 0; r < 3; ++r)                                                                                  \
+            G[a][r] += D[3 * i + a] * u[i][r];                                                                         \
+      for (int n = 0; n < 9; ++n)                                                                                      \
+        memcpy(&K[n / 3][n % 3], maps + ((batch * quadrature + q) * 9 + n) * LANES + begin, sizeof(VECTOR));           \
+      for (int r = 0; r < 3; ++r)                                                                                      \
+        for (int s = 0; s < 3; ++s)                                                                                    \
+          H[r][s] = G[0][r] * K[0][s] + G[1][r] * K[1][s] + G[2][r] * K[2][s];                                         \
+      const VECTOR pressure = signs[q] * lambda * (H[0][0] + H[1][1] + H[2][2]), signed_mu = signs[q] * mu;            \
+      for (int r = 0; r < 3; ++r)                                                                                      \
+      {                                                                                                                \
+        VECTOR T[3];                                                                                                   \
+        for (int s = 0; s < 3; ++s)                                                                                    \
+          T[s] = signed_mu * (H[r][s] + H[s][r]);                                                                      \
+        T[r] += pressure;                                                                                              \
+        for (int a = 0; a < 3; ++a)                                                                                    \
+          F[a][r] = T[0] * K[a][0] + T[1] * K[a][1] + T[2] * K[a][2];                                                  \
+      }                                                                                                                \
+      for (int i = 0; i < points; ++i)                                                                                 \
+        for (int r = 0; r < 3; ++r)                                                                                    \
+          f[i][r] += D[3 * i] * F[0][r] + D[3 * i + 1] * F[1][r] + D[3 * i + 2] * F[2][r];                             \
+    }                                                                                                                  \
+    for (int i = 0; i < points; ++i)                                                                                   \
+    {                                                                                                                  \
+      const TYPE* row = (const TYPE*)f[i];                                                                             \
+      for (int lane = 0; lane < WIDTH; ++lane)                                                                         \
+        for (int r = 0; r < 3; ++r)                                                                                    \
+          y[3 * (size_t)at[i * LANES + lane] + r] += row[r * WIDTH + lane];                                            \
+    }                                                                                                                  \
+  }                                                                                                                    \
+}
+
+DEFINE_PRODUCT(add_curved, float, floats)
+DEFINE_PRODUCT(add_curved_double, double, doubles)
