@@ -86,6 +86,7 @@ benchmark: setup ## every table of docs/performance.md, into results/ (an idle m
 	$(PYTHON) -m benchmarks.products
 	$(PYTHON) -m benchmarks.solvers
 	$(PYTHON) -m benchmarks.contact
+	$(PYTHON) -m benchmarks.organs
 	$(PYTHON) -m benchmarks.scaling
 	$(EPSMESH) benchmark
 	$(PYTHON) -m benchmarks.reductions

@@ -125,3 +125,14 @@ def test_meshes_for_found_contact_are_graded_to_where_it_ends(depth):
     assert all(is_graded_to_contact(replace(case, mesh=mesh)) for mesh in meshes_for(case, 0.02))
     coarse = case.mesh.model_copy(update={"rim": 0.39 * case.probe.half_width, "growth": 0.5})
     assert not is_graded_to_contact(replace(case, mesh=coarse))
+
+
+def test_round_bodies_are_meshed_more_finely_before_elements_of_degree_3_are_taken():
+    """These take more time there, which on the plane top of a box they do not."""
+    ball = {"shape": "ellipsoid", "axes": ["40 mm", "30 mm", "20 mm"], "fixed": {"below": "-8 mm"}}
+    degrees = [
+        [mesh.degree for mesh in meshes_for(parse({**raw(**body), "mesh": {"accuracy": "2 %"}}).case(()), 0.02)]
+        for body in ({}, {"body": ball})
+    ]
+    assert degrees == [sorted(each) for each in degrees]
+    assert degrees[1].count(2) == degrees[0].count(2) + 3

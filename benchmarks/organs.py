@@ -1,0 +1,187 @@
+"""Organs at 1 %, from a file to the force with its bar, place by place: ``python -m benchmarks.organs``.
+
+Seconds are those of processors, the remesher's process included; forms are compiled before, no meshes are kept from
+earlier runs. Then the whole command for one place, and the same with the case stored, which is start-up, dataset and
+figures; at last a large file, checked for the first time and again. Two minutes.
+"""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from shutil import copy
+from tempfile import TemporaryDirectory
+from types import SimpleNamespace
+from typing import Any
+
+import igl
+from mpi4py import MPI
+from threadpoolctl import threadpool_limits
+
+from benchmarks.tables import markdown
+from pipeline import stages
+from pipeline.plan.plan import make_plan
+from pipeline.run.compile import prepare
+from pipeline.run.execute import execute
+from pipeline.run.mesh_cache import MeshCache
+from pipeline.run.progress import Silent
+from pipeline.run.record import Record
+from pipeline.shapes.files.stl import parse as read_stl
+from pipeline.shapes.files.stl import written
+from pipeline.study.load import parse
+from pipeline.study.toml import to_toml
+from pipeline.within import VARIABLE
+
+MESHES = Path(__file__).parents[1] / "meshes"
+LIVER = {"shape": "surface", "file": "liver.stl", "unit": "mm", "fixed": {"below": "-20 mm"}}
+KIDNEY = {"shape": "surface", "file": "kidney.obj", "unit": "mm", "fixed": {"below": "-8 mm"}}
+DISC = {"action": "pierce", "shape": "disc", "radius": "4 mm", "depth": "0.3 mm"}
+BLADE = {"action": "cut", "shape": "blade", "length": "8 mm", "width": "2 mm", "depth": "0.3 mm"}
+BALL = {"action": "pierce", "shape": "sphere", "radius": "8 mm", "depth": "0.5 mm", "contact": "unilateral"}
+THICK, THIN = {"thick lobe": "-25 mm 0 mm"}, {"thin lobe": "60 mm -8 mm"}
+Scene = tuple[dict[str, Any], list[float], dict[str, Any], dict[str, str]]
+# Body, ν, probe, places by name.
+SCENES: dict[str, Scene] = {
+    "liver, disc": (
+        LIVER, [0.45, 0.49], DISC, THICK | {"middle": "10 mm 0 mm"} | THIN | {"from the side": "-75 mm 0 mm 5 mm"},
+    ),
+    "liver, disc, compressible": (LIVER, [0.3], DISC, THICK | THIN),
+    "liver, blade": (LIVER, [0.45], BLADE, THICK),
+    "liver, ball, contact found": (LIVER, [0.45], BALL, THICK),
+    "kidney, disc": (KIDNEY, [0.45], DISC, {"top": "0 mm 0 mm"}),
+}  # fmt: skip
+# Parts of a place, by how the names of their stages begin; the rest is what none of them begins with.
+PARTS = {
+    "far surface": ("mesh cache / far surface",),
+    "mesh": ("surface", "gmsh", "curved", "dolfinx mesh", "mesh cache"),
+    "assembly": ("set-up", "spaces, forms"),
+    "iterations": ("iterations", "contact sets", "residuals", "strain"),
+    "error bar": ("error bar",),
+}
+COLUMNS = {
+    "scene": "", "place": "", "nu": "g", "element": "", "first degree": "d", "dofs": ",d", "bar": ".2%",
+    "seconds": ".1f", **dict.fromkeys([*PARTS, "rest"], ".1f"),
+}  # fmt: skip
+WHOLE = {"what": "", "seconds": ".1f"}
+# How often each facet of the liver is cut into four to make a large file: 320,000 of them.
+_TIMES = 3
+
+
+def processor_seconds() -> float:
+    """Return what this process and the children that it waited for have used of processors."""
+    used = [resource.getrusage(whose) for whose in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in used)
+
+
+@contextmanager
+def stages_of_processors() -> Iterator[None]:
+    """Let stages count a processor's seconds instead of those of the clock, from nought."""
+    clock = stages.time
+    stages.table()
+    stages.seconds.clear()
+    stages.time = SimpleNamespace(perf_counter=processor_seconds)  # type: ignore[assignment]
+    stages._since[0] = processor_seconds()
+    try:
+        yield
+    finally:
+        stages.time, stages._since[0] = clock, clock.perf_counter()
+        stages.seconds.clear()
+
+
+def parts_of(seconds: Mapping[str, float]) -> dict[str, float]:
+    """Return the seconds by part of a place, of those by stage."""
+    parts = dict.fromkeys([*PARTS, "rest"], 0.0)
+    for stage, spent in seconds.items():
+        parts[next((part for part, begins in PARTS.items() if stage.startswith(begins)), "rest")] += spent
+    return parts
+
+
+def study_of(scene: Scene) -> dict[str, Any]:
+    """Return the study of a scene, asked to be right to 1 %."""
+    body, ratios, probe, places = scene
+    return {
+        "body": body | {"file": str(MESHES / body["file"])}, "material": {"young": "5 kPa", "poisson": ratios},
+        "probe": probe | {"at": [[f"{x} mm" for x in at.split(" mm")[:-1]] for at in places.values()]},
+        "mesh": {"accuracy": "1 %"}, "solve": {"exact": False},
+    }  # fmt: skip
+
+
+def measure(name: str, folder: Path) -> list[dict[str, Any]]:
+    """Return the rows of a scene, in the order in which they are computed; meshes are kept in ``folder``."""
+    plan = make_plan(parse(study_of(SCENES[name])))
+    named = {at: place for place, at in SCENES[name][3].items()}
+    cases = {solve.key: solve.case for solve in plan.solves}
+    rows: list[dict[str, Any]] = []
+
+    def keep(record: Record) -> None:
+        case = cases[record.key]
+        at = " ".join(str(dict(case.labels)["at"]).split())
+        stages.table()
+        parts = parts_of(stages.seconds)
+        stages.seconds.clear()
+        rows.append({
+            "scene": name, "place": named[at], "nu": case.poisson, "element": case.element,
+            "first degree": case.mesh.degree, "dofs": record.dofs, "cells": record.cells, "force": record.force,
+            "bar": record.force_error, "status": record.status, "seconds": sum(parts.values()), **parts,
+        })  # fmt: skip
+        print(markdown(rows[-1:], COLUMNS).splitlines()[-1], flush=True)
+
+    prepare(MPI.COMM_SELF, plan.solves)
+    with threadpool_limits(limits=1), stages_of_processors():
+        execute(plan, MPI.COMM_SELF, keep, Silent(), None, MeshCache(folder))
+    return rows
+
+
+def command(*arguments: str, folder: Path) -> float:
+    """Return the processor's seconds of a command of the program, which works in ``folder``."""
+    start = processor_seconds()
+    surroundings = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": str(MESHES.parent)}
+    if arguments[0] == "validate":  # a large file is known to be whole by a cache, which is to be empty
+        surroundings["EPSMESH_CACHE"] = str(folder / "cache")
+    whole = [sys.executable, "-m", "pipeline", *arguments]
+    subprocess.run(whole, check=True, stdout=subprocess.DEVNULL, cwd=folder, env=surroundings)
+    return processor_seconds() - start
+
+
+def whole_commands(folder: Path) -> list[dict[str, Any]]:
+    """Return what whole commands take: one place of the liver, the same once it is stored, and a large file's check."""
+    body, _, probe, places = SCENES["liver, disc"]
+    scene = (body, [0.45], probe, dict([next(iter(places.items()))]))
+    copy(MESHES / body["file"], folder)
+    found = read_stl((folder / body["file"]).read_bytes())
+    points, facets = igl.loop(found.points, found.facets, _TIMES)
+    (folder / "large.stl").write_bytes(written(points, facets))
+    for name in ("liver", "large"):
+        study = study_of(scene)
+        study["body"]["file"] = f"{name}.stl"
+        (folder / f"{name}.toml").write_text(to_toml(study, name))
+    run = ("run", "liver.toml", "--output", "results", "--meshes", "meshes")
+    check = ("validate", "large.toml")
+    told = {
+        "one place of the liver: file, force, bar, dataset, figures": run, "the same, stored": run,
+        f"validate, {len(facets):,} facets, first time": check, "again": check,
+        f"validate, {len(found.facets):,} facets": ("validate", "liver.toml"),
+    }  # fmt: skip
+    return [{"what": what, "seconds": command(*arguments, folder=folder)} for what, arguments in told.items()]
+
+
+def main(output: Path = Path("results")) -> None:
+    """Measure, print, and write ``organs.json`` and ``organs.md``."""
+    os.environ[VARIABLE] = str(MESHES)
+    with TemporaryDirectory(prefix="organs-") as folder:
+        rows = [row for name in SCENES for row in measure(name, Path(folder))]
+    with TemporaryDirectory(prefix="organs-") as folder:
+        commands = whole_commands(Path(folder))
+    tables = f"{markdown(rows, COLUMNS)}\n{markdown(commands, WHOLE)}"
+    print(tables)
+    output.mkdir(parents=True, exist_ok=True)
+    (output / "organs.json").write_text(json.dumps({"places": rows, "commands": commands}, indent=1))
+    (output / "organs.md").write_text(tables)
+
+
+if __name__ == "__main__":
+    main()
