@@ -45,15 +45,7 @@ PYTHON
 
 # ---- install -------------------------------------------------------------------------------------------
 "$python" -m venv --system-site-packages "$work/venv"
-"$python" - >"$work/constraints" <<'PYTHON'
-from importlib.metadata import PackageNotFoundError, version
-
-for name in ("numpy", "scipy", "matplotlib", "netCDF4", "mpi4py", "petsc4py", "pandas"):
-    try:
-        print(f"{name}=={version(name)}")
-    except PackageNotFoundError:
-        pass
-PYTHON
+"$python" scripts/constraints.py >"$work/constraints"
 install=("$work/venv/bin/python" -m pip install "${quiet[@]}" -c "$work/constraints")
 export PIP_USER=0
 

@@ -63,33 +63,35 @@ if ((${#wanted[@]})); then
 fi
 
 # ---- venv ---------------------------------------------------------------------------------------------
-# The stamp says for which project file, interpreter and folder the venv was last made complete.
-state=$({ cat pyproject.toml scripts/setup.sh; readlink -f "$python"; pwd; echo "$extras"; } | sha256sum)
-[[ -f $stamp && $(<"$stamp") == "$state" && -x $venv/bin/epsmesh ]] && exit 0
+# The stamp says for which project file, interpreter and folder the venv was last made complete; the other mark stands
+# in it while it is being changed. Where a setup was killed no package can be relied on: pip takes half of one for all.
+state=$({ cat pyproject.toml scripts/setup.sh scripts/constraints.py; readlink -f "$python"; pwd; echo "$extras"; } | sha256sum)
+unfinished=$venv/.epsmesh-unfinished
+[[ -f $stamp && $(<"$stamp") == "$state" && -x $venv/bin/epsmesh && ! -e $unfinished ]] && exit 0
 
-if [[ $(readlink -f "$venv/bin/python" 2>/dev/null) != $(readlink -f "$python") ]]; then
+if [[ -e $unfinished || $(readlink -f "$venv/bin/python" 2>/dev/null) != $(readlink -f "$python") ]]; then
     echo "setup: making $venv"
-    "$python" -m venv --clear --system-site-packages "$venv" || fail "could not make $venv"
+    mkdir -p "$venv"
+    touch "$unfinished"
+    find "$venv/" -mindepth 1 ! -path "$venv/${unfinished##*/}" -delete
+    "$python" -m venv --system-site-packages "$venv" || fail "could not make $venv"
 fi
+touch "$unfinished"
 echo "setup: installing the project and its Python packages into $venv"
-# pip must never replace what comes from Debian: pin it to what is there.
 constraints=$venv/constraints.txt
-"$python" - >"$constraints" <<'PYTHON'
-from importlib.metadata import PackageNotFoundError, version
-
-for name in ("numpy", "scipy", "matplotlib", "netCDF4", "mpi4py", "petsc4py", "pandas"):
-    try:
-        print(f"{name}=={version(name)}")
-    except PackageNotFoundError:
-        pass
-PYTHON
-# A pip configured for --user would install beside the venv.
-PIP_USER=0 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input -c "$constraints" -e ".[$extras]" ||
-    fail "pip could not install the project"
+"$python" scripts/constraints.py >"$constraints"
+install() { # what $1 says and the rest asks for; pip that fails takes back what it did, pip that is killed does not
+    local status=0
+    # A pip configured for --user would install beside the venv.
+    PIP_USER=0 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input "${@:2}" || status=$?
+    ((status)) || return 0
+    ((status > 128)) || rm -f "$unfinished"
+    fail "pip could not install $1"
+}
+install "the project" -c "$constraints" -e ".[$extras]"
 # The remesher of surfaces, mmgs, comes as a program within this package, whose Python part nothing imports: what that
 # asks for (a newer numpy than Debian 12's) is not installed.
-PIP_USER=0 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input --no-deps "$mmg" ||
-    fail "pip could not install $mmg"
+install "$mmg" --no-deps "$mmg"
 
 # ---- check --------------------------------------------------------------------------------------------
 "$venv/bin/python" - <<'PYTHON' || fail "the installed libraries do not work together"
@@ -105,4 +107,5 @@ for library in libblas.so.3 liblapack.so.3; do
     update-alternatives --auto $library-$multiarch" >&2
 done
 echo "$state" >"$stamp"
+rm -f "$unfinished"
 echo "setup: done; the command is $venv/bin/epsmesh"
