@@ -16,7 +16,8 @@ from benchmarks.mutants.changes import Change
 ROOT = Path(__file__).parents[2]
 _COPIED, _LINKED = ("pipeline", "tests", "realtime", "benchmarks", "pyproject.toml"), ("studies", "meshes", "docs")
 _SOURCES = {".py", ".c", ".h", ".toml", ".js", ".j2", ".css"}
-# Seconds after which what runs has been brought to a halt by the change: ranks that wait for each other, as a rule.
+# Seconds, on cores of its own, after which what runs has been brought to a halt by the change: ranks that wait for each
+# other, as a rule. Where others compute, too, it has as many times more as there are processes a core.
 _LONGEST = {1: 600, 2: 90}
 _MPI = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMP_NUM_THREADS": "1"}
 _PASSED, _FAILED, _NONE_CHOSEN = 0, 1, 5
@@ -24,6 +25,11 @@ _PASSED, _FAILED, _NONE_CHOSEN = 0, 1, 5
 
 class StaleError(Exception):
     """A list that does not fit the code any more."""
+
+
+def crowd() -> float:
+    """Return how many processes a core has to run, 1 at least."""
+    return max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
 
 
 @dataclass(frozen=True)
@@ -107,7 +113,7 @@ class Tree:
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
         ) as process:  # fmt: skip
             try:
-                text, _ = process.communicate(timeout=longest or _LONGEST[ranks])
+                text, _ = process.communicate(timeout=longest or _LONGEST[ranks] * crowd())
                 verdict = {_PASSED: "passed", _FAILED: "failed"}.get(process.returncode, "broken")
             except subprocess.TimeoutExpired:
                 os.killpg(process.pid, signal.SIGKILL)
