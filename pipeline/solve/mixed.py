@@ -239,7 +239,7 @@ class MixedProblem:
         with ExitStack() as stack:
             loads = [stack.enter_context(space.pair()) for _ in unknowns]
             for load, values in zip(loads, held, strict=False):
-                space.lift(load, values, split.elastic)
+                space.lift(load, values, split.elastic, checked=space is self._fine)
             for dead in applied:
                 space.displacements.put(loads[-1][0], dead, 1 / split.unit)
             return solver.solve(space.by_region(split.compliance), loads, unknowns, tolerance)
@@ -260,8 +260,8 @@ class MixedProblem:
                 total[0].array[:] = unknown[0].array + values[: dofs.owned]
                 unknown[1].copy(total[1])
                 space.set_fields(total)
-                space.apply(residual, pull, dilation, split.elastic)
-                space.mass.mult(total[1], mass_p)
+                space.apply(residual, pull, dilation, split.elastic, checked=space is self._fine)
+                space.weigh(total[1], mass_p)
                 elastic.append(residual.array.copy())
                 residuals.append(residual.array + pull.array)
                 dilations.append(dilation.array.copy())
@@ -314,7 +314,7 @@ class MixedProblem:
         levels, seconds = zip(*(self._level(d, blocked=not direct and d > 1) for d in degrees), strict=True)
         moduli = zip(self._elastic.lame_lambda, self._elastic.lame_mu, strict=True)
         stiffness = space.by_region(tuple(lame_lambda + 2 * mu for lame_lambda, mu in moduli))
-        saddle = Saddle(list(levels), space.coupling, space.mass, stiffness, degree - 1)
+        saddle = Saddle(list(levels), *space.blocks(entries=direct), stiffness, degree - 1)
         return saddle, space.assembly_seconds + sum(seconds)
 
     @stage("set-up")

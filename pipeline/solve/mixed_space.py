@@ -6,6 +6,7 @@ Pressures are continuous, but from one region of the body to the next.
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from functools import cached_property
 
 import numpy as np
 from dolfinx.fem import petsc as fem_petsc
@@ -22,8 +23,9 @@ from pipeline.solve.mixed_forms import MixedForms
 from pipeline.solve.region_space import region_wise_space
 from pipeline.solve.saddle import Pair
 from pipeline.solve.spaces import ElasticSpace
-from pipeline.solve.straight import assembles
+from pipeline.solve.straight import assembles, pressure
 from pipeline.solve.straight import mixed as straight
+from pipeline.solve.straight.pressure import CellPressures, Coupling, Mass
 from pipeline.solve.vectors import add_from_ghosts, fill, vector
 
 
@@ -31,7 +33,8 @@ class MixedSpace:
     """Displacements and pressures on a mesh, and what couples them.
 
     Pressures are counted in units of ``unit`` × μ, ``unit`` (1/m) being about one over the element size: the blocks
-    of the saddle point are then of like magnitude in any unit of length.
+    of the saddle point are then of like magnitude in any unit of length. What couples them is multiplied cell by cell
+    where C is compiled (:meth:`blocks`), and assembled where entries are asked for.
     """
 
     def __init__(self, body: BodyMesh, displacements: ElasticSpace):
@@ -45,23 +48,35 @@ class MixedSpace:
         self._owned, self._size = index_map.size_local, index_map.size_global
         self.dofs = displacements.dofs.dofs + index_map.size_global
         self.whole_dofs = displacements.dofs.whole_dofs + whole_points(self.pressures, body)
-        with ExitStack() as stack:
-            start = time.perf_counter()
-            self.mass, self.coupling = self._matrices(body)
-            stack.callback(self.mass.destroy)
-            stack.callback(self.coupling.destroy)
-            self._mask_coupling()
-            diagonal = self.mass.getDiagonal()
-            self.unit = (diagonal.sum() / self._size) ** (-1 / 3)
-            diagonal.destroy()
-            self.mass.scale(self.unit**2)
-            self.coupling.scale(self.unit)
-            self.assembly_seconds = time.perf_counter() - start
-            self._stack = stack.pop_all()
+        self._body, self._stack = body, ExitStack()
+        start = time.perf_counter()
+        self._products = self._lay_out()
+        self.unit = self._unit()
+        self.assembly_seconds = time.perf_counter() - start
 
     def close(self) -> None:
         """Free the matrices that pressures take part in."""
         self._stack.close()
+
+    def blocks(self, *, entries: bool) -> tuple[PETSc.Mat, PETSc.Mat]:
+        """Return B and M, which are the space's: with ``entries``, or maybe as products; collective."""
+        if entries or self._products is None:
+            return self.coupling, self.mass
+        return self._shells
+
+    @cached_property
+    def mass(self) -> PETSc.Mat:
+        """M, with entries, assembled when first asked for; collective."""
+        return self._assembled[0]
+
+    @cached_property
+    def coupling(self) -> PETSc.Mat:
+        """B, with entries, and columns of zeros for what is prescribed, assembled when first asked for; collective."""
+        return self._assembled[1]
+
+    def weigh(self, pressure: PETSc.Vec, result: PETSc.Vec) -> None:
+        """Write M p into ``result``; collective."""
+        self.blocks(entries=False)[1].mult(pressure, result)
 
     def by_region(self, values: tuple[float, ...]) -> float | FloatArray:
         """Return what a pressure dof has of a value by region: one for all, or an array for this rank's dofs."""
@@ -73,10 +88,10 @@ class MixedSpace:
         with vector(self.displacements.dofs.space) as u, vector(self.pressures) as p:
             yield u, p
 
-    def lift(self, rhs: Pair, held: FloatArray, law: MaterialLaw) -> None:
+    def lift(self, rhs: Pair, held: FloatArray, law: MaterialLaw, *, checked: bool = True) -> None:
         """Put the loads of the prescribed displacements ``held`` into ``rhs``, the law being K₀'s; collective."""
-        self.displacements.lift(rhs[0], held, law)
-        self._dilate(rhs[1])
+        self.displacements.lift(rhs[0], held, law, checked=checked)
+        self._dilate(rhs[1], checked=checked)
         rhs[1].scale(-1.0)
 
     def set_fields(self, unknown: Pair) -> None:
@@ -84,12 +99,21 @@ class MixedSpace:
         self.displacements.set_displacement(unknown[0])
         fill(self.forms.pressure, unknown[1], self.unit)
 
-    def apply(self, elastic: PETSc.Vec, pull: PETSc.Vec, dilation: PETSc.Vec, law: MaterialLaw) -> None:
-        """Add K₀ u, Bᵀ p and B u, all with the unmodified operator, to the three vectors; collective."""
-        self.displacements.apply(elastic, law)
-        fem_petsc.assemble_vector(pull, self.forms.pull)
-        add_from_ghosts(pull)
-        self._dilate(dilation)
+    def apply(
+        self, elastic: PETSc.Vec, pull: PETSc.Vec, dilation: PETSc.Vec, law: MaterialLaw, *, checked: bool = True
+    ) -> None:
+        """Add K₀ u, Bᵀ p and B u, all with the unmodified operator, to the three vectors; collective.
+
+        ``checked``: see :meth:`ElasticSpace.apply`.
+        """
+        self.displacements.apply(elastic, law, checked=checked)
+        if not checked and self._products is not None:
+            pressure = self.forms.pressure.x.array[: self._owned] / self.unit
+            pull.array[:] += self._products.pull(pressure, whole=True)
+        else:
+            fem_petsc.assemble_vector(pull, self.forms.pull)
+            add_from_ghosts(pull)
+        self._dilate(dilation, checked=checked)
 
     def start_from(self, coarse: "MixedSpace", unknown: Pair, held: FloatArray) -> None:
         """Put the fields of ``coarse``, less the displacements ``held``, into ``unknown``; collective."""
@@ -101,30 +125,68 @@ class MixedSpace:
         unknown[0].array[dofs.prescribed_owned] = 0.0
         unknown[1].array[:] = pressure.x.array[: self._owned] / self.unit
 
-    def _matrices(self, body: BodyMesh) -> tuple[PETSc.Mat, PETSc.Mat]:
-        """Return M and B, without conditions; collective."""
+    def _lay_out(self) -> CellPressures | None:
+        """Return what multiplies with M and B cell by cell, None where nothing does; collective."""
+        works = self.comm.allreduce(pressure.compiles(), op=MPI.LAND)
+        operators = self.displacements.operators
+        return CellPressures(self.pressures, operators.cells) if operators.multiplies and works else None
+
+    def _unit(self) -> float:
+        if self._products is not None:
+            return self._products.unit
+        diagonal = self._bare[0].getDiagonal()
+        unit = float((diagonal.sum() / self._size) ** (-1 / 3))
+        diagonal.destroy()
+        return unit
+
+    @cached_property
+    def _shells(self) -> tuple[PETSc.Mat, PETSc.Mat]:
+        assert self._products is not None
+        matrices = Coupling(self._products).matrix(), Mass(self._products).matrix()
+        for matrix in matrices:
+            self._stack.callback(matrix.destroy)
+        return matrices
+
+    @cached_property
+    def _bare(self) -> tuple[PETSc.Mat, PETSc.Mat]:
+        """M and B in units of length and without conditions; collective."""
         if not assembles(self.displacements.dofs.space):
-            return _assemble(self.forms.mass), _assemble(self.forms.coupling)
-        curved = curved_cells(body.mesh)
-        is_curved = self.comm.allreduce(curved is not None and bool(curved.any()), op=MPI.LOR)
-        mass = straight.mass(self.pressures, curved)
-        coupling = straight.coupling(self.pressures, self.displacements.dofs.space, curved)
-        if is_curved:
-            compat.add_matrix(mass, self.forms.curved_mass, [], 1.0)
-            compat.add_matrix(coupling, self.forms.curved_coupling, [], 1.0)
+            mass, coupling = _assemble(self.forms.mass), _assemble(self.forms.coupling)
+        else:
+            curved = curved_cells(self._body.mesh)
+            is_curved = self.comm.allreduce(curved is not None and bool(curved.any()), op=MPI.LOR)
+            mass = straight.mass(self.pressures, curved)
+            coupling = straight.coupling(self.pressures, self.displacements.dofs.space, curved)
+            if is_curved:
+                compat.add_matrix(mass, self.forms.curved_mass, [], 1.0)
+                compat.add_matrix(coupling, self.forms.curved_coupling, [], 1.0)
+        self._stack.callback(mass.destroy)
+        self._stack.callback(coupling.destroy)
         return mass, coupling
 
-    def _dilate(self, result: PETSc.Vec) -> None:
+    @cached_property
+    def _assembled(self) -> tuple[PETSc.Mat, PETSc.Mat]:
+        """M and B; collective."""
+        start = time.perf_counter()
+        mass, coupling = self._bare
+        free = coupling.createVecRight()
+        free.set(1.0)
+        free.array[self.displacements.dofs.prescribed_owned] = 0.0
+        coupling.diagonalScale(None, free)
+        free.destroy()
+        mass.scale(self.unit**2)
+        coupling.scale(self.unit)
+        self.assembly_seconds += time.perf_counter() - start
+        return mass, coupling
+
+    def _dilate(self, result: PETSc.Vec, *, checked: bool) -> None:
+        if not checked and self._products is not None:
+            displacement = self.displacements.forms.displacement.x.array[: self.displacements.dofs.owned]
+            result.array[:] += self._products.dilation(displacement, whole=True)
+            return
         fem_petsc.assemble_vector(result, self.forms.dilation)
         add_from_ghosts(result)
         result.scale(self.unit)
-
-    def _mask_coupling(self) -> None:
-        free = self.coupling.createVecRight()
-        free.set(1.0)
-        free.array[self.displacements.dofs.prescribed_owned] = 0.0
-        self.coupling.diagonalScale(None, free)
-        free.destroy()
 
 
 def _assemble(form: object) -> PETSc.Mat:

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline import compat
-from pipeline.arrays import BoolArray, Int32Array
+from pipeline.arrays import BoolArray, FloatArray, Int32Array
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.forms import ElasticForms, curved_cells
 from pipeline.solve.material import MaterialLaw
@@ -117,12 +117,21 @@ class Operators:
         self._is_curved = self._space.body.comm.allreduce(curved is not None and bool(curved.any()), op=MPI.LOR)
         return curved
 
-    @stage("assembly")
-    def _product(self, law: MaterialLaw) -> PETSc.Mat:
+    @property
+    def cells(self) -> CellStiffness:
+        """The cells as products have them, laid out when first asked for; collective. Where :attr:`multiplies`."""
         if self._cells is None:
             curved, regions = curved_cells(self._space.body.mesh), self._space.body.regions
             self._cells = CellStiffness(self._space.space, curved, self._space.prescribed, regions)
-        return CellOperator(self._cells, law).matrix()
+        return self._cells
+
+    def whole_product(self, law: MaterialLaw, x: FloatArray) -> FloatArray:
+        """Return K x, without conditions, for owned dofs; collective. Where :attr:`multiplies`."""
+        return CellOperator(self.cells, law).whole(x)
+
+    @stage("assembly")
+    def _product(self, law: MaterialLaw) -> PETSc.Mat:
+        return CellOperator(self.cells, law).matrix()
 
     @stage("assembly")
     def _make(

@@ -87,14 +87,14 @@ class Shared:
         """Return the values of the points that are wanted (n, …), given those of this rank's own; collective."""
         return self.end_read(self.begin_read(values))
 
-    def extend(self, x: np.ndarray) -> np.ndarray:
-        """Return ``x``, three numbers for each point of this rank, and behind it the points wanted; collective."""
-        return np.concatenate([x, self.read(x.reshape(-1, 3)).reshape(-1)])
+    def extend(self, x: np.ndarray, size: int = 3) -> np.ndarray:
+        """Return ``x``, ``size`` numbers for each point of this rank, and behind it the points wanted; collective."""
+        return np.concatenate([x, self.read(x.reshape(-1, size)).reshape(-1)])
 
-    def fold(self, whole: np.ndarray, y: np.ndarray) -> None:
+    def fold(self, whole: np.ndarray, y: np.ndarray, size: int = 3) -> None:
         """Add ``whole``, which goes on behind this rank's points as :meth:`extend` has it, to all ``y``; collective."""
         y += whole[: len(y)]
-        self.add(whole[len(y) :].reshape(-1, 3), y.reshape(-1, 3))
+        self.add(whole[len(y) :].reshape(-1, size), y.reshape(-1, size))
 
     def add(self, more: np.ndarray, values: np.ndarray) -> None:
         """Add ``more`` (n, …) for the points that are wanted to the ``values`` of their owners; collective."""

@@ -25,8 +25,8 @@ Pair = tuple[PETSc.Vec, PETSc.Vec]
 Weight = float | FloatArray
 
 _MOST_ITERATIONS = 300
-# More directions than a solve takes, as a rule.
-_RESTART = 60
+# More directions than a solve takes, as a rule, and one to a tenth: room is made for all of them.
+_RESTART, _RESTART_ROUGH, _ROUGH = 60, 20, 0.1
 # B K₀⁻¹ Bᵀ is M / (λ₀ + 2μ) inside the body and less where the displacement is held; measured, flat from 0.8 to 1.6.
 _SCHUR = 1.2
 # Chebyshev steps for M preconditioned by its diagonal, and smallest over largest eigenvalue, by the degree of the
@@ -41,6 +41,8 @@ _prefixes = itertools.count()
 @dataclass(frozen=True)
 class Saddle:
     """The blocks: ``levels`` end with K₀, ``coupling`` is B, with columns of zeros for prescribed displacements.
+
+    For a direct solve all have entries; else these may be products, as of :mod:`pipeline.solve.straight.pressure`.
 
     ``stiffness`` is λ₀ + 2μ in units of the pressure, one number or one for each pressure of this rank; ``degree`` is
     that of the pressure.
@@ -125,8 +127,7 @@ class SaddleSolver:
 
     def _matrix(self, c: Weight, stack: ExitStack) -> PETSc.Mat:
         saddle = self._saddle
-        mass = _keep(stack, saddle.mass.copy())
-        _weigh(mass, -c)
+        mass = _keep(stack, _weighed(saddle.mass, -c))
         transpose = PETSc.Mat()
         if self._direct:
             saddle.coupling.transpose(transpose)
@@ -231,7 +232,7 @@ def _iteration(
 ) -> PETSc.KSP:
     ksp = _krylov(matrix, stack)
     ksp.setType("gcr")
-    with _options(ksp, {"ksp_gcr_restart": _RESTART}):
+    with _options(ksp, {"ksp_gcr_restart": _RESTART_ROUGH if aim[0] >= _ROUGH else _RESTART}):
         ksp.setFromOptions()
     ksp.setInitialGuessNonzero(True)
     ksp.pc.setType("python")
@@ -242,15 +243,19 @@ def _iteration(
     return ksp
 
 
-def _weigh(mass: PETSc.Mat, weight: Weight) -> None:
-    """Multiply a mass by a weight; pressures of different weights have no entry between them."""
+def _weighed(mass: PETSc.Mat, weight: Weight) -> PETSc.Mat:
+    """Return a mass times a weight, to be destroyed; pressures of different weights have no entry between them."""
+    if mass.getType() == "python":
+        return mass.getPythonContext().weighted(weight).matrix()
+    mass = mass.copy()
     if isinstance(weight, float):
         mass.scale(weight)
-        return
+        return mass
     weights = mass.createVecLeft()
     weights.array[:] = weight
     mass.diagonalScale(weights, None)
     weights.destroy()
+    return mass
 
 
 def _krylov(matrix: PETSc.Mat, stack: ExitStack) -> PETSc.KSP:

@@ -33,20 +33,26 @@ class ElasticSpace:
         return self.dofs.degree
 
     @stage("residuals")
-    def apply(self, result: PETSc.Vec, law: MaterialLaw) -> None:
-        """Add K u (N), with the unmodified operator and the forms' displacement, to ``result``; collective."""
+    def apply(self, result: PETSc.Vec, law: MaterialLaw, *, checked: bool = True) -> None:
+        """Add K u (N), with the unmodified operator and the forms' displacement, to ``result``; collective.
+
+        ``checked``: never by the code that solves multiply with, so that each agrees with the other.
+        """
+        if not checked and self.operators.multiplies:
+            result.array[:] += self.operators.whole_product(law, self.forms.displacement.x.array[: self.dofs.owned])
+            return
         self.forms.set_law(law)
         fem_petsc.assemble_vector(result, self.forms.action)
         add_from_ghosts(result)
 
-    def lift(self, rhs: PETSc.Vec, held: FloatArray, law: MaterialLaw) -> None:
+    def lift(self, rhs: PETSc.Vec, held: FloatArray, law: MaterialLaw, *, checked: bool = True) -> None:
         """Put the loads of the prescribed displacements ``held`` into ``rhs``; collective.
 
         What is left to find is zero on the prescribed dofs, and so is its load: the solver's norms then measure the
         energy of the error and nothing else, in any unit of length.
         """
         self.forms.displacement.x.array[:] = held
-        self.apply(rhs, law)
+        self.apply(rhs, law, checked=checked)
         rhs.scale(-1.0)
         rhs.array[self.dofs.prescribed_owned] = 0.0
 

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.mixed import MixedProblem
+from pipeline.solve.mixed_space import MixedSpace
 from pipeline.solve.single import cycle
 from pipeline.solve.single.blocks import UpperBlocks
 from pipeline.solve.spaces import ElasticSpace, Spaces
@@ -54,6 +56,34 @@ def test_it_is_the_product_of_the_matrix(degree, material, changes):
         for item in (x, y, z):
             item.destroy()
     space.operators.close()
+
+
+@pytest.mark.parametrize(("degree", "changes"), [(3, {}), (2, LAYERS)])
+def test_pressures_take_part_as_in_matrices(degree, changes):
+    """Coupling, its transpose and mass, on straight and on curved cells, continuous and by region."""
+    spaces = Spaces(make_mesh(**changes))
+    space, random = MixedSpace(spaces.body, spaces.get(degree, Conditions())), np.random.default_rng(5)
+    (coupling, mass), wanted = (space.blocks(entries=entries) for entries in (False, True))
+    u, p = (random.standard_normal(size) for size in reversed(coupling.getSize()))
+    weight = np.linspace(1.0, 2.0, len(p))
+    scaled = mass.getPythonContext().weighted(weight).matrix()
+    for found, expected in (
+        (product_of(coupling.mult, u, p), product_of(wanted[0].mult, u, p)),
+        (product_of(coupling.multTranspose, p, u), product_of(wanted[0].multTranspose, p, u)),
+        (product_of(scaled.mult, p, p), weight * product_of(wanted[1].mult, p, p)),
+        (mass.getDiagonal().array, wanted[1].getDiagonal().array),
+    ):
+        assert np.abs(found - expected).max() < 1e-13 * np.abs(expected).max()
+    scaled.destroy()
+    space.close()
+    spaces.close()
+
+
+def product_of(multiply, x, like):
+    """Return what a matrix makes of an array ``x``, an array ``like`` another one."""
+    given, result = (PETSc.Vec().createWithArray(values, comm=PETSc.COMM_SELF) for values in (x, np.zeros_like(like)))
+    multiply(given, result)
+    return result.array
 
 
 @pytest.mark.parametrize(

@@ -55,8 +55,8 @@ class CurvedCells:
     def __init__(self, space: Any, which: Int32Array, dofs: Int32Array):
         """``which`` cells are curved, ``dofs`` (cells, points) are the points of all cells of this rank."""
         self.lanes, degree = Lanes(which, dofs), compat.degree(space)
-        quadrature = quadrature_degree(degree)
-        weights, _, of_geometry = reference(2, quadrature)
+        self._quadrature = quadrature_degree(degree)
+        weights, _, of_geometry = reference(2, self._quadrature)
         nodes = space.mesh.geometry.x[compat.geometry_dofs(space.mesh)[which]]
         self.roots = np.zeros((self.lanes.batches, len(weights), LANES))
         maps = np.zeros((self.lanes.batches, len(weights), 9, LANES))
@@ -64,7 +64,11 @@ class CurvedCells:
                   maps, self.roots)  # fmt: skip
         self.maps = _in_both(maps)
         self.signs = _in_both(np.sign(weights))  # not all weights are positive
-        self.gradients = _in_both(_by_points(reference(degree, quadrature)[2]))
+        self.gradients = _in_both(_by_points(reference(degree, self._quadrature)[2]))
+
+    def values(self, degree: int) -> FloatArray:
+        """Return the values (quadrature, functions) of a space of ``degree`` at the points of the quadrature."""
+        return np.ascontiguousarray(reference(degree, self._quadrature)[1])
 
     @property
     def nbytes(self) -> int:

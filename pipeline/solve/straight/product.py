@@ -199,6 +199,12 @@ class CellOperator:
         self._add(given, result)
         result[self.prescribed] = values
 
+    def whole(self, x: FloatArray) -> FloatArray:
+        """Return A x for the displacement of the owned points, without any conditions."""
+        result = np.zeros(3 * self.rows)
+        self._add(x, result)
+        return result
+
     @property
     def nbytes(self) -> int:
         """Bytes of all that it reads."""

@@ -1,0 +1,211 @@
+"""What pressures take part in, ∫ p q and ∫ q div u, as products cell by cell (``pressure.c``): contexts for PETSc.
+
+On several ranks each multiplies with its own cells; what others' points have is read first, and what they get added
+last, as :class:`~pipeline.solve.straight.product.CellOperator` does. All of it is collective.
+"""
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from pipeline import compat
+from pipeline.arrays import FloatArray
+from pipeline.solve.parcels import Shared, ghosts_of
+from pipeline.solve.straight import native
+from pipeline.solve.straight.native import Library
+from pipeline.solve.straight.pattern import corners, owned_cells, reference
+from pipeline.solve.straight.product import CellStiffness, bernstein
+
+_COUPLING = """
+void {name}(int points, int count, int batches, const int* dofs, const int* pressures, const double* maps,
+            const double* roots, const int* first, const int* column, const double* weight, const int* first_back,
+            const int* column_back, const double* weight_back, const int* raised, const double* mass, const double* x,
+            double* y);
+"""
+_CURVED_COUPLING = """
+void {name}(int points, int count, int quadrature, int batches, const int* dofs, const int* pressures,
+            const double* maps, const double* roots, const double* signs, const double* gradients,
+            const double* values, const double* x, double* y);
+"""
+_DECLARATIONS = """
+void add_mass(int count, int batches, const int* pressures, const double* roots, const double* mass, const double* x,
+              double* y);
+void add_curved_mass(int count, int quadrature, int batches, const int* pressures, const double* roots,
+                     const double* signs, const double* values, const double* x, double* y);
+""" + "".join(
+    text.format(name=name)
+    for text, names in ((_COUPLING, ("add_dilation", "add_pull")),
+                        (_CURVED_COUPLING, ("add_curved_dilation", "add_curved_pull")))
+    for name in names
+)  # fmt: skip
+
+
+@cache
+def library() -> Library:
+    """Return the functions of ``pressure.c``, compiled if they are not yet."""
+    return Library(Path(__file__).with_name("pressure.c"), _DECLARATIONS)
+
+
+@cache
+def compiles() -> bool:
+    """Tell whether they can be compiled here."""
+    return native.compiles(library)
+
+
+class CellPressures:
+    """The pressures of one degree less than displacements on the same cells, in units of ``unit`` (1/m).
+
+    ``diagonal`` is that of the mass, of owned pressures.
+    """
+
+    def __init__(self, pressures: Any, cells: CellStiffness):
+        """Lay out; collective. ``unit`` is about one over the size of an element."""
+        index_map, dofs = pressures.dofmap.index_map, owned_cells(pressures)
+        self.comm, self.cells, self.degree = cells.comm, cells, compat.degree(pressures)
+        self.points, self.local = index_map.size_local, index_map.size_local + index_map.num_ghosts
+        self.shared = ghosts_of(pressures)
+        self._dofs = cells.lanes.spread(dofs[cells.lanes.which])
+        self._roots = cells.lanes.spread(_roots(corners(pressures.mesh)[cells.lanes.which])[:, None])
+        weights, values, _ = reference(self.degree, 2 * self.degree)
+        self._mass = np.ascontiguousarray(np.einsum("q,qi,qj->ij", weights, values, values))
+        # p² of displacements, of which a gradient has one p.
+        self._coupled = bernstein(cells.degree, "float64").mass / cells.degree
+        if (curved := cells.curved) is not None:
+            self._bent = curved.lanes.spread(dofs[curved.lanes.which])
+            self._values = curved.values(self.degree)
+        diagonal = self._diagonal()
+        total = self.comm.allreduce(np.array([diagonal.sum(), len(diagonal)]))
+        self.unit = float(total[0] / total[1]) ** (-1 / 3)
+        self.diagonal = self.unit**2 * diagonal
+
+    def _diagonal(self) -> FloatArray:
+        """Return the diagonal of the mass, of owned pressures, in units of length."""
+        parts = [(self._dofs, self._roots**2 * np.diag(self._mass)[:, None])]
+        if (curved := self.cells.curved) is not None:
+            squares = curved.signs["float64"][:, None] * self._values**2
+            parts.append((self._bent, squares.T @ curved.roots**2))
+        found = sum(np.bincount(dofs.reshape(-1), values.reshape(-1), self.local) for dofs, values in parts)
+        return _folded(np.asarray(found), self.points, self.shared, 1)
+
+    def dilation(self, x: FloatArray, *, whole: bool = False) -> FloatArray:
+        """Return B x for owned displacements; unless ``whole``, those that are prescribed count as nought."""
+        given = x.copy()
+        if not whole:
+            given[self.cells.prescribed] = 0.0
+        found = np.zeros(self.local)
+        self._couple("dilation", _extended(given, self.cells.shared, 3), found)
+        return self.unit * _folded(found, self.points, self.shared, 1)
+
+    def pull(self, x: FloatArray, *, whole: bool = False) -> FloatArray:
+        """Return Bᵀ x for owned pressures; unless ``whole``, nought where displacements are prescribed."""
+        found = np.zeros(3 * self.cells.local)
+        self._couple("pull", _extended(x, self.shared, 1), found)
+        result = self.unit * _folded(found, self.cells.points, self.cells.shared, 3)
+        if not whole:
+            result[self.cells.prescribed] = 0.0
+        return result
+
+    def weigh(self, x: FloatArray) -> FloatArray:
+        """Return M x for owned pressures."""
+        given, found, curved = _extended(x, self.shared, 1), np.zeros(self.local), self.cells.curved
+        count, batches = len(self._mass), self.cells.lanes.batches
+        library()("add_mass", count, batches, self._dofs, self._roots, self._mass, given, found)
+        if curved is not None:
+            _, quadrature, batches = curved.sizes
+            library()("add_curved_mass", count, quadrature, batches, self._bent, curved.roots, curved.signs["float64"],
+                      self._values, given, found)  # fmt: skip
+        return self.unit**2 * _folded(found, self.points, self.shared, 1)
+
+    def _couple(self, which: str, x: FloatArray, y: FloatArray) -> None:
+        """Add B x or Bᵀ x, of local points, to ``y``."""
+        cells, kind = self.cells, "float64"
+        table, pressures = bernstein(cells.degree, kind), bernstein(self.degree, kind).transform
+        there, back = (table.transform, pressures) if which == "dilation" else (pressures, table.transform)
+        points, count = cells.lanes.dofs.shape[1], len(self._mass)
+        library()(
+            f"add_{which}", points, count, cells.lanes.batches, cells.lanes.dofs, self._dofs, cells.maps[kind],
+            self._roots, there.first, there.column, there.weight, back.first_back, back.column_back, back.weight_back,
+            table.raised, self._coupled, x, y,
+        )  # fmt: skip
+        if (curved := cells.curved) is not None:
+            _, quadrature, batches = curved.sizes
+            library()(
+                f"add_curved_{which}", points, count, quadrature, batches, curved.lanes.dofs, self._bent,
+                curved.maps[kind], curved.roots, curved.signs[kind], curved.gradients[kind], self._values, x, y,
+            )  # fmt: skip
+
+
+def _extended(x: FloatArray, shared: Shared | None, size: int) -> FloatArray:
+    """Return the values of the local points, given those of the owned ones; collective."""
+    return x if shared is None else shared.extend(x, size)
+
+
+def _folded(found: FloatArray, owned: int, shared: Shared | None, size: int) -> FloatArray:
+    """Return the sums at the owned points, given what this rank has for the local ones; collective."""
+    if shared is None:
+        return found
+    result = np.zeros(size * owned)
+    shared.fold(found, result, size)
+    return result
+
+
+class Coupling:
+    """B: a context for PETSc."""
+
+    def __init__(self, pressures: CellPressures):
+        self._pressures = pressures
+
+    def matrix(self) -> PETSc.Mat:
+        """Return it as a matrix of PETSc; the caller destroys it."""
+        of = self._pressures
+        return _matrix(self, of.points, 3 * of.cells.points, of.comm)
+
+    def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write B x into ``y``; PETSc calls this."""
+        y.array_w[:] = self._pressures.dilation(x.array_r)
+
+    def multTranspose(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write Bᵀ x into ``y``; PETSc calls this."""
+        y.array_w[:] = self._pressures.pull(x.array_r)
+
+
+class Mass:
+    """M, each row times its ``weight``: a context for PETSc."""
+
+    def __init__(self, pressures: CellPressures, weight: float | FloatArray = 1.0):
+        self._pressures, self._weight = pressures, weight
+
+    def weighted(self, weight: float | FloatArray) -> "Mass":
+        """Return it with other weights."""
+        return Mass(self._pressures, weight)
+
+    def matrix(self) -> PETSc.Mat:
+        """Return it as a matrix of PETSc; the caller destroys it."""
+        of = self._pressures
+        return _matrix(self, of.points, of.points, of.comm)
+
+    def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write M x into ``y``; PETSc calls this."""
+        y.array_w[:] = self._weight * self._pressures.weigh(x.array_r)
+
+    def getDiagonal(self, _: PETSc.Mat, y: PETSc.Vec) -> None:
+        """Write the diagonal into ``y``; PETSc calls this."""
+        y.array_w[:] = self._weight * self._pressures.diagonal
+
+
+def _matrix(context: Any, rows: int, columns: int, comm: Any) -> PETSc.Mat:
+    matrix = PETSc.Mat().createPython(((rows, None), (columns, None)), context, comm=comm)
+    matrix.setUp()
+    return matrix
+
+
+def _roots(points: FloatArray) -> FloatArray:
+    """Return the root of what the maps of cells (n, 4, 3) do to volumes, with the sign of their determinant."""
+    first, second, third = (points[:, 1:] - points[:, :1]).transpose(1, 2, 0)
+    determinants = sum(
+        first[i] * (second[j] * third[k] - second[k] * third[j]) for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+    )
+    return np.sign(determinants) * np.sqrt(np.abs(determinants))
