@@ -7,11 +7,12 @@ from pipeline.study.sweep import Case
 # Volume of gmsh's mean tetrahedron in units of the cube of the size asked for: measured, docs/performance.md.
 _TETRAHEDRON = 0.21
 # Bytes for each dof at the peak of a solve, degree by degree: multigrid, whose operators are products or, where nothing
-# multiplies cell by cell, matrices; the factor of a system of 50,000 dofs; and what two more matrices take. Measured:
-# docs/solvers.md.
+# multiplies cell by cell, matrices, and what conjugate residuals keep, little where a tenth is enough; the factor of a
+# system of 50,000 dofs; and what two more matrices take. Measured: docs/solvers.md.
 _BYTES_PER_DOF = {
     "displacement": {1: 3000, 2: 700, 3: 420, 4: 420},
     "mixed": {2: 1800, 3: 1800, 4: 2200},
+    "mixed, roughly": {3: 850, 4: 850},
     "displacement, matrices": {1: 3000, 2: 1900, 3: 2000, 4: 2800},
     "mixed, matrices": {2: 3800, 3: 4000, 4: 5600},
     "direct": {1: 9000, 2: 9000, 3: 10_000},
@@ -101,13 +102,16 @@ def dofs(count: float, degree: int) -> float:
 
 
 def solving_memory(
-    dofs: float, degree: int, *, direct: bool, mixed: bool = False, matrices: bool = False, parts: bool = False
-) -> float:
+    dofs: float, degree: int, *, direct: bool, mixed: bool = False, matrices: bool = False, parts: bool = False,
+    roughly: bool = False,
+) -> float:  # fmt: skip
     """Estimate the bytes that a solve takes, all ranks together.
 
-    ``matrices`` says that nothing multiplies cell by cell here; ``parts`` keeps A_λ and A_μ for the next ν.
+    ``matrices`` says that nothing multiplies cell by cell here; ``parts`` keeps A_λ and A_μ for the next ν. To solve
+    ``roughly``, as an error bar does, is to a tenth.
     """
     kind = "direct" if direct else ("mixed" if mixed else "displacement") + ", matrices" * matrices
+    kind += ", roughly" * (roughly and kind == "mixed")
     per_dof = _BYTES_PER_DOF[kind][degree] + parts * _BYTES_OF_PARTS[degree]
     # Fill of a factorisation in 3D grows like dofs^(4/3); the figure above is for 50,000.
     growth = (dofs / 50_000) ** (1 / 3) if direct else 1.0
@@ -119,7 +123,9 @@ def enriched_memory(
 ) -> float:
     """Estimate the bytes that an error bar takes: a solve of one degree more than that of ``dofs`` unknowns."""
     growth = _DOFS_PER_CELL[degree + 1] / _DOFS_PER_CELL[degree]
-    return solving_memory(growth * dofs, degree + 1, direct=False, mixed=mixed, matrices=matrices, parts=parts)
+    return solving_memory(
+        growth * dofs, degree + 1, direct=False, mixed=mixed, matrices=matrices, parts=parts, roughly=True
+    )
 
 
 def peak_memory(case: Case, share: float = 1.0) -> float:

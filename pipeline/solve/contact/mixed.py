@@ -44,6 +44,7 @@ class MixedElements:
         self.numbering = self.hierarchy.numbering
         self.unknown: Pair = stack.enter_context(self.mixed.pair())
         self.compliance = self.mixed.by_region(self._split.compliance)
+        self._coupling, self._mass = self.mixed.blocks(entries=self._direct)
         self._held: Int32Array = np.empty(0, dtype=np.int32)
         self._solving: ExitStack | None = None
         self.setup_seconds = 0.0
@@ -85,17 +86,21 @@ class MixedElements:
         start = time.perf_counter()
         with ExitStack() as stack:
             self._held = held
-            coupling = self._coupling(stack)
+            coupling = self._holding(stack)
             moduli = zip(self._split.elastic.lame_lambda, self._split.elastic.lame_mu, strict=True)
             stiffness = self.mixed.by_region(tuple(lame + 2 * mu for lame, mu in moduli))
-            saddle = Saddle(levels, coupling, self.mixed.mass, stiffness, self.space.degree - 1)
+            saddle = Saddle(levels, coupling, self._mass, stiffness, self.space.degree - 1)
             self._solver = stack.enter_context(SaddleSolver(saddle, direct=self._direct))
             self._solving = stack.pop_all()
         self.setup_seconds += time.perf_counter() - start
 
-    def _coupling(self, stack: ExitStack) -> PETSc.Mat:
+    def _holding(self, stack: ExitStack) -> PETSc.Mat:
         """Return B with columns of zeros for what is held."""
-        coupling = self.mixed.coupling.copy()
+        if self._coupling.getType() == "python":
+            coupling = self._coupling.getPythonContext().holding(self._held).matrix()
+            stack.callback(coupling.destroy)
+            return coupling
+        coupling = self._coupling.copy()
         stack.callback(coupling.destroy)
         free = coupling.createVecRight()
         free.set(1.0)
@@ -143,11 +148,14 @@ class MixedElements:
     def _product(self, result: Pair) -> None:
         """Write K₀ u + Bᵀ p and B u − c M p into the two vectors; collective."""
         displacement, pressure = self.unknown
-        self.hierarchy.finest.mult(displacement, result[0])
-        self.mixed.coupling.multTransposeAdd(pressure, result[0], result[0])
-        self.mixed.mass.mult(pressure, result[1])
-        result[1].array[:] *= -self.compliance
-        self.mixed.coupling.multAdd(displacement, result[1], result[1])
+        with self.mixed.pair() as (pull, dilation):
+            self.hierarchy.finest.mult(displacement, result[0])
+            self._coupling.multTranspose(pressure, pull)
+            result[0].axpy(1.0, pull)
+            self._coupling.mult(displacement, dilation)
+            self._mass.mult(pressure, result[1])
+            result[1].array[:] *= -self.compliance
+            result[1].axpy(1.0, dilation)
 
     def show(self) -> None:
         """Make displacement and pressure those of the forms; collective."""

@@ -4,6 +4,7 @@ On several ranks each multiplies with its own cells; what others' points have is
 last, as :class:`~pipeline.solve.straight.product.CellOperator` does. All of it is collective.
 """
 
+from copy import copy
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline import compat
-from pipeline.arrays import FloatArray
+from pipeline.arrays import FloatArray, Int32Array
 from pipeline.solve.parcels import Shared, ghosts_of
 from pipeline.solve.straight import native
 from pipeline.solve.straight.native import Library
@@ -65,6 +66,7 @@ class CellPressures:
         """Lay out; collective. ``unit`` is about one over the size of an element."""
         index_map, dofs = pressures.dofmap.index_map, owned_cells(pressures)
         self.comm, self.cells, self.degree = cells.comm, cells, compat.degree(pressures)
+        self._prescribed = cells.prescribed
         self.points, self.local = index_map.size_local, index_map.size_local + index_map.num_ghosts
         self.shared = ghosts_of(pressures)
         self._dofs = cells.lanes.spread(dofs[cells.lanes.which])
@@ -90,11 +92,17 @@ class CellPressures:
         found = sum(np.bincount(dofs.reshape(-1), values.reshape(-1), self.local) for dofs, values in parts)
         return _folded(np.asarray(found), self.points, self.shared, 1)
 
+    def holding(self, dofs: Int32Array) -> "CellPressures":
+        """Return them with owned displacements ``dofs`` (unrolled) prescribed, too; they share everything else."""
+        other = copy(self)
+        other._prescribed = np.union1d(self._prescribed, dofs).astype(np.int32)
+        return other
+
     def dilation(self, x: FloatArray, *, whole: bool = False) -> FloatArray:
         """Return B x for owned displacements; unless ``whole``, those that are prescribed count as nought."""
         given = x.copy()
         if not whole:
-            given[self.cells.prescribed] = 0.0
+            given[self._prescribed] = 0.0
         found = np.zeros(self.local)
         self._couple("dilation", _extended(given, self.cells.shared, 3), found)
         return self.unit * _folded(found, self.points, self.shared, 1)
@@ -105,7 +113,7 @@ class CellPressures:
         self._couple("pull", _extended(x, self.shared, 1), found)
         result = self.unit * _folded(found, self.cells.points, self.cells.shared, 3)
         if not whole:
-            result[self.cells.prescribed] = 0.0
+            result[self._prescribed] = 0.0
         return result
 
     def weigh(self, x: FloatArray) -> FloatArray:
@@ -157,6 +165,10 @@ class Coupling:
 
     def __init__(self, pressures: CellPressures):
         self._pressures = pressures
+
+    def holding(self, dofs: Int32Array) -> "Coupling":
+        """Return it with columns of zeros for owned ``dofs`` (unrolled), too."""
+        return Coupling(self._pressures.holding(dofs))
 
     def matrix(self) -> PETSc.Mat:
         """Return it as a matrix of PETSc; the caller destroys it."""
