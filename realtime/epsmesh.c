@@ -8,7 +8,8 @@
 static const double PI = 3.14159265358979323846;
 static const double FORMAT = 2.0, TOUCHING = 1e-12, SMALLEST = 1e-6, SLENDER = 0.02, SOFT = 1e-12, STICKS = 0.1;
 static const double BALL_LIMIT = 0.6, NEGLIGIBLE = 1e-17, SAME = 4e-16;
-enum { STEPS = 60, TERMS = 40 };
+static const double FOOT_SAME = 1e-13; /* of the region */
+enum { STEPS = 60, TERMS = 40, FOOT_STEPS = 30 };
 
 /* ---- the file: netCDF classic with 64-bit offsets ---- */
 
@@ -617,6 +618,65 @@ static epsmesh_status misfit(const epsmesh_model *m, const epsmesh_query *q, dou
     if (!(m->poisson_range[0] <= q->poisson && q->poisson <= m->poisson_range[1])) return EPSMESH_POISSON;
     if (q->depth >= m->thickness) return EPSMESH_DEEP;
     return q->depth <= TOUCHING ? EPSMESH_LOST : EPSMESH_OK;
+}
+
+/* Move a place to the nearest one of the region, or nearly: return whether it was outside. */
+static int into_region(const epsmesh_model *m, double place[2]) {
+    double r = sqrt(place[0] * place[0] + place[1] * place[1]);
+    int i, was_outside = 0;
+    for (i = 0; i < 2; i++) {
+        double size = m->is_round ? r : fabs(place[i]);
+        if (size > m->reach[i]) place[i] *= m->reach[i] / size * (1 - 1e-15), was_outside = 1;
+    }
+    return was_outside;
+}
+
+/* Newton's method for (tip - p) . dp/dx = (tip - p) . dp/dy = 0, from the place straight above. */
+static epsmesh_status curved_foot(const epsmesh_model *m, const double tip[3], double foot[3], double *depth) {
+    double place[2] = {tip[0], tip[1]};
+    int i, j, steps, cuts = into_region(m, place);
+    for (steps = 0; steps < FOOT_STEPS; steps++) {
+        spot f = face_at(m, place[0], place[1]);
+        double above = tip[2] - f.height, off[2], k[2][2], det, step[2];
+        if (steps == 0 && !cuts && above >= 0) return EPSMESH_LOST;
+        for (i = 0; i < 2; i++) {
+            off[i] = tip[i] - place[i] + above * f.slope[i];
+            for (j = 0; j < 2; j++) k[i][j] = (i == j) + f.slope[i] * f.slope[j] - above * f.second[i][j];
+        }
+        det = k[0][0] * k[1][1] - k[0][1] * k[1][0];
+        if (!(det > 0 && k[0][0] > 0)) return EPSMESH_DEEP;
+        step[0] = (k[1][1] * off[0] - k[0][1] * off[1]) / det, step[1] = (k[0][0] * off[1] - k[1][0] * off[0]) / det;
+        if (fabs(step[0]) <= FOOT_SAME * m->reach[0] && fabs(step[1]) <= FOOT_SAME * m->reach[1]) {
+            foot[0] = place[0], foot[1] = place[1], foot[2] = f.height;
+            *depth = -above / f.normal[2];
+            return above < 0 ? EPSMESH_OK : EPSMESH_LOST;
+        }
+        for (i = 0; i < 2; i++) place[i] += step[i];
+        /* Steps that end at the border again and again lead out. */
+        if (into_region(m, place) && ++cuts > 2) return EPSMESH_OUTSIDE;
+    }
+    return EPSMESH_DEEP;
+}
+
+epsmesh_status epsmesh_foot(const epsmesh_model *m, const double tip[3], double at[3], double *depth) {
+    double local[3], foot[3];
+    epsmesh_status status;
+    int i, j;
+    if (!m->is_loaded) return EPSMESH_NO_MODEL;
+    for (i = 0; i < 3; i++) {
+        for (local[i] = 0, j = 0; j < 3; j++) local[i] += m->axes[i][j] * (tip[j] - m->origin[j]);
+        if (!isfinite(local[i])) return EPSMESH_INPUT;
+    }
+    if (m->is_flat) {
+        if (local[2] >= 0) return EPSMESH_LOST;
+        foot[0] = local[0], foot[1] = local[1], foot[2] = 0, *depth = -local[2];
+    } else {
+        status = curved_foot(m, local, foot, depth);
+        if (status != EPSMESH_OK) return status;
+    }
+    for (i = 0; i < 3; i++)
+        for (at[i] = m->origin[i], j = 0; j < 3; j++) at[i] += foot[j] * m->axes[j][i];
+    return EPSMESH_OK;
 }
 
 static epsmesh_touch all(epsmesh_status status, double number) {

@@ -64,6 +64,11 @@ typedef struct {
 /* Fill `model` from the `size` bytes of a file at `data`: EPSMESH_OK or EPSMESH_NO_MODEL. */
 epsmesh_status epsmesh_load(epsmesh_model *model, const void *data, size_t size);
 
+/* Find the place `at` of the face above a tool whose lowest point is at `tip` (m), and its `depth` (m) along the inward
+ * normal there: EPSMESH_OK; EPSMESH_LOST if the tool is above the face, EPSMESH_OUTSIDE beside the region of a curved one,
+ * EPSMESH_DEEP where the normals of several places lead to the tip, and then there is none. */
+epsmesh_status epsmesh_foot(const epsmesh_model *model, const double tip[3], double at[3], double *depth);
+
 /* Return a query of the model's own E and nu, along the inward normal, with all else unset. */
 epsmesh_query epsmesh_ask(const epsmesh_model *model);
 

@@ -1,12 +1,22 @@
-/* What a query takes, in microseconds: `latency MODEL [QUERIES [SECONDS]]`, and how many ticks of a
- * loop at 1 kHz are late, with a query and without, each SECONDS long. POSIX for its clock; epsmesh.c itself needs C99 alone. */
+/* What a query takes, tool by tool, in microseconds: `latency MODEL [QUERIES [SECONDS]]`.
+ *
+ * First QUERIES of each tool, one after the other. Then a loop at 1 kHz of SECONDS, whose ticks take the tools in turn,
+ * and nothing in turn with them: what a query takes there, and how many ticks ended after the next one was due, beside
+ * those that asked nothing. POSIX for its clock; epsmesh.c itself needs C99 alone. */
 #define _POSIX_C_SOURCE 200112L
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <time.h>
 
 #include "epsmesh_patch.h"
+
+enum { PATCH = 5, NOTHING = 6, KINDS = 7, PLACES = 101 };
+static const char *const NAMES[] = {"disc", "sphere", "cone", "blade", "bonded", "patch", "nothing"};
+static const long TICK = 1000000; /* ns */
+
+static epsmesh_model model;
+static epsmesh_patch patch;
+static epsmesh_query queries[PATCH + 1][PLACES];
 
 static int rising(const void *a, const void *b) {
     double x = *(const double *)a, y = *(const double *)b;
@@ -25,65 +35,106 @@ static double bowl(double x, double y, void *user) {
     return (x * x + 2 * y * y) / (2 * radius);
 }
 
-/* Run a loop at 1 kHz for so many ticks, each second one with a query, and count those that end after the next is due. */
-static double paced(const epsmesh_model *model, long ticks, long late[2]) {
+/* Ask, and return the force, which is NaN where there is none. */
+static double ask(int kind, long number) {
+    const epsmesh_query *query = &queries[kind % NOTHING][number % PLACES];
+    if (kind == NOTHING) return 0;
+    if (kind == PATCH) return epsmesh_patch_touch(&patch, &model, query, 1e-3 * (double)number).force[2];
+    return epsmesh_touch_at(&model, query).force[2];
+}
+
+/* Find the face at x (m) of the region's middle: the highest tip that a foot is not lost for. */
+static void on_face(double x, double at[3]) {
+    double low = -100 * model.thickness, high = 100 * model.thickness, foot[3], depth;
+    int i, axis;
+    for (i = 0; i < 80; i++) {
+        double z = 0.5 * (low + high);
+        for (axis = 0; axis < 3; axis++) at[axis] = model.origin[axis] + x * model.axes[0][axis] + z * model.axes[2][axis];
+        if (epsmesh_foot(&model, at, foot, &depth) == EPSMESH_LOST) high = z;
+        else low = z;
+    }
+}
+
+/* Put queries of one tool along the middle of the region; return whether the model answers all of them. */
+static int made(int kind, double size) {
+    int i;
+    for (i = 0; i < PLACES; i++) {
+        epsmesh_query *query = &queries[kind][i];
+        double x = 0.8 * model.reach[0] * ((double)i / (PLACES / 2) - 1), force;
+        *query = epsmesh_ask(&model);
+        query->shape = (epsmesh_shape)(kind == PATCH ? EPSMESH_DISC : kind), query->angle = 1.2;
+        query->radius = size, query->length = 2 * size, query->width = 0.4 * size;
+        on_face(x, query->at);
+        query->depth = 0.04 * size;
+        force = ask(kind, i);
+        if (!(force == force)) return 0;
+    }
+    return 1;
+}
+
+static void told(const char *name, double *took, long count) {
+    qsort(took, (size_t)count, sizeof *took, rising);
+    printf("%-8s p50 %7.2f  p99 %7.2f  largest %9.1f us", name, took[count / 2], took[count - 1 - count / 100],
+           took[count - 1]);
+}
+
+/* Run a loop at 1 kHz whose ticks take the `kinds` in turn: what each took, and how many ended after the next was due. */
+static double paced(const int *kinds, int count, long ticks, double *took, long *late) {
     struct timespec due;
     double sum = 0;
     long i;
     clock_gettime(CLOCK_MONOTONIC, &due);
     for (i = 0; i < ticks; i++) {
-        epsmesh_query query = epsmesh_ask(model);
-        double end;
-        due.tv_nsec += 1000000;
+        long turn = i % count;
+        double begin;
+        due.tv_nsec += TICK;
         if (due.tv_nsec >= 1000000000) due.tv_nsec -= 1000000000, due.tv_sec++;
         clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &due, NULL);
-        query.shape = EPSMESH_SPHERE, query.radius = 0.3 * model->thickness, query.depth = 0.002 * model->thickness;
-        memcpy(query.at, model->origin, sizeof query.at);
-        query.at[2] += model->height[0];
-        if (i % 2) sum += epsmesh_touch_at(model, &query).force[2];
-        end = now() - (1e6 * (double)due.tv_sec + 1e-3 * (double)due.tv_nsec);
-        late[i % 2] += end > 1000;
+        begin = now();
+        sum += ask(kinds[turn], i);
+        took[turn * (ticks / count) + i / count] = now() - begin;
+        late[turn] += now() - (1e6 * (double)due.tv_sec + 1e-3 * (double)due.tv_nsec) > 1e-3 * (double)TICK;
     }
     return sum;
 }
 
 int main(int count, char **words) {
-    static epsmesh_model model;
-    static epsmesh_patch patch;
-    static unsigned char data[1 << 24];
-    static const char *const names[] = {"disc", "sphere", "cone", "blade", "bonded", "patch", "nothing"};
-    long i, n = count > 2 ? atol(words[2]) : 20000;
-    double *took = n > 0 ? (double *)malloc((size_t)n * sizeof *took) : NULL, sum = 0, radius;
+    static unsigned char data[1 << 26];
+    long i, n = count > 2 ? atol(words[2]) : 20000, ticks = count > 3 ? (long)(1000 * atof(words[3])) : 0;
     FILE *file = count > 1 ? fopen(words[1], "rb") : NULL;
-    int shape, axis;
-    if (!file || !took || epsmesh_load(&model, data, fread(data, 1, sizeof data, file)) != EPSMESH_OK) {
-        fprintf(stderr, "usage: latency MODEL [QUERIES]\n");
+    int kinds[KINDS], known = 0, kind;
+    double *took, sum = 0, radius;
+    if (!file || n < 1 || ticks < 0 || epsmesh_load(&model, data, fread(data, 1, sizeof data, file)) != EPSMESH_OK) {
+        fprintf(stderr, "usage: latency MODEL [QUERIES [SECONDS]]\n");
         return 2;
     }
     fclose(file);
+    took = (double *)malloc((size_t)(n > ticks ? n : ticks + 1) * sizeof *took);
+    if (!took) return 1;
     radius = 0.05 * model.thickness;
     if (epsmesh_patch_make(&patch, bowl, &radius, 0.6 * radius) != EPSMESH_OK) return 1;
-    for (shape = 0; shape < 7; shape++) {
+    for (kind = 0; kind < KINDS; kind++) {
+        if (kind == NOTHING || made(kind, radius)) kinds[known++] = kind;
+        else printf("%-8s is none of this model's\n", NAMES[kind]);
+    }
+    for (kind = 0; kind < known; kind++) {
         for (i = 0; i < n; i++) {
-            epsmesh_query query = epsmesh_ask(&model);
-            double x = 0.8 * model.reach[0] * ((double)(i % 101) / 50 - 1), begin;
-            query.shape = (epsmesh_shape)shape, query.angle = 1.2;
-            query.radius = radius, query.depth = 0.002 * model.thickness;
-            query.length = 0.1 * model.thickness, query.width = 0.02 * model.thickness;
-            for (axis = 0; axis < 3; axis++) query.at[axis] = model.origin[axis] + x * model.axes[0][axis];
-            begin = now();
-            if (shape < 5) sum += epsmesh_touch_at(&model, &query).force[2];
-            else if (shape == 5) sum += epsmesh_patch_touch(&patch, &model, &query, 1e-3 * (double)i).force[2];
+            double begin = now();
+            sum += ask(kinds[kind], i);
             took[i] = now() - begin;
         }
-        qsort(took, (size_t)n, sizeof *took, rising);
-        printf("%-8s p50 %.2f  p99 %.2f  largest %.1f us\n", names[shape], took[n / 2], took[n - 1 - n / 100], took[n - 1]);
+        told(NAMES[kinds[kind]], took, n), printf("\n");
+    }
+    ticks -= ticks % known;
+    if (ticks) {
+        long late[KINDS] = {0, 0, 0, 0, 0, 0, 0}, each = ticks / known;
+        sum += paced(kinds, known, ticks, took, late);
+        printf("at 1 kHz, %ld ticks of each in turn\n", each);
+        for (kind = 0; kind < known; kind++) {
+            told(NAMES[kinds[kind]], took + kind * each, each);
+            printf("  late %ld\n", late[kind]);
+        }
     }
     free(took);
-    if (count > 3) {
-        long late[2] = {0, 0}, ticks = (long)(2000 * atof(words[3]));
-        sum += paced(&model, ticks, late);
-        printf("1 kHz    late by a tick: %ld of %ld with a query, %ld without\n", late[1], ticks / 2, late[0]);
-    }
     return sum > 0 ? 0 : 1;
 }

@@ -34,8 +34,9 @@ source, wheel, sdist = Path(sys.argv[1]), *sys.argv[2:]
 held = set(zipfile.ZipFile(wheel).namelist())
 sent = {name.split("/", 1)[-1] for name in tarfile.open(sdist).getnames()}
 files = {path.relative_to(source) for path in source.rglob("*") if path.is_file()}
-examples = {Path("pipeline/study/examples") / path.name for path in files if path.parent == Path("studies")}
-package = {str(path) for path in files | examples if path.parts[0] == "pipeline"}
+links = {"studies": "pipeline/study/examples", "meshes": "pipeline/study/meshes", "realtime": "pipeline/realtime/c"}
+linked = {Path(links[path.parts[0]], *path.parts[1:]) for path in files if path.parts[0] in links}
+package = {str(path) for path in files | linked if path.parts[0] == "pipeline"}
 if missing := sorted(package - held):
     sys.exit(f"release: the wheel lacks {', '.join(missing)}")
 if missing := sorted({str(path) for path in files} - sent):

@@ -19,7 +19,9 @@ def installed(tmp_path_factory):
     pytest.importorskip("setuptools", reason="nothing here to build a wheel with")
     folder = tmp_path_factory.mktemp("installed")
     # Building leaves files beside the sources.
-    shutil.copytree(ROOT / "pipeline", folder / "src" / "pipeline", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(
+        ROOT / "pipeline", folder / "src" / "pipeline", ignore=shutil.ignore_patterns("__pycache__", "cache")
+    )
     (folder / "src" / "scripts").mkdir()
     for name in ("pyproject.toml", "README.md", "LICENSE", "scripts/epsmesh"):
         shutil.copy(ROOT / name, folder / "src" / name)
@@ -39,7 +41,7 @@ def installed(tmp_path_factory):
     return run
 
 
-@pytest.mark.parametrize("command", ["verify", "stress", "benchmark", "new", "view", "store", "run"])
+@pytest.mark.parametrize("command", ["verify", "stress", "benchmark", "new", "view", "evaluator", "store", "run"])
 def test_every_command_loads(installed, command):
     done = installed("-m", "pipeline", command, "--help")
     assert done.returncode == 0, done.stderr
@@ -73,3 +75,7 @@ def test_examples_and_templates_come_along(installed):
     assert done.returncode == 0, done.stderr
     script = "from pathlib import Path; import pipeline.report.page as p; print(*Path(p.__file__).parent.rglob('*.j2'))"
     assert "page.html.j2" in installed("-c", script).stdout
+    assert "meshes/liver.stl: the body's" in installed("-m", "pipeline", "new", "liver", "--like", "organ").stdout
+    done = installed("-m", "pipeline", "evaluator", "c")
+    assert "epsmesh_patch.h, " in done.stdout, done.stderr
+    assert "examples/hand.h" in done.stdout

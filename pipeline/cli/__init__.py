@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from pipeline import __version__
-from pipeline.cli import checks, compare, export, guide, merge, new, plan, report, store, study, touch, view
+from pipeline.cli import checks, compare, evaluator, export, guide, merge, new, plan, report, store, study, touch, view
 from pipeline.cli.console import error, make_patient, what_was_not_written
 from pipeline.cli.faults import BAD_INPUT
 from pipeline.cli.group import Commands
@@ -30,7 +30,7 @@ app = typer.Typer(
 )
 _COMMANDS: tuple[Callable[..., None], ...] = (
     new.new, study.validate, plan.plan, study.run, merge.merge, study.status, plan.explain, report.plot, report.report,
-    guide.guide, compare.compare, view.view, export.export, touch.touch,
+    guide.guide, compare.compare, view.view, export.export, evaluator.evaluator, touch.touch,
     checks.verify, checks.stress, checks.benchmark, study.version,
 )  # fmt: skip
 for _command in _COMMANDS:

@@ -1,5 +1,7 @@
 """The command that begins a study file."""
 
+import shutil
+import tomllib
 from pathlib import Path
 from typing import Annotated
 
@@ -8,11 +10,13 @@ import typer
 from pipeline.cli.console import print_json
 from pipeline.cli.faults import Fault, fail, of_file, of_option
 from pipeline.cli.words import Json
-from pipeline.files import write_new
+from pipeline.files import atomic, write_new
 from pipeline.study.problems import nearest
 from pipeline.study.starter import examples, is_name, starter
+from pipeline.within import folders_of, outside
 
 _FOLDER = Path("studies")
+_HOWTO = "docs/howto/own-body.md"
 
 
 def _names(incomplete: str) -> list[str]:
@@ -35,7 +39,8 @@ def new(
 ) -> None:
     """Begin a study file: studies/NAME.toml. An existing file is left alone.
 
-    Without --like it is a small study in which every key is explained.
+    Without --like it is a small study in which every key is explained. The file of a body that a study names is copied
+    with it.
 
     Example: epsmesh new mine
 
@@ -46,16 +51,19 @@ def new(
         fail(_of_name(name, "must be letters, digits, - and _: results are called after it"))
     if not name.endswith(".toml") and Path(name).name != name:
         fail(_of_name(name, f"a name has no folders: it stands for {_FOLDER}/NAME.toml; a path ends in .toml"))
-    text = starter(path.stem) if like is None else _copy_of(like)
+    text, source = (starter(path.stem), path) if like is None else _copy_of(like)
     try:
+        carried = [] if path.exists() else _carried(text, source.parent, path.parent)
         write_new(path, text)
     except FileExistsError:
         fail(of_file(path, "exists already, and is left alone; give another name"))
     except OSError as problem:
         fail(of_file(path, problem.strerror or str(problem)))
     if as_json:
-        print_json({"file": str(path)})
+        print_json({"file": str(path), "carried": [str(file) for file in carried]})
     else:
+        for file in carried:
+            print(f"{file}: the body's, which the study names")
         print(f"{path}: edit it, then `epsmesh plan {path}` and `epsmesh run {path}`")
 
 
@@ -63,17 +71,40 @@ def _of_name(name: str, allowed: str) -> Fault:
     return Fault(f"NAME = {name!r}: {allowed}", key="NAME", value=name, allowed=allowed)
 
 
-def _copy_of(like: str) -> str:
-    """Return the text of a study given by name or path."""
+def _copy_of(like: str) -> tuple[str, Path]:
+    """Return the text of a study given by name or path, and its path."""
     known = _known()
     path = known.get(like, Path(like))
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8"), path
     except (OSError, UnicodeDecodeError) as problem:
         if path.suffix == ".toml" or len(path.parts) > 1:
             reason = getattr(problem, "strerror", None) or "is not UTF-8 text"
             fail(of_option("--like", like, reason))
         fail(of_option("--like", like, f"there is no study of that name; {nearest(like, known)}"))
+
+
+def _carried(text: str, source: Path, target: Path) -> list[Path]:
+    """Copy the body's file that a study names from the folder ``source`` to where it leads from ``target``.
+
+    What is there already is left alone, and what is not to be had, the study's reader tells of.
+
+    Raises:
+        OSError: if it cannot be written.
+    """
+    try:
+        name = tomllib.loads(text)["body"]["file"]
+        here, there = source / name, target / name
+        if there.exists() or not here.is_file():
+            return []
+    except (tomllib.TOMLDecodeError, KeyError, TypeError, ValueError):  # no study, or one of a body without a file
+        return []
+    target.mkdir(parents=True, exist_ok=True)
+    if why := outside(there, folders_of(target)):
+        fail(of_file(there, f"{why}; or begin the study by a NAME without a folder, in studies/", _HOWTO))
+    with atomic(there) as temporary:
+        shutil.copyfile(here, temporary)
+    return [there]
 
 
 def _known() -> dict[str, Path]:

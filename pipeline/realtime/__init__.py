@@ -3,6 +3,7 @@
 from pipeline.realtime.classic import ModelError
 from pipeline.realtime.model import Model, Touch, load
 from pipeline.realtime.patch import Patch, Tip
+from pipeline.realtime.sources import sources
 from pipeline.realtime.surface import Surface, load_surface
 
-__all__ = ["Model", "ModelError", "Patch", "Surface", "Tip", "Touch", "load", "load_surface"]
+__all__ = ["Model", "ModelError", "Patch", "Surface", "Tip", "Touch", "load", "load_surface", "sources"]

@@ -7,9 +7,13 @@
  *
  * The driver's positions come in the scene's unit, here metres. The scene's own deformable body must not push the tool
  * too: this is its force.
+ *
+ * A plug-in for SOFA 24.12 or later: a CMake project that finds Sofa.Component.Haptics, this file and epsmesh.c (as C)
+ * in one shared library, and <RequiredPlugin name="EpsmeshForceFeedback"/> in the scene.
  */
 #include <sofa/component/haptics/ForceFeedback.h>
 #include <sofa/core/ObjectFactory.h>
+#include <sofa/defaulttype/SolidTypes.h>
 
 #include "hand.h"
 
@@ -56,7 +60,17 @@ private:
     bool m_isReady = false;
 };
 
-static const int registered =
-    sofa::core::RegisterObject("Force and error bar of epsmesh's real-time model").add<EpsmeshForceFeedback>();
-
 } // namespace epsmesh
+
+/* What SOFA asks a plug-in for when it is loaded. */
+extern "C" {
+SOFA_EXPORT_DYNAMIC_LIBRARY void initExternalModule() {}
+
+SOFA_EXPORT_DYNAMIC_LIBRARY const char *getModuleName() { return "EpsmeshForceFeedback"; }
+
+SOFA_EXPORT_DYNAMIC_LIBRARY void registerObjects(sofa::core::ObjectFactory *factory) {
+    factory->registerObjects(
+        sofa::core::ObjectRegistrationData("Force and error bar of epsmesh's real-time model")
+            .add<epsmesh::EpsmeshForceFeedback>());
+}
+}

@@ -16,7 +16,7 @@ public sealed class EpsmeshTool : IDisposable
     public EpsmeshTool(string path, double radius, double most)
     {
         tool = epsmesh_unity_open(path, radius, most);
-        if (tool == IntPtr.Zero) throw new ArgumentException(path + " is no model of a flat face");
+        if (tool == IntPtr.Zero) throw new ArgumentException(path + " is no model, or radius or force is not positive");
     }
 
     // N; error is relative. A status other than 0 (ok) or 1 (lost) means that the force fades: see epsmesh.h.

@@ -1,7 +1,7 @@
 /* What all hosts share: a tool in a hand, the force on it, and what is done when the model does not answer. C99 and C++.
  *
- * The tool is a point that moves freely; its depth is how far it is below the plane of the face, straight above or below
- * which it touches. Nothing here blocks or allocates but `hand_load`, which is called once, before the loop.
+ * The tool is a point that moves freely; its depth is how far it is below the undeformed face, along the normal that leads
+ * to it. Nothing here blocks or allocates but `hand_load`, which is called once, before the loop.
  */
 #ifndef EPSMESH_HAND_H
 #define EPSMESH_HAND_H
@@ -27,7 +27,7 @@ typedef struct {
     epsmesh_status status; /* of the last call */
 } hand;
 
-/* Read a model of a face that is flat: 0, or what went wrong. The tool is a ball of `radius` (m). */
+/* Read a model: NULL, or what went wrong. The tool is a ball of `radius` (m). */
 static const char *hand_load(hand *h, const char *path, double radius, double most) {
     FILE *file = fopen(path, "rb");
     long size = -1;
@@ -41,7 +41,6 @@ static const char *hand_load(hand *h, const char *path, double radius, double mo
     free(data);
     fclose(file);
     if (status != EPSMESH_OK) return "the file is no model that this version reads";
-    if (!h->model.is_flat) return "this loop knows flat faces only";
     if (!(radius > 0 && most > 0)) return "radius and largest force must be positive";
     h->tool = epsmesh_ask(&h->model);
     h->tool.shape = EPSMESH_SPHERE, h->tool.radius = radius;
@@ -52,20 +51,17 @@ static const char *hand_load(hand *h, const char *path, double radius, double mo
 
 /* Put the force (N) on a tool whose lowest point is at `tip` (m), both in the body's coordinates, into `force`. */
 static void hand_feel(hand *h, const double tip[3], double force[3]) {
-    const double *out = h->model.axes[2];
-    double above = 0, size = 0;
+    double size = 0;
     epsmesh_touch touch;
     int i;
-    for (i = 0; i < 3; i++) above += out[i] * (tip[i] - h->model.origin[i]);
-    for (i = 0; i < 3; i++) h->tool.at[i] = tip[i] - above * out[i];
-    h->tool.depth = -above;
-    if (above > 0) {
+    touch.status = epsmesh_foot(&h->model, tip, h->tool.at, &h->tool.depth);
+    if (touch.status == EPSMESH_LOST) {
         /* Nothing touches, inside the region or outside it. */
         h->status = EPSMESH_LOST, h->share = 1, h->stiffness = h->error = 0;
         for (i = 0; i < 3; i++) h->last[i] = force[i] = 0;
         return;
     }
-    touch = epsmesh_touch_at(&h->model, &h->tool);
+    if (touch.status == EPSMESH_OK) touch = epsmesh_touch_at(&h->model, &h->tool);
     h->status = touch.status;
     if (touch.status == EPSMESH_OK || touch.status == EPSMESH_LOST) {
         h->share = fmin(1, h->share + HAND_RETURNS);

@@ -1,5 +1,6 @@
 """``epsmesh new``: study files that run as they are, and explain themselves."""
 
+import json
 import tomllib
 from pathlib import Path
 
@@ -77,6 +78,7 @@ def test_new_writes_a_study_and_leaves_an_existing_one_alone(elsewhere):
 def test_like_copies_the_studies_that_come_with_the_program(elsewhere, name):
     assert new("mine", "--like", name).exit_code == 0
     assert (elsewhere / "studies" / "mine.toml").read_text() == (STUDIES / f"{name}.toml").read_text()
+    load(elsewhere / "studies" / "mine.toml")  # with the file of its body
 
 
 def test_like_takes_a_path_and_a_study_of_the_folder(elsewhere):
@@ -84,6 +86,33 @@ def test_like_takes_a_path_and_a_study_of_the_folder(elsewhere):
     assert new("second", "--like", "deep/first.toml").exit_code == 0
     assert new("third", "--like", "second").exit_code == 0
     assert (elsewhere / "studies" / "third.toml").read_text() == starter("first")
+
+
+def test_the_file_of_a_body_is_taken_along_within_the_project(elsewhere):
+    mesh = elsewhere / "meshes" / "liver.stl"
+    assert f"{Path('studies', '..', 'meshes', 'liver.stl')}" in new("mine", "--like", "organ").stdout
+    assert mesh.read_bytes() == (STUDIES.parent / "meshes" / "liver.stl").read_bytes()
+    mesh.write_bytes(b"mine")
+    assert json.loads(new("second", "--like", "organ", "--json").stdout)["carried"] == []
+    assert mesh.read_bytes() == b"mine"
+    mesh.unlink()
+    assert new("mine", "--like", "organ").exit_code == 2
+    assert not mesh.exists()
+    wrong = new(str(elsewhere.parent / "alone" / "mine.toml"), "--like", "organ")
+    assert (wrong.exit_code, "begin the study by a NAME" in wrong.stderr) == (2, True)
+    assert not (elsewhere.parent / "meshes").exists()
+
+
+def test_the_evaluator_in_c_is_copied_and_nothing_overwritten(elsewhere):
+    done = epsmesh("evaluator", "mine/c", "--json")
+    names = json.loads(done.stdout)["files"]
+    assert {"epsmesh.h", "epsmesh.c", "epsmesh_patch.c", "examples/hand.h", "examples/unity.c"} <= {*names}
+    for name in names:
+        assert (elsewhere / "mine" / "c" / name).read_text() == (STUDIES.parent / "realtime" / name).read_text()
+    (elsewhere / "mine" / "c" / "epsmesh.h").unlink()
+    again = epsmesh("evaluator", "mine/c")
+    assert (again.exit_code, "exists already" in again.stderr) == (2, True)
+    assert not (elsewhere / "mine" / "c" / "epsmesh.h").exists()
 
 
 def test_unknown_studies_and_bad_names_are_named():

@@ -83,6 +83,11 @@ def test_c_and_numpy_agree(library, tmp_path, kind):
         query.length, query.width, query.along = 2 * radius, 1e-3, triple(*along)
         found = library.epsmesh_touch_at(room, ctypes.byref(query))
         assert library.epsmesh_word(found.status).decode() == expected.status
+        if expected.status == "ok":
+            place, below = triple(), ctypes.c_double()
+            tip = triple(*(at - depth * np.array(spot.normal) @ model.axes))
+            assert library.epsmesh_foot(room, tip, place, ctypes.byref(below)) == 0
+            np.testing.assert_allclose([*place, below.value], [*at, depth], rtol=1e-9, atol=1e-14)
         values = np.array([*found.force, found.force_error, found.stiffness, found.contact_radius])
         known = np.array([*expected.force, expected.force_error, expected.stiffness, expected.contact_radius])
         scale = np.array([*[np.linalg.norm(expected.force)] * 3, *known[3:]])

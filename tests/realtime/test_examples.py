@@ -66,6 +66,31 @@ def test_a_loop_renders_the_model_and_no_more_than_the_device(plugin, tmp_path):
     plugin.epsmesh_unity_close(tool)
 
 
+@pytest.mark.parametrize("kind", [{}, {"is_round": True}])
+def test_a_loop_knows_a_curved_face_and_yields_no_work(plugin, tmp_path, kind):
+    model = write_random(tmp_path / "model.nc", curved=True, **kind)
+    tool = opened(plugin, tmp_path / "model.nc")
+    assert feel(plugin, tool, 0.01, 0.005, 0.02)[0].tolist() == [0, 0, 0]
+    # A closed path at changing depth, within the face: no multiple of its normals.
+    angles = 2 * np.pi * np.arange(64) / 64
+    xy, forces = np.array([0.008, 0.003]) + 0.004 * np.stack([np.cos(angles), np.sin(angles)], axis=1), []
+    depths, tips = 4e-4 + 2e-4 * np.sin(2 * angles + 1), []
+    for at, depth in zip(xy, depths, strict=True):
+        spot = model.face.at(model.table, *at.tolist())
+        place = np.array([*at, spot.height])
+        tips.append(place - depth * np.array(spot.normal))
+        force, status = feel(plugin, tool, *tips[-1])
+        assert status == 0
+        forces.append(model.query("sphere", radius=RADIUS, at=place, depth=float(depth)).force)
+        np.testing.assert_allclose(force, forces[-1], rtol=1e-8, atol=1e-10)
+    rates = np.fft.ifft(1j * np.fft.fftfreq(64, 1 / 64)[:, None] * np.fft.fft(tips, axis=0), axis=0).real
+    powers = np.sum(forces * rates, axis=1)
+    assert abs(powers.mean()) < 1e-9 * np.abs(powers).max()
+    # Beside the region there is no place above the tool.
+    assert feel(plugin, tool, model.table.reach[0] + 2e-3, 0.0, -4e-3)[1] > 1
+    plugin.epsmesh_unity_close(tool)
+
+
 def test_a_refusal_fades_and_returns_without_a_blow(plugin, tmp_path):
     model = write_random(tmp_path / "model.nc")
     tool, inside, outside = (
@@ -89,6 +114,5 @@ def test_a_refusal_fades_and_returns_without_a_blow(plugin, tmp_path):
 
 def test_no_model_is_no_tool(plugin, tmp_path):
     (tmp_path / "none.nc").write_bytes(b"CDF\x02")
-    write_random(tmp_path / "curved.nc", curved=True)
-    for name in ("none.nc", "missing.nc", "curved.nc"):
+    for name in ("none.nc", "missing.nc"):
         assert opened(plugin, tmp_path / name) is None

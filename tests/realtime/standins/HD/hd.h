@@ -1,5 +1,6 @@
 /* Names of OpenHaptics that the example uses, to check its syntax where the toolkit is not installed. */
-typedef unsigned int HHD, HDCallbackCode, HDenum, HDSchedulerHandle;
+typedef unsigned int HHD, HDCallbackCode, HDenum;
+typedef unsigned long HDSchedulerHandle;
 typedef struct { int errorCode, internalErrorCode; HHD hHD; } HDErrorInfo;
 typedef HDCallbackCode (*HDSchedulerCallback)(void *);
 #define HDCALLBACK

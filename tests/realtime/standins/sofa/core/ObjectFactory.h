@@ -1,7 +1,7 @@
 namespace sofa { namespace core {
-struct RegisterObject {
-    RegisterObject(const char *) {}
-    template <class T> RegisterObject &add() { T made; made.init(); return *this; }
-    operator int() const { return 1; }
+struct ObjectRegistrationData {
+    explicit ObjectRegistrationData(const std::string &) {}
+    template <class T> ObjectRegistrationData &add(bool = false) { T made; made.init(); return *this; }
 };
+struct ObjectFactory { bool registerObjects(ObjectRegistrationData &) { return true; } };
 } }
