@@ -164,22 +164,43 @@ def _percent(value: float) -> str:
 
 
 def _latency(path: Path, seconds: float) -> str:
-    """Return what queries take in C and in numpy, and how many ticks of a loop at 1 kHz were late."""
+    """Return what queries take in C and in numpy, and how many ticks of a loop at 1 kHz are late."""
     program = _FOLDER / "latency"
     sources = ["realtime/epsmesh_patch.c", "realtime/latency.c"]
     subprocess.run(["cc", "-std=c99", "-O2", *sources, "-o", str(program), "-lm"], check=True)
     arguments = [str(program), str(path), "20000", f"{seconds:g}"]
     in_c = subprocess.run(arguments, check=True, capture_output=True, text=True).stdout
-    model, took = load(path), []
-    radius = 0.05 * model.thickness
-    for number in range(2000):
-        x = 0.8 * model.table.reach[0] * ((number % 101) / 50 - 1)
-        at = model.origin + np.array([x, 0.0, model.face.at(model.table, x, 0.0).height]) @ model.axes
-        begin = time.perf_counter()
-        model.query("disc", radius=radius, at=at.tolist(), depth=0.02 * radius)
-        took.append(1e6 * (time.perf_counter() - begin))
-    p50, p99 = np.percentile(took, [50, 99])
-    return f"{in_c}numpy    p50 {p50:.0f}  p99 {p99:.0f}  largest {max(took):.0f} us"
+    return in_c + "".join(_in_numpy(load(path)))
+
+
+def _in_numpy(model: Model) -> Iterator[str]:
+    """Yield for each tool what 20,000 queries take, by the clock and of the processor, beside a call that does nothing.
+
+    Tools take turns, so that what else the machine does falls on all of them.
+    """
+    size, rng = 0.05 * model.thickness, np.random.default_rng(11)
+    blade = {"length": 2 * size, "width": 0.4 * size}
+    tools = {
+        "disc": ("disc", {"radius": size}), "sphere": ("sphere", {"radius": size}),
+        "cone": ("cone", {"radius": size, "angle": 1.2}), "blade": ("blade", blade),
+        "bonded": ("disc", {"radius": size, "contact": "bonded"}),
+    }  # fmt: skip
+    if not len(model.table.tensors):
+        del tools["blade"], tools["bonded"]
+    took: dict[str, list[tuple[float, float]]] = {name: [] for name in (*tools, "nothing")}
+    for _ in range(20_000):
+        x, y = (0.8 * rng.uniform(-0.7, 0.7, 2) * model.table.reach).tolist()
+        at = (model.origin + np.array([x, y, model.face.at(model.table, x, y).height]) @ model.axes).tolist()
+        ratio = float(rng.uniform(*model.table.poisson))
+        for name, times in took.items():
+            begin, of_thread = time.perf_counter(), time.thread_time()
+            if name in tools:
+                tool, sizes = tools[name]
+                model.query(tool, at=at, depth=0.04 * size, poisson=ratio, **sizes)
+            times.append((1e6 * (time.perf_counter() - begin), 1e6 * (time.thread_time() - of_thread)))
+    for name, times in took.items():
+        (p50, p99), (own50, own99) = (np.percentile(column, [50, 99]) for column in zip(*times, strict=True))
+        yield f"numpy {name:8} p50 {p50:.0f}  p99 {p99:.0f} us; of the processor {own50:.0f}, {own99:.0f}\n"
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ FIGURES = Path(__file__).parent / "figures"
 ASKED = MappingProxyType({
     "touch": {"tool": "sphere", "x": 22, "y": -12, "radius": 7, "depth": 2.2},
     "touch_curved": {"tool": "sphere", "x": 6, "y": -7, "radius": 6, "depth": 2},
+    "touch_organ": {"tool": "sphere", "radius": 6, "depth": 1.5},
 })  # fmt: skip
 TITLES = MappingProxyType({"touch": "A soft pad", "touch_curved": "An ellipsoid"})
 _WAIT = "new Promise(done => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(done)), 500))"

@@ -119,7 +119,7 @@ def _bend(face: Face, table: Table, x: float, y: float) -> float:
     """Return the mean curvature (1/m), positive on a dome."""
     spot = face.at(table, x, y)
     metric = np.eye(2) + np.outer(spot.slope, spot.slope)
-    return float(-0.5 * np.trace(np.linalg.solve(metric, spot.second)) / np.sqrt(1 + spot.slope @ spot.slope))
+    return float(-0.5 * np.trace(np.linalg.solve(metric, spot.second)) * spot.outward[2])
 
 
 def _fitted(rows: FloatArray, columns: FloatArray, values: FloatArray) -> FloatArray:

@@ -7,6 +7,7 @@ from math import cos, hypot, log, pi, sin, sqrt
 import numpy as np
 
 from pipeline.realtime.contact import Contact, Place
+from pipeline.realtime.table import chebyshev
 
 # Of a rectangle, half sides l ≥ w, E* = 1, in Chebyshev polynomials of 1 - 2 log(w/l)/log(1/50): F/d in units of
 # 2 √(l w), <x²>/l² and <y²>/w² of its pressure, and moment per tilt about its short and long axis in l^2.5 w^0.5, l w².
@@ -46,29 +47,36 @@ class Blade:
         force, _, _, lean_along, lean_across = _rectangle(short / long)
         stiff = place.plane
         along, across = self.spread
-        edge = np.array([cos(self.turn), sin(self.turn)])
-        side = np.array([-edge[1], edge[0]])
+        edge = cos(self.turn), sin(self.turn)
         leans = stiff * lean_along * long**2.5 * short**0.5, stiff * lean_across * short**2 * long
         shape = place.shape
         # e·A·e = h/2 + (A₁ cos 2φ + A_xy sin 2φ), and the other sign across.
-        double = np.array([cos(2 * self.turn), sin(2 * self.turn)])
         mean, half = (along + across) / 2, along - across
+        apart, twist = half * cos(2 * self.turn), half * sin(2 * self.turn)
         soft = 1 / (stiff * force * 2 * sqrt(long * short)) + place.c
-        soft += mean * place.h + half * float(double @ shape.bent)
-        of_place = place.slope_c + mean * place.slope_h + half * (double @ shape.bent_slopes)
-        for lean, direction in zip(leans, (edge, side), strict=True):
-            slope = float(shape.lean @ direction)
+        soft += mean * place.h + apart * shape.bent[0] + twist * shape.bent[1]
+        of_x, of_y = (
+            slope_c + mean * slope_h + apart * slope_apart + twist * slope_twist
+            for slope_c, slope_h, slope_apart, slope_twist in zip(
+                place.slope_c, place.slope_h, *shape.bent_slopes, strict=True
+            )
+        )
+        (xx, xy), (yx, yy) = shape.hessian
+        for lean, (x, y) in zip(leans, (edge, (-edge[1], edge[0])), strict=True):
+            slope = shape.lean[0] * x + shape.lean[1] * y
             soft -= lean * slope**2 / 4
-            of_place = of_place - lean / 2 * slope * (shape.hessian @ direction)
+            of_x -= lean / 2 * slope * (xx * x + xy * y)
+            of_y -= lean / 2 * slope * (yx * x + yy * y)
         push = depth / soft
-        return Contact(push, 0.5 * push**2 * of_place, 1 / soft, hypot(long, short), along + across)
+        squared = 0.5 * push**2
+        return Contact(push, (squared * of_x, squared * of_y), 1 / soft, hypot(long, short), along + across)
 
 
 @lru_cache(64)
 def _rectangle(share: float) -> tuple[float, ...]:
     """Return the five numbers of a rectangle whose ``share`` is w/l."""
     at = 1 - 2 * log(share) / log(_SLENDER)
-    return tuple(np.polynomial.chebyshev.chebval(at, RECTANGLE).tolist())
+    return tuple((np.array(chebyshev(at, len(RECTANGLE))) @ RECTANGLE).tolist())
 
 
 def blade(length: float, width: float, turn: float) -> Blade | None:

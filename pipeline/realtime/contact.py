@@ -12,14 +12,17 @@ The slope g tilts the face by Fg, which moves the pressure aside by what a disc 
 the force aside is ∂U/∂x, and a closed path does no work.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import log1p, nan, pi, sqrt, tan
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-Pair = NDArray[np.float64]
+Array = NDArray[np.float64]
+# Along x and y.
+Pair = tuple[float, float]
+Square = tuple[Pair, Pair]
 
 # Steps of Newton's method, which is kept within a bracket; the radius is then exact to rounding.
 # A step of it that is this small leaves its square.
@@ -39,10 +42,10 @@ class Shape:
     """
 
     bent: Pair
-    bent_slopes: Pair
+    bent_slopes: Square
     lean: Pair
-    hessian: Pair
-    regular: Pair
+    hessian: Square
+    regular: tuple[tuple[float, float, float], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +63,7 @@ class Place:
     slope_tilt: Pair
     plane: float
     bend: float = 0.0
-    slope_bend: Pair = field(default_factory=lambda: np.zeros(2))
+    slope_bend: Pair = (0.0, 0.0)
     shape: Shape | None = None
     poisson: float = nan
 
@@ -88,9 +91,12 @@ class Disc:
         if a > most:
             return None
         force = depth / (tangent(a, place) - 4 / 3 * stiff * a**3 * place.tilt)
-        slope = place.slope_c + place.slope_h * (a**2 / 3 - 4 / 45 * stiff * h * a**5)
-        aside = 0.5 * force**2 * (slope - 4 / 3 * stiff * a**3 * place.slope_tilt)
-        return Contact(force, aside, force / depth, a, 2 / 3 * a**2 - 8 / 45 * stiff * h * a**5)
+        half, of_h, of_tilt = 0.5 * force**2, a**2 / 3 - 4 / 45 * stiff * h * a**5, -4 / 3 * stiff * a**3
+        aside_x, aside_y = (
+            half * (slope_c + of_h * slope_h + of_tilt * slope_tilt)
+            for slope_c, slope_h, slope_tilt in zip(place.slope_c, place.slope_h, place.slope_tilt, strict=True)
+        )
+        return Contact(force, (aside_x, aside_y), force / depth, a, 2 / 3 * a**2 - 8 / 45 * stiff * h * a**5)
 
 
 @dataclass(frozen=True)
@@ -107,7 +113,7 @@ class Round:
         """Return about what the radius of contact (m) is at a ``depth`` (m)."""
         raise NotImplementedError
 
-    def rise(self, square: Pair) -> Pair:
+    def rise(self, square: Array) -> Array:
         """Return how far (m) above its lowest point it is, at squares (m²) of the way to its axis."""
         raise NotImplementedError
 
@@ -165,9 +171,13 @@ def _contact(a: float, found: _Pressed, place: Place) -> Contact:
     force, stiff, square = found.force, place.plane, found.square / found.force
     of_h = 0.25 * force**2 * square + 4 / 3 * stiff**2 * place.tilt * a**5 * force**3 / found.growth
     of_tilt = -2 / 3 * stiff * a**3 * force**2
-    aside = 0.5 * force**2 * place.slope_c + of_h * place.slope_h + of_tilt * place.slope_tilt
-    aside = aside + 0.5 * found.square * place.slope_bend
-    return Contact(force, aside, 1 / found.compliance, a, square)
+    aside_x, aside_y = (
+        0.5 * force**2 * slope_c + of_h * slope_h + of_tilt * slope_tilt + 0.5 * found.square * slope_bend
+        for slope_c, slope_h, slope_tilt, slope_bend in zip(
+            place.slope_c, place.slope_h, place.slope_tilt, place.slope_bend, strict=True
+        )
+    )
+    return Contact(force, (aside_x, aside_y), 1 / found.compliance, a, square)
 
 
 @dataclass(frozen=True)
@@ -195,7 +205,7 @@ class Ball(Round):
         """H. Hertz, 1882."""
         return sqrt(self.radius * depth)
 
-    def rise(self, square: Pair) -> Pair:
+    def rise(self, square: Array) -> Array:
         """Beyond its own radius it is as high as there."""
         return np.asarray(self.radius - np.sqrt(np.maximum(self.radius**2 - square, 0.0)))
 
@@ -215,7 +225,7 @@ class Cone(Round):
         """A. E. H. Love, 1939."""
         return 2 / pi * depth / self.slope
 
-    def rise(self, square: Pair) -> Pair:
+    def rise(self, square: Array) -> Array:
         """A straight flank."""
         return np.asarray(self.slope * np.sqrt(square))
 
@@ -238,9 +248,12 @@ class Bonded:
         soft = 1 - 2 * ratio
         down = 4 * shear * a * (log1p(2 * soft) / soft if soft > _SOFT else 2.0)
         aside = 8 * shear * a / (2 - ratio)
-        compliance = place.shape.regular + np.diag([1 / aside, 1 / aside, 1 / down + a**2 / 3 * place.h])
-        force = depth * np.linalg.inv(compliance)[:, 2]
-        return Contact(float(force[2]), force[:2], float(force[2]) / depth, a, 2 / 3 * a**2)
+        (xx, xy, xz), (_, yy, yz), (_, _, zz) = place.shape.regular
+        xx, yy, zz = xx + 1 / aside, yy + 1 / aside, zz + 1 / down + a**2 / 3 * place.h
+        # The last column of the inverse, by cofactors.
+        flat, to_x, to_y = xx * yy - xy * xy, xy * yz - yy * xz, xy * xz - xx * yz
+        share = depth / (xz * to_x + yz * to_y + zz * flat)
+        return Contact(share * flat, (share * to_x, share * to_y), share * flat / depth, a, 2 / 3 * a**2)
 
 
 def tangent(a: float, place: Place) -> float:

@@ -1,12 +1,14 @@
 """The face that a tool presses on, flat or not: its height, its normal, and forces on a tool that moves over it."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.realtime.contact import Contact
-from pipeline.realtime.table import Table
+from pipeline.realtime.contact import Contact, Pair, Square
+from pipeline.realtime.table import Table, derived
 
 Array = NDArray[np.float64]
 
@@ -19,16 +21,21 @@ class Spot:
     """
 
     height: float
-    slope: Array
-    second: Array
+    slope: Pair
+    second: Square
     bend: float
-    slope_bend: Array
+    slope_bend: Pair
 
     @property
     def normal(self) -> Array:
         """The outward unit normal (3,)."""
-        steep = np.array([-self.slope[0], -self.slope[1], 1.0])
-        return np.asarray(steep / np.sqrt(steep @ steep))
+        return np.array(self.outward)
+
+    @property
+    def outward(self) -> tuple[float, float, float]:
+        """The same, as numbers."""
+        steep = sqrt(1 + self.slope[0] ** 2 + self.slope[1] ** 2)
+        return -self.slope[0] / steep, -self.slope[1] / steep, 1 / steep
 
     @property
     def turn(self) -> Array:
@@ -38,17 +45,24 @@ class Spot:
         first /= np.sqrt(first @ first)
         return np.array([first, _cross(normal, first), normal])
 
-    def force(self, contact: Contact, depth: float) -> Array:
-        """Return the force (3,) on a tool whose tip is at p - d n: its work is what the energy W(x, y, d) loses.
+    def force(self, contact: Contact, depth: float) -> tuple[float, float, float]:
+        """Return the force on a tool whose tip is at p - d n: its work is what the energy W(x, y, d) loses.
 
         Along the normal it is ∂W/∂d; f · (∂p/∂x - d ∂n/∂x) is ``aside``, the slope of -W at a fixed depth.
         """
-        if not self.slope.any() and not self.second.any():
-            return np.array([*contact.aside, contact.force])
-        steep = np.sqrt(1 + self.slope @ self.slope)
-        metric = np.eye(2) + np.outer(self.slope, self.slope) + depth / steep * self.second
-        tangents = np.array([[1.0, 0.0, self.slope[0]], [0.0, 1.0, self.slope[1]]])
-        return np.asarray(contact.force * self.normal + np.linalg.solve(metric, contact.aside) @ tangents)
+        if self is FLAT:
+            return (*contact.aside, contact.force)
+        (x, y), ((xx, xy), (_, yy)), (aside_x, aside_y) = self.slope, self.second, contact.aside
+        bent = depth / sqrt(1 + x**2 + y**2)
+        along, mixed, across = 1 + x**2 + bent * xx, x * y + bent * xy, 1 + y**2 + bent * yy
+        share = along * across - mixed**2
+        to_x, to_y = (across * aside_x - mixed * aside_y) / share, (along * aside_y - mixed * aside_x) / share
+        out_x, out_y, out_z = self.outward
+        force = contact.force
+        return force * out_x + to_x, force * out_y + to_y, force * out_z + to_x * x + to_y * y
+
+
+FLAT = Spot(0.0, (0.0, 0.0), ((0.0, 0.0), (0.0, 0.0)), 0.0, (0.0, 0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +72,7 @@ class Face:
     height: Array = field(default_factory=lambda: np.zeros((1, 1)))
     bend: Array = field(default_factory=lambda: np.zeros((1, 1)))
 
-    @property
+    @cached_property
     def is_flat(self) -> bool:
         """Whether it is the plane z = 0."""
         return not (self.height.any() or self.bend.any())
@@ -66,9 +80,13 @@ class Face:
     def at(self, table: Table, x: float, y: float) -> Spot:
         """Return what it is at a place (m) of a table's region."""
         if self.is_flat:
-            return Spot(0.0, np.zeros(2), np.zeros((2, 2)), 0.0, np.zeros(2))
-        (z, slope, (xx, xy, yy)), (bend, slope_bend, _) = table.local(np.stack([self.height, self.bend]), x, y)
-        return Spot(z, slope, np.array([[xx, xy], [xy, yy]]), bend, slope_bend)
+            return FLAT
+        (z, slope, (xx, xy, yy)), (bend, slope_bend, _) = table.local(self._derived, x, y)
+        return Spot(z, slope, ((xx, xy), (xy, yy)), bend, slope_bend)
+
+    @cached_property
+    def _derived(self) -> Array:
+        return derived(np.stack([self.height, self.bend])[:, None])
 
 
 def _cross(a: Array, b: Array) -> Array:

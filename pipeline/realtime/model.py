@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from math import inf, isfinite, nan, pi, prod
+from functools import cached_property
+from math import atan2, hypot, inf, isfinite, nan, pi, prod
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from pipeline.realtime.blade import Blade, blade
 from pipeline.realtime.classic import ModelError, read_doubles
 from pipeline.realtime.contact import Bonded, Contact, Disc, Place, Round, ball, cone
-from pipeline.realtime.face import Face
+from pipeline.realtime.face import Face, Spot
 from pipeline.realtime.table import TENSORS, Table
 
 FORMAT = 2.0
@@ -118,14 +119,15 @@ class Model:
         if isinstance(shape, str):
             return _refused(shape)
         whole = isinstance(shape, Blade | Bonded)
-        local = self._local(at)
-        if not (np.isfinite(local).all() and isfinite(depth) and isfinite(ratio) and 0 < modulus < inf):
+        x, y, z = self._local(at)
+        if not (
+            isfinite(x) and isfinite(y) and isfinite(z) and isfinite(depth) and isfinite(ratio) and 0 < modulus < inf
+        ):
             return _refused("input")
-        x, y, z = local.tolist()
         if not self.table.holds(x, y):
             return _refused("outside")
         spot = self.face.at(self.table, x, y)
-        if reason := self._misfit(z - spot.height, depth, ratio, axis, spot.normal):
+        if reason := self._misfit(z - spot.height, depth, ratio, axis, spot):
             return _refused(reason)
         if depth <= _TOUCHING:
             return Touch("lost", np.zeros(3), 0.0, 0.0, 0.0)
@@ -135,21 +137,29 @@ class Model:
             if not self.face.is_flat:
                 place = replace(place, bend=spot.bend, slope_bend=spot.slope_bend)
             found = shape.press(depth, place, self.largest * room)
-            force = spot.force(found, depth) @ self.axes if found else np.zeros(3)
+            if found is None:
+                return _refused("large")
+            push = spot.force(found, depth)
         except ArithmeticError:
             return _refused("damaged")
-        if found is None:
-            return _refused("large")
-        force *= modulus
+        (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = self._frame
+        out_x, out_y, out_z = (modulus * part for part in push)
+        force = np.array([
+            out_x * xx + out_y * yx + out_z * zx,
+            out_x * xy + out_y * yy + out_z * zy,
+            out_x * xz + out_y * yz + out_z * zz,
+        ])  # fmt: skip
         error = found.stiffness * self._uncertain(place, room, found, sticks=isinstance(shape, Bonded)) + self.bar[3]
-        if not (np.isfinite(force).all() and isfinite(error) and found.force > 0 and found.stiffness > 0):
+        if not (isfinite(out_x) and isfinite(out_y) and isfinite(out_z) and isfinite(error)):
+            return _refused("damaged")
+        if not (found.force > 0 and found.stiffness > 0):
             return _refused("damaged")
         return Touch("ok", force, error, modulus * found.stiffness, found.radius)
 
     def room(self, x: float, y: float) -> float:
         """Return the distance (m) from a place to the nearest side, or to the bottom."""
         if self.table.is_round:
-            return min(self.sides[0] - float(np.hypot(x, y)), self.thickness)
+            return min(self.sides[0] - hypot(x, y), self.thickness)
         return min(self.sides[0] - abs(x), self.sides[1] - abs(y), self.thickness)
 
     def tool(
@@ -179,30 +189,37 @@ class Model:
             return "tool"
         if min(sizes[2:]) < _SMALLEST:
             return "input"
-        edge = np.array([1.0, 0.0])
+        edge_x, edge_y = 1.0, 0.0
         if along is not None:
             given = np.asarray(along, dtype=float)
             if given.shape != (3,) or not np.isfinite(given).all():
                 return "input"
-            edge = (self.axes @ given)[:2]
-        if not np.hypot(*edge) > 0:
+            edge_x, edge_y, _ = (self.axes @ given).tolist()
+        if not hypot(edge_x, edge_y) > 0:
             return "input"
-        return blade(sizes[2], sizes[3], float(np.arctan2(edge[1], edge[0]))) or "tool"
+        return blade(sizes[2], sizes[3], atan2(edge_y, edge_x)) or "tool"
 
-    def _local(self, at: Sequence[float]) -> NDArray[np.float64]:
+    @cached_property
+    def _frame(self) -> list[list[float]]:
+        """The axes, as numbers."""
+        return [[float(part) for part in row] for row in self.axes]
+
+    def _local(self, at: Sequence[float]) -> tuple[float, float, float]:
         place = np.asarray(at, dtype=float)
-        return self.axes @ (place - self.origin) if place.shape == (3,) else np.full(3, nan)
+        if place.shape != (3,):
+            return nan, nan, nan
+        x, y, z = (place - self.origin).tolist()
+        (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = self._frame
+        return xx * x + xy * y + xz * z, yx * x + yy * y + yz * z, zx * x + zy * y + zz * z
 
-    def _misfit(
-        self, off: float, depth: float, ratio: float, axis: Sequence[float] | None, normal: NDArray[np.float64]
-    ) -> str:
+    def _misfit(self, off: float, depth: float, ratio: float, axis: Sequence[float] | None, spot: Spot) -> str:
         """Return the status of a query that the model does not answer, or nothing."""
         low, high = self.table.poisson
         if axis is not None:
             pointed = np.asarray(axis, dtype=float)
             if pointed.shape != (3,) or not np.isfinite(pointed).all() or not (length := np.linalg.norm(pointed)) > 0:
                 return "input"
-            if not float(-normal @ (self.axes @ pointed) / length) >= 1 - 0.5 * self.aligned**2:
+            if not float(-spot.normal @ (self.axes @ pointed) / length) >= 1 - 0.5 * self.aligned**2:
                 return "tilted"
         if abs(off) > self.off:
             return "off"
@@ -214,7 +231,7 @@ class Model:
         """Return how far c may be off (1/m), what is left out of it included."""
         of_c, of_h, beyond, _ = self.bar
         share = (contact.radius / room) ** 4
-        bent = abs(place.h) + (2 * float(np.hypot(*place.shape.bent)) if place.shape else 0.0)
+        bent = abs(place.h) + (2 * hypot(*place.shape.bent) if place.shape else 0.0)
         # Tissue that sticks is pulled inwards or outwards as well, more the more its volume changes.
         pulled = _STICKS * (1 - 2 * place.poisson) * contact.radius / room if sticks else 0.0
         return (of_c + beyond * share + pulled) / room + of_h * bent * contact.mean_square
@@ -259,6 +276,7 @@ def model_of(data: bytes) -> Model:
         found["reciprocal"], found["curvature"], float(found["c_ref"]), (reach[0], reach[1]), is_round,
         (ratios[0], ratios[1]), (bool(even_x), bool(even_y)), leans=bool(found["leans"] == 1.0), **tensors,
     )  # fmt: skip
+    table.prepare()
     return Model(
         table, found["origin"], found["axes"], (sides[0], sides[1]), bar=(bar[0], bar[1], bar[2], bar[3]),
         face=Face(found["height"], found["bend"]), **rest,

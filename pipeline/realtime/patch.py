@@ -115,7 +115,7 @@ class Patch:
             raise ModelError("a patch knows flat faces only")
         self._pressed = np.ones(_SIDE**2, dtype=bool)
         # What the contact with a half-space fills of the outline, at depths from shallow to deep.
-        none, self._fills = np.zeros(2), np.ones((_TOLD, 2))
+        none, self._fills = (0.0, 0.0), np.ones((_TOLD, 2))
         place = Place(0.0, 0.0, 0.0, none, none, none, 1.0)
         for number, depth in enumerate(self._told_depths()):
             for _ in range(2):
@@ -150,7 +150,13 @@ class Patch:
             return Touch("damaged", np.full(3, nan))
         if found is None or found.radius > model.largest * room:
             return Touch("large", np.full(3, nan))
-        contact = Contact(found.force, found.aside, found.stiffness, found.radius, found.mean_square)
+        contact = Contact(
+            found.force,
+            (float(found.aside[0]), float(found.aside[1])),
+            found.stiffness,
+            found.radius,
+            found.mean_square,
+        )
         error = found.stiffness * model._uncertain(place, room, contact) + model.bar[3] + _GOOD
         force = modulus * np.array([*found.aside, found.force]) @ model.axes
         if not (np.isfinite(force).all() and np.isfinite(error) and found.force > 0):
@@ -161,13 +167,17 @@ class Patch:
         table = self.model.table
         if len(table.tensors):
             return table.at(x, y, ratio, whole=True)
-        place, hessian = table.at(x, y, ratio), np.zeros((2, 2))
-        lean = place.slope_c if table.leans else np.zeros(2)
-        for axis, step in enumerate(_STEP * np.array(table.reach)):
-            shift = step * np.eye(2)[axis]
-            ends = [table.at(x + sign * shift[0], y + sign * shift[1], ratio).slope_c for sign in (1, -1)]
-            hessian[axis] = table.leans * (ends[0] - ends[1]) / (2 * step)
-        return replace(place, shape=Shape(np.zeros(2), np.zeros((2, 2)), lean, hessian, np.zeros((3, 3))))
+        place, none = table.at(x, y, ratio), (0.0, 0.0)
+        slopes = [
+            [table.at(x + sign * step_x, y + sign * step_y, ratio).slope_c for sign in (1, -1)]
+            for step_x, step_y in ((_STEP * table.reach[0], 0.0), (0.0, _STEP * table.reach[1]))
+        ]
+        (xx, xy), (yx, yy) = (
+            ((ahead[0] - behind[0]) / (2 * _STEP * size), (ahead[1] - behind[1]) / (2 * _STEP * size))
+            for (ahead, behind), size in zip(slopes, table.reach, strict=True)
+        )
+        lean, hessian = (place.slope_c, ((xx, xy), (yx, yy))) if table.leans else (none, (none, none))
+        return replace(place, shape=Shape(none, (none, none), lean, hessian, ((0.0, 0.0, 0.0),) * 3))
 
     def _told_depths(self) -> Array:
         return self.tip.deepest * np.geomspace(_SHALLOWEST, 0.9, _TOLD)
@@ -240,10 +250,9 @@ class _Pressed:
     def of(place: Place, places: Array, own: Array, loads: Array, stiffness: float) -> "_Pressed":
         force, moment, on = float(loads.sum()), places @ loads, loads > 0
         square, apart, twist = (float(loads @ of) for of in _squares(places))
-        of_place = force * place.slope_c + square / 2 * place.slope_h
+        of_place = force * np.array(place.slope_c) + square / 2 * np.array(place.slope_h)
         if place.shape is not None:
-            slopes = place.shape.bent_slopes
-            of_place = of_place + place.shape.hessian @ moment + apart * slopes[0] + twist * slopes[1]
+            of_place = of_place + place.shape.hessian @ moment + np.array([apart, twist]) @ place.shape.bent_slopes
         aside = 0.5 * force * of_place
         extent = np.abs(own[:, on]).max(axis=1)
         return _Pressed(force, aside, stiffness, float(np.hypot(*own[:, on]).max()), square / force, extent)

@@ -14,16 +14,20 @@ R the regular part of the Green's function at the place itself, A the second der
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.realtime.contact import Place, Shape
+from pipeline.realtime.contact import Pair, Place, Shape, Square
 
 Array = NDArray[np.float64]
 # A value, its slope, and its second derivatives xx, xy, yy.
-_Local = tuple[float, Array, tuple[float, float, float]]
+Local = tuple[float, Pair, tuple[float, float, float]]
 TENSORS = 7
+# Derivatives along v and u, of which value and slope are made, and of the first of some tables how that bends.
+_SLOPES, _BENDS = ((0, 0), (0, 1), (1, 0)), ((0, 2), (1, 1), (2, 0))
+_NONE: Pair = (0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +53,12 @@ class Table:
             return bool(x**2 + y**2 <= self.reach[0] ** 2)
         return abs(x) <= self.reach[0] and abs(y) <= self.reach[1]
 
+    def prepare(self) -> None:
+        """Make what all queries share: some milliseconds, which the first one would wait for."""
+        _ = self._round
+        if len(self.tensors):
+            _ = self._all
+
     def at(self, x: float, y: float, poisson: float, *, whole: bool = False) -> Place:
         """Return what is known of a place (m) in the region, for a Poisson's ratio in the range.
 
@@ -59,85 +69,120 @@ class Table:
         """
         low, high = self.poisson
         middle = 0.0 if high == low else (2 * poisson - low - high) / (high - low)
-        of_poisson = polynomials(middle, len(self.reciprocal))[0]
-        tables = np.stack([self.reciprocal, self.curvature])
-        if whole:
-            tables = np.concatenate([tables, self.tensors])
-        flat = of_poisson @ tables.reshape(len(tables), len(of_poisson), -1)
-        (t, slope_t, of_t), (q, slope_q, _), *others = self.local(flat.reshape(-1, *tables.shape[2:]), x, y)
+        (t, slope_t, of_t), (q, slope_q, _), *others = self.local(self._all if whole else self._round, x, y, middle)
         if not t > 0:
             raise ArithmeticError("no compliance is below -c_ref")
-        slope_c = -slope_t / t**2
-        bend = [
-            2 * a * b / t**3 - second / t**2
-            for (a, b), second in zip(
-                ((slope_t[0], slope_t[0]), (slope_t[0], slope_t[1]), (slope_t[1], slope_t[1])), of_t, strict=True
-            )
-        ]
-        hessian = np.array([[bend[0], bend[1]], [bend[1], bend[2]]])
-        tilt, slope_tilt = 0.25 * float(slope_c @ slope_c), 0.5 * hessian @ slope_c
-        slope_h = slope_q / t**3 - 3 * q * slope_t / t**4
-        if not self.leans:
-            tilt, slope_tilt, hessian = 0.0, np.zeros(2), np.zeros((2, 2))
-        shape = None
-        if whole:
-            bent, bent_slopes, regular = self._shape(others, x, y, t, slope_t)
-            lean = slope_c if self.leans else np.zeros(2)
-            shape = Shape(bent, bent_slopes, lean, hessian, regular)
         c, stiff = 1 / t - self.c_ref, 1 / (1 - poisson**2)
-        return Place(c, q / t**3, tilt, slope_c, slope_h, slope_tilt, stiff, shape=shape, poisson=poisson)
+        (tx, ty), (xx, xy, yy), cube = slope_t, of_t, t**3
+        slope_c = -tx / t**2, -ty / t**2
+        slope_h = slope_q[0] / cube - 3 * q * tx / t**4, slope_q[1] / cube - 3 * q * ty / t**4
+        tilt, slope_tilt, lean, hessian = 0.0, _NONE, _NONE, (_NONE, _NONE)
+        if self.leans:
+            bend = 2 * tx * ty / cube - xy / t**2
+            hessian = (2 * tx * tx / cube - xx / t**2, bend), (bend, 2 * ty * ty / cube - yy / t**2)
+            (first, second), lean = slope_c, slope_c
+            tilt = 0.25 * (first**2 + second**2)
+            slope_tilt = (
+                0.5 * (hessian[0][0] * first + hessian[0][1] * second),
+                0.5 * (hessian[1][0] * first + hessian[1][1] * second),
+            )
+        shape = self._shape(others, (x, y), t, slope_t, lean, hessian) if whole else None
+        return Place(c, q / cube, tilt, slope_c, slope_h, slope_tilt, stiff, shape=shape, poisson=poisson)
 
-    def local(self, tables: Array, x: float, y: float) -> list[_Local]:
-        """Return of each of ``tables`` (n, v, u) what it is at a place (m)."""
+    @cached_property
+    def _round(self) -> Array:
+        return derived(np.stack([self.reciprocal, self.curvature]))
+
+    @cached_property
+    def _all(self) -> Array:
+        return derived(np.concatenate([[self.reciprocal], [self.curvature], self.tensors]))
+
+    def local(self, tables: Array, x: float, y: float, middle: float = 0.0) -> list[Local]:
+        """Return of each of ``tables``, as ``derived`` gives them, what it is at a place (m); ν is from -1 to 1.
+
+        Second derivatives are those of the first table, and 0 of the others.
+        """
         a, b = self.reach
         if self.is_round:
             u, v = 2 * (x**2 + y**2) / a**2 - 1, 0.0
         else:
             u = 2 * (x / a) ** 2 - 1 if self.even[0] else x / a
             v = 2 * (y / b) ** 2 - 1 if self.even[1] else y / b
-        left, right = polynomials(v, tables.shape[1]), polynomials(u, tables.shape[2])
-        return [self._along(found, x, y) for found in left @ tables @ right.T]
+        *_, layers, rows, columns = tables.shape
+        down = [of_nu * of_v for of_nu in chebyshev(middle, layers) for of_v in chebyshev(v, rows)]
+        terms = np.multiply.outer(down, chebyshev(u, columns))
+        found = (tables.reshape(-1, terms.size) @ terms.ravel()).tolist()
+        own = [self._along(found[i : i + 3], [0.0, 0.0, 0.0], x, y) for i in range(6, len(found), 3)]
+        return [self._along(found[3:6], found[:3], x, y), *own]
 
-    def _along(self, found: Array, x: float, y: float) -> _Local:
-        """Return a value, its slope, and its second derivatives xx, xy, yy, from those in v (rows) and u."""
-        (f, fu, fuu), (fv, fuv), fvv = found[0].tolist(), found[1, :2].tolist(), float(found[2, 0])
+    def _along(self, slopes: list[float], bends: list[float], x: float, y: float) -> Local:
+        """Return a value, its slope, and its second derivatives xx, xy, yy, from those along u and v."""
+        (f, fu, fv), (fuu, fuv, fvv) = slopes, bends
         a, b = self.reach
         bend = 4 / a**2
         if self.is_round:
             ux, uy = bend * x, bend * y
-            slope = np.array([fu * ux, fu * uy])
-            return f, slope, (fuu * ux**2 + fu * bend, fuu * ux * uy, fuu * uy**2 + fu * bend)
+            return f, (fu * ux, fu * uy), (fuu * ux**2 + fu * bend, fuu * ux * uy, fuu * uy**2 + fu * bend)
         (ux, uxx) = (bend * x, bend) if self.even[0] else (1 / a, 0.0)
         (vy, vyy) = (4 / b**2 * y, 4 / b**2) if self.even[1] else (1 / b, 0.0)
-        slope = np.array([fu * ux, fv * vy])
-        return f, slope, (fuu * ux**2 + fu * uxx, fuv * ux * vy, fvv * vy**2 + fv * vyy)
+        return f, (fu * ux, fv * vy), (fuu * ux**2 + fu * uxx, fuv * ux * vy, fvv * vy**2 + fv * vyy)
 
-    def _shape(self, others: list[_Local], x: float, y: float, t: float, slope_t: Array) -> tuple[Array, Array, Array]:
-        """Return A₁ and A_xy, their slopes, and R."""
-        (a, b), values, slopes = self.reach, [], []
-        known = factors((x / a, y / b), self.reach, self.even, self.is_round)
-        for (f, slope, _), (factor, own) in zip(others, known, strict=True):
-            values.append(factor * f)
-            slopes.append(factor * slope + f * own)
-        bent, bent_slopes = np.array(values[:2]) / t**3, np.array(slopes[:2]) / t**3
-        bent_slopes -= 3 * bent[:, None] * slope_t / t
-        xz, yz, mean, half, xy = np.array(values[2:]) / t
-        regular = np.array([[mean + half, xy, xz], [xy, mean - half, yz], [xz, yz, 1 / t - self.c_ref]])
-        return bent, bent_slopes, regular
+    def _shape(self, others: list[Local], at: Pair, t: float, slope_t: Pair, lean: Pair, hessian: Square) -> Shape:
+        """Return what tools take that are not round, from the tables but the first two."""
+        (a, b), cube = self.reach, t**3
+        known = factors((at[0] / a, at[1] / b), self.reach, self.even, self.is_round)
+        apart, twist, xz, yz, mean, half, xy = (
+            factor * f for (f, _, _), (factor, _) in zip(others, known, strict=True)
+        )
+        bent = apart / cube, twist / cube
+        apart_x, apart_y, twist_x, twist_y = (
+            (factor * slope[axis] + f * own[axis]) / cube - 3 * value * slope_t[axis] / t
+            for value, (f, slope, _), (factor, own) in zip(bent, others[:2], known[:2], strict=True)
+            for axis in (0, 1)
+        )
+        regular = (
+            ((mean + half) / t, xy / t, xz / t),
+            (xy / t, (mean - half) / t, yz / t),
+            (xz / t, yz / t, 1 / t - self.c_ref),
+        )
+        return Shape(bent, ((apart_x, apart_y), (twist_x, twist_y)), lean, hessian, regular)
+
+
+def derived(tables: Array) -> Array:
+    """Return the coefficients of derivatives of ``tables`` (n, ν, v, u) along v and u (3 + 3 n, ν, v, u).
+
+    First stand uu, uv and vv of the first table, then of each table itself, along u and along v.
+    """
+    orders = [(tables[0], order) for order in _BENDS] + [(table, order) for table in tables for order in _SLOPES]
+    found = np.zeros((len(orders), *tables.shape[1:]))
+    for row, (table, (of_v, of_u)) in zip(found, orders, strict=True):
+        part = np.polynomial.chebyshev.chebder(table, of_v, axis=-2)
+        part = np.polynomial.chebyshev.chebder(part, of_u, axis=-1)
+        row[:, : part.shape[-2], : part.shape[-1]] = part
+    return found
 
 
 def factors(
     at: tuple[float, float], reach: tuple[float, float], even: tuple[bool, bool], is_round: bool
-) -> list[tuple[float, Array]]:
+) -> list[tuple[float, Pair]]:
     """Return what each of the seven tables is times, with its slope (1/m), at ξ and η."""
     (xi, of_x), (eta, of_y) = (
         (share, 1 / size) if is_even else (1.0, 0.0) for share, size, is_even in zip(at, reach, even, strict=True)
     )
-    one, none = 1.0, np.zeros(2)
-    twist = (2 * xi * eta, np.array([2 * eta * of_x, 2 * xi * of_y]))
-    along, across = (xi, np.array([of_x, 0.0])), (eta, np.array([0.0, of_y]))
-    apart = (xi**2 - eta**2, np.array([2 * xi * of_x, -2 * eta * of_y])) if is_round else (one, none)
-    return [apart, twist, along, across, (one, none), apart, twist]
+    one = 1.0, _NONE
+    twist = 2 * xi * eta, (2 * eta * of_x, 2 * xi * of_y)
+    apart = (xi**2 - eta**2, (2 * xi * of_x, -2 * eta * of_y)) if is_round else one
+    return [apart, twist, (xi, (of_x, 0.0)), (eta, (0.0, of_y)), one, apart, twist]
+
+
+def chebyshev(at: float, count: int) -> list[float]:
+    """Return T_n for n below ``count``."""
+    before, value, twice = at, 1.0, 2 * at
+    found = []
+    for _ in range(count):
+        found.append(value)
+        before, value = value, twice * value - before
+    return found
 
 
 def polynomials(at: float, count: int) -> Array:

@@ -14,6 +14,7 @@ class Surface {
     this.regular = new Float64Array(3 * SEEN.MOST);
     this.moved = new Float64Array(3 * SEEN.MOST);
     for (let a = 0; a < this.n; a++) for (let i = 0; i < 3; i++) this.rest[3 * a + i] = points[i * this.n + a];
+    this.shown = new Int32Array(3 * (this.m + 2 * SEEN.MOST)); // each new vertex makes two triangles more at most
     this.spans = Float64Array.from({ length: this.m }, (_, t) => this.spanOf(t));
   }
   // The longest edge of a triangle.
@@ -44,14 +45,24 @@ class Surface {
     }
     return found;
   }
-  far(x, y, poisson, spread) {
+  far(px, py, poisson, spread) {
     const { modes, regular, n } = this;
-    const amounts = this.amountsAt(x, y, poisson, spread);
+    const amounts = this.amountsAt(px, py, poisson, spread);
     const rank = amounts.length;
-    for (let row = 0, at = 0; row < 3 * n; row++) {
-      let sum = 0;
-      for (let k = 0; k < rank; k++) sum += modes[at++] * amounts[k];
-      regular[row] = sum;
+    // Three sums at a time: one alone would wait for itself at each step.
+    for (let row = 0, at = 0; row < 3 * n; row += 3, at += 3 * rank) {
+      let x = 0;
+      let y = 0;
+      let z = 0;
+      for (let k = 0; k < rank; k++) {
+        const amount = amounts[k];
+        x += modes[at + k] * amount;
+        y += modes[at + rank + k] * amount;
+        z += modes[at + 2 * rank + k] * amount;
+      }
+      regular[row] = x;
+      regular[row + 1] = y;
+      regular[row + 2] = z;
     }
   }
   // Put into `moved` the displacement of all vertices, local; return the triangles (flat) that show it.
@@ -110,20 +121,26 @@ class Surface {
       return found;
     };
     let now = [];
-    const done = [];
+    const { triangles, spans, shown: done } = this;
+    let size = 0;
     for (let t = 0; t < m; t++) {
-      const [p, q, r] = [this.triangles[t], this.triangles[m + t], this.triangles[2 * m + t]];
+      const p = triangles[t];
+      const [dx, dy, dz] = [rest[3 * p] - x, rest[3 * p + 1] - y, rest[3 * p + 2] - z];
       // No edge of a triangle so far away is halved.
-      const away = Math.hypot(rest[3 * p] - x, rest[3 * p + 1] - y, rest[3 * p + 2] - z) - foot.reach - this.spans[t];
-      (this.spans[t] > 0.5 * away ? now : done).push(p, q, r);
+      const near = 3 * spans[t] + foot.reach;
+      if (dx * dx + dy * dy + dz * dz < near * near) now.push(p, triangles[m + t], triangles[2 * m + t]);
+      else for (let j = 0; j < 3; j++) done[size++] = triangles[j * m + t];
     }
+    const keep = (corners) => {
+      for (const at of corners) done[size++] = at;
+    };
     for (let level = 0; level < SEEN.LEVELS && now.length; level++) {
       const next = [];
       for (let t = 0; t < now.length; t += 3) {
         const c = [now[t], now[t + 1], now[t + 2]];
         const e = [middle(c[1], c[2]), middle(c[2], c[0]), middle(c[0], c[1])];
         const split = e.filter((at) => at >= 0).length;
-        if (split === 0) done.push(...c);
+        if (split === 0) keep(c);
         else if (split === 3) next.push(c[0], e[2], e[1], e[2], c[1], e[0], e[1], e[0], c[2], e[0], e[1], e[2]);
         else {
           // Turn it so that what is halved, or what is not, lies opposite to the first corner.
@@ -136,6 +153,7 @@ class Surface {
       }
       now = next;
     }
-    return { triangles: done.concat(now), count };
+    keep(now);
+    return { triangles: done.subarray(0, size), count };
   }
 }
