@@ -1,11 +1,12 @@
 """How near real-time models come to full solves, and how long an answer takes, at a thousand a second.
 
-    python -m benchmarks.realtime [--touches 200] [--models box,cylinder,...] [--minutes 60] [--seconds 60]
+    python -m benchmarks.realtime [--touches 200] [--round 10] [--models box,...] [--minutes 60] [--seconds 60]
 
 A model that is missing is exported first. Its touches are random, of other seeds than what its bar was fitted to; those
 that were solved before are kept in results/realtime/, and a run goes on where the last one ended, model after model, a
 group of touches each in turn. --minutes of processor time later it solves no more, and the tables are of what there is;
 --seconds 0 leaves latency out. All touches of all models take some hours.
+Balls and cones are judged by full solves that find the contact, whose own bars are longer than the model's.
 Beside each model stand what a half-space gives, and the model at the nearest place that its table was made from.
 """
 
@@ -20,7 +21,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from benchmarks.touches import add_groups, groups_of
+from benchmarks.touches import NAMES, add_groups, flat_kinds, groups_of
 from pipeline.arrays import FloatArray
 from pipeline.export.checks import TOOLS, Check, with_bar
 from pipeline.export.export import export, write
@@ -32,12 +33,14 @@ from pipeline.realtime.model import Model
 from pipeline.study.load import load as load_study
 
 _FOLDER = Path("results/realtime")
-# Of models; of the full solves that they are judged by; how many their bars are fitted to, and judged on as well.
-_ACCURACY, _PRECISE, _CHECKS = 0.01, 0.0025, 12
+# Of models; of the full solves that they are judged by, flat tools and others; how many their bars are fitted to, and
+# judged on as well.
+_ACCURACY, _PRECISE, _PRECISE_ROUND, _CHECKS = 0.01, 0.0025, 0.006, 12
 _FLAT = (
     '\n[probe]\nshape = "disc"\ncontact = "frictionless"\nradius = "4 mm"\ndepth = "0.1 mm"\n[mesh]\naccuracy = "1 %"\n'
 )
 _SOFT = '[material]\nyoung = "10 kPa"\npoisson = 0.45\n'
+_RANGE = _SOFT.replace("0.45", "[0.3, 0.45]")
 _TUMOUR = """[[body.inclusion]]
 name = "tumour"
 at = ["0 mm", "0 mm", "-12 mm"]
@@ -45,13 +48,38 @@ radius = "5 mm"
 young = "40 kPa"
 poisson = 0.45
 """
+# Off the middle, no ball, less stiff: none that anything was developed on.
+_NODULE = """[[body.inclusion]]
+name = "nodule"
+at = ["6 mm", "-4 mm", "-12 mm"]
+axes = ["7 mm", "5 mm", "4 mm"]
+young = "35 kPa"
+poisson = 0.4
+"""
+_LAYERS = """[[body.layers]]
+name = "skin"
+thickness = "7 mm"
+young = "30 kPa"
+poisson = 0.4
+[[body.layers]]
+name = "fat"
+thickness = "9 mm"
+young = "5 kPa"
+poisson = 0.45
+[[body.layers]]
+name = "muscle"
+young = "20 kPa"
+poisson = 0.45
+"""
 STUDIES = MappingProxyType({
     "box": '[body]\nshape = "box"\nsize = ["80 mm", "80 mm", "40 mm"]\n' + _SOFT + _FLAT,
     "cylinder": '[body]\nshape = "cylinder"\nradius = "30 mm"\nheight = "25 mm"\n' + _SOFT + _FLAT,
     "tumour": '[body]\nshape = "box"\nsize = ["60 mm", "60 mm", "30 mm"]\n' + _TUMOUR
-    + _SOFT.replace("10 kPa", "8 kPa") + _FLAT,
+    + _RANGE.replace("10 kPa", "8 kPa") + _FLAT,
+    "nodule": '[body]\nshape = "box"\nsize = ["70 mm", "50 mm", "35 mm"]\n' + _NODULE + _SOFT + _FLAT,
+    "layers": '[body]\nshape = "box"\nsize = ["60 mm", "60 mm", "30 mm"]\n' + _LAYERS + _SOFT + _FLAT,
     "ellipsoid": '[body]\nshape = "ellipsoid"\naxes = ["40 mm", "40 mm", "25 mm"]\nfixed = {below = "-6 mm"}\n'
-    + _SOFT + _FLAT,
+    + _RANGE + _FLAT,
     "liver": '[body]\nshape = "surface"\nfile = "../../meshes/liver.stl"\nunit = "mm"\nfixed = {below = "-20 mm"}\n'
     + _SOFT + _FLAT.replace('depth =', 'at = ["-25 mm", "0 mm"]\ndepth ='),
 })  # fmt: skip
@@ -60,31 +88,40 @@ STUDIES = MappingProxyType({
 def main() -> None:
     """Solve, and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--touches", type=int, default=200, help="a model")
+    parser.add_argument("--touches", type=int, default=200, help="of flat tools, a model")
+    parser.add_argument("--round", type=int, default=10, help="touches of balls and cones, a model")
     parser.add_argument("--models", default=",".join(STUDIES), help="some of them, by name")
     parser.add_argument("--minutes", type=float, default=inf, help="of processor time for full solves")
     parser.add_argument("--seconds", type=float, default=60.0, help="of a loop at 1 kHz")
     asked = parser.parse_args()
     _FOLDER.mkdir(parents=True, exist_ok=True)
     names, end = asked.models.split(","), time.process_time() + 60 * asked.minutes
-    rounds = {name: add_groups(_records(name), *_model(name), asked.touches) for name in names}
+    rounds = {name: _touches(name, asked.touches, asked.round) for name in names}
     while rounds and time.process_time() < end:
         for name in list(rounds):
             if next(rounds[name], None) is None:
                 del rounds[name]
-    print("| model | tool | touches | places | median error | largest | held | bar/error | truth's bar | ", end="")
-    print("half-space | nearest point |")
-    print("|" + 11 * "---|")
+    print("| model | tool | touches | places | median error | largest | held | with truth's bar | bar/error | ", end="")
+    print("truth's bar | half-space | nearest point |")
+    print("|" + 12 * "---|")
     for name in names:
-        for line in _lines(name, load(_FOLDER / f"{name}.epsm.nc"), groups_of(_records(name))):
+        for line in _lines(name, load(_FOLDER / f"{name}.epsm.nc")):
             print(line, flush=True)
     if asked.seconds > 0:
         print()
         print(_latency(_FOLDER / f"{names[0]}.epsm.nc", asked.seconds))
 
 
-def _records(name: str) -> Path:
-    return _FOLDER / f"{name}.touches.jsonl"
+def _records(name: str, tools: str = "touches") -> Path:
+    return _FOLDER / f"{name}.{tools}.jsonl"
+
+
+def _touches(name: str, flat: int, others: int) -> Iterator[list[Check]]:
+    """Yield groups of touches of a model as they are solved, those of tools that are not flat first."""
+    model, solver = _model(name)
+    coarser = replace(solver, accuracy=_PRECISE_ROUND)
+    yield from add_groups(_records(name, "round"), model, coarser, others, range(len(TOOLS), len(NAMES)))
+    yield from add_groups(_records(name), model, solver, flat, flat_kinds(model))
 
 
 def _model(name: str) -> tuple[Model, Solver]:
@@ -97,14 +134,21 @@ def _model(name: str) -> tuple[Model, Solver]:
     return load(path), Solver(scope.sections, scope.file, scope.young, _PRECISE)
 
 
-def _lines(name: str, model: Model, groups: Mapping[int, Sequence[Check]]) -> Iterator[str]:
-    """Yield a line for each tool, and one for all of them."""
-    judged = [[with_bar(model, check) for check in group if _is_answered(model, check)] for group in groups.values()]
-    judged = [group for group in judged if group]
-    for tool in (*TOOLS, "all"):
-        of = [group for group in judged if tool in ("all", TOOLS[group[0].kind])]
+def _lines(name: str, model: Model) -> Iterator[str]:
+    """Yield a line for each tool, and one for all that are flat."""
+    flat, others = (_judged(model, groups_of(_records(name, tools))) for tools in ("touches", "round"))
+    for tool, groups in [
+        *((tool, flat) for tool in (*TOOLS, "all")),
+        *((tool, others) for tool in NAMES[len(TOOLS) :]),
+    ]:
+        of = [group for group in groups if tool in ("all", NAMES[group[0].kind])]
         if of:
             yield "| " + " | ".join([name, tool, *_cells(model, of)]) + " |"
+
+
+def _judged(model: Model, groups: Mapping[int, Sequence[Check]]) -> list[list[Check]]:
+    judged = [[with_bar(model, check) for check in group if _is_answered(model, check)] for group in groups.values()]
+    return [group for group in judged if group]
 
 
 def _is_answered(model: Model, check: Check) -> bool:
@@ -121,7 +165,8 @@ def _cells(model: Model, groups: Sequence[Sequence[Check]]) -> list[str]:
     )
     return [
         str(len(of)), str(len(groups)), _percent(np.median(errors)), _percent(errors.max()),
-        f"{sum(check.is_held for check in of)}", f"{np.median(bars / np.maximum(errors, 1e-6)):.2g}",
+        f"{sum(check.is_held for check in of)}", f"{np.sum(errors <= bars + [check.full_error for check in of])}",
+        f"{np.median(bars / np.maximum(errors, 1e-6)):.2g}",
         _percent(float(np.median([check.full_error for check in of]))),
         f"{_percent(np.median(plain))}, {_percent(plain.max())}",
         f"{_percent(np.median(nearest))}, {_percent(nearest.max())}",

@@ -1,22 +1,28 @@
 """Held-out touches of a real-time model by full solves of the program: groups on one mesh each, kept on file.
 
-A group is one place and one tool, a disc, a blade or a bonded disc, at four of the Poisson's ratios that the model
-takes, or at the one. Depths, and moduli, are no touches of their own: force is proportional to both.
+A group is one place and one flat tool, a disc, a blade or a bonded disc, at four of the Poisson's ratios that the model
+takes, or at the one. Depths, and moduli, are no touches of their own: force is proportional to both. Balls and cones,
+whose contact is found, are groups of one touch each, on a file of their own.
 """
 
 import json
-from collections.abc import Iterator
-from dataclasses import asdict
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, replace
+from math import atanh, hypot, nan, pi, radians, tan
 from pathlib import Path
 
 import numpy as np
 
-from pipeline.export.checks import TOOLS, Check, random_touch, solved
+from pipeline.export.checks import TOOLS, Check, random_place, random_touch, solved, with_bar
 from pipeline.export.full import Solver, Tool
 from pipeline.realtime.model import Model
 
 # Seeds of groups; Poisson's ratios of one, each from a quarter of the range.
 _SEED, _RATIOS = 5000, 4
+# All tools by their number, the last two not flat: contact radii in units of the largest that the model takes, radii of
+# balls in units of that of contact, half angles of cones (degrees), and where their shafts begin.
+NAMES = (*TOOLS, "ball", "cone")
+_CONTACTS, _BALLS, _ANGLES, _SHAFT = (0.2, 0.8), (2.0, 7.0), (55.0, 80.0), 1.6
 
 
 def groups_of(path: Path) -> dict[int, list[Check]]:
@@ -31,12 +37,12 @@ def groups_of(path: Path) -> dict[int, list[Check]]:
     return found
 
 
-def add_groups(path: Path, model: Model, solver: Solver, count: int) -> Iterator[list[Check]]:
-    """Yield group after group until so many touches are on file, each written when it is solved."""
+def add_groups(path: Path, model: Model, solver: Solver, count: int, kinds: Sequence[int]) -> Iterator[list[Check]]:
+    """Yield groups of tools of these ``kinds`` in turn until so many touches are on file, each written when solved."""
     known = groups_of(path)
     held, number = sum(map(len, known.values())), max(known, default=-1) + 1
     while held < count:
-        found = _solve(model, solver, number)
+        found = _solve(model, solver, number, kinds[number % len(kinds)])
         lines = [json.dumps(asdict(check) | {"group": number}) + "\n" for check in found]
         with path.open("a", encoding="utf-8") as file:
             file.write("".join(lines))
@@ -44,10 +50,38 @@ def add_groups(path: Path, model: Model, solver: Solver, count: int) -> Iterator
         yield found
 
 
-def _solve(model: Model, solver: Solver, number: int) -> list[Check]:
+def flat_kinds(model: Model) -> range:
+    """Return the numbers of the flat tools that a model answers for."""
+    return range(len(TOOLS) if len(model.table.tensors) else 1)
+
+
+def _solve(model: Model, solver: Solver, number: int, kind: int) -> list[Check]:
     rng = np.random.default_rng(_SEED + number)
-    kind = number % len(TOOLS) if len(model.table.tensors) else 0
     low, high = model.table.poisson
+    if kind >= len(TOOLS):
+        asked = _turned(model, _random_round(model, rng, kind))
+        return solved(model, solver, asked, [asked.poisson] if low < high else None)
     shares = (np.arange(_RATIOS) + rng.uniform(size=_RATIOS)) / _RATIOS
     ratios = (low + (high - low) * shares).tolist() if low < high else None
-    return solved(model, solver, random_touch(model, rng, kind), ratios)
+    return solved(model, solver, _turned(model, random_touch(model, rng, kind)), ratios)
+
+
+def _random_round(model: Model, rng: np.random.Generator, kind: int) -> Check:
+    """Return a touch of a ball or a cone, not solved yet, pressed so deep that a half-space would touch ``radius``."""
+    x, y = random_place(model, rng)
+    a = model.largest * model.room(x, y) * float(np.exp(rng.uniform(*np.log(_CONTACTS))))
+    poisson = float(rng.uniform(*model.table.poisson))
+    if NAMES[kind] == "ball":
+        share = 1 / float(rng.uniform(*_BALLS))
+        depth, tool = a * atanh(share), Tool("sphere", a / share, contact="unilateral")
+    else:
+        angle = radians(rng.uniform(*_ANGLES))
+        depth, tool = pi / 2 * a / tan(angle), Tool("cone", _SHAFT * a, angle, contact="unilateral")
+    return with_bar(model, Check(x, y, a, depth, poisson, nan, nan, nan, nan, kind, tool))
+
+
+def _turned(model: Model, asked: Check) -> Check:
+    """Return a touch of a round tool on a round body where the program solves half of it: above the x axis."""
+    if not model.table.is_round or asked.tool.name == "blade":
+        return asked
+    return replace(asked, x=hypot(asked.x, asked.y), y=0.0)

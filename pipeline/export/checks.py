@@ -15,6 +15,8 @@ from pipeline.stages import stage
 _SIZES, _DEPTH = (0.1, 0.99), 0.02
 # The bar is so much longer than the longest that the fit needs.
 _SAFETY = 1.3
+# Of their own bars, full solves tell F to this share at best.
+_LEAST = 0.25
 # Blades are so much longer than wide.
 _SLENDER = (1.0, 12.0)
 TOOLS = ("disc", "blade", "bonded")
@@ -138,6 +140,15 @@ def random_place(model: Model, rng: np.random.Generator) -> tuple[float, float]:
 def needed(checks: Sequence[Check], floor: float) -> float:
     """Return by how much bars must grow, ``floor`` apart, to hold errors with a safety, at least 1."""
     return max(1.0, _SAFETY * max((abs(check.error) - floor) / (check.bar - floor) for check in checks))
+
+
+def told(checks: Sequence[Check], bar: float) -> float:
+    """Return what full solves tell F to, relative: their own ``bar``, which counts in those of the checks, or less.
+
+    Beside a curved surface own bars are some times the error; what the checks show of it, with a safety, is enough.
+    """
+    seen = max(abs(check.error) - (check.bar - bar) for check in checks)
+    return min(bar, max(_LEAST * bar, _SAFETY * seen))
 
 
 def columns(fitted: Sequence[Check], judged: Sequence[Check]) -> dict[str, tuple[str, FloatArray]]:

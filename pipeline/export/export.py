@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.export.checks import TOOLS, Check, check_touches, columns, needed, with_bar
+from pipeline.export.checks import TOOLS, Check, check_touches, columns, needed, told, with_bar
 from pipeline.export.compliance import coarse_mesh, compliances
 from pipeline.export.curved import curved_model
 from pipeline.export.file import write_model
@@ -25,9 +25,9 @@ from pipeline.solve.material import MaterialLaw
 # units of the way to the nearest side or the bottom.
 MARGIN, LARGEST = 0.15, 0.4
 # The table may miss c by this share of what the asked accuracy leaves for the largest disc; full solves are as much
-# more precise. Bars before they are fitted: of c, of h's part, and of the fourth power of what a contact measures;
-# besides, no bar is shorter than what full solves tell.
-_SHARE, _PRECISE, _PRECISE_CURVED, _BARS = 0.4, 0.25, 0.5, (1e-3, 0.03, 0.1)
+# more precise, those of two discs that make a curved body's table less. Bars before they are fitted: of c, of h's part,
+# and of the fourth power of what a contact measures; besides, no bar is shorter than what full solves tell.
+_SHARE, _PRECISE, _PRECISE_CURVED, _PRECISE_TABLE, _BARS = 0.4, 0.25, 0.5, 1.0, (1e-3, 0.03, 0.1)
 _SEEDS = (1, 2)
 # How far off a flat face a query may be, in units of the thickness.
 _OFF = 1e-6
@@ -78,16 +78,19 @@ def export(
     precise = _PRECISE * accuracy if scope.is_flat else _PRECISE_CURVED * accuracy
     solver = Solver(scope.sections, scope.file, scope.young, precise)
     make = _flat if scope.is_flat else curved_model
-    bare, missed, places = make(scope, solver, accuracy, largest, (*_BARS, precise), margin)
+    of_table = replace(solver, accuracy=_PRECISE_TABLE * accuracy)
+    bare, missed, places = make(scope, of_table, accuracy, largest, (*_BARS, precise), margin)
     tools = range(len(TOOLS)) if len(bare.table.tensors) else (0,)
     halves = [checks - checks // 2, checks // 2]
     fitted, judged = (
         check_touches(bare, solver, count, seed, tools) for count, seed in zip(halves, _SEEDS, strict=True)
     )
     # What is beyond the bar of a bonded tool alone is no matter of the others.
-    factor = needed([check for check in fitted if TOOLS[check.kind] != "bonded"], precise)
+    plain = [check for check in fitted if TOOLS[check.kind] != "bonded"]
+    floor = precise if scope.is_flat else told(plain, bare.bar[3])
+    factor = needed([with_bar(replace(bare, bar=(*_BARS, floor)), check) for check in plain], floor)
     first, second, third = _BARS
-    model = replace(bare, bar=(factor * first, factor * second, factor * third, precise))
+    model = replace(bare, bar=(factor * first, factor * second, factor * third, floor))
     fitted, judged = ([with_bar(model, check) for check in half] for half in (fitted, judged))
     seen, unseen = None, ""
     if surface:

@@ -18,6 +18,7 @@ _SIZES, _POISSONS = (4, 8, 16), 3
 # c_ref in units of 1/thickness, above the least c.
 _ABOVE = 1.0
 _DIGITS = 12
+_UNKNOWN = np.full(2, np.nan)
 # Of a place and its image where x and y are exchanged: c, h, A₁, A_xy, R_xz, R_yz, mean and half difference, R_xy.
 _SWAPPED, _SIGNS = [0, 1, 2, 3, 5, 4, 6, 7, 8], np.array([1, 1, -1, 1, 1, 1, 1, -1, 1])
 # Of the tables beyond c and h, so many are second derivatives; on a round body, along x, some are what others are.
@@ -30,19 +31,23 @@ def tabulate(
     compliances: Compliances,
     tolerance: float,
     sizes: Sequence[int] = _SIZES,
+    *,
+    sparse: bool = False,
 ) -> tuple[Table, float]:
     """Return a table, and by how much the last but one missed c × room at the new nodes of the last.
 
-    It is the first whose forerunner missed less than ``tolerance``, or the largest.
+    It is the first whose forerunner missed less than ``tolerance``, or the largest. If ``sparse``, where a place is
+    dear, each size but the first is tried with few of its nodes before all are solved for: see :func:`_filled`.
     """
     ratios = ratios_of(poissons)
     known: list[dict[tuple[float, float], FloatArray]] = [{} for _ in ratios]
     table, missed = None, np.inf
     used: set[tuple[float, float]] = set()
-    for number, size in enumerate(sizes):
-        places = _places(region, size)
+    grids = [(size, few) for n, size in enumerate(sizes) for few in ((True, False) if sparse and n else (False,))]
+    for number, (size, few) in enumerate(grids):
+        places = _places(region, size, few=few)
         # The first table is never the last: what the second one takes is solved for together with it.
-        wanted = _places(region, sizes[1]) if number == 0 and len(sizes) > 1 else places
+        wanted = _places(region, grids[1][0], few=grids[1][1]) if number == 0 and len(grids) > 1 else places
         unknown = [place for place in dict.fromkeys(_image(region, p) for p in wanted) if place not in known[0]]
         for ratio, found in zip(ratios, known, strict=True):
             if unknown:
@@ -55,7 +60,7 @@ def tabulate(
                 for ratio, found in zip(ratios, known, strict=True)
                 for x, y in new
             )
-        values = np.array([[_turned(region, place, found) for place in places] for found in known])
+        values = np.array([[_turned(region, place, found) for place in _places(region, size)] for found in known])
         table = _table(region, poissons, size, values)
         if missed <= tolerance:
             break
@@ -80,12 +85,11 @@ def _missed(table: Table, place: tuple[float, float], poisson: float, c: float) 
 def _table(region: Region, poissons: tuple[float, float], size: int, values: FloatArray) -> Table:
     """Return the table through ``values`` (ν, places, 2 or 9)."""
     c, h, *others = np.moveaxis(values.reshape(len(values), -1, size + 1, values.shape[-1]), -1, 0)
-    c_ref = max(0.0, -float(c.min())) + _ABOVE / region.thickness
+    c_ref = max(0.0, -float(np.nanmin(c))) + _ABOVE / region.thickness
     t = 1 / (c + c_ref)
     tensors = _tensors(region, size, [f * t ** (3 if n < _BENDS else 1) for n, f in enumerate(others)])
-    table = Table(
-        _coefficients(t), _coefficients(h * t**3), c_ref, region.reach, region.is_round, poissons, region.even
-    )
+    t, q = _filled(t), _filled(h * t**3)
+    table = Table(_coefficients(t), _coefficients(q), c_ref, region.reach, region.is_round, poissons, region.even)
     return replace(table, tensors=tensors) if others else table
 
 
@@ -112,11 +116,33 @@ def _divided(values: FloatArray, factor: FloatArray) -> FloatArray:
     return found
 
 
-def _places(region: Region, size: int) -> Places:
-    """Return the places of the nodes, x fastest."""
+def _filled(values: FloatArray) -> FloatArray:
+    """Return ``values`` (ν, v, u) with what is unknown, NaN, told by the nodes of half as many intervals and a cross.
+
+    These are S. A. Smolyak's (1963): along the middle lines polynomials of the size's degree, their sum elsewhere, and
+    what that misses of both directions together from the nodes of half the degree.
+    """
+    if not np.isnan(values).any():
+        return values
+    size = values.shape[-1] - 1
+    middle = size // 2
+    of_few = np.polynomial.chebyshev.chebvander(_nodes(size), middle) @ _inverse(middle)
+    few = values[:, ::2, ::2]
+    few_u, few_v = few[:, middle // 2] @ of_few.T, few[:, :, middle // 2] @ of_few.T
+    both = of_few @ few @ of_few.T - few_u[:, None, :] - few_v[:, :, None]
+    return np.asarray(values[:, middle, None, :] + values[:, :, middle, None] + both)
+
+
+def _places(region: Region, size: int, *, few: bool = False) -> Places:
+    """Return the places of the nodes, x fastest; of ``few`` those of half as many intervals and the middle lines."""
     x, y = (reach * shares(size, even) for reach, even in zip(region.reach, region.even, strict=True))
     ys = [0.0] if region.is_round else y.tolist()
-    return [(round(a, _DIGITS), round(b, _DIGITS)) for b in ys for a in x.tolist()]
+    return [
+        (round(a, _DIGITS), round(b, _DIGITS))
+        for j, b in enumerate(ys)
+        for i, a in enumerate(x.tolist())
+        if not few or size // 2 in (i, j) or i % 2 == j % 2 == 0
+    ]
 
 
 def _image(region: Region, place: tuple[float, float]) -> tuple[float, float]:
@@ -128,7 +154,7 @@ def _image(region: Region, place: tuple[float, float]) -> tuple[float, float]:
 def _turned(region: Region, place: tuple[float, float], found: Mapping[tuple[float, float], FloatArray]) -> FloatArray:
     """Return what is known of a place, or what its image on a square face tells of it."""
     image = _image(region, place)
-    values = found[image]
+    values = found.get(image, _UNKNOWN)
     if image == place or len(values) < len(_SWAPPED):
         return values
     return values[_SWAPPED] * _SIGNS
@@ -148,6 +174,11 @@ def _coefficients(values: FloatArray, nodes: tuple[int, ...] | None = None) -> F
     """Return the Chebyshev coefficients of values at the first of so many ``nodes`` along each direction, or at all."""
     for axis, (count, of) in enumerate(zip(values.shape, nodes or values.shape, strict=True)):
         if count > 1:
-            matrix = np.polynomial.chebyshev.chebvander(_nodes(of - 1)[:count], count - 1)
-            values = np.moveaxis(np.tensordot(np.linalg.inv(matrix), values, (1, axis)), 0, axis)
+            values = np.moveaxis(np.tensordot(_inverse(of - 1, count), values, (1, axis)), 0, axis)
     return values
+
+
+def _inverse(size: int, count: int | None = None) -> FloatArray:
+    """Return what makes coefficients of values at the first ``count`` nodes, or at all."""
+    count = size + 1 if count is None else count
+    return np.asarray(np.linalg.inv(np.polynomial.chebyshev.chebvander(_nodes(size)[:count], count - 1)))

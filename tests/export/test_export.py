@@ -1,14 +1,14 @@
 """Tables that know a smooth body, studies that no model is made of, and one body by full solves."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.export.checks import Check, needed
+from pipeline.export.checks import Check, needed, told
 from pipeline.export.compliance import coarse_mesh, compliances
 from pipeline.export.curved import curved_model
 from pipeline.export.full import Full, Tool
@@ -199,6 +199,7 @@ class Known:
     """Full solves of discs on a body whose c and h are known."""
 
     young: float
+    accuracy: float = 0.01
 
     def press_all(self, tool: Tool, at: tuple[float, ...], depths: Sequence[float], poissons=None) -> list[Full]:
         ((depth,), nothing) = depths, np.zeros(2)
@@ -220,7 +221,7 @@ def test_a_curved_body_is_what_two_discs_tell(axes):
     model, missed, places = curved_model(scope, solver, 0.01, 0.4, (1e-3, 0.03, 0.1, 1e-3), 0.0)
     a, b, c = (1e-3 * axis for axis in axes)
     assert missed < 5e-3
-    assert places in (3, 5, 9, 25)
+    assert places == (5 if axes[0] == axes[1] else 13)
     for x, y in np.random.default_rng(5).uniform(-0.25, 0.25, (20, 2)) * (a, b):
         found, spot = model.table.at(x, y, 0.45), model.face.at(model.table, x, y)
         assert (found.c, found.h) == pytest.approx(solver.regular(x, y), rel=2e-3)
@@ -270,6 +271,14 @@ def test_other_tissue_bounds_what_is_answered_for():
     assert (region.thickness, region.even) == (pytest.approx(6e-3), (False, True))
     assert scope.poissons == (0.45, 0.45)
     assert scope.tissues[1] == pytest.approx((1.0, 5.0))
+
+
+def test_what_full_solves_tell_is_what_checks_show_with_a_safety():
+    touches = [Check(0, 0, 1e-3, 1e-5, 0.4, 1.0, 1e-3, 1 + error, 0.006) for error in (0.001, -0.002)]
+    # 0.5 % by their own bars, of 0.6 % in all.
+    assert told(touches, 0.005) == pytest.approx(1.3 * (0.002 - 0.001))
+    assert told(touches[:1], 0.005) == 0.25 * 0.005
+    assert told([replace(touches[0], force=1.02)], 0.005) == 0.005
 
 
 def test_bars_grow_until_they_hold_what_they_were_fitted_to():
