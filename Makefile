@@ -87,6 +87,7 @@ benchmark: setup ## every table of docs/performance.md, into results/ (an idle m
 	$(PYTHON) -m benchmarks.solvers
 	$(PYTHON) -m benchmarks.contact
 	$(PYTHON) -m benchmarks.organs
+	$(PYTHON) -m benchmarks.paths
 	$(PYTHON) -m benchmarks.scaling
 	$(EPSMESH) benchmark
 	$(PYTHON) -m benchmarks.reductions

@@ -23,6 +23,7 @@ from pipeline.solve.carried import Carried, carried_of, imbalance, shares
 from pipeline.solve.closure import TWO_SIDED, balanced, energy_beyond, far_share
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.dead_loads import Applied
+from pipeline.solve.earlier import Earlier, SetUp
 from pipeline.solve.enrich import energy_decrements
 from pipeline.solve.error import error_bar, stiffness_bars
 from pipeline.solve.forms import mean_strain_form
@@ -56,6 +57,9 @@ class DisplacementProblem:
         self._shared, self._reuse = shared, reuse
         # By motion, the last solution for a unit of it less the prescribed displacements, owned dofs.
         self.corrections: dict[Motion, FloatArray] = {}
+        # Of a tool and the far fields of its places, that were solved with one law.
+        self._earlier: tuple[MaterialLaw, Earlier] | None = None
+        self._kept: SetUp | None = None
         self._loaded: FloatArray | None = None  # the last solution for dead loads, owned dofs
         self._spaces, self._body, self._conditions = spaces, spaces.body, conditions
         self._fine = spaces.get(degree, conditions)
@@ -66,6 +70,8 @@ class DisplacementProblem:
 
     def __exit__(self, *_: object) -> None:
         self.corrections.clear()
+        self._earlier = None
+        self._let_go()
 
     @property
     def dofs(self) -> int:
@@ -94,6 +100,7 @@ class DisplacementProblem:
         tolerance *= TWO_SIDED if loads.far is not None else 1.0
         held = [fine.dofs.held(motion) for motion in loads.motions]
         applied = fine.applied(loads.dead)
+        earlier = self._solved_with(law) if self._reuse and loads.far is not None and not direct else None
         with ExitStack() as stack:
             start = time.perf_counter()
             columns = [*held, *applied]
@@ -102,15 +109,16 @@ class DisplacementProblem:
                 fine.lift(load, values, law)
                 if self._reuse and motion in self.corrections:
                     unknown.array[:] = self.corrections[motion]
+                elif earlier is not None:
+                    unknown.array[:] = earlier.known[motion] if motion in earlier.known else earlier.guess(load.array)
             for dead in applied:
                 fine.put(rhs[-1], dead)
             assemble = time.perf_counter() - start
-            levels, seconds = self._hierarchy(law, stack, direct=direct)
-            assemble += seconds
-            solver = LinearSolver(levels, direct=direct, tolerance=tolerance)
-            stack.callback(solver.close)
+            found = self._set_up(law, stack, direct=direct, keep=earlier is not None)
+            solver, assemble = found.solver, assemble + found.seconds
             start = time.perf_counter()
-            iterations = sum(map(solver.solve, rhs, unknowns))
+            new = [earlier is None or motion not in earlier.known for motion in loads.motions] + [True] * len(applied)
+            iterations = sum(solver.solve(rhs[n], unknowns[n], tolerance) for n in np.flatnonzero(new))
             response, carried = self._response(unknowns, held, applied, law, loads)
             for _ in range(MOST_ROUNDS):
                 if direct or (share := rest(response.balance, asked)) == 1.0:
@@ -123,6 +131,8 @@ class DisplacementProblem:
                     f"forces do not balance: relative error {response.balance:.1e}, allowed {BALANCE_LIMIT:.0e}"
                 )
             if loads.far is not None:
+                if earlier is not None:
+                    _remember(earlier, loads, solver, rhs, unknowns)
                 loads, held = self._close(response, unknowns, held)
                 response = balanced(self._response(unknowns, held, applied, law, loads)[0])
             self.corrections = {m: u.array.copy() for m, u in zip(loads.motions, unknowns, strict=False)}
@@ -140,15 +150,46 @@ class DisplacementProblem:
             if not solver.is_single and fine.degree > 1:
                 solver.close()  # what the next degree takes is the most memory of all
             start = time.perf_counter()
-            found, (released_finer, pushed_finer), more = self._decrements(law, levels, held, loads, solver, stack)
+            gained, (released_finer, pushed_finer), more = self._decrements(law, held, loads, found, stack)
             plain = plain_share(self._body)
         form = response.stiffness if carried is None else carried.form
-        relative = np.array([error_bar(share, fine.degree, plain=plain) for share in shares(found, form)])
+        relative = np.array([error_bar(share, fine.degree, plain=plain) for share in shares(gained, form)])
         return replace(
-            solution.with_bars(found, stiffness_bars(form, relative), "displacement", apart=loads.apart), plain=plain,
+            solution.with_bars(gained, stiffness_bars(form, relative), "displacement", apart=loads.apart), plain=plain,
             estimate_iterations=more, released_finer=released_finer, pushed_finer=pushed_finer,
             time_estimate=time.perf_counter() - start,
         ).with_release_bar(fine.degree)  # fmt: skip
+
+    def _set_up(self, law: MaterialLaw, stack: ExitStack, *, direct: bool, keep: bool) -> SetUp:
+        """Return a solver and its levels, freed with the stack or, if it is to ``keep``, used for the next solve.
+
+        What does not cycle in single precision is not kept: it takes much memory beside the next degree. Collective.
+        """
+        if self._kept is not None and self._kept.law == law and keep and not direct:
+            return self._kept
+        self._let_go()
+        with ExitStack() as owner:
+            levels, seconds = self._hierarchy(law, owner, direct=direct)
+            solver = LinearSolver(levels, direct=direct, tolerance=TOLERANCE)
+            owner.callback(solver.close)
+            found = SetUp(law, levels, seconds, solver)
+            if keep and solver.is_single:
+                self._kept = found = replace(found, owner=owner.pop_all())
+            else:
+                stack.push(owner.pop_all())
+        return found
+
+    def _let_go(self) -> None:
+        """Free what was kept for the next solve."""
+        if self._kept is not None and self._kept.owner is not None:
+            self._kept.owner.close()
+        self._kept = None
+
+    def _solved_with(self, law: MaterialLaw) -> Earlier:
+        """Return what was solved with a law, for a tool and the far fields of its places; one law at a time."""
+        if self._earlier is None or self._earlier[0] != law:
+            self._earlier = law, Earlier(self._fine.dofs.comm, self._fine.dofs.owned)
+        return self._earlier[1]
 
     @staticmethod
     def _close(response: Response, unknowns: list[PETSc.Vec], held: list[FloatArray]) -> tuple[Loads, list[FloatArray]]:
@@ -242,15 +283,16 @@ class DisplacementProblem:
 
     @stage("error bar")
     def _decrements(
-        self, law: MaterialLaw, levels: list[Level], held: list[FloatArray], loads: Loads, below: LinearSolver,
-        stack: ExitStack,
-    ) -> tuple[FloatArray, Released, int]:  # fmt: skip
+        self, law: MaterialLaw, held: list[FloatArray], loads: Loads, below: SetUp, stack: ExitStack
+    ) -> tuple[FloatArray, Released, int]:
         """Return what one degree more takes away from the last stiffness of the whole body, and the iterations.
 
         Between them is what it makes of the energy that a slit's front, and the blade's tip, release.
         """
         fine = self._fine
-        finer, solver = self._finer(law, levels, stack, below)
+        finer, solver = below.above or self._finer(law, below.levels, below.owner or stack, below.solver)
+        if below.owner is not None:
+            below.above = finer, solver
         moved = fine.forms.displacement.x.array.copy()
         applied = finer.applied(loads.dead)
         units = [([values], Loads((motion,), (1.0,))) for motion, values in zip(loads.motions, held, strict=True)]
@@ -334,3 +376,15 @@ class DisplacementProblem:
         balance = max(balance, imbalance(found, np.diag(stationary), works, applied[0], loads, mirrored))
         loaded = carried_of(stationary, works, found.on_probe[-1], mirrored, apart=loads.apart)
         return replace(response, balance=balance), loaded
+
+
+def _remember(
+    earlier: Earlier, loads: Loads, solver: LinearSolver, products: list[PETSc.Vec], unknowns: list[PETSc.Vec]
+) -> None:
+    """Keep ``unknowns`` for other places, of which the tool's own motion is one; overwrite ``products``; collective."""
+    for motion, product, unknown in zip(loads.motions, products, unknowns, strict=True):
+        if motion not in earlier.known:
+            solver.multiply(unknown, product)
+            earlier.add(product.array, unknown.array)
+    own, *_ = loads.motions
+    earlier.known = {own: unknowns[0].array.copy()}
