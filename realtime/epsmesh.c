@@ -86,7 +86,7 @@ typedef struct {
     int rank; /* -1: not yet found */
 } wanted;
 
-enum { WANTED = 22, OPTIONAL = 21 };
+enum { WANTED = 23, OPTIONAL = 21 };
 
 /* Return where the `n` doubles of a variable begin, or NULL if they are not all in the file. */
 static const unsigned char *found_at(const reader *r, const unsigned char *begin, const size_t *shape, int rank,
@@ -162,7 +162,7 @@ static int is_sound(const epsmesh_model *m) {
             if (!(fabs(dot) < 1e-9)) return 0;
         }
     }
-    if (m->bar[3] < 0) return 0;
+    if (m->bar[3] < 0 || m->bend_error < 0) return 0;
     for (i = 0; i < 2; i++)
         if (!(0 < m->reach[i] && m->reach[i] < m->sides[i])) return 0;
     if (m->is_round && (m->counts[1] != 1 || m->face_counts[0] != 1 || !m->even[0] || !m->even[1])) return 0;
@@ -198,11 +198,12 @@ epsmesh_status epsmesh_load(epsmesh_model *m, const void *data, size_t size) {
         {"even", even, 2, {0}, -1},
         {"height", m->height, EPSMESH_MOST_IN_ALL, {0}, -1},
         {"bend", m->bend, EPSMESH_MOST_IN_ALL, {0}, -1},
-        {"tensors", m->tensors, EPSMESH_TENSORS * EPSMESH_MOST_IN_ALL, {0}, -1}, /* may be missing */
+        {"tensors", m->tensors, EPSMESH_TENSORS * EPSMESH_MOST_IN_ALL, {0}, -1}, /* may be missing, as may */
+        {"bend_error", &m->bend_error, 1, {0}, -1},
     };
-    static const int ranks[WANTED] = {3, 3, 2, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 2, 4};
+    static const int ranks[WANTED] = {3, 3, 2, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 2, 4, 0};
     static const size_t firsts[] = {3, 3, 4, 2, 2, 2};
-    m->is_loaded = 0;
+    m->is_loaded = 0, m->bend_error = 0;
     r.data = (const unsigned char *)data, r.size = size, r.at = 0, r.failed = data == NULL;
     if (!read_variables(&r, w)) return EPSMESH_NO_MODEL;
     for (i = 0; i < WANTED; i++)
@@ -724,6 +725,10 @@ epsmesh_touch epsmesh_touch_at(const epsmesh_model *m, const epsmesh_query *q) {
     sticks = q->shape == EPSMESH_BONDED_DISC ? STICKS * (1 - 2 * q->poisson) * k.radius / room : 0;
     t.force_error = m->bar[3] + k.stiffness * ((m->bar[0] + m->bar[2] * share * share + sticks) / room +
                                                m->bar[1] * bent * k.mean_square);
+    if (q->shape == EPSMESH_SPHERE || q->shape == EPSMESH_CONE) {
+        double growth = 3 * k.stiffness / k.force - 2 / q->depth;
+        t.force_error += m->bend_error / 2 * k.mean_square * (growth > 0 ? growth : 0);
+    }
     force_at(&f, k.force, k.aside, q->depth, force);
     for (i = 0; i < 3; i++)
         for (t.force[i] = 0, j = 0; j < 3; j++) t.force[i] += q->young * force[j] * m->axes[j][i];

@@ -38,7 +38,7 @@ typedef struct {
     double tensors[EPSMESH_TENSORS * EPSMESH_MOST_IN_ALL], height[EPSMESH_MOST_IN_ALL], bend[EPSMESH_MOST_IN_ALL];
     int counts[3], face_counts[2], is_round, even[2], leans, has_tensors, is_flat, is_loaded;
     double c_ref, reach[2], sides[2], thickness, origin[3], axes[3][3], poisson_range[2];
-    double young, poisson, largest, off, aligned, bar[4];
+    double young, poisson, largest, off, aligned, bar[4], bend_error;
 } epsmesh_model;
 
 typedef struct {

@@ -27,6 +27,10 @@ _FINER = 2 / 3
 _SHARE = 0.5
 # The face: points along each direction, and polynomials fitted to them; a facetted one is smooth but for its facets.
 _POINTS, _TERMS = 25, 9
+# Second derivatives of such a fit to facets are noise towards its ends: curvature is that of paraboloids fitted within
+# so many radii of the study's disc, and may be off by as much as those within others differ; heights for them are apart
+# by so much of that radius.
+_WINDOW, _OTHERS, _APART = 1.0, (0.7, 1.4), 0.25
 # A query may be so much further off the face than that fit, and its axis so far off the normal.
 _OFF, _LEAST_OFF, _ALIGNED = 1.5, 1e-3, 0.1
 
@@ -57,10 +61,10 @@ def curved_model(
 
     table, missed = tabulate(region, scope.poissons, found, _SHARE * accuracy, _SIZES, sparse=not region.is_round)
     table = replace(table, leans=False)
-    face, off = _face(scope, table, middle)
+    face, off, bend_error = _face(scope, table, middle)
     model = Model(
         table, np.array([*middle, 0.0]), np.eye(3), region.sides, room, scope.young, scope.poisson, largest,
-        (*bar[:3], float(np.mean(told))), face, max(_OFF * off, _LEAST_OFF * room), _ALIGNED,
+        (*bar[:3], float(np.mean(told))), face, max(_OFF * off, _LEAST_OFF * room), _ALIGNED, bend_error,
     )  # fmt: skip
     return model, missed, len(known) * len(ratios)
 
@@ -99,8 +103,8 @@ def _regular(
     return np.stack([bent[0] - a**2 * h / 3, h], axis=-1), told
 
 
-def _face(scope: Scope, table: Table, middle: tuple[float, ...]) -> tuple[Face, float]:
-    """Return the face as polynomials, and how far (m) it is from them at most.
+def _face(scope: Scope, table: Table, middle: tuple[float, ...]) -> tuple[Face, float, float]:
+    """Return the face as polynomials, and how far (m) it is from them, and its curvature (1/m) from theirs, at most.
 
     Raises:
         ExportError: if there is no face above the region.
@@ -108,29 +112,74 @@ def _face(scope: Scope, table: Table, middle: tuple[float, ...]) -> tuple[Face, 
     share = np.cos(np.pi * (np.arange(_POINTS) + 0.5) / _POINTS)
     count = 1 if table.is_round else _TERMS
     xs = table.reach[0] * (np.sqrt((share + 1) / 2) if table.even[0] else share)
-    ys = table.reach[1] * (np.sqrt((share + 1) / 2) if table.even[1] else share)
+    ys = table.reach[1] * (np.sqrt((share + 1) / 2) if table.even[1] else share) if count > 1 else np.zeros(1)
     vander = np.polynomial.chebyshev.chebvander(share, _TERMS - 1)
-    grid = [[(float(x), float(y)) for x in xs] for y in (ys if count > 1 else [0.0])]
     try:
-        heights = np.array([
-            [scope.body.frame((x + middle[0], y + middle[1])).point[2] for x, y in line] for line in grid
-        ])  # fmt: skip
+        heights = _heights(scope, middle, xs, ys)
     except PlaceError as problem:
         raise ExportError(
             f"probe.at: the region round it, {1e3 * table.reach[0]:.3g} mm to each side: a place {problem}"
         ) from None
     rows = vander if count > 1 else np.ones((1, 1))
     height = _fitted(rows, vander, heights)
-    plain = Face(height, np.zeros_like(height) + 1e-300)
-    bends = np.array([[_bend(plain, table, x, y) for x, y in line] for line in grid])
-    return Face(height, _fitted(rows, vander, bends)), float(np.abs(rows @ height @ vander.T - heights).max())
+    if scope.body.half_sides:  # a smooth body
+        plain = Face(height, np.zeros_like(height) + 1e-300)
+        bends, doubt = np.array([[_bend(plain, table, x, y) for x in xs] for y in ys]), 0.0
+    else:
+        bends, doubt = _bends(scope, middle, xs, ys)
+    bend = _fitted(rows, vander, bends)
+    missed = [float(np.abs(rows @ fit @ vander.T - known).max()) for fit, known in ((height, heights), (bend, bends))]
+    return Face(height, bend), missed[0], doubt + missed[1] if doubt else 0.0
+
+
+def _heights(scope: Scope, middle: tuple[float, ...], xs: FloatArray, ys: FloatArray) -> FloatArray:
+    """Return the face's height (y, x), in m, at places from the middle of the region."""
+    return np.array([[scope.body.frame((x + middle[0], y + middle[1])).point[2] for x in xs] for y in ys])
+
+
+def _bends(scope: Scope, middle: tuple[float, ...], xs: FloatArray, ys: FloatArray) -> tuple[FloatArray, float]:
+    """Return the mean curvature (y, x), in 1/m, by paraboloids, and by how much those of other sizes differ at most.
+
+    Raises:
+        ExportError: if the face ends too near to the region.
+    """
+    radius = scope.case.probe.circumradius
+    wide = max(_WINDOW, *_OTHERS) * radius
+    across, down = (
+        np.arange(-most, most + 1e-9, _APART * radius) for most in (np.abs(xs).max() + wide, np.abs(ys).max() + wide)
+    )
+    try:
+        z = _heights(scope, middle, across, down)
+    except PlaceError as problem:
+        raise ExportError(
+            f"probe.at: the face is to be known {1e3 * wide:.3g} mm beyond the region, too: a place {problem}"
+        ) from None
+    x, y = np.meshgrid(across, down)
+    places = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    found, *others = (
+        np.array([[_paraboloid(places - (x, y, 0.0), share * radius) for x in xs] for y in ys])
+        for share in (_WINDOW, *_OTHERS)
+    )
+    return found, max(float(np.abs(other - found).max()) for other in others)
+
+
+def _paraboloid(away: FloatArray, reach: float) -> float:
+    """Return the mean curvature (1/m) on the axis of the paraboloid next to points (n, 3), in m, up to ``reach``."""
+    x, y, z = away[away[:, 0] ** 2 + away[:, 1] ** 2 <= reach**2].T
+    terms = np.column_stack([np.ones_like(x), x, y, x**2 / 2, x * y, y**2 / 2])
+    _, *slope, xx, xy, yy = np.linalg.lstsq(terms, z, rcond=None)[0].tolist()
+    return _mean_curvature(slope, [[xx, xy], [xy, yy]])
 
 
 def _bend(face: Face, table: Table, x: float, y: float) -> float:
     """Return the mean curvature (1/m), positive on a dome."""
     spot = face.at(table, x, y)
-    metric = np.eye(2) + np.outer(spot.slope, spot.slope)
-    return float(-0.5 * np.trace(np.linalg.solve(metric, spot.second)) * spot.outward[2])
+    return _mean_curvature(spot.slope, spot.second)
+
+
+def _mean_curvature(slope: Sequence[float], second: Sequence[Sequence[float]]) -> float:
+    metric = np.eye(2) + np.outer(slope, slope)
+    return float(-0.5 * np.trace(np.linalg.solve(metric, second)) / np.sqrt(1 + np.dot(slope, slope)))
 
 
 def _fitted(rows: FloatArray, columns: FloatArray, values: FloatArray) -> FloatArray:

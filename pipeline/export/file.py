@@ -11,6 +11,7 @@ All numbers that a query needs are doubles, in SI units, for a body with E = 1:
     leans                    1: the tilt of the face by its force is to be added; 0: it is in h
     height, bend             (face_v, face_u) coefficients of the face's z (m) and its mean curvature (1/m), 0 if flat
     off, aligned             how far off the face (m), and its normal (rad), a query may be
+    bend_error               how far the mean curvature may be off (1/m); none in a file is 0
     reach                    (2,) X and Y (m), half extents of the region, or its radius twice
     sides, thickness         (2,) half extents of the face (m), or its radius twice; way to support or other tissue
     origin, axes             (3,) and (3, 3): the middle of the face, and rows x, y and outward normal
@@ -56,7 +57,7 @@ def write_model(
     numbers = {
         "format": FORMAT, "c_ref": table.c_ref, "is_round": float(table.is_round), "thickness": model.thickness,
         "young": model.young, "poisson": model.poisson, "largest": model.largest, "leans": float(table.leans),
-        "off": model.off, "aligned": model.aligned,
+        "off": model.off, "aligned": model.aligned, "bend_error": model.bend_error,
     }  # fmt: skip
     variables: dict[str, Variable] = {
         "reciprocal": (("poisson_node", "v", "u"), table.reciprocal, {"units": "m"}),
@@ -73,7 +74,7 @@ def write_model(
     }
     if len(table.tensors):
         variables["tensors"] = (("tensor", "poisson_node", "v", "u"), table.tensors, {"units": "1"})
-    units = {"c_ref": "1/m", "thickness": "m", "young": "Pa", "off": "m", "aligned": "rad"}
+    units = {"c_ref": "1/m", "thickness": "m", "young": "Pa", "off": "m", "aligned": "rad", "bend_error": "1/m"}
     for name, value in numbers.items():
         variables[name] = ((), np.array(value), {"units": units.get(name, "1")})
     for name, (unit, values) in checks.items():

@@ -75,6 +75,7 @@ class Model:
     ``largest`` is the largest radius of contact in units of the way to the nearest side or there, ``bar`` the shares of
     c, of h's part, of what is beyond it, and of F, that count as error. ``face`` tells the height of what is not flat.
     A query may be ``off`` the face by so much (m), and its axis by the angle ``aligned`` (rad) off the normal.
+    ``bend_error`` (1/m) is how far the face's mean curvature may be off.
     """
 
     table: Table
@@ -89,6 +90,7 @@ class Model:
     face: Face = field(default_factory=Face)
     off: float = 0.0
     aligned: float = 1e-6
+    bend_error: float = 0.0
 
     def query(
         self,
@@ -150,6 +152,9 @@ class Model:
             out_x * xz + out_y * yz + out_z * zz,
         ])  # fmt: skip
         error = found.stiffness * self._uncertain(place, room, found, sticks=isinstance(shape, Bonded)) + self.bar[3]
+        if isinstance(shape, Round):
+            # ∂F/∂κ is half the slope of ∫ p r² with the depth, which both grow by powers of the depth, n and 3 n + 1.
+            error += self.bend_error / 2 * found.mean_square * max(3 * found.stiffness / found.force - 2 / depth, 0.0)
         if not (isfinite(out_x) and isfinite(out_y) and isfinite(out_z) and isfinite(error)):
             return _refused("damaged")
         if not (found.force > 0 and found.stiffness > 0):
@@ -255,7 +260,7 @@ def model_of(data: bytes) -> Model:
     found = read_doubles(data)
     shapes = {"reciprocal": 3, "curvature": 3, "origin": (3,), "axes": (3, 3), "bar": (4,), "height": 2, "bend": 2}
     shapes |= dict.fromkeys(("reach", "sides", "poisson_range", "even"), (2,))
-    shapes |= {"tensors": 4} if "tensors" in found else {}
+    shapes |= {name: rank for name, rank in (("tensors", 4), ("bend_error", ())) if name in found}
     shapes |= dict.fromkeys(("format", "is_round", "c_ref", "leans", *_NUMBERS), ())
     if "format" in found and found["format"].shape == () and found["format"] != FORMAT:
         raise ModelError(f"the file has format {float(found['format']):g}, and this program reads {FORMAT:g}")
@@ -269,7 +274,7 @@ def model_of(data: bytes) -> Model:
             raise ModelError(f"{name} is not finite")
     _check(found)
     reach, sides, ratios, bar = (found[name].tolist() for name in ("reach", "sides", "poisson_range", "bar"))
-    rest = {name: float(found[name]) for name in _NUMBERS}
+    rest = {name: float(found[name]) for name in (*_NUMBERS, "bend_error") if name in found}
     is_round, (even_x, even_y) = bool(found["is_round"] == 1.0), found["even"] == 1.0
     tensors = {"tensors": found["tensors"]} if "tensors" in found else {}
     table = Table(
@@ -305,6 +310,7 @@ def _check(found: dict[str, NDArray[np.float64]]) -> None:
         "young": bool(found["young"] > 0),
         "largest": bool(0 < found["largest"] <= 1),
         "bar": bool((found["bar"] >= 0).all()),
+        "bend_error": bool(found.get("bend_error", np.zeros(())) >= 0),
     }
     for name, is_right in fits.items():
         if not is_right:

@@ -100,7 +100,7 @@ def _told(surface: Surface, arrays: dict[str, Any]) -> dict[str, Any]:
     """Return what the script is told besides the arrays; the camera's lengths are in mm, along the face's axes."""
     model, table = surface.model, surface.table
     low, high = table.points.min(axis=0), table.points.max(axis=0)
-    names = ("thickness", "young", "poisson", "largest", "sides", "bar", "off")
+    names = ("thickness", "young", "poisson", "largest", "sides", "bar", "off", "bend_error")
     numbers = {name: getattr(model, name) for name in names} | {
         "origin": model.origin.tolist(), "axes": model.axes.tolist(), "c_ref": model.table.c_ref,
         "reach": model.table.reach, "even": model.table.even,

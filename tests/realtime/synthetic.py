@@ -27,7 +27,7 @@ def random_model(*, is_round: bool = False, turned: bool = False, is_even: bool 
     if curved:
         heights = rng.standard_normal((2, 1 if is_round else 4, 5)) / np.arange(1, 6) ** 3
         face = Face(2e-3 * heights[0], 4.0 * heights[1])
-    rest = {"face": face, "off": 1e-7, "aligned": 0.02 if curved else 1e-6}
+    rest = {"face": face, "off": 1e-7, "aligned": 0.02 if curved else 1e-6, "bend_error": 3.0 if curved else 0.0}
     return Model(table, origin, axes, sides, 0.02, 10e3, 0.45, 0.5, (0.02, 0.1, 0.5, 0.001), **rest)
 
 

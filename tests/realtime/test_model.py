@@ -113,6 +113,18 @@ def test_nor_does_one_over_a_curved_face(name, sizes, is_round):
     assert abs(2 * pi / count * (np.array(forces) * moved).sum()) < 1e-8 * stored
 
 
+@pytest.mark.parametrize(("name", "sizes"), TOOLS[:3])
+def test_what_is_not_known_of_the_faces_curvature_is_in_the_bar_of_round_tools(name, sizes):
+    model, at = random_model(curved=True), (0.01, 0.012)
+    place = (*at, model.face.at(model.table, *at).height)
+    touch, known = (deep(of, name, sizes, at=place) for of in (model, replace(model, bend_error=0.0)))
+    bend = model.face.bend.copy()
+    bend[0, 0] += model.bend_error
+    sharper = deep(replace(model, face=replace(model.face, bend=bend)), name, sizes, at=place)
+    change = 1 - np.linalg.norm(sharper.force) / np.linalg.norm(touch.force)
+    assert touch.force_error - known.force_error == pytest.approx(change, rel=0.1, abs=1e-12)
+
+
 def test_a_slender_blade_is_a_strip():
     none, stiff, long, short = np.zeros(2), 1 / (1 - 0.3**2), 50e-3, 1e-3
     flat = Shape(none, np.zeros((2, 2)), none, np.zeros((2, 2)), np.zeros((3, 3)))

@@ -123,7 +123,7 @@ const NOTHING = { force: [NaN, NaN, NaN], error: NaN, stiffness: NaN, radius: Na
 
 class Model {
   constructor(told) {
-    // origin, axes (rows x, y, outward), sides, thickness, young, poisson, largest, bar, off, height, bend
+    // origin, axes (rows x, y, outward), sides, thickness, young, poisson, largest, bar, off, height, bend, bend_error
     Object.assign(this, told);
     this.table = new Table(told);
     this.isFlat = ![told.height, told.bend].flat(2).some((value) => value !== 0);
@@ -162,7 +162,9 @@ class Model {
     if (!this.isFlat) Object.assign(place, { bend: spot.bend, slopeBend: spot.slopeBend });
     const contact = shape.press(depth, place, this.largest * room);
     if (!contact) return refused("large");
-    const error = contact.stiffness * this.uncertain(place, room, contact, shape) + this.bar[3];
+    const growth = shape instanceof Round ? Math.max((3 * contact.stiffness) / contact.force - 2 / depth, 0) : 0;
+    const error = contact.stiffness * this.uncertain(place, room, contact, shape) + this.bar[3]
+      + (this.bend_error / 2) * contact.square * growth;
     const force = this.body(spot.force(contact, depth).map((value) => young * value));
     const isRight = [...force, error].every(Number.isFinite) && contact.force > 0 && contact.stiffness > 0;
     if (!isRight) return refused("damaged");
