@@ -60,7 +60,7 @@ def new(
     except OSError as problem:
         fail(of_file(path, problem.strerror or str(problem)))
     if as_json:
-        print_json({"file": str(path), "carried": [str(file) for file in carried]})
+        print_json({"file": str(path)} | ({"carried": [str(file) for file in carried]} if carried else {}))
     else:
         for file in carried:
             print(f"{file}: the body's, which the study names")

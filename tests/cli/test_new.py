@@ -93,7 +93,7 @@ def test_the_file_of_a_body_is_taken_along_within_the_project(elsewhere):
     assert f"{Path('studies', '..', 'meshes', 'liver.stl')}" in new("mine", "--like", "organ").stdout
     assert mesh.read_bytes() == (STUDIES.parent / "meshes" / "liver.stl").read_bytes()
     mesh.write_bytes(b"mine")
-    assert json.loads(new("second", "--like", "organ", "--json").stdout)["carried"] == []
+    assert json.loads(new("second", "--like", "organ", "--json").stdout) == {"file": "studies/second.toml"}
     assert mesh.read_bytes() == b"mine"
     mesh.unlink()
     assert new("mine", "--like", "organ").exit_code == 2
