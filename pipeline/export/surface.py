@@ -80,20 +80,23 @@ def tabulate_surface(body: Pressed, poissons: tuple[float, float], origin: Float
     """
     region, (low, high) = body.region, poissons
     ratios = (low + high) / 2 + (high - low) / 2 * (_ends(_POISSONS - 1) if low < high else np.zeros(1))
-    sources = _sources(region)
-    solved = [body.solve(sources, float(ratio)) for ratio in ratios]
+    sources, held_out, middle = _sources(region), _held_out(region), len(ratios) // 2
+    # Places held out are solved for with the others: a factorisation takes much longer than what it serves for.
+    asked = [[*sources, *held_out] if number == middle else sources for number in range(len(ratios))]
+    solved = [body.solve(places, float(ratio)) for places, ratio in zip(asked, ratios, strict=True)]
     boundary = solved[0]
     images = [_image(boundary, motion) for motion in _motions(region)]
     places = np.array([image.motion[:2, :2] @ source for source in sources for image in images])
     fields = np.array([
-        [image.of(values).ravel() for values in found.values for image in images] for found in solved
+        [image.of(values).ravel() for values in found.values[: len(sources)] for image in images] for found in solved
     ])  # fmt: skip
     rooms = np.array([region.room(x, y) for x, y in places])
     modes = _modes((fields * rooms[:, None]).reshape(-1, fields.shape[-1]))
     basis = _basis(region, places)
     amounts = np.array([np.linalg.lstsq(basis, found @ modes, rcond=None)[0] for found in fields])
     table = _table(region, boundary, modes, amounts, poissons, origin)
-    return _judged(table, body, float(ratios.mean()))
+    known = replace(boundary, values=solved[middle].values[len(sources) :])
+    return _judged(table, body, float(ratios[middle]), held_out, known)
 
 
 def _sources(region: Region) -> list[Place]:
@@ -192,16 +195,20 @@ def _table(
     )  # fmt: skip
 
 
-def _judged(table: SurfaceTable, body: Pressed, poisson: float) -> SurfaceTable:
-    """Return the table with what it misses R × room by at places that it was not made of."""
-    region, rng = body.region, np.random.default_rng(0)
-    shares = rng.uniform(-1, 1, (_HELD_OUT, 2)) / (np.sqrt(2) if region.is_round else 1)
-    places = [(float(x), float(y)) for x, y in shares * region.reach]
-    found = body.solve(places, poisson)
+def _held_out(region: Region) -> list[Place]:
+    """Return places that no table is made of."""
+    shares = np.random.default_rng(0).uniform(-1, 1, (_HELD_OUT, 2)) / (np.sqrt(2) if region.is_round else 1)
+    return [(float(x), float(y)) for x, y in shares * region.reach]
+
+
+def _judged(
+    table: SurfaceTable, body: Pressed, poisson: float, places: list[Place], known: OnBoundary
+) -> SurfaceTable:  # fmt: skip
+    """Return the table with what it misses R × room by at ``places`` that it was not made of, where R is ``known``."""
     missed = 0.0
-    for (x, y), values in zip(places, found.values, strict=True):
+    for (x, y), values in zip(places, known.values, strict=True):
         centre = np.array(body.force((x, y), poisson).centre)
-        clear = np.linalg.norm(found.nodes - centre, axis=1) >= body.next
+        clear = np.linalg.norm(known.nodes - centre, axis=1) >= body.next
         difference = (table.far(x, y, poisson) - values)[clear]
-        missed = max(missed, region.room(x, y) * float(np.linalg.norm(difference, axis=1).max()))
+        missed = max(missed, body.region.room(x, y) * float(np.linalg.norm(difference, axis=1).max()))
     return replace(table, error=missed)
