@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 
 import pytest
 
@@ -17,8 +18,9 @@ from pipeline.shapes.probes.blade import Blade
 from pipeline.verify.stress import cells
 from pipeline.verify.stress.runner import rows_of
 from tests.commands import ROOT
-from tests.report.chosen import dataset
+from tests.report.chosen import TEXT, dataset
 
+SCALPEL = TEXT[TEXT.rindex("[[probe]]") : TEXT.index("[mesh]")]
 NAMES = sorted(
     f"{group}{command.name or command.callback.__name__}"
     for group, commands in (("", app), ("store ", store.app)) for command in commands.registered_commands
@@ -35,11 +37,19 @@ def failed(done, status=2):
     return told["errors"]
 
 
+@pytest.fixture(scope="module")
+def known(tmp_path_factory):
+    """The file of a dataset of one scene, with F_exact."""
+    file = tmp_path_factory.mktemp("known") / "known.nc"
+    write(dataset(TEXT.replace("[0.3, 0.4]", "0.3").replace(SCALPEL, "")), file)
+    return file
+
+
 @pytest.fixture
-def here(tmp_path, monkeypatch):
+def here(known, tmp_path, monkeypatch):
     """A folder with a small dataset, in which commands are called."""
     monkeypatch.chdir(tmp_path)
-    write(dataset(), tmp_path / "known.nc")
+    shutil.copy(known, tmp_path)
     return tmp_path
 
 
