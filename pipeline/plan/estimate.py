@@ -11,7 +11,7 @@ _TETRAHEDRON = 0.21
 # system of 50,000 dofs; and what two more matrices take. Measured: docs/solvers.md.
 _BYTES_PER_DOF = {
     "displacement": {1: 3000, 2: 700, 3: 420, 4: 420},
-    "mixed": {2: 1800, 3: 1800, 4: 2200},
+    "mixed": {2: 1450, 3: 1200, 4: 1200},
     "mixed, roughly": {3: 850, 4: 850},
     "displacement, matrices": {1: 3000, 2: 1900, 3: 2000, 4: 2800},
     "mixed, matrices": {2: 3800, 3: 4000, 4: 5600},

@@ -25,8 +25,8 @@ Pair = tuple[PETSc.Vec, PETSc.Vec]
 Weight = float | FloatArray
 
 _MOST_ITERATIONS = 300
-# More directions than a solve takes, as a rule, and one to a tenth: room is made for all of them.
-_RESTART, _RESTART_ROUGH, _ROUGH = 60, 20, 0.1
+# More directions than a solve takes, as a rule, and than one to a tenth: all of them are made and zeroed beforehand.
+_RESTART, _RESTART_ROUGH, _ROUGH = 40, 20, 0.1
 # B K₀⁻¹ Bᵀ is M / (λ₀ + 2μ) inside the body and less where the displacement is held; measured, flat from 0.8 to 1.6.
 _SCHUR = 1.2
 # Chebyshev steps for M preconditioned by its diagonal, and smallest over largest eigenvalue, by the degree of the
