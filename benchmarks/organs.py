@@ -10,7 +10,7 @@ import os
 import resource
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from shutil import copy
@@ -63,7 +63,7 @@ PARTS = {
     "error bar": ("error bar",),
 }
 COLUMNS = {
-    "scene": "", "place": "", "nu": "g", "element": "", "first degree": "d", "dofs": ",d", "bar": ".2%",
+    "scene": "", "place": "", "nu": "g", "element": "", "meshes": "d", "dofs": ",d", "bar": ".2%",
     "seconds": ".1f", **dict.fromkeys([*PARTS, "rest"], ".1f"),
 }  # fmt: skip
 WHOLE = {"what": "", "seconds": ".1f"}
@@ -75,6 +75,21 @@ def processor_seconds() -> float:
     """Return what this process and the children that it waited for have used of processors."""
     used = [resource.getrusage(whose) for whose in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(one.ru_utime + one.ru_stime for one in used)
+
+
+class Meshes(Silent):
+    """Counts the meshes that were begun: a runner tells of each, of the operator on it, and of each solve."""
+
+    begun = 0
+
+    def begin(self, keys: Collection[str]) -> None:
+        """Count."""
+        self.begun += 1
+
+    def taken(self) -> int:
+        """Return how many meshes were begun since this was asked for."""
+        meshes, self.begun = self.begun // 3, 0
+        return meshes
 
 
 @contextmanager
@@ -116,6 +131,7 @@ def measure(name: str, folder: Path) -> list[dict[str, Any]]:
     named = {at: place for place, at in SCENES[name][3].items()}
     cases = {solve.key: solve.case for solve in plan.solves}
     rows: list[dict[str, Any]] = []
+    meshes = Meshes()
 
     def keep(record: Record) -> None:
         case = cases[record.key]
@@ -125,14 +141,14 @@ def measure(name: str, folder: Path) -> list[dict[str, Any]]:
         stages.seconds.clear()
         rows.append({
             "scene": name, "place": named[at], "nu": case.poisson, "element": case.element,
-            "first degree": case.mesh.degree, "dofs": record.dofs, "cells": record.cells, "force": record.force,
+            "meshes": meshes.taken(), "dofs": record.dofs, "cells": record.cells, "force": record.force,
             "bar": record.force_error, "status": record.status, "seconds": sum(parts.values()), **parts,
         })  # fmt: skip
         print(markdown(rows[-1:], COLUMNS).splitlines()[-1], flush=True)
 
     prepare(MPI.COMM_SELF, plan.solves)
     with threadpool_limits(limits=1), stages_of_processors():
-        execute(plan, MPI.COMM_SELF, keep, Silent(), None, MeshCache(folder))
+        execute(plan, MPI.COMM_SELF, keep, meshes, None, MeshCache(folder))
     return rows
 
 

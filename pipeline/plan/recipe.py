@@ -42,8 +42,8 @@ LADDER = (
     Recipe(3, 0.05, 0.35, 1.0e-4),
     Recipe(3, 0.025, 0.3, 5.0e-5),
 )
-# Beside a round surface elements of degree 3 take two to three times as long as those of degree 2 on smaller cells, for
-# the same bar or a wider one (docs/decisions.md).
+# Beside a round surface elements of degree 2 on smaller cells have a narrower bar in the time of the first rung of
+# degree 3 (docs/decisions.md).
 _ROUND = (
     *LADDER[:4],
     Recipe(2, 0.15, 0.35, 1.15e-3),

@@ -128,7 +128,7 @@ def test_meshes_for_found_contact_are_graded_to_where_it_ends(depth):
 
 
 def test_round_bodies_are_meshed_more_finely_before_elements_of_degree_3_are_taken():
-    """These take more time there, which on the plane top of a box they do not."""
+    """These have wider bars there in the same time, which on the plane top of a box they do not."""
     ball = {"shape": "ellipsoid", "axes": ["40 mm", "30 mm", "20 mm"], "fixed": {"below": "-8 mm"}}
     degrees = [
         [mesh.degree for mesh in meshes_for(parse({**raw(**body), "mesh": {"accuracy": "2 %"}}).case(()), 0.02)]
