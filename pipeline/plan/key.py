@@ -7,7 +7,7 @@ from functools import lru_cache
 from math import inf
 from typing import Any
 
-from pipeline.plan.symmetry import mirror_planes, movement_planes
+from pipeline.plan.symmetry import is_round, mirror_planes, movement_planes
 from pipeline.shapes.body import Body
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
@@ -18,6 +18,9 @@ from pipeline.units import canonical
 
 # Raise by hand when the same input gives another force: records made before are then not used any more.
 PHYSICS_VERSION = 5
+
+# Where an accuracy is asked for, records are not used whose bars were made without N, or of plates as of other bodies.
+_BARS_ANEW = "bars of N"
 
 _MANY = 200_000  # sections of a large study
 # Keys that came later, with the value that stands for what was before: records of then stay valid.
@@ -55,6 +58,8 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
     ]
     if case.load.acts:
         parts.append(_load_text(case.load, case.densities))
+    if case.mesh.accuracy is not None and _has_bars_anew(case):
+        parts.append(_BARS_ANEW)
     if case.solve.timing:
         parts += [str(case.labels), str(case.solve.repeats)]
     return digest("\n".join(parts))
@@ -69,7 +74,14 @@ def reference_key(case: Case, accuracy: float) -> str:
         text_of(case.material, ("density", *case.material.PROPORTIONAL_TO)),
         text_of(probe, probe.proportional_to), ratios,
     ]  # fmt: skip
+    if _has_bars_anew(replace(case, mesh=Mesh.model_construct({"accuracy"}, accuracy=accuracy))) and not is_round(case):
+        parts.append(_BARS_ANEW)
     return digest("\n".join(parts))
+
+
+def _has_bars_anew(case: Case) -> bool:
+    """Tell whether bars of an accuracy on record may be too small: of mixed elements in thin bodies, and of plates."""
+    return not case.probe.is_unilateral and (case.element == "mixed" or case.is_plate) and case.is_even
 
 
 def mesh_key(case: Case) -> str:

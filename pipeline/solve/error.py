@@ -28,10 +28,19 @@ _UNSEEN, _UNSEEN_PLAIN = 0.3, 0.8
 _PLAIN = 0.2
 # A larger share of F_p than this makes no larger bar: the force is not known.
 _MOST = 0.9
-# F is at F_{p+1} - (centre ± spread) θ s on meshes graded to the edge, on others, and without quarter points.
-_LIMITS = {"displacement": (0.4, 0.25), "mixed": (0.5, 0.35)}
+# F is at F_{p+1} - (centre ± spread) θ s on meshes graded to the edge, by element and degree; of several movements of
+# mixed elements; on other meshes, and without quarter points.
+_LIMITS = {
+    ("displacement", 2): (0.4, 0.25), ("displacement", 3): (0.4, 0.25),
+    ("mixed", 2): (0.38, 0.3), ("mixed", 3): (0.58, 0.34),
+}  # fmt: skip
+_LIMITS_SEVERAL = (0.5, 0.35)
+# Or, of mixed elements, at ± so many θ (N - |s|) from there, if that is more: s is then what two errors leave of each
+# other, and N knows of both.
+_APART = {2: 0.3, 3: 0.15}
 _LIMITS_COARSE, _LIMITS_PLAIN = (0.4, 1.0), (0.85, 0.85)
-# Where materials meet, or a surface is curved, part of the error is from there: the next degree takes another share.
+# Where materials meet, a surface is curved, or the body is a plate, part of the error is from there: the next degree
+# takes another share.
 _LIMITS_ELSEWHERE = {"displacement": (0.4, 0.4), "mixed": (0.5, 0.9)}
 # The energy that a slit's front releases is at that of degree p + 1, less (centre ± spread) θ times what that changed.
 _RELEASE = (0.45, 0.9)
@@ -73,22 +82,41 @@ def stiffness_bars(stiffness: FloatArray, relative: FloatArray, *, apart: bool =
 
 def extrapolate(
     stiffness: FloatArray, decrements: FloatArray, bars: FloatArray, degree: int, element: str, *,
-    plain: float = 0.0, graded: bool = True, elsewhere: bool = False,
+    plain: float = 0.0, graded: bool = True, elsewhere: bool = False, unseen: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Return the stiffness (n, n) that the degrees tend to, and the bars on its entries.
 
-    ``decrements`` is K_p - K_{p+1}, ``bars`` those on K_p: of each, the same share of F_p is left. ``elsewhere``
-    tells that the probe's edge may not be all that F errs by.
+    ``decrements`` is K_p - K_{p+1}, ``bars`` those on K_p: of each, the same share of F_p is left, or more where
+    ``unseen`` (n), N of a mixed element in units of the stiffnesses on the diagonal, asks for it. ``elsewhere`` tells
+    that the probe's edge may not be all that F errs by.
     """
     theta = _theta(degree)
-    limits = _LIMITS_ELSEWHERE if elsewhere else _LIMITS
-    centre, spread = limits[element] if graded else _LIMITS_COARSE
-    if plain >= _PLAIN:
-        centre, spread = _LIMITS_PLAIN
+    centre, spread = _limits(
+        degree, element, plain=plain, graded=graded, elsewhere=elsewhere, several=len(stiffness) > 1
+    )
     relative = np.diag(bars) / np.abs(np.diag(stiffness))
     share = 1 / np.sqrt(1 + relative)
     left = bars * np.outer(share, share) * spread * theta / (1 + _left(degree, element, plain) * theta)
+    if unseen is not None and not elsewhere and plain < _PLAIN:
+        scale = np.abs(np.diag(stiffness))
+        least = _APART[degree] * theta * (unseen - np.abs(np.diag(decrements)) / scale) * scale
+        found = np.diag(left)
+        wider = np.sqrt(np.maximum(1.0, np.divide(least, found, out=np.ones_like(found), where=found > 0)))
+        left = left * np.outer(wider, wider)
     return stiffness - (1 + centre * theta) * decrements, left
+
+
+def _limits(
+    degree: int, element: str, *, plain: float, graded: bool, elsewhere: bool, several: bool
+) -> tuple[float, float]:
+    """Return centre and spread of what degree p + 1 leaves, in units of θ s."""
+    if plain >= _PLAIN:
+        return _LIMITS_PLAIN
+    if not graded:
+        return _LIMITS_COARSE
+    if elsewhere:
+        return _LIMITS_ELSEWHERE[element]
+    return _LIMITS_SEVERAL if several and element == "mixed" else _LIMITS[element, degree]
 
 
 def release_bar(released: float, finer: float, degree: int, bar: float, *, extrapolated: bool = False) -> float:

@@ -216,14 +216,15 @@ class MixedProblem:
         decrements = coarse - (fine.stiffness if carried is None else carried.form)
         first = 2.0 ** len(self._body.mirrored) * np.diag(solver.first_energies)
         plain = plain_share(self._body)
+        unseen = shares(first, coarse)
         relative = [
             error_bar(d, self._degree, "mixed", plain=plain, unseen=n)
-            for d, n in zip(shares(decrements, coarse), shares(first, coarse), strict=True)
+            for d, n in zip(shares(decrements, coarse), unseen, strict=True)
         ]
         bars = split.unit * stiffness_bars(coarse, np.array(relative))
         return replace(
             solution.with_bars(split.unit * decrements, bars, "mixed", apart=loads.apart), plain=plain,
-            released_finer=released, pushed_finer=pushed,
+            unseen=unseen[: len(loads.motions)], released_finer=released, pushed_finer=pushed,
             estimate_iterations=iterations, time_estimate=time.perf_counter() - start,
         ).with_release_bar(self._degree)  # fmt: skip
 

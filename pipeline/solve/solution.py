@@ -42,7 +42,8 @@ class Solution:
     ``max_strain`` is the largest principal strain of a cell's mean strain, clear of singular edges
     (:mod:`pipeline.solve.strain`); ``dofs`` and ``cells`` are those of the whole body, ``iterations`` the sum over the
     motions. ``decrements`` (n, n) is what one degree more takes away from the probe's stiffness, and ``bars`` (n, n)
-    the 95 % error bars on its entries, made with ``plain``, the share of edges at the rim without quarter points (see
+    the 95 % error bars on its entries, made with ``plain``, the share of edges at the rim without quarter points, and
+    for mixed elements with ``unseen`` (n), N in units of the energies on the diagonal (see
     :mod:`pipeline.solve.error`). Of unilateral contact, ``contact_area`` (m²) and ``contact_radius`` (m) are those
     found, ``iterations`` the linear solves that it took, and ``stored`` (J) is its strain energy, which is not half of
     F d. ``released`` (n, n) is the energy (J) that a metre of advance of a slit's front releases, a form of the amounts
@@ -72,6 +73,7 @@ class Solution:
     released: FloatArray | None = None
     released_finer: FloatArray | None = None
     release_bar: float = nan
+    unseen: FloatArray | None = None
     pushed: FloatArray | None = None
     pushed_finer: FloatArray | None = None
     push_bar: float = nan
@@ -185,7 +187,7 @@ class Solution:
             return replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
         stiffness, bars = extrapolate(
             self.stiffness, self.decrements, self.bars, degree, element, plain=self.plain, graded=graded,
-            elsewhere=elsewhere,
+            elsewhere=elsewhere, unseen=self.unseen,
         )  # fmt: skip
         best = replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
         if self.carried is not None:

@@ -21,6 +21,8 @@ from pipeline.study.schema import Drawing, Material, Mesh, Planning, Solving, ma
 # Keys that both body and probe have, or a variable of the dataset: their dimension says whose it is.
 _AMBIGUOUS = ("radius", "shape", "accuracy", "axis")
 
+# A body that is held beside the probe alone is a plate up to this thickness over its reach (docs/accuracy.md).
+_PLATE = 0.1
 _PARTS = ("body", "material", "probe", "mesh", "solve", "load")
 
 
@@ -156,8 +158,19 @@ class Case:
 
     @property
     def is_plain(self) -> bool:
-        """Whether the probe's edge rules the error of F: one material, pressed straight down on a plane face."""
+        """Whether the probe's edge rules the error of F: what is pressed is even, and no plate."""
+        return self.is_even and not self.is_plate
+
+    @property
+    def is_even(self) -> bool:
+        """Whether a body of one material is pressed straight down on a plane face."""
         return not self.body.regions and self.probe.slit is None and is_level(self.body, self.frame)
+
+    @property
+    def is_plate(self) -> bool:
+        """Whether the body spans what holds it beside the probe, and is so thin that it bends there."""
+        thickness, reach = self.body.thickness(self.frame), self.body.reach(self.frame)
+        return not self.body.support.holds_column() and thickness < _PLATE * reach
 
     @property
     def is_full(self) -> bool:
