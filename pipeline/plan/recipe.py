@@ -78,7 +78,7 @@ _FOUND = (
 _THICKNESS, _THINNEST = 10.0, 0.15
 # Those of the mixed element over those of the displacement element at ν = 0.3, by degree: where the probe's edge rules
 # them, and otherwise.
-_MIXED_EVEN, _MIXED = {2: 0.9, 3: 1.0}, {2: 1.2, 3: 1.05}
+_MIXED_EVEN, _MIXED = {2: 1.0, 3: 1.05}, {2: 1.2, 3: 1.05}
 # Those of several movements over those of one, of mixed elements.
 _SEVERAL = 1.15
 # And those of bodies of several materials, with a curved surface, or of plates, by element (pipeline/solve/error.py).
