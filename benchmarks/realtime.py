@@ -33,9 +33,9 @@ from pipeline.realtime.model import Model
 from pipeline.study.load import load as load_study
 
 _FOLDER = Path("results/realtime")
-# Of models; of the full solves that they are judged by, flat tools and others; how many their bars are fitted to, and
-# judged on as well.
-_ACCURACY, _PRECISE, _PRECISE_ROUND, _CHECKS = 0.01, 0.0025, 0.006, 12
+# Of models; of the full solves that they are judged by, flat tools, those on organs, and others; how many their bars
+# are fitted to, and judged on as well.
+_ACCURACY, _PRECISE, _PRECISE_ORGAN, _PRECISE_ROUND, _CHECKS = 0.01, 0.0025, 0.005, 0.006, 12
 _FLAT = (
     '\n[probe]\nshape = "disc"\ncontact = "frictionless"\nradius = "4 mm"\ndepth = "0.1 mm"\n[mesh]\naccuracy = "1 %"\n'
 )
@@ -131,7 +131,8 @@ def _model(name: str) -> tuple[Model, Solver]:
     scope = scope_of(load_study(study))
     if not path.exists():
         write(export(scope, _ACCURACY, _CHECKS), path, scope, study, "benchmark")
-    return load(path), Solver(scope.sections, scope.file, scope.young, _PRECISE)
+    precise = _PRECISE if scope.body.half_sides else _PRECISE_ORGAN
+    return load(path), Solver(scope.sections, scope.file, scope.young, precise)
 
 
 def _lines(name: str, model: Model) -> Iterator[str]:
