@@ -186,13 +186,14 @@ def _half_space(model: Model, check: Check) -> float:
 def _nearest(model: Model, check: Check) -> float:
     """Return F (N) of the same tool at the nearest place that the table was made from."""
     _, rows, columns = model.table.reciprocal.shape
-    x = model.table.reach[0] * shares(columns - 1, model.table.even[0])
+    # Not outside by rounding.
+    x = (1 - 1e-12) * model.table.reach[0] * shares(columns - 1, model.table.even[0])
     if model.table.is_round:
         radius = float(np.hypot(check.x, check.y))
         share = float(x[np.argmin(np.abs(x - radius))]) / max(radius, 1e-12)
         at = (check.x * share, check.y * share)
     else:
-        y = model.table.reach[1] * shares(rows - 1, model.table.even[1])
+        y = (1 - 1e-12) * model.table.reach[1] * shares(rows - 1, model.table.even[1])
         at = (_closest(x, check.x, model.table.even[0]), _closest(y, check.y, model.table.even[1]))
     # The tool may be larger than what the model takes there.
     wide = replace(model, sides=(1e3, 1e3), thickness=1e3, largest=1.0)
