@@ -228,6 +228,8 @@ epsmesh_status epsmesh_load(epsmesh_model *m, const void *data, size_t size) {
     m->is_flat = 1;
     for (i = 0; i < m->face_counts[0] * m->face_counts[1]; i++)
         if (m->height[i] != 0 || m->bend[i] != 0) m->is_flat = 0;
+    /* A curved face that does not say how well it is known is of a time when it was known badly. */
+    if (!m->is_flat && w[OPTIONAL + 1].rank < 0) return EPSMESH_NO_MODEL;
     m->is_loaded = is_sound(m);
     return m->is_loaded ? EPSMESH_OK : EPSMESH_NO_MODEL;
 }

@@ -11,7 +11,7 @@ All numbers that a query needs are doubles, in SI units, for a body with E = 1:
     leans                    1: the tilt of the face by its force is to be added; 0: it is in h
     height, bend             (face_v, face_u) coefficients of the face's z (m) and its mean curvature (1/m), 0 if flat
     off, aligned             how far off the face (m), and its normal (rad), a query may be
-    bend_error               how far the mean curvature may be off (1/m); none in a file is 0
+    bend_error               how far the mean curvature may be off (1/m); a file of a flat face may lack it
     reach                    (2,) X and Y (m), half extents of the region, or its radius twice
     sides, thickness         (2,) half extents of the face (m), or its radius twice; way to support or other tissue
     origin, axes             (3,) and (3, 3): the middle of the face, and rows x, y and outward normal

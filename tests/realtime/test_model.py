@@ -233,6 +233,17 @@ def test_a_damaged_file_is_no_model_or_answers_with_a_status(tmp_path, kind):
     assert loaded > 20
 
 
+def test_a_curved_face_says_how_well_it_is_known(tmp_path):
+    for curved in (False, True):
+        write_random(tmp_path / "model.nc", curved=curved)
+        without = (tmp_path / "model.nc").read_bytes().replace(b"bend_error", b"bend_other")
+        if not curved:
+            assert model_of(without).bend_error == 0
+            continue
+        with pytest.raises(ModelError, match="bend_error"):
+            model_of(without)
+
+
 def test_tables_that_make_no_sense_give_a_status():
     model = random_model()
     table = replace(model.table, reciprocal=-model.table.reciprocal)
