@@ -23,17 +23,17 @@ from pipeline.solve.carried import Carried, carried_of, imbalance, shares
 from pipeline.solve.closure import TWO_SIDED, balanced, energy_beyond, far_share
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.dead_loads import Applied
-from pipeline.solve.earlier import Earlier, SetUp
+from pipeline.solve.earlier import Earlier
 from pipeline.solve.enrich import energy_decrements
 from pipeline.solve.error import error_bar, stiffness_bars
 from pipeline.solve.forms import mean_strain_form
-from pipeline.solve.linear import Level, LinearSolver, SolveError, is_direct
+from pipeline.solve.hierarchy import Hierarchy, SetUp
+from pipeline.solve.linear import LinearSolver, SolveError, is_direct
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.reaction import Response, reaction, sums
 from pipeline.solve.release import Front, Release, Released
 from pipeline.solve.rim import plain_share
-from pipeline.solve.single.cycle import takes_product
 from pipeline.solve.solution import BALANCE_LIMIT, MOST_ROUNDS, TOLERANCE, Solution, rest
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.strain import largest_strain, principal_strains
@@ -54,15 +54,14 @@ class DisplacementProblem:
         Raises:
             SolveError: if footprint and support share a point: no displacement satisfies both.
         """
-        self._shared, self._reuse = shared, reuse
+        self._reuse = reuse
         # By motion, the last solution for a unit of it less the prescribed displacements, owned dofs.
         self.corrections: dict[Motion, FloatArray] = {}
-        # Of a tool and the far fields of its places, that were solved with one law.
-        self._earlier: tuple[MaterialLaw, Earlier] | None = None
-        self._kept: SetUp | None = None
+        self._earlier: Earlier | None = None  # of a tool and the far fields of its places
         self._loaded: FloatArray | None = None  # the last solution for dead loads, owned dofs
-        self._spaces, self._body, self._conditions = spaces, spaces.body, conditions
-        self._fine = spaces.get(degree, conditions)
+        self._body, self._conditions = spaces.body, conditions
+        self._hierarchy = Hierarchy(spaces, degree, conditions, shared=shared)
+        self._fine = self._hierarchy.fine
         self._strain = mean_strain_form(self._fine.dofs.space, self._fine.forms.displacement)
 
     def __enter__(self) -> Self:
@@ -71,7 +70,7 @@ class DisplacementProblem:
     def __exit__(self, *_: object) -> None:
         self.corrections.clear()
         self._earlier = None
-        self._let_go()
+        self._hierarchy.let_go()
 
     @property
     def dofs(self) -> int:
@@ -114,7 +113,7 @@ class DisplacementProblem:
             for dead in applied:
                 fine.put(rhs[-1], dead)
             assemble = time.perf_counter() - start
-            found = self._set_up(law, stack, direct=direct, keep=earlier is not None)
+            found = self._hierarchy.set_up(law, stack, direct=direct, keep=earlier is not None)
             solver, assemble = found.solver, assemble + found.seconds
             start = time.perf_counter()
             new = [earlier is None or motion not in earlier.known for motion in loads.motions] + [True] * len(applied)
@@ -132,7 +131,7 @@ class DisplacementProblem:
                 )
             if loads.far is not None:
                 if earlier is not None:
-                    _remember(earlier, loads, solver, rhs, unknowns)
+                    earlier.remember(loads.motions, solver, rhs, unknowns)
                 loads, held = self._close(response, unknowns, held)
                 response = balanced(self._response(unknowns, held, applied, law, loads)[0])
             self.corrections = {m: u.array.copy() for m, u in zip(loads.motions, unknowns, strict=False)}
@@ -160,36 +159,11 @@ class DisplacementProblem:
             time_estimate=time.perf_counter() - start,
         ).with_release_bar(fine.degree)  # fmt: skip
 
-    def _set_up(self, law: MaterialLaw, stack: ExitStack, *, direct: bool, keep: bool) -> SetUp:
-        """Return a solver and its levels, freed with the stack or, if it is to ``keep``, used for the next solve.
-
-        What does not cycle in single precision is not kept: it takes much memory beside the next degree. Collective.
-        """
-        if self._kept is not None and self._kept.law == law and keep and not direct:
-            return self._kept
-        self._let_go()
-        with ExitStack() as owner:
-            levels, seconds = self._hierarchy(law, owner, direct=direct)
-            solver = LinearSolver(levels, direct=direct, tolerance=TOLERANCE)
-            owner.callback(solver.close)
-            found = SetUp(law, levels, seconds, solver)
-            if keep and solver.is_single:
-                self._kept = found = replace(found, owner=owner.pop_all())
-            else:
-                stack.push(owner.pop_all())
-        return found
-
-    def _let_go(self) -> None:
-        """Free what was kept for the next solve."""
-        if self._kept is not None and self._kept.owner is not None:
-            self._kept.owner.close()
-        self._kept = None
-
     def _solved_with(self, law: MaterialLaw) -> Earlier:
-        """Return what was solved with a law, for a tool and the far fields of its places; one law at a time."""
-        if self._earlier is None or self._earlier[0] != law:
-            self._earlier = law, Earlier(self._fine.dofs.comm, self._fine.dofs.owned)
-        return self._earlier[1]
+        """Return what was solved with a law: of one at a time it is kept."""
+        if self._earlier is None or self._earlier.law != law:
+            self._earlier = Earlier(self._fine.dofs.comm, self._fine.dofs.owned, law)
+        return self._earlier
 
     @staticmethod
     def _close(response: Response, unknowns: list[PETSc.Vec], held: list[FloatArray]) -> tuple[Loads, list[FloatArray]]:
@@ -208,7 +182,7 @@ class DisplacementProblem:
         """
         direct = is_direct(method, self.dofs, self._fine.degree)
         with ExitStack() as stack:
-            levels, _ = self._hierarchy(law, stack, direct=direct, entries=linear)
+            levels, _ = self._hierarchy.levels(law, stack, direct=direct, entries=linear)
             solver = LinearSolver(levels, direct=direct, tolerance=0.5, linear=linear)
             stack.callback(solver.close)
             yield solver
@@ -224,49 +198,6 @@ class DisplacementProblem:
 
     def _largest_strain(self) -> float:
         return largest_strain(self._strain, self._body, self._conditions.front)
-
-    def _hierarchy(
-        self, law: MaterialLaw, stack: ExitStack, *, direct: bool, entries: bool = False
-    ) -> tuple[list[Level], float]:
-        """Return the levels of multigrid, or the one of a direct solve, and the seconds that one assembly takes.
-
-        Their operators are given back with the ``stack``; all of them have ``entries``, or maybe the lowest alone.
-        """
-        spaces = [self._fine] if direct else [*self._coarser(), self._fine]
-        found = [self._level(space, law, stack, blocked=not direct, entries=entries) for space in spaces]
-        return [level for level, _ in found], sum(seconds for _, seconds in found)
-
-    def _coarser(self) -> list[ElasticSpace]:
-        """Return the spaces of lower degree; collective."""
-        return [self._spaces.get(degree, self._conditions) for degree in range(1, self._fine.degree)]
-
-    def _finer(
-        self, law: MaterialLaw, levels: list[Level], stack: ExitStack, below: LinearSolver | None = None
-    ) -> tuple[ElasticSpace, LinearSolver]:
-        """Return the space of one degree more and a solver in it above ``levels``, freed with the stack; collective.
-
-        ``below`` is the solver of ``levels``, if it is still there.
-        """
-        finer = self._spaces.get(self._fine.degree + 1, self._conditions)
-        if len(levels) == 1:
-            coarser = (self._level(space, law, stack, blocked=True, entries=True)[0] for space in self._coarser())
-            levels = [*coarser, *levels]
-        entries = not takes_product([level.matrix for level in levels])
-        level, _ = self._level(finer, law, stack, blocked=True, entries=entries)
-        solver = LinearSolver([*levels, level], direct=False, tolerance=0.5, below=below)
-        stack.callback(solver.close)
-        return finer, solver
-
-    def _level(
-        self, space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, blocked: bool, entries: bool
-    ) -> tuple[Level, float]:
-        blocked, operators = blocked and space.degree > 1, space.operators
-        if blocked and not entries:
-            lent = operators.lend_for_cycles(law, shared=self._shared)
-        else:
-            lent = operators.lend(law, blocked=blocked, shared=self._shared)
-        matrix, seconds = stack.enter_context(lent)
-        return Level(space.dofs.space, matrix, space.dofs.prescribed, not law.is_uniform), seconds
 
     def _unit(self, motion: Motion, held: FloatArray) -> FloatArray:
         """Return the last solution for a unit of ``motion``, owned dofs."""
@@ -290,9 +221,7 @@ class DisplacementProblem:
         Between them is what it makes of the energy that a slit's front, and the blade's tip, release.
         """
         fine = self._fine
-        finer, solver = below.above or self._finer(law, below.levels, below.owner or stack, below.solver)
-        if below.owner is not None:
-            below.above = finer, solver
+        finer, solver = self._hierarchy.above(below, stack)
         moved = fine.forms.displacement.x.array.copy()
         applied = finer.applied(loads.dead)
         units = [([values], Loads((motion,), (1.0,))) for motion, values in zip(loads.motions, held, strict=True)]
@@ -376,15 +305,3 @@ class DisplacementProblem:
         balance = max(balance, imbalance(found, np.diag(stationary), works, applied[0], loads, mirrored))
         loaded = carried_of(stationary, works, found.on_probe[-1], mirrored, apart=loads.apart)
         return replace(response, balance=balance), loaded
-
-
-def _remember(
-    earlier: Earlier, loads: Loads, solver: LinearSolver, products: list[PETSc.Vec], unknowns: list[PETSc.Vec]
-) -> None:
-    """Keep ``unknowns`` for other places, of which the tool's own motion is one; overwrite ``products``; collective."""
-    for motion, product, unknown in zip(loads.motions, products, unknowns, strict=True):
-        if motion not in earlier.known:
-            solver.multiply(unknown, product)
-            earlier.add(product.array, unknown.array)
-    own, *_ = loads.motions
-    earlier.known = {own: unknowns[0].array.copy()}

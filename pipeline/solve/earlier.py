@@ -1,37 +1,21 @@
-"""What one solve leaves to the next on the same mesh: its set-up, and solutions to begin with."""
+"""What one solve leaves to the next on the same mesh: solutions to begin with."""
 
-from contextlib import ExitStack
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.linear import Level, LinearSolver
+from pipeline.solve.linear import LinearSolver
 from pipeline.solve.loads import Motion
 from pipeline.solve.material import MaterialLaw
-from pipeline.solve.spaces import ElasticSpace
 from pipeline.solve.vectors import global_sum
 
 # So many solutions are kept, and no more than fit into so many bytes of a process.
 _MOST, _BYTES = 24, 100_000_000
 # What is left of a solution beside the earlier ones is dropped below this share of its energy.
 _SAME = 1e-12
-
-
-@dataclass
-class SetUp:
-    """A solver of ``levels`` for a law, which took ``seconds`` to assemble, and the one ``above`` it, if it was made.
-
-    ``owner`` frees them, if they are kept from solve to solve.
-    """
-
-    law: MaterialLaw
-    levels: list[Level]
-    seconds: float
-    solver: LinearSolver
-    owner: ExitStack | None = None
-    above: tuple[ElasticSpace, LinearSolver] | None = None
 
 
 class Earlier:
@@ -41,8 +25,9 @@ class Earlier:
     these by the solver's error, which neighbours are hardly farther apart than.
     """
 
-    def __init__(self, comm: MPI.Comm, owned: int):
-        """Keep none, of ``owned`` dofs on this rank; collective."""
+    def __init__(self, comm: MPI.Comm, owned: int, law: MaterialLaw):
+        """Keep none, of ``owned`` dofs on this rank, and of the K of a ``law``; collective."""
+        self.law = law
         # Of motions that come again as they are.
         self.known: dict[Motion, FloatArray] = {}
         self._comm = comm
@@ -69,6 +54,19 @@ class Earlier:
         self._solutions.append(solution / energy**0.5)
         if len(self._products) > self._most:
             del self._products[-2], self._solutions[-2]
+
+    def remember(
+        self, motions: Sequence[Motion], solver: LinearSolver, products: list[PETSc.Vec], solutions: list[PETSc.Vec]
+    ) -> None:
+        """Keep ``solutions`` for other places, of which the tool's own motion, the first, is one; collective.
+
+        ``products`` are overwritten.
+        """
+        for motion, product, solution in zip(motions, products, solutions, strict=True):
+            if motion not in self.known:
+                solver.multiply(solution, product)
+                self.add(product.array, solution.array)
+        self.known = {motions[0]: solutions[0].array.copy()}
 
     def _amounts(self, load: FloatArray) -> FloatArray:
         return global_sum(self._comm, np.array([x @ load for x in self._solutions]))

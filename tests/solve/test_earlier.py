@@ -8,7 +8,10 @@ from pipeline.plan.plan import make_plan
 from pipeline.run import far_field
 from pipeline.run.execute import compute
 from pipeline.solve.earlier import Earlier
+from pipeline.solve.material import MaterialLaw
 from tests.cases import study
+
+LAW = MaterialLaw.of_moduli(1.0, 0.3)
 
 
 def _operator(size=60):
@@ -20,7 +23,7 @@ def _operator(size=60):
 
 def test_the_guess_is_the_nearest_sum_in_energy():
     matrix, random = _operator()
-    earlier = Earlier(MPI.COMM_SELF, len(matrix))
+    earlier = Earlier(MPI.COMM_SELF, len(matrix), LAW)
     solutions = random.standard_normal((5, len(matrix)))
     solutions[1:4] = solutions[0] + 1e-3 * solutions[1:4]  # neighbours
     load = matrix @ random.standard_normal(len(matrix))
@@ -36,7 +39,7 @@ def test_the_guess_is_the_nearest_sum_in_energy():
 
 def test_what_is_no_news_is_not_kept_and_the_latest_is():
     matrix, random = _operator()
-    earlier = Earlier(MPI.COMM_SELF, 100_000_000 // (16 * 3))
+    earlier = Earlier(MPI.COMM_SELF, 100_000_000 // (16 * 3), LAW)
     found = random.standard_normal((5, len(matrix)))
     for solution in (found[0], 2 * found[0], *found):
         earlier.add(matrix @ solution, solution)

@@ -67,7 +67,7 @@ class LargeProblem(DisplacementProblem):
         self._forms = NeoHookeanForms(fine.dofs.space, fine.forms)
         with ExitStack() as stack:
             direct = is_direct(method, self.dofs, fine.degree)
-            levels, assembly = self._hierarchy(law, stack, direct=direct)
+            levels, assembly = self._hierarchy.levels(law, stack, direct=direct)
             solver = LinearSolver(levels, direct=direct, tolerance=TOLERANCE)
             stack.callback(solver.close)
             start = time.perf_counter()
@@ -213,7 +213,7 @@ class LargeProblem(DisplacementProblem):
         And the iterations that it took.
         """
         fine = self._fine
-        finer, solver = self._finer(law, levels, stack)
+        finer, solver = self._hierarchy.finer(law, levels, stack)
         forms = NeoHookeanForms(finer.dofs.space, finer.forms)
         finer.forms.set_law(law)
         residuals = [stack.enter_context(vector(finer.dofs.space)) for _ in range(2)]
