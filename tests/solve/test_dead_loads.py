@@ -15,7 +15,7 @@ from pipeline.solve.conditions import Conditions
 from pipeline.solve.dead_loads import apply_loads
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.spaces import ElasticSpace, Spaces
-from pipeline.solve.vectors import vector
+from pipeline.solve.vectors import global_sum, vector
 from tests.cases import solve, study
 
 YOUNG, HEIGHT = 10e3, 20e-3
@@ -99,6 +99,18 @@ def test_loads_add_up_and_leave_the_force_of_the_depth(pulled):
     parts = np.array([pulled.load_force_vector, squeezed_.load_force_vector])
     assert both.load_force_vector == pytest.approx(parts.sum(axis=0), abs=1e-6 * pulled.load_force_vector[0])
     assert both.load_force == both.load_force_vector[2]
+
+
+@pytest.mark.mpi
+def test_what_ranks_add_for_each_other_counts():
+    """Shape functions add up to 1: so do the forces of all dofs to the resultant, wherever they are owned."""
+    load = {**GRAVITY, "traction": [PULL]}
+    body, _ = mesh_case(study(mesh={"degree": 1}).case(()), ("x", "y"), MPI.COMM_WORLD)
+    with Spaces(body) as spaces:
+        space = spaces.get(2, Conditions()).dofs.space
+        applied = apply_loads(dead_loads_of(study(material=HEAVY, load=load).case(())), body, space)
+    whole = global_sum(body.comm, applied.forces.reshape(-1, 3).sum(axis=0))
+    assert whole == pytest.approx(applied.resultant, rel=1e-9)
 
 
 def test_loads_grow_apart_from_depth_and_modulus(pulled):
