@@ -7,7 +7,6 @@ figures; at last a large file, checked for the first time and again. Two minutes
 
 import json
 import os
-import resource
 import subprocess
 import sys
 from collections.abc import Collection, Iterator, Mapping
@@ -22,6 +21,7 @@ import igl
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
+from benchmarks.processor import processor_seconds
 from benchmarks.tables import markdown
 from pipeline import stages
 from pipeline.plan.plan import make_plan
@@ -69,12 +69,6 @@ COLUMNS = {
 WHOLE = {"what": "", "seconds": ".1f"}
 # How often each facet of the liver is cut into four to make a large file: 320,000 of them.
 _TIMES = 3
-
-
-def processor_seconds() -> float:
-    """Return what this process and the children that it waited for have used of processors."""
-    used = [resource.getrusage(whose) for whose in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return sum(one.ru_utime + one.ru_stime for one in used)
 
 
 class Meshes(Silent):

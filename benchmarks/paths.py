@@ -16,7 +16,7 @@ from typing import Any
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
-from benchmarks.organs import processor_seconds
+from benchmarks.processor import processor_seconds
 from benchmarks.tables import markdown
 from pipeline.plan.plan import make_plan
 from pipeline.run.compile import prepare

@@ -12,7 +12,6 @@ import argparse
 import json
 import os
 import re
-import resource
 import subprocess
 import sys
 import time
@@ -26,6 +25,7 @@ import numpy as np
 import xarray as xr
 
 from benchmarks.plain_case import MOST_DIRECT, SOLVERS, Solved, solve
+from benchmarks.processor import processor_seconds
 from pipeline.plan import estimate
 from pipeline.study.load import load
 from pipeline.study.sweep import Case, Study
@@ -58,12 +58,10 @@ def run_program(study: Study, folder: Path, *, exact: bool) -> dict[str, Any]:
         text = text if found else f"{text}\n[solve]\nexact = false\n"
     file = folder / f"{study.name}.toml"
     file.write_text(text)
-    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    used, start = processor_seconds(), time.perf_counter()
     _epsmesh(file, folder)
-    seconds = time.perf_counter() - start
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return {"seconds": seconds, "cpu": cpu, "dataset": folder / f"{study.name}.nc"}
+    seconds, used = time.perf_counter() - start, processor_seconds() - used
+    return {"seconds": seconds, "cpu": used, "dataset": folder / f"{study.name}.nc"}
 
 
 def _epsmesh(file: Path, folder: Path) -> None:

@@ -8,7 +8,6 @@ find F_exact and an error bar on every force. The forces are compared, too. Half
 
 import json
 import os
-import resource
 import subprocess
 import sys
 import tempfile
@@ -19,20 +18,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from benchmarks.processor import processor_seconds
+
 
 def run(study: Path, folder: Path, *arguments: str) -> tuple[dict[str, float], xr.Dataset]:
     """Run ``study`` from nothing; return its seconds and the dataset."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    start = time.perf_counter()
+    used, start = processor_seconds(), time.perf_counter()
     command = [sys.executable, "-m", "pipeline", "run", str(study), "--quiet", "--output", str(folder)]
     subprocess.run(
         [*command, "--meshes", str(folder / "meshes"), *arguments],
         check=True,
         env=os.environ | {"OMP_NUM_THREADS": "1"},
     )
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return {"wall": time.perf_counter() - start, "cpu": cpu}, xr.load_dataset(folder / f"{study.stem}.nc")
+    seconds = {"wall": time.perf_counter() - start, "cpu": processor_seconds() - used}
+    return seconds, xr.load_dataset(folder / f"{study.stem}.nc")
 
 
 def main(study: Path = Path("studies/figure3.toml"), output: Path = Path("results")) -> dict[str, Any]:

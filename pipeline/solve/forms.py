@@ -122,6 +122,12 @@ def curved_cells(mesh: Any) -> BoolArray | None:
     return _curved[mesh]
 
 
+def has_curved_cells(mesh: Any) -> bool:
+    """Tell whether any rank has a curved cell; collective."""
+    curved = curved_cells(mesh)
+    return bool(mesh.comm.allreduce(curved is not None and bool(curved.any()), op=MPI.LOR))
+
+
 def _find_curved(mesh: Any) -> BoolArray | None:
     nodes = compat.geometry_dofs(mesh)
     if nodes.shape[1] == 4:

@@ -17,7 +17,7 @@ from pipeline import compat
 from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.conditions import whole_points
-from pipeline.solve.forms import curved_cells
+from pipeline.solve.forms import curved_cells, has_curved_cells
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.mixed_forms import MixedForms
 from pipeline.solve.region_space import region_wise_space
@@ -154,10 +154,9 @@ class MixedSpace:
             mass, coupling = _assemble(self.forms.mass), _assemble(self.forms.coupling)
         else:
             curved = curved_cells(self._body.mesh)
-            is_curved = self.comm.allreduce(curved is not None and bool(curved.any()), op=MPI.LOR)
             mass = straight.mass(self.pressures, curved)
             coupling = straight.coupling(self.pressures, self.displacements.dofs.space, curved)
-            if is_curved:
+            if has_curved_cells(self._body.mesh):
                 compat.add_matrix(mass, self.forms.curved_mass, [], 1.0)
                 compat.add_matrix(coupling, self.forms.curved_coupling, [], 1.0)
         self._stack.callback(mass.destroy)

@@ -9,9 +9,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline import compat
-from pipeline.arrays import BoolArray, FloatArray, Int32Array
+from pipeline.arrays import FloatArray, Int32Array
 from pipeline.mesh.distribute import BodyMesh
-from pipeline.solve.forms import ElasticForms, curved_cells
+from pipeline.solve.forms import ElasticForms, curved_cells, has_curved_cells
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.single.cycle import takes_product
 from pipeline.solve.straight import assembles, product
@@ -111,12 +111,6 @@ class Operators:
         """Lend K as a product where that is possible, else as a matrix of blocks; collective."""
         return self.lend_product(law) if self.multiplies else self.lend(law, blocked=True, shared=shared)
 
-    def _curved(self) -> BoolArray | None:
-        """Return which local cells are curved, and remember whether any of all ranks is; collective."""
-        curved = curved_cells(self._space.body.mesh)
-        self._is_curved = self._space.body.comm.allreduce(curved is not None and bool(curved.any()), op=MPI.LOR)
-        return curved
-
     @property
     def cells(self) -> CellStiffness:
         """The cells as products have them, laid out when first asked for; collective. Where :attr:`multiplies`."""
@@ -174,7 +168,8 @@ class Operators:
     def _assemble_straight(self, law: MaterialLaw, diagonal: float, mat_type: str, into: PETSc.Mat | None) -> PETSc.Mat:
         """Assemble the straight cells, which are most, the fast way, and let dolfinx add the others; collective."""
         if self._straight is None:
-            curved, regions = self._curved(), self._space.body.regions
+            self._is_curved = has_curved_cells(self._space.body.mesh)
+            curved, regions = curved_cells(self._space.body.mesh), self._space.body.regions
             self._straight = StraightStiffness(self._space.space, curved, self._space.prescribed, regions)
         matrix = self._straight.matrix(mat_type) if into is None else into
         matrix.zeroEntries()
