@@ -7,12 +7,13 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 from benchmarks.peers.figure import draw
 from benchmarks.peers.processes import MODULES, ask
-from benchmarks.peers.results import TARGETS, Run, breakdown, standings, table, to_json, truths_table
+from benchmarks.peers.results import TARGETS, Run, breakdown, medians, standings, table, to_json, truths_table
 from benchmarks.peers.settings import CONTACT_GRID, GRIDS, LADDERS, MERIDIAN, PROGRAM, Settings
 from benchmarks.peers.tasks import TASKS
 from benchmarks.peers.truth import Truth, converge, known
@@ -37,6 +38,7 @@ def main() -> int:
                 continue
             runs.append(_run(program, job, answer, truths))
             print(_line(runs[-1]), flush=True)
+    runs = medians(runs)
     found = standings(runs)
     texts = [truths_table(truths), table(found), breakdown(found)]
     if options.cpu:
@@ -63,14 +65,13 @@ def _options() -> argparse.Namespace:
 
 
 def _jobs(options: argparse.Namespace) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield which program is asked for what; scenes outside, so that a scene's times are near one another."""
-    for name in options.scenes:
+    """Yield who is asked for what: all in turn, again and again, as no machine is always as fast."""
+    for name, _ in product(options.scenes, range(options.repeats)):
         for program in options.programs:
             if not _settings(program, name, 1):
                 continue
             for threads in (1, 2) if options.two and program != "scikit-fem" else (1,):
-                job = {"scene": name, "threads": threads, "repeats": options.repeats}
-                yield program, job | {"settings": _settings(program, name, threads)}
+                yield program, {"scene": name, "threads": threads, "settings": _settings(program, name, threads)}
 
 
 def _settings(program: str, scene: str, threads: int) -> Settings:

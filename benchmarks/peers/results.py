@@ -1,7 +1,9 @@
 """What the runs say: the fastest of each program that reaches a true error, tables, JSON."""
 
+import json
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from statistics import median
 from typing import Any
 
 from benchmarks.peers.processes import PEERS
@@ -14,7 +16,7 @@ GOAL = 0.5  # this program's time over the best peer's
 
 @dataclass(frozen=True)
 class Run:
-    """One setting of one program: medians of its runs. ``error`` is relative to the truth."""
+    """One setting of one program. ``error`` is relative to the truth; ``all_seconds`` are those of every repeat."""
 
     scene: str
     program: str
@@ -26,7 +28,7 @@ class Run:
     cpu: float
     dofs: int
     parts: dict[str, float]
-    all_seconds: list[float]
+    all_seconds: tuple[float, ...] = ()
 
     def on(self, clock: str) -> float:
         """Return what it took by ``clock``: "seconds", or "cpu" (of two ranks, the first one's)."""
@@ -62,6 +64,19 @@ class Standing:
         """This program's time, asked for the accuracy, over the best peer's."""
         best = self.best_peer
         return self.asked.on(self.clock) / best.on(self.clock) if self.asked and best else None
+
+
+def medians(runs: Iterable[Run]) -> list[Run]:
+    """Return for each setting the middle one of its repeats, with the middle of their processor times."""
+    repeats: dict[str, list[Run]] = {}
+    for run in runs:
+        repeats.setdefault(json.dumps([run.scene, run.program, run.threads, run.setting]), []).append(run)
+    found = []
+    for same in repeats.values():
+        seconds = tuple(run.seconds for run in same)
+        middle = sorted(same, key=lambda run: run.seconds)[len(same) // 2]
+        found.append(replace(middle, cpu=median(run.cpu for run in same), all_seconds=seconds))
+    return found
 
 
 def standings(runs: Sequence[Run], clock: str = "seconds") -> list[Standing]:

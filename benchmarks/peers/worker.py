@@ -6,7 +6,6 @@ Libraries are loaded and each setting has run once before it is timed: cold of m
 import gc
 import json
 import os
-import statistics
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -31,21 +30,16 @@ Solve = Callable[..., Answer]
 def answers(solve: Solve, job: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield, for each of the job's settings, what ``solve(scene, threads, **setting)`` gave and what it cost.
 
-    ``seconds`` and ``cpu`` are medians of ``repeats`` runs; with ``warm`` each setting runs once before, otherwise
-    the first setting alone does.
+    With ``warm`` each setting runs once before it is timed, otherwise the first setting alone does.
     """
     scene, threads = TASKS[job["scene"]], job.get("threads", 1)
     for number, setting in enumerate(job["settings"]):
         try:
             if job.get("warm", True) or number == 0:
                 solve(scene, threads, **setting)
-            runs = [_timed(solve, scene, threads, setting) for _ in range(job.get("repeats", 1))]
+            yield {"setting": setting, **_timed(solve, scene, threads, setting)}
         except Exception as error:  # one setting that fails is no reason to lose the rest
             yield {"setting": setting, "failed": f"{type(error).__name__}: {error}"}
-            continue
-        middle = sorted(runs, key=lambda run: run["seconds"])[len(runs) // 2]
-        cpu = statistics.median(run["cpu"] for run in runs)
-        yield {"setting": setting, **middle, "cpu": cpu, "all_seconds": [run["seconds"] for run in runs]}
 
 
 def _timed(solve: Solve, scene: Task, threads: int, setting: dict[str, Any]) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from mpi4py import MPI
 
 from benchmarks.peers import figure, program, results
 from benchmarks.peers.processes import PEERS_PYTHON, ask
-from benchmarks.peers.results import Run, standings
+from benchmarks.peers.results import Run, medians, standings
 from benchmarks.peers.settings import CONTACT_GRID, GRIDS, LADDERS
 from benchmarks.peers.tasks import TASKS
 from benchmarks.peers.truth import Truth
@@ -19,7 +19,7 @@ NEEDS_PEERS = pytest.mark.skipif(not PEERS_PYTHON.exists(), reason="scripts/peer
 
 def run(who, seconds, error, threads=1, **setting):
     parts = {"mesh": 0.25 * seconds, "solve": 0.75 * seconds}
-    return Run("blade", who, threads, setting, 4.0, error, seconds, 0.5 * seconds, 1000, parts, [seconds])
+    return Run("blade", who, threads, setting, 4.0, error, seconds, 0.5 * seconds, 1000, parts)
 
 
 def test_the_fastest_within_a_true_error_counts():
@@ -73,12 +73,18 @@ def test_a_setting_that_fails_does_not_end_the_job():
             raise ValueError("no such order")
         return Answer(float(order), 10, {})
 
-    job = {"scene": "disc", "settings": [{"order": order} for order in (1, 2, 3)], "repeats": 3}
+    job = {"scene": "disc", "settings": [{"order": order} for order in (1, 2, 3)]}
     first, failed, last = answers(solve, job)
     assert (first["force"], last["force"]) == (1.0, 3.0)
     assert "no such order" in failed["failed"]
-    assert calls == [1] * 4 + [2] + [3] * 4  # each runs once before it is timed
-    assert len(first["all_seconds"]) == 3
+    assert calls == [1, 1, 2, 3, 3]  # each runs once before it is timed
+
+
+def test_of_repeats_the_middle_one_counts():
+    runs = [run("NGSolve", seconds, 0.009, order=order) for seconds in (0.2, 0.9, 0.3) for order in (3, 4)]
+    third, fourth = medians(runs)
+    assert (third.setting, fourth.setting) == ({"order": 3}, {"order": 4})
+    assert (third.seconds, third.cpu, third.all_seconds) == (0.3, 0.15, (0.2, 0.9, 0.3))
 
 
 @pytest.mark.parametrize("name", TASKS)
