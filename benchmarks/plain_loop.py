@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from threadpoolctl import threadpool_limits
 
 from benchmarks.plain_case import MOST_DIRECT, SOLVERS, Solved, solve
 from benchmarks.processor import processor_seconds
@@ -148,7 +149,8 @@ def main() -> int:
             place.mkdir()
             program[key] = run_program(study, place, exact=exact)
             print(f"this program, {key}: {program[key]['seconds']:.0f} s, {program[key]['cpu']:.0f} s cpu", flush=True)
-        solved = run_loop(cases, options.solver, options.most_direct)
+        with threadpool_limits(limits=1):
+            solved = run_loop(cases, options.solver, options.most_direct)
         deviations = compare(program["with F_exact"].pop("dataset"), solved)
     program["without F_exact"].pop("dataset")
     result = {
