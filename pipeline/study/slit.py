@@ -2,8 +2,7 @@
 
 from math import inf, isfinite
 
-import numpy as np
-
+from pipeline.shapes.arrays import np
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.contact import is_level
 from pipeline.shapes.frame import Frame

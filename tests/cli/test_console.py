@@ -69,7 +69,7 @@ def test_help_of_plot_names_every_figure(epsmesh):
 def test_help_imports_neither_solvers_nor_what_is_slow():
     code = "import sys, pipeline.cli; print(*sys.modules)"
     modules = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT).stdout
-    slow = {"dolfinx", "gmsh", "petsc4py", "mpi4py", "matplotlib", "xarray", "pandas", "rich", "jinja2"}
+    slow = {"numpy", "dolfinx", "gmsh", "petsc4py", "mpi4py", "matplotlib", "xarray", "pandas", "rich", "jinja2"}
     assert not slow & set(modules.split())
 
 

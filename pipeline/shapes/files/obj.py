@@ -1,6 +1,6 @@
 """OBJ: lines of points (v) and of facets (f); all else, textures, normals, groups, is passed over."""
 
-from pipeline.shapes.arrays import IntArray, np
+from pipeline.shapes.arrays import BoolArray, IntArray, np
 from pipeline.shapes.files.raw import Raw, is_number, limit, table, triangulate
 from pipeline.shapes.triangles import SurfaceError
 
@@ -36,12 +36,12 @@ def parse(data: bytes) -> Raw:
     return Raw(points, triangulate(points, corners, counts))
 
 
-def _rows(lines: list[bytes], chosen: np.ndarray) -> list[bytes]:
+def _rows(lines: list[bytes], chosen: BoolArray) -> list[bytes]:
     rows = [lines[k][2:] for k in np.nonzero(chosen)[0]]
     return [row.partition(b"#")[0] for row in rows] if any(b"#" in row for row in rows) else rows
 
 
-def _facets(lines: list[bytes], is_facet: np.ndarray, before: IntArray) -> tuple[IntArray, IntArray]:
+def _facets(lines: list[bytes], is_facet: BoolArray, before: IntArray) -> tuple[IntArray, IntArray]:
     """Return the corners of all facets, numbered from nought, and how many each has."""
     rows = _rows(lines, is_facet)
     if any(b"/" in row for row in rows):
