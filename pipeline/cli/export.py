@@ -7,7 +7,7 @@ import typer
 
 from pipeline import __version__
 from pipeline.cli.console import load_solvers, print_json, warning
-from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_file, of_option
+from pipeline.cli.faults import BAD_INPUT, DONE, SOME_FAILED, Fault, fail, of_file, of_option
 from pipeline.cli.words import DEFAULT_OUTPUT, File, Json, check_output, load_all
 
 # What can be exported, and how: told with a refusal.
@@ -38,9 +38,12 @@ def export(
 ) -> None:
     """Make a model that answers 1,000 times a second: forces of small tools on a box, a cylinder, or part of an organ.
 
-    Exit status 1 if its bars do not hold what they must on the touches that they are judged on.
+    Under mpirun the ranks share what there is to solve. Exit status 1 if its bars do not hold what they must on the
+    touches that they are judged on.
 
     Example: epsmesh export studies/quick.toml --accuracy 1% -o box.epsm.nc
+
+    Example: mpirun -n 2 epsmesh export studies/quick.toml -o box.epsm.nc
     """
     from pipeline.export.scope import ExportError, scope_of
     from pipeline.units import parse_quantity
@@ -60,28 +63,36 @@ def export(
     except ExportError as problem:
         fail(Fault(str(problem), file=str(file), howto=_HOWTO))
     load_solvers()
-    from mpi4py import MPI
+    from threadpoolctl import threadpool_limits
 
+    from pipeline import workflow
     from pipeline.export.export import export as make_model
     from pipeline.export.export import write
+    from pipeline.export.ranks import Ranks
     from pipeline.mesh.generate import MeshError
     from pipeline.solve.linear import SolveError
 
-    if MPI.COMM_WORLD.size > 1:
-        fail("export works in one process: start it without mpirun")
-    try:
-        exported = make_model(scope, wanted, checks, surface=surface)
-        write(exported, path, scope, file, __version__)
-    except (ExportError, OSError) as problem:
-        fail(Fault(str(problem), file=str(file), howto=_HOWTO))
-    except (MeshError, SolveError, RuntimeError) as problem:
-        fail(of_file(file, str(problem)), status=SOME_FAILED)
-    if exported.unseen:
+    comm = workflow.world()
+    ranks = Ranks(comm)
+    fault, status = Fault(""), DONE
+    # Of several ranks each is one thread: BLAS's own would take the others' cores.
+    with workflow.abort_on_exception(comm), threadpool_limits(1 if comm.size > 1 else None, user_api="blas"):
+        try:
+            exported = make_model(scope, wanted, checks, surface=surface, ranks=ranks)
+            ranks.on_first(lambda: write(exported, path, scope, file, __version__))
+        except (ExportError, OSError) as problem:
+            fault, status = Fault(str(problem), file=str(file), howto=_HOWTO), BAD_INPUT
+        except (MeshError, SolveError, RuntimeError) as problem:
+            fault, status = of_file(file, str(problem)), SOME_FAILED
+    if status != DONE:
+        fail(fault, status=status)
+    speaks = comm.rank == 0
+    if speaks and exported.unseen:
         warning(f"{path} holds no visible surface: {exported.unseen}")
     found = exported.summary(wanted) | {"file": str(path)}
-    if as_json:
+    if speaks and as_json:
         print_json(found)
-    else:
+    elif speaks:
         print(f"wrote {path}: {found['places']} places solved for, {found['coefficients']} coefficients")
         print(
             f"judged on {found['judged']} touches: {100 * found['held']:.0f} % held by their bars, largest error "

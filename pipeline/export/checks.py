@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.export.full import Full, Solver, Tool
+from pipeline.export.ranks import ALONE, Ranks
 from pipeline.realtime.model import Model
 from pipeline.stages import stage
 
@@ -59,22 +60,26 @@ class Check:
         return max(abs(self.error), self.aside) <= self.bar
 
 
+def random_touches(model: Model, count: int, seed: int, tools: Sequence[int] = (0,)) -> list[Check]:
+    """Return ``count`` random touches of a model, of ``tools`` in turn, not solved yet."""
+    rng = np.random.default_rng(seed)
+    return [random_touch(model, rng, tools[number % len(tools)]) for number in range(count)]
+
+
 @stage("checks")
-def check_touches(model: Model, solver: Solver, count: int, seed: int, tools: Sequence[int] = (0,)) -> list[Check]:
-    """Return ``count`` random touches of a model, of ``tools`` in turn, with their full solves.
+def check_touches(model: Model, solver: Solver, touches: Sequence[Check], ranks: Ranks = ALONE) -> list[Check]:
+    """Return ``touches`` of a model with their full solves; collective.
 
     Raises:
         RuntimeError: if a full solve failed.
     """
-    rng = np.random.default_rng(seed)
-    return [_check(model, solver, rng, tools[number % len(tools)]) for number in range(count)]
-
-
-def _check(model: Model, solver: Solver, rng: np.random.Generator, kind: int) -> Check:
-    asked = random_touch(model, rng, kind)
     low, high = model.table.poisson
-    (found,) = solved(model, solver, asked, [asked.poisson] if low < high else None)
-    return found
+
+    def check(asked: Check) -> Check:
+        (found,) = solved(model, solver, asked, [asked.poisson] if low < high else None)
+        return found
+
+    return ranks.in_turn(touches, check)
 
 
 def random_touch(model: Model, rng: np.random.Generator, kind: int) -> Check:

@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from pipeline.arrays import FloatArray
+from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region
 from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import BodyMesh, distribute
@@ -32,8 +33,10 @@ _ASIDE = 0.2
 
 
 @stage("export mesh")
-def coarse_mesh(case: Case, region: Region, finer: float = 1.0) -> BodyMesh:
+def coarse_mesh(case: Case, region: Region, finer: float = 1.0, ranks: Ranks = ALONE) -> BodyMesh:
     """Return a mesh of the whole body for all places of a region, elements smaller by a factor ``finer``.
+
+    The first of ``ranks`` makes it, and each has it whole.
 
     Raises:
         MeshError: if the body cannot be meshed.
@@ -48,7 +51,8 @@ def coarse_mesh(case: Case, region: Region, finer: float = 1.0) -> BodyMesh:
         length, width = 2 * region.reach[0], 2 * region.reach[1]
         probe = Blade.model_construct(shape="blade", length=length, width=width, **size)
     mesh = Mesh.model_construct(epsilon=region.margin, fine=near, coarse=max(near, far), rim=near, growth=_GROWTH)
-    return distribute(MPI.COMM_SELF, _without_quarter_points(mesh_arrays(replace(case, probe=probe, mesh=mesh), ())))
+    arrays = ranks.on_first(lambda: mesh_arrays(replace(case, probe=probe, mesh=mesh), ()))
+    return distribute(MPI.COMM_SELF, _without_quarter_points(arrays))
 
 
 def _without_quarter_points(arrays: MeshArrays) -> MeshArrays:

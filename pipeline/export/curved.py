@@ -7,6 +7,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.export.full import Solver, Tool
+from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, Scope
 from pipeline.export.tabulate import Places, ratios_of, tabulate
@@ -36,9 +37,10 @@ _OFF, _LEAST_OFF, _ALIGNED = 1.5, 1e-3, 0.1
 
 
 def curved_model(
-    scope: Scope, solver: Solver, accuracy: float, largest: float, bar: tuple[float, float, float, float], _: float
-) -> tuple[Model, float, int]:
-    """Return a model, by how much its table missed, and how many places were solved for.
+    scope: Scope, solver: Solver, accuracy: float, largest: float, bar: tuple[float, float, float, float], _: float,
+    ranks: Ranks = ALONE,
+) -> tuple[Model, float, int]:  # fmt: skip
+    """Return a model, by how much its table missed, and how many places were solved for; collective.
 
     Raises:
         ExportError: if the face is not all above the region.
@@ -52,11 +54,14 @@ def curved_model(
     known: dict[tuple[float, float], FloatArray] = {}
     told: list[float] = []
 
+    def regular(place: tuple[float, float]) -> tuple[FloatArray, list[float]]:
+        return _regular(solver, (place[0] + middle[0], place[1] + middle[1]), radius, scope, ratios)
+
     def found(places: Places, poisson: float) -> FloatArray:
-        for x, y in places:
-            if (x, y) not in known:
-                known[x, y], bars = _regular(solver, (x + middle[0], y + middle[1]), radius, scope, ratios)
-                told.extend(bars)
+        unknown = [place for place in dict.fromkeys(places) if place not in known]
+        for place, (values, bars) in zip(unknown, ranks.in_turn(unknown, regular), strict=True):
+            known[place] = values
+            told.extend(bars)
         return np.array([known[place][ratios.index(poisson)] for place in places])
 
     table, missed = tabulate(region, scope.poissons, found, _SHARE * accuracy, _SIZES, sparse=not region.is_round)

@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.export.checks import TOOLS, Check, check_touches, columns, needed, told, with_bar
+from pipeline.export.checks import TOOLS, Check, check_touches, columns, needed, random_touches, told, with_bar
 from pipeline.export.compliance import coarse_mesh, compliances
 from pipeline.export.curved import curved_model
 from pipeline.export.file import write_model
 from pipeline.export.full import Solver
+from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, Scope
 from pipeline.export.seen import seen_body
@@ -65,11 +66,11 @@ class Exported:
 
 def export(
     scope: Scope, accuracy: float, checks: int, *, margin: float = MARGIN, largest: float = LARGEST,
-    surface: bool = False,
+    surface: bool = False, ranks: Ranks = ALONE,
 ) -> Exported:  # fmt: skip
     """Return the model of a study to a relative ``accuracy``, with half of ``checks`` fitted to and half judged on.
 
-    With ``surface`` it holds what is seen of the body, too.
+    With ``surface`` it holds what is seen of the body, too. Collective: ``ranks`` share what there is to solve.
 
     Raises:
         ExportError: if the body leaves no region.
@@ -79,12 +80,12 @@ def export(
     solver = Solver(scope.sections, scope.file, scope.young, precise)
     make = _flat if scope.is_flat else curved_model
     of_table = replace(solver, accuracy=_PRECISE_TABLE * accuracy)
-    bare, missed, places = make(scope, of_table, accuracy, largest, (*_BARS, precise), margin)
+    bare, missed, places = make(scope, of_table, accuracy, largest, (*_BARS, precise), margin, ranks)
     tools = range(len(TOOLS)) if len(bare.table.tensors) else (0,)
     halves = [checks - checks // 2, checks // 2]
-    fitted, judged = (
-        check_touches(bare, solver, count, seed, tools) for count, seed in zip(halves, _SEEDS, strict=True)
-    )
+    touches = [random_touches(bare, count, seed, tools) for count, seed in zip(halves, _SEEDS, strict=True)]
+    checked = check_touches(bare, solver, [*touches[0], *touches[1]], ranks)
+    fitted, judged = checked[: halves[0]], checked[halves[0] :]
     # What is beyond the bar of a bonded tool alone is no matter of the others.
     plain = [check for check in fitted if TOOLS[check.kind] != "bonded"]
     floor = precise if scope.is_flat else told(plain, bare.bar[3])
@@ -95,27 +96,29 @@ def export(
     seen, unseen = None, ""
     if surface:
         try:
-            seen = tabulate_surface(seen_body(scope, model, margin), scope.poissons, model.origin)
+            seen = tabulate_surface(seen_body(scope, model, margin, ranks), scope.poissons, model.origin)
         except ExportError as reason:
             unseen = str(reason)
     return Exported(model, fitted, judged, missed, places, seen, unseen)
 
 
 def _flat(
-    scope: Scope, _: Solver, accuracy: float, largest: float, bar: tuple[float, float, float, float], margin: float
-) -> tuple[Model, float, int]:
-    """Return the model of a flat body, by how much its table missed, and how many places were solved for."""
+    scope: Scope, _: Solver, accuracy: float, largest: float, bar: tuple[float, float, float, float], margin: float,
+    ranks: Ranks,
+) -> tuple[Model, float, int]:  # fmt: skip
+    """Return the model of a flat body, by how much its table missed, and the number of places solved; collective."""
     assert isinstance(scope.body, Layered)
     region = Region.of(scope.body, margin)
     if min(region.reach) <= 0:
         raise ExportError("the body leaves no region: ask for a smaller margin")
-    mesh = coarse_mesh(scope.case, region)
+    mesh = coarse_mesh(scope.case, region, ranks=ranks)
     solved: list[tuple[float, float]] = []
 
     def counted(places: Places, poisson: float) -> FloatArray:
         solved.extend(places)
         tissues = scope.tissues_at(poisson)
-        return compliances(mesh, region, places, poisson, MaterialLaw(*tissues) if tissues else None)
+        law = MaterialLaw(*tissues) if tissues else None
+        return np.array(ranks.together(places, lambda some: list(compliances(mesh, region, some, poisson, law))))
 
     table, missed = tabulate(region, scope.poissons, counted, _SHARE * accuracy)
     model = Model(

@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 from pipeline.export.compliance import coarse_mesh
 from pipeline.export.curved import curved_region
+from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, Scope
 from pipeline.export.surface import Pressed
@@ -30,8 +31,8 @@ _BLUNT, _NEXT = 0.1, 0.5
 _STRAIGHT_ABOVE = 0.9
 
 
-def seen_body(scope: Scope, model: Model, margin: float) -> Pressed:
-    """Return the body of a model, with the forces on its face.
+def seen_body(scope: Scope, model: Model, margin: float, ranks: Ranks = ALONE) -> Pressed:
+    """Return the body of a model, with the forces on its face; collective.
 
     Raises:
         ExportError: if part of it lies above its own region.
@@ -48,11 +49,11 @@ def seen_body(scope: Scope, model: Model, margin: float) -> Pressed:
         def on_plane(place: tuple[float, float], poisson: float) -> PointForce:
             return PointForce(poisson, (*place, 0.0), region.room(*place))
 
-        return Pressed(coarse_mesh(scope.case, region), region, on_plane, law)
-    return _curved(scope, model, law)
+        return Pressed(coarse_mesh(scope.case, region, ranks=ranks), region, on_plane, law, ranks=ranks)
+    return _curved(scope, model, law, ranks)
 
 
-def _curved(scope: Scope, model: Model, law: Law) -> Pressed:
+def _curved(scope: Scope, model: Model, law: Law, ranks: Ranks) -> Pressed:
     radius = scope.case.probe.circumradius
     region = curved_region(scope, model.thickness)
 
@@ -62,17 +63,17 @@ def _curved(scope: Scope, model: Model, law: Law) -> Pressed:
         first, second, third = ((float(a), float(b), float(c)) for a, b, c in spot.turn)
         return PlacedForce(poisson, (x, y, z), region.room(*place), (first, second, third), _BLUNT * radius)
 
-    mesh = _mesh(scope, region, radius)
+    mesh = _mesh(scope, region, radius, ranks)
     points = np.asarray(mesh.mesh.geometry.x)
     corners = [(x * region.reach[0], y * region.reach[1]) for x in (-0.7, 0.0, 0.7) for y in (-0.7, 0.0, 0.7)]
     if max(on_face(place, scope.poisson).above(points) for place in corners) > _STRAIGHT_ABOVE:
         raise ExportError("part of the body lies above its own region, so that what is seen of it is not known")
-    return Pressed(mesh, region, on_face, law, _NEXT * radius)
+    return Pressed(mesh, region, on_face, law, _NEXT * radius, ranks)
 
 
-def _mesh(scope: Scope, region: Region, radius: float) -> BodyMesh:
+def _mesh(scope: Scope, region: Region, radius: float, ranks: Ranks) -> BodyMesh:
     """Return a mesh that is fine enough in the region for loads that grow towards a force, and to be looked at."""
     around, fine = _AROUND * max(region.reach), _IN_REGION * radius
     coarse = max(fine, _ELSEWHERE * scope.body.volume ** (1 / 3))
     mesh = Mesh.model_construct(epsilon=around, fine=fine, coarse=coarse, rim=fine, growth=_GROWTH)
-    return distribute(MPI.COMM_SELF, mesh_arrays(replace(scope.case, mesh=mesh), ()))
+    return distribute(MPI.COMM_SELF, ranks.on_first(lambda: mesh_arrays(replace(scope.case, mesh=mesh), ())))

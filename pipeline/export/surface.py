@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.arrays import FloatArray, IntArray
+from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.realtime.surface import SurfaceTable
@@ -53,7 +54,7 @@ class Pressed:
     """A meshed body whose ``region`` of the face is pressed on, and the forces that do so, of a Poisson's ratio.
 
     ``law`` tells the tissues in units of μ at the face, where they are several, for its Poisson's ratio. R is not
-    judged ``next`` (m) to a force.
+    judged ``next`` (m) to a force. Each of ``ranks`` has the whole mesh, and solves for some of the places.
     """
 
     mesh: BodyMesh
@@ -61,14 +62,23 @@ class Pressed:
     force: Callable[[Place, float], PointForce]
     law: Callable[[float], MaterialLaw | None] = lambda _: None
     next: float = 0.0
+    ranks: Ranks = ALONE
 
     def solve(self, places: Sequence[Place], poisson: float) -> OnBoundary:
-        """Return R (m/N, E = 1) for a force at each place."""
-        forces = [self.force(place, poisson) for place in places]
-        found = regular_on_boundary(self.mesh, forces, self.law(poisson))
-        # Of a unit of the field, 4πμ times the radius newtons, and E = 2 (1 + ν) μ.
-        scales = np.array([2 * (1 + poisson) / (4 * pi * force.radius) for force in forces])
-        return OnBoundary(found.nodes, found.triangles, scales[:, None, None] * found.values)
+        """Return R (m/N, E = 1) for a force at each place; collective."""
+        # All ranks number the boundary alike: their meshes are one.
+        boundary: list[OnBoundary] = []
+
+        def solve(some: Sequence[Place]) -> list[FloatArray]:
+            forces = [self.force(place, poisson) for place in some]
+            boundary.append(regular_on_boundary(self.mesh, forces, self.law(poisson)))
+            # Of a unit of the field, 4πμ times the radius newtons, and E = 2 (1 + ν) μ.
+            scales = np.array([2 * (1 + poisson) / (4 * pi * force.radius) for force in forces])
+            return list(scales[:, None, None] * boundary[0].values)
+
+        values = np.array(self.ranks.together(places, solve))
+        # The first rank has a share of whatever there is.
+        return replace(self.ranks.on_first(lambda: boundary[0]), values=values)
 
 
 @stage("far field")

@@ -1,0 +1,89 @@
+"""An export on several ranks: they share the work, and what they make of it is what one alone makes."""
+
+from dataclasses import replace
+from itertools import chain
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from pipeline.export import surface
+from pipeline.export.curved import curved_model
+from pipeline.export.export import export
+from pipeline.export.ranks import ALONE, Ranks
+from pipeline.export.scope import scope_of
+from tests.export.test_export import CYLINDER, DOME, SOFT, Known, study
+
+pytestmark = pytest.mark.mpi
+WORLD = Ranks(MPI.COMM_WORLD)
+SHARES = ["together", "in_turn"]
+several = pytest.mark.skipif(WORLD.comm.size == 1, reason="one rank agrees with itself")
+
+
+def squares(share: str, count: int, ranks: Ranks = WORLD) -> tuple[list[int], list[int]]:
+    """Return the squares of 0, 1, …, and those of which this rank was asked."""
+    own: list[int] = []
+
+    def square(number: int) -> int:
+        own.append(number)
+        if number == 5:
+            raise ValueError("five")
+        return number**2
+
+    if share == "in_turn":
+        return ranks.in_turn(range(count), square), own
+    return ranks.together(range(count), lambda some: [square(number) for number in some]), own
+
+
+@pytest.mark.parametrize("share", SHARES)
+@pytest.mark.parametrize("count", [0, 1, 5])
+def test_each_item_is_one_ranks_and_all_have_what_came_of_it(share, count):
+    found, own = squares(share, count)
+    assert found == [n**2 for n in range(count)]
+    assert sorted(chain(*WORLD.comm.allgather(own))) == list(range(count))
+
+
+@pytest.mark.parametrize("share", SHARES)
+def test_what_fails_on_one_rank_is_raised_on_all(share):
+    with pytest.raises((ValueError, RuntimeError), match="five") as raised:
+        squares(share, 7)
+    # Once as itself, where it was met.
+    assert WORLD.comm.allreduce(raised.type is ValueError) == 1
+    with pytest.raises(ValueError if WORLD.comm.rank == 0 else RuntimeError, match="first"):
+        WORLD.on_first(lambda: int("first"))
+    assert WORLD.on_first(lambda: WORLD.comm.rank) == 0
+
+
+@several
+def test_ranks_that_ask_for_different_work_are_told_so():
+    with pytest.raises(RuntimeError, match="do not agree"):
+        squares("together", 3 + WORLD.comm.rank)
+
+
+@several
+def test_ranks_make_the_model_that_one_makes(monkeypatch):
+    for name, value in (("_SIZE", 2), ("_HELD_OUT", 1), ("_POISSONS", 2)):
+        monkeypatch.setattr(surface, name, value)
+    scope = replace(scope_of(study()), sections={"body": CYLINDER, "material": SOFT})
+    found, alone = (export(scope, 0.1, 4, margin=0.5, surface=True, ranks=ranks) for ranks in (WORLD, ALONE))
+    assert found.places == alone.places
+    assert found.model.bar == pytest.approx(alone.model.bar, rel=1e-6)
+    for name in ("reciprocal", "curvature", "tensors"):
+        numbers, known = (getattr(made.model.table, name) for made in (found, alone))
+        assert np.abs(numbers - known).max() <= 1e-8 * np.abs(known).max()
+    for one, other in zip(found.fitted + found.judged, alone.fitted + alone.judged, strict=True):
+        assert (one.x, one.y, one.tool, one.full) == (other.x, other.y, other.tool, pytest.approx(other.full, rel=1e-8))
+    place = (0.3 * found.model.table.reach[0], 0.0, 0.4)
+    far, known = found.surface.far(*place), alone.surface.far(*place)
+    assert np.abs(far - known).max() <= 1e-4 * np.abs(known).max()
+
+
+@several
+def test_discs_on_a_curved_body_are_shared_out():
+    scope = scope_of(study(body=DOME))
+    (found, *counts), (alone, *known) = (
+        curved_model(scope, Known(10e3), 0.01, 0.4, (1e-3, 0.03, 0.1, 1e-3), 0.0, ranks) for ranks in (WORLD, ALONE)
+    )
+    assert counts == known
+    assert np.array_equal(found.table.reciprocal, alone.table.reciprocal)
+    assert np.array_equal(found.table.curvature, alone.table.curvature)
