@@ -10,10 +10,33 @@ import typer
 
 from pipeline.cli import app
 from pipeline.plan.plan import make_plan
+from pipeline.quantities import attributes
 from pipeline.report.dataset import build
 from pipeline.study.keys import SECTION_TEXTS, all_sections, heading, keys_of
 from pipeline.study.load import parse
 from pipeline.study.starter import starter
+
+# Studies that together have every variable: changes of the one that `epsmesh new` writes.
+_VARIANTS: tuple[dict[str, dict[str, Any]], ...] = (
+    {
+        "probe": {"motion": "all"},
+        "mesh": {"outside": "coarse"},
+        "load": {"traction": [{"on": "sides", "pressure": "1 kPa"}]},
+    },
+    {"probe": {"contact": "unilateral"}},
+    {
+        "probe": {
+            "shape": "blade",
+            "action": "cut",
+            "length": "8 mm",
+            "width": "1 mm",
+            "depth": "0.2 mm",
+            "incision": "4 mm",
+        },
+        "mesh": {"outside": "coarse"},
+    },
+    {"material": {"poisson": 0.3, "law": ["linear", "neo-hookean"]}, "solve": {"exact": False}},
+)
 
 
 def write_reference(folder: Path) -> None:
@@ -30,9 +53,10 @@ def study_page() -> str:
     lines = [
         "# Study file", "",
         "TOML. A list where one value is expected is a sweep, and a dimension of the dataset; so is an array of tables "
-        "(`[[probe]]`), labelled by the tables' `name`. Quantities are text, one number and one unit (`\"10 mm\"`, "
-        "`\"12 kPa\"`, `\"1 %\"`): prefixes of metre and pascal, `bar`, and `%`; of loads kg/m^3 and m/s^2. A decimal "
-        "comma, a ±, or anything that would have to be calculated is an error. `title` stands before the sections.",
+        "(`[[body]]`, `[[material]]`, `[[probe]]`, `[[mesh]]`), labelled by the tables' `name`. Quantities are text, "
+        "one number and one unit (`\"10 mm\"`, `\"12 kPa\"`, `\"1 %\"`, `\"60 deg\"`): metre and pascal with their "
+        "prefixes, `bar`, `%`, `deg` and `rad`; of loads kg/m^3 and m/s^2. A decimal comma, a ±, or a sum is an error. "
+        "`title` stands before the sections.",
     ]  # fmt: skip
     for section in all_sections():
         lines += [
@@ -53,24 +77,27 @@ def study_page() -> str:
 
 def dataset_page() -> str:
     """Return the page of every variable of a dataset."""
-    study = tomllib.loads(starter("study"))
-    study["probe"]["motion"] = "all"
-    study["mesh"]["outside"] = "coarse"
-    study["load"] = {"traction": [{"on": "sides", "pressure": "1 kPa"}]}
-    dataset = build(make_plan(parse(study)), {})
+    found: dict[str, dict[str, Any]] = {"body_message": attributes("body_message")}  # of files that were mended alone
+    for changes in _VARIANTS:
+        study = tomllib.loads(starter("study"))
+        for section, keys in changes.items():
+            study[section] = keys if "shape" in keys else study.get(section, {}) | keys
+        found |= {name: variable.attrs for name, variable in build(make_plan(parse(study)), {}).data_vars.items()}
     lines = [
         "# Dataset", "",
         "`results/<study>.nc`: netCDF4, SI units, CF attributes. Its dimensions are what the study sweeps, in the "
         "file's order, with coordinates named like the keys of `body`, `material`, `probe` and `mesh`. An array of "
-        "tables gives the dimension `probe` or `body`; a radius or shape is `probe_radius`, `body_radius`; a key of a "
-        "layer or an inclusion has its name before it, `skin_young`. A path gives the dimension `path`, a raster "
-        "`x` and `y`: lengths in m, and `at_x`, `at_y` and `at_z` are then coordinates. `epsilon` is infinite for the "
-        "full order.", "",
+        "tables gives the dimension `body`, `material`, `probe` or `mesh`; a radius or shape is `probe_radius`, "
+        "`body_radius`; a key of a layer or an inclusion has its name before it, `skin_young`. A path gives the "
+        "dimension `path`, a raster `x` and `y`: lengths in m, and `at_x`, `at_y` and `at_z` are then coordinates. "
+        "`epsilon` is infinite for the full order.", "",
+        "What belongs to loads, slits, unilateral contact, `motion = \"all\"`, several laws or a mended file is there "
+        "only where the study has it.", "",
         *_table(("variable", "unit", "meaning")),
     ]  # fmt: skip
-    for name, variable in sorted(dataset.data_vars.items()):
-        unit = variable.attrs.get("units", "text")
-        lines.append(_row(f"`{name}`", "" if unit == "1" else unit, variable.attrs.get("long_name", "")))
+    for name, attrs in sorted(found.items()):
+        unit = attrs.get("units", "text")
+        lines.append(_row(f"`{name}`", "" if unit == "1" else unit, attrs.get("long_name", "")))
     lines += [
         "", "Values are missing (NaN; -1 for counts) where a case failed, was skipped or has not been run. Where a "
         "path has left the body, `status` is `lost` and `force` 0.", "",

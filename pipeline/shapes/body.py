@@ -32,7 +32,11 @@ class Body(Section, ABC):
     shape: Annotated[str, Words("Shape of the body.", '"box"', is_used=True)]
     fixed: Annotated[
         Fixed,
-        Words("Where the body is held: on its bottom, its sides, both, or everywhere below a height.", '"bottom"'),
+        Words(
+            "Where the body is held: on its bottom, its sides, both, or everywhere below a height.",
+            '"bottom"',
+            takes='"bottom" | "sides" | "bottom+sides" | {below = length}',
+        ),
     ] = "bottom"
     inclusion: Annotated[
         tuple[Inclusion, ...], Words("Balls and ellipsoids inside it, of another material.", "[[body.inclusion]]")

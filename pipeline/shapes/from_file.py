@@ -32,7 +32,12 @@ class FromFile(Facetted):
     if TYPE_CHECKING:
         file: str  # not here, or it were checked before the fields that say how it is read
     fixed: Annotated[
-        Fixed, Words("Where it is held: everywhere below a height, in the file's own frame.", '{below = "-40 mm"}')
+        Fixed,
+        Words(
+            "Where it is held: everywhere below a height, in the file's own frame.",
+            '{below = "-40 mm"}',
+            takes="{below = length}",
+        ),
     ]
 
     _loaded: Loaded = PrivateAttr()

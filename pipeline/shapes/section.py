@@ -9,7 +9,7 @@ from pydantic_core import PydanticCustomError
 
 @dataclass(frozen=True)
 class Words:
-    """What a key means, an example in TOML, and what its default is where the model has no plain value for it.
+    """What a key means, an example in TOML, and its default and what it takes where the model does not tell.
 
     Stands in the annotation of a field; the reference and the studies that ``epsmesh new`` begins are made of it.
     """
@@ -18,6 +18,7 @@ class Words:
     example: str
     default: str = ""
     is_used: bool = False  # in the study that `epsmesh new` writes
+    takes: str = ""
 
 
 class Section(BaseModel):

@@ -118,8 +118,8 @@ def _takes(model: type[Section], name: str) -> str:
     """Say what a key takes, as far as its type tells."""
     if name == "epsilon":
         return 'length > 0 | "full"'
-    if name == "fixed":
-        return '"bottom" | "sides" | "bottom+sides" | {below = length}'
+    if own := words_of(model, name).takes:
+        return own
     if name == "on":
         return 'face | "free" | {around = 3 lengths, radius = length}'
     field = model.model_fields[name]

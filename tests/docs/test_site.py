@@ -47,6 +47,20 @@ def test_every_variable_of_a_dataset_has_units_and_a_meaning_and_is_in_the_refer
         assert f">{name}<" in page
 
 
+@pytest.mark.parametrize(
+    "name", ["contact_area", "energy_release_ratio", "load_force", "linear_ratio", "stiffness", "body_message"]
+)
+def test_variables_that_few_studies_have_are_in_the_reference(site, name):
+    assert f">{name}<" in reference(site, "dataset")
+
+
+def test_what_holds_a_body_is_told_of_each_kind_of_body():
+    takes = {shape: key.takes for key in keys_of("body") if key.name == "fixed" for shape in key.shapes}
+    assert takes["surface"] == takes["ellipsoid"] == "{below = length}"
+    assert "face" in takes["cad"]
+    assert "bottom" in takes["box"]
+
+
 def test_every_command_and_option_has_help_and_is_in_the_reference(site):
     import typer
 

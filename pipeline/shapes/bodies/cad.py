@@ -60,7 +60,11 @@ class FromCad(FromFile):
     fixed: Annotated[
         Below | NamedFace,
         BeforeValidator(_held),
-        Words("Where it is held: everywhere below a height of the file, or on faces by a name.", '{face = "base"}'),
+        Words(
+            "Where it is held: everywhere below a height of the file, or on faces by a name.",
+            '{face = "base"}',
+            takes="{below = length} | {face = text}",
+        ),
     ]  # type: ignore[assignment]
 
     _loaded: Solid = PrivateAttr()

@@ -43,7 +43,7 @@ class Ellipsoid(Drawn):
     ]
     fixed: Annotated[
         Below, BeforeValidator(_below),
-        Words("Where the body is held: everywhere below a height.", '{below = "-6 mm"}'),
+        Words("Where the body is held: everywhere below a height.", '{below = "-6 mm"}', takes="{below = length}"),
     ]  # fmt: skip
 
     @property
