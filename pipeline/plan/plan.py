@@ -4,7 +4,7 @@ from collections.abc import Collection
 from dataclasses import replace
 
 from pipeline.plan.key import case_key, normalised, reference_key
-from pipeline.plan.recipe import meshes_for
+from pipeline.plan.recipe import rungs_for
 from pipeline.plan.reductions import REDUCTIONS, strike_stored
 from pipeline.plan.shard import Shard, take
 from pipeline.plan.steps import Solve
@@ -67,7 +67,7 @@ def make_plan(
 def first_attempts(plan: Plan) -> Plan:
     """Return the plan in which every goal has its first mesh, and the others in reserve."""
     solves = (
-        replace(solve, later=meshes_for(solve.case, solve.goal)).again() if solve.goal and not solve.later else solve
+        replace(solve, later=rungs_for(solve.case, solve.goal)).again() if solve.goal and not solve.later else solve
         for solve in plan.solves
     )
     return replace(plan, solves=tuple(solves))
@@ -110,7 +110,7 @@ def ask_for_exact(plan: Plan) -> Plan:
 def _reference(key: str, case: Case, accuracy: float) -> Solve:
     mesh = Mesh.model_construct({"accuracy"}, accuracy=accuracy)
     whole = replace(normalised(case), mesh=mesh, solve=Solving())
-    solve = Solve(key, whole, goal=accuracy, later=meshes_for(whole, accuracy), is_reference=True).again()
+    solve = Solve(key, whole, goal=accuracy, later=rungs_for(whole, accuracy), is_reference=True).again()
     if is_round(whole):
         return replace(solve, axisymmetric=True)
     return replace(solve, mirrors=model_planes(whole))

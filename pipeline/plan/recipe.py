@@ -31,6 +31,14 @@ class Recipe:
     bar: float
 
 
+@dataclass(frozen=True)
+class Rung:
+    """The mesh settings that a recipe gives for a case, and the relative error bar to expect of them there."""
+
+    mesh: Mesh
+    bar: float
+
+
 LADDER = (
     Recipe(2, 0.4, 0.7, 4.6e-3),
     Recipe(2, 0.3, 0.6, 3.2e-3),
@@ -89,26 +97,30 @@ _LOCKING = 0.35
 _SLIDE = 0.8
 # A bar is expected to be met if the mesh should give this share of it. One that misses is followed by one that should
 # have a bar smaller by this factor at least: rungs in between are to begin with.
-_MARGIN, _STEP = 0.9, 1.4
+MARGIN, _STEP = 0.9, 1.4
 # Elements between the probe's edge and a held face beside it.
 _ACROSS_GAP = 3
 # Elements through the thickness of a layer, near the probe.
 _THROUGH = 2
 
 
-def meshes_for(case: Case, accuracy: float) -> tuple[Mesh, ...]:
-    """Return the mesh settings to try, in turn, for a relative error of F below ``accuracy``.
+def rungs_for(case: Case, accuracy: float) -> tuple[Rung, ...]:
+    """Return the meshes to try, in turn, for a relative error of F below ``accuracy``.
 
     What the study file gives of rim, growth, degree and sizes is kept.
     """
     ladder = _ladder(case)
     expected = [_expected(case, recipe) for recipe in ladder]
-    first = next((i for i, bar in enumerate(expected) if bar <= _MARGIN * accuracy), len(ladder) - 1)
+    first = next((i for i, bar in enumerate(expected) if bar <= MARGIN * accuracy), len(ladder) - 1)
     tried = [first]
     for number in range(first + 1, len(ladder)):
         if _STEP * expected[number] <= expected[tried[-1]] or number == len(ladder) - 1:
             tried.append(number)
-    return tuple(dict.fromkeys(_mesh(case, ladder[number]) for number in tried))
+    rungs: dict[Mesh, Rung] = {}
+    for number in tried:  # several recipes give one mesh where the study gives the rest
+        rung = Rung(_mesh(case, ladder[number]), expected[number])
+        rungs.setdefault(rung.mesh, rung)
+    return tuple(rungs.values())
 
 
 def _ladder(case: Case) -> tuple[Recipe, ...]:

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Collection, Hashable
 from dataclasses import dataclass, replace
+from math import nan
 
 from pipeline.plan.key import mesh_key, operator_key
-from pipeline.study.schema import Mesh
+from pipeline.plan.recipe import MARGIN, Rung
 from pipeline.study.sweep import Case
 
 # From so many depths of found contact on a small body on, the body is condensed to the surface that may touch.
@@ -19,8 +20,9 @@ class Solve:
 
     ``mirrors`` are the planes of symmetry ("x": x = 0) that leave half or a quarter of the body to be solved;
     ``axisymmetric`` leaves the meridian; ``reduced`` may be answered from a reduced basis. A case with a ``goal``, the
-    relative error asked for, is tried again with the meshes of ``later`` until its error bar is below it. ``stands``
-    is where the probe of the case stands whose mesh it shares, if that is elsewhere on the body.
+    relative error asked for, is tried again with the meshes of ``later`` until its error bar is below it; ``expected``
+    is the bar to expect of its present mesh. ``stands`` is where the probe of the case stands whose mesh it shares, if
+    that is elsewhere on the body.
     """
 
     key: str
@@ -29,7 +31,8 @@ class Solve:
     mirrors: tuple[str, ...] = ()
     axisymmetric: bool = False
     goal: float | None = None
-    later: tuple[Mesh, ...] = ()
+    later: tuple[Rung, ...] = ()
+    expected: float = nan
     is_reference: bool = False
     reduced: bool = False
     stands: tuple[float, ...] | None = None
@@ -46,9 +49,18 @@ class Solve:
         """What people call it."""
         return f"F_exact of {self.case}" if self.is_reference else str(self.case)
 
-    def again(self) -> "Solve":
-        """Return the next attempt at the goal."""
-        return replace(self, case=replace(self.case, mesh=self.later[0]), later=self.later[1:])
+    def again(self, bar: float = nan) -> "Solve":
+        """Return the next attempt at the goal.
+
+        If the last one came to an error ``bar``, meshes that would miss the goal if theirs were as much more than
+        expected are passed over, where there is one that would not.
+        """
+        more, goal = bar / self.expected, self.goal or 0.0
+        serves = (number for number, rung in enumerate(self.later) if more * rung.bar <= MARGIN * goal)
+        number = next(serves, 0)
+        rung = self.later[number]
+        case = replace(self.case, mesh=rung.mesh)
+        return replace(self, case=case, later=self.later[number + 1 :], expected=rung.bar)
 
 
 @dataclass(frozen=True)

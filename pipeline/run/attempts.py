@@ -25,7 +25,7 @@ class Attempts:
             return record
         if record.is_ok and record.force_error > solve.goal and solve.later:
             self._earlier.setdefault(solve.key, []).append(record)
-            self._again.append(solve.again())
+            self._again.append(solve.again(record.force_error))
             return None
         return _concluded(solve, record, self._earlier.pop(solve.key, []))
 

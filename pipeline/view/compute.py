@@ -63,7 +63,7 @@ def compute_fields(
             fields, proved = _attempt(solve, comm, bar, cache, note)
             if solve.goal is None or 0 <= proved <= solve.goal or not solve.later:
                 return fields
-            solve = solve.again()
+            solve = solve.again(proved)
 
 
 def _attempt(

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from pipeline.plan.key import case_key, reference_key
 from pipeline.plan.plan import make_plan
-from pipeline.plan.recipe import meshes_for
+from pipeline.plan.recipe import rungs_for
 from pipeline.report.dataset import build
 from pipeline.run.execute import compute
 from pipeline.run.measure import is_graded_to_contact
@@ -84,7 +84,7 @@ def test_records_whose_bars_may_be_too_small_are_not_used():
 @pytest.mark.parametrize("accuracy", [0.03, 0.01, 0.002])
 def test_meshes_that_follow_one_that_missed_are_clearly_better(accuracy):
     case = parse({**raw(), "mesh": {"accuracy": f"{100 * accuracy} %"}}).case(())
-    meshes = meshes_for(case, accuracy)
+    meshes = [rung.mesh for rung in rungs_for(case, accuracy)]
     assert all(finer.rim < mesh.rim or finer.degree > mesh.degree for mesh, finer in pairwise(meshes))
     bars = [0.75 * mesh.rim / case.probe.half_width / 2 ** (2 * (mesh.degree - 2)) for mesh in meshes]
     assert all(bar <= 0.8 * earlier for earlier, bar in pairwise(bars))
@@ -97,14 +97,14 @@ def test_a_slender_body_takes_a_coarser_mesh():
     def rim(**body):
         slender = {"size": ["18 mm", "18 mm", "80 mm"], **body}
         case = parse({**raw(body=slender), "mesh": {"accuracy": "0.3 %"}}).case(())
-        return meshes_for(case, 0.003)[0].rim
+        return rungs_for(case, 0.003)[0].mesh.rim
 
     assert rim() > rim(fixed="bottom+sides")
 
 
 def test_a_mesh_that_misses_is_followed_by_a_better_one(monkeypatch):
     """Recipes that promise too much are found out by the error bar, and the next one is tried."""
-    monkeypatch.setattr("pipeline.plan.recipe._MARGIN", 1e3)
+    monkeypatch.setattr("pipeline.plan.recipe.MARGIN", 1e3)
     _, records = run(mesh={"accuracy": "0.1 %"})
     (record,) = records.values()
     assert record.status == "ok"
@@ -159,7 +159,7 @@ def test_meshes_for_found_contact_are_graded_to_where_it_ends(depth):
     """The coarsest is at the limit of what is, whatever rounding does; one as coarse beside the footprint is not."""
     ball = {"shape": "sphere", "radius": "9 mm", "depth": f"{depth} mm"}
     case = parse({**raw(probe=ball), "mesh": {"accuracy": "2 %"}}).case(())
-    assert all(is_graded_to_contact(replace(case, mesh=mesh)) for mesh in meshes_for(case, 0.02))
+    assert all(is_graded_to_contact(replace(case, mesh=rung.mesh)) for rung in rungs_for(case, 0.02))
     coarse = case.mesh.model_copy(update={"rim": 0.39 * case.probe.half_width, "growth": 0.5})
     assert not is_graded_to_contact(replace(case, mesh=coarse))
 
@@ -168,7 +168,7 @@ def test_round_bodies_are_meshed_more_finely_before_elements_of_degree_3_are_tak
     """These have wider bars there in the same time, which on the plane top of a box they do not."""
     ball = {"shape": "ellipsoid", "axes": ["40 mm", "30 mm", "20 mm"], "fixed": {"below": "-8 mm"}}
     degrees = [
-        [mesh.degree for mesh in meshes_for(parse({**raw(**body), "mesh": {"accuracy": "2 %"}}).case(()), 0.02)]
+        [rung.mesh.degree for rung in rungs_for(parse({**raw(**body), "mesh": {"accuracy": "2 %"}}).case(()), 0.02)]
         for body in ({}, {"body": ball})
     ]
     assert degrees == [sorted(each) for each in degrees]

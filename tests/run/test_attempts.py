@@ -82,10 +82,24 @@ def test_no_force_is_relied_on_whose_bar_is_as_large_as_itself(solve):
 
 
 def test_attempts_go_on_until_the_bar_is_small_and_all_their_time_counts():
-    found = judged(asked(), record(0.02), record(0.01), record(0.002))
+    found = judged(asked(), record(0.005), record(0.004), record(0.002))
     assert (found.status, found.force_error, found.time_error) == ("ok", 0.002, 0.0)
     assert found.time_solve == 3 * 1.5
     assert found.observation() is None
+
+
+def test_meshes_that_would_miss_by_as_much_are_passed_over():
+    """What the first mesh missed by is known of the others, too: none is solved on that it tells to be too coarse."""
+    solve = asked()
+    first, expected = solve.later[0], [rung.bar for rung in solve.later]
+    assert solve.again(1.01 * solve.expected).case.mesh == first.mesh
+    # As far above what was expected as leaves the third to come the first that serves.
+    more = 0.89 * solve.goal / expected[2]
+    found = solve.again(more * solve.expected)
+    assert (found.case.mesh, found.expected) == (solve.later[2].mesh, expected[2])
+    assert found.later == solve.later[3:]
+    # Where none serves, nothing is left out.
+    assert solve.again(1e3 * solve.expected).later == solve.later[1:]
 
 
 def test_an_accuracy_that_is_missed_for_another_reason_says_both():
