@@ -114,13 +114,13 @@ stress: setup ## numerical stability: a matrix of extremes (10 minutes)
 fuzz: setup ## eight thousand study files, and damaged surfaces, datasets, stores and models (half an hour)
 	EPSMESH_FUZZ=$(FUZZ) $(MPI_ENV) $(PYTHON) -m pytest tests/fuzz -q $(PYTEST_ARGS)
 
-soak: setup ## 20,000 cases on 2,000 meshes in one run: memory and pace stay flat (half an hour; SOAK_ARGS=2000: a part)
+soak: setup ## 20,000 cases on 2,000 meshes in one run: memory and pace stay flat (a quarter of an hour; SOAK_ARGS=2000: a part)
 	$(MPI_ENV) $(PYTHON) -m benchmarks.soak $(SOAK_ARGS)
 
 faults: setup ## runs killed at a hundred moments: nothing finished is lost (half an hour; FAULTS_ARGS=20: fewer)
 	$(MPI_ENV) $(PYTHON) -m benchmarks.faults $(FAULTS_ARGS)
 
-mutants: setup ## wrong numbers on purpose, each is noticed (an hour; MUTANTS_ARGS=--continue): results/mutants.md
+mutants: setup ## wrong numbers on purpose, each is noticed (a quarter of an hour; MUTANTS_ARGS=--continue): results/mutants.md
 	$(MPI_ENV) $(PYTHON) -m benchmarks.mutants $(MUTANTS_ARGS)
 
 lint: setup ## ruff, mypy, the layers of the imports, and whether the list of mutants fits the code
