@@ -186,8 +186,9 @@ def _scaled(record: Record | None, scale: Scale) -> Record | None:
     if record is None or record.is_ok:
         return record.scaled(scale) if record else None
     return replace(
-        record, force=nan, force_vector=(nan, nan, nan), energy=nan, energy_release=nan, max_strain=nan, balance=nan,
-        contact_area=nan, contact_radius=nan, load_force=nan, load_force_error=nan, load_energy=nan, sag=nan,
+        record, force=nan, force_vector=(nan, nan, nan), force_vector_error=(nan, nan, nan), stiffness=(),
+        stiffness_error=(), energy=nan, energy_release=nan, max_strain=nan, balance=nan, contact_area=nan,
+        contact_radius=nan, load_force=nan, load_force_error=nan, load_energy=nan, sag=nan,
         load_force_vector=(nan, nan, nan),
     )  # fmt: skip
 

@@ -8,6 +8,7 @@ from pipeline.plan.steps import Solve
 from pipeline.run.measure import turned_back
 from pipeline.run.problem import loads_of
 from pipeline.run.record import Record
+from pipeline.shapes.frame import Vector
 from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.reduced_basis import Reduced, ReducedBasis
 
@@ -54,7 +55,16 @@ def _source(solve: Solve, solved: dict[float, Record]) -> Record:
     neighbours = above + below
     bars = [record.force_error for record in neighbours]
     message = next((record.message for record in neighbours if record.message), "")
-    return replace(neighbours[0], force_error=nan if any(map(isnan, bars)) else max(bars), message=message)
+    nearest, bar = neighbours[0], nan if any(map(isnan, bars)) else max(bars)
+    vector = _vector_bars(nearest, bar * abs(nearest.force))
+    return replace(nearest, force_error=bar, force_vector_error=vector, message=message)
+
+
+def _vector_bars(record: Record, bar: float) -> Vector:
+    """Return the bars (N) on the components of a record's force if that along its axis has the ``bar`` (N)."""
+    own = record.force_error * abs(record.force)
+    x, y, z = (component and component * bar / own for component in record.force_vector_error)
+    return x, y, z
 
 
 def _ratio(solve: Solve) -> float:
@@ -68,9 +78,10 @@ def _record(
     """Return the record of an evaluation, which is for μ = 1."""
     scale, (_, mu) = solve.case.scale, solve.case.material.lame
     x, y, z = (mu * component for component in reduced.response.force)
+    bar = source.force_error + reduced.bound
     return replace(
         source, key=solve.key, origin="reduced", young=scale.stress, depth=scale.length, force=z,
         force_vector=turned_back(solve.case.frame.turn, (x, y, z)),
-        force_error=source.force_error + reduced.bound, energy=mu * reduced.response.energy,
+        force_error=bar, force_vector_error=_vector_bars(source, bar * abs(z)), energy=mu * reduced.response.energy,
         max_strain=problem.largest_strain(basis.displacement(reduced)), balance=reduced.bound, iterations=0,
     )  # fmt: skip

@@ -19,6 +19,7 @@ from pipeline.solve.solution import Solution
 from pipeline.study.sweep import Case
 
 _ROUNDING = 1e-9
+BARS = ("force_error", "force_vector_error", "stiffness_error", "energy_release_error", "load_force_error")
 TIMES = ("time_mesh", "time_assemble", "time_setup", "time_solve")
 
 

@@ -22,7 +22,7 @@ from pipeline.run.attempts import Attempts
 from pipeline.run.basis import reduced_records
 from pipeline.run.compile import prepare
 from pipeline.run.far_field import share_far_fields
-from pipeline.run.measure import TIMES, record_of
+from pipeline.run.measure import BARS, TIMES, record_of
 from pipeline.run.memory import FreeMemory, PeakMemory, give_back
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import mesh_case, on_first_rank
@@ -187,10 +187,7 @@ class StepRunner:
             return record
         told = self._afresh(replace(solve, mirrors=model_planes(solve.case)), memory, Bar.IF_ROOM)
         seconds = told.time_total + told.time_error
-        return replace(
-            record, force_error=told.force_error, load_force_error=told.load_force_error, time_error=seconds,
-            message=told.message,
-        )  # fmt: skip
+        return replace(record, **{name: getattr(told, name) for name in BARS}, time_error=seconds, message=told.message)
 
     def _afresh(self, solve: Solve, memory: PeakMemory, bar: Bar) -> Record:
         """Compute one case, mesh and all; collective."""

@@ -67,6 +67,17 @@ def test_accuracy_that_is_missed_is_a_failed_case():
     assert record.force_error > 0.001
 
 
+def test_what_is_known_of_an_accuracy_that_is_missed_is_how_far():
+    """Nothing in newtons is shown of it, which would be another tissue's where moduli are scaled."""
+    mesh = {"accuracy": "0.1 %", "rim": "1.5 mm", "growth": 1.0, "degree": 2, "fine": "5 mm", "coarse": "10 mm"}
+    plan, records = run(mesh=mesh, probe={"motion": "all"}, material={"young": ["1 kPa", "10 kPa"]})
+    data = build(plan, records)
+    assert (data["status"] == "failed").all()
+    assert (data["force_error"] > 0.001).all()
+    for name in ("force_vector", "force_vector_error", "stiffness", "stiffness_error"):
+        assert np.isnan(data[name]).all()
+
+
 def test_records_whose_bars_may_be_too_small_are_not_used():
     """Those of mixed elements in bodies of one material were made without N; others have the key that they had."""
 

@@ -237,3 +237,14 @@ def test_timed_cases_are_medians_of_repeats_each_made_afresh(monkeypatch, tmp_pa
     assert 0 < record.force_error < 0.5
     assert next(told, None) is None
     assert not list(tmp_path.iterdir())
+
+
+def test_timed_cases_have_all_bars_that_untimed_ones_have():
+    slit = {**BLADE, "width": "1 mm", "incision": "4 mm"}
+    timed, untimed = (
+        next(iter(solve(probe=slit, mesh={"rim": "0.5 mm"}, solve=how).values()))
+        for how in ({"timing": True, "repeats": 1, "exact": False}, {"exact": False})
+    )
+    assert timed.energy_release == pytest.approx(untimed.energy_release, rel=1e-4)
+    for name in ("force_error", "force_vector_error", "energy_release_error"):
+        assert getattr(timed, name) == pytest.approx(getattr(untimed, name), rel=1e-3)
