@@ -1,4 +1,4 @@
-"""Processor time, of which a busy machine takes less than of the clock's."""
+"""Processor time: other programs on the machine lengthen it far less than the time that passes."""
 
 import resource
 

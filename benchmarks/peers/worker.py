@@ -37,9 +37,10 @@ def answers(solve: Solve, job: dict[str, Any]) -> Iterator[dict[str, Any]]:
         try:
             if job.get("warm", True) or number == 0:
                 solve(scene, threads, **setting)
-            yield {"setting": setting, **_timed(solve, scene, threads, setting)}
+            found = _timed(solve, scene, threads, setting)
         except Exception as error:  # one setting that fails is no reason to lose the rest
-            yield {"setting": setting, "failed": f"{type(error).__name__}: {error}"}
+            found = {"failed": f"{type(error).__name__}: {error}"}
+        yield {"setting": setting, **found}
 
 
 def _timed(solve: Solve, scene: Task, threads: int, setting: dict[str, Any]) -> dict[str, Any]:

@@ -81,11 +81,7 @@ _APART = ("labels", "mesh", "spread", "correction", "laws", "laws_of_full")
 
 
 def _row(verdict: Verdict, guideline: Guideline) -> dict[str, Any]:
-    plain = {
-        k: v
-        for k, v in verdict.__dict__.items()
-        if k not in ("labels", "mesh", "spread", "correction", "laws", "laws_of_full")
-    }
+    plain = {k: v for k, v in vars(verdict).items() if k not in _APART}
     spread = verdict.spread
     kept = keeps(verdict, guideline.verdicts, guideline.accuracy, "force") and verdict.seconds <= guideline.budget
     return {

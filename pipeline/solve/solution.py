@@ -40,11 +40,11 @@ class Solution:
     """What one solve gives; all values global and equal on every rank, times in seconds.
 
     ``max_strain`` is the largest principal strain of a cell's mean strain, clear of singular edges
-    (:mod:`pipeline.solve.strain`); ``dofs`` and ``cells`` are those of the whole body, ``iterations`` the sum over the
-    motions. ``decrements`` (n, n) is what one degree more takes away from the probe's stiffness, and ``bars`` (n, n)
-    the 95 % error bars on its entries, made with ``plain``, the share of edges at the rim without quarter points, and
-    for mixed elements with ``unseen`` (n), N in units of the energies on the diagonal (see
-    :mod:`pipeline.solve.error`). Of unilateral contact, ``contact_area`` (m²) and ``contact_radius`` (m) are those
+    (:mod:`pipeline.solve.strain`); ``dofs`` are those of the whole body, ``cells`` those of the part that is modelled,
+    ``iterations`` the sum over the motions. ``decrements`` (n, n) is what one degree more takes away from the probe's
+    stiffness, and ``bars`` (n, n) the 95 % error bars on its entries, made with ``plain``, the share of edges at the
+    rim without quarter points, and for mixed elements with ``unseen`` (n), N in units of the energies on the diagonal
+    (see :mod:`pipeline.solve.error`). Of unilateral contact, ``contact_area`` (m²) and ``contact_radius`` (m) are those
     found, ``iterations`` the linear solves that it took, and ``stored`` (J) is its strain energy, which is not half of
     F d. ``released`` (n, n) is the energy (J) that a metre of advance of a slit's front releases, a form of the amounts
     of the motions (:mod:`pipeline.solve.release`), ``released_finer`` what one degree more makes of it, and

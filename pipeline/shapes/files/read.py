@@ -49,11 +49,6 @@ def state_of(path: Path) -> tuple[int, int]:
     return state.st_mtime_ns, state.st_size
 
 
-def read_surface(path: Path, unit: float) -> Triangles:
-    """Return the surface in a file, as :func:`load_surface` does."""
-    return load_surface(path, unit).triangles
-
-
 @lru_cache(maxsize=8)
 def _load(path: Path, _changed: int, size: int, unit: float, repair: bool, smooth: float | None) -> Loaded:
     if path.suffix.lower() not in _PARSERS:

@@ -98,16 +98,6 @@ def entries_of_parts(matrix: PETSc.Mat, inside: int, outside: int) -> Iterator[l
     matrix.assemble()  # what was made of the values before is void
 
 
-def entries_to_read(matrix: PETSc.Mat, count: int) -> FloatArray:
-    """Return the ``count`` entries of a matrix, as :func:`entries` does, to read for as long as the matrix lives.
-
-    Raises:
-        RuntimeError: if PETSc does not lend them.
-    """
-    with _array(matrix, matrix.handle) as values:
-        return np.ctypeslib.as_array(values, (count,))
-
-
 @dataclass(frozen=True)
 class BlockRows:
     """Sparse rows of blocks of 3 × 3 (``offsets``, ``columns``), and their numbers, block by block by columns."""
