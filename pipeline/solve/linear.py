@@ -7,6 +7,7 @@ Every solver has its own options prefix.
 import itertools
 import operator
 import time
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,14 +64,13 @@ class Level:
     space: Any
     matrix: PETSc.Mat
     prescribed: np.ndarray
+    jumps: bool = False
+    held: np.ndarray | None = None
 
     @property
     def degree(self) -> int:
         """Polynomial degree of the space."""
         return compat.degree(self.space)
-
-    jumps: bool = False
-    held: np.ndarray | None = None
 
 
 def is_direct(method: str, dofs: int, degree: int) -> bool:
@@ -99,15 +99,29 @@ class LinearSolver:
         self._is_single = not direct and not linear and suits(self._matrices)
         self._looked_closer = False
         self._owned: list[Any] = []
-        matrix = levels[-1].matrix
         start = time.perf_counter()
         self._prefix = f"epsmesh{next(_prefixes)}_"
         self._options: set[str] = set()
+        with ExitStack() as undo:
+            undo.callback(self.close)
+            try:
+                self._set_up(tolerance)
+            except PETSc.Error as error:
+                raise SolveError(explain(error)) from error
+            except ArithmeticError as error:
+                raise SolveError(str(error)) from error
+            finally:
+                self._clear_options()
+            undo.pop_all()
+        self.setup_seconds = time.perf_counter() - start
+
+    def _set_up(self, tolerance: float) -> None:
+        matrix = self.matrix
         self.ksp = self._own(PETSc.KSP().create(matrix.comm))
         self.ksp.setOptionsPrefix(self._prefix)
         self._operator = self._symmetric_product(matrix) if self._is_single and not is_product(matrix) else matrix
         self.ksp.setOperators(self._operator, matrix)
-        if direct:
+        if self._is_direct:
             self.ksp.setType("preonly")
             self.ksp.pc.setType("cholesky")
             self.ksp.pc.setFactorSolverType("mumps")
@@ -115,20 +129,9 @@ class LinearSolver:
             self.ksp.setType("cg")
             self.ksp.setNormType(PETSc.KSP.NormType.NATURAL)
             self.ksp.setTolerances(rtol=tolerance, atol=0.0, max_it=_MOST_ITERATIONS)
-        try:
-            if not direct:
-                self._multigrid(self.ksp.pc)
-            self.ksp.setFromOptions()
-            self.ksp.setUp()
-        except PETSc.Error as error:
-            self.close()
-            raise SolveError(explain(error)) from error
-        except ArithmeticError as error:
-            self.close()
-            raise SolveError(str(error)) from error
-        finally:
-            self._clear_options()
-        self.setup_seconds = time.perf_counter() - start
+            self._multigrid(self.ksp.pc)
+        self.ksp.setFromOptions()
+        self.ksp.setUp()
 
     @stage("iterations")
     def solve(
@@ -143,7 +146,7 @@ class LinearSolver:
             SolveError: if PETSc reports anything but convergence.
         """
         if tolerance is not None:
-            self.ksp.setTolerances(rtol=tolerance)
+            self.ksp.setTolerances(rtol=tolerance, atol=0.0)
         if target is not None:
             self.ksp.setTolerances(rtol=0.0, atol=target)
         its = self._iterate(rhs, solution)

@@ -64,3 +64,43 @@ def test_iterations_do_not_grow_with_the_mesh(degree):
             dofs.append(problem.dofs)
     assert dofs[1] > 4 * dofs[0]
     assert counts[1] <= 1.3 * counts[0]
+
+
+def test_a_tolerance_after_a_target_is_kept():
+    """What one solve was allowed to leave, in joules, the next one is not."""
+    with (
+        DisplacementProblem(Spaces(make_mesh()), 2, Conditions()) as problem,
+        problem.solver(law(0.3), "iterative") as solver,
+    ):
+        rhs, solution = solver.matrix.createVecs()
+        rhs.set(1.0)
+        loose = solver.solve(rhs, solution, target=1e3)
+        solution.set(0.0)
+        strict = solver.solve(rhs, solution, tolerance=1e-8)
+        rhs.destroy()
+        solution.destroy()
+    assert loose < 3 < strict
+
+
+def test_a_set_up_that_fails_leaves_nothing(monkeypatch):
+    made = []
+
+    def own(self, item):
+        self._owned.append(item)
+        made.append(item)
+        return item
+
+    def multigrid(*_):
+        raise MemoryError
+
+    with (
+        Spaces(make_mesh()) as spaces,
+        DisplacementProblem(spaces, 2, Conditions()) as problem,
+        problem.solver(law(0.3), "iterative") as solver,
+    ):
+        monkeypatch.setattr(LinearSolver, "_own", own)
+        monkeypatch.setattr(LinearSolver, "_multigrid", multigrid)
+        with pytest.raises(MemoryError):
+            LinearSolver(solver.levels, direct=False, tolerance=1e-6)
+    assert made
+    assert all(item.handle == 0 for item in made)

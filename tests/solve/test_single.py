@@ -135,3 +135,11 @@ def test_an_operator_that_is_not_positive_is_refused():
         with pytest.raises(SolveError, match="not positive definite"):
             LinearSolver([coarse, Level(fine.space, turned, fine.prescribed)], direct=False, tolerance=1e-6)
         turned.destroy()
+
+
+def test_moduli_out_of_range_are_refused():
+    with (
+        DisplacementProblem(Spaces(make_mesh()), 2, Conditions()) as problem,
+        pytest.raises(SolveError, match="the range of single precision"),
+    ):
+        problem.solve(MaterialLaw.of(1e-38, 1e-38), PRESS, method="iterative")

@@ -8,6 +8,7 @@ On several ranks each smooths the rows that it owns; what it needs of others' po
 """
 
 from dataclasses import replace
+from math import isfinite
 
 import numpy as np
 from mpi4py import MPI
@@ -121,7 +122,11 @@ class SmoothedLevel:
         self._operator.multiply(x, self._product)
 
     def _largest_eigenvalue(self, steps: int) -> float:
-        """Return the largest eigenvalue of D⁻¹ A, from below, by Lanczos' method from noise."""
+        """Return the largest eigenvalue of D⁻¹ A, from below, by Lanczos' method from noise; collective.
+
+        Raises:
+            ArithmeticError: on every rank, if entries leave the range of single precision.
+        """
         r = np.random.default_rng(self._comm.rank).standard_normal(self.size, dtype=np.float32)
         z, p, diagonal, beside = np.empty_like(r), np.zeros_like(r), [], []
         previous = step = 0.0
@@ -136,6 +141,8 @@ class SmoothedLevel:
             before, step = step, rz / self._dot(p, self._product)
             diagonal.append(1 / step + (ratio / before if before else 0.0))
             beside.append(ratio**0.5 / before if before else 0.0)
+            if not isfinite(diagonal[-1]):
+                raise ArithmeticError("moduli or sizes leave the range of single precision")
             self._product *= step
             library()("subtract", self.size, self._product, r)
             previous = rz
