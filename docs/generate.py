@@ -145,6 +145,7 @@ def _parameter(parameter: Any) -> str:
         return ""
     required = parameter.param_type_name == "argument"
     name = parameter.metavar or parameter.opts[0].upper() if required else ", ".join(reversed(parameter.opts))
+    name = "/".join((name, *parameter.secondary_opts))
     if not required and parameter.metavar:
         name = f"{name} {parameter.metavar}"
     default = parameter.default

@@ -70,3 +70,4 @@ def test_every_command_and_option_has_help_and_is_in_the_reference(site):
             assert f'<span class="pre">{leaf.name}</span>' in page
             for parameter in leaf.params:
                 assert getattr(parameter, "help", None), f"{leaf.name} {parameter.name} has no help"
+                assert all(option in page for option in parameter.secondary_opts), f"{leaf.name} {parameter.name}"
