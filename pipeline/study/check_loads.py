@@ -83,7 +83,7 @@ def _makes_sense(load: Load, problems: Problems) -> bool:
 def _check_probe(probe: Probe, problems: Problems) -> None:
     if probe.is_unilateral:
         problems.error(
-            "probe.contact", probe.contact, "where a tool touches hangs on how loads have bent the surface, which is "
+            "probe.contact", probe.contact, "where a tool touches depends on how loads have bent the surface, which is "
             'not computed: use "bonded" or "frictionless", or leave [load] out',
         )  # fmt: skip
     if probe.slit is not None:

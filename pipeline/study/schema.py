@@ -105,7 +105,7 @@ class Mesh(Section):
         Length | None,
         Field(json_schema_extra={"unit": "m"}),
         Words(
-            "Element size at the probe's edge, where stresses are singular: F_max hangs on it more than on anything "
+            "Element size at the probe's edge, where stresses are singular: F_max depends on it more than on anything "
             "else.",
             '"0.2 mm"',
             default="a tenth of the probe's half width, at most fine",
