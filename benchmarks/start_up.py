@@ -1,40 +1,96 @@
-"""Seconds until the commands that need no solver answer: medians, each in a process of its own.
+"""What the commands that need no solver cost before they answer: seconds of the processor, modules loaded.
 
-python -m benchmarks.start_up        writes results/start_up.json
+python -m benchmarks.start_up                  this program
+python -m benchmarks.start_up ../earlier ...   and other checkouts of it, by turns, on the studies of the last one
+
+Writes results/start_up.json. Each command runs in a process of its own, as where it is installed: with the bytecode
+that Python keeps. Seconds of the processor depend less than those of the clock on what else the machine does; the least
+of them depends least.
 """
 
 import json
+import os
+import resource
+import shutil
 import statistics
 import subprocess
 import sys
-import time
+import tempfile
 from pathlib import Path
 
 COMMANDS = {
     "--help": ["--help"],
-    "validate": ["validate", "studies/figure3.toml"],
-    "plan": ["plan", "studies/figure3.toml"],
-    "status": ["status", "studies/figure3.toml"],
-    "explain": ["explain", "studies/figure3.toml"],
+    "new": ["new", "mine"],
+    "validate": ["validate", "studies/quick.toml"],
+    "validate figure3": ["validate", "studies/figure3.toml"],
+    "plan": ["plan", "studies/quick.toml"],
+    "plan figure3": ["plan", "studies/figure3.toml"],
+    "status": ["status", "studies/quick.toml"],
+    "explain": ["explain", "studies/quick.toml"],
 }
-_REPEATS = 7
+HERE = Path(__file__).parents[1]
+_REPEATS = 15
 
 
-def main(output: Path = Path("results")) -> dict[str, float]:
-    """Measure, print and write."""
-    found = {}
-    for name, arguments in COMMANDS.items():
-        times = []
-        for _ in range(_REPEATS):
-            start = time.perf_counter()
-            subprocess.run([sys.executable, "-m", "pipeline", *arguments], check=True, capture_output=True)
-            times.append(time.perf_counter() - start)
-        found[name] = statistics.median(times)
-        print(f"{name:10} {found[name]:.2f} s")
+def main(*others: str, output: Path = Path("results")) -> dict[str, dict[str, dict[str, float]]]:
+    """Measure, print and write: by checkout and command, the least and the median of the seconds, and the modules."""
+    trees = [HERE, *(Path(other).resolve() for other in others)]
+    seconds: dict[tuple[Path, str], list[float]] = {(tree, name): [] for tree in trees for name in COMMANDS}
+    modules: dict[tuple[Path, str], int] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for turn in range(_REPEATS + 1):
+            for name, arguments in COMMANDS.items():
+                for tree in trees:
+                    place = Path(folder) / "place"
+                    shutil.copytree(trees[-1] / "studies", place / "studies", ignore=shutil.ignore_patterns("results"))
+                    if turn:
+                        seconds[tree, name].append(_seconds(tree, arguments, place))
+                    else:  # also writes the bytecode
+                        modules[tree, name] = _modules(tree, arguments, place)
+                    shutil.rmtree(place)
+    found = {
+        str(tree): {
+            name: {
+                "least": min(seconds[tree, name]),
+                "median": statistics.median(seconds[tree, name]),
+                "modules": modules[tree, name],
+            }
+            for name in COMMANDS
+        }
+        for tree in trees
+    }
+    for name in COMMANDS:
+        row = (found[str(tree)][name] for tree in trees)
+        print(f"{name:18}", *(f"{one['least']:.3f} {one['median']:.3f} s {one['modules']:4} modules" for one in row))
     output.mkdir(exist_ok=True)
     (output / "start_up.json").write_text(json.dumps(found, indent=2))
     return found
 
 
+def _run(tree: Path, words: list[str], place: Path) -> str:
+    environment = os.environ | {"PYTHONPATH": str(tree)}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    done = subprocess.run(
+        [sys.executable, *words], env=environment, cwd=place, check=True, capture_output=True, text=True
+    )
+    return done.stderr
+
+
+def _seconds(tree: Path, arguments: list[str], place: Path) -> float:
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    _run(tree, ["-m", "pipeline", *arguments], place)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def _modules(tree: Path, arguments: list[str], place: Path) -> int:
+    """Return how many modules are loaded; fail where those are not of ``tree``."""
+    found = _run(tree, ["-c", "import pipeline, sys; print(pipeline.__file__, file=sys.stderr)"], place)
+    if Path(found.strip()).parents[1] != tree:
+        raise RuntimeError(f"{tree}: Python takes {found.strip()} for it")
+    return sum(line.startswith("import time:") for line in _run(tree, ["-X", "importtime", "-m", "pipeline",
+                                                                       *arguments], place).splitlines())  # fmt: skip
+
+
 if __name__ == "__main__":
-    main()
+    main(*sys.argv[1:])

@@ -10,7 +10,7 @@ from pipeline.plan.describe import summary
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.run.progress import Terminal
 from pipeline.study.load import load, load_mapping
-from pipeline.study.starter import is_name
+from pipeline.study.named import is_name
 from pipeline.study.sweep import Study
 
 if TYPE_CHECKING:

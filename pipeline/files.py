@@ -4,7 +4,6 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from secrets import token_hex
 
 # Bytes that a disk must have left for a file: less than a dataset and its figure take.
 _LEAST_ROOM = 200_000
@@ -86,7 +85,7 @@ def why_not_writable(path: Path) -> str:
 def _beside(path: Path) -> Iterator[Path]:
     path.parent.mkdir(parents=True, exist_ok=True)
     # Not by the number of the process: those of two machines, or of two containers, may well be one.
-    temporary = path.with_name(f".{token_hex(4)}-{path.name}")
+    temporary = path.with_name(f".{os.urandom(4).hex()}-{path.name}")
     try:
         yield temporary
     finally:

@@ -1,9 +1,11 @@
 """Quantities written with their unit, as text, and read into SI numbers.
 
-One number and one unit, by a grammar of our own: pint, whose texts are calculations, is asked what a unit is worth.
+One number and one unit, by a grammar of our own: pint, whose texts are calculations, is asked what a unit is worth that
+few people write.
 """
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from math import inf, pi
@@ -39,22 +41,26 @@ degree = 3.14159265358979323846 / 180 * radian = deg = °
 
 @dataclass(frozen=True)
 class _Kind:
-    """What a quantity is called, an example of one, and the units that people write it in."""
+    """What a quantity is called, an example of one, and what the units that people write it in are worth in SI's."""
 
     name: str
     example: str
-    units: tuple[str, ...]
+    units: Mapping[str, float]
 
 
 # By SI unit.
 _KINDS = {
-    "m": _Kind("a length", "10 mm", ("mm", "cm", "m", "µm")),
-    "Pa": _Kind("a pressure", "10 kPa", ("Pa", "kPa", "MPa", "GPa", "bar", "mbar", "N/m^2", "N/mm^2")),
-    "s": _Kind("a time", "10 ms", ("s", "ms", "µs")),
-    "": _Kind("a share", "1 %", ("%",)),
-    "rad": _Kind("an angle", "60 deg", ("deg", "°", "rad")),
-    "kg/m^3": _Kind("a density", "1060 kg/m^3", ("kg/m^3", "g/cm^3")),
-    "m/s^2": _Kind("an acceleration", "-9.81 m/s^2", ("m/s^2", "mm/s^2")),
+    "m": _Kind("a length", "10 mm", {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "µm": 1e-6}),
+    "Pa": _Kind(
+        "a pressure",
+        "10 kPa",
+        {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "bar": 1e5, "mbar": 1e2, "N/m^2": 1.0, "N/mm^2": 1e6},
+    ),
+    "s": _Kind("a time", "10 ms", {"s": 1.0, "ms": 1e-3, "µs": 1e-6}),
+    "": _Kind("a share", "1 %", {"%": 1e-2}),
+    "rad": _Kind("an angle", "60 deg", {"deg": pi / 180, "°": pi / 180, "rad": 1.0}),
+    "kg/m^3": _Kind("a density", "1060 kg/m^3", {"kg/m^3": 1.0, "g/cm^3": 1e3}),
+    "m/s^2": _Kind("an acceleration", "-9.81 m/s^2", {"m/s^2": 1.0, "mm/s^2": 1e-3}),
 }
 # Pure numbers by another name: alone they are a unit, within another one they would hide a factor.
 _PURE = {"": ("%", "percent"), "rad": ("deg", "degree", "°", "rad", "radian")}
@@ -78,7 +84,7 @@ _NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)\b", re.IGNORECASE)
 
 @cache
 def _registry() -> "pint.UnitRegistry":
-    import pint  # noqa: PLC0415 (a tenth of a second, which `--help` does without)
+    import pint  # noqa: PLC0415 (a tenth of a second, which most studies do without)
 
     registry = pint.UnitRegistry(None)
     for line in _DEFINITIONS:
@@ -126,9 +132,11 @@ def parse_quantity(text: Any, unit: str) -> float:
 def _factor(text: str, unit: str) -> float:
     """Return what a number before the unit ``text`` is multiplied with to be one in the SI ``unit``."""
     kind = _KINDS[unit]
+    if text in kind.units:
+        return kind.units[text]
     if not text and unit == "":
         return 1.0
-    allowed = f"allowed are {', '.join(kind.units)}" if len(kind.units) > 1 else f"write {kind.units[0]}"
+    allowed = f"allowed are {', '.join(kind.units)}" if len(kind.units) > 1 else f"write {next(iter(kind.units))}"
     if not text:
         raise _refusal(unit, f"the unit is missing; {allowed}")
     if not _UNIT.fullmatch(text):

@@ -1,5 +1,6 @@
 """Quantities: one number and one unit; whatever else pint would calculate is refused with the reason."""
 
+import pint
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -75,6 +76,17 @@ def test_anything_else_is_refused_and_says_why(text, unit):
 @given(st.floats(allow_nan=False, allow_infinity=False), st.sampled_from(["mm", "m", "cm"]))
 def test_a_number_means_what_it_says(number, unit):
     assert parse_quantity(f"{number!r} {unit}", "m") == pytest.approx(number * {"mm": 1e-3, "m": 1, "cm": 1e-2}[unit])
+
+
+@pytest.mark.parametrize("unit", ["m", "Pa", "s", "rad", "kg/m^3", "m/s^2"])
+def test_units_that_people_write_are_worth_what_they_are_elsewhere(unit):
+    with pytest.raises(ValueError, match="the unit is missing") as problem:
+        parse_quantity("1", unit)
+    written = str(problem.value).partition("allowed are ")[2].split(", ")
+    assert len(written) > 1
+    for one in written:
+        worth = pint.get_application_registry().Quantity(1.0, one).to(unit).magnitude
+        assert parse_quantity(f"0.5 {one}", unit) == canonical(0.5 * worth)
 
 
 @given(st.text(max_size=12))

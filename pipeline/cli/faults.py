@@ -4,13 +4,15 @@ import time
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
 
 from pipeline.cli.console import error, is_json_wanted, print_json
 from pipeline.launcher import is_first_rank
-from pipeline.study.problems import StudyError
+
+if TYPE_CHECKING:
+    from pipeline.study.problems import StudyError
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 _PATIENCE = 5.0  # seconds
@@ -42,7 +44,7 @@ def of_file(path: str | Path, why: str, howto: str | None = None) -> Fault:
     return Fault(f"{path}: {why}", file=str(path), howto=howto)
 
 
-def of_study(wrong: StudyError, hint: str = "") -> list[Fault]:
+def of_study(wrong: "StudyError", hint: str = "") -> list[Fault]:
     """Return what is wrong with a study file, each problem by itself; ``hint`` goes with what people read."""
     return [
         Fault(f"{wrong.file}: {one}{hint}", wrong.file, one.key, one.value, one.allowed, one.howto or None)

@@ -19,13 +19,12 @@ from pipeline.cli.words import (
     check_names,
     load_all,
 )
-from pipeline.plan.plan import Plan, make_plan
-from pipeline.plan.shard import deal, shard_of, stores_of
-from pipeline.study.sweep import Study
 
 if TYPE_CHECKING:
+    from pipeline.plan.plan import Plan
     from pipeline.run.merge import Source
     from pipeline.run.record import Record
+    from pipeline.study.sweep import Study
 
 # Longer lists of pending cases than this are cut.
 _MOST_CASES = 10
@@ -48,6 +47,8 @@ def merge(
 
     Example: epsmesh merge studies/figure3.toml
     """
+    from pipeline.plan.plan import make_plan
+
     (study,) = load_all([file])
     paths = _stores(study, stores, output)
     plan = make_plan(study, without=check_names(without))
@@ -82,8 +83,10 @@ def merge(
     raise typer.Exit(SOME_FAILED if problems or missing or counts["failed"] else DONE)
 
 
-def _stores(study: Study, given: list[Path] | None, output: Path) -> list[Path]:
+def _stores(study: "Study", given: list[Path] | None, output: Path) -> list[Path]:
     """Return the stores to be merged, or exit if one is not there, or none."""
+    from pipeline.plan.shard import stores_of
+
     absent = [path for path in given or () if not path.is_file()]
     if absent:
         fail(*(of_file(path, "there is no such store") for path in absent))
@@ -95,7 +98,7 @@ def _stores(study: Study, given: list[Path] | None, output: Path) -> list[Path]:
     return found
 
 
-def _merged(paths: list[Path], path: Path, plan: Plan) -> tuple[tuple["Source", ...], dict[str, "Record"]]:
+def _merged(paths: list[Path], path: Path, plan: "Plan") -> "tuple[tuple[Source, ...], dict[str, Record]]":
     """Merge into the store at ``path`` and return the plan's records, with those of cases that need not be run."""
     from pipeline.run import merge as merging
     from pipeline.run.stop import skipped
@@ -122,10 +125,12 @@ def _dates(records: dict[str, "Record"]) -> dict[str, str]:
     return {"start": dates[0] if dates else now, "end": dates[-1] if dates else now}
 
 
-def _completing(plan: Plan, missing: frozenset[str], paths: list[Path], options: list[str]) -> list[str]:
+def _completing(plan: "Plan", missing: frozenset[str], paths: list[Path], options: list[str]) -> list[str]:
     """Return the commands that compute what is missing: the shards it is in, of the deal that was run last."""
     if not missing:
         return []
+    from pipeline.plan.shard import deal, shard_of
+
     words = ["epsmesh", "run", plan.study.file, *options]
     latest = max(paths, key=lambda path: path.stat().st_mtime if shard_of(path) else -1.0)
     shard = shard_of(latest)
@@ -140,7 +145,7 @@ def _completing(plan: Plan, missing: frozenset[str], paths: list[Path], options:
     return commands
 
 
-def _tell_pending(plan: Plan, missing: frozenset[str], again: list[str]) -> None:
+def _tell_pending(plan: "Plan", missing: frozenset[str], again: list[str]) -> None:
     """Say which cases are not on record, and what to do."""
     if not missing:
         return

@@ -1,7 +1,6 @@
 """The command that begins a study file."""
 
 import shutil
-import tomllib
 from pathlib import Path
 from typing import Annotated
 
@@ -11,8 +10,7 @@ from pipeline.cli.console import print_json
 from pipeline.cli.faults import Fault, fail, of_file, of_option
 from pipeline.cli.words import Json
 from pipeline.files import atomic, write_new
-from pipeline.study.problems import nearest
-from pipeline.study.starter import examples, is_name, starter
+from pipeline.study.named import examples, is_name
 from pipeline.within import folders_of, outside
 
 _FOLDER = Path("studies")
@@ -51,7 +49,7 @@ def new(
         fail(_of_name(name, "must be letters, digits, - and _: results are called after it"))
     if not name.endswith(".toml") and Path(name).name != name:
         fail(_of_name(name, f"a name has no folders: it stands for {_FOLDER}/NAME.toml; a path ends in .toml"))
-    text, source = (starter(path.stem), path) if like is None else _copy_of(like)
+    text, source = (_starter(path.stem), path) if like is None else _copy_of(like)
     try:
         carried = [] if path.exists() else _carried(text, source.parent, path.parent)
         write_new(path, text)
@@ -71,6 +69,12 @@ def _of_name(name: str, allowed: str) -> Fault:
     return Fault(f"NAME = {name!r}: {allowed}", key="NAME", value=name, allowed=allowed)
 
 
+def _starter(name: str) -> str:
+    from pipeline.study.starter import starter
+
+    return starter(name)
+
+
 def _copy_of(like: str) -> tuple[str, Path]:
     """Return the text of a study given by name or path, and its path."""
     known = _known()
@@ -81,6 +85,8 @@ def _copy_of(like: str) -> tuple[str, Path]:
         if path.suffix == ".toml" or len(path.parts) > 1:
             reason = getattr(problem, "strerror", None) or "is not UTF-8 text"
             fail(of_option("--like", like, reason))
+        from pipeline.study.problems import nearest
+
         fail(of_option("--like", like, f"there is no study of that name; {nearest(like, known)}"))
 
 
@@ -92,6 +98,8 @@ def _carried(text: str, source: Path, target: Path) -> list[Path]:
     Raises:
         OSError: if it cannot be written.
     """
+    import tomllib
+
     try:
         name = tomllib.loads(text)["body"]["file"]
         here, there = source / name, target / name

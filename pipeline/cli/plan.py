@@ -25,14 +25,12 @@ from pipeline.cli.words import (
     stored_records,
     warn,
 )
-from pipeline.plan.describe import story, summary
-from pipeline.plan.plan import Plan, make_plan
 from pipeline.run.remaining import format_seconds
-from pipeline.run.room import MEMORY_SHARE, machine_room
-from pipeline.study.sweep import Case, Study
 
 if TYPE_CHECKING:
+    from pipeline.plan.plan import Plan
     from pipeline.run.record import Record
+    from pipeline.study.sweep import Case, Study
 
 # Longer lists of steps than this are cut: the costliest are shown.
 _MOST_STEPS = 20
@@ -60,15 +58,19 @@ def plan(
 
     Example: epsmesh plan studies/figure3.toml --without symmetry
     """
+    from pipeline.plan.describe import summary
+    from pipeline.run.room import MEMORY_SHARE, machine_room
+
     (study,) = load_all([file])
     made, _ = _planned(study, output, store, check_names(without))
     found = summary(made, ranks)
     room = machine_room() if memory is None else 1e9 * memory
-    found |= {"memory_available": room, "too_large": sum(_is_large(step, room) for step in found["steps"])}
+    most = MEMORY_SHARE * room
+    found |= {"memory_available": room, "too_large": sum(step["memory"] > most for step in found["steps"])}
     _show(study, found, quiet=quiet, verbose=verbose, as_json=as_json)
     # Where all cases are too large, that of F_exact may still be solved: for nothing.
     asked = [step for step in found["steps"] if not step["exact"]] or found["steps"]
-    nothing_fits = bool(asked) and all(_is_large(step, room) for step in asked)
+    nothing_fits = bool(asked) and all(step["memory"] > most for step in asked)
     if found["too_large"] and not as_json:
         what = "no case fits" if nothing_fits else f"{found['too_large']} of {found['meshes']} steps do not fit"
         warning(
@@ -78,11 +80,7 @@ def plan(
     raise typer.Exit(SOME_FAILED if nothing_fits else DONE)
 
 
-def _is_large(step: dict[str, Any], room: float) -> bool:
-    return bool(step["memory"] > MEMORY_SHARE * room)
-
-
-def _show(study: Study, found: dict[str, Any], *, quiet: bool, verbose: bool, as_json: bool) -> None:
+def _show(study: "Study", found: dict[str, Any], *, quiet: bool, verbose: bool, as_json: bool) -> None:
     """Print the summary of a plan."""
     if as_json:
         print_json(found)
@@ -130,6 +128,8 @@ def explain(
 
     Example: epsmesh explain studies/figure3.toml "poisson=0.3, epsilon=10 mm, outside=free"
     """
+    from pipeline.plan.describe import story
+
     (study,) = load_all([file])
     chosen = find_case(study, case)
     made, records = _planned(study, output, store, check_names(without))
@@ -160,16 +160,18 @@ def _short(value: Any) -> Any:
 
 
 def _planned(
-    study: Study, output: Path, store: Path | None, without: tuple[str, ...]
-) -> tuple[Plan, dict[str, "Record"]]:
+    study: "Study", output: Path, store: Path | None, without: tuple[str, ...]
+) -> "tuple[Plan, dict[str, Record]]":
     """Return the plan of what is not on record, and the records that are."""
+    from pipeline.plan.plan import make_plan
+
     bare = make_plan(study, without=without)
     records, cost = stored_records(store or output / "cases.sqlite", bare)
     done = [key for key, record in records.items() if record.is_ok]
     return replace(make_plan(study, done, without) if done else bare, cost=cost), records
 
 
-def find_case(study: Study, text: str) -> Case:
+def find_case(study: "Study", text: str) -> "Case":
     """Return the case of a number, or of labels, the first of several; fail with what there is to choose from."""
     cases = list(study.cases())
     if text.strip().isdecimal():
@@ -201,7 +203,7 @@ def _of_case(text: str, allowed: str) -> Fault:
     return Fault(f"case {shown}: {allowed}", key="CASE", value=text, allowed=allowed)
 
 
-def _matches(case: Case, wanted: dict[str, str]) -> bool:
+def _matches(case: "Case", wanted: dict[str, str]) -> bool:
     labels = {name: _squeezed(text) for name, text in case.words.items()}
     return all(labels[name] == value for name, value in wanted.items())
 

@@ -11,8 +11,6 @@ import typer
 from pipeline import __version__
 from pipeline.cli.console import error, print_json
 from pipeline.cli.faults import BAD_INPUT, DONE, INTERRUPTED, SOME_FAILED, Fault, as_data, fail, of_study, tell
-from pipeline.cli.outcome import announce, conclude, print_stages
-from pipeline.cli.outcome import as_data as outcome_data
 from pipeline.cli.words import (
     DEFAULT_MESHES,
     DEFAULT_OUTPUT,
@@ -35,11 +33,9 @@ from pipeline.cli.words import (
     stored_records,
     warn,
 )
-from pipeline.plan.plan import Plan, make_plan
-from pipeline.study.load import load
-from pipeline.study.problems import StudyError
 
 if TYPE_CHECKING:
+    from pipeline.plan.plan import Plan
     from pipeline.run.progress import Terminal
 
 
@@ -48,6 +44,10 @@ def validate(files: Files, as_json: Json = False) -> None:
 
     Example: epsmesh validate studies/*.toml
     """
+    from pipeline.plan.plan import make_plan
+    from pipeline.study.load import load
+    from pipeline.study.problems import StudyError
+
     failed = False
     report: list[dict[str, Any]] = []
     for file in files:
@@ -108,6 +108,8 @@ def run(
     check_output(store or output / "cases.sqlite", folder=None if meshes == DEFAULT_MESHES else meshes)
     for study in () if part else studies:
         check_output(*(output / f"{study.name}.{suffix}" for suffix in ("nc", "png", "svg")))
+    from pipeline.cli.outcome import announce, conclude, print_stages
+    from pipeline.cli.outcome import as_data as outcome_data
     from pipeline.run.guard import Guard, guarded
 
     # Memory that runs out ends one case: another process waits, where this one is the command's own.
@@ -161,6 +163,7 @@ def status(
 
     Example: epsmesh status studies/figure3.toml
     """
+    from pipeline.plan.plan import make_plan
     from pipeline.run.outcome import count_states, failures
     from pipeline.run.stop import skipped
 
@@ -195,7 +198,7 @@ def version(as_json: Json = False) -> None:
         print(f"{name:10} {value}")
 
 
-def _progress(plan: Plan, *, verbose: bool) -> "Terminal":
+def _progress(plan: "Plan", *, verbose: bool) -> "Terminal":
     from pipeline.run.progress import Terminal
     from pipeline.run.remaining import Remaining, expectations
 

@@ -9,11 +9,11 @@ from pipeline.cli.console import error, print_json
 from pipeline.cli.faults import SOME_FAILED, Fault, fail
 from pipeline.cli.plan import find_case
 from pipeline.cli.words import DEFAULT_OUTPUT, File, Json, Output, load_all
-from pipeline.study.sweep import Case, Study
 
 if TYPE_CHECKING:
     from mpi4py import MPI
 
+    from pipeline.study.sweep import Case, Study
     from pipeline.view.fields import Fields
 
 MESHES = Path("meshes/cache")
@@ -57,7 +57,9 @@ def view(
             _write(study, fields, stem, export, as_json=as_json)
 
 
-def fields_of(study: Study, case: Case, comm: "MPI.Comm", mesh_only: bool, bar: bool, meshes: Path) -> "Fields | None":
+def fields_of(
+    study: "Study", case: "Case", comm: "MPI.Comm", mesh_only: bool, bar: bool, meshes: Path
+) -> "Fields | None":
     """Return the case's fields, on the first rank; if it cannot be computed, exit on all of them."""
     from pipeline.mesh.generate import MeshError
     from pipeline.run.mesh_cache import MeshCache
@@ -87,7 +89,7 @@ def fields_of(study: Study, case: Case, comm: "MPI.Comm", mesh_only: bool, bar: 
     fail(Fault(why, file=study.file, key="CASE", value=str(case)), status=SOME_FAILED)
 
 
-def _write(study: Study, fields: "Fields", stem: Path, export: str | None, *, as_json: bool) -> None:
+def _write(study: "Study", fields: "Fields", stem: Path, export: str | None, *, as_json: bool) -> None:
     """Write what was asked for, and say what is in it."""
     written = _written(study, fields, stem, export)
     if as_json:
@@ -99,7 +101,7 @@ def _write(study: Study, fields: "Fields", stem: Path, export: str | None, *, as
         print(f"wrote {path}{remark}")
 
 
-def _written(study: Study, fields: "Fields", stem: Path, export: str | None) -> dict[Path, str]:
+def _written(study: "Study", fields: "Fields", stem: Path, export: str | None) -> dict[Path, str]:
     """Write what was asked for; return the files, with what is to be said of each."""
     title = str(fields.case) if study.axes else study.title
     if export == "html":
@@ -120,7 +122,7 @@ def _written(study: Study, fields: "Fields", stem: Path, export: str | None) -> 
     return files
 
 
-def _number(study: Study, case: Case) -> int:
+def _number(study: "Study", case: "Case") -> int:
     """Return the case's number, counted from 0, the last axis fastest."""
     number = 0
     for position, length in zip(case.index, study.shape, strict=True):

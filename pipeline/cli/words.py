@@ -9,16 +9,14 @@ import typer
 from pipeline.cli.console import warning
 from pipeline.cli.faults import Fault, fail, of_file, of_option, of_study
 from pipeline.files import why_not_writable
-from pipeline.plan.cost import CostModel
-from pipeline.plan.plan import Plan
-from pipeline.plan.shard import Shard, parse_shard, reason_against
-from pipeline.study.load import load
-from pipeline.study.problems import StudyError, nearest
-from pipeline.study.schema import REDUCTIONS
-from pipeline.study.sweep import Study
+from pipeline.study.vocabulary import REDUCTIONS
 
 if TYPE_CHECKING:
+    from pipeline.plan.cost import CostModel
+    from pipeline.plan.plan import Plan
+    from pipeline.plan.shard import Shard
     from pipeline.run.record import Record
+    from pipeline.study.sweep import Study
 
 # What a command finds as its context's object where it was started as a program, and not by a test.
 OWN_PROCESS = "own process"
@@ -53,8 +51,11 @@ Without = Annotated[
 ]
 
 
-def load_all(files: list[Path]) -> list[Study]:
+def load_all(files: list[Path]) -> "list[Study]":
     """Load studies, or exit with every problem of every file; on several ranks only the first one speaks."""
+    from pipeline.study.load import load
+    from pipeline.study.problems import StudyError
+
     studies, faults = [], list[Fault]()
     for file in files:
         try:
@@ -83,8 +84,10 @@ def meant(file: Path) -> str:
     return f"; did you mean {known[close[0]]}?" if close else ""
 
 
-def stored_records(path: Path, plan: Plan) -> tuple[dict[str, "Record"], CostModel]:
+def stored_records(path: Path, plan: "Plan") -> "tuple[dict[str, Record], CostModel]":
     """Return what the store at ``path`` has of a plan's cases and of their F_exact, and what cases cost."""
+    from pipeline.plan.cost import CostModel
+
     if not path.exists():
         return {}, CostModel()
     from pipeline.run.reading import known_of
@@ -116,13 +119,13 @@ def check_output(*files: Path, folder: Path | None = None) -> None:
         fail(*found.values())
 
 
-def axes_of(study: Study) -> str:
+def axes_of(study: "Study") -> str:
     """Return the swept inputs in brackets."""
     text = " × ".join(f"{len(axis)} {axis.name}" for axis in study.axes)
     return f" ({text})" if text else ""
 
 
-def warn(study: Study) -> None:
+def warn(study: "Study") -> None:
     """Print the warnings of a study."""
     for text in study.warnings:
         warning(text)
@@ -132,15 +135,19 @@ def check_names(without: list[str] | None) -> tuple[str, ...]:
     """Return the names of reductions, or exit if there is none of such a name."""
     unknown = [name for name in without or () if name not in REDUCTIONS]
     if unknown:
+        from pipeline.study.problems import nearest
+
         meant_one = nearest(unknown[0], REDUCTIONS)
         fail(of_option("--without", unknown[0], f"no reduction is called so; {meant_one}", _SKIPPING))
     return tuple(without or ())
 
 
-def check_shard(text: str | None, studies: list[Study]) -> Shard | None:
+def check_shard(text: str | None, studies: "list[Study]") -> "Shard | None":
     """Return the shard that ``--shard`` names, or exit if it names none or a study cannot be dealt out."""
     if text is None:
         return None
+    from pipeline.plan.shard import parse_shard, reason_against
+
     try:
         shard = parse_shard(text)
     except ValueError as problem:

@@ -12,9 +12,9 @@ from typing import Any
 
 from pipeline.plan.key import case_key, digest
 from pipeline.plan.symmetry import body_planes, is_body_round
-from pipeline.shapes.arrays import FloatArray, np
 from pipeline.shapes.body import Layered
 from pipeline.shapes.contact import is_level
+from pipeline.shapes.frame import Vector
 from pipeline.study.sweep import Case
 
 # Places that differ by less than this, in units of the body, are the same; so are directions.
@@ -22,6 +22,10 @@ _DIGITS = 9
 _SAME = 1e-9
 # What keys have in the place of a place.
 NOWHERE = (0.0, 0.0)
+
+# Three by three, by rows.
+Matrix = tuple[Vector, Vector, Vector]
+_UNITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -32,7 +36,7 @@ class Image:
     """
 
     of: tuple[int, ...]
-    rows: tuple[tuple[float, ...], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    rows: Matrix = _UNITY
     of_scene: bool = True
 
     def vector(self, values: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -46,7 +50,7 @@ class Image:
         return x, y, z
 
 
-def image_key(case: Case, *, scaled: bool) -> tuple[str, FloatArray] | None:
+def image_key(case: Case, *, scaled: bool) -> tuple[str, Matrix] | None:
     """Return a key that images have in common, and the matrix (3, 3) that takes the case to where they are compared.
 
     ``scaled`` leaves out what F is proportional to. None where no images are looked for: on bodies without symmetry,
@@ -79,16 +83,16 @@ def moved_key(case: Case, *, scaled: bool) -> str:
     return digest("\n".join([case_key(elsewhere, scaled=scaled), "moved"]))
 
 
-def _compared(case: Case) -> Iterator[tuple[tuple[float, ...], FloatArray]]:
+def _compared(case: Case) -> Iterator[tuple[tuple[float, ...], Matrix]]:
     """Yield every image of a case's place, as numbers, with the matrix that takes the case there."""
     probe, frame, extent = case.probe, case.frame, case.body.extent
     along = (0.0, 0.0, 0.0) if probe.is_round else frame.along
-    turn, planes = np.eye(3), body_planes(case.body)
+    turn, planes = _UNITY, body_planes(case.body)
     if is_body_round(case.body):
         level = [v[:2] for v in (frame.point, frame.axis, along) if hypot(*v[:2]) > _SAME * extent]
         if level:
             x, y = (c / hypot(*level[0]) for c in level[0])
-            turn = np.array([[x, y, 0.0], [-y, x, 0.0], [0.0, 0.0, 1.0]])
+            turn = ((x, y, 0.0), (-y, x, 0.0), (0.0, 0.0, 1.0))
         planes = ("y",)
     if not planes:
         return
@@ -96,8 +100,28 @@ def _compared(case: Case) -> Iterator[tuple[tuple[float, ...], FloatArray]]:
     signs = [(-1.0, 1.0) if plane in planes and probe.is_mirrored(0.0, 1.0) else (1.0,) for plane in ("x", "y")]
     is_pushed = case.travel == tuple(probe.depth * c for c in frame.axis) and probe.slit is None
     turns_round = is_pushed and probe.is_mirrored(1.0, 0.0) and probe.is_mirrored(0.0, 1.0)
-    for x, y in product(*signs):
-        matrix = np.diag([x, y, 1.0]) @ turn
+    x, y, z = frame.point
+    point = x / extent, y / extent, z / extent
+    for right, far in product(*signs):
+        matrix = _scaled(turn[0], right), _scaled(turn[1], far), turn[2]
         for sign in (1.0, -1.0) if turns_round else (1.0,):
-            vectors = (np.array(frame.point) / extent, frame.normal, frame.axis, sign * np.array(along))
-            yield tuple(float(c) for v in vectors for c in np.round(matrix @ np.array(v), _DIGITS) + 0.0), matrix
+            vectors = (point, frame.normal, frame.axis, _scaled(along, sign))
+            yield tuple(round(c, _DIGITS) + 0.0 for vector in vectors for c in _times(matrix, vector)), matrix
+
+
+def from_place(there: Matrix, here: Matrix) -> Matrix:
+    """Return the matrix that takes vectors of one place to another: each with its own to where they are compared."""
+    x, y, z = zip(*there, strict=True)
+    first, second, third = (_times((x, y, z), column) for column in zip(*here, strict=True))
+    return first, second, third
+
+
+def _times(matrix: Matrix, vector: Vector) -> Vector:
+    x, y, z = vector
+    first, second, third = (float(a * x + b * y + c * z) for a, b, c in matrix)
+    return first, second, third
+
+
+def _scaled(vector: Vector, factor: float) -> Vector:
+    x, y, z = vector
+    return factor * x, factor * y, factor * z

@@ -6,12 +6,11 @@ from dataclasses import replace
 from pipeline.plan import estimate
 from pipeline.plan.basis import use_reduced_basis
 from pipeline.plan.deeper import Deeper, deeper_than, depth_key
-from pipeline.plan.images import NOWHERE, Image, image_key, moved_key
+from pipeline.plan.images import NOWHERE, Image, Matrix, from_place, image_key, moved_key
 from pipeline.plan.key import case_key, digest, mesh_key
 from pipeline.plan.steps import MOST_DOFS, MeshStep, OperatorStep, Solve, mesh_steps
 from pipeline.plan.symmetry import is_round, model_planes
 from pipeline.plan.work import Plan, Struck, reason_of
-from pipeline.shapes.arrays import FloatArray
 from pipeline.study.sweep import Case
 
 _OF_STRESS_ALONE = (
@@ -59,7 +58,7 @@ def strike_scaled(plan: Plan) -> Plan:
 
 def strike_images(plan: Plan) -> Plan:
     """Places that are each other's image, mirrored or turned about the body's axis, are solved once."""
-    first: dict[str, tuple[Solve, FloatArray]] = {}
+    first: dict[str, tuple[Solve, Matrix]] = {}
     key: dict[str, str] = {}
     images: dict[tuple[int, ...], Image] = {}
     for solve in plan.solves if _sweeps_places(plan) else ():
@@ -70,7 +69,7 @@ def strike_images(plan: Plan) -> Plan:
         other, there = first.setdefault(text, (solve, matrix))
         if other is not solve:
             key[solve.key] = other.key
-            image = Image(other.case.index, tuple(map(tuple, (matrix.T @ there).tolist())))
+            image = Image(other.case.index, from_place(there, matrix))
             images |= dict.fromkeys(solve.serves, image)
     solves = tuple(replace(solve, key=key.get(solve.key, solve.key)) for solve in plan.solves)
     plan = replace(plan, solves=solves, keys=tuple(key.get(k, k) for k in plan.keys), images=images)

@@ -4,8 +4,10 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from pipeline.plan.plan import Plan
+if TYPE_CHECKING:
+    from pipeline.plan.plan import Plan
 
 # The estimates count for as much as this share of the whole, measured.
 _TRUST = 0.005
@@ -24,7 +26,7 @@ class Expected:
     step: int
 
 
-def expectations(plan: Plan) -> dict[str, Expected]:
+def expectations(plan: "Plan") -> dict[str, Expected]:
     """Return what every solve of ``plan`` should take, by label; the time of a mesh is shared by its solves."""
     found = {}
     for number, step in enumerate(plan.meshes):

@@ -8,7 +8,7 @@ from pydantic import PrivateAttr, ValidationInfo, field_serializer, field_valida
 from pydantic_core import PydanticCustomError
 
 from pipeline.shapes.facetted import Facetted
-from pipeline.shapes.files.read import Loaded
+from pipeline.shapes.files.loaded import Loaded
 from pipeline.shapes.section import Words
 from pipeline.shapes.support import Below, Fixed
 from pipeline.shapes.triangles import SurfaceError, Triangles

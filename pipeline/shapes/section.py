@@ -24,7 +24,8 @@ class Words:
 class Section(BaseModel):
     """A section of a study file: strict, frozen; lengths in metres, pressures in pascal."""
 
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid")
+    # Built when a value is first checked: no study has all sections.
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", defer_build=True)
 
     name: Annotated[str, Field(exclude=True)] = ""
 

@@ -116,7 +116,7 @@ class Faces(Support):
 class Below(BaseModel, Support):
     """Held everywhere below a height: ``fixed = {below = "-15 mm"}``."""
 
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid")
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", defer_build=True)
     below: Coordinate
 
     @staticmethod
@@ -178,7 +178,7 @@ class Below(BaseModel, Support):
 class NamedFace(BaseModel, Support):
     """Held on the faces that a CAD file gives a name: ``fixed = {face = "base"}``."""
 
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid")
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", defer_build=True)
     face: str
 
     def holds(self, surfaces: Surfaces, points: FloatArray, tolerance: float) -> bool:

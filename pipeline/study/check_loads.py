@@ -5,9 +5,9 @@ from itertools import product
 from math import dist, isfinite
 from typing import cast
 
-from pipeline.shapes.bodies.cad import FromCad
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import PlaceError
+from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section, in_mm
 from pipeline.shapes.support import Faces, NamedFace
@@ -119,7 +119,7 @@ def _check_place(body: Body, traction: Traction, key: str, problems: Problems) -
             )  # fmt: skip
             return False
         return True
-    if on != FREE and isinstance(body, FromCad):
+    if on != FREE and isinstance(body, FromFile) and body.HAS_NAMES:
         problems.error(key, on, 'faces of a CAD file carry no tractions by name: use a cap round a point, or "free"')
         return False
     if on != FREE and on not in names:

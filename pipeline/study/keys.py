@@ -7,7 +7,8 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import isinf
-from typing import Any
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
@@ -54,6 +55,7 @@ _QUANTITIES = {
     "m/s^2": ("acceleration", "accelerations"),
     "": ("number", "numbers"),
 }
+_PLAIN = {bool: "true | false", int: "whole number", str: "text"}
 _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 
 
@@ -123,30 +125,29 @@ def _takes(model: type[Section], name: str) -> str:
     if name == "on":
         return 'face | "free" | {around = 3 lengths, radius = length}'
     field = model.model_fields[name]
-    return _kind(model.model_json_schema()["properties"][name]) + _bounds(field)
+    return _kind(field.annotation, _unit(field.annotation, [field])) + _bounds(field)
 
 
-def _kind(schema: dict[str, Any]) -> str:
-    choices = schema.get("enum", [schema["const"]] if "const" in schema else [])
-    if choices:
-        return " | ".join(json.dumps(choice) for choice in choices)
-    if "anyOf" in schema:
-        return " | ".join(_kind(part) for part in schema["anyOf"] if part.get("type") != "null")
-    match schema.get("type", "table"):
-        case "array" if "prefixItems" in schema:
-            items = schema["prefixItems"]
-            return f"{len(items)} {_QUANTITIES[items[0].get('unit', '')][1]}"
-        case "array":
-            return f"list of {_kind(schema['items']).replace(' | ', ', ')}"
-        case "boolean":
-            return "true | false"
-        case "integer":
-            return "whole number"
-        case "string":
-            return "text"
-        case "object" | "table":
-            return "table"
-    return _QUANTITIES[schema.get("unit", "")][0]
+def _kind(annotation: Any, unit: str) -> str:
+    """Name the values of a type; ``unit`` is what its numbers are in."""
+    kind, parts = get_origin(annotation) or annotation, get_args(annotation)
+    if kind is Annotated:
+        return _kind(parts[0], _unit(parts[0], parts[1:]) or unit)
+    if kind is Literal:
+        return " | ".join(map(json.dumps, parts))
+    if kind in (Union, UnionType):
+        return " | ".join(_kind(part, unit) for part in parts if part is not NoneType)
+    if kind is tuple and ... in parts:
+        return f"list of {_kind(parts[0], unit).replace(' | ', ', ')}"
+    if kind is tuple:
+        return f"{len(parts)} {_QUANTITIES[unit][1]}"
+    return _QUANTITIES[unit][0] if kind is float else _PLAIN.get(kind, "table")
+
+
+def _unit(annotation: Any, notes: Iterable[Any]) -> str:
+    """Return the SI unit that is noted on a type, or on what it is made of, "" if none is."""
+    extras = (getattr(note, "json_schema_extra", None) for note in _metadata(annotation, notes))
+    return next((str(extra["unit"]) for extra in extras if isinstance(extra, dict) and "unit" in extra), "")
 
 
 def _bounds(field: FieldInfo) -> str:

@@ -19,7 +19,7 @@ _NONE = 1e-12
 class Cap(BaseModel):
     """What of the boundary lies within a ball and faces the way that it does at the centre."""
 
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid")
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", defer_build=True)
     around: tuple[Coordinate, Coordinate, Coordinate]
     radius: Length
 

@@ -15,6 +15,7 @@ from pipeline.shapes.section import Section, Words
 from pipeline.shapes.tissue import Tissue
 from pipeline.study.loads import Load, Traction
 from pipeline.study.path import Path
+from pipeline.study.vocabulary import FIGURES, REDUCTIONS
 from pipeline.units import Length, Pressure, Share, parse_quantity
 
 # ---- material ---------------------------------------------------------------------------------------
@@ -187,12 +188,6 @@ class Solving(Section):
     ] = 3
 
 
-REDUCTIONS = (
-    "duplicates", "full", "scaling", "images", "moved", "axisymmetric", "symmetry", "sharing", "reuse", "reduced",
-    "condensed", "stored", "all",
-)  # fmt: skip
-
-
 class Planning(Section):
     """What the planner may leave out: reductions not to be used, and where a sweep over ε may end.
 
@@ -219,13 +214,6 @@ class Planning(Section):
             default="none: every epsilon is run",
         ),
     ] = None
-
-
-# Each is drawn by the module of its name in pipeline/report/figures.
-FIGURES = (
-    "epsilon", "ratio", "speedup", "exact", "convergence", "accuracy", "map", "force", "compliance", "linear",
-    "contact", "loads",
-)  # fmt: skip
 
 
 class Drawing(Section):

@@ -1,13 +1,10 @@
-"""A first study file, with every key that there is explained; and the studies that come with the program."""
+"""A first study file, with every key that there is explained."""
 
 import json
 import textwrap
-from pathlib import Path
 
 from pipeline.study.keys import SECTION_TEXTS, Key, all_sections, heading, keys_of
 
-# The studies of the checkout, which are installed with the package.
-EXAMPLES = Path(__file__).parent / "examples"
 _WIDTH = 110
 
 
@@ -26,16 +23,6 @@ def starter(name: str) -> str:
         for key in keys:
             lines += _lines(key, chosen, is_left_out=is_piece)
     return "\n".join(lines) + "\n"
-
-
-def is_name(name: str) -> bool:
-    """Tell whether a study may be called so: results are called after it."""
-    return name == name.strip() and name.replace("-", "").replace("_", "").replace(".", "").isalnum()
-
-
-def examples() -> dict[str, Path]:
-    """Return the studies that come with the program, by name."""
-    return {path.stem: path for path in sorted(EXAMPLES.glob("*.toml"))}
 
 
 def _lines(key: Key, chosen: str, *, is_left_out: bool) -> list[str]:

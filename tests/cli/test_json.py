@@ -114,7 +114,7 @@ def test_what_else_is_wrong_is_told(epsmesh, small, here, words, key):
 
 
 def test_an_exception_is_told_and_goes_on(epsmesh, small, monkeypatch):
-    monkeypatch.setattr("pipeline.cli.plan.make_plan", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr("pipeline.plan.plan.make_plan", lambda *_, **__: 1 / 0)
     done = epsmesh("plan", small, "--json")
     assert failed(done, status=1)[0]["message"] == "ZeroDivisionError: division by zero"
     assert isinstance(done.exception, ZeroDivisionError)

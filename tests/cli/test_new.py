@@ -9,7 +9,8 @@ import pytest
 from pipeline.plan.plan import make_plan
 from pipeline.study.keys import SECTION_TEXTS, all_sections, keys_of, shapes_of, words_of
 from pipeline.study.load import load, parse
-from pipeline.study.starter import examples, starter
+from pipeline.study.named import examples
+from pipeline.study.starter import starter
 from tests.commands import epsmesh
 
 STUDIES = Path(__file__).parents[2] / "studies"

@@ -7,7 +7,7 @@ from pipeline.report.compliance import tool_dimension
 from pipeline.report.figures.dimensions import mesh_dimensions, refinements
 from pipeline.report.figures.loads import dimension
 from pipeline.report.table import study_of
-from pipeline.study.schema import FIGURES
+from pipeline.study.vocabulary import FIGURES
 
 # What can be drawn on request.
 KINDS = (*FIGURES, "nothing")

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field
 
 from pipeline.shapes.files.image import load_image
-from pipeline.shapes.files.read import Loaded
+from pipeline.shapes.files.loaded import Loaded
 from pipeline.shapes.from_file import UNITS, FromFile
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.section import Words

@@ -6,7 +6,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
-from pipeline.shapes.files.read import Loaded, load_surface
+from pipeline.shapes.files.loaded import Loaded
+from pipeline.shapes.files.read import load_surface
 from pipeline.shapes.from_file import UNITS, FromFile
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.section import Words

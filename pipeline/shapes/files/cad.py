@@ -15,7 +15,8 @@ from pipeline.launcher import environment_alone
 from pipeline.shapes.arrays import BoolArray, FloatArray, IntArray, np
 from pipeline.shapes.files import check
 from pipeline.shapes.files.edges import Edges, oriented
-from pipeline.shapes.files.read import LARGEST_FILE, Loaded, state_of
+from pipeline.shapes.files.loaded import Loaded
+from pipeline.shapes.files.read import LARGEST_FILE, state_of
 from pipeline.shapes.files.step import entities_of, named_faces, unit_of
 from pipeline.shapes.triangles import SurfaceError, Triangles, doubled_normals, enclosed
 

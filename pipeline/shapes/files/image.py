@@ -13,8 +13,9 @@ from typing import Any
 from pipeline.shapes.arrays import FloatArray, IntArray, np
 from pipeline.shapes.files.checked import kept_image
 from pipeline.shapes.files.labels import LARGEST_IMAGE, LabelMap, files_of, of_label, read_labels
+from pipeline.shapes.files.loaded import Loaded
 from pipeline.shapes.files.raw import Raw
-from pipeline.shapes.files.read import Loaded, state_of
+from pipeline.shapes.files.read import state_of
 from pipeline.shapes.files.shells import largest_shell
 from pipeline.shapes.files.whole import made_whole
 from pipeline.shapes.triangles import SurfaceError, Triangles, enclosed

@@ -1,12 +1,12 @@
 """From a file to a closed surface in metres, or to what is wrong with it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 from pipeline.shapes.files import obj, ply, stl
 from pipeline.shapes.files.checked import kept_whole
+from pipeline.shapes.files.loaded import Loaded
 from pipeline.shapes.files.raw import Raw
 from pipeline.shapes.files.whole import made_whole
 from pipeline.shapes.triangles import SurfaceError, Triangles
@@ -14,14 +14,6 @@ from pipeline.shapes.triangles import SurfaceError, Triangles
 _PARSERS: dict[str, Callable[[bytes], Raw]] = {".stl": stl.parse, ".ply": ply.parse, ".obj": obj.parse}
 # That of 2,000,000 facets of an STL file as text.
 LARGEST_FILE = 600_000_000  # bytes
-
-
-@dataclass(frozen=True)
-class Loaded:
-    """A surface, and what was done to it that its author should know."""
-
-    triangles: Triangles
-    notices: tuple[str, ...]
 
 
 def load_surface(path: Path, unit: float, repair: bool = False, smooth: float | None = None) -> Loaded:

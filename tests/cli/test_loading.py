@@ -1,0 +1,84 @@
+"""Each command loads what it needs: what another one, or another study, would need must not make it wait."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pipeline.shapes.registry import BODIES, PROBES
+from tests.commands import ENVIRONMENT, ROOT
+from tests.studies import small_text
+
+RUN = """
+import sys
+from pipeline.__main__ import main
+sys.argv = ["epsmesh", *sys.argv[1:]]
+try:
+    main()
+finally:
+    print(*sys.modules, file=sys.stderr)
+"""
+# What nothing that answers at once needs: the figures' and the files' libraries, and the solvers.
+_SLOW = {"dolfinx", "gmsh", "petsc4py", "mpi4py", "matplotlib", "xarray", "pandas", "netCDF4", "rich", "jinja2"}
+# What a study of plain shapes, in units that people write, does without, too.
+_ELSEWHERE = {"numpy", "scipy", "pint", "sqlite3", "http", "asyncio"}
+
+
+def loaded(*arguments: object, within: Path = ROOT) -> set[str]:
+    """Return the modules that a command has loaded by its end, in a process of its own."""
+    done = subprocess.run(
+        [sys.executable, "-c", RUN, *map(str, arguments)], capture_output=True, text=True, check=True, cwd=within,
+        env=ENVIRONMENT | {"PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    return set(done.stderr.split())
+
+
+def libraries(modules: set[str]) -> set[str]:
+    return {module.partition(".")[0] for module in modules}
+
+
+def shapes(modules: set[str]) -> set[str]:
+    """Return the shapes of bodies and probes whose classes are among ``modules``."""
+    of = {kind.__module__: shape for known in (BODIES, PROBES) for shape, kind in known.items()}
+    return {of[module] for module in modules & set(of)}
+
+
+@pytest.fixture
+def study(tmp_path):
+    file = tmp_path / "plain.toml"
+    file.write_text(small_text())
+    return file
+
+
+def test_help_loads_no_study_no_plan_and_no_shape():
+    modules = loaded("--help")
+    assert not libraries(modules) & (_SLOW | _ELSEWHERE | {"pydantic", "psutil", "hashlib", "tomllib"})
+    assert {m for m in modules if m.startswith(("pipeline.study.", "pipeline.plan", "pipeline.shapes"))} <= {
+        "pipeline.study.vocabulary", "pipeline.study.named",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("command", ["validate", "plan", "status", "explain"])
+def test_a_study_loads_the_shapes_that_it_names_and_no_arrays(command, study, tmp_path):
+    modules = loaded(command, study, within=tmp_path)
+    assert not libraries(modules) & (_SLOW | _ELSEWHERE - ({"sqlite3"} if command == "status" else set()))
+    assert shapes(modules) == {"box", "disc"}
+    assert "psutil" not in modules or command == "plan"
+
+
+def test_a_unit_that_few_people_write_is_asked_after(study, tmp_path):
+    study.write_text(study.read_text().replace("kPa", "kN/m^2"))
+    assert "pint" in loaded("validate", study, within=tmp_path)
+
+
+def test_a_study_begun_like_another_loads_no_shape(tmp_path):
+    modules = loaded("new", "mine", "--like", ROOT / "studies" / "quick.toml", within=tmp_path)
+    assert (tmp_path / "studies" / "mine.toml").exists()
+    assert not {module for module in modules if module.startswith("pipeline.shapes")}
+
+
+def test_a_first_study_lists_every_shape_and_computes_nothing(tmp_path):
+    modules = loaded("new", "mine", within=tmp_path)
+    assert shapes(modules) == {*BODIES, *PROBES}
+    assert not libraries(modules) & (_SLOW | _ELSEWHERE)
