@@ -12,7 +12,7 @@ from pydantic_core import PydanticCustomError
 from pipeline.shapes.arrays import FloatArray, IntArray, np
 from pipeline.shapes.cad_face import CadFace, plane_piece, raised
 from pipeline.shapes.facetted import skin_of
-from pipeline.shapes.files.cad import Solid, load_solid
+from pipeline.shapes.files.loaded import Solid
 from pipeline.shapes.frame import Frame, Vector, unit
 from pipeline.shapes.from_file import UNITS, FromFile
 from pipeline.shapes.rays import facing, pierce
@@ -72,6 +72,8 @@ class FromCad(FromFile):
     @classmethod
     def load(cls, file: str, given: Mapping[str, Any]) -> Solid:
         """Return the solid in a file."""
+        from pipeline.shapes.files.cad import load_solid  # noqa: PLC0415 (as a file is read)
+
         return load_solid(Path(file), given["unit"], SIZES[given["unit"]])
 
     @field_validator("file")

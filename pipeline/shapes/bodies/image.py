@@ -6,7 +6,6 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
-from pipeline.shapes.files.image import load_image
 from pipeline.shapes.files.loaded import Loaded
 from pipeline.shapes.from_file import UNITS, FromFile
 from pipeline.shapes.scanned import Scanned
@@ -40,5 +39,7 @@ class FromImage(FromFile, Scanned):
     @classmethod
     def load(cls, file: str, given: Mapping[str, Any]) -> Loaded:
         """Return the surface round the label."""
+        from pipeline.shapes.files.image import load_image  # noqa: PLC0415 (as a file is read)
+
         unit = UNITS[given["unit"]] if given["unit"] else None
         return load_image(Path(file), given["label"], unit, given["smooth"])

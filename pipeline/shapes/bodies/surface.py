@@ -7,7 +7,6 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field
 
 from pipeline.shapes.files.loaded import Loaded
-from pipeline.shapes.files.read import load_surface
 from pipeline.shapes.from_file import UNITS, FromFile
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.section import Words
@@ -42,4 +41,6 @@ class FromSurface(FromFile, Scanned):
     @classmethod
     def load(cls, file: str, given: Mapping[str, Any]) -> Loaded:
         """Return the surface in a file."""
+        from pipeline.shapes.files.read import load_surface  # noqa: PLC0415 (as a file is read)
+
         return load_surface(Path(file), UNITS[given["unit"]], given["repair"], given["smooth"] or None)

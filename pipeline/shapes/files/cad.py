@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
@@ -12,10 +11,10 @@ from zipfile import BadZipFile
 
 from pipeline.files import atomic, cache_folder
 from pipeline.launcher import environment_alone
-from pipeline.shapes.arrays import BoolArray, FloatArray, IntArray, np
+from pipeline.shapes.arrays import FloatArray, IntArray, np
 from pipeline.shapes.files import check
 from pipeline.shapes.files.edges import Edges, oriented
-from pipeline.shapes.files.loaded import Loaded
+from pipeline.shapes.files.loaded import Solid
 from pipeline.shapes.files.read import LARGEST_FILE, state_of
 from pipeline.shapes.files.step import entities_of, named_faces, unit_of
 from pipeline.shapes.triangles import SurfaceError, Triangles, doubled_normals, enclosed
@@ -27,26 +26,6 @@ _PROGRAM = "pipeline.scene.tessellate"
 _LONGEST = 600  # s
 # Of the solid's volume, triangles may miss this much; of its extent, vertices in the file may be off by that.
 _MISSED, _OFF = 0.03, 1e-5
-
-
-@dataclass(frozen=True, eq=False)
-class Solid(Loaded):
-    """A solid's ``triangles``, and what is known of its faces.
-
-    ``normals`` (m, 3, 3) are the outward ones of the true surface at the corners of the facets; ``face`` (m) is the
-    number of the face that each facet is on; ``planes`` tells of faces whether they are plane, ``radius`` (m) how
-    round, ``names`` which numbers a name stands for. ``box`` (2, 3) and ``volume`` are in m and m³, ``content`` is the
-    hash of the file.
-    """
-
-    normals: FloatArray
-    face: IntArray
-    planes: BoolArray
-    radius: FloatArray
-    names: dict[str, tuple[int, ...]]
-    box: FloatArray
-    volume: float
-    content: str
 
 
 def load_solid(path: Path, unit: str, size: float) -> Solid:

@@ -1,7 +1,8 @@
-"""What a file of a body is read into."""
+"""What the files of bodies are read into."""
 
 from dataclasses import dataclass
 
+from pipeline.shapes.arrays import BoolArray, FloatArray, IntArray
 from pipeline.shapes.triangles import Triangles
 
 
@@ -11,3 +12,23 @@ class Loaded:
 
     triangles: Triangles
     notices: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Solid(Loaded):
+    """A solid's ``triangles``, and what is known of its faces.
+
+    ``normals`` (m, 3, 3) are the outward ones of the true surface at the corners of the facets; ``face`` (m) is the
+    number of the face that each facet is on; ``planes`` tells of faces whether they are plane, ``radius`` (m) how
+    round, ``names`` which numbers a name stands for. ``box`` (2, 3) and ``volume`` are in m and m³, ``content`` is the
+    hash of the file.
+    """
+
+    normals: FloatArray
+    face: IntArray
+    planes: BoolArray
+    radius: FloatArray
+    names: dict[str, tuple[int, ...]]
+    box: FloatArray
+    volume: float
+    content: str

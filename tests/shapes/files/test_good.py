@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from pipeline.arrays import FloatArray
-from pipeline.shapes.files.read import Loaded, load_surface
+from pipeline.shapes.files.loaded import Loaded
+from pipeline.shapes.files.read import load_surface
 from tests.shapes.files.solids import Surface, ball, obj, ply, stl, stl_text
 
 BALL = ball()
