@@ -51,7 +51,7 @@ def new(
         fail(_of_name(name, f"a name has no folders: it stands for {_FOLDER}/NAME.toml; a path ends in .toml"))
     text, source = (_starter(path.stem), path) if like is None else _copy_of(like)
     try:
-        carried = [] if path.exists() else _carried(text, source.parent, path.parent)
+        carried = [] if like is None or path.exists() else _carried(text, source.parent, path.parent)
         write_new(path, text)
     except FileExistsError:
         fail(of_file(path, "exists already, and is left alone; give another name"))
