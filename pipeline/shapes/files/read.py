@@ -9,7 +9,7 @@ from pipeline.shapes.files.checked import kept_whole
 from pipeline.shapes.files.loaded import Loaded
 from pipeline.shapes.files.raw import Raw
 from pipeline.shapes.files.whole import made_whole
-from pipeline.shapes.triangles import SurfaceError, Triangles
+from pipeline.shapes.triangles import SurfaceError
 
 _PARSERS: dict[str, Callable[[bytes], Raw]] = {".stl": stl.parse, ".ply": ply.parse, ".obj": obj.parse}
 # That of 2,000,000 facets of an STL file as text.
