@@ -1,5 +1,6 @@
 """The site builds without a warning, and the reference holds everything that the code has."""
 
+import re
 import subprocess
 import sys
 
@@ -28,6 +29,14 @@ def site(tmp_path_factory):
 
 def reference(site, name):
     return (site / "reference" / f"{name}.html").read_text(encoding="utf-8")
+
+
+def test_formulas_are_shown_as_they_are_written(site):
+    """Neither as source of TeX, nor with stars that were taken for emphasis."""
+    for page in site.rglob("*.html"):
+        text = page.read_text(encoding="utf-8")
+        assert "$$" not in text, page.name
+        assert not re.search(r"\w<em>|</em>\w", text), page.name
 
 
 def test_every_key_is_in_the_reference(site):
