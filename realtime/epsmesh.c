@@ -9,7 +9,9 @@ static const double PI = 3.14159265358979323846;
 static const double FORMAT = 2.0, TOUCHING = 1e-12, SMALLEST = 1e-6, SLENDER = 0.02, SOFT = 1e-12, STICKS = 0.1;
 static const double BALL_LIMIT = 0.6, NEGLIGIBLE = 1e-17, SAME = 4e-16;
 static const double FOOT_SAME = 1e-13; /* of the region */
-enum { STEPS = 60, TERMS = 40, FOOT_STEPS = 30 };
+/* Of several tools: NEAR in units of both radii; see pipeline/realtime/doubt.py for the others. */
+static const double NEAR = 2.0, SETTLED = 1e-8, FOURTH = 0.5, FOURTH_BLADE = 2.0, BENDS_BLADE = 2.0;
+enum { STEPS = 60, TERMS = 40, FOOT_STEPS = 30, SETTLE_STEPS = 40 };
 
 /* ---- the file: netCDF classic with 64-bit offsets ---- */
 
@@ -86,7 +88,7 @@ typedef struct {
     int rank; /* -1: not yet found */
 } wanted;
 
-enum { WANTED = 23, OPTIONAL = 21 };
+enum { WANTED = 27, OPTIONAL = 21, OF_PAIRS = 23 };
 
 /* Return where the `n` doubles of a variable begin, or NULL if they are not all in the file. */
 static const unsigned char *found_at(const reader *r, const unsigned char *begin, const size_t *shape, int rank,
@@ -172,6 +174,26 @@ static int is_sound(const epsmesh_model *m) {
     return m->thickness > 0 && m->young > 0 && m->largest > 0 && m->largest <= 1;
 }
 
+/* Return whether what a file tells of two places, if it does, is that of a model. */
+static int has_pairs(epsmesh_model *m, const wanted *w) {
+    int i, j, n, found = 0, rank, nodes;
+    for (i = 0; i < WANTED - OF_PAIRS; i++) found += w[i].rank >= 0;
+    m->has_pairs = found > 0;
+    if (!found) return 1;
+    if (found < WANTED - OF_PAIRS || m->pair_error < 0 || m->pair_aside < 0) return 0;
+    if (w[0].length[0] > EPSMESH_MOST_MODES || w[1].length[0] > EPSMESH_MOST_LINKS) return 0;
+    for (i = 1; i < 3; i++) {
+        if (w[0].length[i] > EPSMESH_MOST || w[1].length[i] != w[0].length[0]) return 0;
+        m->pair_counts[i + 1] = (int)w[0].length[i];
+    }
+    rank = m->pair_counts[1] = (int)w[0].length[0], nodes = m->pair_counts[0] = (int)w[1].length[0];
+    for (n = 0; n < nodes; n++)
+        for (i = 0; i < rank; i++)
+            for (j = 0; j < i; j++)
+                if (m->pair_links[(n * rank + i) * rank + j] != m->pair_links[(n * rank + j) * rank + i]) return 0;
+    return nodes == 1 || m->poisson_range[0] < m->poisson_range[1];
+}
+
 epsmesh_status epsmesh_load(epsmesh_model *m, const void *data, size_t size) {
     double format, is_round, even[2], leans;
     reader r;
@@ -200,8 +222,12 @@ epsmesh_status epsmesh_load(epsmesh_model *m, const void *data, size_t size) {
         {"bend", m->bend, EPSMESH_MOST_IN_ALL, {0}, -1},
         {"tensors", m->tensors, EPSMESH_TENSORS * EPSMESH_MOST_IN_ALL, {0}, -1}, /* may be missing, as may */
         {"bend_error", &m->bend_error, 1, {0}, -1},
+        {"pair_modes", m->pair_modes, EPSMESH_MOST_TERMS, {0}, -1},
+        {"pair_links", m->pair_links, EPSMESH_MOST_LINKS * EPSMESH_MOST_MODES * EPSMESH_MOST_MODES, {0}, -1},
+        {"pair_error", &m->pair_error, 1, {0}, -1},
+        {"pair_aside", &m->pair_aside, 1, {0}, -1},
     };
-    static const int ranks[WANTED] = {3, 3, 2, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 2, 4, 0};
+    static const int ranks[WANTED] = {3, 3, 2, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 2, 4, 0, 3, 3, 0, 0};
     static const size_t firsts[] = {3, 3, 4, 2, 2, 2};
     m->is_loaded = 0, m->bend_error = 0;
     r.data = (const unsigned char *)data, r.size = size, r.at = 0, r.failed = data == NULL;
@@ -230,6 +256,7 @@ epsmesh_status epsmesh_load(epsmesh_model *m, const void *data, size_t size) {
         if (m->height[i] != 0 || m->bend[i] != 0) m->is_flat = 0;
     /* A curved face that does not say how well it is known is of a time when it was known badly. */
     if (!m->is_flat && w[OPTIONAL + 1].rank < 0) return EPSMESH_NO_MODEL;
+    if (!has_pairs(m, w + OF_PAIRS)) return EPSMESH_NO_MODEL;
     m->is_loaded = is_sound(m);
     return m->is_loaded ? EPSMESH_OK : EPSMESH_NO_MODEL;
 }
@@ -698,50 +725,408 @@ epsmesh_query epsmesh_ask(const epsmesh_model *m) {
     return q;
 }
 
-epsmesh_touch epsmesh_touch_at(const epsmesh_model *m, const epsmesh_query *q) {
-    double local[3], edge[2], force[3], room, share, bent, sticks;
+/* A query that makes sense, with what is known of its place. */
+typedef struct {
+    double local[3], edge[2], room;
     spot f;
-    epsmesh_status status = misfit(m, q, local, edge, &f);
-    epsmesh_touch t;
     place p;
-    contact k;
-    int i, j, is_disc = q->shape == EPSMESH_DISC || q->shape == EPSMESH_BONDED_DISC, fits;
-    if (status == EPSMESH_LOST) return all(status, 0.0);
-    if (status != EPSMESH_OK) return all(status, (double)NAN);
-    if (!place_at(m, local[0], local[1], q->poisson, q->shape >= EPSMESH_BLADE, &p))
-        return all(EPSMESH_DAMAGED, (double)NAN);
-    p.bend = f.bend, p.slope_bend[0] = f.slope_bend[0], p.slope_bend[1] = f.slope_bend[1];
-    room = room_at(m, local[0], local[1]);
-    if (is_disc) {
-        fits = q->radius <= m->largest * room;
-        k = q->shape == EPSMESH_DISC ? press_disc(q->radius, q->depth, &p) : press_bonded(q->radius, q->depth, &p);
-    } else if (q->shape == EPSMESH_BLADE) {
-        fits = press_blade(q, edge, &p, m->largest * room, &k);
-    } else {
-        fits = press_round(q, &p, m->largest * room, &k);
-    }
-    if (!fits) return all(EPSMESH_LARGE, (double)NAN);
-    share = (k.radius / room) * (k.radius / room);
-    bent = fabs(p.h) + 2 * sqrt(p.bent[0] * p.bent[0] + p.bent[1] * p.bent[1]);
-    t.status = EPSMESH_OK, t.stiffness = q->young * k.stiffness, t.contact_radius = k.radius;
-    sticks = q->shape == EPSMESH_BONDED_DISC ? STICKS * (1 - 2 * q->poisson) * k.radius / room : 0;
-    t.force_error = m->bar[3] + k.stiffness * ((m->bar[0] + m->bar[2] * share * share + sticks) / room +
-                                               m->bar[1] * bent * k.mean_square);
+} asked;
+
+static int surveyed(const epsmesh_model *m, const epsmesh_query *q, asked *a) {
+    if (!place_at(m, a->local[0], a->local[1], q->poisson, q->shape >= EPSMESH_BLADE, &a->p)) return 0;
+    a->p.bend = a->f.bend, a->p.slope_bend[0] = a->f.slope_bend[0], a->p.slope_bend[1] = a->f.slope_bend[1];
+    a->room = room_at(m, a->local[0], a->local[1]);
+    return 1;
+}
+
+/* Return whether the contact of a tool at a depth of its query is small enough. */
+static int press(const epsmesh_model *m, const epsmesh_query *q, const asked *a, contact *k) {
+    double most = m->largest * a->room;
+    if (q->shape == EPSMESH_BLADE) return press_blade(q, a->edge, &a->p, most, k);
+    if (q->shape == EPSMESH_SPHERE || q->shape == EPSMESH_CONE) return press_round(q, &a->p, most, k);
+    *k = q->shape == EPSMESH_DISC ? press_disc(q->radius, q->depth, &a->p) : press_bonded(q->radius, q->depth, &a->p);
+    return q->radius <= most;
+}
+
+static double bar_of(const epsmesh_model *m, const epsmesh_query *q, const asked *a, const contact *k) {
+    double share = (k->radius / a->room) * (k->radius / a->room), error;
+    double bent = fabs(a->p.h) + 2 * sqrt(a->p.bent[0] * a->p.bent[0] + a->p.bent[1] * a->p.bent[1]);
+    double sticks = q->shape == EPSMESH_BONDED_DISC ? STICKS * (1 - 2 * q->poisson) * k->radius / a->room : 0;
+    error = m->bar[3] + k->stiffness * ((m->bar[0] + m->bar[2] * share * share + sticks) / a->room +
+                                        m->bar[1] * bent * k->mean_square);
     if (q->shape == EPSMESH_SPHERE || q->shape == EPSMESH_CONE) {
-        double growth = 3 * k.stiffness / k.force - 2 / q->depth;
-        t.force_error += m->bend_error / 2 * k.mean_square * (growth > 0 ? growth : 0);
+        double growth = 3 * k->stiffness / k->force - 2 / q->depth;
+        error += m->bend_error / 2 * k->mean_square * (growth > 0 ? growth : 0);
     }
-    force_at(&f, k.force, k.aside, q->depth, force);
+    return error;
+}
+
+/* Return a contact in the body's coordinates, of a tool at `depth` by itself. */
+static epsmesh_touch told(const epsmesh_model *m, double young, double depth, const asked *a, const contact *k,
+                          double error) {
+    epsmesh_touch t;
+    double force[3];
+    int i, j;
+    t.status = EPSMESH_OK, t.stiffness = young * k->stiffness, t.contact_radius = k->radius, t.force_error = error;
+    force_at(&a->f, k->force, k->aside, depth, force);
     for (i = 0; i < 3; i++)
-        for (t.force[i] = 0, j = 0; j < 3; j++) t.force[i] += q->young * force[j] * m->axes[j][i];
-    if (!(k.force > 0 && is_positive(t.stiffness) && isfinite(t.force_error) && isfinite(t.force[0]) &&
+        for (t.force[i] = 0, j = 0; j < 3; j++) t.force[i] += young * force[j] * m->axes[j][i];
+    if (!(k->force > 0 && is_positive(t.stiffness) && isfinite(t.force_error) && isfinite(t.force[0]) &&
           isfinite(t.force[1]) && isfinite(t.force[2])))
         return all(EPSMESH_DAMAGED, (double)NAN);
     return t;
 }
 
+epsmesh_touch epsmesh_touch_at(const epsmesh_model *m, const epsmesh_query *q) {
+    asked a;
+    contact k;
+    epsmesh_status status = misfit(m, q, a.local, a.edge, &a.f);
+    if (status == EPSMESH_LOST) return all(status, 0.0);
+    if (status != EPSMESH_OK) return all(status, (double)NAN);
+    if (!surveyed(m, q, &a)) return all(EPSMESH_DAMAGED, (double)NAN);
+    if (!press(m, q, &a, &k)) return all(EPSMESH_LARGE, (double)NAN);
+    return told(m, q->young, q->depth, &a, &k, bar_of(m, q, &a, &k));
+}
+
+/* ---- several tools: pipeline/realtime/pairs.py, several.py and doubt.py ---- */
+
+enum { TOOLS = EPSMESH_MOST_TOOLS };
+
+/* Of places i and j: G, its slope with x_i, the size of the Laplacian of R, a half-space's share of G, x_i - x_j over
+ * the distance, and that; of a tool i at the place of j, w and its slope with x_i. */
+typedef struct {
+    double sinks[TOOLS][TOOLS], slopes[TOOLS][TOOLS][2], bends[TOOLS][TOOLS], near[TOOLS][TOOLS], away[TOOLS][TOOLS][2], apart[TOOLS][TOOLS];
+    double bent[TOOLS][TOOLS], slope_bent[TOOLS][TOOLS][2];
+} influence;
+
+typedef struct {
+    double depth[TOOLS], force[TOOLS], mean[TOOLS], aside[TOOLS][2], inverse[TOOLS][TOOLS];
+    contact k[TOOLS];
+} settled;
+
+/* Modes at a place: values, slopes with x and y, and Laplacian. */
+static void modes_at(const epsmesh_model *m, double x, double y, double f[4][EPSMESH_MOST_MODES]) {
+    double u[3][EPSMESH_MOST], v[3][EPSMESH_MOST], a = m->reach[0], b = m->reach[1];
+    int i, j, k, rows = m->pair_counts[2], columns = m->pair_counts[3];
+    const double *c = m->pair_modes;
+    polynomials(x / a, columns, u), polynomials(y / b, rows, v);
+    for (k = 0; k < m->pair_counts[1]; k++) {
+        f[0][k] = f[1][k] = f[2][k] = f[3][k] = 0;
+        for (j = 0; j < rows; j++, c += columns) {
+            double sum[3] = {0, 0, 0};
+            for (i = 0; i < columns; i++) sum[0] += c[i] * u[0][i], sum[1] += c[i] * u[1][i], sum[2] += c[i] * u[2][i];
+            f[0][k] += v[0][j] * sum[0], f[1][k] += v[0][j] * sum[1] / a, f[2][k] += v[1][j] * sum[0] / b;
+            f[3][k] += v[0][j] * sum[2] / (a * a) + v[2][j] * sum[0] / (b * b);
+        }
+    }
+}
+
+/* Return the second moment (m2) of a contact under a `force` on a half-space, and which `power` of the force it is. */
+static double moment(const epsmesh_query *q, double plane, double force, double *power) {
+    double big = 0.5 * (q->length > q->width ? q->length : q->width), c8[3][EPSMESH_MOST], r[2] = {0, 0};
+    double small = 0.5 * (q->length > q->width ? q->width : q->length);
+    int i, j;
+    *power = q->shape == EPSMESH_SPHERE ? 2.0 / 3 : q->shape == EPSMESH_CONE ? 1.0 : 0.0;
+    force = force > 0 ? force : 0;
+    if (q->shape == EPSMESH_SPHERE) return 0.4 * pow(0.75 * force * q->radius / plane, 2.0 / 3);
+    if (q->shape == EPSMESH_CONE) return 2.0 / 3 * force * tan(q->angle) / (PI * plane);
+    if (q->shape != EPSMESH_BLADE) return 2.0 / 3 * q->radius * q->radius;
+    polynomials(1 - 2 * log(small / big) / log(SLENDER), 8, c8);
+    for (i = 0; i < 2; i++)
+        for (j = 0; j < 8; j++) r[i] += RECTANGLE[i + 1][j] * c8[0][j];
+    return r[0] * big * big + r[1] * small * small;
+}
+
+/* The second moment ((xx, xy), (xy, yy)) of a contact, in units of its trace. */
+static void tensor(const epsmesh_query *q, const double edge[2], double t[2][2]) {
+    double big = 0.5 * (q->length > q->width ? q->length : q->width), c8[3][EPSMESH_MOST], r[2] = {0, 0}, e[2], share;
+    double small = 0.5 * (q->length > q->width ? q->width : q->length);
+    int i, j;
+    t[0][0] = t[1][1] = 0.5, t[0][1] = t[1][0] = 0;
+    if (q->shape != EPSMESH_BLADE) return;
+    polynomials(1 - 2 * log(small / big) / log(SLENDER), 8, c8);
+    for (i = 0; i < 2; i++)
+        for (j = 0; j < 8; j++) r[i] += RECTANGLE[i + 1][j] * c8[0][j];
+    e[0] = q->length < q->width ? -edge[1] : edge[0], e[1] = q->length < q->width ? edge[0] : edge[1];
+    r[0] *= big * big, r[1] *= small * small, share = r[0] / (r[0] + r[1]);
+    for (i = 0; i < 2; i++)
+        for (j = 0; j < 2; j++) t[i][j] = (1 - share) * (i == j) + (2 * share - 1) * e[i] * e[j];
+}
+
+static void bent_at(const epsmesh_query *q, const double edge[2], int n, int i, influence *g) {
+    double t[2][2];
+    int j, k;
+    tensor(q, edge, t);
+    for (j = 0; j < n; j++) {
+        double d = g->apart[i][j], *e = g->away[i][j], along[2], share, near = g->near[i][j] / (d * d);
+        if (i == j) {
+            g->bent[i][j] = g->slope_bent[i][j][0] = g->slope_bent[i][j][1] = 0;
+            continue;
+        }
+        for (k = 0; k < 2; k++) along[k] = t[k][0] * e[0] + t[k][1] * e[1];
+        share = along[0] * e[0] + along[1] * e[1];
+        g->bent[i][j] = near * (1.5 * share - 0.5);
+        for (k = 0; k < 2; k++) g->slope_bent[i][j][k] = near / d * (3 * along[k] + (1.5 - 7.5 * share) * e[k]);
+    }
+}
+
+static void influences(const epsmesh_model *m, int n, const epsmesh_query *q, const asked *a, influence *g) {
+    double f[TOOLS][4][EPSMESH_MOST_MODES], linked[TOOLS][EPSMESH_MOST_MODES], nu[3][EPSMESH_MOST];
+    double low = m->poisson_range[0], high = m->poisson_range[1], plane = 1 / (1 - q->poisson * q->poisson);
+    int i, j, k, l, rank = m->pair_counts[1];
+    polynomials(high == low ? 0 : (2 * q->poisson - low - high) / (high - low), m->pair_counts[0], nu);
+    for (i = 0; i < n; i++) {
+        modes_at(m, a[i].local[0], a[i].local[1], f[i]);
+        for (k = 0; k < rank; k++) linked[i][k] = 0;
+    }
+    for (l = 0; l < rank; l++)
+        for (k = 0; k < rank; k++) {
+            double s = 0;
+            for (j = 0; j < m->pair_counts[0]; j++) s += nu[0][j] * m->pair_links[(j * rank + l) * rank + k];
+            for (i = 0; i < n; i++) linked[i][k] += f[i][0][l] * s;
+        }
+    for (i = 0; i < n; i++)
+        for (j = 0; j < n; j++) {
+            double x = a[i].local[0] - a[j].local[0], y = a[i].local[1] - a[j].local[1], d = sqrt(x * x + y * y);
+            double r[4] = {0, 0, 0, 0};
+            if (d < TOUCHING) d = TOUCHING;
+            for (l = 0; l < 4; l++)
+                for (k = 0; k < rank; k++) r[l] += f[i][l][k] * linked[j][k];
+            g->apart[i][j] = d, g->away[i][j][0] = x / d, g->away[i][j][1] = y / d;
+            g->near[i][j] = i == j ? 0 : 1 / (PI * plane * d);
+            g->sinks[i][j] = i == j ? 0 : g->near[i][j] + r[0], g->bends[i][j] = i == j ? 0 : fabs(r[3]);
+            for (l = 0; l < 2; l++)
+                g->slopes[i][j][l] = i == j ? 0 : r[l + 1] - g->near[i][j] / d * g->away[i][j][l];
+        }
+    for (i = 0; i < n; i++) bent_at(&q[i], a[i].edge, n, i, g);
+}
+
+/* Put the inverse of `a`, which is lost, into `b`: Gauss's elimination with the largest pivots of the columns. */
+static int inverted(int n, double a[TOOLS][TOOLS], double b[TOOLS][TOOLS]) {
+    int i, j, k;
+    for (i = 0; i < n; i++)
+        for (j = 0; j < n; j++) b[i][j] = i == j;
+    for (k = 0; k < n; k++) {
+        int best = k;
+        double pivot;
+        for (i = k + 1; i < n; i++)
+            if (fabs(a[i][k]) > fabs(a[best][k])) best = i;
+        for (j = 0; j < n; j++) {
+            double of_a = a[k][j], of_b = b[k][j];
+            a[k][j] = a[best][j], b[k][j] = b[best][j], a[best][j] = of_a, b[best][j] = of_b;
+        }
+        pivot = a[k][k];
+        if (!(fabs(pivot) > 0) || !isfinite(pivot)) return 0;
+        for (j = 0; j < n; j++) a[k][j] /= pivot, b[k][j] /= pivot;
+        for (i = 0; i < n; i++) {
+            double share = a[i][k];
+            for (j = 0; j < n && i != k; j++) a[i][j] -= share * a[k][j], b[i][j] -= share * b[k][j];
+        }
+    }
+    return 1;
+}
+
+/* Press all tools to depths: EPSMESH_LARGE, and whose contact is, or EPSMESH_DAMAGED. */
+static epsmesh_status press_all(const epsmesh_model *m, int n, const epsmesh_query *q, const asked *a,
+                                const double depth[TOOLS], contact k[TOOLS], int *whose) {
+    int i;
+    for (i = 0; i < n; i++) {
+        epsmesh_query left = q[i];
+        left.depth = depth[i];
+        *whose = i;
+        memset(&k[i], 0, sizeof k[i]);
+        if (!isfinite(depth[i])) return EPSMESH_DAMAGED;
+        if (depth[i] > TOUCHING && !press(m, &left, &a[i], &k[i])) return EPSMESH_LARGE;
+    }
+    return EPSMESH_OK;
+}
+
+static void asides(int n, const epsmesh_query *q, const influence *g, settled *s) {
+    int i, j, l;
+    for (i = 0; i < n; i++)
+        for (l = 0; l < 2; l++) {
+            double fi = s->k[i].force, more = 0;
+            for (j = 0; j < n; j++)
+                more += fi * s->k[j].force * (g->slopes[i][j][l] + s->mean[i] * g->slope_bent[i][j][l] -
+                                              s->mean[j] * g->slope_bent[j][i][l]);
+            s->aside[i][l] = s->k[i].aside[l] + (q[i].shape == EPSMESH_BONDED_DISC ? 0 : more);
+        }
+}
+
+/* Newton's method from what each tool feels alone. */
+static epsmesh_status settle_all(const epsmesh_model *m, int n, const epsmesh_query *q, const asked *a, const influence *g,
+                             settled *s, int *whose) {
+    int i, j, steps, is_last = 0;
+    for (steps = 0; steps < SETTLE_STEPS; steps++) {
+        double grown[TOOLS], felt[TOOLS], power[TOOLS], slope[TOOLS][TOOLS], largest = 0, change = 0;
+        epsmesh_status status;
+        for (i = 0; i < n; i++) {
+            s->mean[i] = moment(&q[i], a[i].p.plane, s->force[i], &power[i]);
+            grown[i] = (1 + power[i]) * s->mean[i];
+            for (felt[i] = 0, j = 0; j < n; j++) felt[i] += g->bent[i][j] * s->force[j];
+        }
+        for (i = 0; i < n; i++) {
+            s->depth[i] = q[i].depth - grown[i] * felt[i];
+            for (j = 0; j < n; j++) s->depth[i] -= (g->sinks[i][j] + g->bent[j][i] * s->mean[j]) * s->force[j];
+        }
+        status = press_all(m, n, q, a, s->depth, s->k, whose);
+        if (status != EPSMESH_OK) return status;
+        for (i = 0; i < n; i++) {
+            for (j = 0; j < n; j++) {
+                double second = g->sinks[i][j] + grown[i] * g->bent[i][j] + grown[j] * g->bent[j][i];
+                if (i == j) second = s->force[i] > 0 ? power[i] * grown[i] * felt[i] / s->force[i] : 0;
+                slope[i][j] = (i == j) + s->k[i].stiffness * second;
+            }
+        }
+        if (!inverted(n, slope, s->inverse)) return EPSMESH_DAMAGED;
+        if (is_last) {
+            asides(n, q, g, s);
+            return EPSMESH_OK;
+        }
+        for (i = 0; i < n; i++) {
+            double step = 0;
+            for (j = 0; j < n; j++) step += s->inverse[i][j] * (s->force[j] - s->k[j].force);
+            felt[i] = step;
+        }
+        for (i = 0; i < n; i++) {
+            s->force[i] -= felt[i];
+            if (!isfinite(s->force[i])) return EPSMESH_DAMAGED;
+            if (fabs(s->force[i]) > largest) largest = fabs(s->force[i]);
+            if (fabs(felt[i]) > change) change = fabs(felt[i]);
+        }
+        is_last = change <= SETTLED * largest;
+    }
+    return EPSMESH_DAMAGED;
+}
+
+/* The relative bars, where the forces are not 0. */
+static void doubts(const epsmesh_model *m, int n, const epsmesh_query *q, const asked *a, const influence *g,
+                   const settled *s, double errors[TOOLS]) {
+    double off[TOOLS], pull[TOOLS], lean[TOOLS], turn[TOOLS], ratio = q->poisson;
+    int i, j;
+    for (i = 0; i < n; i++) {
+        double stiff = 4 * s->k[i].radius / ((1 + ratio) * (2 - ratio));
+        for (pull[i] = lean[i] = 0, j = 0; j < n; j++) {
+            if (j == i) continue;
+            pull[i] += m->pair_aside / g->apart[i][j] * s->k[j].force;
+            lean[i] += sqrt(g->slopes[i][j][0] * g->slopes[i][j][0] + g->slopes[i][j][1] * g->slopes[i][j][1]) *
+                       s->k[j].force;
+        }
+        pull[i] *= q[i].shape == EPSMESH_BONDED_DISC ? stiff : 0;
+        turn[i] = 4.0 / 3 * a[i].p.plane * cube(s->k[i].radius);
+    }
+    for (i = 0; i < n; i++) {
+        off[i] = turn[i] * sqrt(a[i].p.tilt) * lean[i];
+        for (j = 0; j < n; j++) {
+            double d = g->apart[i][j], near = g->near[i][j], doubt, both, known = s->k[j].aside[0];
+            int of[2], l, blades = 0;
+            if (j == i) continue;
+            of[0] = i, of[1] = j;
+            doubt = (m->pair_error + m->bar[0]) / sqrt(a[i].room * a[j].room);
+            for (l = 0; l < 2; l++) {
+                double mean = s->k[of[l]].mean_square, other = mean > 0 ? fabs(mean - s->mean[of[l]]) : mean;
+                int is_blade = q[of[l]].shape == EPSMESH_BLADE;
+                blades += is_blade;
+                doubt += (is_blade ? BENDS_BLADE : 1.0) / 4 * (mean * g->bends[of[l]][of[1 - l]] + other * near / (d * d));
+            }
+            both = (s->k[i].mean_square + s->k[j].mean_square) / (d * d);
+            off[i] += (doubt + (blades ? FOURTH_BLADE : FOURTH) * both * both * near) * s->k[j].force;
+            off[i] += sqrt(g->slopes[j][i][0] * g->slopes[j][i][0] + g->slopes[j][i][1] * g->slopes[j][i][1]) * turn[j] *
+                      (s->k[j].force * sqrt(a[j].p.tilt) + lean[j]);
+            known = sqrt(known * known + s->k[j].aside[1] * s->k[j].aside[1]);
+            if (q[j].shape == EPSMESH_BONDED_DISC) off[i] += m->pair_aside / d * (known + pull[j]);
+        }
+    }
+    for (i = 0; i < n; i++) {
+        errors[i] = pull[i];
+        for (j = 0; j < n; j++) {
+            epsmesh_query left = q[j];
+            left.depth = s->depth[j];
+            if (s->k[j].force > 0)
+                errors[i] += fabs(s->inverse[i][j]) * (bar_of(m, &left, &a[j], &s->k[j]) * s->k[j].force +
+                                                       s->k[j].stiffness * off[j]);
+        }
+        errors[i] = s->k[i].force > 0 ? errors[i] / s->k[i].force : 0;
+    }
+}
+
+/* Say that some tools, marked in `which`, have a status, and that the others have none for that. */
+static void refuse(int n, epsmesh_touch *t, const int which[TOOLS], epsmesh_status status) {
+    int i;
+    for (i = 0; i < n; i++) t[i] = all(which[i] ? status : EPSMESH_OTHERS, (double)NAN);
+}
+
+static void refuse_all(int n, epsmesh_touch *t, epsmesh_status status) {
+    int i;
+    for (i = 0; i < n; i++) t[i] = all(status, (double)NAN);
+}
+
+static int too_near(int n, const contact k[TOOLS], const influence *g, int near[TOOLS]) {
+    int i, j, found = 0;
+    for (i = 0; i < n; i++)
+        for (near[i] = 0, j = 0; j < n; j++)
+            if (i != j && k[i].radius > 0 && k[j].radius > 0 && g->apart[i][j] < NEAR * (k[i].radius + k[j].radius))
+                near[i] = found = 1;
+    return found;
+}
+
+void epsmesh_touch_all(const epsmesh_model *m, int n, const epsmesh_query *q, epsmesh_touch *t) {
+    asked a[TOOLS];
+    influence g;
+    settled s;
+    epsmesh_status status[TOOLS], found;
+    double errors[TOOLS];
+    int i, refused = 0, which[TOOLS], whose = 0;
+    if (n == 1) t[0] = epsmesh_touch_at(m, q);
+    if (n <= 1) return;
+    if (!m->is_loaded || !m->has_pairs) {
+        refuse_all(n, t, m->is_loaded ? EPSMESH_ALONE : EPSMESH_NO_MODEL);
+        return;
+    }
+    for (i = 1; i < n; i++) refused |= !(q[i].young == q[0].young && q[i].poisson == q[0].poisson);
+    if (n > TOOLS || refused) {
+        refuse_all(n, t, EPSMESH_INPUT);
+        return;
+    }
+    for (i = 0; i < n; i++) {
+        status[i] = misfit(m, &q[i], a[i].local, a[i].edge, &a[i].f);
+        refused |= status[i] != EPSMESH_OK && status[i] != EPSMESH_LOST;
+    }
+    for (i = 0; i < n && refused; i++) {
+        found = status[i] == EPSMESH_OK || status[i] == EPSMESH_LOST ? EPSMESH_OTHERS : status[i];
+        t[i] = all(found, (double)NAN);
+    }
+    if (refused) return;
+    for (i = 0; i < n; i++) {
+        s.depth[i] = q[i].depth;
+        if (surveyed(m, &q[i], &a[i])) continue;
+        refuse_all(n, t, EPSMESH_DAMAGED);
+        return;
+    }
+    influences(m, n, q, a, &g);
+    found = press_all(m, n, q, a, s.depth, s.k, &whose);
+    if (found == EPSMESH_OK && too_near(n, s.k, &g, which)) found = EPSMESH_NEAR;
+    for (i = 0; i < n; i++) s.force[i] = s.k[i].force;
+    if (found == EPSMESH_OK) found = settle_all(m, n, q, a, &g, &s, &whose);
+    if (found == EPSMESH_OK && too_near(n, s.k, &g, which)) found = EPSMESH_NEAR;
+    for (i = 0; i < n && found == EPSMESH_LARGE; i++) which[i] = i == whose;
+    if (found == EPSMESH_DAMAGED) refuse_all(n, t, found);
+    else if (found != EPSMESH_OK) refuse(n, t, which, found);
+    if (found != EPSMESH_OK) return;
+    doubts(m, n, q, a, &g, &s, errors);
+    for (i = 0; i < n; i++) {
+        contact k = s.k[i];
+        if (!(k.force > 0)) t[i] = all(EPSMESH_LOST, 0.0);
+        k.stiffness *= s.inverse[i][i], k.aside[0] = s.aside[i][0], k.aside[1] = s.aside[i][1];
+        if (k.force > 0) t[i] = told(m, q[i].young, q[i].depth, &a[i], &k, errors[i]);
+        which[i] = t[i].status == EPSMESH_DAMAGED, refused |= which[i];
+    }
+    if (refused) refuse(n, t, which, EPSMESH_DAMAGED);
+}
+
 const char *epsmesh_word(epsmesh_status status) {
     static const char *const words[] = {"ok",      "lost",   "outside", "large", "deep",    "tool",
-                                        "input",   "poisson", "tilted", "off",   "damaged", "no model"};
+                                        "input",   "poisson", "tilted", "off",   "damaged", "no model",
+                                        "near",    "others", "alone"};
     return (int)status >= 0 && status < EPSMESH_STATUSES ? words[status] : "";
 }

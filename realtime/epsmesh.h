@@ -14,6 +14,7 @@ extern "C" {
 #endif
 
 enum { EPSMESH_MOST = 64, EPSMESH_MOST_IN_ALL = 4096, EPSMESH_TENSORS = 7 };
+enum { EPSMESH_MOST_TOOLS = 8, EPSMESH_MOST_MODES = 96, EPSMESH_MOST_TERMS = 16384, EPSMESH_MOST_LINKS = 3 };
 
 typedef enum {
     EPSMESH_OK,
@@ -28,6 +29,9 @@ typedef enum {
     EPSMESH_OFF,      /* the place is not on the face */
     EPSMESH_DAMAGED,  /* the model's numbers make no sense here */
     EPSMESH_NO_MODEL, /* the file is of another kind or version, cut short, or contradicts itself */
+    EPSMESH_NEAR,     /* the middles of two contacts are nearer to each other than twice their radii together */
+    EPSMESH_OTHERS,   /* another tool has no answer, and without its force there is none here */
+    EPSMESH_ALONE,    /* the model knows one tool at a time: its face is curved, or its file of an earlier version */
     EPSMESH_STATUSES
 } epsmesh_status;
 
@@ -39,6 +43,9 @@ typedef struct {
     int counts[3], face_counts[2], is_round, even[2], leans, has_tensors, is_flat, is_loaded;
     double c_ref, reach[2], sides[2], thickness, origin[3], axes[3][3], poisson_range[2];
     double young, poisson, largest, off, aligned, bar[4], bend_error;
+    double pair_modes[EPSMESH_MOST_TERMS], pair_links[EPSMESH_MOST_LINKS * EPSMESH_MOST_MODES * EPSMESH_MOST_MODES];
+    double pair_error, pair_aside;
+    int pair_counts[4], has_pairs; /* nu, modes, and polynomials of y and x */
 } epsmesh_model;
 
 typedef struct {
@@ -74,6 +81,12 @@ epsmesh_query epsmesh_ask(const epsmesh_model *model);
 
 /* Answer a query; all numbers are NaN unless the status is EPSMESH_OK or EPSMESH_LOST. */
 epsmesh_touch epsmesh_touch_at(const epsmesh_model *model, const epsmesh_query *query);
+
+/* Answer `count` queries of tools that press all at once, of one E and nu: each touch is what that tool feels, its
+ * stiffness that while the others are held. If one has no answer, the others have EPSMESH_OTHERS; more than
+ * EPSMESH_MOST_TOOLS are EPSMESH_INPUT, as are E or nu that differ. The formulas are those of pipeline/realtime/several.py,
+ * pairs.py and doubt.py. */
+void epsmesh_touch_all(const epsmesh_model *model, int count, const epsmesh_query *queries, epsmesh_touch *touches);
 
 /* Return the word that Python uses for a status. */
 const char *epsmesh_word(epsmesh_status status);

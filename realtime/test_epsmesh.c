@@ -48,6 +48,32 @@ static void ask_around(const epsmesh_model *model, int times) {
     }
 }
 
+/* Ask for some tools at once: either all have an answer, or none has numbers. */
+static void ask_several(const epsmesh_model *model, int times) {
+    epsmesh_query queries[EPSMESH_MOST_TOOLS];
+    epsmesh_touch touches[EPSMESH_MOST_TOOLS];
+    int i, j, k, n, answers;
+    for (i = 0; i < times; i++) {
+        n = 2 + i % (EPSMESH_MOST_TOOLS - 1);
+        for (j = 0; j < n; j++) {
+            double x = within(-1, 1) * model->reach[0], y = within(-1, 1) * model->reach[1];
+            queries[j] = epsmesh_ask(model);
+            queries[j].shape = (epsmesh_shape)((i + j) % 5), queries[j].radius = within(1e-4, 2e-3), queries[j].angle = 1.2;
+            queries[j].length = 2e-3, queries[j].width = 5e-4, queries[j].depth = within(-1e-5, 3e-4);
+            for (k = 0; k < 3; k++)
+                queries[j].at[k] = model->origin[k] + x * model->axes[0][k] + y * model->axes[1][k];
+        }
+        epsmesh_touch_all(model, n, queries, touches);
+        for (answers = 0, j = 0; j < n; j++) {
+            int has = touches[j].status == EPSMESH_OK || touches[j].status == EPSMESH_LOST;
+            answers += has;
+            expect(has == (isfinite(touches[j].force[0] + touches[j].force_error + touches[j].stiffness) != 0),
+                   "an answer of several is finite, a refusal is not");
+        }
+        expect(answers == 0 || answers == n, "all tools have an answer, or none has");
+    }
+}
+
 int main(int count, char **words) {
     static epsmesh_model model, damaged;
     static unsigned char data[1 << 20];
@@ -60,6 +86,7 @@ int main(int count, char **words) {
     fclose(file);
     expect(epsmesh_load(&model, data, size) == EPSMESH_OK, "the model is read");
     ask_around(&model, 3000);
+    ask_several(&model, 2000);
     expect(epsmesh_load(&damaged, NULL, 0) == EPSMESH_NO_MODEL, "nothing is no model");
     memset(&query, 0, sizeof query);
     expect(epsmesh_touch_at(&damaged, &query).status == EPSMESH_NO_MODEL, "what was not loaded is not asked");
@@ -76,7 +103,10 @@ int main(int count, char **words) {
         int flips = 1 + (int)(draw() % 4);
         memcpy(part, data, size);
         while (flips--) part[draw() % (i % 2 ? size : 1500 < size ? 1500 : size)] = (unsigned char)draw();
-        if (epsmesh_load(&damaged, part, size) == EPSMESH_OK) ask_around(&damaged, 6);
+        if (epsmesh_load(&damaged, part, size) == EPSMESH_OK) {
+            ask_around(&damaged, 6);
+            ask_several(&damaged, 2);
+        }
     }
     free(part);
     printf("%s\n", failures ? "failed" : "passed");

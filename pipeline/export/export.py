@@ -9,8 +9,10 @@ from pipeline.arrays import FloatArray
 from pipeline.export.checks import TOOLS, Check, check_touches, columns, needed, random_touches, told, with_bar
 from pipeline.export.compliance import coarse_mesh, compliances
 from pipeline.export.curved import curved_model
+from pipeline.export.far import far_fields
 from pipeline.export.file import write_model
 from pipeline.export.full import Solver
+from pipeline.export.pairs import tabulate_pairs
 from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, Scope
@@ -94,11 +96,14 @@ def export(
     model = replace(bare, bar=(factor * first, factor * second, factor * third, floor))
     fitted, judged = ([with_bar(model, check) for check in half] for half in (fitted, judged))
     seen, unseen = None, ""
-    if surface:
+    if surface or scope.is_flat:
         try:
-            seen = tabulate_surface(seen_body(scope, model, margin, ranks), scope.poissons, model.origin)
+            far = far_fields(seen_body(scope, model, margin, ranks), scope.poissons)
         except ExportError as reason:
             unseen = str(reason)
+        else:
+            seen = tabulate_surface(far, model.origin) if surface else None
+            model = replace(model, pairs=tabulate_pairs(far)) if scope.is_flat else model
     return Exported(model, fitted, judged, missed, places, seen, unseen)
 
 

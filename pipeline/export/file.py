@@ -20,6 +20,14 @@ All numbers that a query needs are doubles, in SI units, for a body with E = 1:
     largest                  largest radius of contact, in units of the way to the nearest side or to ``thickness``
     bar                      (4,) b: c may be off by (b0 + b2 (a/room)⁴)/room + b1 |h| <r²>, and F by b3 of it besides
 
+A flat face knows what tools do to each other (pipeline/realtime/pairs.py); a file may lack all four:
+
+    pair_modes               (pair_mode, pair_y, pair_x) Chebyshev coefficients of φ (1) over x/X and y/Y
+    pair_links               (pair_node, pair_mode, pair_other) S (1/m), over ν: a force of one at y sinks x by
+                             φ(x)·S φ(y) more than that of a half-space; symmetric to the last digit
+    pair_error               how far that may be off, times the root of both ways to the nearest side or the bottom (1)
+    pair_aside               how far a force of one moves another place aside, times the way to it, at most (1)
+
 A model may hold what is seen of the body (pipeline/realtime/surface.py), in smaller numbers, which C passes over:
 
     surface_points           (vertex, component) m, from the middle of the face along its axes
@@ -42,7 +50,9 @@ import xarray as xr
 
 from pipeline.arrays import FloatArray
 from pipeline.files import atomic
-from pipeline.realtime.model import FORMAT, Model
+from pipeline.realtime.model import Model
+from pipeline.realtime.pairs import Pairs
+from pipeline.realtime.read import FORMAT
 from pipeline.realtime.surface import SurfaceTable
 
 Checks = Mapping[str, tuple[str, FloatArray]]
@@ -80,6 +90,7 @@ def write_model(
     for name, (unit, values) in checks.items():
         variables[f"check_{name}"] = (("check",), np.asarray(values, dtype=float), {"units": unit})
     variables |= _of_surface(surface) if surface else {}
+    variables |= _of_pairs(model.pairs) if model.pairs else {}
     dataset = xr.Dataset(variables, attrs=dict(attributes))
     encoding = {name: {"_FillValue": None} for name in variables}
     with atomic(path) as temporary:
@@ -94,4 +105,13 @@ def _of_surface(surface: SurfaceTable) -> dict[str, Variable]:
         "surface_modes": (("vertex", "component", "mode"), surface.modes.astype(np.int16), {"units": "1"}),
         "surface_amounts": (degrees, surface.amounts, {"units": "m/N Pa"}),
         "surface_error": ((), np.array(surface.error), {"units": "1"}),
+    }
+
+
+def _of_pairs(pairs: Pairs) -> dict[str, Variable]:
+    return {
+        "pair_modes": (("pair_mode", "pair_y", "pair_x"), pairs.modes, {"units": "1"}),
+        "pair_links": (("pair_node", "pair_mode", "pair_other"), pairs.links, {"units": "1/m"}),
+        "pair_error": ((), np.array(pairs.error), {"units": "1"}),
+        "pair_aside": ((), np.array(pairs.aside), {"units": "1"}),
     }

@@ -8,10 +8,10 @@ from mpi4py import MPI
 
 from pipeline.export.compliance import coarse_mesh
 from pipeline.export.curved import curved_region
+from pipeline.export.far import Pressed
 from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, Scope
-from pipeline.export.surface import Pressed
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.mesh.of_case import mesh_arrays
 from pipeline.realtime.model import Model

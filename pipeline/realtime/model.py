@@ -1,70 +1,45 @@
 """A model file as an object that is asked for forces: refuses with a status and a sentence, and never extrapolates."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import atan2, hypot, inf, isfinite, nan, pi, prod
-from pathlib import Path
+from math import atan2, hypot, inf, isfinite, nan, pi
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.realtime.blade import Blade, blade
-from pipeline.realtime.classic import ModelError, read_doubles
 from pipeline.realtime.contact import Bonded, Contact, Disc, Place, Round, ball, cone
+from pipeline.realtime.doubt import errors
 from pipeline.realtime.face import Face, Spot
-from pipeline.realtime.table import TENSORS, Table
+from pipeline.realtime.pairs import Pairs
+from pipeline.realtime.several import TOUCHING, Pressing, TooLargeError, pressed, settle, too_near
+from pipeline.realtime.table import Table
+from pipeline.realtime.touch import SENTENCES, Touch, refused
 
-FORMAT = 2.0
-# A depth (m) below which nothing touches; the smallest tool (m).
-_TOUCHING, _SMALLEST = 1e-12, 1e-6
+# The smallest tool (m).
+_SMALLEST = 1e-6
 # How far the regular part of a bonded tool may be off, in units of (1 - 2ν) a/room².
 _STICKS = 0.1
-# Coefficients along one direction, and in all: the C side holds as many.
-MOST, MOST_IN_ALL = 64, 4096
-
-# What may be said of the contact of a tool; and numbers of a file that are the model's as they are.
+# What may be said of the contact of a tool.
 _CONTACTS = {
     "disc": ("frictionless", "bonded"), "blade": ("frictionless",), "sphere": ("unilateral",), "cone": ("unilateral",),
 }  # fmt: skip
-_NUMBERS = ("thickness", "young", "poisson", "largest", "off", "aligned")
 Tool = Disc | Round | Blade | Bonded
 
-SENTENCES = {
-    "ok": "",
-    "lost": "The tool does not touch.",
-    "outside": "The place is outside the model's region: move the tool there, or export a wider region.",
-    "large": "The tool, or its contact, is too large for a place so near to a side or the bottom.",
-    "deep": "The depth is more than the model was made for.",
-    "tool": "The model knows no such tool, or it lacks a size: disc(radius), sphere(radius), cone(radius, angle), "
-    "blade(length, width).",
-    "input": "A number of the query is not finite, or not positive where it must be.",
-    "poisson": "Poisson's ratio is outside the model's range.",
-    "tilted": "The tool must press along the face's inward normal.",
-    "off": "The place is not on the face.",
-    "damaged": "The model's numbers make no sense here: export it again.",
-}
 
+class _Asked(NamedTuple):
+    """A query that makes sense: tool, place and depth (m), the face there, the way (m) to a side, E (Pa) and ν."""
 
-@dataclass(frozen=True, eq=False)
-class Touch:
-    """What a query found; all numbers are NaN unless ``status`` is "ok" or "lost", and ``message`` says why.
-
-    ``force`` (3,), in N, is what the tissue does to the tool, in the body's coordinates; ``force_error`` is relative,
-    of its length along the normal, and holds for the force aside on a bonded disc, too; ``stiffness`` (N/m) is dF/dd at
-    fixed place; ``contact_radius`` is in m.
-    """
-
-    status: str
-    force: NDArray[np.float64]
-    force_error: float = nan
-    stiffness: float = nan
-    contact_radius: float = nan
-
-    @property
-    def message(self) -> str:
-        """A sentence on the status, or nothing if it is "ok"."""
-        return SENTENCES[self.status]
+    tool: Tool
+    x: float
+    y: float
+    depth: float
+    spot: Spot
+    room: float
+    young: float
+    poisson: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +50,7 @@ class Model:
     ``largest`` is the largest radius of contact in units of the way to the nearest side or there, ``bar`` the shares of
     c, of h's part, of what is beyond it, and of F, that count as error. ``face`` tells the height of what is not flat.
     A query may be ``off`` the face by so much (m), and its axis by the angle ``aligned`` (rad) off the normal.
-    ``bend_error`` (1/m) is how far the face's mean curvature may be off.
+    ``bend_error`` (1/m) is how far the face's mean curvature may be off. Without ``pairs`` it knows one tool at a time.
     """
 
     table: Table
@@ -91,6 +66,7 @@ class Model:
     off: float = 0.0
     aligned: float = 1e-6
     bend_error: float = 0.0
+    pairs: Pairs | None = None
 
     def query(
         self,
@@ -115,51 +91,144 @@ class Model:
         ``contact`` is "frictionless" (a disc, a blade) or "unilateral" (a sphere, a cone), or of a disc "bonded": such
         a one sticks where it is. Raises nothing: see ``status``.
         """
+        asked = self._asked(tool, at, depth, (radius, angle, length, width), young, poisson, axis, along, contact)
+        if isinstance(asked, str):
+            return refused(asked)
+        if depth <= TOUCHING:
+            return refused("lost")
+        try:
+            place = self._place(asked)
+            found = asked.tool.press(depth, place, self.largest * asked.room)
+            if found is None:
+                return refused("large")
+            return self._touch(asked, found, self._error(asked, place, found, depth))
+        except ArithmeticError:
+            return refused("damaged")
+
+    def query_all(
+        self, tools: Sequence[Mapping[str, Any]], *, young: float | None = None, poisson: float | None = None
+    ) -> list[Touch]:
+        """Return what each of ``tools`` feels, each as the keywords of a query but E and ν, while all of them press.
+
+        Forces are those of one energy of all places and depths, and a ``stiffness`` is that of one tool while the
+        others are held. Where one tool has no answer the others' status is "others". Raises nothing: see ``status``.
+        """
+        if len(tools) <= 1:
+            return [self.query(**tool, young=young, poisson=poisson) for tool in tools]
+        asked = [self._asked_of(**tool, young=young, poisson=poisson) for tool in tools]
+        refusals = {number: each for number, each in enumerate(asked) if isinstance(each, str)}
+        if self.pairs is None:
+            refusals = dict.fromkeys(range(len(tools)), "alone")
+        if refusals or self.pairs is None:
+            return [refused(refusals.get(number, "others")) for number in range(len(tools))]
+        try:
+            found = self._several([each for each in asked if not isinstance(each, str)], self.pairs)
+        except TooLargeError as problem:
+            found = {problem.number: "large"}
+        except ArithmeticError:
+            found = dict.fromkeys(range(len(tools)), "damaged")
+        if isinstance(found, list):
+            return found
+        return [refused(found.get(number, "others")) for number in range(len(tools))]
+
+    def _several(self, asked: Sequence[_Asked], pairs: Pairs) -> list[Touch] | dict[int, str]:
+        """Return what tools feel together, or the statuses of those that refuse, by number.
+
+        Raises:
+            TooLargeError: if a contact is; ArithmeticError: if the model's numbers make no sense.
+        """
+        places = [self._place(each) for each in asked]
+        tools = [
+            Pressing(each.tool, place, each.depth, self.largest * each.room, each.room)
+            for each, place in zip(asked, places, strict=True)
+        ]
+        between = pairs.between([(each.x, each.y) for each in asked], asked[0].poisson, TOUCHING)
+        alone = pressed(tools, [tool.depth for tool in tools])
+        if near := too_near(alone, between.apart):
+            return dict.fromkeys(near, "near")
+        settled = settle(tools, alone, between)
+        if near := too_near(settled.contacts, between.apart):
+            return dict.fromkeys(near, "near")
+        own = [
+            self._error(*each) if each[2].force > 0 else 0.0
+            for each in zip(asked, places, settled.contacts, settled.depths, strict=True)
+        ]
+        bars = errors(tools, settled, own, pairs, between, self.bar[0]).tolist()
+        found = []
+        for each, contact, aside, stiffness, bar in zip(
+            asked, settled.contacts, settled.asides, settled.stiffnesses.tolist(), bars, strict=True
+        ):
+            felt = replace(contact, aside=aside, stiffness=stiffness)
+            found.append(self._touch(each, felt, bar) if contact.force > 0 else refused("lost"))
+        broken = [number for number, touch in enumerate(found) if touch.status == "damaged"]
+        return dict.fromkeys(broken, "damaged") if broken else found
+
+    def _asked_of(
+        self, tool: str, *, at: Sequence[float], depth: float, radius: float = nan, angle: float = nan,
+        young: float | None = None, poisson: float | None = None, axis: Sequence[float] | None = None,
+        length: float = nan, width: float = nan, along: Sequence[float] | None = None, contact: str | None = None,
+    ) -> _Asked | str:  # fmt: skip
+        """As a query has it."""
+        return self._asked(tool, at, depth, (radius, angle, length, width), young, poisson, axis, along, contact)
+
+    def _asked(
+        self, tool: str, at: Sequence[float], depth: float, sizes: tuple[float, float, float, float],
+        young: float | None, poisson: float | None, axis: Sequence[float] | None, along: Sequence[float] | None,
+        contact: str | None,
+    ) -> _Asked | str:  # fmt: skip
+        """Return a query, or the status of one that the model does not answer."""
         modulus = self.young if young is None else float(young)
         ratio = self.poisson if poisson is None else float(poisson)
-        shape = self._tool(tool, contact, (radius, angle, length, width), along)
+        shape = self._tool(tool, contact, sizes, along)
         if isinstance(shape, str):
-            return _refused(shape)
-        whole = isinstance(shape, Blade | Bonded)
+            return shape
         x, y, z = self._local(at)
         if not (
             isfinite(x) and isfinite(y) and isfinite(z) and isfinite(depth) and isfinite(ratio) and 0 < modulus < inf
         ):
-            return _refused("input")
+            return "input"
         if not self.table.holds(x, y):
-            return _refused("outside")
+            return "outside"
         spot = self.face.at(self.table, x, y)
         if reason := self._misfit(z - spot.height, depth, ratio, axis, spot):
-            return _refused(reason)
-        if depth <= _TOUCHING:
-            return Touch("lost", np.zeros(3), 0.0, 0.0, 0.0)
-        room = self.room(x, y)
-        try:
-            place = self.table.at(x, y, ratio, whole=whole)
-            if not self.face.is_flat:
-                place = replace(place, bend=spot.bend, slope_bend=spot.slope_bend)
-            found = shape.press(depth, place, self.largest * room)
-            if found is None:
-                return _refused("large")
-            push = spot.force(found, depth)
-        except ArithmeticError:
-            return _refused("damaged")
+            return reason
+        return _Asked(shape, x, y, depth, spot, self.room(x, y), modulus, ratio)
+
+    def _place(self, asked: _Asked) -> Place:
+        """Return what is known of a query's place.
+
+        Raises:
+            ArithmeticError: if the table is not that of a body.
+        """
+        place = self.table.at(asked.x, asked.y, asked.poisson, whole=isinstance(asked.tool, Blade | Bonded))
+        if self.face.is_flat:
+            return place
+        return replace(place, bend=asked.spot.bend, slope_bend=asked.spot.slope_bend)
+
+    def _touch(self, asked: _Asked, found: Contact, error: float) -> Touch:
+        """Return a contact in the body's coordinates, or that the numbers make no sense."""
+        modulus = asked.young
         (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = self._frame
-        out_x, out_y, out_z = (modulus * part for part in push)
+        out_x, out_y, out_z = (modulus * part for part in asked.spot.force(found, asked.depth))
         force = np.array([
             out_x * xx + out_y * yx + out_z * zx,
             out_x * xy + out_y * yy + out_z * zy,
             out_x * xz + out_y * yz + out_z * zz,
         ])  # fmt: skip
-        error = found.stiffness * self._uncertain(place, room, found, sticks=isinstance(shape, Bonded)) + self.bar[3]
-        if isinstance(shape, Round):
+        if not (isfinite(out_x) and isfinite(out_y) and isfinite(out_z) and isfinite(error)):
+            return refused("damaged")
+        if not (found.force > 0 and found.stiffness > 0):
+            return refused("damaged")
+        return Touch("ok", force, error, modulus * found.stiffness, found.radius)
+
+    def _error(self, asked: _Asked, place: Place, found: Contact, depth: float) -> float:
+        """Return the relative bar of a contact at a ``depth`` (m)."""
+        is_bonded = isinstance(asked.tool, Bonded)
+        error = found.stiffness * self._uncertain(place, asked.room, found, sticks=is_bonded) + self.bar[3]
+        if isinstance(asked.tool, Round):
             # ∂F/∂κ is half the slope of ∫ p r² with the depth, which both grow by powers of the depth, n and 3 n + 1.
             error += self.bend_error / 2 * found.mean_square * max(3 * found.stiffness / found.force - 2 / depth, 0.0)
-        if not (isfinite(out_x) and isfinite(out_y) and isfinite(out_z) and isfinite(error)):
-            return _refused("damaged")
-        if not (found.force > 0 and found.stiffness > 0):
-            return _refused("damaged")
-        return Touch("ok", force, error, modulus * found.stiffness, found.radius)
+        return error
 
     def room(self, x: float, y: float) -> float:
         """Return the distance (m) from a place to the nearest side, or to the bottom."""
@@ -242,82 +311,6 @@ class Model:
         return (of_c + beyond * share + pulled) / room + of_h * bent * contact.mean_square
 
 
-def load(path: str | Path) -> Model:
-    """Return the model at ``path``.
-
-    Raises:
-        ModelError: if it is no model, or of another version, or damaged; OSError if it cannot be read.
-    """
-    return model_of(Path(path).read_bytes())
-
-
-def model_of(data: bytes) -> Model:
-    """Return the model that the bytes of a file hold.
-
-    Raises:
-        ModelError: if they are no model, or of another version, or damaged.
-    """
-    found = read_doubles(data)
-    shapes = {"reciprocal": 3, "curvature": 3, "origin": (3,), "axes": (3, 3), "bar": (4,), "height": 2, "bend": 2}
-    shapes |= dict.fromkeys(("reach", "sides", "poisson_range", "even"), (2,))
-    shapes |= {name: rank for name, rank in (("tensors", 4), ("bend_error", ())) if name in found}
-    shapes |= dict.fromkeys(("format", "is_round", "c_ref", "leans", *_NUMBERS), ())
-    if "format" in found and found["format"].shape == () and found["format"] != FORMAT:
-        raise ModelError(f"the file has format {float(found['format']):g}, and this program reads {FORMAT:g}")
-    for name, shape in shapes.items():
-        values = found.get(name)
-        if values is None:
-            raise ModelError(f"the file has no {name}: it is no model")
-        if shape not in (values.shape, values.ndim):
-            raise ModelError(f"{name} has shape {values.shape}")
-        if not np.isfinite(values).all():
-            raise ModelError(f"{name} is not finite")
-    _check(found)
-    reach, sides, ratios, bar = (found[name].tolist() for name in ("reach", "sides", "poisson_range", "bar"))
-    rest = {name: float(found[name]) for name in (*_NUMBERS, "bend_error") if name in found}
-    is_round, (even_x, even_y) = bool(found["is_round"] == 1.0), found["even"] == 1.0
-    tensors = {"tensors": found["tensors"]} if "tensors" in found else {}
-    table = Table(
-        found["reciprocal"], found["curvature"], float(found["c_ref"]), (reach[0], reach[1]), is_round,
-        (ratios[0], ratios[1]), (bool(even_x), bool(even_y)), leans=bool(found["leans"] == 1.0), **tensors,
-    )  # fmt: skip
-    table.prepare()
-    return Model(
-        table, found["origin"], found["axes"], (sides[0], sides[1]), bar=(bar[0], bar[1], bar[2], bar[3]),
-        face=Face(found["height"], found["bend"]), **rest,
-    )  # fmt: skip
-
-
-def _check(found: dict[str, NDArray[np.float64]]) -> None:
-    """Hold the numbers of a file against what a model's can be."""
-    shape, axes, (low, high) = found["reciprocal"].shape, found["axes"], found["poisson_range"]
-    reach, sides = found["reach"], found["sides"]
-    flags, face, tensors = found["even"], found["height"].shape, found.get("tensors")
-    fits = {
-        "even": all(flag in (0.0, 1.0) for flag in flags),
-        "leans": float(found["leans"]) in (0.0, 1.0),
-        "height": face == found["bend"].shape and max(face) <= MOST and (face[0] == 1 or not found["is_round"]),
-        "off": bool(found["off"] > 0),
-        "aligned": bool(0 < found["aligned"] <= 0.5),
-        "tensors": tensors is None or tensors.shape == (TENSORS, *shape),
-        "reciprocal": shape == found["curvature"].shape and max(shape) <= MOST and prod(shape) <= MOST_IN_ALL,
-        "is_round": bool(found["is_round"] == 0)
-        or (bool(found["is_round"] == 1) and shape[1] == 1 and bool((flags == 1).all())),
-        "axes": bool(np.abs(axes @ axes.T - np.eye(3)).max() < 1e-9),
-        "reach": bool((reach > 0).all() and (reach < sides).all()),
-        "poisson_range": bool(-1 < low <= found["poisson"] <= high <= 0.5) and (shape[0] == 1 or bool(low < high)),
-        "thickness": bool(found["thickness"] > 0),
-        "young": bool(found["young"] > 0),
-        "largest": bool(0 < found["largest"] <= 1),
-        "bar": bool((found["bar"] >= 0).all()),
-        # A curved face that does not say how well it is known is of a time when it was known badly.
-        "bend_error": bool(found["bend_error"] >= 0) if "bend_error" in found else not found["bend"].any(),
-    }
-    for name, is_right in fits.items():
-        if not is_right:
-            raise ModelError(f"{name} is not that of a model")
-
-
 def _bonded(radius: float) -> "Bonded | str":
     if not isfinite(radius):
         return "tool"
@@ -334,7 +327,3 @@ def _round(name: str, radius: float, angle: float) -> "Disc | Round | str":
     if name == "disc":
         return Disc(radius)
     return ball(radius) if name == "sphere" else cone(angle, radius)
-
-
-def _refused(status: str) -> Touch:
-    return Touch(status, np.full(3, nan))

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from pipeline.realtime.classic import ModelError
 from pipeline.realtime.contact import Contact, Place, Shape
-from pipeline.realtime.model import Model, Touch
+from pipeline.realtime.model import Model
+from pipeline.realtime.touch import Touch
 
 Array = NDArray[np.float64]
 Height = Callable[[Array, Array], Array]

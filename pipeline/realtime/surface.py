@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.realtime.classic import ModelError, read_numbers
-from pipeline.realtime.model import Model, Touch, model_of
+from pipeline.realtime.model import Model
 from pipeline.realtime.near import Footprint
+from pipeline.realtime.read import model_of
 from pipeline.realtime.table import polynomials
+from pipeline.realtime.touch import Touch
 
 Array = NDArray[np.float64]
 # What is nearer to the face than this, in units of the thickness, lies on it.

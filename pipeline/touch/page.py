@@ -9,8 +9,8 @@ import numpy as np
 from pipeline.files import write_whole
 from pipeline.html import joined, json_in_page, render_page
 from pipeline.realtime.blade import RECTANGLE
-from pipeline.realtime.model import SENTENCES
 from pipeline.realtime.surface import Surface
+from pipeline.realtime.touch import SENTENCES
 from pipeline.view import palette
 from pipeline.view.page import TEMPLATES as OF_VIEW
 from pipeline.view.page.numbers import layout, packed

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.export import surface
+from pipeline.export import far as far_field
 from pipeline.export.curved import curved_model
 from pipeline.export.export import export
 from pipeline.export.ranks import ALONE, Ranks
@@ -63,7 +63,7 @@ def test_ranks_that_ask_for_different_work_are_told_so():
 @several
 def test_ranks_make_the_model_that_one_makes(monkeypatch):
     for name, value in (("_SIZE", 2), ("_HELD_OUT", 1), ("_POISSONS", 2)):
-        monkeypatch.setattr(surface, name, value)
+        monkeypatch.setattr(far_field, name, value)
     scope = replace(scope_of(study()), sections={"body": CYLINDER, "material": SOFT})
     found, alone = (export(scope, 0.1, 4, margin=0.5, surface=True, ranks=ranks) for ranks in (WORLD, ALONE))
     assert found.places == alone.places
@@ -73,6 +73,8 @@ def test_ranks_make_the_model_that_one_makes(monkeypatch):
         assert np.abs(numbers - known).max() <= 1e-8 * np.abs(known).max()
     for one, other in zip(found.fitted + found.judged, alone.fitted + alone.judged, strict=True):
         assert (one.x, one.y, one.tool, one.full) == (other.x, other.y, other.tool, pytest.approx(other.full, rel=1e-8))
+    numbers, known = (made.model.pairs.links for made in (found, alone))
+    assert np.abs(numbers - known).max() <= 1e-4 * np.abs(known).max()
     place = (0.3 * found.model.table.reach[0], 0.0, 0.4)
     far, known = found.surface.far(*place), alone.surface.far(*place)
     assert np.abs(far - known).max() <= 1e-4 * np.abs(known).max()

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from pipeline.compat import geometry_dofs
-from pipeline.export import compliance, surface
+from pipeline.export import compliance, far
 from pipeline.export.compliance import compliances
 from pipeline.export.curved import curved_model
+from pipeline.export.far import far_fields
 from pipeline.export.scope import scope_of
 from pipeline.export.seen import seen_body
+from pipeline.export.surface import tabulate_surface
 from pipeline.mesh.curve import EDGES
 from pipeline.realtime.near import boussinesq
 from pipeline.realtime.surface import SurfaceTable
@@ -24,9 +26,9 @@ BOX = {"shape": "box", "size": ["40 mm", "50 mm", "20 mm"]}
 @pytest.fixture(autouse=True)
 def few(monkeypatch):
     """Few places are solved for."""
-    monkeypatch.setattr(surface, "_SIZE", 2)
-    monkeypatch.setattr(surface, "_HELD_OUT", 1)
-    monkeypatch.setattr(surface, "_POISSONS", 2)
+    monkeypatch.setattr(far, "_SIZE", 2)
+    monkeypatch.setattr(far, "_HELD_OUT", 1)
+    monkeypatch.setattr(far, "_POISSONS", 2)
 
 
 def volume_within(table: SurfaceTable) -> float:
@@ -43,7 +45,7 @@ def test_the_far_field_is_that_of_the_body(body, volume):
     corners, middles = np.split(mesh.mesh.geometry.x[geometry_dofs(mesh.mesh)], [4], axis=1)
     ends = corners[:, EDGES]
     assert np.abs(middles - ends.mean(axis=2)).max() < 0.1 * np.ptp(ends, axis=2).max()  # no quarter points
-    table = surface.tabulate_surface(pressed, (POISSON, POISSON + 1e-9), np.zeros(3))
+    table = tabulate_surface(far_fields(pressed, (POISSON, POISSON + 1e-9)), np.zeros(3))
     assert table.modes.shape[2] < 40
     assert volume_within(table) == pytest.approx(volume, rel=5e-3)
     held = np.flatnonzero(table.points[:, 2] < -region.thickness + 1e-6)
@@ -63,7 +65,7 @@ def test_a_skin_has_a_far_field_of_its_own(monkeypatch):
     monkeypatch.setattr(compliance, "_TO_TISSUE", 1)
     scope = scope_of(study(body=CYLINDER | {"layers": [SKIN | {"thickness": "6 mm"}]}))
     pressed = seen_body(scope, None, 0.5)
-    table = surface.tabulate_surface(pressed, scope.poissons, np.zeros(3))
+    table = tabulate_surface(far_fields(pressed, scope.poissons), np.zeros(3))
     middle = np.argmin(np.linalg.norm(table.points, axis=1))
     # Tissue a fourth as stiff below it yields more than a half-space of skin; were it all skin, its support less.
     assert 0.4 < -pressed.region.thickness * table.far(0.0, 0.0, scope.poisson)[middle, 2] < 0.55
@@ -74,7 +76,7 @@ def test_what_a_force_on_a_dome_does_elsewhere_a_force_there_does_here():
     scope = scope_of(study(body=DOME, probe=DISC | {"radius": "5 mm"}))
     model, *_ = curved_model(scope, Known(10e3), 0.01, 0.4, (1e-3, 0.03, 0.1, 1e-3), 0.0)
     pressed = seen_body(scope, model, 0.0)
-    table = surface.tabulate_surface(pressed, scope.poissons, model.origin)
+    table = tabulate_surface(far_fields(pressed, scope.poissons), model.origin)
     a, c, below = 30e-3, 15e-3, -5e-3
     # Of the ellipsoid, points that are below the support are part of the body, too.
     assert volume_within(table) == pytest.approx(4 / 3 * pi * a**2 * c, rel=0.02)

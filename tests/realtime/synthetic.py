@@ -6,7 +6,9 @@ import numpy as np
 
 from pipeline.export.file import write_model
 from pipeline.realtime.face import Face
-from pipeline.realtime.model import Model, load
+from pipeline.realtime.model import Model
+from pipeline.realtime.pairs import Pairs
+from pipeline.realtime.read import load
 from pipeline.realtime.surface import Surface, SurfaceTable, load_surface
 from pipeline.realtime.table import Table
 
@@ -28,7 +30,16 @@ def random_model(*, is_round: bool = False, turned: bool = False, is_even: bool 
         heights = rng.standard_normal((2, 1 if is_round else 4, 5)) / np.arange(1, 6) ** 3
         face = Face(2e-3 * heights[0], 4.0 * heights[1])
     rest = {"face": face, "off": 1e-7, "aligned": 0.02 if curved else 1e-6, "bend_error": 3.0 if curved else 0.0}
+    rest["pairs"] = None if curved else random_pairs(table)
     return Model(table, origin, axes, sides, 0.02, 10e3, 0.45, 0.5, (0.02, 0.1, 0.5, 0.001), **rest)
+
+
+def random_pairs(table: Table, rank: int = 4) -> Pairs:
+    """Of smooth random modes; a force sinks other places a tenth to a half more or less than on a half-space."""
+    rng, rows = np.random.default_rng(6), np.arange(1, 6)
+    modes = rng.standard_normal((rank, 5, 5)) / np.multiply.outer(rows, rows) ** 2
+    links = 4 * rng.standard_normal((3, rank, rank)) / np.arange(1, 4)[:, None, None]
+    return Pairs(modes, (links + links.transpose(0, 2, 1)) / 2, 2e-3, 0.2, table.reach, table.poisson)
 
 
 def write_random(path: Path, **kind: bool) -> Model:

@@ -99,6 +99,54 @@ def test_c_and_numpy_agree(library, tmp_path, kind):
     assert seen >= {"ok", "lost", "outside", "poisson"}
 
 
+@pytest.mark.parametrize("kind", [{}, {"is_round": True}, {"turned": True}, {"curved": True}])
+def test_several_tools_are_those_of_numpy(library, tmp_path, kind):
+    model = write_random(tmp_path / "model.nc", **kind)
+    data, room = (tmp_path / "model.nc").read_bytes(), ctypes.create_string_buffer(1 << 20)
+    assert library.epsmesh_load(room, data, ctypes.c_size_t(len(data))) == 0
+    rng, seen, triple = np.random.default_rng(8), set(), ctypes.c_double * 3
+    for number in range(250):
+        count = int(rng.integers(1, 9)) if number % 2 else 2
+        young, poisson = rng.uniform(1e3, 1e5), rng.uniform(0.295, 0.49)
+        tools, queries = [], (Query * count)()
+        for query in queries:
+            shape = int(rng.integers(5))
+            x, y = rng.uniform(-1.0, 1.0, 2) * model.table.reach / (np.sqrt(2) if "is_round" in kind else 1)
+            at = model.origin + np.array([x, y, 0.0]) @ model.axes
+            depth, radius = rng.uniform(-5e-5, 4e-4), (1e-3, 4e-3, 5e-3, 1e-3, 1e-3)[shape] * rng.uniform(0.3, 1)
+            along, depth = rng.standard_normal(3), nan if rng.uniform() < 0.01 else depth
+            tool = {"tool": SHAPES[shape], "at": at, "depth": depth, "radius": radius, "angle": 1.1, "along": along}
+            tools.append(tool | {"length": 2 * radius, "width": 5e-4} | ({"contact": "bonded"} if shape == 4 else {}))
+            query.shape, query.radius, query.angle, query.at, query.depth = shape, radius, 1.1, triple(*at), depth
+            query.young, query.poisson, query.length, query.width = young, poisson, 2 * radius, 5e-4
+            query.along = triple(*along)
+        touches = (Touch * count)()
+        library.epsmesh_touch_all(room, count, queries, touches)
+        for found, expected in zip(touches, model.query_all(tools, young=young, poisson=poisson), strict=True):
+            assert library.epsmesh_word(found.status).decode() == expected.status
+            values = np.array([*found.force, found.force_error, found.stiffness, found.contact_radius])
+            known = np.array([*expected.force, expected.force_error, expected.stiffness, expected.contact_radius])
+            scale = np.array([*[np.linalg.norm(expected.force)] * 3, *known[3:]])
+            assert np.all((np.abs(values - known) <= 1e-10 * scale) | np.isnan(known))
+            assert np.array_equal(np.isnan(values), np.isnan(known))
+            seen.add(expected.status)
+    if "curved" in kind:
+        assert seen >= {"alone", "off"}
+        return
+    assert seen >= {"ok", "lost", "near", "others", "poisson", "input"}
+    good = list(queries)[:1] * 2
+    for name, other in (("young", 2e3), ("poisson", 0.35)):
+        queries = (Query * 2)(*good)
+        for query in queries:
+            query.young, query.poisson = 1e3, 0.4
+        setattr(queries[1], name, other)
+        touches = (Touch * 9)()
+        library.epsmesh_touch_all(room, 2, queries, touches)
+        assert [library.epsmesh_word(touch.status) for touch in touches[:2]] == [b"input", b"input"]
+    library.epsmesh_touch_all(room, 9, (Query * 9)(*[good[0]] * 9), touches)
+    assert {library.epsmesh_word(touch.status) for touch in touches} == {b"input"}
+
+
 def test_a_damaged_file_breaks_nothing(tmp_path):
     write_random(tmp_path / "model.nc")
     program = tmp_path / "test_epsmesh"

@@ -10,7 +10,7 @@ from scipy.special import ellipe, ellipk
 from pipeline.realtime import Model, ModelError
 from pipeline.realtime.blade import blade
 from pipeline.realtime.contact import Disc, Place, Shape, ball, cone
-from pipeline.realtime.model import model_of
+from pipeline.realtime.read import model_of
 from tests.realtime.synthetic import random_model, write_random
 
 TOOLS = (

@@ -1,0 +1,214 @@
+"""R on a body's boundary for forces all over a region of its face: what both of a model's far tables are made of.
+
+R (m/N for E = 1) is solved for at Chebyshev places of a quarter of the region, or of a radius, and carried to their
+images: mirror images of a box, turned ones of a round body.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from math import pi
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pipeline.arrays import FloatArray, IntArray
+from pipeline.export.ranks import ALONE, Ranks
+from pipeline.export.region import Region
+from pipeline.mesh.distribute import BodyMesh
+from pipeline.solve.far_field import PointForce
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.regular import OnBoundary, regular_on_boundary
+from pipeline.stages import stage
+
+# Intervals between the places from the middle to the end of the region; of Poisson's ratios; held-out places.
+_SIZE, _POISSONS, _HELD_OUT = 6, 3, 4
+# Triangles that are looked through for the one a point lies in, steps that find its place on a bent one.
+_NEAREST, _STEPS = 24, 6
+
+Place = tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """A motion (3, 3) that maps the body to itself, and the values at the moved nodes as sums of those at nodes."""
+
+    motion: FloatArray
+    nodes: IntArray
+    weights: FloatArray
+
+    def of(self, values: FloatArray) -> FloatArray:
+        """Return the field (n, 3) for the moved force, from that for the force itself."""
+        return np.asarray(np.einsum("nk,nki->ni", self.weights, values[self.nodes]) @ self.motion.T)
+
+
+@dataclass(frozen=True, eq=False)
+class Pressed:
+    """A meshed body whose ``region`` of the face is pressed on, and the forces that do so, of a Poisson's ratio.
+
+    ``law`` tells the tissues in units of μ at the face, where they are several, for its Poisson's ratio. R is not
+    judged ``next`` (m) to a force. Each of ``ranks`` has the whole mesh, and solves for some of the places.
+    """
+
+    mesh: BodyMesh
+    region: Region
+    force: Callable[[Place, float], PointForce]
+    law: Callable[[float], MaterialLaw | None] = lambda _: None
+    next: float = 0.0
+    ranks: Ranks = ALONE
+
+    def solve(self, places: Sequence[Place], poisson: float) -> OnBoundary:
+        """Return R (m/N, E = 1) for a force at each place; collective."""
+        # All ranks number the boundary alike: their meshes are one.
+        boundary: list[OnBoundary] = []
+
+        def solve(some: Sequence[Place]) -> list[FloatArray]:
+            forces = [self.force(place, poisson) for place in some]
+            boundary.append(regular_on_boundary(self.mesh, forces, self.law(poisson)))
+            # Of a unit of the field, 4πμ times the radius newtons, and E = 2 (1 + ν) μ.
+            scales = np.array([2 * (1 + poisson) / (4 * pi * force.radius) for force in forces])
+            return list(scales[:, None, None] * boundary[0].values)
+
+        values = np.array(self.ranks.together(places, solve))
+        # The first rank has a share of whatever there is.
+        return replace(self.ranks.on_first(lambda: boundary[0]), values=values)
+
+
+@dataclass(frozen=True, eq=False)
+class FarFields:
+    """R of a ``body`` for a force at each of its ``sources``, for each of ``ratios`` within ``poissons``.
+
+    Of the middle one of ``solved``, the last fields are those of forces ``held_out``, that no table is made of.
+    ``motions`` map the body to itself and the sources to all ``places``, source by source.
+    """
+
+    body: Pressed
+    poissons: tuple[float, float]
+    ratios: FloatArray
+    sources: list[Place]
+    held_out: list[Place]
+    solved: list[OnBoundary]
+    motions: list[FloatArray]
+
+    @cached_property
+    def places(self) -> FloatArray:
+        """The places (n, 2), in m, that fields are known for."""
+        return np.array([motion[:2, :2] @ source for source in self.sources for motion in self.motions])
+
+    @property
+    def rooms(self) -> FloatArray:
+        """The way (n,), in m, from each place to the nearest side or the bottom."""
+        return np.array([self.body.region.room(x, y) for x, y in self.places])
+
+    @property
+    def middle(self) -> int:
+        """The number of the ratio that the places held out are solved for."""
+        return len(self.ratios) // 2
+
+    @property
+    def known(self) -> FloatArray:
+        """R (places held out, n, 3) on the boundary."""
+        return self.solved[self.middle].values[len(self.sources) :]
+
+    def basis(self) -> FloatArray:
+        """Return T_j(y/Y) T_i(x/X) at the places (n, terms), of a round region those with i + j up to the degree."""
+        region = self.body.region
+        x, y = (np.polynomial.chebyshev.chebvander(self.places[:, i] / region.reach[i], 2 * _SIZE) for i in range(2))
+        terms = np.einsum("nj,ni->nji", y, x)
+        if region.is_round:
+            terms = terms * (np.add.outer(*2 * [np.arange(2 * _SIZE + 1)]) <= 2 * _SIZE)
+        return np.asarray(terms.reshape(len(self.places), -1))
+
+    @property
+    def degrees(self) -> tuple[int, int]:
+        """How many polynomials of y and of x there are in the basis."""
+        return 2 * _SIZE + 1, 2 * _SIZE + 1
+
+    def over_ratios(self, values: FloatArray) -> FloatArray:
+        """Return the Chebyshev coefficients over ν of ``values`` (ν, ...) at the ratios."""
+        count = len(self.ratios)
+        nodes = _ends(count - 1) if count > 1 else np.zeros(1)
+        return np.tensordot(np.linalg.inv(np.polynomial.chebyshev.chebvander(nodes, count - 1)), values, 1)
+
+
+@stage("far field")
+def far_fields(body: Pressed, poissons: tuple[float, float]) -> FarFields:
+    """Return R on the whole boundary, for a range of Poisson's ratios; collective.
+
+    Raises:
+        SolveError: if it cannot be solved for.
+    """
+    region, (low, high) = body.region, poissons
+    ratios = (low + high) / 2 + (high - low) / 2 * (_ends(_POISSONS - 1) if low < high else np.zeros(1))
+    sources, held_out, middle = _sources(region), _held_out(region), len(ratios) // 2
+    # Places held out are solved for with the others: a factorisation takes much longer than what it serves for.
+    asked = [[*sources, *held_out] if number == middle else sources for number in range(len(ratios))]
+    solved = [body.solve(places, float(ratio)) for places, ratio in zip(asked, ratios, strict=True)]
+    return FarFields(body, poissons, ratios, sources, held_out, solved, _motions(region))
+
+
+def _sources(region: Region) -> list[Place]:
+    """Return the places that are solved for: the others are their images."""
+    lines = [
+        reach * _ends(2 * _SIZE)[: _SIZE + 1 if even else None]
+        for reach, even in zip(region.reach, region.even, strict=True)
+    ]
+    if region.is_round:
+        return [(float(r), 0.0) for r in lines[0]]
+    pairs = [(float(a), float(b)) for a, b in product(*lines)]
+    return [(a, b) for a, b in pairs if a >= b] if region.is_square else pairs
+
+
+def _ends(size: int) -> FloatArray:
+    """Return the extrema of T_size, from 1 to -1."""
+    return np.asarray(np.cos(pi * np.arange(size + 1) / size))
+
+
+def _motions(region: Region) -> list[FloatArray]:
+    """Return the motions that map the body to itself and its sources to all places."""
+    if region.is_round:
+        angles = 2 * pi * np.arange(4 * _SIZE + 1) / (4 * _SIZE + 1)
+        return [np.array([[np.cos(t), -np.sin(t), 0], [np.sin(t), np.cos(t), 0], [0, 0, 1]]) for t in angles]
+    x, y = ((1.0, -1.0) if even else (1.0,) for even in region.even)
+    signs = [np.diag([a, b, 1.0]) for a, b in product(x, y)]
+    swap = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, 1]])
+    return [*signs, *(sign @ swap for sign in signs)] if region.is_square else signs
+
+
+def _held_out(region: Region) -> list[Place]:
+    """Return places that no table is made of."""
+    shares = np.random.default_rng(0).uniform(-1, 1, (_HELD_OUT, 2)) / (np.sqrt(2) if region.is_round else 1)
+    return [(float(x), float(y)) for x, y in shares * region.reach]
+
+
+def image_of(boundary: OnBoundary, motion: FloatArray) -> Image:
+    """Find where on the boundary every node comes from."""
+    return Image(motion, *located(boundary, boundary.nodes @ motion))
+
+
+def located(boundary: OnBoundary, points: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return the six nodes of the triangle that each of ``points`` (n, 3) is on, and their weights there."""
+    corners = boundary.nodes[boundary.triangles]
+    _, near = cKDTree(corners[:, :3].mean(axis=1)).query(points, k=min(_NEAREST, len(corners)))
+    tried = corners[near]
+    across = np.stack([tried[:, :, 1] - tried[:, :, 0], tried[:, :, 2] - tried[:, :, 0]], axis=-1)
+    inverse = np.linalg.pinv(across)
+    local = np.einsum("nkij,nkj->nki", inverse, points[:, None] - tried[:, :, 0])
+    for _ in range(_STEPS):
+        reached = np.einsum("nka,nkai->nki", _quadratic(local), tried)
+        local = local + np.einsum("nkij,nkj->nki", inverse, points[:, None] - reached)
+    local = np.clip(local, 0, 1)
+    local /= np.maximum(local.sum(axis=-1, keepdims=True), 1)
+    weights = _quadratic(local)
+    missed = np.linalg.norm(np.einsum("nka,nkai->nki", weights, tried) - points[:, None], axis=-1)
+    best, rows = missed.argmin(axis=1), np.arange(len(points))
+    return boundary.triangles[near[rows, best]], weights[rows, best]
+
+
+def _quadratic(local: FloatArray) -> FloatArray:
+    """Return the six functions of a triangle at the last two of its barycentric coordinates (..., 2)."""
+    b, c = local[..., 0], local[..., 1]
+    a = 1 - b - c
+    ends = [a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1)]
+    return np.stack([*ends, 4 * b * c, 4 * a * c, 4 * a * b], axis=-1)

@@ -1,0 +1,94 @@
+"""What forces at two places of a flat face do to each other, as a few modes: ``pipeline.realtime.pairs``.
+
+The regular part R of the normal displacement at one Chebyshev place for a force at another is a symmetric matrix, but
+for the mesh. Its range is cut where it misses what is asked; modes are the polynomials through what is left of it.
+"""
+
+from math import pi
+
+import numpy as np
+
+from pipeline.arrays import FloatArray
+from pipeline.export.far import FarFields, located
+from pipeline.realtime.pairs import MOST_MODES, MOST_TERMS, Pairs
+from pipeline.stages import stage
+
+# Modes are kept until they miss R times the way to the nearest side by less than this.
+_CUT = 1e-3
+# A node this near to the plane of the face, in units of the thickness, lies on it.
+_ON_FACE = 1e-9
+
+
+@stage("pairs")
+def tabulate_pairs(far: FarFields) -> Pairs:
+    """Return R between all places of a region, and by how much of the way to a side it may be off.
+
+    That is what it is off for forces held out, anywhere else on the face, or half of what the mesh misses of symmetry.
+    """
+    ways = np.sqrt(far.rooms)
+    weights = np.multiply.outer(ways, ways)
+    solved = _between(far) * weights
+    even = (solved + solved.transpose(0, 2, 1)) / 2
+    range_of = _range(even, min(MOST_MODES, MOST_TERMS // int(np.prod(far.degrees))))
+    modes = np.linalg.lstsq(far.basis(), range_of / ways[:, None], rcond=None)[0].T.reshape(-1, *far.degrees)
+    links = far.over_ratios(range_of.T @ even @ range_of)
+    links = (links + links.transpose(0, 2, 1)) / 2
+    region = far.body.region
+    pairs = Pairs(modes, links, 0.0, _aside(far), region.reach, far.poissons)
+    mesh = float(np.abs(solved - even).max())
+    return Pairs(modes, links, max(_missed(pairs, far), mesh), pairs.aside, region.reach, far.poissons)
+
+
+def _between(far: FarFields) -> FloatArray:
+    """Return what a force at each place (columns) sinks all places (rows) beyond a half-space: (ν, n, n), in 1/m."""
+    points = _on_face(far.places)
+    maps = [located(far.solved[0], points @ motion) for motion in far.motions]
+    sunk = [-found.values[: len(far.sources), :, 2] for found in far.solved]
+    columns = [[(weights * of[nodes]).sum(axis=1) for of in each for nodes, weights in maps] for each in sunk]
+    return np.array(columns).transpose(0, 2, 1)
+
+
+def _range(even: FloatArray, most: int) -> FloatArray:
+    """Return orthonormal columns (n, rank) that make ``even`` (ν, n, n) but for ``_CUT``, or the first ``most``."""
+    found, _, _ = np.linalg.svd(np.concatenate(list(even), axis=1), full_matrices=False)
+    low, high = 1, min(most, found.shape[1])
+    while low < high:
+        rank = (low + high) // 2
+        onto = found[:, :rank] @ found[:, :rank].T
+        missed = float(np.abs(onto @ even @ onto - even).max())
+        low, high = (low, rank) if missed <= _CUT else (rank + 1, high)
+    return np.asarray(found[:, :low])
+
+
+def _missed(pairs: Pairs, far: FarFields) -> float:
+    """Return by how much R times both ways to a side is off at nodes of the face, for forces held out."""
+    nodes, region = far.solved[far.middle].nodes, far.body.region
+    inside = np.abs(nodes[:, 2]) <= _ON_FACE * region.thickness
+    if region.is_round:
+        inside &= np.hypot(nodes[:, 0], nodes[:, 1]) <= region.reach[0]
+    else:
+        inside &= (np.abs(nodes[:, :2]) <= region.reach).all(axis=1)
+    on = [(float(x), float(y)) for x, y in nodes[inside, :2]]
+    rooms = [np.sqrt([region.room(x, y) for x, y in places]) for places in (far.held_out, on)]
+    told = pairs.regular(far.held_out, on, float(far.ratios[far.middle]))
+    return float(np.abs((told + far.known[:, inside, 2]) * np.multiply.outer(*rooms)).max())
+
+
+def _aside(far: FarFields) -> float:
+    """Return the most that a force of one moves another place aside, times the way to it."""
+    nodes, weights = located(far.solved[0], _on_face(far.places))
+    largest = 0.0
+    for found, poisson in zip(far.solved, far.ratios.tolist(), strict=True):
+        towards = -(1 - 2 * poisson) * (1 + poisson) / (2 * pi)
+        for source, values in zip(far.sources, found.values, strict=False):
+            away = far.places - source
+            square = (away**2).sum(axis=1)
+            beside = square > 0
+            moved = np.einsum("nk,nki->ni", weights, values[nodes, :2])[beside]
+            moved += towards * away[beside] / square[beside, None]
+            largest = max(largest, float((np.linalg.norm(moved, axis=1) * np.sqrt(square[beside])).max()))
+    return largest
+
+
+def _on_face(places: FloatArray) -> FloatArray:
+    return np.column_stack([places, np.zeros(len(places))])

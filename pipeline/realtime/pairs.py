@@ -1,0 +1,126 @@
+"""What a force at one place does at another: the normal part of a body's Green's function, E = 1, on a flat face.
+
+    G(x, y) = (1 - ν²)/(π |x - y|) + R(x, y),    R(x, y) = Σ φ_k(x) S_kl(ν) φ_l(y),
+
+a half-space's (J. Boussinesq, 1885) and the regular part, of low rank: modes φ, polynomials over the region, and links
+S, symmetric as R is (E. Betti, 1872).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.realtime.classic import ModelError
+from pipeline.realtime.contact import Pair
+from pipeline.realtime.table import chebyshev, polynomials
+
+Array = NDArray[np.float64]
+# Modes, and coefficients of all of them: the C side holds as many; so does it links over ν.
+MOST_MODES, MOST_TERMS, MOST_LINKS = 96, 16384, 3
+PARTS = {"pair_modes": 3, "pair_links": 3, "pair_error": 0, "pair_aside": 0}
+
+
+@dataclass(frozen=True, eq=False)
+class Influence:
+    """Of places i and j: ``sinks`` (n, n) is G (1/m), 0 where i = j, ``slopes`` (n, n, 2) its slope with x_i (1/m²).
+
+    ``bends`` (n, n) is the size of the Laplacian of R with x_i (1/m³), ``near`` (n, n) a half-space's share of G, and
+    ``away`` (n, n, 2) and ``apart`` (n, n) are x_i - x_j and the distance (m), of a place and itself infinite.
+    """
+
+    sinks: Array
+    slopes: Array
+    bends: Array
+    near: Array
+    away: Array
+    apart: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """``modes`` (rank, y, x), Chebyshev coefficients over ``reach`` (m), ``links`` (ν, rank, rank) in 1/m over ν.
+
+    R may be off by ``error`` over the root of both ways to the nearest side or the bottom; aside, a force of one moves
+    the face by ``aside`` over the distance at most.
+    """
+
+    modes: Array
+    links: Array
+    error: float
+    aside: float
+    reach: Pair
+    poisson: Pair
+
+    def between(self, places: list[Pair], poisson: float, least: float = 0.0) -> Influence:
+        """Return what forces at ``places`` (m) do to each other, none of them nearer than ``least`` (m)."""
+        terms = [self._terms(x, y) for x, y in places]
+        flat = self._flat
+        value, along, across, bend = (np.array([term[k] for term in terms]) @ flat.T for k in range(4))
+        linked = value @ self._linked(poisson)
+        at = np.array(places)
+        away = at[:, None] - at
+        apart = np.maximum(np.sqrt((away**2).sum(axis=-1)), least)
+        np.fill_diagonal(apart, np.inf)
+        near = (1 - poisson**2) / (pi * apart)
+        others = 1.0 - np.eye(len(places))
+        sinks = others * (near + linked @ value.T)
+        slopes = np.stack([along @ linked.T, across @ linked.T], axis=-1) - (near / apart**2)[..., None] * away
+        return Influence(sinks, others[..., None] * slopes, others * np.abs(bend @ linked.T), near, away, apart)
+
+    def regular(self, at: list[Pair], to: list[Pair], poisson: float) -> Array:
+        """Return R (n, m), in 1/m, of n places ``at`` for forces at m others."""
+        of_at, of_to = (np.array([self._terms(x, y)[0] for x, y in places]) @ self._flat.T for places in (at, to))
+        return np.asarray(of_at @ self._linked(poisson) @ of_to.T)
+
+    def _linked(self, poisson: float) -> Array:
+        low, high = self.poisson
+        middle = 0.0 if high == low else (2 * poisson - low - high) / (high - low)
+        return np.asarray(np.tensordot(np.array(chebyshev(middle, len(self.links))), self.links, 1))
+
+    @cached_property
+    def _flat(self) -> Array:
+        return self.modes.reshape(len(self.modes), -1)
+
+    def _terms(self, x: float, y: float) -> tuple[Array, Array, Array, Array]:
+        """Return all products of polynomials at a place, their slopes with x and y, and their Laplacian."""
+        (a, b), (_, rows, columns) = self.reach, self.modes.shape
+        (u, du, ddu), (v, dv, ddv) = polynomials(x / a, columns), polynomials(y / b, rows)
+        return (
+            np.outer(v, u).ravel(), np.outer(v, du).ravel() / a, np.outer(dv, u).ravel() / b,
+            np.outer(v, ddu).ravel() / a**2 + np.outer(ddv, u).ravel() / b**2,
+        )  # fmt: skip
+
+
+def read_pairs(found: Mapping[str, Array], reach: Pair, poisson: Pair) -> Pairs | None:
+    """Return what a file's variables hold, or nothing if it is of one tool alone.
+
+    Raises:
+        ModelError: if it is not that of a model.
+    """
+    if not any(name in found for name in PARTS):
+        return None
+    for name, rank in PARTS.items():
+        values = found.get(name)
+        if values is None:
+            raise ModelError(f"the file has no {name}, but others of its kind: it is no model")
+        if values.ndim != rank:
+            raise ModelError(f"{name} has shape {values.shape}")
+        if not np.isfinite(values).all():
+            raise ModelError(f"{name} is not finite")
+    modes, links = found["pair_modes"], found["pair_links"]
+    rank, rows, columns = modes.shape
+    fits = {
+        "pair_modes": rank <= MOST_MODES and modes.size <= MOST_TERMS and max(rows, columns) <= 64,
+        "pair_links": links.shape[1:] == (rank, rank) and len(links) <= MOST_LINKS
+        and bool((links == links.transpose(0, 2, 1)).all()) and (len(links) == 1 or poisson[0] < poisson[1]),
+        "pair_error": bool(found["pair_error"] >= 0),
+        "pair_aside": bool(found["pair_aside"] >= 0),
+    }  # fmt: skip
+    for name, is_right in fits.items():
+        if not is_right:
+            raise ModelError(f"{name} is not that of a model")
+    return Pairs(modes, links, float(found["pair_error"]), float(found["pair_aside"]), reach, poisson)

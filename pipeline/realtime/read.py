@@ -1,0 +1,95 @@
+"""A model out of a file: every number held against what a model's can be."""
+
+from math import prod
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.realtime.classic import ModelError, read_doubles
+from pipeline.realtime.face import Face
+from pipeline.realtime.model import Model
+from pipeline.realtime.pairs import read_pairs
+from pipeline.realtime.table import TENSORS, Table
+
+FORMAT = 2.0
+# Coefficients along one direction, and in all: the C side holds as many.
+MOST, MOST_IN_ALL = 64, 4096
+# Numbers of a file that are the model's as they are.
+_NUMBERS = ("thickness", "young", "poisson", "largest", "off", "aligned")
+
+
+def load(path: str | Path) -> Model:
+    """Return the model at ``path``.
+
+    Raises:
+        ModelError: if it is no model, or of another version, or damaged; OSError if it cannot be read.
+    """
+    return model_of(Path(path).read_bytes())
+
+
+def model_of(data: bytes) -> Model:
+    """Return the model that the bytes of a file hold.
+
+    Raises:
+        ModelError: if they are no model, or of another version, or damaged.
+    """
+    found = read_doubles(data)
+    shapes = {"reciprocal": 3, "curvature": 3, "origin": (3,), "axes": (3, 3), "bar": (4,), "height": 2, "bend": 2}
+    shapes |= dict.fromkeys(("reach", "sides", "poisson_range", "even"), (2,))
+    shapes |= {name: rank for name, rank in (("tensors", 4), ("bend_error", ())) if name in found}
+    shapes |= dict.fromkeys(("format", "is_round", "c_ref", "leans", *_NUMBERS), ())
+    if "format" in found and found["format"].shape == () and found["format"] != FORMAT:
+        raise ModelError(f"the file has format {float(found['format']):g}, and this program reads {FORMAT:g}")
+    for name, shape in shapes.items():
+        values = found.get(name)
+        if values is None:
+            raise ModelError(f"the file has no {name}: it is no model")
+        if shape not in (values.shape, values.ndim):
+            raise ModelError(f"{name} has shape {values.shape}")
+        if not np.isfinite(values).all():
+            raise ModelError(f"{name} is not finite")
+    _check(found)
+    reach, sides, ratios, bar = (found[name].tolist() for name in ("reach", "sides", "poisson_range", "bar"))
+    rest = {name: float(found[name]) for name in (*_NUMBERS, "bend_error") if name in found}
+    is_round, (even_x, even_y) = bool(found["is_round"] == 1.0), found["even"] == 1.0
+    tensors = {"tensors": found["tensors"]} if "tensors" in found else {}
+    table = Table(
+        found["reciprocal"], found["curvature"], float(found["c_ref"]), (reach[0], reach[1]), is_round,
+        (ratios[0], ratios[1]), (bool(even_x), bool(even_y)), leans=bool(found["leans"] == 1.0), **tensors,
+    )  # fmt: skip
+    table.prepare()
+    return Model(
+        table, found["origin"], found["axes"], (sides[0], sides[1]), bar=(bar[0], bar[1], bar[2], bar[3]),
+        face=Face(found["height"], found["bend"]), pairs=read_pairs(found, table.reach, table.poisson), **rest,
+    )  # fmt: skip
+
+
+def _check(found: dict[str, NDArray[np.float64]]) -> None:
+    """Hold the numbers of a file against what a model's can be."""
+    shape, axes, (low, high) = found["reciprocal"].shape, found["axes"], found["poisson_range"]
+    reach, sides = found["reach"], found["sides"]
+    flags, face, tensors = found["even"], found["height"].shape, found.get("tensors")
+    fits = {
+        "even": all(flag in (0.0, 1.0) for flag in flags),
+        "leans": float(found["leans"]) in (0.0, 1.0),
+        "height": face == found["bend"].shape and max(face) <= MOST and (face[0] == 1 or not found["is_round"]),
+        "off": bool(found["off"] > 0),
+        "aligned": bool(0 < found["aligned"] <= 0.5),
+        "tensors": tensors is None or tensors.shape == (TENSORS, *shape),
+        "reciprocal": shape == found["curvature"].shape and max(shape) <= MOST and prod(shape) <= MOST_IN_ALL,
+        "is_round": bool(found["is_round"] == 0)
+        or (bool(found["is_round"] == 1) and shape[1] == 1 and bool((flags == 1).all())),
+        "axes": bool(np.abs(axes @ axes.T - np.eye(3)).max() < 1e-9),
+        "reach": bool((reach > 0).all() and (reach < sides).all()),
+        "poisson_range": bool(-1 < low <= found["poisson"] <= high <= 0.5) and (shape[0] == 1 or bool(low < high)),
+        "thickness": bool(found["thickness"] > 0),
+        "young": bool(found["young"] > 0),
+        "largest": bool(0 < found["largest"] <= 1),
+        "bar": bool((found["bar"] >= 0).all()),
+        # A curved face that does not say how well it is known is of a time when it was known badly.
+        "bend_error": bool(found["bend_error"] >= 0) if "bend_error" in found else not found["bend"].any(),
+    }
+    for name, is_right in fits.items():
+        if not is_right:
+            raise ModelError(f"{name} is not that of a model")
