@@ -1,4 +1,4 @@
-"""Two frictionless discs on a box by quadratic tetrahedra of its own: nothing of the program is in it."""
+"""Two frictionless discs on a box by quadratic tetrahedra of its own: nothing of the program is in its elasticity."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,6 +8,8 @@ import gmsh
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
+
+from pipeline.compat import gmsh_session
 
 Array = NDArray[np.float64]
 Disc = tuple[float, float, float]
@@ -29,8 +31,7 @@ class Mesh:
 
 def meshed(size: Sequence[float], discs: Sequence[Disc], finer: float = 1.0) -> Mesh:
     """Return a box of a ``size`` (m), its top at z = 0, held at the bottom, with ``discs`` (x, y, radius) on it."""
-    gmsh.initialize()
-    try:
+    with gmsh_session():
         gmsh.option.setNumber("General.Terminal", 0)
         occ, mesh = gmsh.model.occ, gmsh.model.mesh
         occ.addBox(-size[0] / 2, -size[1] / 2, -size[2], *size)
@@ -61,8 +62,6 @@ def meshed(size: Sequence[float], discs: Sequence[Disc], finer: float = 1.0) -> 
             np.unique(np.concatenate([number[mesh.getElementsByType(9, tag)[1]] for tag in tags_of]))
             for tags_of in faces
         ]
-    finally:
-        gmsh.finalize()
     points = points.reshape(-1, 3)
     held = np.flatnonzero(points[:, 2] < -size[2] * (1 - 1e-9))
     return Mesh(points, number[cells].reshape(-1, 10).astype(np.int64), held, nodes)

@@ -1,0 +1,88 @@
+"""What two places of a face do to each other: reciprocal, right at one place, and two discs by other elements."""
+
+from math import hypot
+
+import numpy as np
+import pytest
+
+from benchmarks.two_discs import forces, meshed
+from pipeline.export import far
+from pipeline.export.compliance import compliances
+from pipeline.export.far import FarFields, far_fields
+from pipeline.export.pairs import tabulate_pairs
+from pipeline.export.scope import scope_of
+from pipeline.export.seen import seen_body
+from pipeline.realtime.model import Model
+from pipeline.realtime.table import Table
+from tests.export.test_export import BOX, CYLINDER, SKIN, study
+
+
+def fields(body: dict, poissons: tuple[float, float], margin: float) -> FarFields:
+    scope = scope_of(study(body=body, material={"young": "10 kPa", "poisson": poissons[0]}))
+    return far_fields(seen_body(scope, None, margin), poissons)
+
+
+@pytest.mark.parametrize(
+    ("body", "most"),
+    [(BOX, 0.004), (CYLINDER, 0.004), (CYLINDER | {"layers": [SKIN | {"thickness": "6 mm"}]}, 0.012)],
+)
+def test_a_table_of_two_places_is_reciprocal_and_knows_each_by_itself(body, most, monkeypatch):
+    monkeypatch.setattr(far, "_POISSONS", 2)
+    is_layered = "layers" in body  # whose skin has ν = 0.45
+    known = fields(body, (0.45, 0.45) if is_layered else (0.35, 0.45), 0.3)
+    pairs, region = tabulate_pairs(known), known.body.region
+    assert np.array_equal(pairs.links, pairs.links.transpose(0, 2, 1))
+    assert 0 < pairs.error < most
+    places = [(0.4 * region.reach[0], -0.3 * region.reach[1]), (-0.5 * region.reach[0], 0.6 * region.reach[1])]
+    for poisson in (0.45,) if is_layered else (0.35, 0.42):
+        law = known.body.law(poisson)
+        told = pairs.regular(places, places, poisson)
+        assert told == pytest.approx(told.T, rel=1e-12)
+        for number, row in enumerate(compliances(known.body.mesh, region, places, poisson, law)):
+            room = region.room(*places[number])
+            assert told[number, number] * room == pytest.approx(row[0] * room, abs=2 * most)
+    between = pairs.between(places, poisson)
+    step = 1e-5
+    for axis in range(2):
+        moved = [
+            pairs.between([tuple(np.add(places[0], way * step * np.eye(2)[axis])), places[1]], poisson).sinks[0, 1]
+            for way in (-1, 1)
+        ]
+        assert between.slopes[0, 1, axis] == pytest.approx((moved[1] - moved[0]) / (2 * step), rel=1e-4)
+
+
+def test_a_force_draws_other_places_along_the_face_no_more_than_the_file_says():
+    """Of a half-space (1 - 2ν)(1 + ν)/(2π) at most; what is held adds to that far away."""
+    known = fields(CYLINDER, (0.3, 0.3 + 1e-9), 0.5)
+    assert 0.4 * 1.3 / (2 * np.pi) < tabulate_pairs(known).aside < 0.5
+
+
+@pytest.mark.parametrize(("poisson", "apart"), [(0.3, 9e-3), (0.45, 16e-3)])
+def test_two_discs_are_those_of_other_elements(poisson, apart):
+    """Box of 40 x 40 x 20 mm: what the one takes of the other's force, by quadratic elements that know both edges."""
+    body, depth, radii = BOX | {"size": ["40 mm", "40 mm", "20 mm"]}, 1e-4, (1.5e-3, 2.5e-3)
+    known = fields(body, (poisson, poisson), 0.3)
+    region, x = known.body.region, apart / 2
+    ((c, h, *_),) = compliances(known.body.mesh, region, [(x, 0.0)], poisson)
+    t = 1 / (c + 100)
+    numbers = np.full((1, 1, 1), t), np.full((1, 1, 1), h * t**3)
+    table = Table(*numbers, 100.0, region.reach, False, (poisson, poisson))
+    model = Model(
+        table, np.zeros(3), np.eye(3), region.sides, 0.02, 1.0, poisson, 0.5, (0.0, 0.0, 0.0, 0.0), off=1e-8,
+        pairs=tabulate_pairs(known),
+    )  # fmt: skip
+    discs = [(-x, 0.0, radii[0]), (x, 0.0, radii[1])]
+    asked = [{"tool": "disc", "radius": r, "at": (x, y, 0.0), "depth": depth} for x, y, r in discs]
+    alone = [model.query(**tool) for tool in asked]
+    touches = model.query_all(asked)
+    by_itself, both = forces(meshed((0.04, 0.04, 0.02), discs, 0.6), poisson, [depth, depth])
+    # Of the first disc: how far a force of one on the second sinks it.
+    felt = (depth - depth * both[0] / by_itself[0]) / both[1]
+    told = (depth - depth * touches[0].force[2] / alone[0].force[2]) / touches[1].force[2]
+    assert told == pytest.approx(felt, abs=0.01 * (1 - poisson**2) / (np.pi * apart))
+    own = [depth / touch.force[2] for touch in alone]
+    truth = np.linalg.solve([[own[0], felt], [felt, own[1]]], [depth, depth])
+    for touch, force in zip(touches, truth, strict=True):
+        assert touch.force[2] == pytest.approx(force, rel=touch.force_error)
+        assert touch.force_error < 0.006
+    assert hypot(*touches[0].force[:2]) > 1e-3 * touches[0].force[2]
