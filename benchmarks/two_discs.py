@@ -1,7 +1,8 @@
-"""Two frictionless discs on a box by quadratic tetrahedra of its own: nothing of the program is in its elasticity."""
+"""Two frictionless discs on a box or a cylinder by quadratic elements of its own: no elasticity of the program's."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import basix
 import gmsh
@@ -29,16 +30,20 @@ class Mesh:
     discs: list[NDArray[np.int64]]
 
 
-def meshed(size: Sequence[float], discs: Sequence[Disc], finer: float = 1.0) -> Mesh:
-    """Return a box of a ``size`` (m), its top at z = 0, held at the bottom, with ``discs`` (x, y, radius) on it."""
+def meshed(size: Sequence[float], discs: Sequence[Disc], finer: float = 1.0, ends: Sequence[float] = ()) -> Mesh:
+    """Return a body, its top at z = 0, held at the bottom, with ``discs`` (x, y, radius, in m) on it.
+
+    It is a box of three ``size``s (m), or a cylinder of a radius and a height; layers end at depths ``ends`` (m).
+    """
     with gmsh_session():
         gmsh.option.setNumber("General.Terminal", 0)
         occ, mesh = gmsh.model.occ, gmsh.model.mesh
-        occ.addBox(-size[0] / 2, -size[1] / 2, -size[2], *size)
+        depths = [0.0, *ends, size[-1]]
+        solid = [(3, _slab(size, top, bottom)) for top, bottom in pairwise(depths)]
         flat = [(2, occ.addDisk(x, y, 0.0, r, r)) for x, y, r in discs]
-        _, parts = occ.fragment([(3, 1)], flat)
+        _, parts = occ.fragment(solid, flat)
         occ.synchronize()
-        faces = [[tag for _, tag in part] for part in parts[1:]]
+        faces = [[tag for _, tag in part] for part in parts[len(solid) :]]
         fields = []
         for (x, y, r), _ in zip(discs, faces, strict=True):
             fields.append(mesh.field.add("MathEval"))
@@ -46,7 +51,7 @@ def meshed(size: Sequence[float], discs: Sequence[Disc], finer: float = 1.0) -> 
             way = f"Sqrt({edge}^2+z^2)"
             mesh.field.setString(fields[-1], "F", f"{_EDGE * r / finer!r}+{_GROWTH / finer!r}*{way}")
         fields.append(mesh.field.add("MathEval"))
-        mesh.field.setString(fields[-1], "F", f"{_COARSE * size[2] / finer!r}")
+        mesh.field.setString(fields[-1], "F", f"{_COARSE * size[-1] / finer!r}")
         least = mesh.field.add("Min")
         mesh.field.setNumbers(least, "FieldsList", fields)
         mesh.field.setAsBackgroundMesh(least)
@@ -63,13 +68,25 @@ def meshed(size: Sequence[float], discs: Sequence[Disc], finer: float = 1.0) -> 
             for tags_of in faces
         ]
     points = points.reshape(-1, 3)
-    held = np.flatnonzero(points[:, 2] < -size[2] * (1 - 1e-9))
+    held = np.flatnonzero(points[:, 2] < -size[-1] * (1 - 1e-9))
     return Mesh(points, number[cells].reshape(-1, 10).astype(np.int64), held, nodes)
 
 
-def forces(mesh: Mesh, poisson: float, depths: Sequence[float]) -> tuple[list[float], list[float]]:
-    """Return the force (N) on each disc by itself, and on each while all press, at ``depths`` (m), for E = 1."""
-    stiffness = _assembled(mesh, poisson)
+def _slab(size: Sequence[float], top: float, bottom: float) -> int:
+    occ = gmsh.model.occ
+    if len(size) == 2:
+        return int(occ.addCylinder(0, 0, -bottom, 0, 0, bottom - top, size[0]))
+    return int(occ.addBox(-size[0] / 2, -size[1] / 2, -bottom, *size[:2], bottom - top))
+
+
+def forces(
+    mesh: Mesh, poisson: float, depths: Sequence[float], layers: Sequence[tuple[float, float, float]] = ()
+) -> tuple[list[float], list[float]]:
+    """Return the force (N) on each disc by itself, and on each while all press, at ``depths`` (m), for E = 1.
+
+    ``layers`` are E, ν, and the depth (m) that each ends at, instead of one material.
+    """
+    stiffness = _assembled(mesh, layers or [(1.0, poisson, np.inf)])
     alone = [_pressed(mesh, stiffness, {number: depth})[number] for number, depth in enumerate(depths)]
     return alone, _pressed(mesh, stiffness, dict(enumerate(depths)))
 
@@ -104,11 +121,14 @@ def _pressed(mesh: Mesh, stiffness: "PETSc.Mat", depths: dict[int, float]) -> li
     return [-float(pushed[3 * nodes + 2].sum()) for nodes in mesh.discs]
 
 
-def _assembled(mesh: Mesh, poisson: float) -> "PETSc.Mat":
+def _assembled(mesh: Mesh, layers: Sequence[tuple[float, float, float]]) -> "PETSc.Mat":
     """Return the stiffness of all dofs (N/m), three a node."""
-    lame, shear = poisson / ((1 + poisson) * (1 - 2 * poisson)), 0.5 / (1 + poisson)
     points, weights = basix.make_quadrature(basix.CellType.tetrahedron, 4)
     corners = mesh.points[mesh.cells]
+    layer = np.searchsorted([end for _, _, end in layers[:-1]], -corners[:, :4, 2].mean(axis=1))
+    young, poisson, _ = np.array(layers)[layer].T
+    lame = (young * poisson / ((1 + poisson) * (1 - 2 * poisson)))[:, None, None, None, None]
+    shear = (0.5 * young / (1 + poisson))[:, None, None]
     count = len(mesh.cells)
     blocks = np.zeros((count, 10, 3, 10, 3))
     for point, weight in zip(points, weights, strict=True):
@@ -118,7 +138,7 @@ def _assembled(mesh: Mesh, poisson: float) -> "PETSc.Mat":
         slope = np.einsum("aj,nji->nai", local, np.linalg.inv(jacobian))
         scaled = volume[:, None, None] * slope
         blocks += lame * np.einsum("nai,nbj->naibj", scaled, slope)
-        blocks += shear * np.einsum("naj,nbi->naibj", scaled, slope)
+        blocks += shear[:, :, :, None, None] * np.einsum("naj,nbi->naibj", scaled, slope)
         dot = shear * np.einsum("nak,nbk->nab", scaled, slope)
         for axis in range(3):
             blocks[:, :, axis, :, axis] += dot

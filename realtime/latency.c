@@ -1,6 +1,6 @@
 /* What a query takes, tool by tool, in microseconds: `latency MODEL [QUERIES [SECONDS]]`.
  *
- * First QUERIES of each tool, one after the other. Then a loop at 1 kHz of SECONDS, whose ticks take the tools in turn,
+ * First QUERIES of each tool, and of two discs at once, one after the other. Then a loop at 1 kHz of SECONDS, whose ticks take the tools in turn,
  * and nothing in turn with them: what a query takes there, and how many ticks ended after the next one was due, beside
  * those that asked nothing. POSIX for its clock; epsmesh.c itself needs C99 alone. */
 #define _POSIX_C_SOURCE 200112L
@@ -10,13 +10,13 @@
 
 #include "epsmesh_patch.h"
 
-enum { PATCH = 5, NOTHING = 6, KINDS = 7, PLACES = 101 };
-static const char *const NAMES[] = {"disc", "sphere", "cone", "blade", "bonded", "patch", "nothing"};
+enum { PATCH = 5, BOTH = 6, NOTHING = 7, KINDS = 8, PLACES = 101 };
+static const char *const NAMES[] = {"disc", "sphere", "cone", "blade", "bonded", "patch", "two", "nothing"};
 static const long TICK = 1000000; /* ns */
 
 static epsmesh_model model;
 static epsmesh_patch patch;
-static epsmesh_query queries[PATCH + 1][PLACES];
+static epsmesh_query queries[NOTHING][PLACES];
 
 static int rising(const void *a, const void *b) {
     double x = *(const double *)a, y = *(const double *)b;
@@ -39,6 +39,13 @@ static double bowl(double x, double y, void *user) {
 static double ask(int kind, long number) {
     const epsmesh_query *query = &queries[kind % NOTHING][number % PLACES];
     if (kind == NOTHING) return 0;
+    if (kind == BOTH) {
+        epsmesh_query both[2];
+        epsmesh_touch touches[2];
+        both[0] = *query, both[1] = queries[BOTH][(number + PLACES / 2) % PLACES];
+        epsmesh_touch_all(&model, 2, both, touches);
+        return touches[0].force[2];
+    }
     if (kind == PATCH) return epsmesh_patch_touch(&patch, &model, query, 1e-3 * (double)number).force[2];
     return epsmesh_touch_at(&model, query).force[2];
 }
@@ -57,15 +64,18 @@ static void on_face(double x, double at[3]) {
 
 /* Put queries of one tool along the middle of the region; return whether the model answers all of them. */
 static int made(int kind, double size) {
+    double force;
     int i;
     for (i = 0; i < PLACES; i++) {
         epsmesh_query *query = &queries[kind][i];
-        double x = 0.8 * model.reach[0] * ((double)i / (PLACES / 2) - 1), force;
+        double x = 0.8 * model.reach[0] * ((double)i / (PLACES / 2) - 1);
         *query = epsmesh_ask(&model);
-        query->shape = (epsmesh_shape)(kind == PATCH ? EPSMESH_DISC : kind), query->angle = 1.2;
+        query->shape = (epsmesh_shape)(kind >= PATCH ? EPSMESH_DISC : kind), query->angle = 1.2;
         query->radius = size, query->length = 2 * size, query->width = 0.4 * size;
         on_face(x, query->at);
         query->depth = 0.04 * size;
+    }
+    for (i = 0; i < PLACES; i++) {
         force = ask(kind, i);
         if (!(force == force)) return 0;
     }
@@ -127,7 +137,7 @@ int main(int count, char **words) {
     }
     ticks -= ticks % known;
     if (ticks) {
-        long late[KINDS] = {0, 0, 0, 0, 0, 0, 0}, each = ticks / known;
+        long late[KINDS] = {0, 0, 0, 0, 0, 0, 0, 0}, each = ticks / known;
         sum += paced(kinds, known, ticks, took, late);
         printf("at 1 kHz, %ld ticks of each in turn\n", each);
         for (kind = 0; kind < known; kind++) {

@@ -1,0 +1,136 @@
+"""Two discs at once: real-time models against quadratic elements that know both, and whether the bars hold.
+
+    python -m benchmarks.two_tools [--pairs 6] [--models box,cylinder,layers] [--finer 0.8]
+
+A model that is missing is exported first, into results/two_tools/. Pairs are random: places of the region, radii of
+0.04 to 0.25 of the room there, and depths, at both ends of the range of Poisson's ratio on one mesh. What a force on
+one disc sinks the other is taken from the elements (``benchmarks.two_discs``): the mesh at the edges, by which a disc's
+own force is off most, changes it least. With the model's own compliances it tells what both should feel.
+"""
+
+import argparse
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import hypot
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+
+from benchmarks.realtime import STUDIES
+from benchmarks.two_discs import Disc, forces, meshed
+from pipeline.export.checks import random_place
+from pipeline.export.export import export, write
+from pipeline.export.scope import Scope, scope_of
+from pipeline.realtime import Model, load
+from pipeline.realtime.several import NEAR
+from pipeline.shapes.body import Layered
+from pipeline.study.load import load as load_study
+
+_FOLDER = Path("results/two_tools")
+_ACCURACY, _CHECKS, _SIZES, _DEPTHS, _SEED = 0.01, 6, (0.04, 0.25), (5e-5, 2e-4), 77
+# Middles are up to so many times both radii apart: beyond, there is little to see.
+_APART = 8.0
+
+
+@dataclass(frozen=True)
+class Felt:
+    """Of one disc of a pair: the way between both, in units of both radii, and the share of its force that it loses.
+
+    ``error`` is that of the model's force, relative, and ``bar`` its bar.
+    """
+
+    apart: float
+    lost: float
+    error: float
+    bar: float
+
+
+def main() -> None:
+    """Solve, and print a table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--pairs", type=int, default=6, help="of each model")
+    parser.add_argument("--models", default="box,cylinder,layers", help="some of them, by name")
+    parser.add_argument("--finer", type=float, default=0.8, help="elements are smaller by this factor")
+    asked = parser.parse_args()
+    print("| body | ν | forces | apart, in both radii | of the other | error: median, largest | held | bar: median |")
+    print("|" + 8 * "---|")
+    for name in asked.models.split(","):
+        for line in _lines(name, asked.pairs, asked.finer):
+            print(line, flush=True)
+
+
+def _lines(name: str, pairs: int, finer: float) -> Iterator[str]:
+    model, scope = _model(name)
+    rng, found = np.random.default_rng(_SEED), defaultdict(list)
+    for _ in range(pairs):
+        for poisson, felt in _solved(model, scope, _pair(model, rng), rng.uniform(*_DEPTHS, 2).tolist(), finer):
+            found[poisson].extend(felt)
+    for poisson, felt in found.items():
+        errors, lost, apart = ([abs(getattr(each, key)) for each in felt] for key in ("error", "lost", "apart"))
+        held = sum(abs(each.error) <= each.bar for each in felt)
+        yield (
+            f"| {name} | {poisson:g} | {len(felt)} | {min(apart):.1f} to {max(apart):.1f} | {100 * min(lost):.1f} to "
+            f"{100 * max(lost):.1f} % | {100 * median(errors):.2g} %, {100 * max(errors):.2g} % | {held} | "
+            f"{100 * median(each.bar for each in felt):.2g} % |"
+        )
+
+
+def _model(name: str) -> tuple[Model, Scope]:
+    study, path = _FOLDER / f"{name}.toml", _FOLDER / f"{name}.epsm.nc"
+    _FOLDER.mkdir(parents=True, exist_ok=True)
+    study.write_text(STUDIES[name])
+    scope = scope_of(load_study(study))
+    if not path.exists():
+        write(export(scope, _ACCURACY, _CHECKS), path, scope, study, "benchmark")
+    return load(path), scope
+
+
+def _pair(model: Model, rng: np.random.Generator) -> list[Disc]:
+    """Return two discs that a model answers for, not too far from each other."""
+    while True:
+        discs = []
+        for _ in range(2):
+            x, y = random_place(model, rng)
+            discs.append((x, y, model.room(x, y) * float(np.exp(rng.uniform(*np.log(_SIZES))))))
+        (x, y, a), (to_x, to_y, b) = discs
+        if NEAR < hypot(x - to_x, y - to_y) / (a + b) < _APART:
+            return discs
+
+
+def _solved(
+    model: Model, scope: Scope, discs: list[Disc], depths: list[float], finer: float
+) -> Iterator[tuple[float, list[Felt]]]:
+    """Yield what both feel, for each Poisson's ratio."""
+    body = scope.body
+    assert isinstance(body, Layered)
+    height = body.heights[1] - body.heights[0]
+    size = (body.half_sides[0], height) if body.is_round else (2 * body.half_sides[0], 2 * body.half_sides[1], height)
+    ends = np.cumsum([layer.thickness for layer in body.layers[:-1]]).tolist()
+    layers = [
+        (layer.young / scope.young, layer.poisson, end)
+        for layer, end in zip(body.layers, [*ends, height], strict=False)
+    ]
+    mesh = meshed(size, discs, finer, ends)
+    (x, y, a), (to_x, to_y, b) = discs
+    for poisson in sorted({*model.table.poisson}):
+        alone, both = forces(mesh, poisson, depths, layers)
+        felt = (depths[0] - depths[0] * both[0] / alone[0]) / both[1]
+        asked = [
+            {"tool": "disc", "radius": r, "at": model.origin + np.array([x, y, 0.0]) @ model.axes, "depth": depth}
+            for (x, y, r), depth in zip(discs, depths, strict=True)
+        ]
+        own = [model.query(**tool, young=1.0, poisson=poisson) for tool in asked]
+        told = model.query_all(asked, young=1.0, poisson=poisson)
+        soft = [depth / float(touch.force[2]) for depth, touch in zip(depths, own, strict=True)]
+        truth = np.linalg.solve([[soft[0], felt], [felt, soft[1]]], depths)
+        yield poisson, [
+            Felt(hypot(x - to_x, y - to_y) / (a + b), 1 - force / float(single.force[2]),
+                 float(touch.force[2]) / force - 1, touch.force_error)
+            for force, single, touch in zip(truth.tolist(), own, told, strict=True)
+        ]  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()
