@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
@@ -19,6 +20,16 @@ _ON_INCLUSION = 0.4
 _IN_LAYER = 0.5
 # Points on an inclusion of which the one nearest to anything else is taken for the nearest of all.
 _POINTS = 2000
+
+
+# Elements along the probe's edge may be this much longer than those that a thin layer below it asks for: at 10 times,
+# some are flat, and F errs by more than its bar.
+_LONGER = 4
+
+
+def longest_at_rim(body: Body) -> float:
+    """Return the length (m) that elements along the probe's edge may have above a thin layer; infinite without one."""
+    return _LONGER * _IN_LAYER * (body.heights[1] - body.interfaces[0]) if body.interfaces else inf
 
 
 def region_sizes(scene: Scene, growth: float) -> Iterator[str]:

@@ -21,6 +21,9 @@ PHYSICS_VERSION = 5
 
 # Where an accuracy is asked for, records are not used whose bars were made without N, or of plates as of other bodies.
 _BARS_ANEW = "bars of N"
+# Above a layer that is thinner than this share of the elements along the probe's edge, those were too long: records of
+# then are not used.
+_THIN, _RIM_ANEW = 0.5, "a rim that follows the layer"
 
 _MANY = 200_000  # sections of a large study
 # Keys that came later, with the value that stands for what was before: records of then stay valid.
@@ -60,6 +63,8 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
         parts.append(_load_text(case.load, case.densities))
     if case.mesh.accuracy is not None and _has_bars_anew(case):
         parts.append(_BARS_ANEW)
+    if _has_thin_layer(case):
+        parts.append(_RIM_ANEW)
     if case.solve.timing:
         parts += [str(case.labels), str(case.solve.repeats)]
     return digest("\n".join(parts))
@@ -74,14 +79,26 @@ def reference_key(case: Case, accuracy: float) -> str:
         text_of(case.material, ("density", *case.material.PROPORTIONAL_TO)),
         text_of(probe, probe.proportional_to), ratios,
     ]  # fmt: skip
-    if _has_bars_anew(replace(case, mesh=Mesh.model_construct({"accuracy"}, accuracy=accuracy))) and not is_round(case):
+    exact = replace(case, mesh=Mesh.model_construct({"accuracy"}, accuracy=accuracy))
+    if _has_bars_anew(exact) and not is_round(case):
         parts.append(_BARS_ANEW)
+    if _has_thin_layer(exact) and not is_round(case):
+        parts.append(_RIM_ANEW)
     return digest("\n".join(parts))
 
 
 def _has_bars_anew(case: Case) -> bool:
     """Tell whether bars of an accuracy on record may be too small: of mixed elements in thin bodies, and of plates."""
     return not case.probe.is_unilateral and (case.element == "mixed" or case.is_plate) and case.is_even
+
+
+def _has_thin_layer(case: Case) -> bool:
+    """Tell whether elements along the probe's edge are, or may come to be, long beside a layer below it."""
+    if not case.body.interfaces:
+        return False
+    half_width = case.probe.half_width
+    longest = half_width if case.mesh.accuracy is not None else case.mesh.rim_size(half_width)
+    return case.body.heights[1] - case.body.interfaces[0] < _THIN * longest
 
 
 def mesh_key(case: Case) -> str:

@@ -17,6 +17,7 @@ from pipeline.solve.material import MaterialLaw, SplitLaw
 from pipeline.solve.mixed import MixedProblem
 from pipeline.solve.solution import Solution
 from pipeline.solve.spaces import Spaces
+from tests.cases import solve as solve_study
 from tests.cases import study
 
 SKIN = {"name": "skin", "thickness": "3 mm", "young": "60 kPa", "poisson": 0.3}
@@ -146,3 +147,19 @@ def test_ranks_agree(kind, degree, method):
 def test_law_of_a_case_numbers_materials_like_meshes():
     case = study(body=BODY).case(())
     assert law_of(case) == moduli((10e3, 0.3), (60e3, 0.3), (50e3, 0.45))
+
+
+def test_a_thin_layer_of_the_same_material_changes_nothing_but_the_mesh():
+    """Elements along the probe's edge follow it: their long ones made flat ones, with strains of any size in them."""
+    skin = {"name": "skin", "thickness": "0.15 mm", "young": "10 kPa", "poisson": 0.3}
+    body = {"shape": "box", "size": ["20 mm", "20 mm", "10 mm"], "fixed": "bottom"}
+    probe, mesh = {"radius": "2 mm", "depth": "0.1 mm"}, {"fine": "3 mm", "coarse": "5 mm", "growth": 0.5}
+    ((layered,), (plain,)) = (
+        solve_study(body=body | more, probe=probe, mesh=mesh | {"rim": rim}).values()
+        for more, rim in (({"layers": [skin]}, "1 mm"), ({}, "0.1 mm"))
+    )
+    assert layered.status == plain.status == "ok"
+    error = abs(layered.force / plain.force - 1)
+    assert error < layered.force_error + plain.force_error
+    assert error < 0.01
+    assert layered.max_strain < 0.1
