@@ -45,7 +45,7 @@ def new(
     Example: epsmesh new mine --like figure3
     """
     path = Path(name) if name.endswith(".toml") else _FOLDER / f"{name}.toml"
-    if not is_name(path.stem):
+    if not is_name(path.name.removesuffix(".toml")):  # of "...toml" the stem is all of it since Python 3.14
         fail(_of_name(name, "must be letters, digits, - and _: results are called after it"))
     if not name.endswith(".toml") and Path(name).name != name:
         fail(_of_name(name, f"a name has no folders: it stands for {_FOLDER}/NAME.toml; a path ends in .toml"))

@@ -17,6 +17,8 @@ from pipeline.arrays import Int32Array
 
 # The mark of integrals over all cells.
 EVERYWHERE = -1
+# Of the messages that find out who has which ghosts.
+_TAG = 1701
 
 Code = tuple[Any, Any, Any]  # what was compiled, its module, its text
 _SCALAR = np.dtype(PETSc.ScalarType)
@@ -60,7 +62,8 @@ def renumbered_space(space: Any, dofs: np.ndarray, owned: int, ghosts: np.ndarra
     This rank owns the first ``owned``; ``ghosts`` are the global numbers of the others, which ``owners`` own.
     """
     mesh = space.mesh
-    index_map = cpp.common.IndexMap(mesh.comm, owned, ghosts.astype(np.int64), owners.astype(np.int32))
+    tag = (_TAG,) if "tag" in str(cpp.common.IndexMap.__init__.__doc__) else ()  # since 0.11
+    index_map = cpp.common.IndexMap(mesh.comm, owned, ghosts.astype(np.int64), owners.astype(np.int32), *tag)
     offsets = np.arange(0, dofs.size + 1, dofs.shape[1], dtype=np.int32)
     rows = cpp.graph.AdjacencyList_int32(np.ascontiguousarray(dofs.reshape(-1), dtype=np.int32), offsets)
     dofmap = cpp.fem.DofMap(space.dofmap.dof_layout, index_map, 1, rows, 1)
@@ -92,7 +95,9 @@ def _form_of_addresses(expression: Any, mesh: Any, tags: Any, code: Code, kernel
         marked = {fem.IntegralType.cell: (list(chosen.items()), tags)}
         return _wrapped(code, spaces, marked, coefficients, constants, False, mesh)
     used = np.arange(len(coefficients), dtype=np.int8)
-    parts = [(mark, kernel, _cells(mesh, tags, mark), used) for mark, kernel in chosen.items()]
+    # Since 0.10 integrals are numbered one after the other, whatever their marks.
+    numbers = range(len(chosen)) if _has_entity_maps() else chosen
+    parts = [(n, kernel, _cells(mesh, tags, m), used) for n, (m, kernel) in zip(numbers, chosen.items(), strict=True)]
     integrals = {fem.IntegralType.cell: parts}
     return _wrapped(code, spaces, integrals, coefficients, constants, False, _entity_maps(), mesh)
 
@@ -148,7 +153,11 @@ def _constants(expression: Any) -> list[Any]:
 
 def _entity_maps() -> Any:
     """Return no maps between meshes: since 0.10 those are in a list."""
-    return [] if hasattr(cpp.mesh, "EntityMap") else {}
+    return [] if _has_entity_maps() else {}
+
+
+def _has_entity_maps() -> bool:
+    return hasattr(cpp.mesh, "EntityMap")
 
 
 def _address(module: Any, compiled: Any) -> Any:

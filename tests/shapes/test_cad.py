@@ -76,8 +76,8 @@ def test_the_solid_has_the_mesh_of_the_shape_that_it_is(drawn: Path, name: str, 
     assert {name: len(facets) for name, facets in first.facets.items()} == {
         name: len(facets) for name, facets in second.facets.items()
     }
-    # gmsh 4.13 makes a few cells more of one of two boxes that are alike.
-    assert len(first.cells) == pytest.approx(len(second.cells), rel=5e-3)
+    # gmsh 4.13 and 4.15 make a few cells more of one of two boxes that are alike: 0.8 %.
+    assert len(first.cells) == pytest.approx(len(second.cells), rel=1e-2)
     places = [np.quantile(np.linalg.norm(mesh.points, axis=1), np.linspace(0, 1, 41)) for mesh in (first, second)]
     assert np.abs(places[0] - places[1]).max() < max(close, 5e-3) * native.extent
 
