@@ -22,9 +22,9 @@ _IN_LAYER = 0.5
 _POINTS = 2000
 
 
-# Elements along the probe's edge may be this much longer than those that a thin layer below it asks for: at 10 times,
-# some are flat, and F errs by more than its bar.
-_LONGER = 4
+# Elements along the probe's edge may be this much longer than those that a thin layer below it asks for: at 4 times
+# some meshes have flat ones, at 10 most, and F errs by more than its bar.
+_LONGER = 2
 
 
 def longest_at_rim(body: Body) -> float:

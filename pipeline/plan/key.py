@@ -23,7 +23,7 @@ PHYSICS_VERSION = 5
 _BARS_ANEW = "bars of N"
 # Above a layer that is thinner than this share of the elements along the probe's edge, those were too long: records of
 # then are not used.
-_THIN, _RIM_ANEW = 0.5, "a rim that follows the layer"
+_THIN, _RIM_ANEW = 1.0, "a rim that follows the layer"
 
 _MANY = 200_000  # sections of a large study
 # Keys that came later, with the value that stands for what was before: records of then stay valid.

@@ -149,11 +149,13 @@ def test_law_of_a_case_numbers_materials_like_meshes():
     assert law_of(case) == moduli((10e3, 0.3), (60e3, 0.3), (50e3, 0.45))
 
 
-def test_a_thin_layer_of_the_same_material_changes_nothing_but_the_mesh():
+@pytest.mark.parametrize("at", [["0 mm", "0 mm"], ["1 mm", "0.5 mm"]])
+def test_a_thin_layer_of_the_same_material_changes_nothing_but_the_mesh(at):
     """Elements along the probe's edge follow it: their long ones made flat ones, with strains of any size in them."""
     skin = {"name": "skin", "thickness": "0.15 mm", "young": "10 kPa", "poisson": 0.3}
     body = {"shape": "box", "size": ["20 mm", "20 mm", "10 mm"], "fixed": "bottom"}
-    probe, mesh = {"radius": "2 mm", "depth": "0.1 mm"}, {"fine": "3 mm", "coarse": "5 mm", "growth": 0.5}
+    probe = {"radius": "2 mm", "depth": "0.1 mm", "at": at}
+    mesh = {"fine": "3 mm", "coarse": "5 mm", "growth": 0.5}
     ((layered,), (plain,)) = (
         solve_study(body=body | more, probe=probe, mesh=mesh | {"rim": rim}).values()
         for more, rim in (({"layers": [skin]}, "1 mm"), ({}, "0.1 mm"))
