@@ -9,6 +9,7 @@ import gmsh
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy.sparse import csr_array
 
 from pipeline.compat import gmsh_session
 
@@ -16,7 +17,7 @@ Array = NDArray[np.float64]
 Disc = tuple[float, float, float]
 
 # Elements at the edge of a disc and within it, in units of its radius; how they grow away from it, and the largest, in
-# units of the height.
+# units of the height, or of the first layer's thickness.
 _EDGE, _GROWTH, _COARSE = 0.09, 0.35, 0.25
 
 
@@ -51,7 +52,9 @@ def meshed(size: Sequence[float], discs: Sequence[Disc], finer: float = 1.0, end
             way = f"Sqrt({edge}^2+z^2)"
             mesh.field.setString(fields[-1], "F", f"{_EDGE * r / finer!r}+{_GROWTH / finer!r}*{way}")
         fields.append(mesh.field.add("MathEval"))
-        mesh.field.setString(fields[-1], "F", f"{_COARSE * size[-1] / finer!r}")
+        # As coarse below the first layer as the height allows, within it as its thickness does.
+        below = f"(Abs(z+{depths[1]!r})-(z+{depths[1]!r}))/2"
+        mesh.field.setString(fields[-1], "F", f"{_COARSE * depths[1] / finer!r}+{_GROWTH / finer!r}*{below}")
         least = mesh.field.add("Min")
         mesh.field.setNumbers(least, "FieldsList", fields)
         mesh.field.setAsBackgroundMesh(least)
@@ -144,8 +147,9 @@ def _assembled(mesh: Mesh, layers: Sequence[tuple[float, float, float]]) -> "PET
             blocks[:, :, axis, :, axis] += dot
     dofs = (3 * mesh.cells[:, :, None] + np.arange(3)).reshape(count, 30).astype(np.int32)
     size = 3 * len(mesh.points)
-    matrix = PETSc.Mat().createAIJ([size, size], nnz=300, comm=PETSc.COMM_SELF)
-    matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, False)
+    of_node = csr_array((np.ones(mesh.cells.size), mesh.cells.ravel(), np.arange(0, mesh.cells.size + 1, 10)))
+    columns = np.diff((of_node.T @ of_node).indptr)
+    matrix = PETSc.Mat().createAIJ([size, size], nnz=np.repeat(3 * columns, 3).astype(np.int32), comm=PETSc.COMM_SELF)
     for row, block in zip(dofs, blocks.reshape(count, 30, 30), strict=True):
         matrix.setValues(row, row, block, addv=True)
     matrix.assemble()

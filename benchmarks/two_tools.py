@@ -54,7 +54,7 @@ def main() -> None:
     parser.add_argument("--models", default="box,cylinder,layers", help="some of them, by name")
     parser.add_argument("--finer", type=float, default=0.8, help="elements are smaller by this factor")
     asked = parser.parse_args()
-    print("| body | ν | forces | apart, in both radii | of the other | error: median, largest | held | bar: median |")
+    print("| body | ν | forces | apart, in both radii | lost | error: median, largest | held | bar: median |")
     print("|" + 8 * "---|")
     for name in asked.models.split(","):
         for line in _lines(name, asked.pairs, asked.finer):

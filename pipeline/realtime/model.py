@@ -278,11 +278,17 @@ class Model:
         """The axes, as numbers."""
         return [[float(part) for part in row] for row in self.axes]
 
+    @cached_property
+    def _start(self) -> list[float]:
+        """The origin, as numbers."""
+        return [float(part) for part in self.origin]
+
     def _local(self, at: Sequence[float]) -> tuple[float, float, float]:
         place = np.asarray(at, dtype=float)
         if place.shape != (3,):
             return nan, nan, nan
-        x, y, z = (place - self.origin).tolist()
+        (x, y, z), (from_x, from_y, from_z) = place.tolist(), self._start
+        x, y, z = x - from_x, y - from_y, z - from_z
         (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = self._frame
         return xx * x + xy * y + xz * z, yx * x + yy * y + yz * z, zx * x + zy * y + zz * z
 
