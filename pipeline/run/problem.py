@@ -33,7 +33,7 @@ from pipeline.solve.straight.product import compiles
 from pipeline.study.sweep import Case
 
 # Unknowns up to which a direct solve is a way out where iterations do not converge.
-_MOST_DIRECT = 60_000
+_MOST_DIRECT = 100_000
 # What is virtually moved round a slit's front is this near to it, in units of the distance to anything else.
 _CLEAR = 0.7
 
