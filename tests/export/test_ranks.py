@@ -77,7 +77,8 @@ def test_ranks_make_the_model_that_one_makes(monkeypatch):
     assert np.abs(numbers - known).max() <= 1e-4 * np.abs(known).max()
     place = (0.3 * found.model.table.reach[0], 0.0, 0.4)
     far, known = found.surface.far(*place), alone.surface.far(*place)
-    assert np.abs(far - known).max() <= 1e-4 * np.abs(known).max()
+    # Modes are left out up to a share of the largest value: rounding may decide on one of them.
+    assert np.abs(far - known).max() <= 0.03 * np.abs(known).max()
 
 
 @several
