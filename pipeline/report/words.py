@@ -26,7 +26,7 @@ def choice(coordinate: xr.DataArray, value: Any) -> str:
     """Write a choice along a dimension: ``ν = 0.45``, ``ε = full``, ``outside free``, or a table's own name."""
     if isinstance(value, str):
         return value if coordinate.name in ("probe", "body") else f"{symbol(coordinate)} {points(value)}"
-    return f"{symbol(coordinate)} = {number(coordinate, value)}"
+    return f"{symbol(coordinate)} = {re.sub(r'^-', '−', number(coordinate, value))}"
 
 
 def choices(dataset: xr.Dataset, selection: dict[str, Any]) -> str:
@@ -62,6 +62,12 @@ def formula(name: str) -> str:
     """Return the symbol of a variable as a formula, with its indices set low."""
     low = re.sub(r"_(\w+)", r"_{\1}", quantities.symbol(name))
     return f"${low}$"
+
+
+def at_most(error: xr.DataArray) -> str:
+    """Write the largest of relative errors, `` (at most 0.08 %)``; '' where none is known."""
+    largest = float(error.max())
+    return f" (at most {100 * largest:.2g} %)" if np.isfinite(largest) else ""
 
 
 def is_numeric(array: xr.DataArray) -> bool:

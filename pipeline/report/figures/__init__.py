@@ -19,6 +19,8 @@ from pipeline.report.figures.linear import linear
 from pipeline.report.figures.loads import loads
 from pipeline.report.figures.map import force_map
 from pipeline.report.figures.style import STYLE, save
+from pipeline.report.figures.text import shortened
+from pipeline.report.words import is_numeric
 
 __all__ = ["FIGURES", "KINDS", "STYLE", "choose", "draw", "figure", "lacks", "save"]
 
@@ -49,12 +51,20 @@ def draw(
 def figure(dataset: xr.Dataset, kind: str, *, titled: bool = True) -> Figure:
     """Draw the figure of one ``kind``, with the study's title or without."""
     title = _plain(str(dataset.attrs.get("title", ""))) if titled else ""
-    named = {dim: values for dim, values in dataset.indexes.items() if any("$" in str(value) for value in values)}
-    if named:
-        plain = {dim: (dim, [_plain(str(v)) for v in values], dataset[dim].attrs) for dim, values in named.items()}
-        dataset = dataset.assign_coords(plain)
+    dataset = _with_short_names(dataset)
     with mpl.rc_context(STYLE):
         return FIGURES[kind](dataset, title, _missing(dataset))
+
+
+def _with_short_names(dataset: xr.Dataset) -> xr.Dataset:
+    """Return ``dataset`` with names that fit a figure, and that are no formulas."""
+    plain = {}
+    for dim, values in dataset.indexes.items():
+        names = [str(value) for value in values]
+        shown = [_plain(name) for name in shortened(names)]
+        if not is_numeric(dataset[dim]) and shown != names:
+            plain[dim] = (dim, shown, dataset[dim].attrs)
+    return dataset.assign_coords(plain) if plain else dataset
 
 
 def _plain(text: str) -> str:

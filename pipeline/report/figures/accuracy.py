@@ -6,20 +6,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.report.figures.axis import bounds, log_axis
-from pipeline.report.figures.convergence import mark_floor, notes
+from pipeline.report.figures.convergence import mark_floor, notes, shown_of
 from pipeline.report.figures.dimensions import mesh_dimensions, with_error
-from pipeline.report.figures.layout import Selection, arrange
-from pipeline.report.figures.panels import BARS, grid, panels
-from pipeline.report.figures.style import PAPER, finish, look
+from pipeline.report.figures.layout import Layout, Selection, arrange
+from pipeline.report.figures.names import Places
+from pipeline.report.figures.panels import BARS, Panel, grid, panels
+from pipeline.report.figures.style import finish, look
+from pipeline.report.figures.text import width_of
 from pipeline.report.pareto import front
 from pipeline.report.times import spreads, warned
 from pipeline.report.words import choices, heading, number, symbol
 
 _MOST_NAMED = 6
-# Share of a panel's height that two names keep apart.
-_APART = 0.06
-# Inches that a letter of a name takes.
-_LETTER = 0.05
+_HEIGHT, _BESIDE = 2.7, 0.85  # inches: of a row, and of what is above and below its axes
+_SIZE, _LINE = 6.5, 0.1  # of a name: points, and inches from line to line
 
 
 def accuracy(dataset: xr.Dataset, title: str, warning: str) -> Figure:
@@ -29,47 +29,78 @@ def accuracy(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     data["spread"] = xr.ones_like(data["error"]) if factor is None else factor
     meshes = mesh_dimensions(data)
     layout = arrange(data, ("error",), None, flat=meshes)
-    figure = grid(layout, ("error",), height=2.7, share="y")
+    figure = grid(layout, ("error",), height=_HEIGHT, share="y")
+    times = bounds(shown_of(data["time_total"], layout), 2.0)
+    errors = bounds(100 * shown_of(data["error"], layout), 1.6)
     for panel in panels(figure, data, layout, ("error",)):
-        limits = bounds(panel.data["time_total"].values, 1.4)
-        log_axis(panel.ax, *limits, which="x")
-        # Names are written left of the points: the first ones need room.
-        share = min(_LETTER * _longest(panel.data, meshes) / panel.width, 0.5)
-        panel.ax.set_xlim(limits[0] / (limits[1] / limits[0]) ** (share / (1 - share)), limits[1])
+        log_axis(panel.ax, *times, which="x")
         for position, curve in enumerate(layout.curves):
-            named = position == len(layout.curves) - 1
-            _draw_scene(panel.ax, panel.data.sel(curve), position, choices(data, curve), meshes if named else [])
+            _draw_scene(panel.ax, panel.data.sel(curve), position, choices(data, curve))
+        _name_meshes(panel, layout, meshes, times, errors)
         panel.ax.set_title(panel.title)
         mark_floor(panel.ax, panel.data)
         if panel.is_last:
             panel.ax.set_xlabel(heading(dataset["time_total"]))
         if panel.is_first:
             panel.ax.set_ylabel(f"$|F/F_{{{reference}}}-1|$ (%)")
-    log_axis(figure.axes[0], *bounds(100 * data["error"].values, 1.6))
+    log_axis(figure.axes[0], *errors)
     what = "lines: cases that no other beats in both, without errors that a finer mesh has 1.5 times as large"
-    labels = f"their {', '.join(symbol(data[name]) for name in meshes)} at the points"
+    whose = f"those of {choices(data, layout.curves[-1])}" if len(layout.curves) > 1 else "they"
+    named = f"{whose} have {', '.join(symbol(data[name]) for name in meshes)} beside them where there is room"
     bars = "" if factor is None else "bars: how far repeats are apart"
-    finish(figure, title, notes(reference, f"{what}, {labels}", bars, layout.note), warned(warning, dataset))
+    finish(figure, title, notes(reference, data, what, named, bars, layout.note), warned(warning, dataset))
     return figure
 
 
-def _draw_scene(ax: Axes, scene: xr.Dataset, position: int, label: str, named: list[str]) -> None:
-    """Draw the cases of one scene, those on its front strong, and name the meshes of the front."""
-    flat = scene.stack(case=list(scene["error"].dims)) if scene["error"].dims else scene.expand_dims("case")
-    seconds, error = flat["time_total"].values, 100 * flat["error"].values
-    best = front(seconds, np.where(flat["is_by_chance"].values, np.nan, error))
+def _draw_scene(ax: Axes, scene: xr.Dataset, position: int, label: str) -> None:
+    """Draw the cases of one scene, those on its front strong."""
+    seconds, error, best = _front(scene)
+    factor = _flat(scene)["spread"].values[best]
     style = look(position)
     ax.plot(seconds, error, **style, linestyle="none", alpha=0.35, markeredgewidth=0)
     ax.plot(seconds[best], error[best], **style, label=label or None, drawstyle="steps-post")
-    factor = flat["spread"].values[best]
     bars = seconds[best] * np.stack([1 - 1 / factor, factor - 1])
     if bars.any():
         ax.errorbar(seconds[best], error[best], xerr=bars, fmt="none", ecolor=style["color"], **BARS)
-    for i in _some(best, error):
-        words = _name_of({name: flat[name].values[i] for name in named}, scene)
-        place = {"xytext": (-4, -3), "textcoords": "offset points", "ha": "right", "va": "top"}
-        ground = {"facecolor": PAPER, "alpha": 0.75, "linewidth": 0, "pad": 0.6}
-        ax.annotate(words, (seconds[i], error[i]), fontsize=6.5, color=style["color"], bbox=ground, **place)
+
+
+def _name_meshes(
+    panel: Panel, layout: Layout, meshes: list[str], times: tuple[float, float], errors: tuple[float, float]
+) -> None:
+    """Name meshes on the front of the last scene, first and last before the others, where nothing is covered."""
+    size = (panel.width, _HEIGHT - _BESIDE)
+    room = Places(*size)
+
+    def inches(values: np.ndarray, limits: tuple[float, float], length: float) -> np.ndarray:
+        low, high = np.log(limits)
+        known = np.where(values > 0, values, np.nan)
+        return np.asarray((np.log(known) - low) / (high - low) * length)
+
+    for curve in layout.curves:
+        seconds, error, best = _front(panel.data.sel(curve))
+        x, y = inches(seconds, times, size[0]), inches(error, errors, size[1])
+        room.take_points(x, y)
+        room.take_steps(x[best], y[best])
+    scene = panel.data.sel(layout.curves[-1])
+    flat, colour, count = _flat(scene), look(len(layout.curves) - 1)["color"], 0
+    for i in (*best[:1], *best[:0:-1]):
+        words = _name_of({name: flat[name].values[i] for name in meshes}, scene)
+        place = room.find(x[i], y[i], width_of(words, _SIZE), _LINE) if np.isfinite(x[i] + y[i]) else None
+        if place and count < _MOST_NAMED:
+            count += 1
+            corner = {"xytext": (place[0] / size[0], place[1] / size[1]), "textcoords": "axes fraction"}
+            panel.ax.annotate(words, (seconds[i], error[i]), fontsize=_SIZE, color=colour, **corner)
+
+
+def _front(scene: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return seconds and errors (%) of the cases of a scene, and which of them no other beats in both."""
+    flat = _flat(scene)
+    seconds, error = flat["time_total"].values, 100 * flat["error"].values
+    return seconds, error, np.asarray(front(seconds, np.where(flat["is_by_chance"].values, np.nan, error)))
+
+
+def _flat(scene: xr.Dataset) -> xr.Dataset:
+    return scene.stack(case=list(scene["error"].dims)) if scene["error"].dims else scene.expand_dims("case")
 
 
 def _name_of(mesh: Selection, scene: xr.Dataset) -> str:
@@ -77,19 +108,3 @@ def _name_of(mesh: Selection, scene: xr.Dataset) -> str:
     if mesh.get("epsilon") == np.inf:
         mesh.pop("outside", None)
     return ", ".join(number(scene[name], value) for name, value in mesh.items())
-
-
-def _longest(data: xr.Dataset, meshes: list[str]) -> int:
-    """Return how many letters the longest name of a mesh has."""
-    return sum(2 + max(len(number(data[name], value)) for value in data[name].values) for name in meshes)
-
-
-def _some(best: np.ndarray, error: np.ndarray) -> list[int]:
-    """Return the cases of a front whose names do not cover one another, first and last before the others."""
-    height = np.log10(np.where(error > 0, error, np.nan))
-    span = float(np.nanmax(height) - np.nanmin(height)) if np.isfinite(height).any() else 0.0
-    chosen: list[int] = []
-    for i in (*best[:1], *best[:0:-1]):
-        if all(abs(height[i] - height[j]) > _APART * span for j in chosen):
-            chosen.append(int(i))
-    return chosen[:_MOST_NAMED]

@@ -1,14 +1,17 @@
 """The axes of a figure: where values stand, which of them are written out."""
 
-import textwrap
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
+from pipeline.report.figures.text import fits, shortened, width_of, wrapped
 from pipeline.report.words import heading, is_numeric, number, points, scale
 
+_SIZE = 8.0  # points: what is written at an axis
+_GAP = 0.06  # inches between two texts
+_WORD_LINES, _SLANTED = 3, 24  # of words: lines; letters where they are slanted
 # Values that span more than this are shown on a logarithmic axis.
 _LONG = 30.0
 
@@ -29,11 +32,14 @@ class Horizontal:
         span = float(np.ptp(x)) or 1.0
         if self.is_log:
             ax.set_xscale("log")
-        chosen = self._chosen(x, span, width)
+        texts = self.texts if self.joins else self._in_lines(width)
+        chosen = self._chosen(x, span, width, texts)
         slanted = not chosen
         chosen = chosen or list(range(len(x)))
         ticks = [float(self.positions[i]) for i in chosen]
-        labels = [self.texts[i] for i in chosen] if last else [""] * len(chosen)
+        if slanted:
+            texts = tuple(shortened(texts, _SLANTED))
+        labels = [texts[i] for i in chosen] if last else [""] * len(chosen)
         turned = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"} if slanted and last else {}
         ax.set_xticks(ticks, labels, **turned)
         ax.set_xticks([x for i, x in enumerate(self.positions) if i not in chosen], [], minor=True)
@@ -41,19 +47,27 @@ class Horizontal:
         low, high = x.min() - margin, x.max() + margin
         ax.set_xlim(*((10**low, 10**high) if self.is_log else (low, high)))
         if last:
-            ax.set_xlabel(textwrap.fill(self.heading, max(14, int(15 * width))))
+            ax.set_xlabel(wrapped(self.heading, width + 0.3, _SIZE))
 
     def _even(self, x: np.ndarray) -> np.ndarray:
         return np.log10(x) if self.is_log else x
 
-    def _chosen(self, x: np.ndarray, span: float, width: float) -> list[int]:
+    def _in_lines(self, width: float) -> tuple[str, ...]:
+        """Return words in lines, where that makes room for all of them side by side."""
+        room = width / len(self.texts) - _GAP
+        lines = tuple(wrapped(text, room, _SIZE) for text in self.texts)
+        is_good = all(fits(text, room, _SIZE) for text in self.texts)
+        return lines if is_good and all(text.count("\n") < _WORD_LINES for text in lines) else self.texts
+
+    def _chosen(self, x: np.ndarray, span: float, width: float, texts: tuple[str, ...]) -> list[int]:
         """Return which values are written, the largest first; none if they are words that do not all fit."""
+        reach = 1.1 * span if self.joins else span + 1.0
         chosen: list[int] = []
         for i in np.argsort(-x, kind="stable"):
-            room = 0.08 + 0.035 * (len(self.texts[i]) + len(self.texts[chosen[-1]])) if chosen else 0.0
-            if not chosen or (x[chosen[-1]] - x[i]) / span * 0.9 * width > room:
+            room = _GAP + (_widest(texts[i]) + _widest(texts[chosen[-1]])) / 2 if chosen else 0.0
+            if not chosen or (x[chosen[-1]] - x[i]) / reach * width > room:
                 chosen.append(int(i))
-        return chosen if self.joins or len(chosen) == len(self.texts) else []
+        return chosen if self.joins or len(chosen) == len(texts) else []
 
 
 def horizontal(coordinate: xr.DataArray) -> Horizontal:
@@ -76,14 +90,15 @@ def horizontal(coordinate: xr.DataArray) -> Horizontal:
     else:
         past = finite.max() + 0.2 * max(np.ptp(finite), finite.max() / 3)
     positions = np.where(np.isfinite(values), values * factor, past)
-    texts = tuple(number(coordinate, value).removesuffix(f" {unit}") for value in values)
+    texts = tuple(number(coordinate, value).removesuffix(f" {unit}").replace("-", "−") for value in values)
     return Horizontal(positions, texts, heading(coordinate), is_log)
 
 
 def log_axis(ax: Axes, low: float, high: float, which: str = "y") -> None:
     """Make an axis logarithmic from ``low`` to ``high``, with round numbers written out."""
     ticks = _round_numbers(low, high, most=8 if which == "y" else 4)
-    texts = [f"{tick / 1000:g}k" if tick >= 1e4 else f"{tick:g}" for tick in ticks]
+    is_many = max(ticks, default=0.0) >= 1e4
+    texts = [f"{tick / 1000:g}k" if is_many and tick >= 1e3 else f"{tick:g}" for tick in ticks]
     if which == "y":
         ax.set_yscale("log")
         ax.set_yticks(ticks, texts)
@@ -100,6 +115,7 @@ def _round_numbers(low: float, high: float, most: int) -> list[float]:
     """Return round numbers from ``low`` to ``high``, as many as are allowed."""
     exponents = range(int(np.floor(np.log10(low))) - 1, int(np.ceil(np.log10(high))) + 1)
     ticks: list[float] = []
+    denser: list[float] = []
     for steps, stride in (
         ((1, 1.5, 2, 3, 4, 5, 6, 8), 1),
         ((1, 2, 5), 1),
@@ -112,7 +128,9 @@ def _round_numbers(low: float, high: float, most: int) -> list[float]:
         ticks = [tick for tick in ticks if low / 1.05 <= tick <= 1.05 * high]
         if len(ticks) <= most:
             break
-    return ticks
+        denser = ticks
+    # Rather every second number of a dense axis than one alone.
+    return denser[:: -(-len(denser) // most)] if denser and len(ticks) < 2 else ticks
 
 
 def bounds(values: np.ndarray, margin: float = 1.25) -> tuple[float, float]:
@@ -122,3 +140,7 @@ def bounds(values: np.ndarray, margin: float = 1.25) -> tuple[float, float]:
     if high < 3 * low:
         low, high = low / (3 * low / high) ** 0.5, high * (3 * low / high) ** 0.5
     return low / margin, high * margin
+
+
+def _widest(text: str) -> float:
+    return max(width_of(line, _SIZE) for line in text.splitlines() or [""])

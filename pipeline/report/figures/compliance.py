@@ -7,11 +7,12 @@ from matplotlib.figure import Figure
 
 from pipeline.report.compliance import sinking, tool_dimension
 from pipeline.report.figures.layout import arrange
-from pipeline.report.figures.panels import grid, panels
+from pipeline.report.figures.panels import grid, panels, share_columns
 from pipeline.report.figures.style import finish, look
 from pipeline.report.words import choice
 
 _PER_MM = 1e-3  # of 1/m
+_ROOM = 1.04  # to the right of the last tool
 _WHOLE = "whole_compliance"
 _OF_CONTACT = {"bonded": {"linestyle": "--", "markerfacecolor": "none"}}
 
@@ -21,7 +22,8 @@ def compliance(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     data, heading = _with_positions(dataset)
     layout = arrange(data, (_WHOLE,), tool_dimension(dataset), flat=("epsilon",), most=(1, 3, 3))
     figure = grid(layout, (_WHOLE,), height=2.4)
-    for panel in panels(figure, data, layout, (_WHOLE,)):
+    shown = list(panels(figure, data, layout, (_WHOLE,)))
+    for panel in shown:
         _draw(panel.ax, panel.data)
         if panel.title:
             panel.ax.set_title(panel.title)
@@ -29,8 +31,9 @@ def compliance(dataset: xr.Dataset, title: str, warning: str) -> Figure:
             panel.ax.set_ylabel("$E d/F$ (1/mm)")
         if panel.is_last:
             panel.ax.set_xlabel(heading)
-    for ax in figure.axes:  # they share it: not before all are drawn
-        ax.set_xlim(left=0)
+    share_columns(shown, layout)
+    # All share it: not before all are drawn.
+    figure.axes[0].set_xlim(0, _ROOM * figure.axes[0].get_xlim()[1])
     contacts = np.unique(data["touch"].values.astype(str))
     bonded = "dashed: bonded" if "bonded" in contacts and len(contacts) > 1 else ""
     finish(figure, title, "; ".join(filter(None, (bonded, layout.note))), warning)

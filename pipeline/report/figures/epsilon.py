@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from pipeline.report.figures.axis import log_axis
 from pipeline.report.figures.layout import arrange
-from pipeline.report.figures.panels import draw_curves, draw_spread, grid, panels, share_heights
+from pipeline.report.figures.panels import draw_curves, draw_spread, grid, panels, share_columns, share_heights
 from pipeline.report.figures.style import CLAIM, LINE, finish
 from pipeline.report.table import study_of
 from pipeline.report.times import spreads, warned
@@ -48,7 +48,8 @@ def _against_epsilon(dataset: xr.Dataset, quantities: Sequence[str], title: str,
         panel.ax.set_yscale("log" if panel.quantity == "speedup" else "linear")
         if panel.quantity == "speedup" and "spread" in dataset:
             draw_spread(panel, layout)
-    share_heights(shown, lambda panel: panel.quantity == "speedup" or (panel.quantity, panel.column))
+    share_heights((panel for panel in shown if panel.quantity == "speedup"), lambda panel: panel.quantity)
+    share_columns((panel for panel in shown if panel.quantity != "speedup"), layout)
     study = study_of(dataset)
     asking = study if study and study.drawing.paper else None
     for panel, positions in zip(shown, x, strict=True):

@@ -11,11 +11,13 @@ from matplotlib.figure import Figure
 from pipeline.report.figures.layout import arrange
 from pipeline.report.figures.panels import Panel, draw_curves
 from pipeline.report.figures.style import FAILED, QUIET, finish, look, new_figure
+from pipeline.report.figures.text import width_of, wrapped
 from pipeline.report.words import choices, heading
 
 _COLUMNS, _MOST_PANELS, _MOST_CURVES = 3, 6, 4
 _LEGEND_ROW = 0.1  # of a panel's height
-_HANDLE, _LETTER = 0.35, 0.05  # inches
+_HANDLE = 0.6  # inches
+_AT, _NAMES = 7.0, 6.5  # points
 
 
 def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
@@ -29,8 +31,7 @@ def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     for ax in axes.ravel()[max(len(dims), 1) :]:
         ax.remove()
     width = figure.get_figwidth() / columns - 0.6
-    for dim, ax in zip(dims, axes.ravel(), strict=False):
-        _draw_against(ax, dataset, dim, width)
+    parts = [_draw_against(ax, dataset, dim, width) for dim, ax in zip(dims, axes.ravel(), strict=False)]
     drawn = axes.ravel()[: len(dims)]
     top = max((ax.get_ylim()[1] for ax in drawn), default=0.0)
     for ax in drawn:  # a glance compares panels
@@ -39,31 +40,37 @@ def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
         _draw_one(axes[0, 0], dataset)
     for ax in axes[:, 0]:
         ax.set_ylabel(heading(dataset["force"]))
-    left_out = f"; not shown: against {', '.join(swept[_MOST_PANELS:])}" if swept[_MOST_PANELS:] else ""
-    finish(figure, title, f"bars: 95 % error bars{left_out}", warning, legend=False)
+    known = dict.fromkeys(words for part in parts for words in part)
+    left_out = [f"curves: {', '.join(known)}"] if known else []
+    left_out += [f"not shown: against {', '.join(swept[_MOST_PANELS:])}"] if swept[_MOST_PANELS:] else []
+    finish(figure, title, "; ".join(("bars: 95 % error bars", *left_out)), warning, legend=False)
     return figure
 
 
-def _draw_against(ax: Axes, dataset: xr.Dataset, dim: str, width: float) -> None:
+def _draw_against(ax: Axes, dataset: xr.Dataset, dim: str, width: float) -> tuple[str, ...]:
+    """Draw the force against one dimension; return which values of the curves' are left out, in words."""
     layout = arrange(dataset, ("force",), dim, most=(_MOST_CURVES, 1, 1))
     panel = Panel(ax, dataset.sel(layout.at), "force", "", width, column=0, is_last=True)
     draw_curves(panel, layout, factor=1e3, errors="force_error")
     if layout.fixed:
-        words = f"at {choices(dataset, layout.fixed)}"
-        ax.set_title(textwrap.fill(words, max(16, int(17 * width))), fontsize=7, color=QUIET)
+        words = f"at {choices(dataset, layout.fixed).removeprefix('at ')}"
+        ax.set_title(wrapped(words, width, _AT, most=3), fontsize=_AT, color=QUIET)
     _from_zero(ax)
     if len(layout.curves) > 1:
         _write_legend(ax, width)
+    return layout.part
 
 
 def _write_legend(ax: Axes, width: float) -> None:
     """Name the curves above them, in two columns where two fit ``width`` inches."""
-    texts = ax.get_legend_handles_labels()[1]
-    columns = 2 if 2 * (_HANDLE + _LETTER * max(map(len, texts), default=0)) < width else 1
+    handles, texts = ax.get_legend_handles_labels()
+    texts = [wrapped(text, width - _HANDLE, _NAMES, most=1) for text in texts]
+    columns = 2 if 2 * (_HANDLE + max((width_of(text, _NAMES) for text in texts), default=0.0)) < width else 1
     rows = -(-len(texts) // columns)
     low, high = ax.get_ylim()
     ax.set_ylim(low, high + (high - low) * _LEGEND_ROW * rows / (1 - _LEGEND_ROW * rows))
-    ax.legend(loc="upper center", ncol=columns, fontsize=6.5, frameon=False, handlelength=1.6, columnspacing=1.0)
+    look_of = {"fontsize": _NAMES, "frameon": False, "handlelength": 1.6, "columnspacing": 1.0}
+    ax.legend(handles, texts, loc="upper center", ncol=columns, **look_of)
 
 
 def _draw_one(ax: Axes, dataset: xr.Dataset) -> None:

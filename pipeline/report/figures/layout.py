@@ -22,7 +22,8 @@ _IDLE = 1e-7
 class Layout:
     """What a figure shows: every combination of a row, a column and a curve, each a selection along dimensions.
 
-    ``at`` is selected throughout, ``fixed`` the part of it that matters; ``note`` says so to the reader.
+    ``at`` is selected throughout, ``fixed`` the part of it that matters; ``note`` says so to the reader, ``part`` which
+    values were left out.
     """
 
     x: str | None
@@ -32,6 +33,7 @@ class Layout:
     at: Selection = field(default_factory=dict)
     fixed: Selection = field(default_factory=dict)
     note: str = ""
+    part: tuple[str, ...] = ()
 
 
 def arrange(
@@ -61,7 +63,9 @@ def arrange(
         parts.append((dim, _spread(dataset, dim, count)))
     fixed = {dim: _representative(dataset, dim, x) for dim in live}
     (_, curves), (_, columns), (_, rows) = parts
-    return Layout(x, rows, columns, curves, at | fixed, fixed, _note(dataset, fixed, idle, parts))
+    part = tuple(f"{len(p)} of {dataset.sizes[d]} values of {symbol(dataset[d])}"
+                 for d, p in parts if d and len(p) < dataset.sizes[d])  # fmt: skip
+    return Layout(x, rows, columns, curves, at | fixed, fixed, _note(dataset, fixed, idle, part), part)
 
 
 def _depends(array: xr.DataArray, dim: str) -> bool:
@@ -96,16 +100,12 @@ def _spread(dataset: xr.Dataset, dim: str | None, most: int) -> list[Selection]:
     return [{dim: values[i]} for i in chosen]
 
 
-def _note(
-    dataset: xr.Dataset, fixed: Selection, idle: list[str], parts: list[tuple[str | None, list[Selection]]]
-) -> str:
+def _note(dataset: xr.Dataset, fixed: Selection, idle: list[str], part: Sequence[str]) -> str:
     """Say what is shown of a study that has more than fits."""
     words = [f"{choice(dataset[d], value)} (one of {dataset.sizes[d]})" for d, value in fixed.items()]
-    words += [f"{len(p)} of {dataset.sizes[d]} values of {symbol(dataset[d])}"
-              for d, p in parts if d and len(p) < dataset.sizes[d]]  # fmt: skip
-    text = f"shown: {', '.join(words)}" if words else ""
+    text = f"shown: {', '.join((*words, *part))}" if words or part else ""
     same = f"the same for every {', '.join(symbol(dataset[d]) for d in idle)}" if idle else ""
-    return "; ".join(part for part in (text, same) if part)
+    return "; ".join(filter(None, (text, same)))
 
 
 def _representative(dataset: xr.Dataset, dim: str, x: str | None) -> Any:

@@ -1,6 +1,5 @@
 """A grid of panels: a curve for each choice, an axis that all share."""
 
-import textwrap
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -13,12 +12,13 @@ from matplotlib.figure import Figure
 from pipeline.report.figures.axis import Horizontal, horizontal
 from pipeline.report.figures.layout import Layout, title_of
 from pipeline.report.figures.style import FAILED, PANEL_HEIGHT, PAPER, WIDTH, look, new_figure
+from pipeline.report.figures.text import wrapped
 from pipeline.report.words import choices
 
 # How bars of errors and of repeats look.
 BARS = {"capsize": 2, "elinewidth": 0.8}
-# Letters of a title for each inch of a panel; and on one line of the narrowest.
-_LETTERS, _NARROWEST = 19, 16
+# Of a panel's title: points, lines, and the inches by which it may be wider than the panel.
+_TITLE, _TITLE_LINES, _BESIDE = 8.0, 4, 0.1
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def panels(figure: Figure, dataset: xr.Dataset, layout: Layout, quantities: Sequ
         row, quantity = divmod(line, len(quantities))
         choice = layout.rows[row] | layout.columns[column]
         title = title_of(dataset, layout.rows[row], layout.columns[column]) if quantity == 0 else ""
-        title = textwrap.fill(title, max(_NARROWEST, int(_LETTERS * width)))
+        title = wrapped(title, width + _BESIDE, _TITLE, most=_TITLE_LINES)
         last = line == len(figure.axes) // columns - 1
         yield Panel(ax, dataset.sel(layout.at | choice), quantities[quantity], title, width, column, last)
 
@@ -70,6 +70,12 @@ def share_heights(shown: Iterable[Panel], group: Callable[[Panel], Hashable]) ->
         limits = np.array([ax.get_ylim() for ax in axes])
         for ax in axes:
             ax.set_ylim(limits[:, 0].min(), limits[:, 1].max())
+
+
+def share_columns(shown: Iterable[Panel], layout: Layout) -> None:
+    """Give panels one scale: all of them or, where columns are what becomes of the outside, those of each column."""
+    by_column = any("outside" in column for column in layout.columns)
+    share_heights(shown, lambda panel: (panel.quantity, panel.column if by_column else 0))
 
 
 def draw_curves(panel: Panel, layout: Layout, factor: float = 1.0, errors: str = "") -> Horizontal:

@@ -1,6 +1,5 @@
 """What all figures share: colours, sizes, files."""
 
-import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -8,13 +7,17 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from pipeline.files import atomic
+from pipeline.report.figures.text import width_of, wrapped
 
 WIDTH, PANEL_HEIGHT = 7.1, 1.75  # inches: the width of a page's text
 # From dark to light, told apart by the colour-blind and in grey; markers tell them apart as well.
 COLOURS = ("#00204d", "#1f5fa8", "#2a9d8f", "#b87d00", "#b0413e", "#9030f0", "#480000")
 MARKERS = "osD^vPX"
 CLAIM, FAILED, QUIET, LINE, GRID, PAPER = "#d81b60", "#c62828", "#555555", "#000000", "#dddddd", "#ffffff"
-STYLE = {"font.size": 8, "axes.titlesize": 8, "legend.fontsize": 7.5, "svg.fonttype": "none", "axes.grid": True,
+_TITLE, _LEGEND, _NOTE = 9.5, 7.5, 7.0  # points
+_TITLE_LINES = 4
+_EDGE, _HANDLE = 0.2, 0.55  # inches: beside a figure's text, and of a legend's entry beside its words
+STYLE = {"font.size": 8, "axes.titlesize": 8, "legend.fontsize": _LEGEND, "svg.fonttype": "none", "axes.grid": True,
           "grid.linewidth": 0.4, "grid.color": GRID, "lines.linewidth": 1.2, "lines.markersize": 3.5,
           "svg.hashsalt": "epsmesh"}  # fmt: skip
 
@@ -34,13 +37,14 @@ def look(position: int) -> dict[str, str]:
 def finish(figure: Figure, title: str, note: str = "", warning: str = "", *, legend: bool = True) -> None:
     """Add title, legend, and the notes below: what is shown of a large study, and what is missing."""
     if title:
-        figure.suptitle(_wrapped(title, figure, 9.5), fontsize=9.5, fontweight="bold")
+        words = wrapped(title, figure.get_figwidth() - _EDGE, _TITLE, bold=True, most=_TITLE_LINES)
+        figure.suptitle(words, fontsize=_TITLE, fontweight="bold")
     lines, bottom = [], 0.0
     for text, colour in ((note, QUIET), (warning, FAILED)):
-        for line in reversed(_wrapped(text, figure, 7).splitlines()):
+        for line in reversed(wrapped(text, figure.get_figwidth() - _EDGE, _NOTE).splitlines()):
             lines.append((line, colour))
     for line, colour in lines:
-        figure.text(0.01, (0.04 + bottom) / figure.get_figheight(), line, fontsize=7, color=colour, va="bottom")
+        figure.text(0.01, (0.04 + bottom) / figure.get_figheight(), line, fontsize=_NOTE, color=colour, va="bottom")
         bottom += 0.14
     entries: dict[str, Any] = {}
     for ax in figure.axes if legend else ():
@@ -48,13 +52,17 @@ def finish(figure: Figure, title: str, note: str = "", warning: str = "", *, leg
         entries = dict(zip(labels, handles, strict=True)) | entries
     labels = list(entries)
     if len(labels) > 1:
-        columns = max(1, min(len(labels), int(figure.get_figwidth() / (0.45 + 0.068 * max(map(len, labels))))))
+        room = figure.get_figwidth() - _EDGE
+        labels = [wrapped(label, room - _HANDLE, _LEGEND, most=1) for label in labels]
+        columns = max(1, min(len(labels), int(room / (_HANDLE + max(width_of(label, _LEGEND) for label in labels)))))
+        columns = -(-len(labels) // -(-len(labels) // columns))  # rows as even as can be
         anchor = (0.5, bottom / figure.get_figheight())
         figure.legend(
             list(entries.values()), labels, loc="lower center", ncol=columns, frameon=False, bbox_to_anchor=anchor
         )
         bottom += 0.12 + 0.16 * -(-len(labels) // columns)
     share = (bottom + 0.02) / figure.get_figheight()
+    figure.align_ylabels()
     figure.get_layout_engine().set(rect=(0, share, 1, 1 - share))
 
 
@@ -64,8 +72,3 @@ def save(figure: Figure, path: Path) -> Path:
         # Without a date, the same dataset gives the same file.
         figure.savefig(temporary, dpi=200, metadata={"Date": None} if path.suffix == ".svg" else None)
     return path
-
-
-def _wrapped(text: str, figure: Figure, size: float) -> str:
-    """Break ``text`` where it would be wider than the figure."""
-    return textwrap.fill(text, max(20, int(figure.get_figwidth() * 72 / (0.62 * size))))
