@@ -9,8 +9,10 @@ import gmsh
 from pipeline.shapes.frame import Frame
 from pipeline.shapes.probe import Probe
 
-# Fewer segments than this would not tell a disc from a box.
-_FEWEST_SEGMENTS = 8
+# Arcs of an eighth of a turn fold cells, which give up their quarter points: F is then 3 to 40 times as far off.
+_FEWEST_SEGMENTS = 12
+# Where nothing is singular, fewer than this would not tell a disc from a box.
+_FEWEST_REGULAR = 8
 # A quarter of a disc has a whole number of edges.
 _SEGMENT_MULTIPLE = 4
 # A column is a dozen edges round at least.
@@ -41,7 +43,8 @@ class Sizes:
         # The footprint's edge may lie beyond where contact is expected to end, and elements are small.
         size = min(self.rim + self.growth * probe.rim_offset, max(self.rim, self.fine))
         quarters = ceil(probe.perimeter / size / _SEGMENT_MULTIPLE)
-        return max(_FEWEST_SEGMENTS, _SEGMENT_MULTIPLE * quarters)
+        fewest = _FEWEST_SEGMENTS if probe.has_singular_edge else _FEWEST_REGULAR
+        return max(fewest, _SEGMENT_MULTIPLE * quarters)
 
 
 def set_size_field(

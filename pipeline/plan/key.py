@@ -24,6 +24,8 @@ _BARS_ANEW = "bars of N"
 # Above a layer that is thinner than this share of the elements along the probe's edge, those were too long: records of
 # then are not used.
 _THIN, _RIM_ANEW = 1.0, "a rim that follows the layer"
+# Round edges had at least as many elements once, and those of records that were made then are not used.
+_FEWEST, _MORE_EDGES = 8, "twelve edges"
 
 _MANY = 200_000  # sections of a large study
 # Keys that came later, with the value that stands for what was before: records of then stay valid.
@@ -65,6 +67,8 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
         parts.append(_BARS_ANEW)
     if _has_thin_layer(case):
         parts.append(_RIM_ANEW)
+    if _has_few_edges(case):
+        parts.append(_MORE_EDGES)
     if case.solve.timing:
         parts += [str(case.labels), str(case.solve.repeats)]
     return digest("\n".join(parts))
@@ -99,6 +103,14 @@ def _has_thin_layer(case: Case) -> bool:
     half_width = case.probe.half_width
     longest = half_width if case.mesh.accuracy is not None else case.mesh.rim_size(half_width)
     return case.body.heights[1] - case.body.interfaces[0] < _THIN * longest
+
+
+def _has_few_edges(case: Case) -> bool:
+    """Tell whether a round, singular edge would have no more than the fewest elements by the size that is given."""
+    probe = case.probe
+    if case.mesh.accuracy is not None or not (probe.is_curved and probe.has_singular_edge):
+        return False
+    return probe.perimeter <= _FEWEST * case.mesh.rim_size(probe.half_width)
 
 
 def mesh_key(case: Case) -> str:

@@ -107,7 +107,7 @@ class Mesh(Section):
         Field(json_schema_extra={"unit": "m"}),
         Words(
             "Element size at the probe's edge, where stresses are singular: F_max depends on it more than on anything "
-            "else.",
+            "else. A round punch has at least twelve along its edge.",
             '"0.2 mm"',
             default="a tenth of the probe's half width, at most fine",
         ),

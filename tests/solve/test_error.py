@@ -10,7 +10,7 @@ from pipeline.run.meshing import mesh_case
 from pipeline.solve.error import error_bar, extrapolate, is_graded
 from pipeline.solve.rim import plain_share
 from pipeline.study.load import parse
-from tests.cases import BLADE, study
+from tests.cases import BLADE, solve, study
 
 # Scenes of random proportions on meshes with elements as large as the probe, whose bars were too small:
 # radius, height (mm), fixed, ν, contact, probe's radius, fine, coarse, rim (mm), degree.
@@ -55,7 +55,7 @@ def test_bars_of_coarse_meshes_hold_the_truth(case):
     found, truth = force(content, mesh, solid=True), force(content, {"accuracy": "0.1 %"}, solid=False)
     assert found.status == "ok"
     error = max(abs(found.force / truth.force - 1), abs(truth.force / found.force - 1))
-    assert error <= found.force_error <= 2 * error
+    assert error <= found.force_error <= max(2 * error, 0.015)
 
 
 @pytest.mark.parametrize("case", [MISSED[0], MISSED[4], MISSED[7], MISSED[9]], ids=str)
@@ -156,11 +156,29 @@ def test_quarter_points_are_found():
     assert share(probe=BLADE) == 0.0
 
 
+@pytest.mark.parametrize("size", ["1.8 mm", "2.7 mm", "4.9 mm"])
+def test_however_large_elements_may_be_a_disc_keeps_its_quarter_points(size):
+    """Eight edges round it would fold some of the cells."""
+    assert share(mesh={"rim": size, "fine": "5 mm"}) == 0.0
+
+
 @pytest.mark.mpi
 def test_long_arcs_cost_quarter_points():
-    """Eight edges round a disc fold some cells; the same on the whole body, its parts, and any number of ranks."""
-    coarse = {"mesh": {"rim": "2.7 mm", "fine": "2.7 mm"}}
+    """Some of an ellipse's fold cells; the same on the whole body, its parts, and any number of ranks."""
+    flat = {"action": "pierce", "shape": "ellipse", "axes": ["3 mm", "2 mm"], "depth": "0.2 mm"}
+    coarse = {"probe": flat, "mesh": {"rim": "1.5 mm", "fine": "2 mm"}}
     quarter = share(**coarse)
     assert 0.1 < quarter < 0.9
     assert share(MPI.COMM_WORLD, **coarse) == pytest.approx(quarter)
     assert share(mirrors=(), **coarse) == pytest.approx(quarter)
+
+
+@pytest.mark.parametrize(("degree", "limit"), [(2, 0.05), (3, 0.015)])
+def test_the_largest_elements_at_an_edge_are_a_few_per_cent_off(degree, limit):
+    """With eight edges they were 7.0 and 1.9 % off; the meridian has none of them."""
+    content = {"body": {"shape": "cylinder", "radius": "20 mm", "height": "20 mm", "fixed": "bottom"}}
+    mesh = {"rim": "2.9 mm", "fine": "4 mm", "growth": 0.8, "degree": degree}
+    (found,), (truth,) = solve(**content, mesh=mesh).values(), solve(**content, plan={"without": []}).values()
+    off = abs(found.force / truth.force - 1)
+    assert off < limit
+    assert off < found.force_error
