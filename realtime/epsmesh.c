@@ -771,8 +771,8 @@ static epsmesh_touch told(const epsmesh_model *m, double young, double depth, co
     force_at(&a->f, k->force, k->aside, depth, force);
     for (i = 0; i < 3; i++)
         for (t.force[i] = 0, j = 0; j < 3; j++) t.force[i] += young * force[j] * m->axes[j][i];
-    if (!(k->force > 0 && is_positive(t.stiffness) && isfinite(t.force_error) && isfinite(t.force[0]) &&
-          isfinite(t.force[1]) && isfinite(t.force[2])))
+    if (!(k->force > 0 && is_positive(t.stiffness) && t.force_error >= 0 && isfinite(t.force_error) &&
+          isfinite(t.force[0]) && isfinite(t.force[1]) && isfinite(t.force[2])))
         return all(EPSMESH_DAMAGED, (double)NAN);
     return t;
 }

@@ -284,8 +284,8 @@ epsmesh_touch epsmesh_patch_touch(epsmesh_patch *t, const epsmesh_model *m, cons
     force[0] = s.k.aside[0], force[1] = s.k.aside[1], force[2] = s.k.force;
     for (i = 0; i < 3; i++)
         for (found.force[i] = 0, j = 0; j < 3; j++) found.force[i] += q.young * force[j] * m->axes[j][i];
-    if (!(s.k.force > 0 && is_positive(found.stiffness) && isfinite(found.force_error) && isfinite(found.force[0]) &&
-          isfinite(found.force[1]) && isfinite(found.force[2])))
+    if (!(s.k.force > 0 && is_positive(found.stiffness) && found.force_error >= 0 && isfinite(found.force_error) &&
+          isfinite(found.force[0]) && isfinite(found.force[1]) && isfinite(found.force[2])))
         return all(EPSMESH_DAMAGED, (double)NAN);
     return found;
 }

@@ -41,6 +41,7 @@ static void ask_around(const epsmesh_model *model, int times) {
         if (touch.status == EPSMESH_OK || touch.status == EPSMESH_LOST) {
             expect(isfinite(touch.force[0] + touch.force[1] + touch.force[2]), "a force is finite");
             expect(isfinite(touch.force_error + touch.stiffness + touch.contact_radius), "an answer is finite");
+            expect(touch.force_error >= 0, "a bar is none of less than nothing");
         } else {
             expect(isnan(touch.force[0]) && isnan(touch.stiffness), "a refusal has no numbers");
         }
@@ -69,9 +70,21 @@ static void ask_several(const epsmesh_model *model, int times) {
             answers += has;
             expect(has == (isfinite(touches[j].force[0] + touches[j].force_error + touches[j].stiffness) != 0),
                    "an answer of several is finite, a refusal is not");
+            expect(!has || touches[j].force_error >= 0, "a bar of several is none of less than nothing");
         }
         expect(answers == 0 || answers == n, "all tools have an answer, or none has");
     }
+}
+
+/* Put numbers in the place of counts: those that products overflow with, or limits are missed by one. */
+static void miscount(unsigned char *part, size_t size) {
+    static const unsigned long numbers[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 63, 64, 65, 95, 96, 97, 255, 256, 257, 4096, 4097,
+                                            16384, 16385, 0x1fffffffUL, 0x20000000UL, 0x40000000UL, 0x7fffffffUL,
+                                            0x80000000UL, 0xfffffffeUL, 0xffffffffUL};
+    size_t at = 4 * (draw() % (size / 4));
+    unsigned long number = numbers[draw() % (sizeof numbers / sizeof *numbers)];
+    int i;
+    for (i = 0; i < 4; i++) part[at + (size_t)i] = (unsigned char)(number >> (24 - 8 * i) & 0xff);
 }
 
 int main(int count, char **words) {
@@ -99,10 +112,13 @@ int main(int count, char **words) {
     }
     part = (unsigned char *)malloc(size);
     if (!part) return 2;
-    for (i = 0; i < 20000; i++) {
+    for (i = 0; i < 30000; i++) {
         int flips = 1 + (int)(draw() % 4);
         memcpy(part, data, size);
-        while (flips--) part[draw() % (i % 2 ? size : 1500 < size ? 1500 : size)] = (unsigned char)draw();
+        while (flips--) {
+            if (i % 3 == 2) miscount(part, 3000 < size ? 3000 : size); /* the header of a model with pairs, all of it */
+            else part[draw() % (i % 3 ? size : 1500 < size ? 1500 : size)] = (unsigned char)draw();
+        }
         if (epsmesh_load(&damaged, part, size) == EPSMESH_OK) {
             ask_around(&damaged, 6);
             ask_several(&damaged, 2);

@@ -215,7 +215,7 @@ class Model:
             out_x * xy + out_y * yy + out_z * zy,
             out_x * xz + out_y * yz + out_z * zz,
         ])  # fmt: skip
-        if not (isfinite(out_x) and isfinite(out_y) and isfinite(out_z) and isfinite(error)):
+        if not (isfinite(out_x) and isfinite(out_y) and isfinite(out_z) and 0 <= error < inf):
             return refused("damaged")
         if not (found.force > 0 and found.stiffness > 0):
             return refused("damaged")

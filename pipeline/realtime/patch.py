@@ -11,7 +11,7 @@ that forces stay the slopes of one energy; which rectangles press is first tried
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from math import cos, nan, sin
+from math import cos, inf, nan, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -160,7 +160,7 @@ class Patch:
         )
         error = found.stiffness * model._uncertain(place, room, contact) + model.bar[3] + _GOOD
         force = modulus * np.array([*found.aside, found.force]) @ model.axes
-        if not (np.isfinite(force).all() and np.isfinite(error) and found.force > 0):
+        if not (np.isfinite(force).all() and 0 <= error < inf and found.force > 0):
             return Touch("damaged", np.full(3, nan))
         return Touch("ok", force, error, modulus * found.stiffness, found.radius)
 

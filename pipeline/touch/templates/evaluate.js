@@ -166,7 +166,7 @@ class Model {
     const error = contact.stiffness * this.uncertain(place, room, contact, shape) + this.bar[3]
       + (this.bend_error / 2) * contact.square * growth;
     const force = this.body(spot.force(contact, depth).map((value) => young * value));
-    const isRight = [...force, error].every(Number.isFinite) && contact.force > 0 && contact.stiffness > 0;
+    const isRight = [...force, error].every(Number.isFinite) && error >= 0 && contact.force > 0 && contact.stiffness > 0;
     if (!isRight) return refused("damaged");
     return { status: "ok", force, error, stiffness: young * contact.stiffness, radius: contact.radius, spot, shape };
   }
