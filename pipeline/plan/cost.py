@@ -6,13 +6,14 @@ for meshing, for solving and for the error bar, of each kind of element. Where n
 below; a few observations move it a little, many determine it (ridge regression about the law below).
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from math import exp, log
 from statistics import median
 
 from pipeline.plan import estimate
 from pipeline.plan.steps import MeshStep, Solve
+from pipeline.plan.symmetry import model_planes
 from pipeline.study.sweep import Case
 
 # What ranks are worth on one solve: n of them are as good as n^0.8.
@@ -20,7 +21,7 @@ _PARALLEL = 0.8
 # Seconds on one core of 2020s hardware: for each tetrahedron; and of the mixed element, as a multiple.
 _MESH, _MIXED = 2e-5, 1.3
 _SOLVE = {1: 5e-6, 2: 2e-5, 3: 5e-5, 4: 1.6e-4}
-_MERIDIAN, _MERIDIAN_BYTES = 0.5, 4.5e8
+_MERIDIAN, _MERIDIAN_BYTES = 0.5, 3.8e8
 # And one whose contact is to be found: so many times that.
 _FOUND, _TRIALS = "meridian contact", 2.0
 # Share of the meshes that miss the accuracy they were chosen for: 5 of 60 scenes, 9 of 48 blades that slice.
@@ -87,7 +88,7 @@ class CostModel:
             kind, _, poisson = features(solve)
             seconds += sum(self.seconds(stage, kind, cells, poisson) for stage in ("solve", "bar"))
             seconds += self._further(solve)
-        memory = estimate.peak_memory(step.case, 0.5 ** len(step.mirrors))
+        memory = max(map(_memory, {_size(solve): solve for solve in step.solves}.values()))
         return StepEstimate("mesh", len(step.solves), len(step.operators), cells, seconds, memory, title)
 
     def _further(self, solve: Solve) -> float:
@@ -98,6 +99,20 @@ class CostModel:
             kind, cells, poisson = features(solve)
             seconds += likely * sum(self.seconds(stage, kind, cells, poisson) for stage in ("mesh", "solve", "bar"))
         return seconds
+
+
+def _size(solve: Solve) -> Hashable:
+    """Return what tells apart, of the solves on one mesh, those that take other amounts of memory."""
+    case = solve.case
+    return case.element, case.mesh.degree, case.material.law, case.solve.method, solve.reduced
+
+
+def _memory(solve: Solve) -> float:
+    """Return the bytes of a solve with its bar, which of a timed one is found apart, by symmetry."""
+    apart = solve.case.solve.timing and solve.goal is None
+    planes = model_planes(solve.case) if apart else solve.mirrors
+    share, of_bar = 0.5 ** len(solve.mirrors), 0.5 ** len(planes)
+    return estimate.peak_memory(solve.case, share, of_bar, reduced=solve.reduced)
 
 
 def features(solve: Solve) -> tuple[str, float, float]:

@@ -6,6 +6,7 @@ from typing import Any
 
 from pipeline.plan.cost import speed_up
 from pipeline.plan.deeper import depth_key
+from pipeline.plan.estimate import on_ranks
 from pipeline.plan.plan import Plan
 from pipeline.plan.schedule import schedule
 from pipeline.plan.steps import MeshStep, Solve
@@ -21,7 +22,13 @@ def summary(plan: Plan, ranks: int = 1) -> dict[str, Any]:
         costs = [step.seconds / speed_up(phase.size) for step in found]
         seconds += _makespan(costs, ranks // phase.size)
         steps += [
-            vars(s) | {"seconds": cost, "ranks": phase.size, "exact": all(solve.is_reference for solve in step.solves)}
+            vars(s)
+            | {
+                "seconds": cost,
+                "memory": on_ranks(s.memory, phase.size),
+                "ranks": phase.size,
+                "exact": all(solve.is_reference for solve in step.solves),
+            }
             for step, s, cost in zip(phase.steps, found, costs, strict=True)
         ]
     return {

@@ -13,14 +13,18 @@ _BYTES_PER_DOF = {
     "displacement": {1: 3000, 2: 700, 3: 420, 4: 420},
     "mixed": {2: 1450, 3: 1200, 4: 1200},
     "mixed, roughly": {3: 850, 4: 850},
+    "large, roughly": {2: 600, 3: 600, 4: 600},
     "displacement, matrices": {1: 3000, 2: 1900, 3: 2000, 4: 2800},
     "mixed, matrices": {2: 3800, 3: 4000, 4: 5600},
     "direct": {1: 9000, 2: 9000, 3: 10_000},
 }
 _BYTES_OF_PARTS = {1: 1000, 2: 1500, 3: 2200, 4: 3300}
+# And what a reduced basis keeps besides: a hierarchy for its bound, and five vectors of each of some eight solutions.
+_BYTES_OF_BASIS = {1: 1000, 2: 1100, 3: 1800, 4: 2500}
 _BASE = 200e6
-# What a process holds besides once it has meshed and solved: programs, compiled forms.
-_LOADED = 100e6
+# What a process holds besides once it has meshed and solved, programs and compiled forms; and what every further rank
+# has of its own.
+_LOADED, _RANK = 60e6, 180e6
 # Dofs for each tetrahedron on large meshes, three components.
 _DOFS_PER_CELL = {1: 0.55, 2: 4.4, 3: 15.0, 4: 35.0}
 # Bytes gmsh and the arrays take for each tetrahedron while meshing.
@@ -102,16 +106,17 @@ def dofs(count: float, degree: int) -> float:
 
 
 def solving_memory(
-    dofs: float, degree: int, *, direct: bool, mixed: bool = False, matrices: bool = False, parts: bool = False,
-    roughly: bool = False,
+    dofs: float, degree: int, *, direct: bool, mixed: bool = False, matrices: bool = False, large: bool = False,
+    parts: bool = False, roughly: bool = False,
 ) -> float:  # fmt: skip
     """Estimate the bytes that a solve takes, all ranks together.
 
-    ``matrices`` says that nothing multiplies cell by cell here; ``parts`` keeps A_λ and A_μ for the next ν. To solve
-    ``roughly``, as an error bar does, is to a tenth.
+    ``matrices`` says that nothing multiplies cell by cell here, as for ``large`` displacements, but for their error
+    bar; ``parts`` keeps A_λ and A_μ for the next ν. To solve ``roughly``, as an error bar does, is to a tenth.
     """
-    kind = "direct" if direct else ("mixed" if mixed else "displacement") + ", matrices" * matrices
-    kind += ", roughly" * (roughly and kind == "mixed")
+    kind = "direct" if direct else ("mixed" if mixed else "displacement") + ", matrices" * (matrices or large)
+    kind = "large" if large and roughly else kind
+    kind += ", roughly" * (roughly and kind in ("mixed", "large"))
     per_dof = _BYTES_PER_DOF[kind][degree] + parts * _BYTES_OF_PARTS[degree]
     # Fill of a factorisation in 3D grows like dofs^(4/3); the figure above is for 50,000.
     growth = (dofs / 50_000) ** (1 / 3) if direct else 1.0
@@ -119,20 +124,30 @@ def solving_memory(
 
 
 def enriched_memory(
-    dofs: float, degree: int, *, mixed: bool = False, matrices: bool = False, parts: bool = False
+    dofs: float, degree: int, *, mixed: bool = False, matrices: bool = False, large: bool = False, parts: bool = False
 ) -> float:
     """Estimate the bytes that an error bar takes: a solve of one degree more than that of ``dofs`` unknowns."""
     growth = _DOFS_PER_CELL[degree + 1] / _DOFS_PER_CELL[degree]
     return solving_memory(
-        growth * dofs, degree + 1, direct=False, mixed=mixed, matrices=matrices, parts=parts, roughly=True
+        growth * dofs, degree + 1, direct=False, mixed=mixed, matrices=matrices, large=large, parts=parts, roughly=True
     )
 
 
-def peak_memory(case: Case, share: float = 1.0) -> float:
-    """Estimate the bytes that a case takes with its error bar, within a factor of 1.5; see :func:`case_memory`."""
-    degree, mixed = case.mesh.degree, case.element == "mixed"
-    enriched = enriched_memory(dofs(share * cells(case), degree), degree, mixed=mixed)
-    return _LOADED + max(case_memory(case, share), enriched)
+def peak_memory(case: Case, share: float = 1.0, of_bar: float | None = None, *, reduced: bool = False) -> float:
+    """Estimate the bytes that a case takes with its error bar, within a factor of 1.5; see :func:`case_memory`.
+
+    ``of_bar`` is the part of the body that the bar is found on, if that is another; ``reduced`` cases have a basis.
+    """
+    degree, mixed, large = case.mesh.degree, case.element == "mixed", case.material.is_large
+    count = dofs((share if of_bar is None else of_bar) * cells(case), degree)
+    enriched = enriched_memory(count, degree, mixed=mixed, large=large)
+    basis = reduced * _BYTES_OF_BASIS[degree] * dofs(share * cells(case), degree)
+    return _LOADED + max(case_memory(case, share), enriched) + basis
+
+
+def on_ranks(memory: float, ranks: int) -> float:
+    """Estimate the bytes of all ``ranks`` together for what takes ``memory`` on one."""
+    return memory + (ranks - 1) * _RANK
 
 
 def case_memory(case: Case, share: float = 1.0) -> float:
@@ -142,5 +157,6 @@ def case_memory(case: Case, share: float = 1.0) -> float:
     """
     count, degree = share * cells(case), case.mesh.degree
     direct, mixed = case.solve.method == "direct", case.element == "mixed"
-    solving = solving_memory(dofs(count, degree), degree, direct=direct, mixed=mixed)
+    large = case.material.is_large
+    solving = solving_memory(dofs(count, degree), degree, direct=direct, mixed=mixed, large=large)
     return max(_BASE + _BYTES_PER_CELL * count, solving)

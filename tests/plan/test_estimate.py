@@ -2,11 +2,16 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
 from pipeline.mesh.of_case import mesh_arrays
 from pipeline.plan import estimate
+from pipeline.plan.cost import CostModel
+from pipeline.plan.describe import summary
+from pipeline.plan.plan import make_plan
+from pipeline.plan.steps import MeshStep, OperatorStep, mesh_steps
 from tests.cases import BLADE, solve, study
 
 MESHES = {
@@ -50,3 +55,38 @@ def test_memory_of_a_solve_is_not_underestimated(method):
     memory, dofs = map(float, done.stdout.split())
     estimated = max(estimate.solving_memory(dofs, 2, direct=method == "direct"), estimate.enriched_memory(dofs, 2))
     assert memory < 1.3 * estimated < 3 * memory
+
+
+def test_a_step_takes_what_the_largest_of_its_solves_takes():
+    """Poisson's ratios of one mesh need other elements; large displacements need matrices."""
+    ratios = study(material={"poisson": [0.3, 0.49]}, mesh={"fine": "1 mm"})
+    (step,) = mesh_steps(make_plan(ratios).solves)
+    each = [CostModel().step(MeshStep((OperatorStep((solve,)),))).memory for solve in step.solves]
+    assert [solve.case.element for solve in step.solves] == ["displacement", "mixed"]
+    assert CostModel().step(step).memory == max(each) > 1.3 * min(each)
+    laws = [study(material={"law": law}, mesh={"fine": "1 mm"}).case(()) for law in ("linear", "neo-hookean")]
+    linear, large = map(estimate.peak_memory, laws)
+    assert large > 1.2 * linear
+
+
+def test_a_reduced_basis_and_further_ranks_take_room_of_their_own():
+    ratios = study(material={"poisson": [0.05 * n for n in range(1, 9)]}, mesh={"fine": "1 mm"})
+    plan = make_plan(ratios)
+    (step,) = mesh_steps(plan.solves)
+    assert step.solves[0].reduced
+    alone = CostModel().step(MeshStep((OperatorStep((replace(step.solves[0], reduced=False),)),))).memory
+    assert CostModel().step(step).memory > 1.15 * alone
+    one, two = (summary(plan, ranks)["memory"] for ranks in (1, 2))
+    assert two == estimate.on_ranks(one, 2) > one
+
+
+def test_the_bar_of_a_timed_case_is_found_on_what_symmetry_leaves():
+    """Its times are those of the whole body; in room, that is a quarter of a bar on all of it."""
+    memory = [
+        CostModel().step(MeshStep((OperatorStep((solve,)),))).memory
+        for timing in (True, False)
+        for solve in make_plan(
+            study(mesh={"fine": "1 mm", "model": "3d"}, solve={"timing": timing}), without=("symmetry",)
+        ).solves
+    ]
+    assert memory[0] < 0.8 * memory[1]
