@@ -10,9 +10,15 @@ _LEAST_ROOM = 200_000
 
 
 def cache_folder() -> Path:
-    """Return the folder of what can be made again: $EPSMESH_CACHE, or one in the user's cache."""
-    given = os.environ.get("EPSMESH_CACHE")
-    return Path(given or Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "epsmesh")
+    """Return the folder of what can be made again: $EPSMESH_CACHE, or one in the user's cache.
+
+    As freedesktop's specification has it, a cache that is empty or no absolute path is none: code is loaded from there,
+    and the folder that one is in may be a stranger's.
+    """
+    if given := os.environ.get("EPSMESH_CACHE"):
+        return Path(given)
+    caches = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    return (caches if caches.is_absolute() else Path.home() / ".cache") / "epsmesh"
 
 
 @contextmanager

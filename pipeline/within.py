@@ -31,8 +31,16 @@ def folders_of(folder: Path) -> tuple[Path, ...]:
     folder = folder.resolve()
     above = (place for place in (folder, *folder.parents) if place != place.parent)
     project = next((place for place in above if any((place / mark).exists() for mark in _MARKS)), folder)
-    allowed = (Path(text).expanduser() for text in os.environ.get(VARIABLE, "").split(os.pathsep) if text)
+    allowed = (_expanded(text) for text in os.environ.get(VARIABLE, "").split(os.pathsep) if text)
     return (project, *(place.resolve() for place in allowed))
+
+
+def _expanded(text: str) -> Path:
+    """Return the path that ``text`` means; that of a user whom nobody knows is itself."""
+    try:
+        return Path(text).expanduser()
+    except RuntimeError:
+        return Path(text)
 
 
 def outside(path: Path, folders: Collection[Path]) -> str:

@@ -2,9 +2,11 @@
 
 import ast
 import gzip
+import json
 import os
 import re
 import sqlite3
+import subprocess
 import tomllib
 from pathlib import Path
 from struct import pack
@@ -12,6 +14,7 @@ from struct import pack
 import numpy as np
 import pytest
 
+from pipeline.files import cache_folder
 from pipeline.plan.plan import make_plan
 from pipeline.realtime import ModelError
 from pipeline.realtime.classic import read_doubles
@@ -27,7 +30,9 @@ from pipeline.study.load import load
 from pipeline.study.problems import StudyError
 from pipeline.within import folders_of, outside
 from tests.cases import raw, study
+from tests.commands import ENVIRONMENT, ROOT, command, spawn
 from tests.organs import box, write_stl
+from tests.realtime.synthetic import write_random
 from tests.report.synthetic import dataset
 
 FILES = sorted(file for folder in ("pipeline", "benchmarks", "scripts", "docs") for file in Path(folder).rglob("*.py"))
@@ -229,6 +234,10 @@ def test_a_dataset_moves_no_cursor_and_fills_no_memory(tmp_path):
         "CREATE TRIGGER more AFTER INSERT ON records BEGIN DELETE FROM records; END",
         "DROP TABLE records; CREATE VIEW records AS WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n) "
         "SELECT k AS key, k AS record, 0 AS stored FROM n",
+        "DROP TABLE records; CREATE VIRTUAL TABLE records USING fts5(key, record, stored); "
+        "PRAGMA writable_schema = ON; UPDATE sqlite_master SET sql = replace(sql, 'CREATE VIRTUAL', 'CREATE  VIRTUAL')",
+        "DROP TABLE records; CREATE TABLE Records (key TEXT, record TEXT AS (hex(zeroblob(7000000))), stored REAL)",
+        "CREATE INDEX slow ON records (hex(zeroblob(7000000)))",
     ],
 )
 def test_a_store_is_data(tmp_path, program):
@@ -237,11 +246,71 @@ def test_a_store_is_data(tmp_path, program):
     database = sqlite3.connect(path)
     database.executescript(program)
     database.close()
-    with pytest.raises(StoreError, match="no case store"):
+    with pytest.raises(StoreError, match=r"no case store|not that of a case store"):
         known_of(path, make_plan(study()))
     opened = Store(path)
     assert "was moved to" in opened.notice
     opened.close()
+
+
+HOSTILE = "a\x1b]0;b\x07\n\u009b2J\u202e"
+
+
+def test_no_file_writes_on_a_terminal_what_it_does_not_say(tmp_path):
+    """Neither by its name, nor by names in it, nor by keys of records, for people or for scripts."""
+    mine = tmp_path / f"{HOSTILE}.toml"
+    mine.write_text("title = 1")
+    store, model = tmp_path / "cases.sqlite", tmp_path / "model.nc"
+    opened = Store(store)
+    opened.put_rows([(HOSTILE, "{", 0.0)])
+    opened.close()
+    write_random(model)
+    start = (data := bytearray(model.read_bytes())).index(b"reciprocal")
+    data[start : start + 3], data[start + 16 : start + 20] = b"\x1b[2", b"\xff" * 4
+    model.write_bytes(data)
+    commands = [("validate", mine), ("store", "verify", "--store", store), ("touch", model), ("touch", mine)]
+    for words in (*commands, *((*words, "--json") for words in commands)):
+        done = spawn(*words)
+        text = done.stdout + done.stderr
+        assert done.returncode in (1, 2)
+        assert all(line.isprintable() for line in text.split("\n")), text
+        assert "\\x1b" in text or "\\u001b" in text
+        if "--json" in words and "store" not in words:
+            (fault, *_) = at[0]["errors"] if isinstance(at := json.loads(done.stdout), list) else at["errors"]
+            assert words[1] is not mine or fault["file"] == str(mine)
+
+
+def test_what_a_stream_has_no_sign_for_is_written_out(tmp_path):
+    done = subprocess.run(
+        command("plan", "studies/quick.toml", "--output", tmp_path), capture_output=True, check=False, cwd=ROOT,
+        env=ENVIRONMENT | {"PYTHONIOENCODING": "ascii"},
+    )  # fmt: skip
+    assert done.returncode == 0
+    assert rb"2 poisson \xd7 5 epsilon" in done.stdout
+
+
+def test_commands_that_messages_name_hold_one_command_each(tmp_path, epsmesh):
+    store = tmp_path / "x; reboot.sqlite"
+    store.write_bytes(b"no store" * 100)
+    told = epsmesh("status", "studies/quick.toml", "--store", store).stderr
+    assert f"`epsmesh store prune --store '{store}' --yes`" in told
+    told = epsmesh("plot", tmp_path / "$(reboot).toml").stderr
+    assert f"`epsmesh run '{tmp_path}/$(reboot).toml'`" in told
+
+
+@pytest.mark.parametrize("folder", ["", "here", "../here"])
+def test_code_is_loaded_from_no_folder_that_one_happens_to_be_in(monkeypatch, tmp_path, folder):
+    monkeypatch.delenv("EPSMESH_CACHE", raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("XDG_CACHE_HOME", folder)
+    assert cache_folder() == tmp_path / ".cache" / "epsmesh"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "caches"))
+    assert cache_folder() == tmp_path / "caches" / "epsmesh"
+
+
+def test_a_user_whom_nobody_knows_allows_nothing(monkeypatch, folders, epsmesh):
+    monkeypatch.setenv("EPSMESH_FILES", "~nobody-of-that-name/files")
+    assert epsmesh("validate", written(folders[0], "../../strange/box.stl")).exit_code == 2
 
 
 def test_records_that_nest_without_end_are_none(tmp_path):

@@ -5,8 +5,11 @@ import os
 import signal
 import sys
 from contextvars import ContextVar
+from io import TextIOWrapper
 from math import inf, isfinite
 from typing import Any, TextIO
+
+from pipeline.visible import visible_json, visible_lines
 
 # Of the command that runs: whether JSON was asked for, and whether any has been printed.
 JSON: ContextVar[dict[str, bool]] = ContextVar("JSON")
@@ -29,12 +32,12 @@ def paint(text: str, colour: str, stream: TextIO) -> str:
 
 def error(text: str) -> None:
     """Print to standard error, in red."""
-    print(paint(text, "red", sys.stderr), file=sys.stderr, flush=True)
+    print(paint(visible_lines(text), "red", sys.stderr), file=sys.stderr, flush=True)
 
 
 def warning(text: str) -> None:
     """Print a warning to standard error, in yellow."""
-    print(paint(f"warning: {text}", "yellow", sys.stderr), file=sys.stderr, flush=True)
+    print(paint(f"warning: {visible_lines(text)}", "yellow", sys.stderr), file=sys.stderr, flush=True)
 
 
 def is_json_wanted() -> bool:
@@ -51,7 +54,7 @@ def print_json(value: Any) -> None:
     """Print ``value`` as JSON: an infinite ε is "full", as in a study file, and null is what JSON has no number for."""
     if is_json_wanted():
         JSON.get()["printed"] = True
-    print(json.dumps(plain(value), indent=2, ensure_ascii=False, allow_nan=False), flush=True)
+    print(visible_json(json.dumps(plain(value), indent=2, ensure_ascii=False, allow_nan=False)), flush=True)
 
 
 def plain(value: Any, key: str = "") -> Any:
@@ -68,20 +71,24 @@ def plain(value: Any, key: str = "") -> Any:
 class Patient:
     """A stream whose reader may go away: what is then written is dropped, and the command goes on to its end.
 
-    ``fault`` says why else it could not be written: a full disk.
+    What one cannot see, or the stream has no sign for, is written out. ``fault`` says why else it could not be written:
+    a full disk.
     """
 
     def __init__(self, stream: TextIO):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
         self._stream = stream
         self.fault = ""
 
     def write(self, text: str) -> int:
         """Write ``text``, or drop it."""
+        text = visible_lines(text)
         try:
-            return self._stream.write(text)
+            self._stream.write(text)
         except OSError as error:
             self._drop(error)
-            return len(text)
+        return len(text)
 
     def flush(self) -> None:
         """Flush, or drop what is left."""
@@ -101,10 +108,13 @@ class Patient:
 
 
 def make_patient() -> None:
-    """Let standard output and error outlive their readers: ``epsmesh plan … | head``."""
+    """Let standard output and error outlive their readers: ``epsmesh plan … | head``.
+
+    Standard error that is a terminal has a bar that moves the cursor, and is left as it is.
+    """
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
-        if stream is not None and not stream.isatty():
+        if stream is not None and not (name == "stderr" and stream.isatty()):
             setattr(sys, name, Patient(stream))
 
 

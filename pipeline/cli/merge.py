@@ -2,6 +2,7 @@
 
 from datetime import UTC, datetime
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -93,7 +94,7 @@ def _stores(study: "Study", given: list[Path] | None, output: Path) -> list[Path
     found = given or stores_of(output, study)
     if not found:
         folder = output / "shards"
-        made = f"`epsmesh run {study.file} --shard 1/4` and so on make them"
+        made = f"`epsmesh run {quote(study.file)} --shard 1/4` and so on make them"
         fail(of_file(folder, f"no stores of {study.file}; {made}", CLUSTER))
     return found
 
@@ -131,7 +132,8 @@ def _completing(plan: "Plan", missing: frozenset[str], paths: list[Path], option
         return []
     from pipeline.plan.shard import deal, shard_of
 
-    words = ["epsmesh", "run", plan.study.file, *options]
+    file = quote(plan.study.file)
+    words = ["epsmesh", "run", file, *map(quote, options)]
     latest = max(paths, key=lambda path: path.stat().st_mtime if shard_of(path) else -1.0)
     shard = shard_of(latest)
     if shard is None:
@@ -141,7 +143,7 @@ def _completing(plan: "Plan", missing: frozenset[str], paths: list[Path], option
     commands = [" ".join([*words, "--shard", f"{number}/{shard.count}"]) for number in numbers]
     if not options:
         array = ",".join(map(str, numbers))
-        commands.append(f"SHARDS={shard.count} sbatch --array={array} scripts/slurm/shards.sbatch {plan.study.file}")
+        commands.append(f"SHARDS={shard.count} sbatch --array={array} scripts/slurm/shards.sbatch {file}")
     return commands
 
 

@@ -1,6 +1,7 @@
 """What ``run`` says before and after: what is to be done, and what came of it."""
 
 from collections import Counter
+from shlex import quote
 from typing import TYPE_CHECKING, Any, TextIO
 
 from pipeline import stages
@@ -62,13 +63,13 @@ def conclude(
         error(f"failed: {case}: {message}")
     study = plan.study
     if len(outcome.failures) > _MOST_FAILURES:
-        error(f"… and {len(outcome.failures) - _MOST_FAILURES} more: `epsmesh status {study.file}` lists them")
+        error(f"… and {len(outcome.failures) - _MOST_FAILURES} more: `epsmesh status {quote(study.file)}` lists them")
     if not quiet:
         print(_line(plan, opened, outcome, seconds, shard), flush=True)
     if outcome.interrupted:
         cases = sum(outcome.counts.values())
         done = cases - outcome.counts["pending"]
-        again = f"`epsmesh run {study.file}{f' --shard {shard}' if shard else ''}` goes on from there"
+        again = f"`epsmesh run {quote(study.file)}{f' --shard {shard}' if shard else ''}` goes on from there"
         error(f"interrupted: {done} of {cases} cases are on record; {again}")
 
 
@@ -94,7 +95,7 @@ def _line(plan: Plan, opened: "Opened", outcome: "Outcome", seconds: float, shar
     if shard:
         # A shard may hold F_exact and no case, or nothing where there are fewer steps than shards.
         found = found if sum(outcome.counts.values()) else "F_exact" if plan.part else "nothing to do"
-        where = f"kept for `epsmesh merge {plan.study.file}`, when all shards are done"
+        where = f"kept for `epsmesh merge {quote(plan.study.file)}`, when all shards are done"
         return f"{plan.study.file}, shard {shard}: {found}{read_back}; {where}; {format_seconds(seconds)}"
     files = ", ".join(map(str, outcome.files))
     return f"{plan.study.file}: {found}{read_back}; wrote {files}; {format_seconds(seconds)}"

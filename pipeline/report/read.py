@@ -2,12 +2,13 @@
 
 from math import prod
 from pathlib import Path
+from shlex import quote
 
 import numpy as np
 import xarray as xr
 
 from pipeline.report.table import DatasetError
-from pipeline.study.problems import visible
+from pipeline.visible import visible, visible_lines
 
 # What every dataset of a study has, and figures and report are made from.
 _NEEDED = (
@@ -31,7 +32,7 @@ def dataset_path(file: str | Path, output: str | Path = "results") -> Path:
     path = file if file.suffix == ".nc" else Path(output) / f"{file.stem}.nc"
     if not path.is_file():
         study = file.with_suffix(".toml").name if file.suffix == ".nc" else file
-        raise DatasetError(f"{path}: no such dataset; make it with `epsmesh run {study}`")
+        raise DatasetError(f"{path}: no such dataset; make it with `epsmesh run {quote(str(study))}`")
     return path
 
 
@@ -69,16 +70,12 @@ def _size(path: Path) -> int:
 def _shown(dataset: xr.Dataset) -> xr.Dataset:
     """Return a dataset whose texts, but for the study's own, move no cursor of the terminal that shows them."""
     for held in (dataset, *dataset.variables.values()):
-        texts = {name: _lines(text) for name, text in held.attrs.items() if isinstance(text, str) and name != "study"}
-        held.attrs.update(texts)
+        texts = {name: text for name, text in held.attrs.items() if isinstance(text, str) and name != "study"}
+        held.attrs.update({name: visible_lines(text) for name, text in texts.items()})
     of_text = {name: v for name, v in dataset.variables.items() if v.dtype.kind in "OU"}
     changed = {
-        name: (v.dims, np.array([_lines(str(text)) for text in v.values.ravel()], dtype=object).reshape(v.shape))
+        name: (v.dims, np.array([visible_lines(str(text)) for text in v.values.ravel()], dtype=object).reshape(v.shape))
         for name, v in of_text.items()
         if not all(str(text).isprintable() for text in v.values.ravel())
     }
     return dataset.assign({name: (*values, dataset[name].attrs) for name, values in changed.items()})
-
-
-def _lines(text: str) -> str:
-    return text if text.isprintable() else "\n".join(map(visible, text.split("\n")))

@@ -7,6 +7,7 @@ from types import TracebackType
 from typing import Any, Protocol
 
 from pipeline.run.remaining import Remaining, format_seconds
+from pipeline.visible import visible
 
 # In a file a line is written for each of these shares of the work, and when this many seconds went by without one.
 _SHARE, _SILENCE = 0.05, 30.0
@@ -110,7 +111,7 @@ class Terminal:
         step = self._remaining.step_of(text.removeprefix(_MESHING)) if self._remaining is not None else None
         self._step = self._step if step is None else step
         if self._bar is not None:
-            self._bar.update(self._task, description=text)
+            self._bar.update(self._task, description=visible(text))
         elif self._verbose or time.monotonic() - self._told > _SILENCE:
             self._line(f"… {text}")
 
@@ -127,7 +128,7 @@ class Terminal:
 
     def _line(self, text: str, style: str = "") -> None:
         self._told, self._told_count = time.monotonic(), self._count
-        line = f"[{self._count}/{self._total}] {self._times()}  {text}"
+        line = f"[{self._count}/{self._total}] {self._times()}  {visible(text)}"
         if self._bar is not None:
             self._bar.console.print(line, style=style, markup=False, highlight=False, soft_wrap=True)
         else:

@@ -72,6 +72,14 @@ def process_room() -> float:
 
 def granted_room() -> float:
     """Return the bytes of this machine that Slurm grants the job, less what this process holds: more would end it."""
-    each_cpu = float(os.environ.get("SLURM_MEM_PER_CPU") or 0) * float(os.environ.get("SLURM_CPUS_ON_NODE") or 1)
-    granted = 1e6 * (float(os.environ.get("SLURM_MEM_PER_NODE") or 0) or each_cpu)  # 0: all there is
+    each_cpu = _told("SLURM_MEM_PER_CPU") * (_told("SLURM_CPUS_ON_NODE") or 1.0)
+    granted = 1e6 * (_told("SLURM_MEM_PER_NODE") or each_cpu)  # 0: all there is
     return max(0.0, granted - psutil.Process().memory_info().rss) if granted else inf
+
+
+def _told(name: str) -> float:
+    """Return a number of the environment, 0 where it tells none: who set it may not have been Slurm."""
+    with suppress(ValueError):
+        number = float(os.environ.get(name) or 0)
+        return number if 0 < number < inf else 0.0
+    return 0.0

@@ -1,6 +1,7 @@
 """The case store: every record on disk, in one SQLite file, the moment it exists."""
 
 import itertools
+import re
 import sqlite3
 import time
 from collections.abc import Iterable, Iterator
@@ -8,12 +9,16 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
+from shlex import quote
 
 from pipeline.plan.cost import CostModel, fit
 from pipeline.run.record import Record
 from pipeline.stages import stage
 
-SCHEMA = "CREATE TABLE IF NOT EXISTS records (key TEXT PRIMARY KEY, record TEXT NOT NULL, stored REAL NOT NULL)"
+_COLUMNS = "records (key TEXT PRIMARY KEY, record TEXT NOT NULL, stored REAL NOT NULL)"
+SCHEMA = f"CREATE TABLE IF NOT EXISTS {_COLUMNS}"
+# As SQLite writes it into the file, and how it begins what else is no program.
+_RECORDS, _PLAIN = f"CREATE TABLE {_COLUMNS}", re.compile(r"CREATE (TABLE|(UNIQUE )?INDEX) ", re.IGNORECASE)
 # Two runs may share a store: each write takes milliseconds, so half a minute means that something hangs.
 PATIENCE = 30.0
 # Records that the cost model is fitted to: the newest.
@@ -182,14 +187,20 @@ class Store(Records):
 def guard(database: sqlite3.Connection) -> None:
     """Let a file that a stranger made be data only.
 
+    What it declares is held against what may be, not against what may not: SQLite takes the same words in many ways.
+
     Raises:
-        sqlite3.DatabaseError: if it holds views, triggers or tables that are programs: a case store has none.
+        sqlite3.DatabaseError: if it holds views, triggers or tables that are programs, or if its records are not plain
+            columns (those that are computed would fill the memory): a case store has none.
     """
     database.execute("PRAGMA trusted_schema = OFF")
+    database.execute("PRAGMA cell_size_check = ON")
     database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LONGEST)
-    programs = "SELECT name FROM sqlite_master WHERE type IN ('view', 'trigger') OR sql LIKE 'CREATE VIRTUAL%'"
-    if found := database.execute(programs).fetchone():
-        raise sqlite3.DatabaseError(f"it has a view, a trigger or a virtual table, {found[0]!r}: it is no case store")
+    for name, table, sql in database.execute("SELECT name, tbl_name, sql FROM sqlite_master WHERE sql IS NOT NULL"):
+        if not _PLAIN.match(sql):
+            raise sqlite3.DatabaseError(f"it has a view, a trigger or a virtual table, {name!r}: it is no case store")
+        if table.lower() == "records" and " ".join(sql.split()) != _RECORDS:
+            raise sqlite3.DatabaseError(f"its {name!r} is not that of a case store")
 
 
 def _open(path: Path) -> sqlite3.Connection:
@@ -221,7 +232,7 @@ def damaged(path: Path, error: Exception) -> str:
 
 
 def _mend(path: Path) -> str:
-    return f"`epsmesh store prune --store {path} --yes`"
+    return f"`epsmesh store prune --store {quote(str(path))} --yes`"
 
 
 def _readable(text: str) -> Record | None:

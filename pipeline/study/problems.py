@@ -3,7 +3,6 @@
 import difflib
 import json
 import re
-import unicodedata
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -13,6 +12,7 @@ from pydantic import BaseModel, ValidationError
 
 from pipeline.shapes.section import Section
 from pipeline.study.howto import page_of
+from pipeline.visible import visible
 
 # Letters of a value, or of a key, that a message repeats.
 _QUOTED = 200
@@ -230,14 +230,6 @@ def _hashable(value: Any) -> Any:
 def shortened(text: str) -> str:
     """Return a text of the file as a message quotes it: its beginning, if it is long."""
     return text if len(text) <= _QUOTED else f"{text[:_QUOTED]}…"
-
-
-def visible(text: str) -> str:
-    """Return ``text`` with what one cannot see written out: it could move the cursor, or hide what is written."""
-    return "".join(
-        letter if letter.isprintable() or unicodedata.category(letter) == "Zs" else
-        letter.encode("unicode_escape").decode() for letter in text
-    )  # fmt: skip
 
 
 def _toml(value: Any) -> str:

@@ -33,6 +33,9 @@ def test_what_slurm_grants(monkeypatch):
     assert FreeMemory(MPI.COMM_SELF).available() == pytest.approx(100e6, rel=0.5)
     monkeypatch.setenv("SLURM_MEM_PER_CPU", "1")
     assert FreeMemory(MPI.COMM_SELF).available() == 0.0
+    for nothing in ("4G", "lots", "nan", "-1", "inf"):
+        monkeypatch.setenv("SLURM_MEM_PER_CPU", nothing)
+        assert FreeMemory(MPI.COMM_SELF).available() > 0.5 * free
 
 
 def test_a_case_that_needs_more_than_granted_fails_with_its_reason(monkeypatch):
