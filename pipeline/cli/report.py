@@ -28,6 +28,9 @@ def plot(
             show_default=False,
         ),
     ] = None,
+    rest: Annotated[
+        bool, typer.Option("--rest", help="Draw what a figure of a large study leaves out, too: <study>_<kind>_2.png …")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Draw the figures of a dataset, as PNG and SVG, beside it.
@@ -47,7 +50,7 @@ def plot(
         if lack := lacks(dataset, name):
             allowed = f"{lack}; its figures are {', '.join(choose(dataset))}"
             fail(Fault(f"{path}: --kind {name} {allowed}", str(path), "--kind", name, allowed))
-    pictures = draw(dataset, path.with_suffix(""), kinds=kind or choose(dataset))
+    pictures = draw(dataset, path.with_suffix(""), kinds=kind or choose(dataset), rest=rest)
     if as_json:
         print_json({"file": str(path), "files": [str(picture) for picture in pictures]})
         return

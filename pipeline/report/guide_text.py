@@ -53,16 +53,24 @@ def question(guide: Guideline) -> list[str]:
 
 def answer(guide: Guideline) -> list[str]:
     """Return the chosen setting, what it costs and what limits it, and the one with the law of correction."""
+    return [setting(guide), *(f"  {name:<11}  {words}" for name, words in details(guide)), *others(guide)]
+
+
+def setting(guide: Guideline) -> str:
+    """Return the chosen setting, or the best one where none does what was asked for."""
     if guide.answer is None:
-        lines = [f"No setting of this study does that{_nearest(guide)}"]
-        if guide.best:
-            lines += _details(guide.best, guide)
-    else:
-        smallest = "Smallest ε" if "epsilon" in guide.answer.labels else "Fewest unknowns"
-        what = smallest if isfinite(guide.accuracy) else "Most accurate"
-        lines = [f"{what}: {words(guide.answer.labels)}", *_details(guide.answer, guide)]
-        if guide.lean and guide.lean is not guide.answer and guide.lean.dofs < guide.answer.dofs:
-            lines.append(f"Fewest unknowns: {words(guide.lean.labels)} ({cost(guide.lean)})")
+        return f"No setting of this study does that{_nearest(guide)}"
+    smallest = "Smallest ε" if "epsilon" in guide.answer.labels else "Fewest unknowns"
+    what = smallest if isfinite(guide.accuracy) else "Most accurate"
+    return f"{what}: {words(guide.answer.labels)}"
+
+
+def others(guide: Guideline) -> list[str]:
+    """Return the setting with the fewest unknowns, and those with laws of correction."""
+    lines = []
+    chosen, lean = guide.answer, guide.lean
+    if chosen and lean and lean is not chosen and lean.dofs < chosen.dofs:
+        lines.append(f"Fewest unknowns: {words(lean.labels)} ({cost(lean)})")
     corrected = guide.corrected or guide.best_corrected
     if corrected:
         law = corrected.correction
@@ -88,16 +96,20 @@ def _nearest(guide: Guideline) -> str:
     return f"; the quickest takes {time(quickest.seconds)}: {words(quickest.labels)}"
 
 
-def _details(verdict: Verdict, guide: Guideline) -> list[str]:
+def details(guide: Guideline) -> list[tuple[str, str]]:
+    """Return the elements of the chosen setting, what it costs, how sure it is and what limits it: names and words."""
+    verdict = guide.answer or guide.best
+    if verdict is None:
+        return []
     margin = guide.accuracy - verdict.error
     spare = f" (margin {percent(margin)})" if isfinite(margin) and margin >= 0 else ""
     limit = f" at {words(verdict.limit)}" if verdict.limit else ""
     return [
-        f"  elements     {elements(verdict.mesh)}",
-        f"  cost         {cost(verdict)}, on {guide.timing}",
-        *(f"  times        {doubt}" for doubt in guide.doubts),
-        f"  worst error  {percent(verdict.error)}{spare}; {percent(verdict.deviation)} without error bars",
-        f"  limited      {f'F = {newton(verdict.force)}, F_exact = {newton(verdict.exact)}'}{limit}",
+        ("elements", elements(verdict.mesh)),
+        ("cost", f"{cost(verdict)}, on {guide.timing}"),
+        *(("times", doubt) for doubt in guide.doubts),
+        ("worst error", f"{percent(verdict.error)}{spare}; {percent(verdict.deviation)} without error bars"),
+        ("limited", f"F = {newton(verdict.force)}, F_exact = {newton(verdict.exact)}{limit}"),
     ]
 
 

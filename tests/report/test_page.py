@@ -159,7 +159,13 @@ def test_what_was_struck_out_is_told_with_its_reason():
 
 
 def test_a_guide_stands_in_the_page_where_there_is_one(monkeypatch):
-    section = Section(("Smallest ε: <10 mm",), ({"ε": "10 mm", "error": "< 5 %"}, {"ε": "20 mm", "error": "1 %"}))
+    section = Section(
+        "Smallest ε: <10 mm",
+        "Asked for: <5 %",
+        (("cost", "<1 s"),),
+        (),
+        ({"ε": "10 mm", "error": "< 5 %"}, {"ε": "20 mm", "error": "1 %"}),
+    )
     monkeypatch.setattr(page, "guide_section", lambda _: section)
     text = render(small(), "small")
     answer, settings = '<section id="answer">.*Smallest ε: &lt;10 mm', '<section id="guide">.*<td>&lt; 5 %</td>'
@@ -173,7 +179,18 @@ def test_the_guide_of_the_page_is_that_of_the_epsmesh():
     section, found = guide_section(chosen.dataset()), guide(chosen.dataset(), ACCURACY)
     assert section is not None
     assert len(section.rows) == len(found.verdicts)
-    assert section.lines[0] in str(found)
+    assert section.setting in str(found)
+    assert section.question in str(found)
+    assert {name for name, _ in section.details} >= {"how sure: worst error", "cost", "mesh"}
+    assert all(line in str(found) for line in (*(words for _, words in section.details), *section.others))
+
+
+def test_the_report_begins_with_the_answer():
+    told = Reader(render(chosen.dataset(), "chosen")).texts
+    section = guide_section(chosen.dataset())
+    seen = [text.strip() for text in told if text.strip()]
+    assert seen.index(section.setting) < seen.index("cases")
+    assert all(seen.index(words) < seen.index("cases") for _, words in section.details)
 
 
 @pytest.mark.parametrize("study", [{}, {"failed": 99}, {"mesh": {"outside": ["coarse", "free"], "epsilon": "8 mm"}}])

@@ -7,11 +7,14 @@ import pytest
 import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from pipeline.report.figures import choose, figure
+from pipeline.report.figures import choose, draw, figure
 from pipeline.report.figures.axis import log_axis
+from pipeline.report.figures.epsilon import epsilon_layout
 from pipeline.report.figures.names import Places
+from pipeline.report.figures.parts import parts
 from pipeline.report.figures.style import new_figure
 from pipeline.report.figures.text import shortened, width_of, wrapped
+from pipeline.report.page import render
 from tests.cases import raw
 from tests.report.synthetic import EPSILONS, FIGURE, dataset
 
@@ -77,6 +80,43 @@ def test_curves_that_are_left_out_of_forces_are_told():
     assert "4 of 5 values of ν" in words.replace("\n", " ")
 
 
+def test_parts_hold_what_a_figure_leaves_out():
+    young = ["8 kPa", "10 kPa"]
+    radii = [{**raw()["probe"], "radius": f"{r} mm", "name": f"disc {r}"} for r in (1, 1.5, 2, 3)]
+    study = {"probe": radii, "material": {"poisson": [round(0.04 * i, 2) for i in range(12)], "young": young},
+             "mesh": {"epsilon": ["4 mm", "full"], "outside": ["coarse", "free"], "degree": [1, 2]}}  # fmt: skip
+    data = by_probe(dataset(**study))
+    data["force_ratio"] = data["force_ratio"] * (1 + 0.01 * data["degree"])
+    dims = ("poisson", "probe", "degree", "outside")
+    layout = epsilon_layout(data)
+    seen = {cell for row in layout.rows for column in layout.columns for curve in layout.curves
+            for cell in cells(data, dims, layout.at | row | column | curve)}  # fmt: skip
+    every = set(itertools.product(*(data[dim].values for dim in dims)))
+    assert seen < every
+    found = parts(data, "epsilon")
+    for words, part in found:
+        inner = epsilon_layout(part)
+        assert not inner.part
+        assert not inner.fixed
+        assert words
+        seen |= set(itertools.product(*(part[dim].values for dim in dims)))
+    assert seen == every
+    assert parts(by_probe(dataset(**FIGURE)), "epsilon") == []
+    assert parts(data, "force") == []
+
+
+def test_the_rest_of_a_large_study_is_drawn_where_it_is_asked_for(tmp_path):
+    study = {**FIGURE, "probe": [{**raw()["probe"], "radius": f"{r} mm", "name": f"disc {r}"} for r in (1, 2, 3, 4)]}
+    data = by_probe(dataset(**study))
+    count = len(parts(data, "ratio"))
+    names = [path.name for path in draw(data, tmp_path / "a", ["svg"], ["ratio"], rest=True)]
+    assert names == ["a_ratio.svg", *(f"a_ratio_{number}.svg" for number in range(2, count + 2))]
+    assert count > 0
+    page = render(data, "a")
+    assert page.count("<details>") == 1
+    assert f"leaves out: {len(parts(data, 'epsilon'))} more" in page
+
+
 def test_names_of_points_cover_neither_points_nor_lines_nor_each_other():
     rng = np.random.default_rng(0)
     x, y = rng.uniform(0, 3, 40), rng.uniform(0, 2, 40)
@@ -127,6 +167,11 @@ def test_lines_are_no_wider_than_asked():
     assert len(cut) == 2
     assert cut[-1].endswith("…")
     assert width_of(cut[-1], 8) <= 1.0
+
+
+def cells(data, dims, selection):
+    """Return the combinations along ``dims`` that a selection holds."""
+    return itertools.product(*([selection[dim]] if dim in selection else data[dim].values for dim in dims))
 
 
 def by_probe(data):

@@ -18,6 +18,7 @@ from pipeline.report.figures.force import force, nothing
 from pipeline.report.figures.linear import linear
 from pipeline.report.figures.loads import loads
 from pipeline.report.figures.map import force_map
+from pipeline.report.figures.parts import parts
 from pipeline.report.figures.style import STYLE, save
 from pipeline.report.figures.text import shortened
 from pipeline.report.words import is_numeric
@@ -32,11 +33,17 @@ FIGURES: dict[str, Callable[[xr.Dataset, str, str], Figure]] = {
 
 
 def draw(
-    dataset: xr.Dataset, stem: Path, formats: Sequence[str] = ("png", "svg"), kinds: Sequence[str] | None = None
+    dataset: xr.Dataset,
+    stem: Path,
+    formats: Sequence[str] = ("png", "svg"),
+    kinds: Sequence[str] | None = None,
+    *,
+    rest: bool = False,
 ) -> list[Path]:
     """Draw figures of ``dataset``, by default its main one; return the files written.
 
-    The main figure goes to ``<stem>.png`` and ``.svg``, those of other ``kinds`` to ``<stem>_<kind>.png`` and ``.svg``.
+    The main figure goes to ``<stem>.png`` and ``.svg``, those of other ``kinds`` to ``<stem>_<kind>.png`` and ``.svg``,
+    and, with the ``rest``, what each leaves out to ``<stem>_<kind>_2.png`` and so on.
     """
     main = choose(dataset)[0]
     paths = []
@@ -45,6 +52,10 @@ def draw(
         with mpl.rc_context(STYLE):
             drawn = figure(dataset, kind)
             paths += [save(drawn, stem.with_name(f"{name}.{suffix}")) for suffix in formats]
+        for number, (words, part) in enumerate(parts(dataset, kind) if rest else [], start=2):
+            titled = part.assign_attrs(title=" – ".join(filter(None, (str(part.attrs.get("title", "")), words))))
+            drawn = figure(titled, kind)
+            paths += [save(drawn, stem.with_name(f"{stem.name}_{kind}_{number}.{suffix}")) for suffix in formats]
     return paths
 
 

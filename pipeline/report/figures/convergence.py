@@ -20,7 +20,7 @@ _QUANTITIES = ("error", "dofs")
 def convergence(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     """The error of F over what is refined, and below it over the number of unknowns."""
     reference, data = with_error(dataset)
-    layout = arrange(data, ("error",), next(iter(refinements(data)), main_dimension(data)))
+    layout = _layout(data)
     figure = grid(layout, _QUANTITIES, height=2.0, share="y")
     unknowns = bounds(shown_of(data["dofs"], layout))
     for panel in panels(figure, data, layout, _QUANTITIES):
@@ -35,6 +35,15 @@ def convergence(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     crossing = f"hollow: F below F_{reference}, dotted where it passes that" if data["is_below"].any() else ""
     finish(figure, title, notes(reference, data, crossing, layout.note), warning)
     return figure
+
+
+def convergence_layout(dataset: xr.Dataset) -> Layout:
+    """Return what the figure of errors shows."""
+    return _layout(with_error(dataset)[1])
+
+
+def _layout(data: xr.Dataset) -> Layout:
+    return arrange(data, ("error",), next(iter(refinements(data)), main_dimension(data)))
 
 
 def mark_floor(ax: Axes, data: xr.Dataset) -> None:

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.report.figures.axis import log_axis
-from pipeline.report.figures.layout import arrange
+from pipeline.report.figures.layout import Layout, arrange
 from pipeline.report.figures.panels import draw_curves, draw_spread, grid, panels, share_columns, share_heights
 from pipeline.report.figures.style import CLAIM, LINE, finish
 from pipeline.report.table import study_of
@@ -23,8 +23,7 @@ CLAIM_EPSILON, CLAIM_RATIO, CLAIM_SPEEDUP = 10e-3, 0.8, 50.0
 
 def epsilon(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     """F/F_max, with a slit that of the energy released, and below it the speed-up, against ε."""
-    released = [name for name in ("energy_release_ratio",) if name in dataset]
-    return _against_epsilon(dataset, ("force_ratio", *released, "speedup"), title, warning)
+    return _against_epsilon(dataset, _quantities(dataset), title, warning)
 
 
 def ratio(dataset: xr.Dataset, title: str, warning: str) -> Figure:
@@ -35,6 +34,16 @@ def ratio(dataset: xr.Dataset, title: str, warning: str) -> Figure:
 def speedup(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     """Speed-up over the full order against ε."""
     return _against_epsilon(dataset, ("speedup",), title, warning)
+
+
+def epsilon_layout(dataset: xr.Dataset) -> Layout:
+    """Return what the figure against ε shows."""
+    return arrange(dataset, _quantities(dataset), "epsilon")
+
+
+def _quantities(dataset: xr.Dataset) -> tuple[str, ...]:
+    released = [name for name in ("energy_release_ratio",) if name in dataset]
+    return ("force_ratio", *released, "speedup")
 
 
 def _against_epsilon(dataset: xr.Dataset, quantities: Sequence[str], title: str, warning: str) -> Figure:

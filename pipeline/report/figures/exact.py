@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from pipeline.report.figures.axis import log_axis
 from pipeline.report.figures.dimensions import main_dimension
-from pipeline.report.figures.layout import arrange
+from pipeline.report.figures.layout import Layout, arrange
 from pipeline.report.figures.panels import draw_curves, grid, panels, share_columns
 from pipeline.report.figures.style import LINE, QUIET, finish
 from pipeline.report.words import at_most, formula
@@ -17,7 +17,7 @@ _FAR = 3.0
 
 def exact(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     """F/F_exact with both error bars: the case's own at each point, that of F_exact as a band around 1."""
-    layout = arrange(dataset, ("accuracy",), main_dimension(dataset))
+    layout = exact_layout(dataset)
     figure = grid(layout, ("accuracy",), height=2.2)
     shown = list(panels(figure, dataset, layout, ("accuracy",)))
     for panel in shown:
@@ -36,3 +36,8 @@ def exact(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     note = f"bars: 95 % error bars of F; grey band: that of F_exact{at_most(dataset['force_exact_error'])}"
     finish(figure, title, "; ".join(filter(None, (note, layout.note))), warning)
     return figure
+
+
+def exact_layout(dataset: xr.Dataset) -> Layout:
+    """Return what the figure of F/F_exact shows."""
+    return arrange(dataset, ("accuracy",), main_dimension(dataset))

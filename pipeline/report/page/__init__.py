@@ -10,12 +10,17 @@ import xarray as xr
 from pipeline.files import write_whole
 from pipeline.html import joined, render_page
 from pipeline.report.figures import FIGURES, choose, figure
+from pipeline.report.figures.parts import parts
 from pipeline.report.page.cases import FIRST_ROWS, case_table
 from pipeline.report.page.facts import facts, failures, provenance, reproduce, without_exact
 from pipeline.report.page.guideline import guide_section
 from pipeline.report.page.inline import inline_svg
 from pipeline.report.page.skipped import origins, skipped, struck
 
+# What the answer says of times, and the headlines need not say again.
+_TOLD = "speed-ups"
+# Parts of the main figure, beside itself, that the page holds.
+_MOST_PARTS = 6
 _TEMPLATES = Path(__file__).parent / "templates"
 _SCRIPT = re.compile(r"'sha256-[A-Za-z0-9+/=]+'")
 
@@ -34,13 +39,15 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
     A page in a page is bound by the policies of both: the report's must allow the scripts of the ``scene``.
     """
     study = str(dataset.attrs.get("study", ""))
+    guide = guide_section(dataset)
     table = case_table(dataset)
     return render_page(
         _TEMPLATES / "page.html.j2", joined(_TEMPLATES / "page.js"),
         title=dataset.attrs.get("title", name), name=name, style=joined(_TEMPLATES / "page.css"),
         scene=scene, scene_scripts=_SCRIPT.findall(scene)[:1],
-        facts=facts(dataset), failures=failures(dataset), without_exact=without_exact(dataset),
-        figures=_figures(dataset), guide=guide_section(dataset), table=table, first_rows=FIRST_ROWS,
+        facts=[fact for fact in facts(dataset) if not (guide and fact[0] == _TOLD)],
+        failures=failures(dataset), without_exact=without_exact(dataset),
+        figures=_figures(dataset), guide=guide, table=table, first_rows=FIRST_ROWS,
         struck=struck(dataset), origins=origins(dataset), skipped=skipped(dataset),
         study=study, study_link=f"data:text/plain;charset=utf-8,{quote(study)}",
         provenance=provenance(dataset), commands=reproduce(dataset, name),
@@ -49,10 +56,20 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
 
 def _figures(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the figures that suit the study, as SVG to stand in the page, with what they show."""
-    found = []
+    found: list[dict[str, Any]] = []
     for kind in choose(dataset):
         if kind != "nothing":
             svg, width = inline_svg(figure(dataset, kind, titled=False), kind)
             caption = (FIGURES[kind].__doc__ or "").strip().rstrip(".")
-            found.append({"kind": kind, "caption": caption, "svg": svg, "width": width})
+            left_out = [] if found else parts(dataset, kind)
+            drawn = [_part(kind, place, *part) for place, part in enumerate(left_out[:_MOST_PARTS], start=2)]
+            unseen = len(left_out) - len(drawn)
+            found.append(
+                {"kind": kind, "caption": caption, "svg": svg, "width": width, "parts": drawn, "unseen": unseen}
+            )
     return found
+
+
+def _part(kind: str, place: int, words: str, dataset: xr.Dataset) -> dict[str, Any]:
+    """Return a part of what a figure leaves out, as SVG, with what it shows."""
+    return {"caption": words, "svg": inline_svg(figure(dataset, kind, titled=False), f"{kind}-{place}")[0]}

@@ -6,19 +6,28 @@ import xarray as xr
 
 from pipeline.report.guide import guide
 from pipeline.report.guide_settings import ERROR, OFF, RATIO, TIME, UNKNOWNS, USUAL, range_of, settings
-from pipeline.report.guide_text import answer, question
+from pipeline.report.guide_text import details, others, question, setting
 from pipeline.report.guide_words import heads
 from pipeline.report.table import DatasetError
 
 # The accuracy that the report asks for; `epsmesh guide` answers for any.
 ACCURACY = "5 %"
+# What the report calls the details of an answer, in its order.
+_NAMES = {"worst error": "how sure: worst error", "cost": "cost", "times": "times", "elements": "mesh",
+          "limited": "limited by"}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Section:
-    """What is asked and the answer, in lines, and a row for each mesh setting: heading to text."""
+    """The answer: the setting, what was asked for, names and words of what it is worth, the law of correction in lines.
 
-    lines: tuple[str, ...]
+    Below it stand all mesh settings, ``rows`` of heading to text.
+    """
+
+    setting: str
+    question: str
+    details: tuple[tuple[str, str], ...]
+    others: tuple[str, ...]
     rows: tuple[dict[str, str], ...]
 
 
@@ -30,4 +39,6 @@ def guide_section(dataset: xr.Dataset) -> Section | None:
         return None
     columns = [*heads(found), ERROR, UNKNOWNS, USUAL, TIME, range_of(found), RATIO, OFF]
     rows = [{name: row.get(name, "") for name in columns} for row in settings(found)]
-    return Section((*question(found), *answer(found)), tuple(rows))
+    named = [(name, [words for other, words in details(found) if other == name]) for name in _NAMES]
+    told = tuple((_NAMES[name], "; ".join(words)) for name, words in named if words)
+    return Section(setting(found), " ".join(question(found)), told, tuple(others(found)), tuple(rows))

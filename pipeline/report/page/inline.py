@@ -30,5 +30,5 @@ def inline_svg(figure: Figure, name: str) -> tuple[Markup, int]:
     points = float(re.findall(r'width="([\d.]+)pt"', head)[0])
     width = round(points * 4 / 3)
     head = re.sub(r' (width|height)="[^"]*"', "", head)
-    head = f'{head} style="max-width: {width}px; min-width: {points:.0f}px" aria-hidden="true"'
+    head = f'{head} style="max-width: {1.3 * width:.0f}px; min-width: {points:.0f}px" aria-hidden="true"'
     return Markup(f"{head}>{_COLOUR.sub(lambda found: _THEME[found[0]], rest)}".strip()), width
