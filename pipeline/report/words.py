@@ -9,6 +9,8 @@ import xarray as xr
 from pipeline import quantities
 
 _NUMBER = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
+# Of sizes and semi-axes, the last word of their dimensions' names.
+_SIZES = ("size", "axes")
 _POINT = re.compile(rf"{_NUMBER} (?P<unit>[a-zµ]+)(?: {_NUMBER} (?P=unit))+\b")
 
 
@@ -25,13 +27,20 @@ def number(array: xr.DataArray, value: Any) -> str:
 def choice(coordinate: xr.DataArray, value: Any) -> str:
     """Write a choice along a dimension: ``ν = 0.45``, ``ε = full``, ``outside free``, or a table's own name."""
     if isinstance(value, str):
-        return value if coordinate.name in ("probe", "body") else f"{symbol(coordinate)} {points(value)}"
+        return value if coordinate.name in ("probe", "body") else f"{symbol(coordinate)} {lengths(coordinate, value)}"
     return f"{symbol(coordinate)} = {re.sub(r'^-', '−', number(coordinate, value))}"
 
 
 def choices(dataset: xr.Dataset, selection: dict[str, Any]) -> str:
     """Write a choice along several dimensions."""
     return ", ".join(choice(dataset[name], value) for name, value in selection.items())
+
+
+def lengths(coordinate: xr.DataArray, text: str) -> str:
+    """Return ``text`` with points, or, of sizes, with products as people write them: ``40 × 40 × 20 mm``."""
+    if str(coordinate.name).rsplit("_", 1)[-1] not in _SIZES:
+        return points(text)
+    return _POINT.sub(lambda found: f"{' × '.join(found[0].split()[::2])} {found['unit']}", text)
 
 
 def points(text: str) -> str:

@@ -156,7 +156,8 @@ def test_report_and_guide_agree_on_every_number():
         {name: one.get(name, "") for name in row} for row, one in zip(section.rows, known, strict=True)
     ]
     words = text(found)
-    assert all(line in words for line in section.lines)
+    details = [piece for _, told in section.details for piece in told.split("; ")]
+    assert all(line in words for line in (section.question, section.setting, *details, *section.others))
     told = {tuple(re.split(r"\s{2,}", line.strip())[:6]) for line in words.splitlines()}
     names = ("outside", "ε", "worst error", "usual", "time", "unknowns")
     assert {tuple(row[name] for name in names) for row in section.rows} < told

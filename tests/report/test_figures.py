@@ -12,7 +12,7 @@ from pipeline.report.figures.axis import horizontal
 from pipeline.report.figures.layout import arrange
 from pipeline.report.figures.style import COLOURS
 from pipeline.report.pareto import front, is_by_chance
-from pipeline.report.words import points
+from pipeline.report.words import choice, points
 from pipeline.study.problems import StudyError
 from tests.report.synthetic import EPSILONS, FIGURE, dataset
 
@@ -244,5 +244,8 @@ def test_earlier_figure_survives_a_failed_drawing(tmp_path):
 
 def test_points_are_written_as_people_write_them():
     assert points("0 mm 2 mm -7 mm") == "(0, 2, −7) mm"
+    size = xr.DataArray(["40 mm 50.5 mm 20 mm"], dims="body_size", name="body_size", attrs={"units": "m"})
+    assert choice(size, "40 mm 50.5 mm 20 mm").endswith("40 × 50.5 × 20 mm")
+    assert horizontal(size).texts[0].startswith("40 × 50.5 × 20")
     assert points("around 1.5 mm 0 mm -3 mm radius 5 mm") == "around (1.5, 0, −3) mm radius 5 mm"
     assert [points(text) for text in ("disc 3 mm", "10 mm 20 kPa", "coarse")] == ["disc 3 mm", "10 mm 20 kPa", "coarse"]

@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from pipeline.report.figures.text import fits, shortened, width_of, wrapped
-from pipeline.report.words import heading, is_numeric, number, points, scale
+from pipeline.report.words import heading, is_numeric, lengths, number, scale
 
 _SIZE = 8.0  # points: what is written at an axis
 _GAP = 0.06  # inches between two texts
@@ -76,8 +76,8 @@ def horizontal(coordinate: xr.DataArray) -> Horizontal:
     if not is_numeric(coordinate):
         row = np.arange(len(values), dtype=float)
         head = heading(coordinate)
-        written = [points(str(value)) for value in values]
-        if head.endswith(" (mm)") and all(text.endswith(") mm") for text in written):
+        written = [lengths(coordinate, str(value)) for value in values]
+        if head.endswith(" (mm)") and all(text.endswith(" mm") and (")" in text or "×" in text) for text in written):
             written = [text.removesuffix(" mm") for text in written]
         return Horizontal(row, tuple(written), head, joins=False)
     factor, unit = scale(coordinate)
