@@ -151,6 +151,14 @@ class Probe(Section, ABC):
         """Radius of the smallest circle round the footprint (m)."""
 
     @property
+    def pressed(self) -> float:
+        """Radius (m) of the smallest circle round what goes below the surface: tissue that is held there is in the way.
+
+        Of a flat tool that is all of its footprint.
+        """
+        return self.circumradius
+
+    @property
     @abstractmethod
     def half_width(self) -> float:
         """Half of the footprint's smallest extent (m)."""

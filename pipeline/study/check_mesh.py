@@ -7,7 +7,8 @@ from pipeline.shapes.body import Body
 from pipeline.shapes.contact import is_flat, is_level
 from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.indenter import Indenter
-from pipeline.shapes.probe import Probe
+from pipeline.shapes.probe import ON_EDGE, Probe
+from pipeline.shapes.probes.wedge import Wedge
 from pipeline.shapes.section import in_mm
 from pipeline.study.place import held_gap
 from pipeline.study.problems import Problems
@@ -46,9 +47,16 @@ def held_gaps(body: Body, probe: Probe, mesh: Mesh) -> dict[str, float]:
 
 
 def check_column(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
-    """Refuse a column below a face that is none to stand a column under."""
+    """Refuse a column below a face that is none to stand a column under, and one that contact runs out of."""
     frame = probe.frame_on(body)
-    if not mesh.is_closed and isfinite(mesh.column(body.reach(frame))) and not is_level(body, frame):
+    column = mesh.column(body.reach(frame))
+    if mesh.outside == "free" and isinstance(probe, Wedge) and column <= (1 + ON_EDGE) * probe.length / 2:
+        problems.error(
+            "mesh.epsilon", in_mm(mesh.epsilon),
+            f"keeps a column that contact along the wedge runs out of: must be above half its length, "
+            f'{in_mm(probe.length / 2)}, or use outside = "coarse"',
+        )  # fmt: skip
+    elif not mesh.is_closed and isfinite(column) and not is_level(body, frame):
         problems.error(
             "mesh.outside", mesh.outside,
             "a column is kept below a level face that the probe presses straight down on only: "
@@ -58,14 +66,31 @@ def check_column(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> No
 
 def check_gap(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
     """Between the probe and a held face there must be room for an element, or F is that of the element."""
+    if _meets_held_column(body, probe, mesh):
+        problems.error(
+            "mesh.epsilon", in_mm(mesh.epsilon),
+            f"keeps a column that is held at its side, and that the {probe.shape} reaches, {in_mm(probe.pressed)} from "
+            f'its axis: must be above that, or use outside = "coarse" or "free"',
+        )  # fmt: skip
+        return
     if mesh.accuracy is not None and "rim" not in mesh.model_fields_set:
         return
     for key, gap in held_gaps(body, probe, mesh).items():
         if gap < mesh.rim_size(probe.half_width):
             problems.error(
-                key, None, f"leaves {in_mm(gap)} between the probe's edge and a held face, less than an element there: "
+                key, in_mm(mesh.epsilon) if key == "mesh.epsilon" else None,
+                f"leaves {in_mm(gap)} between the probe's edge and a held face, less than an element there: "
                 f"use a rim below {in_mm(gap)}",
             )  # fmt: skip
+
+
+def _meets_held_column(body: Body, probe: Probe, mesh: Mesh) -> bool:
+    """Tell whether the tissue would have to be pushed in where it is held, which no displacement does."""
+    frame = probe.frame_on(body)
+    if mesh.outside != "fixed" or probe.slit is not None or not is_level(body, frame):
+        return False
+    column = mesh.column(body.reach(frame))
+    return column <= probe.pressed * (1 + ON_EDGE)
 
 
 def check_epsilon(mesh: Mesh, probe: Probe, problems: Problems) -> None:

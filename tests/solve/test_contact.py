@@ -169,14 +169,25 @@ def test_contact_that_is_cut_off_is_refused():
 
 
 def test_what_may_touch_may_be_held_as_long_as_it_does_not():
-    """In a held column narrower than the candidates F is that of the meridian; a tool that reaches the column fails."""
+    """In a held column narrower than the candidates F is that of the meridian; a tool that reaches its side fails."""
     column = {"epsilon": "1.6 mm", "outside": "fixed"}
     known = solve(body=SMALL, probe=SPHERE, mesh=COARSE | column, plan={"without": []})[()]
     found = record(mesh=column)
     assert known.origin == "axisymmetric"
     assert found.force == pytest.approx(known.force, rel=found.force_error)
-    (wide,) = solve(body=SMALL, probe=DISC | {"radius": "1.6 mm"}, mesh=COARSE | column).values()
-    assert "runs into what is held" in wide.message
+    flat = Tool(lambda x: np.zeros(len(x)), lambda x: np.ones(len(x), dtype=bool))
+    with pressed(flat, mesh=COARSE | column) as (problem, law, loads), pytest.raises(ContactError, match="runs into"):
+        problem.solve(law, loads)
+
+
+def test_a_tool_may_come_as_near_to_a_held_column_as_it_does_not_go_below_the_surface_there():
+    """What a study is refused for is what a run would fail for: 10 mm - (10² - r²)^½ = 0.1 mm at r = 1.411 mm."""
+    for model in ("auto", "3d"):
+        mesh = COARSE | {"outside": "fixed", "rim": "0.2 mm", "model": model}
+        (found,) = solve(body=SMALL, probe=SPHERE, mesh=mesh | {"epsilon": "1.413 mm"}, plan={"without": []}).values()
+        assert found.status == "ok", found.message
+        with pytest.raises(StudyError, match=r'epsilon = "1.41 mm": .* sphere reaches, 1.411 mm .* must be above'):
+            study(body=SMALL, probe=SPHERE, mesh=mesh | {"epsilon": "1.41 mm"})
 
 
 def test_other_degrees_are_refused():

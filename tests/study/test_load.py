@@ -13,6 +13,8 @@ STUDIES = sorted(Path("studies").glob("*.toml"))
 
 ELLIPSE = {"shape": "ellipse", "axes": ["3 mm", "1 mm"], "depth": "0.1 mm"}
 
+WEDGE = {"shape": "wedge", "angle": "75 deg", "length": "4 mm", "depth": "0.1 mm"}
+
 CLOSED = {"outside": "halfspace", "epsilon": "9 mm"}
 ELLIPSOID = {"shape": "ellipsoid", "axes": ["40 mm", "35 mm", "25 mm"], "fixed": {"below": "-6 mm"}}
 
@@ -136,6 +138,25 @@ MISTAKES = {
     ),
     "no room in the column": (
         {"mesh": {"outside": "fixed", "epsilon": "3.2 mm"}}, ["mesh.epsilon", "leaves 0.2 mm"],
+    ),
+    "held column as wide as the disc": (
+        {"mesh": {"outside": "fixed", "epsilon": "3 mm"}},
+        ['mesh.epsilon = "3 mm"', "the disc reaches, 3 mm from its axis", "must be above that", '"coarse" or "free"'],
+    ),
+    "held column within the disc": (
+        {"mesh": {"outside": "fixed", "epsilon": ["2 mm", "9 mm"]}}, ['mesh.epsilon = "2 mm"', "must be above"],
+    ),
+    "held column of an accuracy": (
+        {"mesh": {"outside": "fixed", "epsilon": "3 mm", "accuracy": "1 %"}}, ['mesh.epsilon = "3 mm"'],
+    ),
+    "held column within an ellipse": (
+        {"probe": ELLIPSE, "mesh": {"outside": "fixed", "epsilon": "2 mm"}}, ["the ellipse reaches, 3 mm"],
+    ),
+    "held column that the flanks of a wedge reach": (
+        {"probe": WEDGE, "mesh": {"outside": "fixed", "epsilon": "2.03 mm"}}, ["the wedge reaches, 2.035 mm"],
+    ),
+    "column that a wedge sticks out of": (
+        {"probe": WEDGE, "mesh": {"outside": "free", "epsilon": "2 mm"}}, ["mesh.epsilon", "above half its length, 2"],
     ),
     "half ball past the bottom": (
         {"mesh": CLOSED | {"epsilon": "20 mm"}}, ["mesh.epsilon", "inside the body: below 20 mm"],

@@ -30,6 +30,11 @@ class RoundIndenter(Indenter):
         return Disc.model_construct(shape="disc", radius=radius, depth=self.depth, at=self.at, axis=self.axis)
 
     @property
+    def pressed(self) -> float:
+        """Radius (m) at which the undeformed tool goes through the surface."""
+        return min(self.section.reach(self.depth), self.limit)
+
+    @property
     def contact_width(self) -> float:
         """Radius (m) of contact on an elastic half-space."""
         return min(self.section.contact_radius(self.depth), self.limit)

@@ -39,6 +39,11 @@ class Wedge(Indenter):
         )  # fmt: skip
 
     @property
+    def pressed(self) -> float:
+        """Distance (m) of the corners of what the undeformed tool presses below the surface."""
+        return hypot(self.length / 2, self.section.reach(self.depth))
+
+    @property
     def force_exponent(self) -> float | None:
         """None: the line load of an edge of some length goes with its depth and the logarithm of it."""
         return None
