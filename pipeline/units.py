@@ -5,6 +5,7 @@ few people write.
 """
 
 import re
+import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -116,8 +117,8 @@ def parse_quantity(text: Any, unit: str) -> float:
         raise _refusal(unit, f"{comma.group()} has a comma: write {whole}.{fraction}{others}")
     found = _NUMBER.match(plain)
     if found is None:
-        finite = "the number must be finite" if _NOT_FINITE.match(plain) else "it begins with a number"
-        raise _refusal(unit, finite)
+        finite = "the number must be finite" if _NOT_FINITE.match(plain) else "the number comes first"
+        raise _refusal(unit, finite + _foreign(plain))
     value, rest = float(found.group()), plain[found.end() :].strip()
     factor = _factor(rest, unit)
     if not rest and abs(value) >= 1:
@@ -140,7 +141,7 @@ def _factor(text: str, unit: str) -> float:
     if not text:
         raise _refusal(unit, f"the unit is missing; {allowed}")
     if not _UNIT.fullmatch(text):
-        raise _refusal(unit, f"one number and one unit are taken, and `{text}` is no unit; {allowed}")
+        raise _refusal(unit, f"one number and one unit are taken, and `{text}` is no unit; {allowed}{_foreign(text)}")
     for symbol, _ in _FACTOR.findall(text):
         if symbol not in _registry():
             meant = next((u for u in kind.units if u.casefold() == text.casefold()), None)
@@ -152,6 +153,12 @@ def _factor(text: str, unit: str) -> float:
     if not quantity.is_compatible_with(unit) or (not is_pure and unit in _PURE):
         raise _refusal(unit, f"`{text}` is no unit of {kind.name}; {allowed}")
     return float(quantity.to(unit).magnitude)
+
+
+def _foreign(text: str) -> str:
+    """Name the first letter, digit or dash of ``text`` that looks like one of a quantity and is none; "" if all are."""
+    found = next((c for c in text if not c.isascii() and c not in "µ°" and unicodedata.category(c)[0] in "LNPC"), None)
+    return "" if found is None else f"; `{found}` is {unicodedata.name(found, 'a sign')}"
 
 
 def _refusal(unit: str, why: str) -> PydanticCustomError:

@@ -6,6 +6,9 @@ from typing import Annotated, Any, Protocol
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
+# Lengths (m) from here on are written in metres: as millimetres the largest numbers would be infinite.
+_VAST = 1e300
+
 
 @dataclass(frozen=True)
 class Words:
@@ -40,6 +43,16 @@ class Problems(Protocol):
         """Report what is doubtful."""
 
 
+def words_of(model: type[BaseModel], name: str) -> Words:
+    """Return the words in the annotation of a field, or of the one that it narrows down."""
+    for owner in model.__mro__:
+        field = getattr(owner, "model_fields", {}).get(name)
+        found = [note for note in field.metadata if isinstance(note, Words)] if field else []
+        if found:
+            return found[-1]
+    raise TypeError(f"{model.__name__}.{name} has no words: add them to its annotation")
+
+
 def refuse(kind: str, later: tuple[str, ...], supported: tuple[str, ...]) -> BeforeValidator:
     """Refuse by name what the format describes and this version cannot compute."""
 
@@ -54,4 +67,4 @@ def refuse(kind: str, later: tuple[str, ...], supported: tuple[str, ...]) -> Bef
 
 def in_mm(length: float) -> str:
     """Write a length (m) for people."""
-    return f"{length * 1e3:.4g} mm"
+    return f"{length * 1e3:.4g} mm" if abs(length) < _VAST else f"{length:.4g} m"

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from pipeline.shapes.section import Section, Words
+from pipeline.shapes.section import Section, Words, words_of
 from pipeline.study.schema import NESTED, SECTIONS, TABLES
 
 
@@ -104,16 +104,6 @@ def shapes_of(section: str) -> dict[str, type[Section]]:
     outer, _, piece = section.partition(".")
     model = _inner(outer)[piece] if piece else SECTIONS[section]
     return dict(model) if isinstance(model, Mapping) else {"": model}
-
-
-def words_of(model: type[Section], name: str) -> Words:
-    """Return the words in the annotation of a field, or of the one that it narrows down."""
-    for owner in model.__mro__:
-        field = getattr(owner, "model_fields", {}).get(name)
-        found = [note for note in field.metadata if isinstance(note, Words)] if field else []
-        if found:
-            return found[-1]
-    raise TypeError(f"{model.__name__}.{name} has no words: add them to its annotation")
 
 
 def _takes(model: type[Section], name: str) -> str:

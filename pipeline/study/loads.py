@@ -14,6 +14,7 @@ from pipeline.units import Acceleration, Coordinate, Length, Stress
 FREE = "free"
 # A component of a unit vector, or a coordinate in units of a cap's radius, that is smaller is none.
 _NONE = 1e-12
+_COORDINATES = 3
 
 
 class Cap(BaseModel):
@@ -26,7 +27,8 @@ class Cap(BaseModel):
 
 def _on(value: Any) -> Any:
     if isinstance(value, dict):
-        if set(value) != {"around", "radius"}:
+        around = value.get("around")
+        if set(value) != {"around", "radius"} or not isinstance(around, tuple) or len(around) != _COORDINATES:
             raise PydanticCustomError(
                 "not_supported",
                 'a cap has a centre and a radius: {around = ["10 mm", "0 mm", "0 mm"], radius = "4 mm"}',

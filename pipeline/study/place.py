@@ -68,7 +68,7 @@ def _footprint(probe: Probe) -> str:
         return f"all that the {probe.shape} may touch, up to {in_mm(probe.circumradius)} from its axis,"
     if probe.slit and not probe.slit.is_open:
         return "the slit"
-    return f"the footprint of the {probe.shape}"
+    return f"the footprint of the {probe.shape}, up to {in_mm(probe.circumradius)} from its axis,"
 
 
 def _check_contact(body: Body, probe: Probe, frame: Frame) -> None:

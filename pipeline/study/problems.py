@@ -6,11 +6,11 @@ import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from pipeline.shapes.section import Section
+from pipeline.shapes.section import Section, words_of
 from pipeline.study.howto import page_of
 from pipeline.visible import visible
 
@@ -197,7 +197,11 @@ def _allowed(item: Any, model: type[BaseModel]) -> str:
         case "quantity":
             return f"must be {context['allowed']}"
         case "missing" | "too_short" | "too_long" | "tuple_type":
-            return f"must be a list of {_values(model.model_fields[str(item['loc'][0])].annotation)} values"
+            return _list_of(model, str(item["loc"][0]))
+        case "float_type" | "int_type":
+            return "must be a number, without a unit or quotation marks"
+        case "bool_type":
+            return "must be true or false, without quotation marks"
         case "string_pattern_mismatch":
             return "must begin with a letter, and have letters, digits, _ and - only"
         case "not_supported":
@@ -206,11 +210,13 @@ def _allowed(item: Any, model: type[BaseModel]) -> str:
             return item["msg"].replace("Input should be", "must be").replace("Value error, ", "")
 
 
-def _values(annotation: Any) -> str:
-    """Say how many values a list holds, by its type: a tuple, or a choice of things that one is among."""
+def _list_of(model: type[BaseModel], key: str) -> str:
+    """Say what a list holds, by the type of a key: a tuple, or a choice of things that one is among; and an example."""
+    annotation: Any = model.model_fields[key].annotation
     parts = (annotation, *getattr(annotation, "__args__", ()))
     items = next((part.__args__ for part in parts if getattr(part, "__origin__", None) is tuple), ())
-    return "2 or 3" if ... in items else str(len(items))
+    count = "" if get_origin(items[0]) is Literal else f" of {'2 or 3' if ... in items else len(items)} values"
+    return f"must be a list{count}, such as {words_of(model, key).example}"
 
 
 def _section_of(key: str) -> tuple[str, int]:

@@ -8,6 +8,7 @@ from math import inf
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field
+from pydantic_core import PydanticCustomError
 
 from pipeline.shapes.regions import Inclusion, Layer
 from pipeline.shapes.registry import BODIES, PROBES
@@ -65,7 +66,19 @@ def material_of(tissue: Tissue) -> Material:
 
 
 def _epsilon(value: Any) -> float:
-    return inf if value == "full" else parse_quantity(value, "m")
+    if value == "full":
+        return inf
+    try:
+        return parse_quantity(value, "m")
+    except PydanticCustomError as error:
+        allowed = error.message().replace('such as "10 mm"', 'such as "10 mm", or "full"', 1)
+        raise PydanticCustomError("quantity", "{allowed}", {"allowed": allowed}) from None
+
+
+def _degree(value: Any) -> Any:
+    if isinstance(value, bool):  # which would be 1
+        raise PydanticCustomError("not_supported", "must be 1, 2 or 3")
+    return value
 
 
 Epsilon = Annotated[float, BeforeValidator(_epsilon), Field(gt=0, json_schema_extra={"unit": "m"})]
@@ -127,7 +140,9 @@ class Mesh(Section):
             is_used=True,
         ),
     ] = "coarse"
-    degree: Annotated[Literal[1, 2, 3], Words("Degree of the displacement's polynomials.", "2")] = 2
+    degree: Annotated[
+        Literal[1, 2, 3], BeforeValidator(_degree), Words("Degree of the displacement's polynomials.", "2")
+    ] = 2
     element: Annotated[
         Literal["auto", "displacement", "mixed"],
         Words(
@@ -198,7 +213,7 @@ class Planning(Section):
 
     without: Annotated[
         tuple[Literal[REDUCTIONS], ...],  # type: ignore[valid-type]
-        Words("Reductions not to be used: see what `epsmesh plan` strikes out.", "[]"),
+        Words("Reductions not to be used: see what `epsmesh plan` strikes out.", '["symmetry"]'),
     ] = ()
     tolerance: Annotated[
         float,

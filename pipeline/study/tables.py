@@ -182,16 +182,22 @@ def _shared_sweeps(name: str, tables: list[Any]) -> dict[Place, list[Any]]:
 
 
 def _possible(name: str, raw: dict[str, Any], problems: Problems, where: str = "") -> dict[str, Any]:
-    """Return a section without the tables that its shape does not have, which are reported."""
+    """Return a section without the keys that other shapes have, and its own has not; they are reported."""
     model, shape = SECTIONS[name], raw.get("shape")
     if not isinstance(model, Mapping) or not isinstance(shape, str) or shape not in model:
         return raw
-    lacking = [key for key in NESTED.get(name, {}) if key in raw and key not in model[shape].model_fields]
+    lacking = [key for key in raw if key not in model[shape].model_fields and _having(model, key)]
     for key in lacking:
-        having = " and ".join(other for other, kind in model.items() if key in kind.model_fields)
+        found = None if key in NESTED.get(name, {}) else raw[key]
         article = "an" if shape[0] in "aeiou" else "a"
-        problems.error(f"{where or name}.{key}", None, f"{article} {shape} has no {key}: {having} have")
+        problems.error(f"{where or name}.{key}", found, f"{article} {shape} has no {key}: {_having(model, key)}")
     return {key: value for key, value in raw.items() if key not in lacking}
+
+
+def _having(model: Mapping[str, type[Section]], key: str) -> str:
+    """Say which shapes have a key, "" if none has."""
+    *others, last = ("", *(shape for shape, kind in model.items() if key in kind.model_fields))
+    return f"{', '.join(others[1:])} and {last} have" if others[1:] else last and f"{last} has"
 
 
 def _model(name: str, raw: dict[str, Any], problems: Problems, where: str = "") -> type[Section] | None:

@@ -23,7 +23,7 @@ from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import PLANES, Probe
 from pipeline.shapes.punch import Straight
 from pipeline.shapes.registry import BODIES, PROBES
-from pipeline.study.keys import words_of
+from pipeline.shapes.section import words_of
 from tests.cases import study
 
 # A body that is not drawn has a file: tests/shapes/test_scanned.py.
