@@ -10,7 +10,7 @@ from pipeline.plan.describe import summary
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.run.progress import Terminal
 from pipeline.study.load import load, load_mapping
-from pipeline.study.named import is_name
+from pipeline.study.named import NAME, is_name
 from pipeline.study.sweep import Study
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ class RunnableStudy:
         if not isinstance(study, Mapping):
             return RunnableStudy(load(study))
         if not is_name(name):
-            raise ValueError(f"name = {name!r}: must be letters, digits, - and _: results are called after it")
+            raise ValueError(f"name = {name!r}: must be {NAME}")
         return RunnableStudy(load_mapping(study, name, folder))
 
     @property

@@ -60,16 +60,16 @@ def test_store_that_cannot_be_used_is_an_exception_on_every_rank(folder):
 @pytest.mark.mpi
 def test_failed_cases_are_counted_in_a_warning(folder):
     if WORLD.rank == 0:
-        (folder / "small.toml").write_text(TEXT.replace('"free"', '"fixed"').replace("4 mm", "2 mm"))
+        (folder / "small.toml").write_text(TEXT.replace('"0.5 mm"', '["1e-9 mm", "0.5 mm"]'))
     WORLD.barrier()
     study = pipeline.load(folder / "small.toml")
     if WORLD.rank == 0:
-        with pytest.warns(RuntimeWarning, match=r"2 failed, the first: .*touches the held face"):
+        with pytest.warns(RuntimeWarning, match=r"4 failed, the first: .*GB of memory"):
             data = study.run(WORLD, output=folder)
     else:
         data = study.run(WORLD, output=folder)
-    assert (data["status"].sel(epsilon=2e-3) == "failed").all()
-    assert (data["status"].sel(epsilon=np.inf) == "ok").all()
+    assert (data["status"].sel(rim=1e-12) == "failed").all()
+    assert (data["status"].sel(rim=0.5e-3) == "ok").all()
 
 
 def test_plan_says_what_a_run_would_do(tmp_path):
@@ -84,6 +84,12 @@ def test_plan_says_what_a_run_would_do(tmp_path):
     assert not (tmp_path / "none.sqlite").exists()
     with pytest.raises(ValueError, match="no reduction is called magic"):
         study.plan(without=["magic"])
+
+
+@pytest.mark.parametrize("name", [None, 3, "", "a b", "../x", "é" * 101])
+def test_a_study_is_called_what_a_file_can_be(name):
+    with pytest.raises(ValueError, match="must be letters, digits, - and _, at most 200 bytes"):
+        pipeline.load({}, name=name)
 
 
 def test_what_is_wrong_is_raised(tmp_path):

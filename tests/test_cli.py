@@ -94,15 +94,15 @@ def test_the_reason_is_told_once_whichever_rank_is_the_first_to_know(small, tmp_
 
 
 def test_failed_case_ends_with_1_and_is_told(spawn, small, tmp_path):
-    small.write_text(SMALL.replace('["coarse", "free"]', '"fixed"').replace('"4 mm", "6 mm"', '"2 mm", "6 mm"'))
+    small.write_text(SMALL.replace('["coarse", "free"]', '"coarse"').replace('"0.5 mm"', '["1e-9 mm", "0.5 mm"]'))
     done = spawn("run", small, "--output", tmp_path)
     assert done.returncode == 1
-    assert "touches the held face" in done.stderr
+    assert "GB of memory" in done.stderr
     data = xr.load_dataset(tmp_path / "small.nc")
-    assert (data["status"].sel(epsilon=2e-3) == "failed").all()
-    assert (data["status"].sel(epsilon=6e-3) == "ok").all()
+    assert (data["status"].sel(rim=1e-12) == "failed").all()
+    assert (data["status"].sel(rim=0.5e-3) == "ok").all()
     status = json.loads(spawn("status", small, "--output", tmp_path, "--json").stdout)
-    assert (status["ok"], status["failed"], status["pending"]) == (4, 2, 0)
+    assert (status["ok"], status["failed"], status["pending"]) == (6, 6, 0)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

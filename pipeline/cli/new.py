@@ -10,7 +10,7 @@ from pipeline.cli.console import print_json
 from pipeline.cli.faults import Fault, fail, of_file, of_option
 from pipeline.cli.words import Json
 from pipeline.files import atomic, write_new
-from pipeline.study.named import examples, is_name
+from pipeline.study.named import NAME, examples, is_name
 from pipeline.within import folders_of, outside
 
 _FOLDER = Path("studies")
@@ -46,7 +46,7 @@ def new(
     """
     path = Path(name) if name.endswith(".toml") else _FOLDER / f"{name}.toml"
     if not is_name(path.name.removesuffix(".toml")):  # of "...toml" the stem is all of it since Python 3.14
-        fail(_of_name(name, "must be letters, digits, - and _: results are called after it"))
+        fail(_of_name(name, f"must be {NAME}"))
     if not name.endswith(".toml") and Path(name).name != name:
         fail(_of_name(name, f"a name has no folders: it stands for {_FOLDER}/NAME.toml; a path ends in .toml"))
     text, source = (_starter(path.stem), path) if like is None else _copy_of(like)

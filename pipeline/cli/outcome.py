@@ -44,6 +44,7 @@ def as_data(plan: Plan, opened: "Opened", outcome: "Outcome", seconds: float) ->
     """Return what came of a study as plain data."""
     return {
         "study": plan.study.file,
+        "warnings": list(plan.study.warnings),
         "cases": len(plan.keys),
         **outcome.counts,
         "stored": sum(key in plan.stored for key in plan.keys),

@@ -186,7 +186,7 @@ def find_case(study: "Study", text: str) -> "Case":
         name, _, value = (word.strip() for word in part.partition("="))
         if name not in names:
             fail(_of_case(text, f"nothing called {name!r} is swept; swept are {', '.join(names) or 'no keys'}"))
-        wanted[name] = _squeezed(value)
+        wanted[name] = value
     found = [case for case in cases if _matches(case, wanted)]
     if not found:
         choices = {axis.name: [axis.write(label) for label in axis.labels] for axis in study.axes}
@@ -204,8 +204,21 @@ def _of_case(text: str, allowed: str) -> Fault:
 
 
 def _matches(case: "Case", wanted: dict[str, str]) -> bool:
-    labels = {name: _squeezed(text) for name, text in case.words.items()}
-    return all(labels[name] == value for name, value in wanted.items())
+    written, labels, units = case.words, dict(case.labels), {axis.name: axis.unit for axis in case.axes}
+    return all(
+        _squeezed(written[name]) == _squeezed(text) or _is(labels[name], text, units[name])
+        for name, text in wanted.items()
+    )
+
+
+def _is(label: float | int | str, text: str, unit: str) -> bool:
+    """Tell whether ``text`` is the quantity of a label, in whatever unit: 0.4 cm is 4 mm."""
+    from pipeline.units import canonical, parse_quantity
+
+    try:
+        return not isinstance(label, str) and canonical(label) == parse_quantity(text, "" if unit == "1" else unit)
+    except ValueError:
+        return False
 
 
 def _squeezed(text: Any) -> str:

@@ -6,8 +6,15 @@ from pathlib import Path
 EXAMPLES = Path(__file__).parent / "examples"
 
 
-def is_name(name: str) -> bool:
+# What a name may be, in words. Files are called after it, with a few letters more: theirs have 255 bytes at most.
+NAME = "letters, digits, - and _, at most 200 bytes: results are called after it"
+_LONGEST = 200
+
+
+def is_name(name: object) -> bool:
     """Tell whether a study may be called so: results are called after it."""
+    if not isinstance(name, str) or len(name.encode(errors="replace")) > _LONGEST:
+        return False
     return name == name.strip() and name.replace("-", "").replace("_", "").replace(".", "").isalnum()
 
 

@@ -107,21 +107,22 @@ def test_a_reader_that_goes_away_is_no_error(lines):
 
 def test_json_of_a_run_is_one_object_with_what_failed_and_why(spawn, tmp_path):
     file = tmp_path / "small.toml"
-    small = SMALL.replace('["coarse", "free"]', '"fixed"').replace('"4 mm", "6 mm"', '"2 mm", "6 mm"')
+    small = SMALL.replace('["coarse", "free"]', '"coarse"').replace('"0.5 mm"', '["1e-9 mm", "0.5 mm"]')
+    small = small.replace('"4 mm", ', "")
     file.write_text(f"{small.replace('[0.3, 0.4]', '0.3')}[solve]\nexact = false\n")
     done = spawn("run", file, "--output", tmp_path, "--meshes", tmp_path / "meshes", "--json")
     found = json.loads(done.stdout)
     assert found["status"] == done.returncode == 1
     (study,) = found["studies"]
-    assert (study["cases"], study["ok"], study["failed"], study["pending"]) == (3, 2, 1, 0)
-    assert {"touches the held face" in failure["message"] for failure in study["failures"]} == {True}
+    assert (study["cases"], study["ok"], study["failed"], study["pending"]) == (4, 2, 2, 0)
+    assert {"GB of memory" in failure["message"] for failure in study["failures"]} == {True}
     assert all(Path(name).exists() for name in study["files"])
     assert study["seconds"] > 0
     again = spawn("run", file, "--output", tmp_path, "--meshes", tmp_path / "meshes")
     line = again.stdout.splitlines()[-1]
-    assert "2 ok, 1 failed (" in line
+    assert "2 ok, 2 failed (" in line
     assert "(2 read back); wrote" in line
-    assert "touches the held face" in line
+    assert "GB of memory" in line
 
 
 @pytest.mark.parametrize(

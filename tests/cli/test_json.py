@@ -113,6 +113,16 @@ def test_what_else_is_wrong_is_told(epsmesh, small, here, words, key):
     assert key is not None or all(error["file"] for error in errors)
 
 
+def test_warnings_of_a_study_are_told(epsmesh, small, tmp_path):
+    small.write_text(small.read_text().replace('"0.1 mm"', '"0.5 mm"'))
+    (told,) = json.loads(epsmesh("validate", small, "--json").stdout)[0]["warnings"]
+    assert "probe.depth" in told
+    assert json.loads(epsmesh("plan", small, "--json").stdout)["warnings"] == [told]
+    assert "warnings" not in json.loads(epsmesh("status", small, "--json").stdout)
+    run = epsmesh("run", small, "--shard", "200/200", "--output", tmp_path, "--json")
+    assert json.loads(run.stdout)["studies"][0]["warnings"] == [told]
+
+
 def test_an_exception_is_told_and_goes_on(epsmesh, small, monkeypatch):
     monkeypatch.setattr("pipeline.plan.plan.make_plan", lambda *_, **__: 1 / 0)
     done = epsmesh("plan", small, "--json")

@@ -126,6 +126,11 @@ def test_a_case_that_some_labels_name_is_said_to_be_the_first_of_several(epsmesh
     assert epsmesh("explain", small, "poisson=0.4, epsilon=4 mm, outside=free").stderr == ""
 
 
+@pytest.mark.parametrize("case", ["epsilon=0.4 cm", "epsilon=4.0 mm", "poisson=30 %, epsilon=4e-3 m"])
+def test_a_case_is_found_by_its_numbers_in_any_unit(epsmesh, small, case):
+    assert epsmesh("explain", small, case).stdout.startswith("poisson = 0.3, epsilon = 4 mm")
+
+
 def test_a_force_on_record_that_is_no_number_is_computed_again(epsmesh, small, tmp_path):
     store, plan = tmp_path / "cases.sqlite", make_plan(load(small))
     fill(store, plan, at_4="ok", at_6="ok", at_inf="ok")

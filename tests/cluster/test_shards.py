@@ -103,13 +103,13 @@ def test_damaged_and_failed(whole, meshes, tmp_path):
     assert f"{damaged}: damaged, left out" in found.output
     assert damaged.read_bytes().startswith(b"no database")
     assert_same(tmp_path / "small.nc", folder / "small.nc")
-    # A support that the small column touches: its cases fail, in the shard and in what is merged.
+    # Elements that fit into no machine: their cases fail, in the shard and in what is merged.
     study = tmp_path / "failing.toml"
-    study.write_text(SMALL.replace('["coarse", "free"]', '"fixed"').replace('"4 mm"', '"2 mm"', 1))
+    study.write_text(SMALL.replace('["coarse", "free"]', '"coarse"').replace('"0.5 mm"', '["1e-9 mm", "0.5 mm"]'))
     assert 1 in {run(study, tmp_path, meshes, "--shard", f"{number}/2").exit_code for number in (1, 2)}
     merged = epsmesh("merge", study, "--output", tmp_path)
     assert merged.exit_code == 1
-    assert "touches the held face" in merged.output
+    assert "GB of memory" in merged.output
     assert "pending" not in merged.output
 
 

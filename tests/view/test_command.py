@@ -16,7 +16,7 @@ STUDY = small_text(
         {"name": "disc, blunt", "shape": "disc", "radius": "2 mm", "depth": "0.1 mm"},
         {"name": "disc, thin", "shape": "disc", "radius": "1 mm", "depth": "0.1 mm"},
     ],
-    mesh={"epsilon": ["2 mm", "4 mm"], "outside": ["coarse", "fixed"]},
+    mesh={"epsilon": ["2 mm", "4 mm"], "rim": ["0.5 mm", "1e-9 mm"]},
 )
 
 
@@ -30,7 +30,7 @@ def view(tmp_path):
 
 @pytest.mark.parametrize("kind", ["vtu", "xdmf"])
 def test_export_writes_a_file_named_after_the_case(view, tmp_path, kind):
-    done = view("probe=disc, thin, epsilon=4 mm, outside=coarse", "--export", kind, "--mesh-only")
+    done = view("probe=disc, thin, epsilon=4 mm, rim=0.5 mm", "--export", kind, "--mesh-only")
     assert done.exit_code == 0, done.output
     assert [path.name for path in (tmp_path / "out").iterdir()] == [f"small_6.{kind}"]
     assert f"small_6.{kind}" in done.output
@@ -39,21 +39,21 @@ def test_export_writes_a_file_named_after_the_case(view, tmp_path, kind):
 def test_without_pyvista_there_is_a_page_and_what_pictures_need_is_said(view, monkeypatch, tmp_path):
     found = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name, *more: None if name == "pyvista" else found(name))
-    done = view("probe=disc, thin, epsilon=4 mm, outside=coarse")
+    done = view("probe=disc, thin, epsilon=4 mm, rim=0.5 mm")
     assert done.exit_code == 0, done.output
     assert "pip install '.[view]'" in done.output
     (page,) = (tmp_path / "out").iterdir()
     assert page.name == "small_6.html"
     text = page.read_text(encoding="utf-8")
     assert "<title>small</title>" in text
-    assert "epsilon = 4 mm, outside = coarse" in text
+    assert "epsilon = 4 mm, rim = 0.5 mm" in text
     assert re.search(r"F = [0-9.]+ mN ± [0-9.]+ %", text)
 
 
 def test_case_that_cannot_be_solved_ends_with_1_and_says_why(view, tmp_path):
-    done = view("probe=disc, blunt, epsilon=2 mm, outside=fixed", "--export", "vtu")
+    done = view("probe=disc, blunt, epsilon=2 mm, rim=1e-9 mm", "--export", "vtu")
     assert done.exit_code == 1
-    assert "failed: the probe's footprint touches the held face" in done.output
+    assert "failed: this case needs about" in done.output
     assert not (tmp_path / "out").exists()
 
 
