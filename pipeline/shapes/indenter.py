@@ -113,6 +113,11 @@ class Indenter(Probe):
         """Radius (m) of the smallest circle about the axis that contact is expected to stay within."""
 
     @property
+    def half_length(self) -> float:
+        """Half the length (m) along which it touches at any depth; none, unless it has a straight edge."""
+        return 0.0
+
+    @property
     def edge_band(self) -> tuple[float, float]:
         """The least and the largest half width (m) at which contact is expected to end."""
         most = self.footprint.half_width

@@ -8,7 +8,6 @@ from pipeline.shapes.contact import is_flat, is_level
 from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import ON_EDGE, Probe
-from pipeline.shapes.probes.wedge import Wedge
 from pipeline.shapes.section import in_mm
 from pipeline.study.place import held_gap
 from pipeline.study.problems import Problems
@@ -50,11 +49,11 @@ def check_column(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> No
     """Refuse a column below a face that is none to stand a column under, and one that contact runs out of."""
     frame = probe.frame_on(body)
     column = mesh.column(body.reach(frame))
-    if mesh.outside == "free" and isinstance(probe, Wedge) and column <= (1 + ON_EDGE) * probe.length / 2:
+    if mesh.outside == "free" and isinstance(probe, Indenter) and column <= (1 + ON_EDGE) * probe.half_length:
         problems.error(
             "mesh.epsilon", in_mm(mesh.epsilon),
-            f"keeps a column that contact along the wedge runs out of: must be above half its length, "
-            f'{in_mm(probe.length / 2)}, or use outside = "coarse"',
+            f"keeps a column that contact along the {probe.shape} runs out of: must be above half its length, "
+            f'{in_mm(probe.half_length)}, or use outside = "coarse"',
         )  # fmt: skip
     elif not mesh.is_closed and isfinite(column) and not is_level(body, frame):
         problems.error(

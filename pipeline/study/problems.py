@@ -17,9 +17,11 @@ from pipeline.visible import visible
 # Letters of a value, or of a key, that a message repeats.
 _QUOTED = 200
 # Problems of one table beyond these are counted only.
-_MOST_ERRORS = 50
+MOST_ERRORS = 50
 # Values of a sweep beyond these are not listed in a warning.
 _MOST_VALUES = 4
+# Names less alike than this are not taken for one another: `step` was not meant to be `raster`.
+_ALIKE = 0.65
 # A number and its unit: warnings that differ in nothing else are one.
 _NUMBER = re.compile(r"-?\d+(\.\d+)?(e[+-]?\d+)?\s?(%|mm\b)?")
 
@@ -75,6 +77,7 @@ class Problems:
     tables: dict[str, tuple[str, ...]] = field(default_factory=dict)
     _about: dict[str, str] = field(default_factory=dict)
     _places: dict[tuple[bool, str, Any, str], int] = field(default_factory=dict)
+    _unread: set[str] = field(default_factory=set)
 
     @contextmanager
     def about(self, **sections: Section) -> Iterator[None]:
@@ -90,6 +93,11 @@ class Problems:
     def error(self, key: str, found: Any, allowed: str) -> None:
         """Add an error."""
         self._add(self.errors, self._problem(key, found, allowed))
+
+    def unknown(self, key: str, found: Any, allowed: str) -> None:
+        """Add the error of a key that is not read: what it stands in can be held against the rest without it."""
+        self.error(key, found, allowed)
+        self._unread.add(key)
 
     def warn(self, key: str, found: Any, allowed: str) -> None:
         """Add a warning."""
@@ -122,7 +130,7 @@ class Problems:
         Of an array of tables, the others are left.
         """
         found = dict(sections)
-        for section, number in {_section_of(error.key) for error in self.errors}:
+        for section, number in {_section_of(error.key) for error in self.errors if error.key not in self._unread}:
             names = self.tables.get(section, ())
             bad = names[number - 1] if 0 < number <= len(names) else None
             found[section] = tuple(one for one in found.get(section, ()) if bad is not None and one.name != bad)
@@ -137,10 +145,10 @@ class Problems:
     def from_pydantic(self, prefix: str, error: ValidationError, model: type[BaseModel], raw: dict[str, Any]) -> None:
         """Translate pydantic's errors of the section ``prefix``, read from ``raw``, for the study's author."""
         found = error.errors(include_url=False, include_context=True, include_input=False)
-        for item in found[:_MOST_ERRORS]:
+        for item in found[:MOST_ERRORS]:
             self._from_item(prefix, item, item["loc"], model, raw)
-        if len(found) > _MOST_ERRORS:
-            self.error(prefix, None, f"… and {len(found) - _MOST_ERRORS} more")
+        if len(found) > MOST_ERRORS:
+            self.error(prefix, None, f"… and {len(found) - MOST_ERRORS} more")
 
     def _from_item(self, where: str, item: Any, place: tuple[Any, ...], model: type[BaseModel], raw: Any) -> None:
         """Translate an error at a ``place`` within the table ``raw``, or within one of its own arrays of tables."""
@@ -178,8 +186,15 @@ def nested_model(model: type[BaseModel], key: str) -> type[BaseModel] | None:
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return ``did you mean …`` with the nearest known name, or the list of all of them."""
     known = list(known)
-    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-    return f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(known)}"
+    close = closest(name, known)
+    return f"did you mean `{close}`?" if close else f"allowed are {', '.join(known)}"
+
+
+def closest(name: str, known: Iterable[str]) -> str:
+    """Return the known name that was probably meant: one much like ``name``, or one that begins with it; "" if none."""
+    known = list(known)
+    begun = [other for other in known if other.startswith(name)] if len(name) > 1 else []
+    return next(iter(difflib.get_close_matches(name, known, n=1, cutoff=_ALIKE) or begun), "")
 
 
 def _allowed(item: Any, model: type[BaseModel]) -> str:
@@ -214,7 +229,7 @@ def _list_of(model: type[BaseModel], key: str) -> str:
     """Say what a list holds, by the type of a key: a tuple, or a choice of things that one is among; and an example."""
     annotation: Any = model.model_fields[key].annotation
     parts = (annotation, *getattr(annotation, "__args__", ()))
-    items = next((part.__args__ for part in parts if getattr(part, "__origin__", None) is tuple), ())
+    items: tuple[Any, ...] = next((part.__args__ for part in parts if getattr(part, "__origin__", None) is tuple), ())
     count = "" if get_origin(items[0]) is Literal else f" of {'2 or 3' if ... in items else len(items)} values"
     return f"must be a list{count}, such as {words_of(model, key).example}"
 

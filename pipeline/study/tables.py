@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from pipeline.shapes.registry import LATER
 from pipeline.shapes.section import Section
 from pipeline.study.path import Way, read_path
-from pipeline.study.problems import Problems, nearest
+from pipeline.study.problems import MOST_ERRORS, Problems, closest, nearest
 from pipeline.study.read import check_text
 from pipeline.study.schema import NESTED, SECTIONS, SINGLE
 from pipeline.study.sweep import Axis
@@ -182,16 +182,31 @@ def _shared_sweeps(name: str, tables: list[Any]) -> dict[Place, list[Any]]:
 
 
 def _possible(name: str, raw: dict[str, Any], problems: Problems, where: str = "") -> dict[str, Any]:
-    """Return a section without the keys that other shapes have, and its own has not; they are reported."""
-    model, shape = SECTIONS[name], raw.get("shape")
-    if not isinstance(model, Mapping) or not isinstance(shape, str) or shape not in model:
-        return raw
-    lacking = [key for key in raw if key not in model[shape].model_fields and _having(model, key)]
-    for key in lacking:
+    """Return a section without the keys that it does not have, which are reported: the rest is checked all the same."""
+    models, shape = SECTIONS[name], raw.get("shape")
+    if isinstance(models, Mapping) and (not isinstance(shape, str) or shape not in models):
+        return raw  # what all shapes lack is told with it
+    model = models[str(shape)] if isinstance(models, Mapping) else models
+    lacking = [key for key in raw if key not in model.model_fields]
+    for key in lacking[:MOST_ERRORS]:
         found = None if key in NESTED.get(name, {}) else raw[key]
-        article = "an" if shape[0] in "aeiou" else "a"
-        problems.error(f"{where or name}.{key}", found, f"{article} {shape} has no {key}: {_having(model, key)}")
+        problems.unknown(f"{where or name}.{key}", found, _lacking(models, model, str(shape), key))
+    if len(lacking) > MOST_ERRORS:
+        problems.unknown(where or name, None, f"… and {len(lacking) - MOST_ERRORS} more")
     return {key: value for key, value in raw.items() if key not in lacking}
+
+
+def _lacking(models: Mapping[str, type[Section]] | type[Section], model: type[Section], shape: str, key: str) -> str:
+    """Say that a section has no such key; if other shapes have it, or one like it, which do."""
+    if not isinstance(models, Mapping):
+        return f"unknown key; {nearest(key, model.model_fields)}"
+    article = "an" if shape[0] in "aeiou" else "a"
+    if having := _having(models, key):
+        return f"{article} {shape} has no {key}: {having}"
+    meant = closest(key, [*model.model_fields, *(known for kind in models.values() for known in kind.model_fields)])
+    if meant and meant not in model.model_fields:
+        return f"unknown key; did you mean `{meant}`? {article} {shape} has none: {_having(models, meant)}"
+    return f"unknown key; {nearest(key, model.model_fields)}"
 
 
 def _having(model: Mapping[str, type[Section]], key: str) -> str:
@@ -223,8 +238,11 @@ def _model(name: str, raw: dict[str, Any], problems: Problems, where: str = "") 
     else:
         problems.error(f"{where}.shape", shape, f"unknown shape; {nearest(str(shape), model)}")
     known = dict.fromkeys(key for kind in model.values() for key in kind.model_fields)
-    for key in (key for key in raw if key not in known):
+    unknown = [key for key in raw if key not in known]
+    for key in unknown[:MOST_ERRORS]:
         problems.error(f"{where}.{key}", raw[key], f"unknown key; {nearest(key, known)}")
+    if len(unknown) > MOST_ERRORS:
+        problems.error(where, None, f"… and {len(unknown) - MOST_ERRORS} more")
     return None
 
 

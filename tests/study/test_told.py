@@ -42,6 +42,17 @@ def test_what_does_not_fit_together_is_told_beside_what_cannot_be_read():
     }  # fmt: skip
 
 
+def test_an_unknown_key_does_not_hide_what_does_not_fit_together():
+    probe = {"axis": [0.5, 0, -1], "incison": "1 mm", "length": "4 mm"}
+    content = raw(probe=probe, mesh={"degree": 1, "outside": "free", "epsilon": "9 mm", "step": 3})
+    problems = {problem.key: problem.allowed for problem in told(content).problems}
+    assert set(problems) == {"probe.incison", "probe.length", "mesh.degree", "mesh.step", "mesh.outside"}
+    assert problems["probe.incison"] == "unknown key; did you mean `incision`? a disc has none: blade has"
+    assert "unknown key; allowed are name, accuracy" in problems["mesh.step"]
+    content["probe"] = [{"name": "one", "colour": 1} | content["probe"], {"name": "two"} | raw()["probe"]]
+    assert {problem.key for problem in told(content).problems} > {"probe[1].colour", "probe[1].incison", "mesh.degree"}
+
+
 def test_errors_and_warnings_name_the_table():
     error = str(told(raw() | {"probe": needles(at=["19 mm", "0 mm"])}))
     assert re.search(r'my\.toml: probe\[2\]\.at = .*\(probe "long"\)', error)

@@ -39,6 +39,11 @@ class Wedge(Indenter):
         )  # fmt: skip
 
     @property
+    def half_length(self) -> float:
+        """Half the length of the edge (m)."""
+        return self.length / 2
+
+    @property
     def pressed(self) -> float:
         """Distance (m) of the corners of what the undeformed tool presses below the surface."""
         return hypot(self.length / 2, self.section.reach(self.depth))
