@@ -193,7 +193,7 @@ def _possible(name: str, raw: dict[str, Any], problems: Problems, where: str = "
         problems.unknown(f"{where or name}.{key}", found, _lacking(models, model, str(shape), key))
     if len(lacking) > MOST_ERRORS:
         problems.unknown(where or name, None, f"… and {len(lacking) - MOST_ERRORS} more")
-    return {key: value for key, value in raw.items() if key not in lacking}
+    return {key: value for key, value in raw.items() if key in model.model_fields}
 
 
 def _lacking(models: Mapping[str, type[Section]] | type[Section], model: type[Section], shape: str, key: str) -> str:
