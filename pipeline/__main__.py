@@ -6,10 +6,12 @@ import sys
 from typing import Any, NoReturn
 
 INTERRUPTED = 130
+_LAST_STANDARD = 2  # number of standard error
 
 
 def main() -> None:
     """Run the command ``epsmesh``; Ctrl-C ends it quietly, even while it loads or is on its way out."""
+    _open_standard_streams()
     listens = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # else it is ignored: nohup, or `&`
     if listens:
         signal.signal(signal.SIGINT, _leave)
@@ -23,6 +25,19 @@ def main() -> None:
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, _leave)
         sys.exit(INTERRUPTED)
+
+
+def _open_standard_streams() -> None:
+    """Open what was closed (``>&-``) on nothing: else the next file takes its number, and what libraries print.
+
+    Python has None for such a stream, which most of what writes or flushes does not expect.
+    """
+    while (number := os.open(os.devnull, os.O_RDWR)) <= _LAST_STANDARD:
+        os.set_inheritable(number, True)
+    os.close(number)
+    for number, name, mode in ((0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(number, mode, encoding="utf-8", closefd=False))
 
 
 def _leave(*_: Any) -> NoReturn:

@@ -1,12 +1,13 @@
 """Files that appear whole or not at all, whatever ends the program, or the machine, meanwhile."""
 
+import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 # Bytes that a disk must have left for a file: less than a dataset and its figure take.
-_LEAST_ROOM = 200_000
+LEAST_ROOM = 200_000
 
 
 def cache_folder() -> Path:
@@ -28,12 +29,17 @@ def atomic(path: Path) -> Iterator[Path]:
     It ends as ``path`` does, for those who tell formats by endings. After an exception, ``path`` is as it was.
 
     Raises:
-        OSError: if the folder cannot be made, or the file not be written.
+        OSError: if the folder cannot be made, or the file not be written: of ``path``, whatever its reason named.
     """
     with _beside(path) as temporary:
-        yield temporary
-        _to_disk(temporary)
-        os.replace(temporary, path)
+        try:
+            yield temporary
+            _to_disk(temporary)
+            os.replace(temporary, path)
+        except OSError as error:
+            if error.errno is None or error.filename not in (None, str(temporary), temporary):
+                raise
+            raise OSError(error.errno, error.strerror, str(path)) from error
 
 
 def write_whole(path: Path, text: str) -> Path:
@@ -67,8 +73,11 @@ def write_new(path: Path, text: str) -> None:
             os.replace(temporary, path)
 
 
-def why_not_writable(path: Path) -> str:
-    """Say why no file can be written at ``path``, "" if one can: tried beside it, folders made, nothing left behind."""
+def why_not_writable(path: Path, room: int = LEAST_ROOM) -> str:
+    """Say why no file of ``room`` bytes can be written at ``path``, "" if one can.
+
+    That is tried beside it with the first of them; the folders that it takes are made, and nothing else is left.
+    """
     if path.is_dir():
         return f"{path}: is a folder, and a file of that name is to be written"
     if path.exists() and not path.is_file():
@@ -80,16 +89,23 @@ def why_not_writable(path: Path) -> str:
             break
     try:
         with _beside(path) as temporary:
-            temporary.write_bytes(bytes(_LEAST_ROOM))
+            tried = temporary.write_bytes(bytes(min(room, LEAST_ROOM)))
             _to_disk(temporary)
+            disk = os.statvfs(path.parent)
     except OSError as error:
         return f"{path}: cannot be written: {error.strerror or error}"
+    left = tried + disk.f_bavail * disk.f_frsize
+    if left < room:
+        return f"{path}: cannot be written: {left / 1e6:.2g} MB are left on the disk, and it may take {room / 1e6:.2g}"
     return ""
 
 
 @contextmanager
 def _beside(path: Path) -> Iterator[Path]:
-    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:  # what is there is no folder
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(path.parent)) from None
     # Not by the number of the process: those of two machines, or of two containers, may well be one.
     temporary = path.with_name(f".{os.urandom(4).hex()}-{path.name}")
     try:

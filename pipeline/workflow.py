@@ -176,6 +176,27 @@ def abort_on_exception(comm: MPI.Comm) -> Iterator[None]:
         comm.Abort(1)
 
 
+@contextmanager
+def ended_soon() -> Iterator[None]:
+    """Turn the signals that ask the program to end into KeyboardInterrupt; it is gone in 20 s, whatever C computes.
+
+    That is for what has no records to write: nothing waits for Python to be asked twice.
+    """
+
+    def interrupt(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    with watched(*before):
+        try:
+            for number in before:
+                signal.signal(number, interrupt)
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+
 def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | None, signals: list[int]) -> None:
     if not plan.solves:
         return

@@ -1,10 +1,13 @@
 """Files appear whole or not at all."""
 
+import errno
 import os
+import subprocess
+import sys
 
 import pytest
 
-from pipeline.files import atomic, write_new
+from pipeline.files import atomic, why_not_writable, write_new, write_whole
 
 
 @pytest.mark.parametrize("name", ["a.nc", "a.b.svg", "plain"])
@@ -55,3 +58,50 @@ def test_a_new_file_leaves_an_existing_one_alone(tmp_path):
     with pytest.raises(FileExistsError):
         write_new(tmp_path / "deep" / "a.toml", "second")
     assert {file.name: file.read_text() for file in (tmp_path / "deep").iterdir()} == {"a.toml": "first"}
+
+
+def test_what_is_wrong_is_wrong_with_the_file_that_was_asked_for(tmp_path):
+    (tmp_path / "a").mkdir()
+    with pytest.raises(IsADirectoryError) as folder:
+        write_whole(tmp_path / "a", "text")
+    assert folder.value.filename == str(tmp_path / "a")
+    with pytest.raises(OSError, match="No space left") as full, atomic(tmp_path / "b"):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    assert full.value.filename == str(tmp_path / "b")
+    with pytest.raises(FileNotFoundError) as other, atomic(tmp_path / "b"):
+        (tmp_path / "none").read_text()
+    assert other.value.filename == str(tmp_path / "none")
+
+
+def test_a_file_that_is_larger_than_the_disk_is_refused(tmp_path):
+    assert not why_not_writable(tmp_path / "deep" / "a")
+    assert "MB are left on the disk, and it may take 1e+12" in why_not_writable(tmp_path / "a", 10**18)
+    assert not list(tmp_path.rglob("*a*"))
+
+
+# A limit of the size of files stands for a full disk: HDF5 finds it when it writes, and again when it closes the file.
+ON_A_FULL_DISK = """
+import resource, sys
+from pathlib import Path
+import numpy as np
+import xarray as xr
+from pipeline.netcdf import write_netcdf
+resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
+dataset = xr.Dataset({"a": (("x",), np.random.default_rng(1).random(100_000))})
+try:
+    write_netcdf(dataset, Path(sys.argv[1]), sys.argv[2])
+except OSError as error:
+    print(error)
+"""
+
+
+@pytest.mark.parametrize("kind", ["NETCDF4", "NETCDF3_64BIT"])
+def test_a_dataset_on_a_full_disk_is_an_error_and_no_crash(tmp_path, kind):
+    path = tmp_path / "a.nc"
+    path.write_text("kept")
+    done = subprocess.run(
+        [sys.executable, "-c", ON_A_FULL_DISK, path, kind], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout.strip()) == (0, f"[Errno 27] File too large: '{path}'")
+    assert path.read_text() == "kept"
+    assert len(list(tmp_path.iterdir())) == 1

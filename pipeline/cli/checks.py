@@ -8,7 +8,7 @@ import typer
 
 from pipeline.cli.console import load_solvers, print_json
 from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_option
-from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output
+from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output, check_output
 
 if TYPE_CHECKING:
     from pipeline.verify.coverage import Trial
@@ -43,7 +43,7 @@ def verify(
 
     Example: epsmesh verify --coverage --family proportions --count 400 --seed 7
     """
-    from pipeline.workflow import world
+    from pipeline.workflow import ended_soon, world
 
     comm = world()
     speaks = comm.rank == 0
@@ -53,7 +53,8 @@ def verify(
         if family not in FAMILIES:
             fail(of_option("--family", family, f"there is no such family of scenes; there are {', '.join(FAMILIES)}"))
         load_solvers()
-        told = tuple(_told(trials(comm, count, seed, family), _trial, speaks and not as_json))
+        with ended_soon():
+            told = tuple(_told(trials(comm, count, seed, family), _trial, speaks and not as_json))
         found = Coverage(told, FAMILIES[family].idle)
         right = found.is_met
         if speaks and as_json:
@@ -73,7 +74,8 @@ def verify(
         load_solvers()
         if speaks and not as_json:
             print(_ROW.format("", "scene", "path", "reference", "value", "error", "bar", "source"))
-        table = list(_told(rows(comm, quick=quick), _row, speaks and not as_json))
+        with ended_soon():
+            table = list(_told(rows(comm, quick=quick), _row, speaks and not as_json))
         right = all(row.is_right for row in table)
         if speaks and as_json:
             print_json([{**asdict(r), "error": r.error, "right": r.is_right} for r in table])
@@ -96,10 +98,13 @@ def benchmark(
 
     Example: epsmesh benchmark
     """
-    from pipeline.verify.work_precision import main
+    from pipeline.verify.work_precision import main, outputs
+    from pipeline.workflow import ended_soon
 
+    check_output(*outputs(output))
     load_solvers()
-    files = main(output, repeats, quick=quick)
+    with ended_soon():
+        files = main(output, repeats, quick=quick)
     if as_json:
         print_json({"files": [str(path) for path in files]})
         return
@@ -130,7 +135,7 @@ def stress(
     """
     from pipeline.verify.stress import line, run, summary
     from pipeline.verify.stress.report import heading
-    from pipeline.workflow import world
+    from pipeline.workflow import ended_soon, world
 
     load_solvers()
     comm = world()
@@ -138,7 +143,8 @@ def stress(
     if speaks and not as_json:
         print(heading())
     try:
-        results = list(_told(run(comm, names, quick=quick), line, speaks and not as_json))
+        with ended_soon():
+            results = list(_told(run(comm, names, quick=quick), line, speaks and not as_json))
     except ValueError as wrong:
         fail(Fault(str(wrong), key="ROW", value=names))
     if speaks and as_json:

@@ -4,6 +4,7 @@ import json
 import os
 import signal
 import sys
+from contextlib import suppress
 from contextvars import ContextVar
 from io import TextIOWrapper
 from math import inf, isfinite
@@ -84,6 +85,7 @@ class Patient:
     def write(self, text: str) -> int:
         """Write ``text``, or drop it."""
         text = visible_lines(text)
+        _leave_broken_pipes()
         try:
             self._stream.write(text)
         except OSError as error:
@@ -92,6 +94,7 @@ class Patient:
 
     def flush(self) -> None:
         """Flush, or drop what is left."""
+        _leave_broken_pipes()
         try:
             self._stream.flush()
         except OSError as error:
@@ -105,6 +108,12 @@ class Patient:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
+
+
+def _leave_broken_pipes() -> None:
+    """Let a write to a pipe that nobody reads fail: PETSc takes it for a crash, whenever it was loaded."""
+    with suppress(ValueError):  # another thread than the main one
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
 
 
 def make_patient() -> None:

@@ -7,7 +7,7 @@ import typer
 
 from pipeline.cli.console import print_json
 from pipeline.cli.faults import fail, of_file
-from pipeline.cli.words import Json
+from pipeline.cli.words import Json, check_output
 from pipeline.files import write_new
 
 _HOWTO = "docs/realtime.md"
@@ -29,6 +29,7 @@ def evaluator(
     for name in names:
         if (folder / name).exists():
             fail(of_file(folder / name, "exists already, and is left alone; give another folder", _HOWTO))
+    check_output(folder=folder)
     try:
         for name in names:
             write_new(folder / name, (sources() / name).read_text(encoding="utf-8"))

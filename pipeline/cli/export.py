@@ -1,20 +1,25 @@
 """The command that makes a real-time model of a study's body."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from pipeline import __version__
 from pipeline.cli.console import load_solvers, print_json, warning
-from pipeline.cli.faults import BAD_INPUT, DONE, SOME_FAILED, Fault, fail, of_file, of_option
-from pipeline.cli.words import DEFAULT_OUTPUT, File, Json, check_output, load_all
+from pipeline.cli.faults import BAD_INPUT, DONE, SOME_FAILED, Fault, fail, of_file, of_option, of_unwritten
+from pipeline.cli.words import DEFAULT_OUTPUT, File, Json, check_machine, check_output, load_all
+from pipeline.files import LEAST_ROOM
+
+if TYPE_CHECKING:
+    from pipeline.export.export import Exported
 
 # What can be exported, and how: told with a refusal.
 _HOWTO = "docs/realtime.md"
 # Of --accuracy: less than the tables and the formulas are good for; more than is of use.
 _ACCURACIES = (0.002, 0.2)
 _MOST_CHECKS = 1000
+_WITH_SURFACE = 5_000_000  # bytes that a model may take
 # The share of the judged touches whose errors the bars must hold.
 _HELD = 0.95
 
@@ -57,7 +62,8 @@ def export(
         fail(of_option("--accuracy", accuracy, f"must be between {least} and {most}"))
     (study,) = load_all([file])
     path = output or DEFAULT_OUTPUT / f"{study.name}.epsm.nc"
-    check_output(path)
+    check_output(path, room=_WITH_SURFACE if surface else LEAST_ROOM)
+    check_machine()
     try:
         scope = scope_of(study)
     except ExportError as problem:
@@ -76,26 +82,34 @@ def export(
     ranks = Ranks(comm)
     fault, status = Fault(""), DONE
     # Of several ranks each is one thread: BLAS's own would take the others' cores.
-    with workflow.abort_on_exception(comm), threadpool_limits(1 if comm.size > 1 else None, user_api="blas"):
+    threads = threadpool_limits(1 if comm.size > 1 else None, user_api="blas")
+    with workflow.abort_on_exception(comm), workflow.ended_soon(), threads:
         try:
             exported = make_model(scope, wanted, checks, surface=surface, ranks=ranks)
             ranks.on_first(lambda: write(exported, path, scope, file, __version__))
-        except (ExportError, OSError) as problem:
+        except ExportError as problem:
             fault, status = Fault(str(problem), file=str(file), howto=_HOWTO), BAD_INPUT
+        except OSError as problem:
+            fault, status = of_unwritten(problem, path), BAD_INPUT
         except (MeshError, SolveError, RuntimeError) as problem:
             fault, status = of_file(file, str(problem)), SOME_FAILED
     if status != DONE:
         fail(fault, status=status)
-    speaks = comm.rank == 0
-    if speaks and exported.unseen:
+    if comm.rank == 0:
+        _tell(exported, wanted, path, as_json=as_json)
+    raise typer.Exit(DONE if exported.held >= _HELD else SOME_FAILED)
+
+
+def _tell(exported: "Exported", wanted: float, path: Path, *, as_json: bool) -> None:
+    """Say what a model holds."""
+    if exported.unseen:
         warning(f"{path} holds no visible surface: {exported.unseen}")
     found = exported.summary(wanted) | {"file": str(path)}
-    if speaks and as_json:
+    if as_json:
         print_json(found)
-    elif speaks:
-        print(f"wrote {path}: {found['places']} places solved for, {found['coefficients']} coefficients")
-        print(
-            f"judged on {found['judged']} touches: {100 * found['held']:.0f} % held by their bars, largest error "
-            f"{100 * found['largest_error']:.2g} %, median bar {100 * found['median_bar']:.2g} %"
-        )
-    raise typer.Exit(DONE if exported.held >= _HELD else SOME_FAILED)
+        return
+    print(f"wrote {path}: {found['places']} places solved for, {found['coefficients']} coefficients")
+    print(
+        f"judged on {found['judged']} touches: {100 * found['held']:.0f} % held by their bars, largest error "
+        f"{100 * found['largest_error']:.2g} %, median bar {100 * found['median_bar']:.2g} %"
+    )

@@ -45,6 +45,13 @@ def of_file(path: str | Path, why: str, howto: str | None = None) -> Fault:
     return Fault(f"{visible(str(path))}: {why}", file=str(path), howto=howto)
 
 
+def of_unwritten(problem: OSError, path: str | Path | None = None) -> Fault:
+    """Return what became of a file that cannot be written: that which ``problem`` names, or else ``path``."""
+    name = problem.filename or path
+    why = f"cannot be written: {problem.strerror or problem}"
+    return of_file(name, why) if name else Fault(why)
+
+
 def of_study(wrong: "StudyError", hint: str = "") -> list[Fault]:
     """Return what is wrong with a study file, each problem by itself; ``hint`` goes with what people read."""
     return [

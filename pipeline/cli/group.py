@@ -1,13 +1,19 @@
 """The commands as a whole: where scripts asked for JSON, whatever ends one is told in JSON, too."""
 
+import errno
+import sys
 from typing import Any
 
 import typer
 from typer.core import TyperGroup
 
 from pipeline.cli.console import JSON, has_printed_json, print_json
-from pipeline.cli.faults import INTERRUPTED, SOME_FAILED, Fault, as_data
+from pipeline.cli.faults import INTERRUPTED, SOME_FAILED, Fault, as_data, fail, of_unwritten
 from pipeline.launcher import is_first_rank
+
+# What a disk or a folder says that cannot be written to, be it only found when all is done.
+_UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EISDIR,
+               errno.ENOTDIR, errno.ENAMETOOLONG, errno.EIO)  # fmt: skip
 
 
 class Commands(TyperGroup):
@@ -27,9 +33,23 @@ class Commands(TyperGroup):
         """Run the command that was asked for; what it raises goes on from here."""
         try:
             return super().invoke(ctx)
+        except OSError as wrong:
+            if wrong.errno not in _UNWRITABLE:
+                _tell(wrong)
+                raise
+            fail(of_unwritten(wrong))
         except (Exception, KeyboardInterrupt) as wrong:
             _tell(wrong)
+            if isinstance(wrong, KeyboardInterrupt):
+                _end_ranks()
             raise
+
+
+def _end_ranks() -> None:
+    """End every rank if there are several: one that alone was interrupted would wait for the others for ever."""
+    mpi = sys.modules.get("mpi4py.MPI")
+    if mpi is not None and mpi.Is_initialized() and not mpi.Is_finalized() and mpi.COMM_WORLD.size > 1:
+        mpi.COMM_WORLD.Abort(INTERRUPTED)
 
 
 def _tell(wrong: BaseException) -> None:

@@ -18,6 +18,8 @@ from pipeline.cli.words import (
     StoreFile,
     Without,
     check_names,
+    check_output,
+    check_store,
     load_all,
 )
 
@@ -52,8 +54,11 @@ def merge(
 
     (study,) = load_all([file])
     paths = _stores(study, stores, output)
+    target = store or output / "cases.sqlite"
+    check_store(target)
+    check_output(target, *(output / f"{study.name}.{suffix}" for suffix in ("nc", "png", "svg")))
     plan = make_plan(study, without=check_names(without))
-    sources, records = _merged(paths, store or output / "cases.sqlite", plan)
+    sources, records = _merged(paths, target, plan)
     problems = [problem for source in sources for problem in source.problems]
     for problem in problems:
         error(problem)

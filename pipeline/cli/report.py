@@ -9,10 +9,13 @@ from pipeline.cli.console import print_json, warning
 from pipeline.cli.faults import Fault, fail, of_file, of_option
 from pipeline.cli.plan import find_case
 from pipeline.cli.view import MESHES, fields_of
-from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output
+from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output, check_machine, check_output
 
 if TYPE_CHECKING:
     import xarray as xr
+
+# Bytes that a page may take: its figures and cases; a scene besides.
+_PAGE, _PAGE_WITH_SCENE = 1_000_000, 4_000_000
 
 Dataset = Annotated[Path, typer.Argument(help="A dataset (.nc), or a study file whose dataset exists.")]
 
@@ -42,7 +45,7 @@ def plot(
     Example: epsmesh plot studies/figure3.toml --kind accuracy --kind exact
     """
     path, dataset = _read(file, output)
-    from pipeline.report.figures import KINDS, choose, draw, lacks
+    from pipeline.report.figures import KINDS, choose, draw, files, lacks
 
     for name in kind or ():
         if name not in KINDS:
@@ -50,7 +53,9 @@ def plot(
         if lack := lacks(dataset, name):
             allowed = f"{lack}; its figures are {', '.join(choose(dataset))}"
             fail(Fault(f"{path}: --kind {name} {allowed}", str(path), "--kind", name, allowed))
-    pictures = draw(dataset, path.with_suffix(""), kinds=kind or choose(dataset), rest=rest)
+    stem, kinds = path.with_suffix(""), kind or choose(dataset)
+    check_output(*(picture for some in files(dataset, stem, kinds=kinds).values() for picture in some))
+    pictures = draw(dataset, stem, kinds=kinds, rest=rest)
     if as_json:
         print_json({"file": str(path), "files": [str(picture) for picture in pictures]})
         return
@@ -80,6 +85,9 @@ def report(
     Example: epsmesh report results/figure3.nc --scene "epsilon=10 mm"
     """
     path, dataset = _read(file, output)
+    check_output(path.with_suffix(".html"), room=_PAGE_WITH_SCENE if scene else _PAGE)
+    if scene:
+        check_machine()
     if file.suffix != ".nc":
         _compare(file, path, dataset)
     from pipeline.report.page import write_page

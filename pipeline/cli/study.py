@@ -24,6 +24,7 @@ from pipeline.cli.words import (
     Verbose,
     Without,
     axes_of,
+    check_machine,
     check_names,
     check_output,
     check_shard,
@@ -108,6 +109,7 @@ def run(
     check_output(store or output / "cases.sqlite", folder=None if meshes == DEFAULT_MESHES else meshes)
     for study in () if part else studies:
         check_output(*(output / f"{study.name}.{suffix}" for suffix in ("nc", "png", "svg")))
+    check_machine()
     from pipeline.cli.outcome import announce, conclude, print_stages
     from pipeline.cli.outcome import as_data as outcome_data
     from pipeline.run.guard import Guard, guarded

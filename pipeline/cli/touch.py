@@ -8,7 +8,9 @@ import typer
 
 from pipeline.cli.console import print_json
 from pipeline.cli.faults import fail, of_file
-from pipeline.cli.words import Json
+from pipeline.cli.words import Json, check_output
+
+_PAGE = 4_000_000  # bytes that it may take
 
 
 def touch(
@@ -37,6 +39,8 @@ def touch(
     from pipeline.realtime import ModelError, load_surface
     from pipeline.touch.page import render, write_touch_page
 
+    if output is not None:
+        check_output(output, room=_PAGE)
     try:
         surface = load_surface(model)
         if output is not None:

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from pipeline.cli.console import error, print_json
+from pipeline.cli.console import error, load_solvers, print_json
 from pipeline.cli.faults import SOME_FAILED, Fault, fail
 from pipeline.cli.plan import find_case
-from pipeline.cli.words import DEFAULT_OUTPUT, File, Json, Output, load_all
+from pipeline.cli.words import DEFAULT_OUTPUT, File, Json, Output, check_machine, check_output, load_all
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pipeline.view.fields import Fields
 
 MESHES = Path("meshes/cache")
+_ROOM = 2_000_000  # bytes that a page or a picture may take
 
 
 def view(
@@ -44,16 +45,21 @@ def view(
     """
     (study,) = load_all([file])
     chosen = find_case(study, case)
-    from pipeline.workflow import abort_on_exception, world
+    stem = output / f"{study.name}_{_number(study, chosen)}"
+    missing = "" if export else _missing()
+    endings = [f".{export or 'html'}"] if export or missing else ["_mesh.png", "_deformed.png"]
+    check_output(*(stem.with_name(f"{stem.name}{ending}") for ending in endings), room=_ROOM)
+    check_machine()
+    from pipeline.workflow import abort_on_exception, ended_soon, world
 
     comm = world()
-    if not export and (missing := _missing()):
+    if missing:
         (error if comm.rank == 0 else _say_nothing)(f"a page instead of pictures: these need {missing}")
         export = "html"
-    with abort_on_exception(comm):
+    load_solvers()
+    with abort_on_exception(comm), ended_soon():
         fields = fields_of(study, chosen, comm, mesh_only, export == "html", meshes)
         if fields is not None:
-            stem = output / f"{study.name}_{_number(study, chosen)}"
             _write(study, fields, stem, export, as_json=as_json)
 
 

@@ -1,6 +1,7 @@
 """What every command takes and says: options, checks of what they hold, words. Only the command line prints."""
 
 import difflib
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -8,7 +9,7 @@ import typer
 
 from pipeline.cli.console import warning
 from pipeline.cli.faults import Fault, fail, of_file, of_option, of_study
-from pipeline.files import why_not_writable
+from pipeline.files import LEAST_ROOM, cache_folder, why_not_writable
 from pipeline.study.vocabulary import REDUCTIONS
 
 if TYPE_CHECKING:
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 OWN_PROCESS = "own process"
 _SKIPPING, CLUSTER = "docs/skipping.md", "docs/cluster.md"  # what tells more
 _SQLITE = b"SQLite format 3\0"
+_UNWRITABLE = ": cannot be written: "
+_COMPILED = 5_000_000  # bytes that compiled forms may take
 DEFAULT_OUTPUT, DEFAULT_MESHES = Path("results"), Path("meshes/cache")
 
 Files = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Study files (TOML).", show_default=False)]
@@ -111,12 +114,40 @@ def check_store(path: Path) -> None:
             fail(of_option("--store", path, "is not a case store"))
 
 
-def check_output(*files: Path, folder: Path | None = None) -> None:
-    """Exit if one of the files, or any file in a ``folder``, could not be written: before anything is computed."""
-    tried = [*files, *([folder / "tried"] if folder else [])]
-    found = {why: Fault(why, file=str(file)) for file in tried if (why := why_not_writable(file))}
+def check_output(*files: Path, folder: Path | None = None, room: int = LEAST_ROOM) -> None:
+    """Exit if one of the files, or any file in a ``folder``, could not be written: before anything is computed.
+
+    Each may take ``room`` bytes. What holds for several, a full disk, is told of the first one.
+    """
+    found = dict[str, Fault]()
+    for file in files:
+        if why := why_not_writable(file, room):
+            reason = why.removeprefix(str(file)) if _UNWRITABLE in why else why
+            found.setdefault(reason, Fault(why, file=str(file)))
+    if folder and (why := _why_no_files(folder)):
+        found[why] = Fault(why, file=str(folder))
     if found:
         fail(*found.values())
+
+
+def check_machine() -> None:
+    """Exit if code cannot be compiled, or MPI not be started, for want of a folder: before anything is computed."""
+    tried = {"EPSMESH_CACHE": (cache_folder(), _COMPILED)}
+    if given := os.environ.get("TMPDIR"):
+        tried["TMPDIR"] = (Path(given), 1)
+    found = [
+        Fault(f"{why}; {name} may name another folder", file=str(folder), key=name)
+        for name, (folder, room) in tried.items()
+        if (why := _why_no_files(folder, room))
+    ]
+    if found:
+        fail(*found)
+
+
+def _why_no_files(folder: Path, room: int = LEAST_ROOM) -> str:
+    """Say why no file of ``room`` bytes can be written in a folder, "" if one can."""
+    tried = folder / "tried"
+    return why_not_writable(tried, room).replace(str(tried), str(folder), 1)
 
 
 def axes_of(study: "Study") -> str:

@@ -49,7 +49,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from pipeline.arrays import FloatArray
-from pipeline.files import atomic
+from pipeline.netcdf import write_netcdf
 from pipeline.realtime.model import Model
 from pipeline.realtime.pairs import Pairs
 from pipeline.realtime.read import FORMAT
@@ -93,8 +93,7 @@ def write_model(
     variables |= _of_pairs(model.pairs) if model.pairs else {}
     dataset = xr.Dataset(variables, attrs=dict(attributes))
     encoding = {name: {"_FillValue": None} for name in variables}
-    with atomic(path) as temporary:
-        dataset.to_netcdf(temporary, format="NETCDF3_64BIT", engine="netcdf4", encoding=encoding)
+    write_netcdf(dataset, path, "NETCDF3_64BIT", encoding)
 
 
 def _of_surface(surface: SurfaceTable) -> dict[str, Variable]:

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline import __version__
-from pipeline.files import atomic
+from pipeline.netcdf import write_netcdf
 from pipeline.plan.images import Image
 from pipeline.plan.key import digest
 from pipeline.plan.plan import Plan
@@ -131,8 +131,7 @@ def _of_loads(study: Study, flat: list[Record | None]) -> dict[str, Any]:
 
 def write(dataset: xr.Dataset, path: Path) -> None:
     """Write ``dataset`` to ``path`` as netCDF4: to a new file beside it, which then takes its place."""
-    with atomic(path) as temporary:
-        dataset.to_netcdf(temporary, format="NETCDF4", engine="netcdf4")
+    write_netcdf(dataset, path, "NETCDF4")
 
 
 def _along(place: xr.DataArray, path: Collection[str]) -> xr.DataArray:

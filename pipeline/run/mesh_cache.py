@@ -1,6 +1,7 @@
 """Meshes kept on disk, by what they depend on: a bounded folder, the least recently used go first."""
 
 import os
+import shutil
 import time
 import zipfile
 from collections.abc import Callable
@@ -55,17 +56,11 @@ class MeshCache:
     @stage("mesh cache")
     def put(self, path: Path, mesh: MeshArrays) -> None:
         """Keep a mesh. A full disk is no reason to end a run: it is then not kept."""
-        arrays = {f"facets_{name}": value for name, value in mesh.facets.items()}
+        arrays: dict[str, Any] = {f"facets_{name}": value for name, value in mesh.facets.items()}
         if mesh.regions is not None:
             arrays["regions"] = mesh.regions
-        with suppress(OSError):
-            with atomic(path) as temporary:
-                np.savez(
-                    temporary, points=mesh.points, cells=mesh.cells, rim=mesh.rim, seconds=np.float64(mesh.seconds),
-                    **arrays,
-                )  # fmt: skip
-                _touch(temporary)
-            self._shrink()
+        own = {"points": mesh.points, "cells": mesh.cells, "rim": mesh.rim, "seconds": np.float64(mesh.seconds)}
+        self._keep(path, arrays | own)
 
     @stage("mesh cache")
     def arrays(self, key: str, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
@@ -79,12 +74,18 @@ class MeshCache:
         except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile):
             pass
         made = make()
+        self._keep(path, made)
+        return made
+
+    def _keep(self, path: Path, arrays: dict[str, Any]) -> None:
+        """Write arrays to a file, if it can be written."""
         with suppress(OSError):
             with atomic(path) as temporary:
-                np.savez(temporary, **made)
-                _touch(temporary)
+                # Of a disk that fills meanwhile zipfile complains once more, on standard error, when it is freed.
+                if shutil.disk_usage(path.parent).free > sum(np.asarray(array).nbytes for array in arrays.values()):
+                    np.savez(temporary, **arrays)
+                    _touch(temporary)
             self._shrink()
-        return made
 
     def _shrink(self) -> None:
         """Remove the least recently used files until the rest is within the limit."""

@@ -177,10 +177,17 @@ class Store(Records):
         self._database.executemany("INSERT OR REPLACE INTO records VALUES (?, ?, ?)", rows)
 
     def prune(self, *, older_than: float | None = None, failed: bool = False) -> int:
-        """Remove what is :meth:`doomed`, and return how many records that were."""
-        gone = self.doomed(older_than=older_than, failed=failed)
-        self._database.executemany("DELETE FROM records WHERE key = ?", [(one.key,) for one in gone])
-        self._database.execute("VACUUM")
+        """Remove what is :meth:`doomed`, and return how many records that were.
+
+        Raises:
+            StoreError: if the file cannot be written.
+        """
+        with self.transaction():
+            gone = self.doomed(older_than=older_than, failed=failed)
+            self._database.executemany("DELETE FROM records WHERE key = ?", [(one.key,) for one in gone])
+        if gone:
+            with suppress(sqlite3.Error):  # it takes a second file's room, and saves no more than that
+                self._database.execute("VACUUM")
         return len(gone)
 
 

@@ -170,6 +170,11 @@ def dataset(points: list[Point], repeats: int) -> xr.Dataset:
     return xr.Dataset(variables, coordinates, {"title": "Work against precision"} | machine() | {"repeats": repeats})
 
 
+def outputs(output: Path) -> list[Path]:
+    """Return the files that :func:`main` writes into ``output``."""
+    return [output / f"{NAME}.{suffix}" for suffix in ("nc", "png", "svg")]
+
+
 def main(output: Path, repeats: int, *, quick: bool = False) -> list[Path]:
     """Measure, print a table, and write dataset and figure into ``output``; return the files."""
     print(f"{'method':26} {'ν':>5} {'dofs':>8} {'seconds':>8} {'bar':>6} {'error':>10} {'bar':>9} {'its':>4}")
@@ -182,6 +187,6 @@ def main(output: Path, repeats: int, *, quick: bool = False) -> list[Path]:
             flush=True,
         )
     found = dataset(points, repeats)
-    path = output / f"{NAME}.nc"
+    path = outputs(output)[0]
     write(found, path)
     return [path, *draw(found, path.with_suffix(""))]

@@ -1,8 +1,13 @@
 """`epsmesh export` refuses what it has no model of, and says why, before anything is solved."""
 
+import signal
+import subprocess
+import time
+from pathlib import Path
+
 import pytest
 
-from tests.commands import epsmesh
+from tests.commands import ENVIRONMENT, ROOT, command, epsmesh
 
 STUDY = """
 [body]
@@ -36,3 +41,44 @@ def test_what_cannot_be_exported_is_refused(tmp_path, contact, arguments, word):
     assert ran.exit_code == 2
     assert word in ran.stderr
     assert not list(tmp_path.rglob("*.nc"))
+
+
+def children(process):
+    """Return the processes that a process has started."""
+    return [int(number) for number in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
+
+
+def loads_mpi(process):
+    return "libmpi" in Path(f"/proc/{process}/maps").read_text()
+
+
+def lives(process):
+    """Tell whether a process runs: one that has ended may stay in the list where nobody asks for its status."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_an_export_ends_with_any_of_its_ranks(tmp_path, number):
+    """The others wait for it in a call that would never be answered."""
+    (tmp_path / "mine.toml").write_text(STUDY.format(contact="frictionless"))
+    arguments = ("export", tmp_path / "mine.toml", "-o", tmp_path / "model.nc")
+    export = subprocess.Popen(
+        command(*arguments, ranks=2), cwd=ROOT, env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    try:
+        end = time.monotonic() + 120
+        while len(ranks := children(export.pid)) < 2 or not all(map(loads_mpi, ranks)):
+            assert time.monotonic() < end
+            time.sleep(0.1)
+        time.sleep(3)  # until it meshes or solves
+        signal_one = subprocess.run(["kill", f"-{number}", str(ranks[1])], check=False)
+        assert signal_one.returncode == 0
+        export.communicate(timeout=60)
+    finally:
+        export.kill()
+    assert export.returncode in (130, 128 + signal.SIGTERM, 128 + signal.SIGKILL)
+    assert not any(map(lives, ranks))
+    assert [file.name for file in tmp_path.iterdir()] == ["mine.toml"]

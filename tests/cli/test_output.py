@@ -1,12 +1,18 @@
 """What cannot be written is found before anything is computed; who no longer reads ends nothing."""
 
 import errno
+import json
 import os
+import re
+import shlex
+import shutil
+import sqlite3
 import subprocess
 
 import pytest
 
-from tests.commands import command
+from tests.commands import ENVIRONMENT, command
+from tests.commands import epsmesh as epsmesh_here
 from tests.studies import small_text
 
 # What stands where, and what is said of it.
@@ -71,3 +77,108 @@ def test_a_disk_that_fills_while_results_are_written_loses_no_record(epsmesh, tm
     (line,) = [line for line in done.stderr.splitlines() if "cannot be written" in line]
     assert "No space left on device" in line
     assert "(1 read back)" in epsmesh("run", file, *options).stdout
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """A folder with a study that was run: small.toml, out/small.nc and out/cases.sqlite."""
+    folder = tmp_path_factory.mktemp("run")
+    file = folder / "small.toml"
+    file.write_text(small_text(mesh={"epsilon": "full"}, solve={"exact": False}), encoding="utf-8")
+    done = epsmesh_here("run", file, "--output", folder / "out", "--meshes", folder / "meshes")
+    assert done.exit_code == 0, done.output
+    return folder
+
+
+# What stands in the way of which command, of those that write other files than `run` does.
+COMMANDS = {
+    "plot": ("out/small.svg", ("plot", "out/small.nc")),
+    "report": ("out/small.html", ("report", "out/small.nc")),
+    "report of a scene": ("out/small.html", ("report", "out/small.nc", "--scene", "0")),
+    "merge": ("more/small.png", ("merge", "small.toml", "out/cases.sqlite", "--output", "more")),
+    "view as a page": ("more/small_0.html", ("view", "small.toml", "0", "--export", "html", "--output", "more")),
+    "view for ParaView": ("more/small_0.vtu", ("view", "small.toml", "0", "--export", "vtu", "--output", "more")),
+    "touch": ("more/page.html", ("touch", "none.epsm.nc", "--output", "more/page.html")),
+    "export": ("more/m.epsm.nc", ("export", "small.toml", "--output", "more/m.epsm.nc")),
+    "benchmark": ("more/work_precision.nc", ("benchmark", "--quick", "--output", "more")),
+}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_finds_first_what_it_cannot_write(name, epsmesh, results, tmp_path, monkeypatch):
+    place, arguments = COMMANDS[name]
+    shutil.copytree(results, tmp_path, dirs_exist_ok=True)
+    (tmp_path / place).unlink(missing_ok=True)
+    (tmp_path / place).mkdir(parents=True)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("pipeline.cli.view._missing", lambda: "")
+    before = sorted(tmp_path.rglob("*"))
+    done = epsmesh(*arguments)
+    assert done.exit_code == 2, done.output
+    assert done.stderr == f"{place}: is a folder, and a file of that name is to be written\n"
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize("arguments", [("new", "small.toml/x.toml"), ("evaluator", "small.toml/x")])
+def test_a_file_in_the_place_of_a_folder_is_told(epsmesh, results, monkeypatch, arguments):
+    monkeypatch.chdir(results)
+    done = epsmesh(*arguments)
+    assert done.exit_code == 2
+    assert re.match(r"small.toml/x[^:]*: (Not a directory|cannot be written: small.toml is a file)", done.stderr)
+
+
+def test_a_disk_that_fills_while_a_page_is_written_is_told(epsmesh, results, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "out/small.html")
+
+    monkeypatch.chdir(results)
+    monkeypatch.setattr("pipeline.report.page.write_page", full)
+    done = epsmesh("report", "out/small.nc", "--json")
+    assert (done.exit_code, done.stderr) == (2, "out/small.html: cannot be written: No space left on device\n")
+    assert json.loads(done.stdout)["errors"][0]["file"] == "out/small.html"
+
+
+@pytest.mark.parametrize("name", ["EPSMESH_CACHE", "TMPDIR"])
+def test_a_folder_that_the_system_needs_is_looked_at_first(epsmesh, results, tmp_path, monkeypatch, name):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv(name, str(tmp_path / "file"))
+    monkeypatch.chdir(results)
+    done = epsmesh("run", "small.toml", "--fresh", "--output", tmp_path / "out")
+    assert done.exit_code == 2
+    assert f"file is a file, not a folder; {name} may name another folder" in done.stderr
+
+
+def test_a_store_that_cannot_be_changed_is_told(epsmesh, results, tmp_path, monkeypatch):
+    """As on a read-only disk; who may do everything is refused by SQLite alone."""
+    path = tmp_path / "cases.sqlite"
+    shutil.copy(results / "out" / "cases.sqlite", path)
+    with sqlite3.connect(path) as database:
+        database.execute("UPDATE records SET record = ''")
+    monkeypatch.setattr("pipeline.run.store._open", lambda path: sqlite3.connect(f"file:{path}?mode=ro", uri=True))
+    assert epsmesh("store", "prune", "--store", path).exit_code == 0
+    done = epsmesh("store", "prune", "--store", path, "--yes")
+    assert done.exit_code == 2
+    assert "readonly" in done.stderr
+
+
+@pytest.mark.parametrize("arguments", [("version",), ("version", "--json"), ("plan", "small.toml"), ("--help",)])
+def test_a_command_whose_reader_went_away_ends_with_0(results, arguments):
+    for _ in range(2):
+        reading, writing = os.pipe()
+        os.close(reading)
+        done = subprocess.run(
+            command(*arguments), stdout=writing, stderr=subprocess.PIPE, text=True, cwd=results, check=False
+        )
+        os.close(writing)
+        assert (done.returncode, "Traceback" in done.stderr) == (0, False)
+
+
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+def test_streams_that_are_closed_are_none_of_a_commands_files(results, tmp_path, closed):
+    """What libraries print would else go into the case store, or into what takes its number next."""
+    shutil.copy(results / "small.toml", tmp_path)
+    run = shlex.join(command("run", "small.toml", "--output", "out"))
+    done = subprocess.run(f"{run} {closed}", shell=True, cwd=tmp_path, env=ENVIRONMENT, check=False)
+    assert done.returncode == 0
+    assert (tmp_path / "out" / "small.nc").is_file()
+    assert epsmesh_here("store", "verify", "--store", tmp_path / "out" / "cases.sqlite").exit_code == 0

@@ -23,7 +23,7 @@ from pipeline.report.figures.style import STYLE, save
 from pipeline.report.figures.text import shortened
 from pipeline.report.words import is_numeric
 
-__all__ = ["FIGURES", "KINDS", "STYLE", "choose", "draw", "figure", "lacks", "save"]
+__all__ = ["FIGURES", "KINDS", "STYLE", "choose", "draw", "figure", "files", "lacks", "save"]
 
 FIGURES: dict[str, Callable[[xr.Dataset, str, str], Figure]] = {
     "epsilon": epsilon, "exact": exact, "convergence": convergence, "accuracy": accuracy, "map": force_map,
@@ -45,18 +45,25 @@ def draw(
     The main figure goes to ``<stem>.png`` and ``.svg``, those of other ``kinds`` to ``<stem>_<kind>.png`` and ``.svg``,
     and, with the ``rest``, what each leaves out to ``<stem>_<kind>_2.png`` and so on.
     """
-    main = choose(dataset)[0]
-    paths = []
-    for kind in [main] if kinds is None else kinds:
-        name = stem.name if kind == main else f"{stem.name}_{kind}"
+    written = []
+    for kind, paths in files(dataset, stem, formats, kinds).items():
         with mpl.rc_context(STYLE):
             drawn = figure(dataset, kind)
-            paths += [save(drawn, stem.with_name(f"{name}.{suffix}")) for suffix in formats]
+            written += [save(drawn, path) for path in paths]
         for number, (words, part) in enumerate(parts(dataset, kind) if rest else [], start=2):
             titled = part.assign_attrs(title=" – ".join(filter(None, (str(part.attrs.get("title", "")), words))))
             drawn = figure(titled, kind)
-            paths += [save(drawn, stem.with_name(f"{stem.name}_{kind}_{number}.{suffix}")) for suffix in formats]
-    return paths
+            written += [save(drawn, stem.with_name(f"{stem.name}_{kind}_{number}.{suffix}")) for suffix in formats]
+    return written
+
+
+def files(
+    dataset: xr.Dataset, stem: Path, formats: Sequence[str] = ("png", "svg"), kinds: Sequence[str] | None = None
+) -> dict[str, list[Path]]:
+    """Return by kind the files that :func:`draw` writes, without the rest."""
+    main = choose(dataset)[0]
+    names = {kind: stem.name if kind == main else f"{stem.name}_{kind}" for kind in kinds or [main]}
+    return {kind: [stem.with_name(f"{name}.{suffix}") for suffix in formats] for kind, name in names.items()}
 
 
 def figure(dataset: xr.Dataset, kind: str, *, titled: bool = True) -> Figure:
