@@ -141,8 +141,13 @@ def peak_memory(case: Case, share: float = 1.0, of_bar: float | None = None, *, 
     degree, mixed, large = case.mesh.degree, case.element == "mixed", case.material.is_large
     count = dofs((share if of_bar is None else of_bar) * cells(case), degree)
     enriched = enriched_memory(count, degree, mixed=mixed, large=large)
-    basis = reduced * _BYTES_OF_BASIS[degree] * dofs(share * cells(case), degree)
+    basis = basis_memory(dofs(share * cells(case), degree), degree) if reduced else 0.0
     return _LOADED + max(case_memory(case, share), enriched) + basis
+
+
+def basis_memory(dofs: float, degree: int) -> float:
+    """Estimate the bytes that a reduced basis takes besides the solves that it is made of and their error bars."""
+    return _BYTES_OF_BASIS[degree] * dofs
 
 
 def on_ranks(memory: float, ranks: int) -> float:

@@ -72,6 +72,12 @@ def memory_of(case: Case, dofs: int) -> tuple[float, float]:
     )
 
 
+def memory_of_basis(case: Case, dofs: int) -> float:
+    """Return the bytes that a reduced basis takes, with a solve of it; bars that have no room are left out."""
+    solving, _ = memory_of(case, dofs)
+    return solving + estimate.basis_memory(dofs, case.mesh.degree)
+
+
 def meridian_problem(case: Case) -> Problem:
     """Return what solves a round ``case`` on its meridian.
 

@@ -31,6 +31,7 @@ from pipeline.run.problem import (
     check_memory,
     lacks_memory,
     memory_of,
+    memory_of_basis,
     meridian_problem,
     problem_of,
     solve_problem,
@@ -161,7 +162,10 @@ class StepRunner:
             return record if record.is_ok else None
 
         tolerance = self._plan.study.planning.tolerance
-        found = self._caught(lambda: reduced_records(step.solves, problem, tolerance, compute, self._finish))
+        if missing := lacks_memory(self._free, memory_of_basis(step.case, problem.dofs), "it"):
+            found: Failure | None = Failure(missing)
+        else:
+            found = self._caught(lambda: reduced_records(step.solves, problem, tolerance, compute, self._finish))
         if isinstance(found, Failure):
             self._progress.note(f"no reduced basis, every case is solved: {found.message}")
 

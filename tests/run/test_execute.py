@@ -153,6 +153,19 @@ def test_a_bound_that_is_none_is_not_relied_on(monkeypatch):
 
 
 @pytest.mark.mpi
+def test_without_memory_for_a_reduced_basis_every_case_is_solved(monkeypatch):
+    ratios = {"poisson": [0.05 * i for i in range(8)]}
+    monkeypatch.setattr("pipeline.plan.estimate.basis_memory", lambda *_: 1e18)
+    solved = solve(WORLD, material=ratios)
+    assert {record.origin for record in solved.values()} == {"symmetric"}
+    monkeypatch.undo()
+    reduced = solve(WORLD, material=ratios)
+    assert {record.origin for record in reduced.values()} == {"symmetric", "reduced"}
+    for index, record in solved.items():
+        assert record.force == pytest.approx(reduced[index].force, rel=1e-5)
+
+
+@pytest.mark.mpi
 @pytest.mark.parametrize("begin", [0, 1])
 def test_bars_of_a_reduced_basis_are_unknown_where_a_neighbours_is(begin, monkeypatch):
     """Memory that suffices for every second bar: what is between a known and an unknown one claims none."""
