@@ -215,4 +215,10 @@ def lacks_memory(free: FreeMemory, needed: float, what: str) -> str:
     available = free.available()
     if needed <= MEMORY_SHARE * available:
         return ""
-    return f"{what} needs about {needed / 1e9:.1f} GB of memory, {available / 1e9:.1f} GB are available"
+    there = f"{_gigabytes(available)} GB are available, of which {100 * MEMORY_SHARE:.0f} % may be taken"
+    return f"{what} needs about {_gigabytes(needed)} GB of memory, {there}"
+
+
+def _gigabytes(size: float) -> str:
+    """Return bytes in GB, to a hundredth where they are few: what is needed and what is there may be close."""
+    return f"{size / 1e9:.2f}" if size < 1e9 else f"{size / 1e9:,.1f}"
