@@ -19,6 +19,9 @@ _PAGE, _PAGE_WITH_SCENE = 1_000_000, 4_000_000
 
 Dataset = Annotated[Path, typer.Argument(help="A dataset (.nc), or a study file whose dataset exists.")]
 
+# The scene of the report's answer.
+_ANSWER = "answer"
+
 
 def plot(
     file: Dataset,
@@ -69,7 +72,8 @@ def report(
     scene: Annotated[
         str | None,
         typer.Option(
-            help='A case to turn round on the page, "poisson=0.3, epsilon=10 mm" or its number: meshed, not solved.',
+            help='A case to turn round on the page, "poisson=0.3, epsilon=10 mm", its number, or "answer", that of the '
+            "report: meshed, not solved.",
             show_default=False,
         ),
     ] = None,
@@ -83,6 +87,8 @@ def report(
     Example: epsmesh report results/figure3.nc
 
     Example: epsmesh report results/figure3.nc --scene "epsilon=10 mm"
+
+    Example: epsmesh report results/figure3.nc --scene answer
     """
     path, dataset = _read(file, output)
     check_output(path.with_suffix(".html"), room=_PAGE_WITH_SCENE if scene else _PAGE)
@@ -106,13 +112,29 @@ def _scene(path: Path, dataset: "xr.Dataset", text: str) -> str:
     study = study_of(dataset)
     if study is None:
         fail(of_file(path, "--scene needs the study's text, as this version reads it"))
-    chosen = find_case(study, text)
+    chosen = find_case(study, _of_answer(path, dataset) if text.strip() == _ANSWER else text)
     from pipeline.view.page import render
     from pipeline.workflow import world
 
     fields = fields_of(study, chosen, world(), mesh_only=True, bar=False, meshes=MESHES)
     assert fields is not None  # one process
     return render(fields, study.title)
+
+
+def _of_answer(path: Path, dataset: "xr.Dataset") -> str:
+    """Return the number of the case that limits the answer of the report; exit if there is no answer."""
+    from pipeline.report.guide import guide
+    from pipeline.report.page.guideline import ACCURACY
+    from pipeline.report.table import DatasetError, number_of
+
+    try:
+        found = guide(dataset, ACCURACY)
+    except DatasetError as wrong:
+        fail(of_file(path, f"--scene {_ANSWER} needs an answer: {wrong}; name a case by its number"))
+    verdict = found.answer or found.best
+    if verdict is None:
+        fail(of_file(path, f"--scene {_ANSWER} needs an answer, and no setting was judged; name a case by its number"))
+    return str(number_of(dataset, verdict.labels | (verdict.limit or {})))
 
 
 def _read(file: Path, output: Path) -> "tuple[Path, xr.Dataset]":

@@ -17,6 +17,7 @@ from pipeline.report.guide import guide
 from pipeline.report.page import render, write_page
 from pipeline.report.page.cases import case_table
 from pipeline.report.page.guideline import ACCURACY, Section, guide_section
+from pipeline.report.table import number_of
 from tests.cases import BLADE, raw
 from tests.commands import epsmesh
 from tests.report import chosen
@@ -183,6 +184,23 @@ def test_the_guide_of_the_page_is_that_of_the_epsmesh():
     assert section.question in str(found)
     assert {name for name, _ in section.details} >= {"how sure: worst error", "cost", "mesh"}
     assert all(line in str(found) for line in (*(words for _, words in section.details), *section.others))
+
+
+def test_the_case_of_the_answer_is_known_by_its_number():
+    data = chosen.dataset()
+    found = guide(data, ACCURACY)
+    verdict = found.answer or found.best
+    number = number_of(data, verdict.labels | verdict.limit)
+    case = data.isel(dict(zip(data["force"].dims, np.unravel_index(number, data["force"].shape), strict=True)))
+    assert float(case["force"]) == verdict.force
+    assert float(case["epsilon"]) == verdict.labels["epsilon"]
+
+
+def test_a_report_says_how_the_answer_is_turned_round_unless_it_is():
+    words = "epsmesh report results/chosen.nc --scene answer"
+    assert words in render(chosen.dataset(), "chosen")
+    assert words not in render(chosen.dataset(), "chosen", "<p>a scene</p>")
+    assert words not in render(small(), "small")
 
 
 def test_the_report_begins_with_the_answer():

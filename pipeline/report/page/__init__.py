@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from shlex import quote as shell
 from typing import Any
 from urllib.parse import quote
 
@@ -51,6 +52,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         struck=struck(dataset), origins=origins(dataset), skipped=skipped(dataset),
         study=study, study_link=f"data:text/plain;charset=utf-8,{quote(study)}",
         provenance=provenance(dataset), commands=reproduce(dataset, name),
+        turn=f"epsmesh report {shell(f'results/{name}.nc')} --scene answer",
     )  # fmt: skip
 
 
