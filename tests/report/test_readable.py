@@ -117,6 +117,27 @@ def test_the_rest_of_a_large_study_is_drawn_where_it_is_asked_for(tmp_path):
     assert f"leaves out: {len(parts(data, 'epsilon'))} more" in page
 
 
+@pytest.mark.parametrize("kind", ["ratio", "force", "convergence"])
+def test_no_line_goes_over_a_case_without_a_force(kind):
+    data = dataset(mesh={"epsilon": EPSILONS})
+    gone = xr.DataArray(np.arange(len(EPSILONS)) == 2, dims="epsilon")
+    data = data.assign({name: data[name].where(~gone) for name in ("force", "force_ratio", "speedup", "dofs")})
+    data["status"] = data["status"].where(~gone, "failed")
+    (ax, *_) = figure(data, kind).axes
+    spans = [np.asarray(line.get_xydata()) for line in ax.lines if len(line.get_xdata()) > 1]
+    spans = [span for span in spans if line_is_joined(ax, span)]
+    assert spans
+    for span in spans:
+        known = np.isfinite(span[:, 1])
+        ends = [pair for pair in itertools.pairwise(range(len(span))) if known[list(pair)].all()]
+        assert not any(span[a, 0] < 7 < span[b, 0] for a, b in ends)  # mm: ε of the case that failed
+
+
+def line_is_joined(ax, span):
+    """Tell a curve from a line over the whole width."""
+    return span[0, 0] not in (0.0, ax.get_xlim()[0])
+
+
 def test_names_of_points_cover_neither_points_nor_lines_nor_each_other():
     rng = np.random.default_rng(0)
     x, y = rng.uniform(0, 3, 40), rng.uniform(0, 2, 40)

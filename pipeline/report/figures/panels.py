@@ -86,16 +86,17 @@ def draw_curves(panel: Panel, layout: Layout, factor: float = 1.0, errors: str =
         line = panel.data.sel(curve)
         y = line[panel.quantity].values * factor
         known = np.isfinite(y)
+        shown = np.where(known, y, np.nan)  # a line does not go over a case that has no value
         style = look(position) | ({} if axis.joins and len(axis.positions) > 1 else {"linestyle": "none"})
         label = choices(panel.data, curve) if known.any() else None
         x = axis.positions + _aside(axis, position, len(layout.curves))
         if errors:
-            bars = np.nan_to_num(np.abs(y * line[errors].values))[known]
-            panel.ax.errorbar(x[known], y[known], bars, label=label, **BARS, **style)
+            bars = np.nan_to_num(np.abs(y * line[errors].values))
+            panel.ax.errorbar(x, shown, bars, label=label, **BARS, **style)
         elif "is_below" in line:
-            draw_signed(panel.ax, x[known], y[known], line["is_below"].values[known], label, style)
+            draw_signed(panel.ax, x, shown, line["is_below"].values, label, style)
         else:
-            panel.ax.plot(x[known], y[known], label=label, **style)
+            panel.ax.plot(x, shown, label=label, **style)
         failed = line["status"].values == "failed"
         if failed.any():
             place = {"transform": panel.ax.get_xaxis_transform(), "zorder": 6}
