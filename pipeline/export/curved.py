@@ -119,12 +119,7 @@ def _face(scope: Scope, table: Table, middle: tuple[float, ...]) -> tuple[Face, 
     xs = table.reach[0] * (np.sqrt((share + 1) / 2) if table.even[0] else share)
     ys = table.reach[1] * (np.sqrt((share + 1) / 2) if table.even[1] else share) if count > 1 else np.zeros(1)
     vander = np.polynomial.chebyshev.chebvander(share, _TERMS - 1)
-    try:
-        heights = _heights(scope, middle, xs, ys)
-    except PlaceError as problem:
-        raise ExportError(
-            f"probe.at: the region round it, {1e3 * table.reach[0]:.3g} mm to each side: a place {problem}"
-        ) from None
+    heights = _heights(scope, middle, xs, ys, f"the region round it, {1e3 * table.reach[0]:.3g} mm to each side")
     rows = vander if count > 1 else np.ones((1, 1))
     height = _fitted(rows, vander, heights)
     if scope.body.half_sides:  # a smooth body
@@ -137,9 +132,16 @@ def _face(scope: Scope, table: Table, middle: tuple[float, ...]) -> tuple[Face, 
     return Face(height, bend), missed[0], doubt + missed[1] if doubt else 0.0
 
 
-def _heights(scope: Scope, middle: tuple[float, ...], xs: FloatArray, ys: FloatArray) -> FloatArray:
-    """Return the face's height (y, x), in m, at places from the middle of the region."""
-    return np.array([[scope.body.frame((x + middle[0], y + middle[1])).point[2] for x in xs] for y in ys])
+def _heights(scope: Scope, middle: tuple[float, ...], xs: FloatArray, ys: FloatArray, what: str) -> FloatArray:
+    """Return the face's height (y, x), in m, at places from the middle of the region, ``what`` they are for.
+
+    Raises:
+        ExportError: if there is no face above one of them.
+    """
+    try:
+        return np.array([[scope.body.frame((x + middle[0], y + middle[1])).point[2] for x in xs] for y in ys])
+    except PlaceError as problem:
+        raise ExportError(f"probe.at: {what}: a place {problem}") from None
 
 
 def _bends(scope: Scope, middle: tuple[float, ...], xs: FloatArray, ys: FloatArray) -> tuple[FloatArray, float]:
@@ -153,12 +155,8 @@ def _bends(scope: Scope, middle: tuple[float, ...], xs: FloatArray, ys: FloatArr
     across, down = (
         np.arange(-most, most + 1e-9, _APART * radius) for most in (np.abs(xs).max() + wide, np.abs(ys).max() + wide)
     )
-    try:
-        z = _heights(scope, middle, across, down)
-    except PlaceError as problem:
-        raise ExportError(
-            f"probe.at: the face is to be known {1e3 * wide:.3g} mm beyond the region, too: a place {problem}"
-        ) from None
+    beyond = f"the face is to be known {1e3 * wide:.3g} mm beyond the region, too"
+    z = _heights(scope, middle, across, down, beyond)
     x, y = np.meshgrid(across, down)
     places = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
     found, *others = (

@@ -206,6 +206,15 @@ def located(boundary: OnBoundary, points: FloatArray) -> tuple[IntArray, FloatAr
     return boundary.triangles[near[rows, best]], weights[rows, best]
 
 
+def least_rank(most: int, suffices: Callable[[int], bool]) -> int:
+    """Return the least rank from 1 to ``most`` that ``suffices``, as all larger ones do, or ``most``."""
+    low, high = 1, most
+    while low < high:
+        rank = (low + high) // 2
+        low, high = (low, rank) if suffices(rank) else (rank + 1, high)
+    return low
+
+
 def _quadratic(local: FloatArray) -> FloatArray:
     """Return the six functions of a triangle at the last two of its barycentric coordinates (..., 2)."""
     b, c = local[..., 0], local[..., 1]

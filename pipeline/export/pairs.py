@@ -9,7 +9,7 @@ from math import pi
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.export.far import FarFields, located
+from pipeline.export.far import FarFields, least_rank, located
 from pipeline.realtime.pairs import MOST_MODES, MOST_TERMS, Pairs
 from pipeline.stages import stage
 
@@ -51,13 +51,12 @@ def _between(far: FarFields) -> FloatArray:
 def _range(even: FloatArray, most: int) -> FloatArray:
     """Return orthonormal columns (n, rank) that make ``even`` (ν, n, n) but for ``_CUT``, or the first ``most``."""
     found, _, _ = np.linalg.svd(np.concatenate(list(even), axis=1), full_matrices=False)
-    low, high = 1, min(most, found.shape[1])
-    while low < high:
-        rank = (low + high) // 2
+
+    def suffices(rank: int) -> bool:
         onto = found[:, :rank] @ found[:, :rank].T
-        missed = float(np.abs(onto @ even @ onto - even).max())
-        low, high = (low, rank) if missed <= _CUT else (rank + 1, high)
-    return np.asarray(found[:, :low])
+        return bool(np.abs(onto @ even @ onto - even).max() <= _CUT)
+
+    return np.asarray(found[:, : least_rank(min(most, found.shape[1]), suffices)])
 
 
 def _missed(pairs: Pairs, far: FarFields) -> float:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.export.far import FarFields, image_of
+from pipeline.export.far import FarFields, image_of, least_rank
 from pipeline.realtime.surface import SurfaceTable
 
 # Modes are kept until they miss R × room by this share of its largest value.
@@ -39,12 +39,11 @@ def _modes(fields: FloatArray) -> FloatArray:
     kept = order[powers[order] > 1e-14 * powers[order[0]]]
     modes = (fields.T @ turned[:, kept]) / np.sqrt(powers[kept])
     amounts, largest = fields @ modes, np.abs(fields).max()
-    low, high = 1, len(kept)
-    while low < high:
-        rank = (low + high) // 2
-        missed = np.abs(fields - amounts[:, :rank] @ modes[:, :rank].T).max()
-        low, high = (low, rank) if missed <= _CUT * largest else (rank + 1, high)
-    return np.asarray(modes[:, :low])
+
+    def suffices(rank: int) -> bool:
+        return bool(np.abs(fields - amounts[:, :rank] @ modes[:, :rank].T).max() <= _CUT * largest)
+
+    return np.asarray(modes[:, : least_rank(len(kept), suffices)])
 
 
 def _table(far: FarFields, modes: FloatArray, amounts: FloatArray, origin: FloatArray) -> SurfaceTable:

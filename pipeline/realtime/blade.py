@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import cos, hypot, log, pi, sin, sqrt
+from math import ceil, cos, hypot, log, pi, sin, sqrt
+from typing import ClassVar
 
 import numpy as np
 
-from pipeline.realtime.contact import Contact, Place
+from pipeline.realtime.place import Array, Contact, Pair, Place, Tool
 from pipeline.realtime.table import chebyshev
 
 # Of a rectangle, half sides l ≥ w, E* = 1, in Chebyshev polynomials of 1 - 2 log(w/l)/log(1/50): F/d in units of
@@ -19,15 +20,20 @@ RECTANGLE = np.array([
     [1.8450174, -0.0168921, 0.2328837, 0.0145178, 0.0050319, 0.0002247, -2e-06, -6.7e-06],
     [1.7362244, 0.2238417, 0.0903649, 0.0247386, 0.0048149, 0.0006582, 5.88e-05, 3.6e-06],
 ]).T  # fmt: skip
+# What is seen of it are discs so many half widths apart, and so many at least and at most.
+_APART, _FEWEST, _MOST = 1.2, 4, 24
 
 
 @dataclass(frozen=True)
-class Blade:
+class Blade(Tool):
     """A flat rectangular punch of half ``length`` and half ``width`` (m), its edge along ``turn`` (rad) from x.
 
     Its stiffness on a half-space, where it presses, and how it resists to be tilted are those of its proportions,
     fitted to an integral equation (A. E. H. Love's rectangles, graded to the edges) to 1e-5.
     """
+
+    is_round: ClassVar[bool] = False
+    asks_all: ClassVar[bool] = True
 
     length: float
     width: float
@@ -70,6 +76,38 @@ class Blade:
         push = depth / soft
         squared = 0.5 * push**2
         return Contact(push, (squared * of_x, squared * of_y), 1 / soft, hypot(long, short), along + across)
+
+    def moment(self, force: float, plane: float) -> tuple[float, float]:
+        """Of a flat tool it is the same under any force."""
+        return sum(self.spread), 0.0
+
+    @property
+    def tensor(self) -> Array:
+        """That of its two moments."""
+        along, across = self.spread
+        edge = np.array([np.cos(self.turn), np.sin(self.turn)])
+        return np.asarray((across * np.eye(2) + (along - across) * np.outer(edge, edge)) / (along + across))
+
+    def spread_of(self, radius: float) -> Array:
+        """It does not depend on the radius."""
+        along, across = self.spread
+        edge = np.array(self.outline[1])
+        side = np.array([-edge[1], edge[0]])
+        return np.asarray(along * np.outer(edge, edge) + across * np.outer(side, side))
+
+    def discs(self, radius: float) -> tuple[float, Array]:
+        """Discs along the edge, at the abscissae of a pressure that grows like 1/√ towards its ends."""
+        along, across = self.spread
+        # Of a disc, the second moment in one direction is a²/3.
+        a = min(sqrt(3 * across), self.width)
+        count = min(max(ceil(2 * self.length / (_APART * self.width)), _FEWEST), _MOST)
+        reach = sqrt(2 * max(along - a**2 / 3, 0.0))
+        return a, np.outer(reach * np.cos(pi * (np.arange(count) + 0.5) / count), self.outline[1])
+
+    @property
+    def outline(self) -> tuple[Pair, Pair]:
+        """Its rectangle."""
+        return (self.length, self.width), (cos(self.turn), sin(self.turn))
 
 
 @lru_cache(64)

@@ -1,6 +1,7 @@
 """Numbers out of a netCDF classic file with 64-bit offsets ("CDF-2"), every length held against what there is."""
 
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -34,6 +35,24 @@ def read_numbers(data: bytes) -> dict[str, NDArray[np.float64]]:
         ModelError: as ``read_doubles``.
     """
     return _read(data, tuple(_TYPES))
+
+
+def check_shapes(
+    found: Mapping[str, NDArray[np.float64]], shapes: Mapping[str, int | tuple[int, ...]], yet: str = ""
+) -> None:
+    """See that there is each variable of ``shapes``, of that rank or shape, and finite; ``yet`` tells of what is not.
+
+    Raises:
+        ModelError: if not.
+    """
+    for name, shape in shapes.items():
+        values = found.get(name)
+        if values is None:
+            raise ModelError(f"the file has no {name}{yet}: it is no model")
+        if shape not in (values.shape, values.ndim):
+            raise ModelError(f"{name} has shape {values.shape}")
+        if not np.isfinite(values).all():
+            raise ModelError(f"{name} is not finite")
 
 
 def _read(data: bytes, kinds: tuple[int, ...]) -> dict[str, NDArray[np.float64]]:

@@ -13,16 +13,12 @@ the force aside is ∂U/∂x, and a closed path does no work.
 """
 
 from dataclasses import dataclass
-from math import log1p, nan, pi, sqrt, tan
-from typing import NamedTuple
+from math import log1p, pi, sqrt, tan
+from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-# Along x and y.
-Pair = tuple[float, float]
-Square = tuple[Pair, Pair]
+from pipeline.realtime.place import Array, Contact, Place, Tool
 
 # Steps of Newton's method, which is kept within a bracket; the radius is then exact to rounding.
 # A step of it that is this small leaves its square.
@@ -33,54 +29,8 @@ _TERMS, _NEGLIGIBLE = 40, 1e-17
 _SOFT = 1e-12
 
 
-@dataclass(frozen=True, eq=False)
-class Shape:
-    """What tools take that are not round, or stick: see ``pipeline.realtime.table``.
-
-    ``bent`` holds A₁ and A_xy (1/m³), ``bent_slopes`` (2, 2) theirs; ``lean`` (2,) is ∇c (1/m²) and ``hessian`` (2, 2)
-    its slope, both 0 where the lean of the face is in h; ``regular`` (3, 3) is R (1/m).
-    """
-
-    bent: Pair
-    bent_slopes: Square
-    lean: Pair
-    hessian: Square
-    regular: tuple[tuple[float, float, float], ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Place:
-    """c (1/m), h (1/m³) and g² (1/m⁴) of a body with E = 1 at a place, their slopes along x and y, and E*.
-
-    ``bend`` (1/m) is the mean curvature of the face, positive where it is a dome, with its slope.
-    """
-
-    c: float
-    h: float
-    tilt: float
-    slope_c: Pair
-    slope_h: Pair
-    slope_tilt: Pair
-    plane: float
-    bend: float = 0.0
-    slope_bend: Pair = (0.0, 0.0)
-    shape: Shape | None = None
-    poisson: float = nan
-
-
 @dataclass(frozen=True)
-class Contact:
-    """Force (N/Pa) against the tool, force aside on it, dF/dd (N/m/Pa), radius of contact (m) and ∫ p r² / F (m²)."""
-
-    force: float
-    aside: Pair
-    stiffness: float
-    radius: float
-    mean_square: float
-
-
-@dataclass(frozen=True)
-class Disc:
+class Disc(Tool):
     """A flat round punch of ``radius`` (m)."""
 
     radius: float
@@ -98,10 +48,16 @@ class Disc:
         )
         return Contact(force, (aside_x, aside_y), force / depth, a, 2 / 3 * a**2 - 8 / 45 * stiff * h * a**5)
 
+    def moment(self, force: float, plane: float) -> tuple[float, float]:
+        """Of a flat tool it is the same under any force."""
+        return 2 / 3 * self.radius**2, 0.0
+
 
 @dataclass(frozen=True)
-class Round:
+class Round(Tool):
     """A tool of revolution, given by D(s), D'(s), ∫ D and ∫ s² D from 0 to s, all in m and m³."""
+
+    grows: ClassVar[bool] = True
 
     limit: float
 
@@ -116,6 +72,11 @@ class Round:
     def rise(self, square: Array) -> Array:
         """Return how far (m) above its lowest point it is, at squares (m²) of the way to its axis."""
         raise NotImplementedError
+
+    def lifted(self, away: Array) -> Array:
+        """It rises from its lowest point."""
+        square = away[:, 0] ** 2 + away[:, 1] ** 2
+        return np.asarray(self.rise(square) - away[:, 2])
 
     def press(self, depth: float, place: Place, most: float) -> Contact | None:
         """Return the contact at a ``depth`` (m), or nothing if its radius is more than ``most`` (m)."""
@@ -184,6 +145,8 @@ def _contact(a: float, found: _Pressed, place: Place) -> Contact:
 class Ball(Round):
     """A sphere of ``radius`` (m)."""
 
+    kind: ClassVar[str] = "sphere"
+
     radius: float
 
     def profile(self, s: float) -> tuple[float, float, float, float]:
@@ -209,10 +172,16 @@ class Ball(Round):
         """Beyond its own radius it is as high as there."""
         return np.asarray(self.radius - np.sqrt(np.maximum(self.radius**2 - square, 0.0)))
 
+    def moment(self, force: float, plane: float) -> tuple[float, float]:
+        """That of H. Hertz's radius of contact."""
+        return 0.4 * (0.75 * force * self.radius / plane) ** (2 / 3), 2 / 3
+
 
 @dataclass(frozen=True)
 class Cone(Round):
     """A sharp cone whose flank rises by ``slope`` (1/tan of the half angle to the axis)."""
+
+    kind: ClassVar[str] = "cone"
 
     slope: float
 
@@ -229,12 +198,17 @@ class Cone(Round):
         """A straight flank."""
         return np.asarray(self.slope * np.sqrt(square))
 
+    def moment(self, force: float, plane: float) -> tuple[float, float]:
+        """That of A. E. H. Love's radius of contact."""
+        return 2 / 3 * force / (pi * plane * self.slope), 1.0
+
 
 @dataclass(frozen=True)
-class Bonded:
+class Bonded(Disc):
     """A flat round punch of ``radius`` (m) that tissue sticks to, and that does not turn."""
 
-    radius: float
+    sticks: ClassVar[bool] = True
+    asks_all: ClassVar[bool] = True
 
     def press(self, depth: float, place: Place, most: float) -> Contact | None:
         """Return the contact at a ``depth`` (m), or nothing if its radius is more than ``most`` (m).

@@ -4,14 +4,11 @@ from collections.abc import Sequence
 from math import hypot, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.realtime.blade import Blade
-from pipeline.realtime.contact import Bonded
 from pipeline.realtime.pairs import Influence, Pairs
+from pipeline.realtime.place import Array
 from pipeline.realtime.several import Pressing, Settled
 
-Array = NDArray[np.float64]
 # Of a half-space's G, what fourth moments of two contacts make of it at most, in units of (m_i + m_j)²/D⁴: of round
 # tools, and of blades that point at each other. Blades bend R by so much more than round tools.
 _FOURTH, _FOURTH_BLADE, _BLADE = 0.5, 2.0, 2.0
@@ -42,7 +39,7 @@ def _spread(tools: Sequence[Pressing], settled: Settled, between: Influence) -> 
     That is what second moments make of R, what is not known of them, and the next term of a half-space's.
     """
     means = np.array([contact.mean_square for contact in settled.contacts])
-    is_blade = np.array([isinstance(tool.tool, Blade) for tool in tools])
+    is_blade = np.array([not tool.tool.is_round for tool in tools])
     other = np.abs(means - np.where(means > 0, settled.moments, 0.0))
     bend = between.near / between.apart**2
     single = np.where(is_blade, _BLADE, 1.0)[:, None] / 4 * (means[:, None] * between.bends + other[:, None] * bend)
@@ -69,7 +66,7 @@ def _pulled(tools: Sequence[Pressing], settled: Settled, moved: Array) -> tuple[
     A disc that sticks has R. D. Mindlin's stiffness aside (1949).
     """
     ratio, forces = tools[0].place.poisson, settled.forces
-    sticks = np.array([isinstance(tool.tool, Bonded) for tool in tools])
+    sticks = np.array([tool.tool.sticks for tool in tools])
     stiff = sticks * [4 * contact.radius / ((1 + ratio) * (2 - ratio)) for contact in settled.contacts]
     aside = stiff * (moved @ forces)
     known = np.array([hypot(*contact.aside) for contact in settled.contacts])

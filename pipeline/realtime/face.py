@@ -7,7 +7,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.realtime.contact import Contact, Pair, Square
+from pipeline.realtime.place import Contact, Pair, Square
 from pipeline.realtime.table import Table, derived
 
 Array = NDArray[np.float64]

@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.realtime.blade import Blade, blade
-from pipeline.realtime.contact import Bonded, Contact, Disc, Place, Round, ball, cone
+from pipeline.realtime.blade import blade
+from pipeline.realtime.contact import Bonded, Disc, ball, cone
 from pipeline.realtime.doubt import errors
 from pipeline.realtime.face import Face, Spot
 from pipeline.realtime.pairs import Pairs
+from pipeline.realtime.place import Contact, Place, Tool
 from pipeline.realtime.several import TOUCHING, Pressing, TooLargeError, pressed, settle, too_near
 from pipeline.realtime.table import Table
 from pipeline.realtime.touch import SENTENCES, Touch, refused
@@ -26,7 +27,6 @@ _STICKS = 0.1
 _CONTACTS = {
     "disc": ("frictionless", "bonded"), "blade": ("frictionless",), "sphere": ("unilateral",), "cone": ("unilateral",),
 }  # fmt: skip
-Tool = Disc | Round | Blade | Bonded
 
 
 class _Asked(NamedTuple):
@@ -200,7 +200,7 @@ class Model:
         Raises:
             ArithmeticError: if the table is not that of a body.
         """
-        place = self.table.at(asked.x, asked.y, asked.poisson, whole=isinstance(asked.tool, Blade | Bonded))
+        place = self.table.at(asked.x, asked.y, asked.poisson, whole=asked.tool.asks_all)
         if self.face.is_flat:
             return place
         return replace(place, bend=asked.spot.bend, slope_bend=asked.spot.slope_bend)
@@ -223,9 +223,8 @@ class Model:
 
     def _error(self, asked: _Asked, place: Place, found: Contact, depth: float) -> float:
         """Return the relative bar of a contact at a ``depth`` (m)."""
-        is_bonded = isinstance(asked.tool, Bonded)
-        error = found.stiffness * self._uncertain(place, asked.room, found, sticks=is_bonded) + self.bar[3]
-        if isinstance(asked.tool, Round):
+        error = found.stiffness * self._uncertain(place, asked.room, found, sticks=asked.tool.sticks) + self.bar[3]
+        if asked.tool.grows:
             # ∂F/∂κ is half the slope of ∫ p r² with the depth, which both grow by powers of the depth, n and 3 n + 1.
             error += self.bend_error / 2 * found.mean_square * max(3 * found.stiffness / found.force - 2 / depth, 0.0)
         return error
@@ -251,7 +250,7 @@ class Model:
 
     def _tool(
         self, name: str, contact: str | None, sizes: tuple[float, float, float, float], along: Sequence[float] | None
-    ) -> "Tool | str":
+    ) -> Tool | str:
         """Return a tool, or the status of one that is none, or that the model has no tables for."""
         if name not in _CONTACTS or contact not in (None, *_CONTACTS[name]):
             return "tool"
@@ -317,13 +316,13 @@ class Model:
         return (of_c + beyond * share + pulled) / room + of_h * bent * contact.mean_square
 
 
-def _bonded(radius: float) -> "Bonded | str":
+def _bonded(radius: float) -> Tool | str:
     if not isfinite(radius):
         return "tool"
     return Bonded(radius) if radius >= _SMALLEST else "input"
 
 
-def _round(name: str, radius: float, angle: float) -> "Disc | Round | str":
+def _round(name: str, radius: float, angle: float) -> Tool | str:
     """Return a tool, or the status of one that is none."""
     sizes = (radius, angle) if name == "cone" else (radius,)
     if not all(isfinite(size) for size in sizes):

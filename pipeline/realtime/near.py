@@ -15,18 +15,13 @@ a disc is not drawn towards it at its edge.
 """
 
 from dataclasses import dataclass
-from math import ceil, cos, inf, pi, sin, sqrt
+from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.realtime.blade import Blade
-from pipeline.realtime.contact import Ball, Bonded, Cone, Disc, Round
+from pipeline.realtime.place import Array, Tool
 
-Array = NDArray[np.float64]
-Tool = Disc | Round | Blade | Bonded
-# ∫ p ρ² of a contact, in units of F a².
-_MOMENTS = {"disc": 2 / 3, "sphere": 2 / 5, "cone": 1 / 3}
 # What is nearer to the axis than this, in units of a, is it.
 _AXIS = 1e-6
 # Up to so many radii of the contact, and no steeper below its plane, a curved face is next to a tool.
@@ -35,57 +30,39 @@ _NEXT, _STEEP = 4.0, 1.0
 _OVER = 0.95
 # A contact reaches no farther from its plane than this, in units of its radius.
 _BOWED = 0.7
-# A blade's discs are so many half widths apart, and so many at least and at most.
-_APART, _FEWEST, _MOST = 1.2, 4, 24
 
 
 @dataclass(frozen=True, eq=False)
 class Footprint:
-    """Where a tool presses: ``kind`` of pressure and its radius ``a`` (m), at ``centres`` (k, 2), in equal parts.
+    """Where a ``tool`` presses: its kind of pressure of a radius ``a`` (m), at ``centres`` (k, 2), in equal parts.
 
-    ``spread`` is the second moment ((xx, xy), (xy, yy)) of all of it (m²), for a force of one; ``half`` are the half
-    extents (m) of a blade, along ``edge`` and across, of another tool none. Lengths lie in the plane of contact.
+    ``spread`` is the second moment ((xx, xy), (xy, yy)) of all of it (m²), for a force of one. Lengths lie in the plane
+    of contact.
     """
 
-    kind: str
+    tool: Tool
     a: float
     centres: Array
     spread: Array
-    half: tuple[float, float] = (inf, inf)
-    edge: tuple[float, float] = (1.0, 0.0)
-    sticks: bool = False
-    rises: Round | None = None
 
     @staticmethod
     def of(tool: Tool, radius: float) -> "Footprint":
         """Return that of a tool whose radius of contact is ``radius`` (m)."""
-        if isinstance(tool, Blade):
-            return _of_blade(tool)
-        kind = "sphere" if isinstance(tool, Ball) else "cone" if isinstance(tool, Cone) else "disc"
-        spread = 0.5 * _MOMENTS[kind] * radius**2 * np.eye(2)
-        rises = tool if isinstance(tool, Round) else None
-        return Footprint(kind, radius, np.zeros((1, 2)), spread, sticks=isinstance(tool, Bonded), rises=rises)
+        return Footprint(tool, *tool.discs(radius), tool.spread_of(radius))
 
     @property
     def reach(self) -> float:
         """The farthest (m) from the axis that it presses."""
-        return self.a if len(self.centres) == 1 else float(np.hypot(*self.half))
+        return self.a if len(self.centres) == 1 else float(np.hypot(*self.tool.outline[0]))
 
     def within(self, away: Array) -> NDArray[np.intp]:
         """Return which of the points (n, 3), in m from the axis and its plane, lie below it."""
         flat = away[:, 0] ** 2 + away[:, 1] ** 2
         near = np.flatnonzero((flat <= self.reach**2) & (np.abs(away[:, 2]) <= _BOWED * self.reach))
         if len(self.centres) > 1:
-            (c, s), (x, y) = self.edge, away[near, :2].T
-            near = near[(np.abs(c * x + s * y) <= self.half[0]) & (np.abs(c * y - s * x) <= self.half[1])]
+            (half, (c, s)), (x, y) = self.tool.outline, away[near, :2].T
+            near = near[(np.abs(c * x + s * y) <= half[0]) & (np.abs(c * y - s * x) <= half[1])]
         return near
-
-    def lifted(self, away: Array) -> Array:
-        """Return by how much (m) more than its lowest point a tool moves what lies below it up, of points (n, 3)."""
-        if self.rises is None:
-            return np.zeros(len(away))
-        square = away[:, 0] ** 2 + away[:, 1] ** 2
-        return np.asarray(self.rises.rise(square) - away[:, 2])
 
     def field(self, away: Array, poisson: float, flat: float) -> Array:
         """Return the displacement (n, 3), E = 1, at points (n, 3), in m; what is within ``flat`` of the plane is on it.
@@ -120,26 +97,11 @@ class Footprint:
     def _on_face(self, at: Array, poisson: float) -> Array:
         """Return the displacement (n, 3) at points (n, 2) of the plane, from the middle of the contact."""
         rho = np.maximum(np.sqrt(at[:, 0] ** 2 + at[:, 1] ** 2), _AXIS * self.a)
-        sunk, share = on_face(self.kind, rho, self.a, 1 / (1 - poisson**2))
-        if self.sticks:
+        sunk, share = on_face(self.tool.kind, rho, self.a, 1 / (1 - poisson**2))
+        if self.tool.sticks:
             share = share * np.maximum(1 - (self.a / rho) ** 2, 0.0)
         aside = -(1 - 2 * poisson) * (1 + poisson) / (2 * pi) * share / rho**2
         return np.column_stack([aside * at[:, 0], aside * at[:, 1], -sunk])
-
-
-def _of_blade(tool: Blade) -> Footprint:
-    """Return discs along the edge, at the abscissae of a pressure that grows like 1/√ towards its ends."""
-    along, across = tool.spread
-    # Of a disc, the second moment in one direction is a²/3.
-    a = min(sqrt(3 * across), tool.width)
-    count = min(max(ceil(2 * tool.length / (_APART * tool.width)), _FEWEST), _MOST)
-    reach = sqrt(2 * max(along - a**2 / 3, 0.0))
-    edge = np.array([cos(tool.turn), sin(tool.turn)])
-    side = np.array([-edge[1], edge[0]])
-    places = reach * np.cos(pi * (np.arange(count) + 0.5) / count)
-    spread = along * np.outer(edge, edge) + across * np.outer(side, side)
-    half = (tool.length, tool.width)
-    return Footprint("disc", a, np.outer(places, edge), spread, half, (float(edge[0]), float(edge[1])))
 
 
 def on_face(tool: str, rho: Array, a: float, plane: float) -> tuple[Array, Array]:

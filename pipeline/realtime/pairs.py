@@ -12,13 +12,11 @@ from functools import cached_property
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.realtime.classic import ModelError
-from pipeline.realtime.contact import Pair
-from pipeline.realtime.table import chebyshev, polynomials
+from pipeline.realtime.classic import ModelError, check_shapes
+from pipeline.realtime.place import Array, Pair
+from pipeline.realtime.table import chebyshev, middle_of, polynomials
 
-Array = NDArray[np.float64]
 # Modes, and coefficients of all of them: the C side holds as many; so does it links over ν.
 MOST_MODES, MOST_TERMS, MOST_LINKS = 96, 16384, 3
 PARTS = {"pair_modes": 3, "pair_links": 3, "pair_error": 0, "pair_aside": 0}
@@ -77,8 +75,7 @@ class Pairs:
         return np.asarray(of_at @ self._linked(poisson) @ of_to.T)
 
     def _linked(self, poisson: float) -> Array:
-        low, high = self.poisson
-        middle = 0.0 if high == low else (2 * poisson - low - high) / (high - low)
+        middle = middle_of(self.poisson, poisson)
         return np.asarray(np.tensordot(np.array(chebyshev(middle, len(self.links))), self.links, 1))
 
     @cached_property
@@ -103,14 +100,7 @@ def read_pairs(found: Mapping[str, Array], reach: Pair, poisson: Pair) -> Pairs 
     """
     if not any(name in found for name in PARTS):
         return None
-    for name, rank in PARTS.items():
-        values = found.get(name)
-        if values is None:
-            raise ModelError(f"the file has no {name}, but others of its kind: it is no model")
-        if values.ndim != rank:
-            raise ModelError(f"{name} has shape {values.shape}")
-        if not np.isfinite(values).all():
-            raise ModelError(f"{name} is not finite")
+    check_shapes(found, PARTS, ", but others of its kind")
     modes, links = found["pair_modes"], found["pair_links"]
     rank, rows, columns = modes.shape
     fits = {

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.realtime.classic import ModelError
-from pipeline.realtime.contact import Contact, Place, Shape
 from pipeline.realtime.model import Model
+from pipeline.realtime.place import Contact, Place, Shape
 from pipeline.realtime.touch import Touch
 
 Array = NDArray[np.float64]

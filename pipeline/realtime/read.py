@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.realtime.classic import ModelError, read_doubles
+from pipeline.realtime.classic import ModelError, check_shapes, read_doubles
 from pipeline.realtime.face import Face
 from pipeline.realtime.model import Model
 from pipeline.realtime.pairs import read_pairs
@@ -35,20 +35,14 @@ def model_of(data: bytes) -> Model:
         ModelError: if they are no model, or of another version, or damaged.
     """
     found = read_doubles(data)
+    shapes: dict[str, int | tuple[int, ...]]
     shapes = {"reciprocal": 3, "curvature": 3, "origin": (3,), "axes": (3, 3), "bar": (4,), "height": 2, "bend": 2}
     shapes |= dict.fromkeys(("reach", "sides", "poisson_range", "even"), (2,))
     shapes |= {name: rank for name, rank in (("tensors", 4), ("bend_error", ())) if name in found}
     shapes |= dict.fromkeys(("format", "is_round", "c_ref", "leans", *_NUMBERS), ())
     if "format" in found and found["format"].shape == () and found["format"] != FORMAT:
         raise ModelError(f"the file has format {float(found['format']):g}, and this program reads {FORMAT:g}")
-    for name, shape in shapes.items():
-        values = found.get(name)
-        if values is None:
-            raise ModelError(f"the file has no {name}: it is no model")
-        if shape not in (values.shape, values.ndim):
-            raise ModelError(f"{name} has shape {values.shape}")
-        if not np.isfinite(values).all():
-            raise ModelError(f"{name} is not finite")
+    check_shapes(found, shapes)
     _check(found)
     reach, sides, ratios, bar = (found[name].tolist() for name in ("reach", "sides", "poisson_range", "bar"))
     rest = {name: float(found[name]) for name in (*_NUMBERS, "bend_error") if name in found}

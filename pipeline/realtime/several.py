@@ -9,17 +9,13 @@ depends on its force alone, and m w = ½ M:∇∇G what that makes of a half-spa
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf, pi
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.realtime.blade import Blade
-from pipeline.realtime.contact import Ball, Bonded, Cone, Contact, Disc, Pair, Place, Round
 from pipeline.realtime.pairs import Influence
-
-Array = NDArray[np.float64]
+from pipeline.realtime.place import Array, Contact, Pair, Place, Tool
 
 # A depth (m) below which nothing touches.
 TOUCHING = 1e-12
@@ -40,7 +36,7 @@ class TooLargeError(Exception):
 class Pressing(NamedTuple):
     """A tool with the ``depth`` (m) that it has by itself, its place, and the largest radius (m) of its contact."""
 
-    tool: Disc | Round | Blade | Bonded
+    tool: Tool
     place: Place
     depth: float
     most: float
@@ -58,23 +54,7 @@ class Pressing(NamedTuple):
 
     def moment(self, force: float) -> tuple[float, float]:
         """Return the mean of r² (m²) under a ``force`` (N/Pa) on a half-space, and which power of the force it is."""
-        tool, force = self.tool, max(force, 0.0)
-        if isinstance(tool, Ball):
-            return 0.4 * (0.75 * force * tool.radius / self.place.plane) ** (2 / 3), 2 / 3
-        if isinstance(tool, Cone):
-            return 2 / 3 * force / (pi * self.place.plane * tool.slope), 1.0
-        if isinstance(tool, Blade):
-            return sum(tool.spread), 0.0
-        return 2 / 3 * tool.radius**2 if isinstance(tool, Disc | Bonded) else 0.0, 0.0
-
-    @property
-    def tensor(self) -> Array:
-        """The second moment ((xx, xy), (xy, yy)), in units of its trace."""
-        if not isinstance(self.tool, Blade):
-            return 0.5 * np.eye(2)
-        along, across = self.tool.spread
-        edge = np.array([np.cos(self.tool.turn), np.sin(self.tool.turn)])
-        return np.asarray((across * np.eye(2) + (along - across) * np.outer(edge, edge)) / (along + across))
+        return self.tool.moment(max(force, 0.0), self.place.plane)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +139,7 @@ def settle(tools: Sequence[Pressing], alone: Sequence[Contact], between: Influen
 def _bent(tools: Sequence[Pressing], between: Influence) -> tuple[Array, Array]:
     """Return w_i (n, n), in 1/m³, of a tool i at the place of j, and its slope (n, n, 2) with x_i."""
     away, near = between.away / between.apart[..., None], between.near / between.apart**2
-    tensors = np.array([tool.tensor for tool in tools])
+    tensors = np.array([tool.tool.tensor for tool in tools])
     along = np.einsum("iab,ijb->ija", tensors, away)
     share = (along * away).sum(axis=-1)
     slope = 3 * along + (1.5 - 7.5 * share)[..., None] * away
@@ -175,5 +155,5 @@ def _asides(
     more = forces[:, None] * np.einsum("j,ija->ia", forces, between.slopes)
     more += moments[:, None] * np.einsum("j,ija->ia", forces, slope_bent)
     more -= forces[:, None] * np.einsum("j,jia->ia", moments, slope_bent)
-    more[[isinstance(tool.tool, Bonded) for tool in tools]] = 0.0
+    more[[tool.tool.sticks for tool in tools]] = 0.0
     return [(x + dx, y + dy) for (x, y), (dx, dy) in zip([each.aside for each in contacts], more.tolist(), strict=True)]

@@ -16,7 +16,7 @@ from pipeline.realtime.classic import ModelError, read_numbers
 from pipeline.realtime.model import Model
 from pipeline.realtime.near import Footprint
 from pipeline.realtime.read import model_of
-from pipeline.realtime.table import polynomials
+from pipeline.realtime.table import middle_of, polynomials
 from pipeline.realtime.touch import Touch
 
 Array = NDArray[np.float64]
@@ -52,8 +52,7 @@ class SurfaceTable:
 
     def amounts_at(self, x: float, y: float, poisson: float, spread: Array = _POINT) -> Array:
         """Return how much there is of each mode (rank,), for a force as ``far`` takes it."""
-        low, high = self.poisson
-        middle = 0.0 if high == low else (2 * poisson - low - high) / (high - low)
+        middle = middle_of(self.poisson, poisson)
         (a, b), (rank, counts, rows, columns) = self.reach, self.amounts.shape
         along, across = polynomials(x / a, columns), polynomials(y / b, rows)
         terms = np.outer(across[0], along[0]) + spread[0, 1] / (a * b) * np.outer(across[1], along[1])
@@ -107,7 +106,7 @@ class Surface:
         moved *= force
         # What the tool covers goes with it.
         below = foot.within(away)
-        more = foot.lifted(away[below]) - depth - moved[below] @ turn[2]
+        more = foot.tool.lifted(away[below]) - depth - moved[below] @ turn[2]
         moved[below] += more[:, None] * turn[2]
         if not np.isfinite(moved).all():
             return Touch("damaged", np.full(3, nan)), np.full(moved.shape, nan)

@@ -17,11 +17,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.realtime.contact import Pair, Place, Shape, Square
+from pipeline.realtime.place import Array, Pair, Place, Shape, Square
 
-Array = NDArray[np.float64]
 # A value, its slope, and its second derivatives xx, xy, yy.
 Local = tuple[float, Pair, tuple[float, float, float]]
 TENSORS = 7
@@ -67,8 +65,7 @@ class Table:
         Raises:
             ArithmeticError: if the table is not that of a body.
         """
-        low, high = self.poisson
-        middle = 0.0 if high == low else (2 * poisson - low - high) / (high - low)
+        middle = middle_of(self.poisson, poisson)
         (t, slope_t, of_t), (q, slope_q, _), *others = self.local(self._all if whole else self._round, x, y, middle)
         if not t > 0:
             raise ArithmeticError("no compliance is below -c_ref")
@@ -173,6 +170,12 @@ def factors(
     twist = 2 * xi * eta, (2 * eta * of_x, 2 * xi * of_y)
     apart = (xi**2 - eta**2, (2 * xi * of_x, -2 * eta * of_y)) if is_round else one
     return [apart, twist, (xi, (of_x, 0.0)), (eta, (0.0, of_y)), one, apart, twist]
+
+
+def middle_of(poissons: Pair, poisson: float) -> float:
+    """Return where in a range a Poisson's ratio is: -1 at its lower end, 1 at its upper one, 0 where there is none."""
+    low, high = poissons
+    return 0.0 if high == low else (2 * poisson - low - high) / (high - low)
 
 
 def chebyshev(at: float, count: int) -> list[float]:

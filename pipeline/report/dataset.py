@@ -1,7 +1,7 @@
 """The dataset of a study: every record in its place, with labels, units and provenance."""
 
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from math import isinf, nan
 from pathlib import Path
@@ -47,64 +47,20 @@ _MISSING = -1  # of counts, which have no NaN
 def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | None = None) -> xr.Dataset:
     """Arrange ``records`` (by key) as the dataset of the plan's study; ``run`` adds attributes of the run."""
     study = plan.study
-    dims = tuple(axis.name for axis in study.axes)
     flat = [
         _imaged(_scaled(records.get(key), plan.scale_of(case)), plan.images.get(case.index)) or absent(case)
         for key, case in zip(plan.keys, study.cases(), strict=True)
     ]
-
-    def array(values: Any, dtype: Any) -> np.ndarray:
-        return np.array(values, dtype=dtype).reshape(study.shape)
-
     keys = plan.reference_keys or [""] * len(flat)
     exact = [
         _scaled(records.get(key), plan.scale_of(case)) or absent(case)
         for key, case in zip(keys, study.cases(), strict=True)
     ]
-    variables: dict[str, Any] = {}
-    found = _FOUND if any(case.probe.is_unilateral for case in study.cases()) else ()
-    for name in (*_FLOATS, *found):
-        values = [getattr(r, name) if r else nan for r in flat]
-        variables[name] = (dims, array(values, float), attributes(name))
-    for name in _COUNTS:
-        values = [getattr(r, name) if r and r.status == "ok" else _MISSING for r in flat]
-        variables[name] = (dims, array(values, np.int64), {**attributes(name), "missing_value": _MISSING})
-    for name in _EXACT:
-        values = [getattr(r, name.replace("_exact", "")) if r else nan for r in exact]
-        variables[name] = (dims, array(values, float), attributes(name))
-    vectors = np.array([r.force_vector if r else (nan,) * 3 for r in flat]).reshape(*study.shape, 3)
-    variables["force_vector"] = ((*dims, "component"), vectors, attributes("force_vector"))
-    bars = np.array([r.force_vector_error if r else (nan,) * 3 for r in flat]).reshape(*study.shape, 3)
-    variables["force_vector_error"] = ((*dims, "component"), bars, attributes("force_vector_error"))
-    has_stiffness = any(case.probe.motion == "all" for case in study.cases())
-    if has_stiffness:
-        for name in ("stiffness", "stiffness_error"):
-            matrices = np.array([getattr(r, name) if r and getattr(r, name) else _NO_STIFFNESS for r in flat])
-            dimensions = (*dims, "movement", "conjugate")
-            variables[name] = (dimensions, matrices.reshape(*study.shape, 6, 6), attributes(name))
-    if any(case.probe.slit for case in study.cases()):
-        for name in _OF_SLITS:
-            source = exact if name.endswith("_exact") else flat
-            values = [getattr(r, name.removesuffix("_exact")) if r else nan for r in source]
-            variables[name] = (dims, array(values, float), attributes(name))
-    variables |= _of_loads(study, flat)
-    frames = [_frame(case) for case in study.cases()]
-    for number, name in enumerate(_PLACE):
-        places = [frame.point[number] if frame else nan for frame in frames]
-        variables[name] = (dims, array(places, float), attributes(name))
-    axes = np.array([frame.axis if frame else (nan,) * 3 for frame in frames]).reshape(*study.shape, 3)
-    variables["axis"] = ((*dims, "component"), axes, attributes("axis"))
-    notices = ["; ".join(case.body.notices) if isinstance(case.body, FromFile) else "" for case in study.cases()]
-    texts = {
-        "status": [r.status if r else "pending" for r in flat],
-        "message": [r.message if r else "" for r in flat],
-        "origin": [_origin(plan, key, record) for key, record in zip(plan.keys, flat, strict=True)],
-        "force_exact_message": [r.message if r else "" for r in exact],
-    } | ({"body_message": notices} if any(notices) else {})
-    for name, words in texts.items():
-        variables[name] = (dims, array(words, object), attributes(name))
+    variables = _of_records(study, flat, exact)
+    variables |= _of_movements(study, flat) | _of_slits(study, flat, exact) | _of_loads(study, flat)
+    variables |= _of_places(study) | _texts(plan, flat, exact)
     coordinates = {axis.name: _coordinate(axis) for axis in study.axes} | {"component": ["x", "y", "z"]}
-    if has_stiffness:
+    if "stiffness" in variables:
         coordinates |= {"movement": list(_MOTIONS), "conjugate": list(_MOTIONS)}
     dataset = xr.Dataset(variables, coordinates, _attributes(plan, flat, run or {}))
     if any(case.is_closed for case in study.cases() if not case.absence):
@@ -114,19 +70,87 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     return _add_ratios(dataset)
 
 
-def _of_loads(study: Study, flat: list[Record | None]) -> dict[str, Any]:
+def _variable(study: Study, name: str, values: Sequence[Any], *more: str, dtype: Any = float) -> tuple[Any, ...]:
+    """Return a variable of ``values``, one a case, of which each has ``more`` dimensions."""
+    array = np.array(values, dtype=dtype)
+    dims = tuple(axis.name for axis in study.axes)
+    return (*dims, *more), array.reshape((*study.shape, *array.shape[1:])), attributes(name)
+
+
+def _of_records(study: Study, flat: Sequence[Record | None], exact: Sequence[Record | None]) -> dict[str, Any]:
+    """Return what every dataset has of the records of the cases, and of those of F_exact."""
+    variables: dict[str, Any] = {}
+    found = _FOUND if any(case.probe.is_unilateral for case in study.cases()) else ()
+    for name in (*_FLOATS, *found):
+        variables[name] = _variable(study, name, [getattr(r, name) if r else nan for r in flat])
+    for name in _COUNTS:
+        values = [getattr(r, name) if r and r.status == "ok" else _MISSING for r in flat]
+        dims, array, attrs = _variable(study, name, values, dtype=np.int64)
+        variables[name] = (dims, array, {**attrs, "missing_value": _MISSING})
+    for name in _EXACT:
+        values = [getattr(r, name.replace("_exact", "")) if r else nan for r in exact]
+        variables[name] = _variable(study, name, values)
+    for name in ("force_vector", "force_vector_error"):
+        values = [getattr(r, name) if r else (nan,) * 3 for r in flat]
+        variables[name] = _variable(study, name, values, "component")
+    return variables
+
+
+def _of_movements(study: Study, flat: Sequence[Record | None]) -> dict[str, Any]:
+    """Return the stiffness against all movements, if any of the study's probes makes them."""
+    if not any(case.probe.motion == "all" for case in study.cases()):
+        return {}
+    variables = {}
+    for name in ("stiffness", "stiffness_error"):
+        values = [(r and getattr(r, name)) or _NO_STIFFNESS for r in flat]
+        variables[name] = _variable(study, name, values, "movement", "conjugate")
+    return variables
+
+
+def _of_slits(study: Study, flat: Sequence[Record | None], exact: Sequence[Record | None]) -> dict[str, Any]:
+    """Return the energy that slits release, if any of the study's blades stands in one."""
+    if not any(case.probe.slit for case in study.cases()):
+        return {}
+    variables = {}
+    for name in _OF_SLITS:
+        source = exact if name.endswith("_exact") else flat
+        values = [getattr(r, name.removesuffix("_exact")) if r else nan for r in source]
+        variables[name] = _variable(study, name, values)
+    return variables
+
+
+def _of_places(study: Study) -> dict[str, Any]:
+    """Return where the probe touches, and along what it advances."""
+    frames = [_frame(case) for case in study.cases()]
+    variables = {
+        name: _variable(study, name, [frame.point[number] if frame else nan for frame in frames])
+        for number, name in enumerate(_PLACE)
+    }
+    axes = [frame.axis if frame else (nan,) * 3 for frame in frames]
+    return variables | {"axis": _variable(study, "axis", axes, "component")}
+
+
+def _texts(plan: Plan, flat: Sequence[Record | None], exact: Sequence[Record | None]) -> dict[str, Any]:
+    """Return what is told in words of each case."""
+    study = plan.study
+    notices = ["; ".join(case.body.notices) if isinstance(case.body, FromFile) else "" for case in study.cases()]
+    texts = {
+        "status": [r.status if r else "pending" for r in flat],
+        "message": [r.message if r else "" for r in flat],
+        "origin": [_origin(plan, key, record) for key, record in zip(plan.keys, flat, strict=True)],
+        "force_exact_message": [r.message if r else "" for r in exact],
+    } | ({"body_message": notices} if any(notices) else {})
+    return {name: _variable(study, name, words, dtype=object) for name, words in texts.items()}
+
+
+def _of_loads(study: Study, flat: Sequence[Record | None]) -> dict[str, Any]:
     """Return the variables of loads, if any of the study's acts."""
     if not any(case.load.acts for case in study.cases()):
         return {}
-    dims = tuple(axis.name for axis in study.axes)
     loaded = [_loaded(record, case) for record, case in zip(flat, study.cases(), strict=True)]
-    variables: dict[str, Any] = {}
-    for name in _OF_LOADS:
-        values = np.array([getattr(r, name) if r else nan for r in loaded], dtype=float)
-        variables[name] = (dims, values.reshape(study.shape), attributes(name))
-    vectors = np.array([r.load_force_vector if r else (nan,) * 3 for r in loaded]).reshape(*study.shape, 3)
-    variables["load_force_vector"] = ((*dims, "component"), vectors, attributes("load_force_vector"))
-    return variables
+    variables = {name: _variable(study, name, [getattr(r, name) if r else nan for r in loaded]) for name in _OF_LOADS}
+    vectors = [r.load_force_vector if r else (nan,) * 3 for r in loaded]
+    return variables | {"load_force_vector": _variable(study, "load_force_vector", vectors, "component")}
 
 
 def write(dataset: xr.Dataset, path: Path) -> None:

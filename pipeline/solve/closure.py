@@ -14,7 +14,7 @@ from pipeline.arrays import FloatArray
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.reaction import Response
-from pipeline.solve.solution import BALANCE_LIMIT
+from pipeline.solve.solution import check_balance
 
 # The work of both sides of a cut balances where each motion's does to this share of what is asked of it.
 TWO_SIDED = 0.1
@@ -47,6 +47,5 @@ def balanced(response: Response) -> Response:
     """
     force, taken = float(response.forces[0, 2]), float(response.stiffness[0, 0])
     balance = max(response.balance, abs(force - taken) / taken)
-    if balance > BALANCE_LIMIT:
-        raise SolveError(f"forces do not balance: relative error {balance:.1e}, allowed {BALANCE_LIMIT:.0e}")
+    check_balance(balance)
     return replace(response, balance=balance)

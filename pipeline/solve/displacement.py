@@ -28,13 +28,13 @@ from pipeline.solve.enrich import energy_decrements
 from pipeline.solve.error import error_bar, stiffness_bars
 from pipeline.solve.forms import mean_strain_form
 from pipeline.solve.hierarchy import Hierarchy, SetUp
-from pipeline.solve.linear import LinearSolver, SolveError, is_direct
+from pipeline.solve.linear import LinearSolver, is_direct
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.reaction import Response, reaction, sums
 from pipeline.solve.release import Front, Release, Released
 from pipeline.solve.rim import plain_share
-from pipeline.solve.solution import BALANCE_LIMIT, MOST_ROUNDS, TOLERANCE, Solution, rest
+from pipeline.solve.solution import MOST_ROUNDS, TOLERANCE, Solution, check_balance, rest
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.strain import largest_strain, principal_strains
 from pipeline.solve.vectors import global_sum, vector
@@ -106,10 +106,7 @@ class DisplacementProblem:
             rhs, unknowns = ([stack.enter_context(vector(fine.dofs.space)) for _ in columns] for _ in range(2))
             for motion, values, load, unknown in zip(loads.motions, held, rhs, unknowns, strict=False):
                 fine.lift(load, values, law)
-                if self._reuse and motion in self.corrections:
-                    unknown.array[:] = self.corrections[motion]
-                elif earlier is not None:
-                    unknown.array[:] = earlier.known[motion] if motion in earlier.known else earlier.guess(load.array)
+                self._guess(motion, load, unknown, earlier)
             for dead in applied:
                 fine.put(rhs[-1], dead)
             assemble = time.perf_counter() - start
@@ -125,10 +122,7 @@ class DisplacementProblem:
                 tolerance *= share
                 iterations += sum(solver.solve(*pair, tolerance) for pair in zip(rhs, unknowns, strict=True))
                 response, carried = self._response(unknowns, held, applied, law, loads)
-            if response.balance > BALANCE_LIMIT:
-                raise SolveError(
-                    f"forces do not balance: relative error {response.balance:.1e}, allowed {BALANCE_LIMIT:.0e}"
-                )
+            check_balance(response.balance)
             if loads.far is not None:
                 if earlier is not None:
                     earlier.remember(loads.motions, solver, rhs, unknowns)
@@ -144,20 +138,32 @@ class DisplacementProblem:
                 iterations, assemble, solver.setup_seconds, seconds, released=released, pushed=pushed,
                 carried=carried,
             )  # fmt: skip
-            if not estimate:
-                return solution
-            if not solver.is_single and fine.degree > 1:
-                solver.close()  # what the next degree takes is the most memory of all
-            start = time.perf_counter()
-            gained, (released_finer, pushed_finer), more = self._decrements(law, held, loads, found, stack)
-            plain = plain_share(self._body)
-        form = response.stiffness if carried is None else carried.form
+            return self._estimated(solution, law, held, loads, found, stack) if estimate else solution
+
+    def _estimated(
+        self, solution: Solution, law: MaterialLaw, held: list[FloatArray], loads: Loads, below: SetUp, stack: ExitStack
+    ) -> Solution:
+        """Return the last ``solution`` with its bars."""
+        fine = self._fine
+        if not below.solver.is_single and fine.degree > 1:
+            below.solver.close()  # what the next degree takes is the most memory of all
+        start = time.perf_counter()
+        gained, (released_finer, pushed_finer), more = self._decrements(law, held, loads, below, stack)
+        plain = plain_share(self._body)
+        form = solution.response.stiffness if solution.carried is None else solution.carried.form
         relative = np.array([error_bar(share, fine.degree, plain=plain) for share in shares(gained, form)])
         return replace(
             solution.with_bars(gained, stiffness_bars(form, relative), "displacement", apart=loads.apart), plain=plain,
             estimate_iterations=more, released_finer=released_finer, pushed_finer=pushed_finer,
             time_estimate=time.perf_counter() - start,
         ).with_release_bar(fine.degree)  # fmt: skip
+
+    def _guess(self, motion: Motion, load: PETSc.Vec, unknown: PETSc.Vec, earlier: Earlier | None) -> None:
+        """Begin an ``unknown`` with the last solution for its motion, or with what ``earlier`` ones tell of it."""
+        if self._reuse and motion in self.corrections:
+            unknown.array[:] = self.corrections[motion]
+        elif earlier is not None:
+            unknown.array[:] = earlier.known[motion] if motion in earlier.known else earlier.guess(load.array)
 
     def _solved_with(self, law: MaterialLaw) -> Earlier:
         """Return what was solved with a law: of one at a time it is kept."""

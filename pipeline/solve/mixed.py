@@ -40,7 +40,7 @@ from pipeline.solve.reaction import Response, reaction, sums
 from pipeline.solve.release import Front, Release, Released
 from pipeline.solve.rim import plain_share
 from pipeline.solve.saddle import Pair, Saddle, SaddleSolver
-from pipeline.solve.solution import BALANCE_LIMIT, TOLERANCE, Solution, rest
+from pipeline.solve.solution import TOLERANCE, Solution, check_balance, rest
 from pipeline.solve.spaces import Spaces
 from pipeline.solve.strain import largest_strain, principal_strains
 from pipeline.solve.vectors import global_sum
@@ -125,10 +125,7 @@ class MixedProblem:
                 loads, held = self._close(response, unknowns, held)
                 response = balanced(self._response(fine, split, unknowns, held, applied, loads)[0])
             seconds = time.perf_counter() - start - (solver.setup_seconds if direct else 0.0)
-            if response.balance > BALANCE_LIMIT:
-                raise SolveError(
-                    f"forces do not balance: relative error {response.balance:.1e}, allowed {BALANCE_LIMIT:.0e}"
-                )
+            check_balance(response.balance)
             released, pushed = self._released(fine, split, unknowns, held)
             amounts = [*loads.amounts, *(1.0 for _ in applied)]
             self._move(unknowns, held, amounts)

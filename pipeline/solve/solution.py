@@ -9,6 +9,7 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.solve.carried import Carried, load_bars
 from pipeline.solve.error import extrapolate, extrapolate_found, extrapolate_release, release_bar
+from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads, Vector
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.reaction import Response
@@ -33,6 +34,16 @@ def rest(balance: float, tolerance: float) -> float:
     if balance <= BALANCE_LIMIT or tolerance > TOLERANCE or not isfinite(balance):
         return 1.0
     return max(_AIM * BALANCE_LIMIT / balance, _MOST)
+
+
+def check_balance(balance: float) -> None:
+    """See that forces balance.
+
+    Raises:
+        SolveError: if they do not.
+    """
+    if balance > BALANCE_LIMIT:
+        raise SolveError(f"forces do not balance: relative error {balance:.1e}, allowed {BALANCE_LIMIT:.0e}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,8 @@ from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, scope_of
 from pipeline.export.tabulate import tabulate
 from pipeline.realtime import Model
-from pipeline.realtime.contact import Place, tangent
+from pipeline.realtime.contact import tangent
+from pipeline.realtime.place import Place
 from pipeline.solve.material import MaterialLaw
 from pipeline.study.load import parse
 from pipeline.verify.compare import solve

@@ -39,6 +39,17 @@ def compiled(*arguments: object) -> None:
     assert found.returncode == 0, found.stderr
 
 
+def assert_same(found, expected, within):
+    """All numbers of two touches, of forces ``within`` that share of the whole one, of others of themselves."""
+    values, known = (
+        np.array([*touch.force, touch.force_error, touch.stiffness, touch.contact_radius])
+        for touch in (found, expected)
+    )
+    scale = np.array([*[np.linalg.norm(expected.force)] * 3, *known[3:]])
+    assert np.all((np.abs(values - known) <= within * scale) | np.isnan(known))
+    assert np.array_equal(np.isnan(values), np.isnan(known))
+
+
 @pytest.fixture(scope="module")
 def library(tmp_path_factory):
     path = tmp_path_factory.mktemp("realtime") / "libepsmesh.so"
@@ -90,11 +101,7 @@ def test_c_and_numpy_agree(library, tmp_path, kind):
             tip = triple(*(at - depth * np.array(spot.normal) @ model.axes))
             assert library.epsmesh_foot(room, tip, place, ctypes.byref(below)) == 0
             np.testing.assert_allclose([*place, below.value], [*at, depth], rtol=1e-9, atol=1e-14)
-        values = np.array([*found.force, found.force_error, found.stiffness, found.contact_radius])
-        known = np.array([*expected.force, expected.force_error, expected.stiffness, expected.contact_radius])
-        scale = np.array([*[np.linalg.norm(expected.force)] * 3, *known[3:]])
-        assert np.all((np.abs(values - known) <= 1e-12 * scale) | np.isnan(known))
-        assert np.array_equal(np.isnan(values), np.isnan(known))
+        assert_same(found, expected, 1e-12)
         seen.add(expected.status)
     assert seen >= {"ok", "lost", "outside", "poisson"}
 
@@ -124,11 +131,7 @@ def test_several_tools_are_those_of_numpy(library, tmp_path, kind):
         library.epsmesh_touch_all(room, count, queries, touches)
         for found, expected in zip(touches, model.query_all(tools, young=young, poisson=poisson), strict=True):
             assert library.epsmesh_word(found.status).decode() == expected.status
-            values = np.array([*found.force, found.force_error, found.stiffness, found.contact_radius])
-            known = np.array([*expected.force, expected.force_error, expected.stiffness, expected.contact_radius])
-            scale = np.array([*[np.linalg.norm(expected.force)] * 3, *known[3:]])
-            assert np.all((np.abs(values - known) <= 1e-10 * scale) | np.isnan(known))
-            assert np.array_equal(np.isnan(values), np.isnan(known))
+            assert_same(found, expected, 1e-10)
             seen.add(expected.status)
     if "curved" in kind:
         assert seen >= {"alone", "off"}

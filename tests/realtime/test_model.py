@@ -9,7 +9,8 @@ from scipy.special import ellipe, ellipk
 
 from pipeline.realtime import Model, ModelError
 from pipeline.realtime.blade import blade
-from pipeline.realtime.contact import Disc, Place, Shape, ball, cone
+from pipeline.realtime.contact import Disc, ball, cone
+from pipeline.realtime.place import Place, Shape
 from pipeline.realtime.read import model_of
 from tests.realtime.synthetic import random_model, write_random
 

@@ -9,8 +9,9 @@ import pytest
 from pipeline.export.file import write_model
 from pipeline.realtime import ModelError, load
 from pipeline.realtime.blade import blade
-from pipeline.realtime.contact import Bonded, Disc, Place, ball, cone
-from pipeline.realtime.near import _MOMENTS, Footprint, boussinesq, on_face
+from pipeline.realtime.contact import Bonded, Disc, ball, cone
+from pipeline.realtime.near import Footprint, boussinesq, on_face
+from pipeline.realtime.place import MOMENTS, Place
 from pipeline.realtime.surface import surface_of
 from tests.realtime.synthetic import random_surface, write_random, write_surface
 
@@ -32,7 +33,7 @@ def test_the_face_leaves_the_tool_without_a_step(name):
     rise = {"disc": 0.0, "sphere": a**2 / 0.8, "cone": a / tan(1.2)}[name]
     assert contact.force * sunk[0] == pytest.approx(depth - rise, rel=1e-4)
     assert share[0] == pytest.approx(1.0)
-    assert contact.mean_square == pytest.approx(_MOMENTS[name] * a**2, rel=1e-4)
+    assert contact.mean_square == pytest.approx(MOMENTS[name] * a**2, rel=1e-4)
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -40,7 +41,7 @@ def test_far_from_a_contact_its_force_and_second_moment_are_what_is_seen(name):
     a, rho = 1e-3, np.array([4e-3, 8e-3])
     sunk, share = on_face(name, rho, a, PLANE)
     away = np.column_stack([rho, 0 * rho, 0 * rho])
-    found = boussinesq(away, POISSON, _MOMENTS[name] * a**2)
+    found = boussinesq(away, POISSON, MOMENTS[name] * a**2)
     aside = (1 - 2 * POISSON) * (1 + POISSON) / (2 * pi) * share / rho
     np.testing.assert_array_less(np.abs(found[:, 2] + sunk) / sunk, 0.4 * (a / rho) ** 4)
     np.testing.assert_allclose(-found[:, 0], aside, rtol=1e-9)
