@@ -97,12 +97,10 @@ class Blade(Tool):
 
     def discs(self, radius: float) -> tuple[float, Array]:
         """Discs along the edge, at the abscissae of a pressure that grows like 1/√ towards its ends."""
-        along, across = self.spread
-        # Of a disc, the second moment in one direction is a²/3.
-        a = min(sqrt(3 * across), self.width)
         count = min(max(ceil(2 * self.length / (_APART * self.width)), _FEWEST), _MOST)
-        reach = sqrt(2 * max(along - a**2 / 3, 0.0))
-        return a, np.outer(reach * np.cos(pi * (np.arange(count) + 0.5) / count), self.outline[1])
+        # Of a disc, the second moment in one direction is a third of the square of its radius.
+        reach = sqrt(2 * max(self.spread[0] - self.width**2 / 3, 0.0))
+        return self.width, np.outer(reach * np.cos(pi * (np.arange(count) + 0.5) / count), self.outline[1])
 
     @property
     def outline(self) -> tuple[Pair, Pair]:

@@ -90,8 +90,10 @@ def test_a_blade_is_seen_as_what_presses_along_its_edge():
     beside = np.outer([-1.5e-3, 0.0, 1.5e-3], along) + 0.55e-3 * across
     sunk = -foot.field(np.column_stack([beside, np.zeros(3)]), POISSON, 1e-9)[:, 2] * force
     assert np.all((sunk > 0.7) & (sunk < 1.0)), sunk
-    inside = np.append(np.outer(np.linspace(-0.8, 0.8, 9) * 3e-3, along), np.zeros((9, 1)), axis=1)
-    assert list(foot.within(np.vstack([inside, [[0.0, 2e-3, 0.0]]]))) == list(range(9))
+    # It covers its rectangle, and nothing beside.
+    shares = np.array([(x, y) for x in (-1.01, -0.99, 0.0, 0.99, 1.01) for y in (-1.1, -0.9, 0.0, 0.9, 1.1)])
+    places = np.column_stack([shares * (3e-3, 0.5e-3) @ np.array([along, across]), np.zeros(len(shares))])
+    assert list(foot.within(places)) == list(np.flatnonzero((np.abs(shares) < 1).all(axis=1)))
 
 
 def test_tissue_that_sticks_is_not_drawn_to_the_edge_and_is_far_away_like_any_other():

@@ -15,7 +15,7 @@ class Footprint {
     this.at = new Float64Array(3); // what the last call found
   }
   ofBlade({ length, width, edge, spread: [along, across] }) {
-    this.a = Math.min(Math.sqrt(3 * across), width);
+    this.a = width;
     const count = Math.min(Math.max(Math.ceil((2 * length) / (NEAR.APART * width)), NEAR.FEWEST), NEAR.MOST);
     const reach = Math.sqrt(2 * Math.max(along - this.a ** 2 / 3, 0));
     this.centres = Array.from({ length: count }, (_, k) => {
