@@ -11,7 +11,7 @@ from pipeline.realtime import ModelError, load
 from pipeline.realtime.blade import blade
 from pipeline.realtime.contact import Bonded, Disc, ball, cone
 from pipeline.realtime.near import Footprint, boussinesq, on_face
-from pipeline.realtime.place import MOMENTS, Place
+from pipeline.realtime.place import MOMENTS, Place, Shape
 from pipeline.realtime.surface import surface_of
 from tests.realtime.synthetic import random_surface, write_random, write_surface
 
@@ -34,6 +34,22 @@ def test_the_face_leaves_the_tool_without_a_step(name):
     assert contact.force * sunk[0] == pytest.approx(depth - rise, rel=1e-4)
     assert share[0] == pytest.approx(1.0)
     assert contact.mean_square == pytest.approx(MOMENTS[name] * a**2, rel=1e-4)
+
+
+@pytest.mark.parametrize("tool", [*SHAPES.values(), Bonded(2e-3), blade(6e-3, 1e-3, 0.4)], ids=str)
+def test_what_is_told_of_a_contact_is_that_of_its_pressure(tool):
+    flat, none = np.zeros(2), ((0.0, 0.0), (0.0, 0.0))
+    shape = Shape((0.0, 0.0), none, (0.0, 0.0), none, ((0.0,) * 3,) * 3)
+    place = Place(0.0, 0.0, 0.0, flat, flat, flat, PLANE, shape=shape, poisson=POISSON)
+    for depth in (1e-6, 2e-6):  # of a large ball, which Hertz's paraboloid is
+        contact = tool.press(depth, place, 1.0)
+        mean, power = tool.moment(contact.force, PLANE)
+        assert mean == pytest.approx(contact.mean_square, rel=1e-4)
+        spread = tool.spread_of(contact.radius)
+        assert np.trace(spread) == pytest.approx(mean, rel=1e-4)
+        np.testing.assert_allclose(mean * tool.tensor, spread, rtol=1e-4)
+        more, _ = tool.moment(1.01 * contact.force, PLANE)
+        assert more == pytest.approx(1.01**power * mean)
 
 
 @pytest.mark.parametrize("name", SHAPES)
