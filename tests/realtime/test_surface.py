@@ -61,6 +61,8 @@ def test_far_from_a_contact_its_force_and_second_moment_are_what_is_seen(name):
     aside = (1 - 2 * POISSON) * (1 + POISSON) / (2 * pi) * share / rho
     np.testing.assert_array_less(np.abs(found[:, 2] + sunk) / sunk, 0.4 * (a / rho) ** 4)
     np.testing.assert_allclose(-found[:, 0], aside, rtol=1e-9)
+    on_plane = Footprint.of(SHAPES[name], a).field(away, POISSON, 1e-9)
+    np.testing.assert_allclose(on_plane, np.column_stack([found[:, :2], -sunk]), rtol=1e-9)
 
 
 def test_below_the_face_a_ring_of_forces_does_what_its_second_moment_tells():
@@ -110,6 +112,16 @@ def test_a_blade_is_seen_as_what_presses_along_its_edge():
     shares = np.array([(x, y) for x in (-1.01, -0.99, 0.0, 0.99, 1.01) for y in (-1.1, -0.9, 0.0, 0.9, 1.1)])
     places = np.column_stack([shares * (3e-3, 0.5e-3) @ np.array([along, across]), np.zeros(len(shares))])
     assert list(foot.within(places)) == list(np.flatnonzero((np.abs(shares) < 1).all(axis=1)))
+
+
+@pytest.mark.parametrize("way", [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, -1.0)], ids=str)
+def test_a_force_that_is_spread_does_far_away_what_its_parts_do(way):
+    table, step = random_surface().table, 2e-4 * np.array(way)
+    at = np.array(AT[:2])
+    one, before, after = (table.amounts_at(*(at + share * step), 0.35) for share in (0, -1, 1))
+    parts = (before + after) / 2 - one
+    spread = table.amounts_at(*at, 0.35, np.outer(step, step)) - one
+    np.testing.assert_allclose(spread, parts, atol=1e-2 * np.abs(parts).max())
 
 
 def test_tissue_that_sticks_is_not_drawn_to_the_edge_and_is_far_away_like_any_other():

@@ -1,5 +1,7 @@
 """Depths of one tool on one mesh: each begins from its neighbours, or on a condensed surface, with the same forces."""
 
+from contextlib import ExitStack
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -10,6 +12,9 @@ from pipeline.plan.plan import make_plan
 from pipeline.plan.steps import FEWEST_DEPTHS
 from pipeline.report.dataset import build
 from pipeline.run.execute import compute
+from pipeline.solve.contact.condensed import CondensedElements
+from pipeline.solve.contact.sweep import Sweep
+from pipeline.solve.material import MaterialLaw
 from pipeline.study.problems import StudyError
 from tests.cases import study
 
@@ -131,3 +136,16 @@ def test_ranks_agree():
     together, alone = (compute(plan, comm) for comm in (MPI.COMM_WORLD, MPI.COMM_SELF))
     for key, record in alone.items():
         assert together[key].force == pytest.approx(record.force, rel=3e-8)
+
+
+def test_bars_between_two_depths_are_those_of_the_worse_one():
+    sweep = Sweep(MaterialLaw.of(1.0, 1.0), "auto", object.__new__(CondensedElements), ExitStack())
+    sweep.keep_bar(1e-4, 3e-3, 1e-2)
+    assert sweep.bar(1.2e-4) is None  # of one depth nothing follows for another
+    sweep.keep_bar(1.5e-4, 2e-3, 2e-2)
+    sweep.keep_bar(4e-4, 1e-3, 1e-2)
+    assert sweep.bar(1e-4) == (3e-3, 1e-2)
+    for depth in (1.05e-4, 1.45e-4):
+        assert sweep.bar(depth) == pytest.approx((1.25 * 2e-3, 1.25 * 2e-2))
+    assert sweep.bar(2e-4) is None  # too far from one of them
+    assert sweep.bar(5e-4) is None

@@ -11,6 +11,8 @@ from pipeline.scene.model import FIXED
 from pipeline.solve.compiled import vector_space
 from pipeline.solve.forms import ElasticForms
 from pipeline.solve.large.forms import NeoHookeanForms
+from pipeline.solve.large.newton import LargeError
+from pipeline.solve.large.problem import LargeProblem
 from pipeline.solve.material import MaterialLaw
 from pipeline.study.problems import StudyError
 from tests.cases import BLADE, force, solve, study
@@ -113,3 +115,14 @@ def test_a_depth_that_is_not_reached_fails_and_says_where():
 def test_what_it_is_not_for_is_refused(changes, key):
     with pytest.raises(StudyError, match=key):
         study(**({"material": LARGE} | changes))
+
+
+def test_a_force_that_is_not_the_derivative_of_the_energy_is_refused(monkeypatch):
+    law, problem = MaterialLaw.of(1e4, 1e4), object.__new__(LargeProblem)
+    monkeypatch.setattr(problem, "_volume", lambda: 1e-5, raising=False)
+    depth = 1e-3 * np.arange(1, 5) / 4
+    problem._check(np.column_stack([depth, 50 * depth, 25 * depth**2]), law)
+    wrong = np.column_stack([depth, 50 * depth, 25.1 * depth**2])
+    with pytest.raises(LargeError, match="not the derivative"):
+        problem._check(wrong, law)
+    problem._check(wrong * (1e-5, 1e-5, 1e-10), law)  # of so little energy rounding takes more away
