@@ -11,6 +11,7 @@ from pipeline.export.pairs import tabulate_pairs
 from pipeline.export.scope import scope_of
 from pipeline.export.seen import seen_body
 from pipeline.realtime.model import Model
+from pipeline.realtime.near import boussinesq
 from pipeline.realtime.table import Table
 from tests.export.test_export import BOX, CYLINDER, SKIN, study
 
@@ -52,7 +53,30 @@ def test_a_table_of_two_places_is_reciprocal_and_knows_each_by_itself(body, most
 def test_a_force_draws_other_places_along_the_face_no_more_than_the_file_says():
     """Of a half-space (1 - 2ν)(1 + ν)/(2π) at most; what is held adds to that far away."""
     known = fields(CYLINDER, (0.3, 0.3 + 1e-9), 0.5)
-    assert 0.4 * 1.3 / (2 * np.pi) < tabulate_pairs(known).aside < 0.5
+    told = tabulate_pairs(known).aside
+    assert 0.4 * 1.3 / (2 * np.pi) < told < 0.5
+    solved, largest = known.solved[0], 0.0
+    on = solved.nodes[:, 2] > -1e-9
+    on &= np.hypot(*solved.nodes[:, :2].T) <= known.body.region.reach[0]
+    for source, regular in zip(known.sources, solved.values, strict=True):
+        away = solved.nodes - (*source, 0.0)
+        way = np.linalg.norm(away, axis=1)
+        beside = on & (way > 2e-3)
+        moved = regular[beside, :2] + boussinesq(away[beside], 0.3, 1e-30)[:, :2]
+        largest = max(largest, float((np.linalg.norm(moved, axis=1) * way[beside]).max()))
+    assert told == pytest.approx(largest, rel=0.02)
+
+
+def test_the_bar_holds_what_a_table_of_few_places_misses(monkeypatch):
+    """Of a force and its own place, which have solves of their own."""
+    monkeypatch.setattr(far, "_SIZE", 2)
+    known = fields(BOX, (0.45, 0.45), 0.3)
+    pairs, region = tabulate_pairs(known), known.body.region
+    places = [(float(x), float(y)) for x, y in np.random.default_rng(1).uniform(-1, 1, (12, 2)) * region.reach]
+    told = np.diag(pairs.regular(places, places, 0.45))
+    solved = [row[0] for row in compliances(known.body.mesh, region, places, 0.45)]
+    off = np.abs(told - solved) * [region.room(*place) for place in places]
+    assert 0.004 < off.max() < pairs.error
 
 
 @pytest.mark.parametrize(("poisson", "apart"), [(0.3, 9e-3), (0.45, 16e-3)])

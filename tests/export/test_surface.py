@@ -111,3 +111,11 @@ def test_the_field_of_a_force_turns_with_it():
     np.testing.assert_allclose(placed.at(world), plain.at(points) @ turn, rtol=1e-9)
     np.testing.assert_allclose(placed.stress(world), turn.T @ plain.stress(points) @ turn, rtol=1e-8, atol=1e-12)
     assert placed.above(world) <= 0 < placed.above(centre + turn[2:])
+
+
+@pytest.mark.parametrize("least", [1, 2, 5, 6])
+def test_no_more_modes_are_kept_than_it_takes(least):
+    asked = []
+    assert far.least_rank(6, lambda rank: asked.append(rank) or rank >= least) == least
+    assert len(asked) <= 3
+    assert far.least_rank(6, lambda _: False) == 6  # of none that serves all
