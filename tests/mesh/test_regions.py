@@ -72,6 +72,14 @@ def test_layers_that_fill_a_cylinder_leave_no_other_cell():
     assert found[1] / found[2] == pytest.approx(2 / 10, rel=1e-5)
 
 
+@pytest.mark.parametrize(("thickness", "longest"), [(0.6, 0.6), (2.0, 1.6)])
+def test_elements_along_the_probes_edge_are_no_longer_than_a_layer_below_is_thick(thickness, longest):
+    mesh = mesh_arrays(case_of({"layers": [SKIN | {"thickness": f"{thickness} mm"}]}, rim="2 mm", fine="3 mm"), ())
+    x, y, _ = mesh.points[np.intersect1d(mesh.rim, mesh.cells[:, :4])].T
+    arcs = 1e3 * np.hypot(x, y).max() * np.diff(np.sort(np.arctan2(y, x)))
+    assert 0.9 * longest < arcs.max() < longest
+
+
 @pytest.mark.parametrize("epsilon", ["3.5 mm", "10 mm"])
 def test_a_column_cuts_an_inclusion_or_passes_it(epsilon):
     case = case_of({"inclusion": [BALL]}, epsilon=epsilon, outside="free")

@@ -113,6 +113,17 @@ def test_a_slender_body_takes_a_coarser_mesh():
     assert rim() > rim(fixed="bottom+sides")
 
 
+def test_tissue_that_hardly_changes_its_volume_takes_a_finer_mesh():
+    """Displacement elements lock there: bars at ν = 0.49 are three times those at 0.3 on one mesh."""
+
+    def mesh(poisson):
+        mesh = {"accuracy": "0.5 %", "element": "displacement"}
+        case = parse({**raw(material={"young": "10 kPa", "poisson": poisson}), "mesh": mesh}).case(())
+        return rungs_for(case, 0.005)[0].mesh
+
+    assert mesh(0.49).rim < mesh(0.3).rim or mesh(0.49).degree > mesh(0.3).degree
+
+
 def test_a_mesh_that_misses_is_followed_by_a_better_one(monkeypatch):
     """Recipes that promise too much are found out by the error bar, and the next one is tried."""
     monkeypatch.setattr("pipeline.plan.recipe.MARGIN", 1e3)
