@@ -39,6 +39,22 @@ def test_error_bars_decide():
     assert guide(dataset(bar=0.0), "2.5%").answer.labels["epsilon"] == 4e-3
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_the_worst_scene_is_the_worst_with_its_own_bar(seed):
+    data, rng = dataset(), np.random.default_rng(seed)
+    for name in ("force_error", "force_exact_error"):
+        data[name] = data[name] * rng.uniform(0.1, 20, (data.sizes["poisson"], data.sizes["probe"])).reshape(
+            [data.sizes[dim] if dim in ("poisson", "probe") else 1 for dim in data[name].dims]
+        )
+    ratio = data["force"] / data["force_exact"]
+    worst = abs(ratio - 1) + ratio * (data["force_error"] + data["force_exact_error"])
+    verdicts = [v for v in guide(data, "5%").verdicts if v.is_judged]
+    assert len(verdicts) > 4
+    for verdict in verdicts:
+        known = worst.sel({name: value for name, value in verdict.labels.items() if value != "full"})
+        assert verdict.error == pytest.approx(float(known.max()))
+
+
 def test_setting_that_is_right_by_chance_is_not_the_answer():
     """F passes through F_exact at ε = 4 mm, and is wrong again beyond: 4 mm is no guideline."""
     curve = {4e-3: 1.0, 6e-3: 1.2, 10e-3: 1.03, inf: 1.01}

@@ -8,6 +8,7 @@ from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build
 from pipeline.run import far_field
 from pipeline.run.execute import compute
+from pipeline.solve import regular
 from pipeline.solve.far_field import PointForce
 from pipeline.verify import known
 from tests.cases import solve, study
@@ -37,15 +38,28 @@ def test_energy_and_force_beyond_a_half_ball(poisson):
     assert area @ field.traction(at)[:, 2] == pytest.approx(field.force(1.0), rel=1e-12)
 
 
-def test_traction_is_that_of_the_displacement():
-    field, step = PointForce(0.3, (0.0, 0.0, 0.0), 1.0), 1e-5
+def smooth(poisson):
+    """Return polynomials that stand for what a body adds to the field."""
+    values = np.random.default_rng(2).uniform(-1, 1, (len(regular._EXPONENTS), 3))
+    field = regular.Smooth((0.1, -0.2, 0.0), 1.5, values)
+    return field, lambda at, normal: field.traction(at, normal, 2 * poisson / (1 - 2 * poisson))
+
+
+def half_space(poisson):
+    field = PointForce(poisson, (0.0, 0.0, 0.0), 1.0)
+    return field, lambda at, _: field.traction(at)
+
+
+@pytest.mark.parametrize("of", [half_space, smooth])
+def test_traction_is_that_of_the_displacement(of):
+    (field, traction), step = of(0.3), 1e-5
     at = np.array([[0.3, 0.4, -0.5], [0.6, 0.0, -0.1]])
     gradient = np.stack([(field.at(at + e) - field.at(at - e)) / (2 * step) for e in step * np.eye(3)], axis=-1)
     strain = (gradient + gradient.transpose(0, 2, 1)) / 2
     dilation = np.trace(strain, axis1=1, axis2=2)
     stress = 2 * strain + 2 * 0.3 / (1 - 2 * 0.3) * dilation[:, None, None] * np.eye(3)
     normal = at / np.linalg.norm(at, axis=1, keepdims=True)
-    assert np.einsum("nij,nj->ni", stress, normal) == pytest.approx(field.traction(at), abs=1e-8)
+    assert np.einsum("nij,nj->ni", stress, normal) == pytest.approx(traction(at, normal), abs=1e-8)
 
 
 @pytest.mark.parametrize(("contact", "poisson"), CLOSURE)

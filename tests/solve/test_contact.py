@@ -60,6 +60,12 @@ def test_hertz():
     assert found.energy == pytest.approx(2 / 5 * found.force * 0.1e-3, rel=0.01)
 
 
+def test_every_set_that_was_solved_for_is_counted():
+    with pressed() as (problem, law, loads):
+        before, after = (problem.solve(law, loads).iterations for _ in range(2))
+        assert before >= after >= problem.found.sets > 0
+
+
 def test_cone():
     """Sneddon: F = 2/π E* tan α d², a = 2/π tan α d."""
     found = record(body=LARGE, probe=CONE, mesh={"fine": "20 mm", "coarse": "20 mm", "rim": "0.15 mm"})

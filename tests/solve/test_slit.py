@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from pipeline import compat
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import conditions_of, loads_of
 from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.mixed import MixedProblem
 from pipeline.solve.release import Release
+from pipeline.solve.rim import clear_cells
 from pipeline.solve.spaces import Spaces
 from pipeline.verify.slits import strip
 from tests.cases import BLADE, solve, study
@@ -64,6 +66,19 @@ def test_change_of_energy():
     ]
     (before, _), (_, release), (after, _) = found
     assert release == pytest.approx((before - after) / (2 * step), rel=0.02)
+
+
+def test_strain_is_read_clear_of_the_front():
+    """Of the cells about it, and of no other."""
+    case = case_of()
+    mesh, _ = mesh_case(case, QUARTER, MPI.COMM_SELF)
+    front = conditions_of(case).front
+    whole, clear = clear_cells(mesh), clear_cells(mesh, front)
+    corners = compat.geometry_dofs(mesh.mesh)[: mesh.owned_cells, :4]
+    _, y, z = mesh.mesh.geometry.x[corners].mean(axis=1).T
+    away = np.hypot(y, z + 4e-3)
+    assert np.array_equal(clear, whole & (away > away[whole & ~clear].max()))
+    assert 10 < np.count_nonzero(whole & ~clear) < 20
 
 
 def test_what_pairs_of_motions_release_is_that_of_their_sums():
