@@ -60,6 +60,15 @@ def test_hertz():
     assert found.energy == pytest.approx(2 / 5 * found.force * 0.1e-3, rel=0.01)
 
 
+def test_candidates_end_where_their_circle_does():
+    """Mid nodes and corners alike; not at the planes of symmetry."""
+    with pressed() as (problem, _, _):
+        candidates = problem._candidates
+    away = np.hypot(*candidates.points[:, :2].T)
+    assert np.array_equal(candidates.is_edge, away > (1 - 1e-6) * away.max())
+    assert np.count_nonzero(candidates.is_edge & (candidates.corners >= 0)) > 5
+
+
 def test_every_set_that_was_solved_for_is_counted():
     with pressed() as (problem, law, loads):
         before, after = (problem.solve(law, loads).iterations for _ in range(2))

@@ -1,5 +1,7 @@
 """Conjugate gradients with multigrid: exact enough for F, balanced near locking, indifferent to the mesh's size."""
 
+import time
+
 import numpy as np
 import pytest
 from petsc4py import PETSc
@@ -38,6 +40,26 @@ def test_forces_that_do_not_balance_are_a_failure():
         pytest.raises(SolveError, match="do not balance"),
     ):
         problem.solve(law(0.3), PRESS, method="iterative", tolerance=1e-3)
+
+
+def test_times_are_those_that_passed():
+    mesh, begin = make_mesh(), time.perf_counter()
+    with DisplacementProblem(Spaces(mesh), 2, Conditions()) as problem:
+        found = problem.solve(law(0.3), PRESS, method="iterative", estimate=True)
+    parts = found.time_assemble, found.time_setup, found.time_solve, found.time_estimate
+    assert min(parts) > 0
+    assert sum(parts) <= time.perf_counter() - begin
+
+
+@pytest.mark.parametrize(("direct", "levels", "serves"), [(False, 1, True), (True, 1, False), (False, 2, False)])
+def test_what_is_set_up_for_degree_1_serves_above_it_unless_it_is_a_factorisation(direct, levels, serves):
+    solver = object.__new__(LinearSolver)
+    solver._is_single, solver._is_direct = False, direct
+    solver._levels = [Level(None, None, np.empty(0)) for _ in range(levels)]
+    above = Level(None, None, np.empty(0))
+    assert solver.carries([*solver._levels, above]) == serves
+    assert not solver.carries([above, *solver._levels])
+    assert not solver.carries([*solver._levels, Level(None, None, np.empty(0), held=np.zeros(1))])
 
 
 def test_what_does_not_converge_is_a_failure():

@@ -17,6 +17,7 @@ from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.mixed import MixedProblem
+from pipeline.solve.reaction import Sums
 from pipeline.solve.spaces import Spaces
 from pipeline.study.problems import StudyError
 from pipeline.study.sweep import Scale
@@ -263,3 +264,22 @@ def test_a_slide_takes_a_finer_mesh():
         (solve,) = plan.solves
         finest.append((solve.case.mesh.degree, -solve.case.mesh.rim))
     assert finest[1] > finest[0] == finest[2]
+
+
+@pytest.mark.parametrize("mirrored", [(), (0,), (0, 1)])
+def test_forces_that_do_not_balance_are_told_by_what_a_motion_is_worth(mirrored):
+    """Of a translation by its force; of a turn, which may take none, by what its energy is worth in a translation."""
+    loads = Loads((Motion(direction=(0.0, 0.0, 1.0)), Motion(rotation=(0.0, 0.0, 1.0))), (1.0, 1.0))
+    energies, off = np.array([400.0, 1.0]), 1e-3
+    straight = np.array([[0.0, 0.0, 400.0], [0.0, 0.0, 0.0]])
+
+    def missed(of_push=0.0, of_turn=0.0, of_work=0.0):
+        on_support = -straight + [[0.0, 0.0, of_push], [0.0, 0.0, of_turn]]
+        return Sums(straight, on_support, np.add(energies, [0.0, of_work]), np.zeros(2)).imbalance(
+            energies, loads, mirrored
+        )
+
+    assert missed() == 0.0
+    assert missed(of_push=off) == pytest.approx(off / 400)
+    assert missed(of_turn=off) == pytest.approx(off / 20)
+    assert missed(of_work=off) == pytest.approx(off)
