@@ -68,6 +68,9 @@ _PURE = {"": ("%", "percent"), "rad": ("deg", "degree", "°", "rad", "radian")}
 # Twelve digits: "3 mm" and "0.3 cm" must be one number wherever two cases are compared.
 _DIGITS = 12
 
+# Beyond these, in SI units, volumes and their like are numbers no more; within them is all that anyone measures.
+_LEAST, _MOST = 1e-30, 1e30
+
 # Characters of a quantity; what is longer is none.
 _LONGEST = 80
 
@@ -75,10 +78,11 @@ _LONGEST = 80
 _SPELLINGS = str.maketrans({"\N{MINUS SIGN}": "-", "\N{GREEK SMALL LETTER MU}": "\N{MICRO SIGN}", "²": "^2", "³": "^3",
                             "·": "*", "⋅": "*", "\N{NO-BREAK SPACE}": " ", "\N{NARROW NO-BREAK SPACE}": " ",
                             "\N{THIN SPACE}": " "})  # fmt: skip
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?(?![0-9.])")
+_NUMBER = re.compile(r"[+-]?(?P<digits>[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?(?![0-9.])")
 _FACTOR = re.compile(r"([A-Za-zµ]+|%|°)(?:(?:\^|\*\*)(-?[0-9]))?")
 # Products, then divisors, one after the other: "kg/m s^2" would be read in two ways.
 _UNIT = re.compile(rf"{_FACTOR.pattern}(?:(?: |\*){_FACTOR.pattern})*(?:/{_FACTOR.pattern})*")
+_DIGIT = re.compile(r"[1-9]")
 _COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
 _NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)\b", re.IGNORECASE)
 
@@ -126,6 +130,10 @@ def parse_quantity(text: Any, unit: str) -> float:
                              f"is {value / 100:g}?")  # fmt: skip
     if not abs(value * factor) < inf:
         raise _refusal(unit, "the number must be finite")
+    if (value != 0 or _DIGIT.search(found["digits"])) and not _LEAST <= abs(value * factor) <= _MOST:
+        raise _refusal(
+            unit, f"numbers from {_LEAST:g} to {_MOST:g} {unit or '(as a share)'} are taken, of either sign, and 0"
+        )
     return canonical(value * factor)
 
 

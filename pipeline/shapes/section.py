@@ -6,9 +6,6 @@ from typing import Annotated, Any, Protocol
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
-# Lengths (m) from here on are written in metres: as millimetres the largest numbers would be infinite.
-_VAST = 1e300
-
 
 @dataclass(frozen=True)
 class Words:
@@ -67,4 +64,4 @@ def refuse(kind: str, later: tuple[str, ...], supported: tuple[str, ...]) -> Bef
 
 def in_mm(length: float) -> str:
     """Write a length (m) for people."""
-    return f"{length * 1e3:.4g} mm" if abs(length) < _VAST else f"{length:.4g} m"
+    return f"{length * 1e3:.4g} mm"

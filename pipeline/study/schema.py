@@ -127,7 +127,7 @@ class Mesh(Section):
     ] = None
     growth: Annotated[
         float,
-        Field(gt=0, le=2),
+        Field(ge=1e-6, le=2),
         Words("By how much an element may be larger for each unit of distance from the edge.", "0.5"),
     ] = 0.5
     outside: Annotated[

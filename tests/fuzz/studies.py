@@ -88,6 +88,21 @@ def near(draw: st.DrawFn) -> dict[str, Any]:
 
 
 @st.composite
+def extreme(draw: st.DrawFn) -> dict[str, Any]:
+    """Draw a good study of which one or two quantities have another order of magnitude, up to what no double holds."""
+    raw = copy.deepcopy(draw(st.sampled_from(GOOD)))
+    measured = [
+        (holder, key) for holder, key in _places(raw)
+        if isinstance(holder[key], float) or (isinstance(holder[key], str) and holder[key].split()[-1:][0] in _GENTLE)
+    ]  # fmt: skip
+    for _ in range(draw(st.integers(1, 2))):
+        holder, key = draw(st.sampled_from(measured))
+        power, value = draw(st.one_of(st.integers(-40, 40), st.integers(-320, 308))), holder[key]
+        holder[key] = float(f"1e{power}") if isinstance(value, float) else f"3e{power} {value.split()[-1]}"
+    return raw
+
+
+@st.composite
 def broken(draw: st.DrawFn) -> dict[str, Any]:
     """Draw a good study with one to four things wrong: values, keys, sections, lists, doublets."""
     raw = copy.deepcopy(draw(st.sampled_from(GOOD)))
@@ -116,7 +131,7 @@ def broken(draw: st.DrawFn) -> dict[str, Any]:
 
 
 nonsense = st.dictionaries(keys, trees, max_size=6)
-studies = st.one_of(near(), broken(), broken(), nonsense)
+studies = st.one_of(near(), extreme(), broken(), broken(), nonsense)
 
 
 @st.composite
