@@ -9,7 +9,8 @@ from pipeline.files import atomic
 if TYPE_CHECKING:
     import xarray as xr
 
-_FIRST_BUFFER = 65536  # bytes: it grows
+# Bytes: it grows. What is more than a classic file needs would stand behind its end.
+_FIRST_BUFFER = 1
 
 
 def write_netcdf(
