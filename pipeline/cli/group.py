@@ -39,10 +39,20 @@ class Commands(TyperGroup):
                 raise
             fail(of_unwritten(wrong))
         except (Exception, KeyboardInterrupt) as wrong:
-            _tell(wrong)
-            if isinstance(wrong, KeyboardInterrupt):
+            plain = isinstance(wrong, typer.Exit) or not _is_of_interrupt(wrong)
+            ended = wrong if plain else KeyboardInterrupt()
+            _tell(ended)
+            if isinstance(ended, KeyboardInterrupt):
                 _end_ranks()
-            raise
+            if ended is wrong:
+                raise
+            raise ended from wrong
+
+
+def _is_of_interrupt(wrong: BaseException | None) -> bool:
+    """Tell whether it is Ctrl-C that an import, or a library, has made another exception of."""
+    wrong = wrong and (wrong.__cause__ or wrong.__context__)
+    return isinstance(wrong, KeyboardInterrupt) or (wrong is not None and _is_of_interrupt(wrong))
 
 
 def _end_ranks() -> None:

@@ -3,7 +3,6 @@
 import os
 import shutil
 import time
-import zipfile
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 
 from pipeline.compat import versions
 from pipeline.files import atomic
+from pipeline.kept import load_kept
 from pipeline.mesh.generate import MeshArrays
 from pipeline.plan.key import digest, mesh_key
 from pipeline.stages import stage
@@ -38,16 +38,16 @@ class MeshCache:
     def get(self, path: Path) -> MeshArrays | None:
         """Return the mesh in ``path``; a file that cannot be read is removed."""
         try:
-            with np.load(path, allow_pickle=False) as content:
-                facets = {name.removeprefix("facets_"): content[name] for name in content if name.startswith("facets_")}
-                mesh = MeshArrays(
-                    content["points"], content["cells"], facets, content["rim"], float(content["seconds"]),
-                    content.get("regions"),
-                )  # fmt: skip
+            content = load_kept(path)
+            facets = {name.removeprefix("facets_"): content[name] for name in content if name.startswith("facets_")}
+            mesh = MeshArrays(
+                content["points"], content["cells"], facets, content["rim"], float(content["seconds"]),
+                content.get("regions"),
+            )  # fmt: skip
             _touch(path)
         except FileNotFoundError:
             return None
-        except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile):
+        except (OSError, ValueError, KeyError):
             with suppress(OSError):
                 path.unlink()
             return None
@@ -67,11 +67,10 @@ class MeshCache:
         """Return the arrays kept under ``key``, or those that ``make`` returns, which are then kept."""
         path = self._folder / f"{digest(key)}.npz"
         try:
-            with np.load(path, allow_pickle=False) as content:
-                found = {name: content[name] for name in content}
+            found = load_kept(path)
             _touch(path)
             return found
-        except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile):
+        except (OSError, ValueError):
             pass
         made = make()
         self._keep(path, made)

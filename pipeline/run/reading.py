@@ -28,7 +28,8 @@ def open_to_read(path: Path) -> Iterator[Records]:
     except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
         raise DamagedStoreError(damaged(path, error)) from error
     except OSError as error:
-        raise StoreError(f"the case store {path} cannot be read: {error.strerror}") from error
+        which = "" if error.filename in (None, str(path)) else f" ({error.filename})"
+        raise StoreError(f"the case store {path} cannot be read: {error.strerror}{which}") from error
 
 
 def known_of(path: Path, plan: Plan) -> tuple[dict[str, Record], CostModel]:

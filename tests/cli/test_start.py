@@ -1,5 +1,6 @@
 """Ctrl-C ends the command quietly at any moment of its start: also while Python itself starts."""
 
+import json
 import os
 import signal
 import subprocess
@@ -9,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.commands import ENVIRONMENT, ROOT
+from tests.commands import ENVIRONMENT, ROOT, epsmesh
 
 LAUNCHER = ROOT / "scripts" / "epsmesh"
 PATHS = {"PYTHONPATH": str(ROOT), "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
@@ -37,3 +38,18 @@ def test_the_launcher_hands_on_arguments_and_status():
     )  # fmt: skip
     assert done.returncode == 2
     assert "a b'c.toml" in done.stderr
+
+
+def test_an_interrupt_of_which_an_import_made_another_exception_is_one(monkeypatch):
+    """As pybind11 does while dolfinx loads."""
+
+    def interrupted(**_):
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as interrupt:
+            raise ImportError("initialization failed") from interrupt
+
+    monkeypatch.setattr("pipeline.run.provenance.provenance", interrupted)
+    done = epsmesh("version", "--json")
+    assert (done.exit_code, done.stderr) == (130, "")
+    assert json.loads(done.stdout)["status"] == 130

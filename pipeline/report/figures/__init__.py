@@ -62,7 +62,9 @@ def files(
 ) -> dict[str, list[Path]]:
     """Return by kind the files that :func:`draw` writes, without the rest."""
     main = choose(dataset)[0]
-    names = {kind: stem.name if kind == main else f"{stem.name}_{kind}" for kind in kinds or [main]}
+    names = {
+        kind: stem.name if kind == main else f"{stem.name}_{kind}" for kind in ([main] if kinds is None else kinds)
+    }
     return {kind: [stem.with_name(f"{name}.{suffix}") for suffix in formats] for kind, name in names.items()}
 
 

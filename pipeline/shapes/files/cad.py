@@ -7,9 +7,9 @@ from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 from pipeline.files import atomic, cache_folder
+from pipeline.kept import load_kept
 from pipeline.launcher import environment_alone
 from pipeline.shapes.arrays import FloatArray, IntArray, np
 from pipeline.shapes.files import check
@@ -70,20 +70,15 @@ def _tessellated(path: Path, unit: str, content: str) -> dict[str, Any]:
     name = "um" if unit == "µm" else unit
     kept = cache_folder() / "cad" / f"{content[:32]}-{name}-{_VERSION}.npz"
     try:
-        return _read(kept)
-    except (OSError, ValueError, KeyError, BadZipFile, EOFError):
+        return load_kept(kept)
+    except (OSError, ValueError):
         pass
     try:
         with atomic(kept) as target:
             _run(path, name, target)
-            return _read(target)
+            return load_kept(target)
     except OSError as error:
         raise SurfaceError(f"{kept.parent}, for what is made of it, cannot be written: set EPSMESH_CACHE") from error
-
-
-def _read(path: Path) -> dict[str, Any]:
-    with np.load(path, allow_pickle=False) as arrays:
-        return {name: arrays[name] for name in arrays.files}
 
 
 def _run(path: Path, unit: str, target: Path) -> None:

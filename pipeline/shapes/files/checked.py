@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterable
 from hashlib import file_digest, sha256
 from pathlib import Path
-from zipfile import BadZipFile
 
 from pipeline.files import atomic, cache_folder
+from pipeline.kept import load_kept
 from pipeline.shapes.arrays import np
 from pipeline.shapes.triangles import Triangles
 
@@ -43,9 +43,9 @@ def _kept(key: str, make: Callable[[], Whole]) -> Whole:
     """Return what is on disk under a key, or make it and write it there."""
     path = cache_folder() / "surfaces" / f"{key[:32]}.npz"
     try:
-        with np.load(path, allow_pickle=False) as found:
-            return Triangles(found["points"], found["facets"]), tuple(found["notices"].tolist())
-    except (OSError, KeyError, ValueError, EOFError, BadZipFile):
+        found = load_kept(path)
+        return Triangles(found["points"], found["facets"]), tuple(found["notices"].tolist())
+    except (OSError, KeyError, ValueError):
         pass  # not there, or cut short
     triangles, notices = make()
     try:
