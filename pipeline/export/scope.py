@@ -7,6 +7,7 @@ from typing import Any
 
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.probes.cone import Cone
+from pipeline.shapes.section import in_mm
 from pipeline.shapes.support import Faces
 from pipeline.shapes.tissue import Tissue
 from pipeline.study.sweep import Case, Study
@@ -102,13 +103,13 @@ def _refusal(case: Case, first: Case) -> str:
     if body != first.body:
         return "a model is of one body, and the study has several: export a study of each"
     if case.load.acts:
-        return "gravity and tractions have no real-time model yet"
+        return "[load]: gravity and tractions have no real-time model yet"
     if case.material.is_large:
         return 'material.law = "neo-hookean" has no real-time model: its force is not in proportion to anything'
     if case.poisson > _MOST:
         return f"material.poisson = {case.poisson:g} is too near to 0.5 for a real-time model: at most {_MOST}"
-    if probe.action != "pierce" or probe.motion == "all" or probe.slit is not None:
-        return "a model is of tools that press straight down, and neither slide nor turn nor cut"
+    if key := _other_than_pressing(case):
+        return f"{key}: a model is of tools that press straight down, and neither slide nor turn nor cut"
     if isinstance(body, Layered):
         return _flat_refusal(case, first, body)
     if not body.is_smooth:
@@ -136,12 +137,22 @@ def _flat_refusal(case: Case, first: Case, body: Layered) -> str:
     if body.regions and body.depth_of_tissue < _SHALLOWEST * min(body.half_sides):
         return "other tissue so near to the surface has no real-time model: a tenth of half the width is the least"
     if not isinstance(body.support, Faces) or set(body.support.names) != {"bottom"}:
-        return 'such a support has no real-time model yet: fixed = "bottom" has'
+        return 'body.fixed: such a support has no real-time model yet: "bottom" has'
     if probe.shape not in _CONTACTS:
         return f'probe.shape = "{probe.shape}" has no real-time model yet: {", ".join(_CONTACTS)} have'
     if probe.contact not in _CONTACTS[probe.shape]:
         right = '" or "'.join(_CONTACTS[probe.shape])
         return f'probe.contact = "{probe.contact}" of a {probe.shape} has no real-time model yet: "{right}" has'
     if isinstance(probe, Cone) and probe.tip:
-        return "a rounded cone has no real-time model yet: a sharp one has"
-    return "" if case.frame.is_upright else "a model is of tools that press straight down"
+        return f"probe.tip = {in_mm(probe.tip)}: a rounded cone has no real-time model yet: a sharp one has"
+    return "" if case.frame.is_upright else "probe.axis: a model is of tools that press straight down: leave it out"
+
+
+def _other_than_pressing(case: Case) -> str:
+    """Return the key, and its value, by which a tool does anything but press; "" if it only presses."""
+    probe = case.probe
+    if probe.slit is not None:
+        return f"probe.incision = {in_mm(probe.slit.depth)}"
+    if probe.motion == "all":
+        return 'probe.motion = "all"'
+    return "" if probe.action == "pierce" else f'probe.action = "{probe.action}"'

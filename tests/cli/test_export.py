@@ -47,6 +47,19 @@ def test_what_cannot_be_exported_is_refused(tmp_path, contact, arguments, word):
 LONGEST = 30
 
 
+@pytest.mark.parametrize(
+    ("line", "word"),
+    [
+        ("axis = [0.3, 0.0, -1.0]", "probe.axis: a model is of tools that press straight down"),
+        ('motion = "all"', 'probe.motion = "all": a model is of tools that press'),
+    ],
+)
+def test_a_refused_tool_is_named_by_its_key(tmp_path, line, word):
+    (tmp_path / "mine.toml").write_text(STUDY.format(contact="bonded").replace("[mesh]", f"{line}\n[mesh]"))
+    ran = epsmesh("export", tmp_path / "mine.toml", "-o", tmp_path / "model.nc")
+    assert (ran.exit_code, word in ran.stderr) == (2, True), ran.stderr
+
+
 def children(process):
     """Return the processes that a process has started."""
     return [int(number) for number in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
