@@ -38,9 +38,12 @@ def dataset(failed: int = 0, pending: int = 0, **changes):
     return build(plan, records, {"start": "2026-01-01"})
 
 
-EPSILONS = ["3 mm", "5 mm", "7 mm", "10 mm", "15 mm", "20 mm", "full"]
+EPSILONS = ["4 mm", "5 mm", "7 mm", "10 mm", "15 mm", "20 mm", "full"]
 FIGURE = {
-    "probe": [{"name": "disc, pierce", **raw()["probe"]}, {"name": "blade, cut", **BLADE}],
+    "probe": [
+        {"name": "disc, pierce", **raw()["probe"], "radius": "2 mm"},
+        {"name": "blade, cut", **BLADE, "length": "4 mm", "width": "1 mm"},
+    ],
     "material": {"poisson": [0.30, 0.40, 0.45, 0.49]},
     "mesh": {"epsilon": EPSILONS, "outside": ["coarse", "free", "fixed"]},
 }

@@ -20,7 +20,7 @@ EXACT = {"exact": True}
 LARGE = {
     "probe": [{"name": f"disc {r}", "shape": "disc", "radius": f"{r} mm", "depth": f"0.{r} mm"} for r in (1, 2, 3, 4)],
     "material": {"poisson": [round(0.02 * i, 2) for i in range(12)], "young": ["1 kPa", "2 kPa"]},
-    "mesh": {"epsilon": ["4 mm", "8 mm", "full"], "outside": ["coarse", "free", "fixed"], "degree": [1, 2]},
+    "mesh": {"epsilon": ["5 mm", "8 mm", "full"], "outside": ["coarse", "free", "fixed"], "degree": [1, 2]},
 }
 SIZES = {"solve": EXACT, "mesh": {"rim": ["1 mm", "0.5 mm", "0.02 mm"], "fine": ["5 mm", "4 mm"]}}
 SMALLER = FIGURE | {"solve": EXACT, "material": {"poisson": [0.3, 0.4]}, "mesh": {"epsilon": ["4 mm", "8 mm", "full"]}}

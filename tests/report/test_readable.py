@@ -21,8 +21,8 @@ from tests.report.synthetic import EPSILONS, FIGURE, dataset
 LONG = {
     "title": "A title that says everything about the study at once, the tissue, the needle, the support, " * 4,
     "probe": [
-        {**raw()["probe"], "name": "a blunt 14-gauge biopsy needle of the second generation, as delivered"},
-        {**raw()["probe"], "radius": "3 mm", "name": f"a trocar without_any_blank_{'0123456789' * 4} in its number"},
+        {**raw()["probe"], "radius": "1 mm", "name": "a blunt 14-gauge biopsy needle of the second generation"},
+        {**raw()["probe"], "radius": "2 mm", "name": f"a trocar without_any_blank_{'0123456789' * 4} in its number"},
     ],
     "material": [
         {"name": f"porcine liver parenchyma ex vivo, perfused at 37 degrees, sample number {i}", "young": "8 kPa",
@@ -84,7 +84,7 @@ def test_parts_hold_what_a_figure_leaves_out():
     young = ["8 kPa", "10 kPa"]
     radii = [{**raw()["probe"], "radius": f"{r} mm", "name": f"disc {r}"} for r in (1, 1.5, 2, 3)]
     study = {"probe": radii, "material": {"poisson": [round(0.04 * i, 2) for i in range(12)], "young": young},
-             "mesh": {"epsilon": ["4 mm", "full"], "outside": ["coarse", "free"], "degree": [1, 2]}}  # fmt: skip
+             "mesh": {"epsilon": ["6 mm", "full"], "outside": ["coarse", "free"], "degree": [1, 2]}}  # fmt: skip
     data = by_probe(dataset(**study))
     data["force_ratio"] = data["force_ratio"] * (1 + 0.01 * data["degree"])
     dims = ("poisson", "probe", "degree", "outside")
@@ -106,7 +106,10 @@ def test_parts_hold_what_a_figure_leaves_out():
 
 
 def test_the_rest_of_a_large_study_is_drawn_where_it_is_asked_for(tmp_path):
-    study = {**FIGURE, "probe": [{**raw()["probe"], "radius": f"{r} mm", "name": f"disc {r}"} for r in (1, 2, 3, 4)]}
+    study = {
+        **FIGURE,
+        "probe": [{**raw()["probe"], "radius": f"{r} mm", "name": f"disc {r}"} for r in (1, 1.5, 2, 2.5)],
+    }
     data = by_probe(dataset(**study))
     count = len(parts(data, "ratio"))
     names = [path.name for path in draw(data, tmp_path / "a", ["svg"], ["ratio"], rest=True)]
