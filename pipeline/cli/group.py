@@ -1,6 +1,7 @@
 """The commands as a whole: where scripts asked for JSON, whatever ends one is told in JSON, too."""
 
 import errno
+import os
 import sys
 from typing import Any
 
@@ -9,7 +10,7 @@ from typer.core import TyperGroup
 
 from pipeline.cli.console import JSON, has_printed_json, print_json
 from pipeline.cli.faults import INTERRUPTED, SOME_FAILED, Fault, as_data, fail, of_unwritten
-from pipeline.launcher import is_first_rank
+from pipeline.launcher import is_first_rank, is_launched
 
 # What a disk or a folder says that cannot be written to, be it only found when all is done.
 _UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EISDIR,
@@ -57,9 +58,14 @@ def _is_of_interrupt(wrong: BaseException | None) -> bool:
 
 def _end_ranks() -> None:
     """End every rank if there are several: one that alone was interrupted would wait for the others for ever."""
+    if not is_launched():
+        return
     mpi = sys.modules.get("mpi4py.MPI")
-    if mpi is not None and mpi.Is_initialized() and not mpi.Is_finalized() and mpi.COMM_WORLD.size > 1:
+    if mpi is not None and mpi.Is_initialized() and not mpi.Is_finalized():
         mpi.COMM_WORLD.Abort(INTERRUPTED)
+    # An import that was interrupted has left no module, but an MPI that waits for all ranks as Python ends.
+    sys.stdout.flush()
+    os._exit(INTERRUPTED)
 
 
 def _tell(wrong: BaseException) -> None:

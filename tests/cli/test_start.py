@@ -53,3 +53,22 @@ def test_an_interrupt_of_which_an_import_made_another_exception_is_one(monkeypat
     done = epsmesh("version", "--json")
     assert (done.exit_code, done.stderr) == (130, "")
     assert json.loads(done.stdout)["status"] == 130
+
+
+# What an interrupt of the import of MPI leaves behind: no module, and an MPI that waits for all ranks as Python ends.
+ONE_RANK_LEAVES = """
+import sys
+from mpi4py import MPI
+from pipeline.cli.group import _end_ranks
+comm = MPI.COMM_WORLD
+if comm.rank == 0:
+    comm.barrier()
+del sys.modules["mpi4py.MPI"]
+_end_ranks()
+"""
+
+
+def test_a_rank_that_is_interrupted_while_mpi_loads_ends_the_others():
+    words = ["mpirun", "--oversubscribe", "-n", "2", sys.executable, "-c", ONE_RANK_LEAVES]
+    done = subprocess.run(words, cwd=ROOT, env=ENVIRONMENT, capture_output=True, check=False, timeout=60)
+    assert done.returncode == 130
