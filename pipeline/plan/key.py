@@ -204,12 +204,17 @@ def text_of(section: Section, without: tuple[str, ...] = ()) -> str:
     return _text({key: value for key, value in content.items() if _LATER.get(key) != value})
 
 
-@lru_cache(_MANY)
 def _mesh_text(mesh: Mesh, is_full: bool, half_width: float, element: str) -> str:
     """Write a mesh section in canonical form; without an ``element``, what the mesh itself depends on."""
+    # Sections are equal whether a value is a default or was given, and of an accuracy what was given is kept.
+    return _written(mesh, frozenset(mesh.model_fields_set - {"name"}), is_full, half_width, element)
+
+
+@lru_cache(_MANY)
+def _written(mesh: Mesh, given_keys: frozenset[str], is_full: bool, half_width: float, element: str) -> str:
     content: dict[str, Any]
     if mesh.accuracy is not None:
-        given = {key: getattr(mesh, key) for key in mesh.model_fields_set if key != "name"}
+        given = {key: getattr(mesh, key) for key in given_keys}
         content = {**given, "accuracy": mesh.accuracy, "model": mesh.model}
     else:
         content = {"epsilon": "full"}

@@ -92,6 +92,18 @@ def test_records_whose_bars_may_be_too_small_are_not_used():
     assert not {*keys(0.47)} & {*before}
 
 
+def test_a_degree_that_is_given_is_another_case_in_any_order():
+    """Without one the accuracy may take any."""
+
+    def key(**mesh):
+        return case_key(parse({**raw(), "mesh": {"accuracy": "0.7 %", **mesh}}).case(()))
+
+    first, given, again = key(), key(degree=2), key()
+    assert first == again != given
+    given, first = (key(degree=2, growth=0.5), key(growth=0.5))
+    assert first != given
+
+
 @pytest.mark.parametrize("accuracy", [0.03, 0.01, 0.002])
 def test_meshes_that_follow_one_that_missed_are_clearly_better(accuracy):
     case = parse({**raw(), "mesh": {"accuracy": f"{100 * accuracy} %"}}).case(())
