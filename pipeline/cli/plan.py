@@ -88,7 +88,7 @@ def _show(study: "Study", found: dict[str, Any], *, quiet: bool, verbose: bool, 
     exact = f" ({found['exact']} of them for F_exact)" if found["exact"] else ""
     to_do = f"{found['meshes']} meshes, {found['operators']} operators, {found['solves']} solves{exact}"
     on = f"on {found['ranks']} {'rank' if found['ranks'] == 1 else 'ranks'}"
-    cost = f"{format_seconds(found['seconds'])} {on}, {found['memory'] / 1e9:.1f} GB for the largest step"
+    cost = f"{format_seconds(found['seconds'])} {on}, {found['memory'] / 1e9:,.1f} GB for the largest step"
     if quiet:
         print(f"{study.file}: {found['cases']} cases; to do: {to_do}{f'; {cost}' if found['steps'] else ''}")
         return
@@ -230,9 +230,9 @@ def _squeezed(text: Any) -> str:
 
 
 def _line(step: dict[str, Any]) -> str:
-    size, gigabytes, ranks = f"{step['cells']:9.0f} cells", step["memory"] / 1e9, step["ranks"]
+    size, gigabytes, ranks = f"{step['cells']:9,.0f} cells", step["memory"] / 1e9, step["ranks"]
     on = f"on {ranks} rank" + "s" * (ranks > 1)
     return (
         f"    {step['kind']:8} {size} {step['solves']:4} solves {format_seconds(step['seconds']):>8} {on}"
-        f" {gigabytes:5.1f} GB  {step['case']}"
+        f" {gigabytes:5,.1f} GB  {step['case']}"
     )

@@ -31,6 +31,8 @@ def dataset_path(file: str | Path, output: str | Path = "results") -> Path:
         raise DatasetError(f"{file}: must be a dataset (.nc) or a study file (.toml)")
     path = file if file.suffix == ".nc" else Path(output) / f"{file.stem}.nc"
     if not path.is_file():
+        if file.suffix == ".toml" and not file.is_file():
+            raise DatasetError(f"{file}: no such study, and {path}: no such dataset")
         study = file.with_suffix(".toml").name if file.suffix == ".nc" else file
         raise DatasetError(f"{path}: no such dataset; make it with `epsmesh run {quote(str(study))}`")
     return path

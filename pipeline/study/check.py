@@ -34,6 +34,8 @@ from pipeline.study.sweep import Axis
 
 # Linear elasticity: strain under the probe is of order depth / radius.
 _LINEAR = 0.10
+# No tissue is softer (Pa): brain and fat have some hundred.
+_SOFTEST = 1.0
 
 
 def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
@@ -73,9 +75,11 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
             check_straight(body, probe, mesh, problems)
             check_slit_in(body, probe, mesh, problems)
     check_large(bodies, materials, probes, meshes, problems)
+    _check_stiffness(bodies, materials, problems)
     for body, material, mesh in itertools.product(bodies, linear, meshes):
         with problems.about(body=body, material=material, mesh=mesh):
-            check_locking(dict(tissues_of(body, material)), mesh, problems)
+            ratios = {f"{key}.poisson": tissue.poisson for key, tissue in tissues_of(body, material)}
+            check_locking(ratios, mesh, problems)
             check_far_field(material, mesh, problems)
     check_reference(meshes, axes, problems)
     for solve in cast(Sequence[Solving], sections["solve"]):
@@ -114,6 +118,18 @@ def _check_depth(probe: Probe, problems: Problems) -> None:
             f"{_LINEAR:.0%}, where F of a neo-Hookean body is about 1 % less, linear elasticity is an extrapolation "
             f"({proportional})",
         )
+
+
+def _check_stiffness(bodies: Sequence[Body], materials: Sequence[Material], problems: Problems) -> None:
+    """Warn of moduli that no tissue has: an m may stand for an M."""
+    for body, material in itertools.product(bodies, materials):
+        with problems.about(body=body, material=material):
+            for key, tissue in tissues_of(body, material):
+                if tissue.young < _SOFTEST:
+                    problems.warn(
+                        f"{key}.young", f"{tissue.young:g} Pa",
+                        "is softer than any tissue; mPa are thousandths of a pascal, MPa are millions",
+                    )  # fmt: skip
 
 
 def _check_thickness(body: Body, probe: Probe, problems: Problems) -> bool:

@@ -8,6 +8,7 @@ from typing import cast
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.regions import Inclusion
 from pipeline.shapes.section import Section, in_mm
+from pipeline.shapes.tissue import Tissue
 from pipeline.study.howto import page_of
 from pipeline.study.problems import Problems
 from pipeline.study.schema import Material, material_of
@@ -50,14 +51,14 @@ def material_without_section(bodies: Sequence[Section]) -> Material:
     return material_of(cast(Sequence[Body], bodies)[0].regions[0])
 
 
-def tissues_of(body: Body, material: Material) -> Iterator[tuple[str, float]]:
-    """Yield key and value of Poisson's ratio of every material in a body."""
+def tissues_of(body: Body, material: Material) -> Iterator[tuple[str, Tissue | Material]]:
+    """Yield the key of every material in a body, with the material."""
     if not body.is_filled:
-        yield "material.poisson", material.poisson
+        yield "material", material
     count = len(body.regions) - len(body.inclusion)
     for number, region in enumerate(body.regions):
         place = f"layers[{number + 1}]" if number < count else f"inclusion[{number - count + 1}]"
-        yield f"body.{place}.poisson", region.poisson
+        yield f"body.{place}", region
 
 
 def _check_names(body: Body, problems: Problems) -> None:

@@ -108,3 +108,13 @@ def test_pages_are_there_and_keys_are_those_of_studies():
     used = {page_of(f"{section}.{key.name}") for section in all_sections() for key in keys_of(section)}
     assert used >= set(pages()) - {"docs/howto/timing.md"}
     assert page_of("file") == ""
+
+
+def test_moduli_in_thousandths_of_a_pascal_are_doubted():
+    """An m for an M: nothing else would tell."""
+    layer = {"name": "skin", "thickness": "2 mm", "young": "20 mPa", "poisson": 0.4}
+    (warning,) = study(body={"layers": [layer]}).warnings
+    assert 'body.layers[1].young = "0.02 Pa"' in warning
+    (warning,) = study(material={"young": "10 mPa"}).warnings
+    assert 'material.young = "0.01 Pa"' in warning and "MPa are millions" in warning
+    assert not study(material={"young": "10 MPa"}).warnings
