@@ -1,7 +1,7 @@
 """How a problem on the meridian is made exact: meshes until the bar is small, a solution refined until round-off."""
 
 from collections.abc import Callable
-from math import inf, pi
+from math import inf, isnan, pi
 from typing import Any, Protocol, Self, TypeVar
 
 import numpy as np
@@ -125,7 +125,7 @@ def refined(
         balance = max(abs(on_probe + on_support) / abs(on_probe), abs(work / twice_energy - 1))
         if balance < _BALANCED or balance > before / 2:
             break
-    if balance > BALANCE_LIMIT:
+    if isnan(balance) or balance > BALANCE_LIMIT:
         raise Unbalanced(
             f"forces do not balance: relative error {balance:.1e}, allowed {BALANCE_LIMIT:.0e}; "
             "the body is so slender that its stiffness drowns in round-off"

@@ -1,7 +1,7 @@
 """What one solve gives, whatever the elements, and how well it must have been solved."""
 
 from dataclasses import dataclass, replace
-from math import isfinite, nan
+from math import isfinite, isnan, nan
 from typing import Any, Protocol, Self
 
 import numpy as np
@@ -42,7 +42,7 @@ def check_balance(balance: float) -> None:
     Raises:
         SolveError: if they do not.
     """
-    if balance > BALANCE_LIMIT:
+    if isnan(balance) or balance > BALANCE_LIMIT:
         raise SolveError(f"forces do not balance: relative error {balance:.1e}, allowed {BALANCE_LIMIT:.0e}")
 
 

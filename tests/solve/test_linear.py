@@ -10,7 +10,7 @@ from pipeline.solve.conditions import Conditions
 from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.linear import Level, LinearSolver, SolveError
 from pipeline.solve.loads import Loads
-from pipeline.solve.solution import BALANCE_LIMIT
+from pipeline.solve.solution import BALANCE_LIMIT, check_balance
 from pipeline.solve.spaces import Spaces
 from tests.solve.test_mixed import DEPTH, PRESS, law, make_mesh
 
@@ -126,3 +126,10 @@ def test_a_set_up_that_fails_leaves_nothing(monkeypatch):
             LinearSolver(solver.levels, direct=False, tolerance=1e-6)
     assert made
     assert all(item.handle == 0 for item in made)
+
+
+@pytest.mark.parametrize("balance", [2 * BALANCE_LIMIT, np.inf, np.nan])
+def test_forces_that_do_not_balance_are_refused_and_so_is_no_number(balance):
+    check_balance(BALANCE_LIMIT)
+    with pytest.raises(SolveError, match="do not balance"):
+        check_balance(balance)
