@@ -107,8 +107,9 @@ def _has_thin_layer(case: Case) -> bool:
 
 def _has_few_edges(case: Case) -> bool:
     """Tell whether a round, singular edge would have no more than the fewest elements by the size that is given."""
-    probe = case.probe
-    if case.mesh.accuracy is not None or not (probe.is_curved and probe.has_singular_edge):
+    probe, mesh = case.probe, case.mesh
+    is_chosen = mesh.accuracy is not None and "rim" not in mesh.model_fields_set  # as small as an accuracy takes
+    if is_chosen or not (probe.is_curved and probe.has_singular_edge):
         return False
     return probe.perimeter <= _FEWEST * case.mesh.rim_size(probe.half_width)
 

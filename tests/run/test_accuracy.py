@@ -125,6 +125,23 @@ def test_a_slender_body_takes_a_coarser_mesh():
     assert rim() > rim(fixed="bottom+sides")
 
 
+@pytest.mark.parametrize(
+    ("mesh", "is_anew"),
+    [
+        ({"rim": "2.9 mm"}, True),
+        ({"rim": "1.5 mm"}, False),
+        ({"rim": "2.9 mm", "accuracy": "2 %"}, True),
+        ({"accuracy": "2 %"}, False),
+    ],
+)
+def test_records_of_discs_that_had_eight_edges_are_not_used(mesh, is_anew, monkeypatch):
+    """Nor where an accuracy was asked for, and the rim given: it is kept."""
+    case = parse({**raw(), "mesh": {"epsilon": "full", "fine": "5 mm", "coarse": "8 mm", **mesh}}).case(())
+    now = case_key(case)
+    monkeypatch.setattr("pipeline.plan.key._FEWEST", 0)
+    assert (case_key(case) != now) == is_anew
+
+
 def test_tissue_that_hardly_changes_its_volume_takes_a_finer_mesh():
     """Displacement elements lock there: bars at ν = 0.49 are three times those at 0.3 on one mesh."""
 
