@@ -112,10 +112,11 @@ def solving_memory(
     """Estimate the bytes that a solve takes, all ranks together.
 
     ``matrices`` says that nothing multiplies cell by cell here, as for ``large`` displacements, but for their error
-    bar; ``parts`` keeps A_λ and A_μ for the next ν. To solve ``roughly``, as an error bar does, is to a tenth.
+    bar where C compiles; ``parts`` keeps A_λ and A_μ for the next ν. To solve ``roughly``, as an error bar does, is to
+    a tenth.
     """
     kind = "direct" if direct else ("mixed" if mixed else "displacement") + ", matrices" * (matrices or large)
-    kind = "large" if large and roughly else kind
+    kind = "large" if large and roughly and not matrices else kind
     kind += ", roughly" * (roughly and kind in ("mixed", "large"))
     per_dof = _BYTES_PER_DOF[kind][degree] + parts * _BYTES_OF_PARTS[degree]
     # Fill of a factorisation in 3D grows like dofs^(4/3); the figure above is for 50,000.
