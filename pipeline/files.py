@@ -4,6 +4,7 @@ import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from math import inf
 from pathlib import Path
 
 # Bytes that a disk must have left for a file: less than a dataset and its figure take.
@@ -91,13 +92,22 @@ def why_not_writable(path: Path, room: int = LEAST_ROOM) -> str:
         with _beside(path) as temporary:
             tried = temporary.write_bytes(bytes(min(room, LEAST_ROOM)))
             _to_disk(temporary)
-            disk = os.statvfs(path.parent)
+            left = tried + room_on_disk(path.parent)
     except OSError as error:
         return f"{path}: cannot be written: {error.strerror or error}"
-    left = tried + disk.f_bavail * disk.f_frsize
     if left < room:
         return f"{path}: cannot be written: {left / 1e6:.2g} MB are left on the disk, and it may take {room / 1e6:.2g}"
     return ""
+
+
+def room_on_disk(folder: Path) -> float:
+    """Return the bytes that are left for files in ``folder``, infinite where its file system has no size of its own.
+
+    Raises:
+        OSError: if it cannot be asked.
+    """
+    disk = os.statvfs(folder)
+    return disk.f_bavail * disk.f_frsize if disk.f_blocks else inf
 
 
 @contextmanager

@@ -4,10 +4,11 @@ import errno
 import os
 import subprocess
 import sys
+from math import inf
 
 import pytest
 
-from pipeline.files import atomic, why_not_writable, write_new, write_whole
+from pipeline.files import atomic, room_on_disk, why_not_writable, write_new, write_whole
 
 
 @pytest.mark.parametrize("name", ["a.nc", "a.b.svg", "plain"])
@@ -77,6 +78,15 @@ def test_a_file_that_is_larger_than_the_disk_is_refused(tmp_path):
     assert not why_not_writable(tmp_path / "deep" / "a")
     assert "MB are left on the disk, and it may take 1e+12" in why_not_writable(tmp_path / "a", 10**18)
     assert not list(tmp_path.rglob("*a*"))
+
+
+def test_a_file_system_without_a_size_of_its_own_has_room(tmp_path, monkeypatch):
+    """Such as a tmpfs without a limit: it tells of no block, neither free nor taken."""
+    assert 0 < room_on_disk(tmp_path) < inf
+    untold = os.statvfs_result((4096, 4096, 0, 0, 0, 0, 0, 0, 0, 255))
+    monkeypatch.setattr("os.statvfs", lambda _: untold)
+    assert room_on_disk(tmp_path) == inf
+    assert not why_not_writable(tmp_path / "a", 10**9)
 
 
 # A limit of the size of files stands for a full disk: HDF5 finds it when it writes, and again when it closes the file.

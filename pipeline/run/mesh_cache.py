@@ -1,7 +1,6 @@
 """Meshes kept on disk, by what they depend on: a bounded folder, the least recently used go first."""
 
 import os
-import shutil
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.compat import versions
-from pipeline.files import atomic
+from pipeline.files import atomic, room_on_disk
 from pipeline.kept import load_kept
 from pipeline.mesh.generate import MeshArrays
 from pipeline.plan.key import digest, mesh_key
@@ -81,7 +80,7 @@ class MeshCache:
         with suppress(OSError):
             with atomic(path) as temporary:
                 # Of a disk that fills meanwhile zipfile complains once more, on standard error, when it is freed.
-                if shutil.disk_usage(path.parent).free > sum(np.asarray(array).nbytes for array in arrays.values()):
+                if room_on_disk(path.parent) > sum(np.asarray(array).nbytes for array in arrays.values()):
                     np.savez(temporary, **arrays)
                     _touch(temporary)
             self._shrink()
