@@ -294,6 +294,7 @@ def test_commands_that_messages_name_hold_one_command_each(tmp_path, epsmesh):
     store.write_bytes(b"no store" * 100)
     told = epsmesh("status", "studies/quick.toml", "--store", store).stderr
     assert f"`epsmesh store prune --store '{store}' --yes`" in told
+    (tmp_path / "$(reboot).toml").write_text("")
     told = epsmesh("plot", tmp_path / "$(reboot).toml").stderr
     assert f"`epsmesh run '{tmp_path}/$(reboot).toml'`" in told
 
