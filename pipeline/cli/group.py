@@ -9,12 +9,13 @@ import typer
 from typer.core import TyperGroup
 
 from pipeline.cli.console import JSON, has_printed_json, print_json
-from pipeline.cli.faults import INTERRUPTED, SOME_FAILED, Fault, as_data, fail, of_unwritten
+from pipeline.cli.faults import INTERRUPTED, SOME_FAILED, Fault, as_data, fail, of_file, of_unwritten
 from pipeline.launcher import is_first_rank, is_launched
 
-# What a disk or a folder says that cannot be written to, be it only found when all is done.
-_UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EISDIR,
-               errno.ENOTDIR, errno.ENAMETOOLONG, errno.EIO)  # fmt: skip
+# What a disk says that cannot be written to, be it only found when all is done.
+_UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
+# What is said of a file, or of a folder, that can be neither read nor written.
+_UNUSABLE = (errno.EACCES, errno.EPERM, errno.EISDIR, errno.ENOTDIR, errno.ENAMETOOLONG, errno.EIO)
 
 
 class Commands(TyperGroup):
@@ -35,10 +36,12 @@ class Commands(TyperGroup):
         try:
             return super().invoke(ctx)
         except OSError as wrong:
-            if wrong.errno not in _UNWRITABLE:
-                _tell(wrong)
-                raise
-            fail(of_unwritten(wrong))
+            if wrong.errno in _UNWRITABLE:
+                fail(of_unwritten(wrong))
+            if wrong.errno in _UNUSABLE and wrong.filename is not None:
+                fail(of_file(wrong.filename, f"cannot be used: {wrong.strerror}"))
+            _tell(wrong)
+            raise
         except (Exception, KeyboardInterrupt) as wrong:
             plain = isinstance(wrong, typer.Exit) or not _is_of_interrupt(wrong)
             ended = wrong if plain else KeyboardInterrupt()
@@ -50,10 +53,10 @@ class Commands(TyperGroup):
             raise ended from wrong
 
 
-def _is_of_interrupt(wrong: BaseException | None) -> bool:
+def _is_of_interrupt(wrong: BaseException) -> bool:
     """Tell whether it is Ctrl-C that an import, or a library, has made another exception of."""
-    wrong = wrong and (wrong.__cause__ or wrong.__context__)
-    return isinstance(wrong, KeyboardInterrupt) or (wrong is not None and _is_of_interrupt(wrong))
+    cause = wrong.__cause__ or wrong.__context__
+    return cause is not None and (isinstance(cause, KeyboardInterrupt) or _is_of_interrupt(cause))
 
 
 def _end_ranks() -> None:

@@ -211,8 +211,10 @@ def _lacking(models: Mapping[str, type[Section]] | type[Section], model: type[Se
 
 def _having(model: Mapping[str, type[Section]], key: str) -> str:
     """Say which shapes have a key, "" if none has."""
-    *others, last = ("", *(shape for shape, kind in model.items() if key in kind.model_fields))
-    return f"{', '.join(others[1:])} and {last} have" if others[1:] else last and f"{last} has"
+    shapes = [shape for shape, kind in model.items() if key in kind.model_fields]
+    if len(shapes) > 1:
+        return f"{', '.join(shapes[:-1])} and {shapes[-1]} have"
+    return f"{shapes[0]} has" if shapes else ""
 
 
 def _model(name: str, raw: dict[str, Any], problems: Problems, where: str = "") -> type[Section] | None:

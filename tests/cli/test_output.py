@@ -182,3 +182,10 @@ def test_streams_that_are_closed_are_none_of_a_commands_files(results, tmp_path,
     assert done.returncode == 0
     assert (tmp_path / "out" / "small.nc").is_file()
     assert epsmesh_here("store", "verify", "--store", tmp_path / "out" / "cases.sqlite").exit_code == 0
+
+
+@pytest.mark.parametrize("command", ["validate", "plot", "touch"])
+def test_a_name_that_no_file_can_have_is_told_without_a_word_of_writing(epsmesh, command):
+    done = epsmesh(command, f"{'a' * 300}.nc")
+    assert done.exit_code == 2
+    assert "File name too long" in done.stderr and "written" not in done.stderr

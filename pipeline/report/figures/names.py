@@ -1,6 +1,6 @@
 """Names beside points: each where it covers neither a point, nor a line, nor another name, or nowhere."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -31,8 +31,8 @@ class Places:
     def take_steps(self, x: np.ndarray, y: np.ndarray) -> None:
         """Keep names off a line (inches) that goes along x first, then along y."""
         for i in range(len(x) - 1):
-            self.taken.append((*sorted_pair(x[i], x[i + 1], y[i], y[i]),))
-            self.taken.append((*sorted_pair(x[i + 1], x[i + 1], y[i], y[i + 1]),))
+            self.taken.append(_between((x[i], y[i]), (x[i + 1], y[i])))
+            self.taken.append(_between((x[i + 1], y[i]), (x[i + 1], y[i + 1])))
 
     def find(self, x: float, y: float, width: float, height: float) -> tuple[float, float] | None:
         """Return the lower left corner of a free place beside a point for a name of that size, and take it."""
@@ -48,9 +48,9 @@ class Places:
                 and box[2] <= self.width - _FRAME and box[3] <= self.height - _FRAME)  # fmt: skip
 
 
-def sorted_pair(a: float, b: float, c: float, d: float) -> Box:
-    """Return the box between two points (a, c) and (b, d)."""
-    return min(a, b), min(c, d), max(a, b), max(c, d)
+def _between(one: tuple[float, float], other: tuple[float, float]) -> Box:
+    (x, y), (u, v) = one, other
+    return min(x, u), min(y, v), max(x, u), max(y, v)
 
 
 def _corners(x: float, y: float, width: float, height: float) -> Iterator[tuple[float, float]]:
@@ -58,5 +58,5 @@ def _corners(x: float, y: float, width: float, height: float) -> Iterator[tuple[
         yield (x - left * width + _NEAR * (1 - 2 * left), y - below * height + _NEAR * (1 - 2 * below))
 
 
-def _meet(one: Sequence[float], other: Sequence[float]) -> bool:
+def _meet(one: Box, other: Box) -> bool:
     return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
