@@ -47,7 +47,7 @@ def test_notebook_runs(name, tmp_path, monkeypatch):
     assert "80 % at ε = 8." in text
     assert "exp(-ε / 5.0 mm), largest residual 0.000" in text
     assert "Smallest ε: " in text
-    assert sum("image/png" in output.get("data", {}) for output in outputs) == 4
+    assert sum("image/png" in output.get("data", {}) for output in outputs) == 5
     assert len((tmp_path / "small.csv").read_text().splitlines()) == 1 + (56 if name == "figure" else 7)
     assert not [output for output in outputs if output.get("name") == "stderr"], outputs
 
@@ -56,6 +56,6 @@ def test_notebook_is_committed_with_small_outputs():
     assert NOTEBOOK.stat().st_size < 300_000
     code = [cell for cell in nbformat.read(NOTEBOOK, as_version=4).cells if cell.cell_type == "code"]
     outputs = [output for cell in code for output in cell.outputs]
-    assert sum("image/png" in output.get("data", {}) for output in outputs) == 4
+    assert sum("image/png" in output.get("data", {}) for output in outputs) == 5
     assert not [output for output in outputs if output.output_type == "error" or output.get("name") == "stderr"]
     assert "/tmp" not in NOTEBOOK.read_text()
