@@ -14,8 +14,8 @@ from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output, check_machine, chec
 if TYPE_CHECKING:
     import xarray as xr
 
-# Bytes that a page may take: its figures and cases; a scene besides.
-_PAGE, _PAGE_WITH_SCENE = 1_000_000, 4_000_000
+# Bytes that a page may take: figures, parts of the first one and some thousand cases; a scene besides.
+_PAGE, _PAGE_WITH_SCENE = 2_000_000, 5_000_000
 
 Dataset = Annotated[Path, typer.Argument(help="A dataset (.nc), or a study file whose dataset exists.")]
 
