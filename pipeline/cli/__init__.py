@@ -1,5 +1,6 @@
 """The command line: parse, call, print. Everything below it raises; only this folder prints and exits."""
 
+import os
 import sys
 from collections.abc import Callable
 from typing import Annotated
@@ -18,6 +19,9 @@ _HELP = """How fine must a mesh be, and where, for the reaction force of a surgi
 Example: epsmesh new mine && epsmesh run studies/mine.toml
 
 Exit status: 0 done, 1 some cases failed, 2 the input is wrong, 130 interrupted."""
+
+# Set by a shell that asks how a word may be completed.
+_COMPLETING = "_EPSMESH_COMPLETE"
 
 app = typer.Typer(
     cls=Commands,
@@ -57,7 +61,8 @@ def _options(
 
 def main() -> None:
     """Run the command ``epsmesh``."""
-    make_patient()
+    if _COMPLETING not in os.environ:  # what a shell reads has tabs, and is none of a terminal's
+        make_patient()
     try:
         app(prog_name="epsmesh", obj=OWN_PROCESS)
     finally:

@@ -172,6 +172,14 @@ def test_shell_completes_commands_and_names_and_leaves_files_to_the_shell():
     assert completed("run", "stud") == []
 
 
+def test_fish_gets_a_tab_between_a_command_and_its_help():
+    asked = {"_EPSMESH_COMPLETE": "complete_fish", "_TYPER_COMPLETE_ARGS": "epsmesh val",
+             "_TYPER_COMPLETE_FISH_ACTION": "get-args"}  # fmt: skip
+    words, environment = [sys.executable, "-m", "pipeline"], ENVIRONMENT | asked
+    done = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    assert done.stdout.startswith("validate\tCheck study files")
+
+
 def test_what_is_no_store_is_left_alone(epsmesh, tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
     letter = tmp_path / "letter.txt"
