@@ -1,16 +1,18 @@
-"""netCDF files, put together in memory and then written as any other file: HDF5 does not survive a full disk."""
+"""netCDF files, for which there is room before they are begun: HDF5 does not survive a full disk."""
 
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from pipeline.files import atomic
 
 if TYPE_CHECKING:
     import xarray as xr
 
-# Bytes: it grows. What is more than a classic file needs would stand behind its end.
-_FIRST_BUFFER = 1
+# Bytes at most: of a file's own, of a variable's or an attribute's description, and of what points to a text.
+_FILE, _DESCRIPTION, _POINTER = 50_000, 2_000, 64
 
 
 def write_netcdf(
@@ -22,16 +24,26 @@ def write_netcdf(
     """Write ``dataset`` to ``path`` in one piece or not at all.
 
     A file whose disk fills while HDF5 writes it cannot be closed, and what cannot be closed ends the process by a
-    fault of memory once Python frees it.
+    fault of memory once Python frees it. So as many bytes as it may take are written in its place first. A file that
+    is put together in HDF5's memory would have attributes of 64 kB at most, and its variables sorted by name.
 
     Raises:
         OSError: if it cannot be written.
     """
-    import netCDF4  # noqa: PLC0415 (slow to load, and wanted last)
-    from xarray.backends import NetCDF4DataStore  # noqa: PLC0415
-
-    file = netCDF4.Dataset(path.name, mode="w", format=kind, memory=_FIRST_BUFFER)
-    dataset.dump_to_store(NetCDF4DataStore(file), encoding=encoding)
-    content = file.close()
     with atomic(path) as temporary:
-        temporary.write_bytes(content)
+        temporary.write_bytes(bytes(most_bytes(dataset)))
+        dataset.to_netcdf(temporary, format=kind, engine="netcdf4", encoding=encoding)
+
+
+def most_bytes(dataset: "xr.Dataset") -> int:
+    """Return the bytes that a file of ``dataset`` takes at most."""
+    held = [dataset.attrs, *(variable.attrs for variable in dataset.variables.values())]
+    values = [*dataset.variables.values(), *(value for attributes in held for value in attributes.values())]
+    return _FILE + sum(_DESCRIPTION + _bytes_of(np.asarray(value)) for value in values)
+
+
+def _bytes_of(values: Any) -> int:
+    """Return the bytes of an array's numbers, or of its texts, of up to four bytes a letter."""
+    if values.dtype.kind not in "OU":
+        return int(values.nbytes)
+    return sum(_POINTER + 4 * len(str(text)) for text in values.flat)

@@ -6,9 +6,12 @@ import subprocess
 import sys
 from math import inf
 
+import numpy as np
 import pytest
+import xarray as xr
 
 from pipeline.files import atomic, room_on_disk, why_not_writable, write_new, write_whole
+from pipeline.netcdf import most_bytes, write_netcdf
 
 
 @pytest.mark.parametrize("name", ["a.nc", "a.b.svg", "plain"])
@@ -87,6 +90,28 @@ def test_a_file_system_without_a_size_of_its_own_has_room(tmp_path, monkeypatch)
     monkeypatch.setattr("os.statvfs", lambda _: untold)
     assert room_on_disk(tmp_path) == inf
     assert not why_not_writable(tmp_path / "a", 10**9)
+
+
+WORDS = np.array(["ü" * (number % 9) for number in range(2_000)], dtype=object)
+DATASETS = {
+    "empty": xr.Dataset(),
+    "numbers": xr.Dataset({"b": (("x", "y"), np.eye(300, 40)), "a": ("x", np.ones(300, bool))}),
+    "words": xr.Dataset({"a": ("x", WORDS)}),
+    "a long study": xr.Dataset({"a": ("x", np.arange(5.0))}, attrs={"study": "ü" * 200_000}),
+    "many": xr.Dataset({f"v{i}": (f"x{i}", np.zeros(2), {"units": "m"}) for i in range(100)}),
+}
+
+
+@pytest.mark.parametrize("name", DATASETS)
+def test_a_dataset_is_written_as_it_is_and_takes_no_more_room_than_was_seen_to(tmp_path, name):
+    """Its variables in their order; the text of its study, however long."""
+    dataset, path = DATASETS[name], tmp_path / "a.nc"
+    write_netcdf(dataset, path, "NETCDF4")
+    assert path.stat().st_size <= most_bytes(dataset)
+    with xr.open_dataset(path, decode_times=False) as read:
+        assert read.identical(dataset)
+        assert list(read.variables) == list(dataset.variables)
+    assert len(list(tmp_path.iterdir())) == 1
 
 
 # A limit of the size of files stands for a full disk: HDF5 finds it when it writes, and again when it closes the file.

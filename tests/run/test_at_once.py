@@ -1,7 +1,6 @@
 """Several at once: runs of one study, studies on one store, readers of what is written; and a clock that goes back."""
 
 import subprocess
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -64,14 +63,16 @@ def test_a_dataset_that_a_notebook_holds_open_is_replaced_beside_it(versions, tm
 def test_who_reads_while_it_is_written_gets_the_last_whole_one(versions, tmp_path, monkeypatch):
     path, seen = tmp_path / "study.nc", []
     write(versions[0], path)
-    whole = Path.write_bytes
+    whole = xr.Dataset.to_netcdf
 
-    def torn(self, content):
-        whole(self, content[: len(content) // 2])
+    def torn(self, target, **options):
+        whole(self, target, **options)
+        content = target.read_bytes()
+        target.write_bytes(content[: len(content) // 2])
         seen.append(xr.load_dataset(path)["force"].values)
         raise OSError("the disk is full")
 
-    monkeypatch.setattr(Path, "write_bytes", torn)
+    monkeypatch.setattr(xr.Dataset, "to_netcdf", torn)
     with pytest.raises(OSError, match="full"):
         write(versions[1], path)
     np.testing.assert_array_equal(seen[0], versions[0]["force"])
