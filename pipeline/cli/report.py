@@ -6,9 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipeline.cli.console import print_json, warning
-from pipeline.cli.faults import Fault, fail, of_file, of_option
-from pipeline.cli.plan import find_case
-from pipeline.cli.view import MESHES, fields_of
+from pipeline.cli.faults import Fault, fail, of_option
 from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output, check_machine, check_output
 
 if TYPE_CHECKING:
@@ -19,8 +17,8 @@ _PAGE, _PAGE_WITH_SCENE = 2_000_000, 5_000_000
 
 Dataset = Annotated[Path, typer.Argument(help="A dataset (.nc), or a study file whose dataset exists.")]
 
-# The scene of the report's answer.
-_ANSWER = "answer"
+# No scene at all.
+_NONE = "none"
 
 
 def plot(
@@ -72,8 +70,8 @@ def report(
     scene: Annotated[
         str | None,
         typer.Option(
-            help='A case to turn round on the page, "poisson=0.3, epsilon=10 mm", its number, or "answer", that of the '
-            "report: meshed, not solved.",
+            help='A case to turn round on the page, "poisson=0.3, epsilon=10 mm", its number, "answer", that of the '
+            'report, or "none": meshed, not solved. Default: the answer\'s, where that takes seconds.',
             show_default=False,
         ),
     ] = None,
@@ -88,53 +86,24 @@ def report(
 
     Example: epsmesh report results/figure3.nc --scene "epsilon=10 mm"
 
-    Example: epsmesh report results/figure3.nc --scene answer
+    Example: epsmesh report results/figure3.nc --scene none
     """
     path, dataset = _read(file, output)
-    check_output(path.with_suffix(".html"), room=_PAGE_WITH_SCENE if scene else _PAGE)
-    if scene:
+    wanted = (scene or "").strip()
+    check_output(path.with_suffix(".html"), room=_PAGE if wanted in ("", _NONE) else _PAGE_WITH_SCENE)
+    if wanted not in ("", _NONE):
         check_machine()
     if file.suffix != ".nc":
         _compare(file, path, dataset)
+    from pipeline.cli.scene import scene_at_hand, scene_of
     from pipeline.report.page import write_page
 
-    page = write_page(dataset, path.with_suffix(".html"), _scene(path, dataset, scene) if scene else "")
+    shown = "" if wanted == _NONE else scene_of(path, dataset, wanted) if wanted else scene_at_hand(dataset)
+    page = write_page(dataset, path.with_suffix(".html"), shown)
     if as_json:
         print_json({"file": str(path), "page": str(page)})
     else:
         print(page)
-
-
-def _scene(path: Path, dataset: "xr.Dataset", text: str) -> str:
-    """Return the page of a case of ``dataset``, as its mesh; exit if there is none."""
-    from pipeline.report.table import study_of
-
-    study = study_of(dataset)
-    if study is None:
-        fail(of_file(path, "--scene needs the study's text, as this version reads it"))
-    chosen = find_case(study, _of_answer(path, dataset) if text.strip() == _ANSWER else text)
-    from pipeline.view.page import render
-    from pipeline.workflow import world
-
-    fields = fields_of(study, chosen, world(), mesh_only=True, bar=False, meshes=MESHES)
-    assert fields is not None  # one process
-    return render(fields, study.title)
-
-
-def _of_answer(path: Path, dataset: "xr.Dataset") -> str:
-    """Return the number of the case that limits the answer of the report; exit if there is no answer."""
-    from pipeline.report.guide import guide
-    from pipeline.report.page.guideline import ACCURACY
-    from pipeline.report.table import DatasetError, number_of
-
-    try:
-        found = guide(dataset, ACCURACY)
-    except DatasetError as wrong:
-        fail(of_file(path, f"--scene {_ANSWER} needs an answer: {wrong}; name a case by its number"))
-    verdict = found.answer or found.best
-    if verdict is None:
-        fail(of_file(path, f"--scene {_ANSWER} needs an answer, and no setting was judged; name a case by its number"))
-    return str(number_of(dataset, verdict.labels | (verdict.limit or {})))
 
 
 def _read(file: Path, output: Path) -> "tuple[Path, xr.Dataset]":

@@ -132,16 +132,20 @@ def check_output(*files: Path, folder: Path | None = None, room: int = LEAST_ROO
 
 def check_machine() -> None:
     """Exit if code cannot be compiled, or MPI not be started, for want of a folder: before anything is computed."""
+    if found := faults_of_machine():
+        fail(*found)
+
+
+def faults_of_machine() -> list[Fault]:
+    """Return what keeps code from being compiled, or MPI from being started: folders that cannot be written."""
     tried = {"EPSMESH_CACHE": (cache_folder(), _COMPILED)}
     if given := os.environ.get("TMPDIR"):
         tried["TMPDIR"] = (Path(given), 1)
-    found = [
+    return [
         Fault(f"{why}; {name} may name another folder", file=str(folder), key=name)
         for name, (folder, room) in tried.items()
         if (why := _why_no_files(folder, room))
     ]
-    if found:
-        fail(*found)
 
 
 def _why_no_files(folder: Path, room: int = LEAST_ROOM) -> str:
