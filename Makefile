@@ -120,7 +120,7 @@ soak: setup ## 20,000 cases on 2,000 meshes in one run: memory and pace stay fla
 faults: setup ## runs killed at a hundred moments: nothing finished is lost (half an hour; FAULTS_ARGS=20: fewer)
 	$(MPI_ENV) $(PYTHON) -m benchmarks.faults $(FAULTS_ARGS)
 
-mutants: setup ## wrong numbers on purpose, each is noticed (half an hour; MUTANTS_ARGS=--continue): results/mutants.md
+mutants: setup ## wrong numbers on purpose, each is noticed (a quarter of an hour; MUTANTS_ARGS=--continue): results/mutants.md
 	$(MPI_ENV) $(PYTHON) -m benchmarks.mutants $(MUTANTS_ARGS)
 
 lint: setup ## ruff, mypy, the layers of the imports, and whether the list of mutants fits the code

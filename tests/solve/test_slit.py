@@ -78,7 +78,7 @@ def test_strain_is_read_clear_of_the_front():
     _, y, z = mesh.mesh.geometry.x[corners].mean(axis=1).T
     away = np.hypot(y, z + 4e-3)
     assert np.array_equal(clear, whole & (away > away[whole & ~clear].max()))
-    assert 10 < np.count_nonzero(whole & ~clear) < 20
+    assert 0 < np.count_nonzero(whole & ~clear) < 30
 
 
 def test_what_pairs_of_motions_release_is_that_of_their_sums():
