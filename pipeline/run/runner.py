@@ -102,7 +102,7 @@ class StepRunner:
         while todo:
             following = todo.pop(0)
             self._way_of(following)(following, PeakMemory(self._comm))
-            give_back()
+            give_back(self._comm)
             if again := self._attempts.take_again():
                 prepare(self._comm, again)
                 todo += mesh_steps(again, shared=self._plan.shared)
@@ -199,7 +199,7 @@ class StepRunner:
         with Spaces(mesh) as spaces, problem_of(spaces, solve.case, shared=False) as problem:
             record = self._solve(solve, problem, Ground(spaces, seconds, memory), bar)
         del mesh, spaces, problem
-        give_back()
+        give_back(self._comm)
         return record
 
     def _solve(self, solve: Solve, problem: FieldProblem, ground: Ground, bar: Bar) -> Record:
