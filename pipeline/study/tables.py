@@ -101,6 +101,7 @@ def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[
     A list that all of them have of a key sweeps it in each of them.
     """
     variants: list[list[Section]] = []
+    read: list[dict[str, Any]] = []
     shared = _shared_sweeps(name, tables)
     if not _is_sane(name, tables, shared, problems):
         return [], ()
@@ -124,6 +125,7 @@ def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[
             combinations = itertools.product(*shared.values())
             filled = [placed(table, zip(shared, values, strict=True)) for values in combinations]
             variants.append([_validate(model, variant) for variant in filled])
+            read.append(table)
         except ValidationError as error:
             problems.from_pydantic(where, error, model, table)
     if len(variants) < len(tables):
@@ -136,7 +138,7 @@ def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[
     axes = [Axis(name, "", tuple(names), "")]
     if variants and shared:
         # What each of their values is does not depend on the table: the first one tells.
-        kind, table = type(variants[0][0]), placed(tables[0], ((place, given[0]) for place, given in shared.items()))
+        kind, table = type(variants[0][0]), placed(read[0], ((place, given[0]) for place, given in shared.items()))
         for place, values in shared.items():
             parsed = [_validate(kind, placed(table, [(place, value)])) for value in values]
             axes.append(axis_of(name, place, values, parsed, problems))

@@ -53,6 +53,14 @@ def test_an_unknown_key_does_not_hide_what_does_not_fit_together():
     assert {problem.key for problem in told(content).problems} > {"probe[1].colour", "probe[1].incison", "mesh.degree"}
 
 
+def test_an_unknown_key_of_one_table_is_told_beside_what_all_of_them_sweep():
+    content = raw() | {"probe": needles()}
+    for probe in content["probe"]:
+        probe["depth"] = ["0.1 mm", "0.2 mm"]
+    content["probe"][0]["size"] = []
+    assert [problem.key for problem in told(content).problems] == ["probe[1].size"]
+
+
 def test_errors_and_warnings_name_the_table():
     error = str(told(raw() | {"probe": needles(at=["19 mm", "0 mm"])}))
     assert re.search(r'my\.toml: probe\[2\]\.at = .*\(probe "long"\)', error)
