@@ -111,13 +111,13 @@ resolution: setup ## what a file's resolution, noise and voxels change of F (a q
 stress: setup ## numerical stability: a matrix of extremes (10 minutes)
 	$(EPSMESH) stress
 
-fuzz: setup ## eight thousand study files, and damaged surfaces, datasets, stores and models (half an hour)
+fuzz: setup ## eight thousand study files, and damaged surfaces, datasets, stores and models (minutes)
 	EPSMESH_FUZZ=$(FUZZ) $(MPI_ENV) $(PYTHON) -m pytest tests/fuzz -q $(PYTEST_ARGS)
 
 soak: setup ## 20,000 cases on 2,000 meshes in one run: memory and pace stay flat (a quarter of an hour; SOAK_ARGS=2000: a part)
 	$(MPI_ENV) $(PYTHON) -m benchmarks.soak $(SOAK_ARGS)
 
-faults: setup ## runs killed at a hundred moments: nothing finished is lost (half an hour; FAULTS_ARGS=20: fewer)
+faults: setup ## runs killed at a hundred moments: nothing finished is lost (a quarter of an hour; FAULTS_ARGS=20: fewer)
 	$(MPI_ENV) $(PYTHON) -m benchmarks.faults $(FAULTS_ARGS)
 
 mutants: setup ## wrong numbers on purpose, each is noticed (a quarter of an hour; MUTANTS_ARGS=--continue): results/mutants.md
