@@ -50,12 +50,12 @@ def read_rows(path: Path) -> list[Row]:
     """
     try:
         with _connection(path) as database:
-            (state,) = database.execute("PRAGMA integrity_check").fetchone()
-            if state != "ok":
-                raise sqlite3.DatabaseError(state)
-            return Records(path, database).rows()
+            records = Records(path, database)
+            if wrong := records.unsound():
+                raise sqlite3.DatabaseError(wrong)
+            return records.rows()
     except (sqlite3.Error, UnicodeDecodeError, OSError) as error:
-        raise StoreError(f"{path}: damaged, left out: {'; '.join(str(error).splitlines())}") from error
+        raise StoreError(f"{path}: damaged, left out: {error}") from error
 
 
 @contextmanager

@@ -87,11 +87,15 @@ class Records:
                 seen.append(record.observation() if (record := _readable(text)) is not None else None)
         return fit(observation for observation in seen if observation is not None)
 
+    def unsound(self) -> str:
+        """Return the first thing that is wrong with the file's pages, on one line; "" if all are sound."""
+        (state,) = self._database.execute("PRAGMA integrity_check(1)").fetchone()
+        return "" if state == "ok" else "; ".join(state.splitlines())
+
     def problems(self) -> Iterator[str]:
         """Yield what is wrong with the file or with its records."""
-        (state,) = self._database.execute("PRAGMA integrity_check").fetchone()
-        if state != "ok":
-            yield f"the file: {state}"
+        if wrong := self.unsound():
+            yield f"the file: {wrong}"
         for key, text, _ in self.rows():
             record = _readable(text)
             if fault := _fault(key, record):

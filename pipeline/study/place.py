@@ -31,7 +31,7 @@ def place_error(body: Body, probe: Probe) -> PlaceError | None:
         if not is_level(body, frame) or isinstance(body, FromFile):
             _check_contact(body, probe, frame)
     except PlaceError as error:
-        return error
+        return error.with_traceback(None)  # it would keep all that was found on the way, and is itself kept
     return None
 
 

@@ -25,6 +25,8 @@ _LIE_ON_ONE_ANOTHER = {
 }  # fmt: skip
 # Layers that are thicker than the body by this share of it: the rest is rounding.
 _SAME = 1e-9
+# Thinner than this share of the body's height, a layer's two ends are one to whoever meshes it.
+_THINNEST = 1e-6
 
 
 def check_regions(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
@@ -77,6 +79,12 @@ def _check_layers(body: Layered, problems: Problems) -> None:
                 return
             if height - total <= _SAME * height:
                 problems.error(key, None, f"nothing is left for it: the layers above take all of {in_mm(height)}")
+            return
+        if layer.thickness < _THINNEST * height:
+            problems.error(
+                key, in_mm(layer.thickness), f"must be at least {in_mm(_THINNEST * height)}, a millionth of the body's "
+                f"height {in_mm(height)}",
+            )  # fmt: skip
             return
         total += layer.thickness
         if total > height * (1 + _SAME):

@@ -88,6 +88,18 @@ def test_damaged_store_is_named_and_left_as_it_is(tmp_path, sources):
     assert {path: path.read_bytes() for path in before} == before
 
 
+def test_what_is_wrong_with_many_pages_of_a_store_is_told_on_one_line(tmp_path, sources):
+    file = sources[0]
+    data = bytearray(file.read_bytes())
+    data[4096 + 3] ^= 1  # of the second page: 256 records more than there are
+    file.write_bytes(data)
+    (found,), _ = merged(tmp_path / "main.sqlite", file)
+    (told,) = found.problems
+    assert "damaged, left out" in told
+    assert "\n" not in told
+    assert len(told) < 500
+
+
 def test_records_that_cannot_be_read_are_left_out(tmp_path, sources):
     database = sqlite3.connect(sources[0])
     database.execute("INSERT INTO records VALUES ('torn', '{', 0), ('nothing', 'null', 0)")

@@ -1,5 +1,7 @@
 """``[probe.path]``: places one after the other, as numbers."""
 
+import gc
+import tracemalloc
 from math import pi
 
 import numpy as np
@@ -123,3 +125,18 @@ def test_beside_an_ellipsoid_contact_is_lost_once_all_of_the_tool_is_beside_it(y
     path = {"points": [["0 mm", "0 mm"], ["0 mm", y]], "off": "lost"}
     found = build(make_plan(study(body=body, probe={"path": path}, mesh={"degree": 2})), {})
     assert found["status"].values.tolist() == ["pending", state]
+
+
+def test_what_is_kept_of_places_that_are_refused_is_small():
+    """What was computed until then is not kept with them: of ten thousand places, that was gigabytes."""
+    grid = {axis: {"from": "-5 mm", "to": "5 mm", "steps": 10} for axis in ("x", "y")}
+    body = {"shape": "ellipsoid", "axes": ["40 mm", "30 mm", "20 mm"], "fixed": {"below": "-5 mm"}}
+    tracemalloc.start()
+    for number in range(2):  # the first time, modules are loaded
+        before = tracemalloc.get_traced_memory()[0]
+        with pytest.raises(StudyError, match="path"):
+            study(body=body, probe={"radius": f"{80 + number} mm", "path": {"raster": grid}})
+        gc.collect()
+        kept = tracemalloc.get_traced_memory()[0] - before
+    tracemalloc.stop()
+    assert kept < 100 * 10_000

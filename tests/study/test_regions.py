@@ -23,6 +23,7 @@ MISTAKES = {
     "one table": ({"layers": SKIN}, ["body.layers", "[[body.layers]]"]),
     "no table": ({"layers": ["skin"]}, ['body.layers[1] = "skin"', "must be a table"]),
     "too thick": ({"layers": [SKIN, FAT | {"thickness": "19 mm"}]}, ["body.layers[2].thickness", "at most", "20 mm"]),
+    "too thin": ({"layers": [SKIN, FAT | {"thickness": "3e-16 mm"}]}, ["body.layers[2].thickness", "a millionth"]),
     "thickness missing": ({"layers": [FAT, SKIN]}, ["body.layers[1].thickness", "only the last"]),
     "nothing left": ({"layers": [SKIN | {"thickness": "20 mm"}, FAT]}, ["body.layers[2].thickness", "nothing is"]),
     "ball or ellipsoid": ({"inclusion": [BALL | {"axes": ["1 mm"] * 3}]}, ["body.inclusion[1]", "radius", "axes"]),

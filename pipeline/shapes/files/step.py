@@ -65,10 +65,7 @@ def _vertices(entities: Entities, face: int) -> FloatArray:
         content = entities.get(left.pop(), "")
         kind = content.split("(")[0].strip()
         if kind == "CARTESIAN_POINT":
-            try:
-                points.append([float(number) for number in content[content.rfind("(") :].strip("() \n").split(",")])
-            except ValueError:
-                raise SurfaceError(f"is damaged: `{content[:60]!r}` is no point") from None
+            points.append(_point(content))
         if kind in _LEADING:
             found = [number for number in _referred(content) if number not in seen]
             # Of faces, the surface is the last; of edges, the curve.
@@ -77,6 +74,14 @@ def _vertices(entities: Entities, face: int) -> FloatArray:
             seen.update(wanted)
             left += wanted
     return np.unique(np.array(points).reshape(-1, 3), axis=0)
+
+
+def _point(content: str) -> tuple[float, float, float]:
+    try:
+        x, y, z = (float(number) for number in content[content.rfind("(") :].strip("() \n").split(","))
+    except ValueError:
+        raise SurfaceError(f"is damaged: `{content[:60]!r}` is no point") from None
+    return x, y, z
 
 
 _LEADING = {"ADVANCED_FACE", "FACE_BOUND", "FACE_OUTER_BOUND", "EDGE_LOOP", "ORIENTED_EDGE", "EDGE_CURVE",
