@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pipeline.files import STORE_NAME
 from pipeline.plan.describe import summary
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.run.progress import Terminal
@@ -106,7 +107,7 @@ class RunnableStudy:
         from pipeline.report import accessor  # noqa: F401, PLC0415 (registers dataset.epsmesh)
 
         comm = workflow.world() if comm is None else comm
-        path = Path(store) if store else Path(output) / "cases.sqlite"
+        path = Path(store) if store else Path(output) / STORE_NAME
         kept = Path(meshes) if meshes else None
         plan, opened = workflow.prepare(self.declared, comm, path, fresh=fresh, without=without, meshes=kept)
         shown = Terminal(len(plan.solves)) if progress and comm.rank == 0 else None

@@ -9,6 +9,9 @@ from pathlib import Path
 
 # Bytes that a disk must have left for a file: less than a dataset and its figure take.
 LEAST_ROOM = 200_000
+# Of a study, in the folder of its results.
+STORE_NAME = "cases.sqlite"
+FIGURE_FORMATS = ("png", "svg")
 
 
 def cache_folder() -> Path:
@@ -21,6 +24,11 @@ def cache_folder() -> Path:
         return Path(given)
     caches = Path(os.environ.get("XDG_CACHE_HOME", ""))
     return (caches if caches.is_absolute() else Path.home() / ".cache") / "epsmesh"
+
+
+def result_files(folder: Path, name: str) -> list[Path]:
+    """Return the dataset, and the files of the main figure, of a study of this ``name``."""
+    return [folder / f"{name}.{ending}" for ending in ("nc", *FIGURE_FORMATS)]
 
 
 @contextmanager

@@ -22,6 +22,7 @@ from pipeline.cli.words import (
     check_store,
     load_all,
 )
+from pipeline.files import STORE_NAME, result_files
 
 if TYPE_CHECKING:
     from pipeline.plan.plan import Plan
@@ -54,9 +55,9 @@ def merge(
 
     (study,) = load_all([file])
     paths = _stores(study, stores, output)
-    target = store or output / "cases.sqlite"
+    target = store or output / STORE_NAME
     check_store(target)
-    check_output(target, *(output / f"{study.name}.{suffix}" for suffix in ("nc", "png", "svg")))
+    check_output(target, *result_files(output, study.name))
     plan = make_plan(study, without=check_names(without))
     sources, records = _merged(paths, target, plan)
     problems = [problem for source in sources for problem in source.problems]

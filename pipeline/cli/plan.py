@@ -25,6 +25,7 @@ from pipeline.cli.words import (
     stored_records,
     warn,
 )
+from pipeline.files import STORE_NAME
 from pipeline.run.remaining import format_seconds
 
 if TYPE_CHECKING:
@@ -166,7 +167,7 @@ def _planned(
     from pipeline.plan.plan import make_plan
 
     bare = make_plan(study, without=without)
-    records, cost = stored_records(store or output / "cases.sqlite", bare)
+    records, cost = stored_records(store or output / STORE_NAME, bare)
     done = [key for key, record in records.items() if record.is_ok]
     return replace(make_plan(study, done, without) if done else bare, cost=cost), records
 

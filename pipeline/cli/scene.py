@@ -7,8 +7,8 @@ import xarray as xr
 from pipeline.cli.console import load_solvers
 from pipeline.cli.faults import fail, of_file
 from pipeline.cli.plan import find_case
-from pipeline.cli.view import MESHES, fields_of
-from pipeline.cli.words import faults_of_machine
+from pipeline.cli.view import fields_of
+from pipeline.cli.words import DEFAULT_MESHES, faults_of_machine
 from pipeline.plan.estimate import cells
 from pipeline.report.guide import guide
 from pipeline.report.page.guideline import ACCURACY
@@ -34,7 +34,7 @@ def scene_of(path: Path, dataset: xr.Dataset, text: str) -> str:
     from pipeline.view.page import render
     from pipeline.workflow import world
 
-    fields = fields_of(study, chosen, world(), mesh_only=True, bar=False, meshes=MESHES)
+    fields = fields_of(study, chosen, world(), mesh_only=True, bar=False, meshes=DEFAULT_MESHES)
     assert fields is not None  # one process
     return render(fields, study.title)
 
@@ -62,7 +62,7 @@ def scene_at_hand(dataset: xr.Dataset) -> str:
     solve = solve_to_view(study, case)
     if cells(solve.case) > _MOST_CELLS:
         return ""
-    kept = MeshCache(MESHES) if MESHES.is_dir() else None
+    kept = MeshCache(DEFAULT_MESHES) if DEFAULT_MESHES.is_dir() else None
     try:
         fields = compute_fields(solve, MPI.COMM_SELF, mesh_only=True, cache=kept)
     except (CaseFailure, MeshError, MemoryError, RuntimeError, OSError):

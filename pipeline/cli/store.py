@@ -11,6 +11,7 @@ import typer
 from pipeline.cli.console import print_json, warning
 from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_file
 from pipeline.cli.words import DEFAULT_OUTPUT, Json, check_store
+from pipeline.files import STORE_NAME
 
 if TYPE_CHECKING:
     from pipeline.run.store import Records
@@ -20,7 +21,7 @@ app = typer.Typer(
 )
 
 StoreFile = Annotated[Path, typer.Option("--store", metavar="FILE", help="The case store.")]
-DEFAULT_STORE = DEFAULT_OUTPUT / "cases.sqlite"
+DEFAULT_STORE = DEFAULT_OUTPUT / STORE_NAME
 
 
 @app.command("list")

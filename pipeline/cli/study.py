@@ -34,6 +34,7 @@ from pipeline.cli.words import (
     stored_records,
     warn,
 )
+from pipeline.files import STORE_NAME, result_files
 
 if TYPE_CHECKING:
     from pipeline.plan.plan import Plan
@@ -106,9 +107,9 @@ def run(
         check_store(store)
     part = check_shard(shard, studies)
     # Where nothing was said, meshes that cannot be kept are made again: that stops nobody.
-    check_output(store or output / "cases.sqlite", folder=None if meshes == DEFAULT_MESHES else meshes)
+    check_output(store or output / STORE_NAME, folder=None if meshes == DEFAULT_MESHES else meshes)
     for study in () if part else studies:
-        check_output(*(output / f"{study.name}.{suffix}" for suffix in ("nc", "png", "svg")))
+        check_output(*result_files(output, study.name))
     check_machine()
     from pipeline.cli.outcome import announce, conclude, print_stages
     from pipeline.cli.outcome import as_data as outcome_data
@@ -124,7 +125,7 @@ def run(
         for study in studies:
             start = time.monotonic()
             try:
-                main = output / "cases.sqlite"
+                main = output / STORE_NAME
                 path = store or (part.store(output, study) if part else main)
                 plan, opened = workflow.prepare(
                     study, comm, path, fresh=fresh, without=left_out, meshes=meshes, shard=part,
@@ -171,7 +172,7 @@ def status(
 
     (study,) = load_all([file])
     plan = make_plan(study, without=check_names(without))
-    records, _ = stored_records(store or output / "cases.sqlite", plan)
+    records, _ = stored_records(store or output / STORE_NAME, plan)
     records |= skipped(plan, records)
     counts, failed = count_states(plan, records), failures(plan, records)
     if as_json:

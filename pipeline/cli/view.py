@@ -8,7 +8,7 @@ import typer
 from pipeline.cli.console import error, load_solvers, print_json
 from pipeline.cli.faults import SOME_FAILED, Fault, fail
 from pipeline.cli.plan import find_case
-from pipeline.cli.words import DEFAULT_OUTPUT, File, Json, Output, check_machine, check_output, load_all
+from pipeline.cli.words import DEFAULT_MESHES, DEFAULT_OUTPUT, File, Json, Output, check_machine, check_output, load_all
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from pipeline.study.sweep import Case, Study
     from pipeline.view.fields import Fields
 
-MESHES = Path("meshes/cache")
 _ROOM = 2_000_000  # bytes that a page or a picture may take
 
 
@@ -29,7 +28,7 @@ def view(
         Literal["html", "vtu", "xdmf"] | None,
         typer.Option(help="Write the page, or a file for ParaView, and no pictures."),
     ] = None,
-    meshes: Annotated[Path, typer.Option(help="Folder of the meshes that are kept.")] = MESHES,
+    meshes: Annotated[Path, typer.Option(help="Folder of the meshes that are kept.")] = DEFAULT_MESHES,
     as_json: Json = False,
 ) -> None:
     """Show one case: its mesh by element size, cut open, and the body as the probe deforms it.

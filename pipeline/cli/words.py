@@ -9,7 +9,7 @@ import typer
 
 from pipeline.cli.console import warning
 from pipeline.cli.faults import Fault, fail, of_file, of_option, of_study
-from pipeline.files import LEAST_ROOM, cache_folder, why_not_writable
+from pipeline.files import LEAST_ROOM, STORE_NAME, cache_folder, why_not_writable
 from pipeline.study.vocabulary import REDUCTIONS
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ Files = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Study file
 File = Annotated[Path, typer.Argument(metavar="FILE", help="A study file (TOML).", show_default=False)]
 Output = Annotated[Path, typer.Option(metavar="DIR", help="Folder of the results.")]
 StoreFile = Annotated[
-    Path | None, typer.Option("--store", metavar="FILE", help="Case store [default: DIR/cases.sqlite].")
+    Path | None, typer.Option("--store", metavar="FILE", help=f"Case store [default: DIR/{STORE_NAME}].")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts, and nothing else on standard output.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the least: errors, and what was asked for.")]
@@ -106,7 +106,7 @@ def stored_records(path: Path, plan: "Plan") -> "tuple[dict[str, Record], CostMo
 def check_store(path: Path) -> None:
     """Exit if the file at ``path`` is plainly something else than a case store: a damaged one is moved aside."""
     if path.is_dir():
-        fail(of_option("--store", path, f"is a folder; a case store is a file, such as {path / 'cases.sqlite'}"))
+        fail(of_option("--store", path, f"is a folder; a case store is a file, such as {path / STORE_NAME}"))
     if path.is_file() and path.suffix not in (".sqlite", ".db"):
         with path.open("rb") as file:
             start = file.read(len(_SQLITE))

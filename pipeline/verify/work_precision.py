@@ -17,6 +17,7 @@ import xarray as xr
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
+from pipeline.files import result_files
 from pipeline.mesh.meridian import Meridian
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import write
@@ -172,7 +173,7 @@ def dataset(points: list[Point], repeats: int) -> xr.Dataset:
 
 def outputs(output: Path) -> list[Path]:
     """Return the files that :func:`main` writes into ``output``."""
-    return [output / f"{NAME}.{suffix}" for suffix in ("nc", "png", "svg")]
+    return result_files(output, NAME)
 
 
 def main(output: Path, repeats: int, *, quick: bool = False) -> list[Path]:

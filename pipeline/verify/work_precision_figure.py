@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from pipeline.files import FIGURE_FORMATS
 from pipeline.report.figures import STYLE, save
 
 # Colour says the element, the line how the mesh is made: told apart by the colour-blind and in grey.
@@ -34,7 +35,7 @@ def draw(dataset: xr.Dataset, stem: Path) -> list[Path]:
         figure.legend(known.values(), known.keys(), loc="lower center", ncol=3)
         figure.subplots_adjust(left=0.11, right=0.98, top=0.94, bottom=0.2, wspace=0.06, hspace=0.08)
         figure.suptitle(dataset.attrs["title"], fontsize=9.5, fontweight="bold")
-        return [save(figure, stem.with_name(f"{stem.name}.{kind}")) for kind in ("png", "svg")]
+        return [save(figure, stem.with_name(f"{stem.name}.{kind}")) for kind in FIGURE_FORMATS]
 
 
 def _panel(axes: Axes, dataset: xr.Dataset, quantity: str) -> None:

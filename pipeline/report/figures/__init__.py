@@ -7,6 +7,7 @@ import matplotlib as mpl
 import xarray as xr
 from matplotlib.figure import Figure
 
+from pipeline.files import FIGURE_FORMATS
 from pipeline.report.figures.accuracy import accuracy
 from pipeline.report.figures.choose import KINDS, choose, lacks
 from pipeline.report.figures.compliance import compliance
@@ -35,7 +36,7 @@ FIGURES: dict[str, Callable[[xr.Dataset, str, str], Figure]] = {
 def draw(
     dataset: xr.Dataset,
     stem: Path,
-    formats: Sequence[str] = ("png", "svg"),
+    formats: Sequence[str] = FIGURE_FORMATS,
     kinds: Sequence[str] | None = None,
     *,
     rest: bool = False,
@@ -58,7 +59,7 @@ def draw(
 
 
 def files(
-    dataset: xr.Dataset, stem: Path, formats: Sequence[str] = ("png", "svg"), kinds: Sequence[str] | None = None
+    dataset: xr.Dataset, stem: Path, formats: Sequence[str] = FIGURE_FORMATS, kinds: Sequence[str] | None = None
 ) -> dict[str, list[Path]]:
     """Return by kind the files that :func:`draw` writes, without the rest."""
     main = choose(dataset)[0]
