@@ -1,6 +1,10 @@
-"""What the environment tells of an MPI launcher, before MPI is loaded."""
+"""What the environment tells of an MPI launcher, before MPI is loaded, and programs that are none of its own."""
 
 import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
 
 # Open MPI 4 and 5 (PMIx), MPICH and Slurm's PMI, Intel's.
 _RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
@@ -22,3 +26,19 @@ def is_first_rank() -> bool:
 def environment_alone() -> dict[str, str]:
     """Return the environment for a process that is none of the launcher's."""
     return {key: value for key, value in os.environ.items() if not key.startswith(_PREFIXES)}
+
+
+def run_alone(
+    program: str, *arguments: str, timeout: float, variables: Mapping[str, str] | None = None
+) -> "subprocess.CompletedProcess[str]":
+    """Run a module of this package as a process of its own, in which a library may end by a fault of memory.
+
+    Raises:
+        subprocess.TimeoutExpired: after ``timeout`` seconds.
+    """
+    environment = environment_alone() | dict(variables or {})
+    root = str(Path(__file__).resolve().parents[1])
+    environment["PYTHONPATH"] = os.pathsep.join(filter(None, [root, environment.get("PYTHONPATH")]))
+    # -P: nothing is imported from the folder that one happens to be in.
+    command = [sys.executable, "-P", "-m", program, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=timeout, env=environment, check=False)

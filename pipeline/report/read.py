@@ -1,23 +1,20 @@
 """Read a dataset that a run has written: by its own name, or by its study's."""
 
-from math import prod
 from pathlib import Path
 from shlex import quote
 
 import numpy as np
 import xarray as xr
 
+from pipeline.report.load import load
 from pipeline.report.table import DatasetError
-from pipeline.visible import visible, visible_lines
+from pipeline.visible import visible_lines
 
 # What every dataset of a study has, and figures and report are made from.
 _NEEDED = (
     "force", "force_error", "force_ratio", "force_exact", "force_exact_error", "force_exact_message", "accuracy",
     "status", "message", "origin", "time_total", "reductions", "study",
 )  # fmt: skip
-# Twice what the most cases that a study may have take.
-_LARGEST = 1_000_000_000  # bytes
-_POINTER = 8  # to a text
 
 
 def dataset_path(file: str | Path, output: str | Path = "results") -> Path:
@@ -45,28 +42,10 @@ def read(file: str | Path, output: str | Path = "results") -> xr.Dataset:
         DatasetError: if there is none, or if it is not a study's.
     """
     path = dataset_path(file, output)
-    try:
-        # A few bytes of a packed file may stand for any number of values.
-        if (size := _size(path)) > _LARGEST:
-            raise DatasetError(f"{path}: would take {size / 1e9:.3g} GB: no study's dataset has more than 1")
-        dataset = _shown(xr.load_dataset(path))
-    except DatasetError:
-        raise
-    except Exception as error:  # of a damaged file the libraries raise many kinds
-        why = next(iter(str(error).splitlines()), type(error).__name__)
-        raise DatasetError(f"{path}: cannot be read as netCDF: {visible(why)}") from None
+    dataset = _shown(load(path))
     if missing := [name for name in _NEEDED if name not in {*dataset.data_vars, *dataset.attrs}]:
         raise DatasetError(f"{path}: not a study's dataset: it has no {', '.join(missing)}")
     return dataset
-
-
-def _size(path: Path) -> int:
-    """Return how many bytes the variables of a file take in memory, without reading them."""
-    from netCDF4 import Dataset  # noqa: PLC0415 (xarray loads it, too)
-
-    with Dataset(path) as file:
-        kinds = [(variable.shape, variable.dtype) for variable in file.variables.values()]
-        return sum(prod(map(int, shape)) * getattr(kind, "itemsize", _POINTER) for shape, kind in kinds)
 
 
 def _shown(dataset: xr.Dataset) -> xr.Dataset:

@@ -1,8 +1,6 @@
 """The solid in a STEP or BREP file, as triangles that a geometry kernel made once, in a process of its own."""
 
-import os
 import subprocess
-import sys
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
@@ -10,7 +8,7 @@ from typing import Any
 
 from pipeline.files import atomic, cache_folder
 from pipeline.kept import load_kept
-from pipeline.launcher import environment_alone
+from pipeline.launcher import run_alone
 from pipeline.shapes.arrays import FloatArray, IntArray, np
 from pipeline.shapes.files import check
 from pipeline.shapes.files.edges import Edges, oriented
@@ -82,13 +80,8 @@ def _tessellated(path: Path, unit: str, content: str) -> dict[str, Any]:
 
 
 def _run(path: Path, unit: str, target: Path) -> None:
-    environment = environment_alone()
-    root = str(Path(__file__).resolve().parents[3])
-    environment["PYTHONPATH"] = os.pathsep.join(filter(None, [root, environment.get("PYTHONPATH")]))
-    # -P: nothing is imported from the folder that one happens to be in.
-    command = [sys.executable, "-P", "-m", _PROGRAM, str(path), unit, str(target)]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST, env=environment, check=False)
+        done = run_alone(_PROGRAM, str(path), unit, str(target), timeout=_LONGEST)
     except subprocess.TimeoutExpired:
         raise SurfaceError(f"could not be covered by triangles within {_LONGEST} s: simplify the solid") from None
     if done.returncode:
