@@ -128,6 +128,14 @@ def test_where_nothing_has_a_force_the_figure_says_why(tmp_path):
     assert "it went wrong" in text
 
 
+def test_a_curve_of_which_no_case_has_run_is_left_out_without_a_warning(tmp_path):
+    data = dataset(material={"poisson": [0.3, 0.4]}, mesh={"epsilon": EPSILONS}, pending=len(EPSILONS))
+    assert (data["status"].sel(poisson=0.4) == "pending").all()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        draw(data, tmp_path / "a", ["png"], choose(data))
+
+
 @pytest.mark.parametrize("kind", sorted({*KINDS} - {"force"}))
 def test_a_figure_that_does_not_suit_says_what_it_lacks(kind):
     assert lacks(dataset(), kind).startswith("needs ")

@@ -90,10 +90,10 @@ def draw_curves(panel: Panel, layout: Layout, factor: float = 1.0, errors: str =
         style = look(position) | ({} if axis.joins and len(axis.positions) > 1 else {"linestyle": "none"})
         label = choices(panel.data, curve) if known.any() else None
         x = axis.positions + _aside(axis, position, len(layout.curves))
-        if errors:
+        if errors and known.any():  # of a curve without a value matplotlib's bars warn
             bars = np.nan_to_num(np.abs(y * line[errors].values))
             panel.ax.errorbar(x, shown, bars, label=label, **BARS, **style)
-        elif "is_below" in line:
+        elif not errors and "is_below" in line:
             draw_signed(panel.ax, x, shown, line["is_below"].values, label, style)
         else:
             panel.ax.plot(x, shown, label=label, **style)
