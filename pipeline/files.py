@@ -12,6 +12,7 @@ LEAST_ROOM = 200_000
 # Of a study, in the folder of its results.
 STORE_NAME = "cases.sqlite"
 FIGURE_FORMATS = ("png", "svg")
+NOT_UTF8 = "is no UTF-8, and netCDF and solvers take no other names (PYTHONUTF8=1 where the locale alone is at fault)"
 
 
 def cache_folder() -> Path:
@@ -82,6 +83,15 @@ def write_new(path: Path, text: str) -> None:
             os.replace(temporary, path)
 
 
+def is_utf8(name: str) -> bool:
+    """Tell whether all bytes that a name of Python's stands for are UTF-8."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
 def why_not_writable(path: Path, room: int = LEAST_ROOM) -> str:
     """Say why no file of ``room`` bytes can be written at ``path``, "" if one can.
 
@@ -91,6 +101,8 @@ def why_not_writable(path: Path, room: int = LEAST_ROOM) -> str:
         return f"{path}: is a folder, and a file of that name is to be written"
     if path.exists() and not path.is_file():
         return f"{path}: is no plain file"
+    if not is_utf8(str(path.absolute())):
+        return f"{path}: cannot be written: its name, or that of a folder above it, {NOT_UTF8}"
     for folder in path.parents:
         if folder.exists():
             if not folder.is_dir():

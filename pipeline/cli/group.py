@@ -10,7 +10,9 @@ from typer.core import TyperGroup
 
 from pipeline.cli.console import JSON, has_printed_json, print_json
 from pipeline.cli.faults import INTERRUPTED, SOME_FAILED, Fault, as_data, fail, of_file, of_unwritten
+from pipeline.files import NOT_UTF8, is_utf8
 from pipeline.launcher import is_first_rank, is_launched
+from pipeline.visible import visible
 
 # What a disk says that cannot be written to, be it only found when all is done.
 _UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
@@ -25,6 +27,8 @@ class Commands(TyperGroup):
         """Read the words of the command line."""
         words = args[: args.index("--")] if "--" in args else args
         JSON.set({"wanted": "--json" in words, "printed": False})
+        if foreign := [word for word in args if not is_utf8(word)]:
+            fail(*(Fault(f"{visible(word)}: {NOT_UTF8}", value=visible(word)) for word in foreign))
         try:
             return super().parse_args(ctx, args)
         except Exception as wrong:

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from pipeline.report.figures import save
+from pipeline.report.figures.style import DEFAULTS, save
 from pipeline.shapes.indenter import Indenter
 from pipeline.view.drawing import MM, Colouring, Drawing
 from pipeline.view.fields import Fields
@@ -26,7 +26,7 @@ _DOTS = 200
 # Panels as shares of the figure: left, bottom, width, height.
 _WHOLE, _CLOSE = (0.01, 0.19, 0.60, 0.70), (0.63, 0.19, 0.36, 0.70)
 _BAR = (0.1, 0.115, 0.4, 0.03)
-_STYLE = {"font.size": 8, "axes.linewidth": 0.6}
+_STYLE = DEFAULTS | {"font.size": 8, "axes.linewidth": 0.6}
 # Names of regions side by side.
 _COLUMNS = 4
 # Letters of a title that fit the width.

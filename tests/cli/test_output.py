@@ -189,3 +189,22 @@ def test_a_name_that_no_file_can_have_is_told_without_a_word_of_writing(epsmesh,
     done = epsmesh(command, f"{'a' * 300}.nc")
     assert done.exit_code == 2
     assert "File name too long" in done.stderr and "written" not in done.stderr
+
+
+@pytest.mark.parametrize("words", [["run", "l\udce9.toml"], ["plan", "small.toml", "--output", "l\udce9", "--json"]])
+def test_a_word_that_is_no_utf8_is_refused_before_a_library_meets_it(results, words):
+    """Bytes of another encoding, as names of files may have them."""
+    done = subprocess.run(command(*words), capture_output=True, text=True, cwd=results, check=False)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1 and r"l\udce9" in done.stderr and "UTF-8" in done.stderr
+    assert "--json" not in words or json.loads(done.stdout)["errors"][0]["value"].startswith(r"l\udce9")
+
+
+def test_a_folder_whose_name_is_no_utf8_is_refused_before_anything_is_computed(epsmesh, tmp_path, monkeypatch):
+    folder = tmp_path / "l\udce9"
+    folder.mkdir()
+    (folder / "small.toml").write_text(small_text())
+    monkeypatch.chdir(folder)
+    done = epsmesh("run", "small.toml")
+    assert done.exit_code == 2
+    assert "cannot be written" in done.stderr and "UTF-8" in done.stderr

@@ -2,6 +2,7 @@
 
 import json
 import os
+import pwd
 import signal
 import subprocess
 import sys
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.__main__ import _have_a_home
 from tests.commands import ENVIRONMENT, ROOT, epsmesh
 
 LAUNCHER = ROOT / "scripts" / "epsmesh"
@@ -72,3 +74,13 @@ def test_a_rank_that_is_interrupted_while_mpi_loads_ends_the_others():
     words = ["mpirun", "--oversubscribe", "-n", "2", sys.executable, "-c", ONE_RANK_LEAVES]
     done = subprocess.run(words, cwd=ROOT, env=ENVIRONMENT, capture_output=True, check=False, timeout=60)
     assert done.returncode == 130
+
+
+def test_a_user_without_a_name_and_a_home_has_that_of_a_container(monkeypatch):
+    """MPI ends with a fault of memory where there is none."""
+    monkeypatch.delenv("HOME")
+    _have_a_home()
+    assert "HOME" not in os.environ  # the system knows
+    monkeypatch.setattr(pwd, "getpwuid", {}.__getitem__)
+    _have_a_home()
+    assert os.environ["HOME"] == "/"

@@ -3,6 +3,7 @@
 import itertools
 import warnings
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray as xr
@@ -22,6 +23,7 @@ LARGE = {
     "material": {"poisson": [round(0.02 * i, 2) for i in range(12)], "young": ["1 kPa", "2 kPa"]},
     "mesh": {"epsilon": ["5 mm", "8 mm", "full"], "outside": ["coarse", "free", "fixed"], "degree": [1, 2]},
 }
+MESHES = {"epsilon": ["5 mm", "full"], "outside": ["coarse", "free"], "degree": [1, 2], "fine": ["5 mm", "4 mm"]}
 SIZES = {"solve": EXACT, "mesh": {"rim": ["1 mm", "0.5 mm", "0.02 mm"], "fine": ["5 mm", "4 mm"]}}
 SMALLER = FIGURE | {"solve": EXACT, "material": {"poisson": [0.3, 0.4]}, "mesh": {"epsilon": ["4 mm", "8 mm", "full"]}}
 # name: study, its main figure, the others
@@ -145,6 +147,16 @@ def test_a_figure_that_does_not_suit_says_what_it_lacks(kind):
 def test_the_same_dataset_gives_the_same_file(tmp_path):
     one, two = (draw(dataset(**SIZES), tmp_path / name, ["svg"])[0].read_text() for name in "ab")
     assert one == two
+
+
+def test_files_do_not_depend_on_the_users_settings_of_matplotlib(tmp_path):
+    """Nor on a matplotlibrc in the folder that one is in, which may be a stranger's."""
+    data = dataset(**LARGE | {"material": {"poisson": [0.3, 0.4]}, "mesh": MESHES})
+    one = draw(data, tmp_path / "a", ["svg"], rest=True)
+    with mpl.rc_context({"font.size": 30, "text.usetex": True, "savefig.dpi": 7, "svg.hashsalt": "x"}):
+        two = draw(data, tmp_path / "b", ["svg"], rest=True)
+    assert len(one) > 1
+    assert [path.read_text() for path in one] == [path.read_text() for path in two]
 
 
 def test_a_large_study_shows_a_part_and_says_which():

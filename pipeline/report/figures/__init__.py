@@ -47,14 +47,14 @@ def draw(
     and, with the ``rest``, what each leaves out to ``<stem>_<kind>_2.png`` and so on.
     """
     written = []
-    for kind, paths in files(dataset, stem, formats, kinds).items():
-        with mpl.rc_context(STYLE):
+    with mpl.rc_context(STYLE):
+        for kind, paths in files(dataset, stem, formats, kinds).items():
             drawn = figure(dataset, kind)
             written += [save(drawn, path) for path in paths]
-        for number, (words, part) in enumerate(parts(dataset, kind) if rest else [], start=2):
-            titled = part.assign_attrs(title=" – ".join(filter(None, (str(part.attrs.get("title", "")), words))))
-            drawn = figure(titled, kind)
-            written += [save(drawn, stem.with_name(f"{stem.name}_{kind}_{number}.{suffix}")) for suffix in formats]
+            for number, (words, part) in enumerate(parts(dataset, kind) if rest else [], start=2):
+                titled = part.assign_attrs(title=" – ".join(filter(None, (str(part.attrs.get("title", "")), words))))
+                drawn = figure(titled, kind)
+                written += [save(drawn, stem.with_name(f"{stem.name}_{kind}_{number}.{suffix}")) for suffix in formats]
     return written
 
 

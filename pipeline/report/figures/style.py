@@ -1,10 +1,13 @@
 """What all figures share: colours, sizes, files."""
 
+import re
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.style.core import STYLE_BLACKLIST
 
 from pipeline.files import atomic
 from pipeline.report.figures.text import width_of, wrapped
@@ -16,10 +19,16 @@ MARKERS = "osD^vPX"
 CLAIM, FAILED, QUIET, LINE, GRID, PAPER = "#d81b60", "#c62828", "#555555", "#000000", "#dddddd", "#ffffff"
 _TITLE, _LEGEND, _NOTE = 9.5, 7.5, 7.0  # points
 _TITLE_LINES = 4
+# Of an SVG: its tags, and in these a name that matplotlib makes up.
+_TAG, _NAME = re.compile(r"<[^<>]*>"), re.compile(r'(?<=["#])[a-zA-Z][0-9a-f]{10}(?=["\)])')
 _EDGE, _HANDLE = 0.2, 0.55  # inches: beside a figure's text, and of a legend's entry beside its words
-STYLE = {"font.size": 8, "axes.titlesize": 8, "legend.fontsize": _LEGEND, "svg.fonttype": "none", "axes.grid": True,
-          "grid.linewidth": 0.4, "grid.color": GRID, "lines.linewidth": 1.2, "lines.markersize": 3.5,
-          "svg.hashsalt": "epsmesh"}  # fmt: skip
+# Whatever a matplotlibrc says, the user's own or one in the folder that one is in: the same dataset, the same file.
+DEFAULTS = {name: value for name, value in mpl.rcParamsDefault.items() if name not in STYLE_BLACKLIST}
+STYLE = DEFAULTS | {
+    "font.size": 8, "axes.titlesize": 8, "legend.fontsize": _LEGEND, "svg.fonttype": "none", "axes.grid": True,
+    "grid.linewidth": 0.4, "grid.color": GRID, "lines.linewidth": 1.2, "lines.markersize": 3.5,
+    "svg.hashsalt": "epsmesh",
+}  # fmt: skip
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -71,4 +80,16 @@ def save(figure: Figure, path: Path) -> Path:
     with atomic(path) as temporary:
         # Without a date, the same dataset gives the same file.
         figure.savefig(temporary, dpi=200, metadata={"Date": None} if path.suffix == ".svg" else None)
+        if path.suffix == ".svg":
+            temporary.write_text(_numbered(temporary.read_text(encoding="utf-8")), encoding="utf-8")
     return path
+
+
+def _numbered(svg: str) -> str:
+    """Return ``svg`` with the names of its parts numbered: matplotlib makes them of sizes down to their last digit."""
+    numbers: dict[str, str] = {}
+
+    def number(name: re.Match[str]) -> str:
+        return numbers.setdefault(name[0], f"{name[0][0]}{len(numbers)}")
+
+    return _TAG.sub(lambda tag: _NAME.sub(number, tag[0]), svg)
