@@ -14,6 +14,7 @@ from pipeline.solve.large.forms import NeoHookeanForms
 from pipeline.solve.large.newton import LargeError
 from pipeline.solve.large.problem import LargeProblem
 from pipeline.solve.material import MaterialLaw
+from pipeline.solve.single import cycle
 from pipeline.study.problems import StudyError
 from tests.cases import BLADE, force, solve, study
 
@@ -76,6 +77,17 @@ def test_quarter_is_the_whole_and_force_goes_with_the_modulus():
     assert stiff.origin == "scaled"
     assert stiff.force == pytest.approx(3 * quarter.force, rel=1e-12)
     assert stiff.energy == pytest.approx(3 * quarter.energy, rel=1e-12)
+
+
+def test_a_preconditioner_that_is_not_definite_is_mended(monkeypatch):
+    """It is set up on a guess of the largest eigenvalue, which a few slender elements make too small."""
+    changes = {"material": LARGE, "solve": {"method": "iterative"}}
+    known = force(**changes)
+    monkeypatch.setattr(cycle, "_LANCZOS", 1)
+    assert force(**changes) == pytest.approx(known, rel=1e-8)
+    monkeypatch.setattr(cycle.SingleCycle, "look_closer", lambda self: None)
+    (record,) = solve(**changes).values()
+    assert record.status == "failed"
 
 
 def test_every_depth_is_solved_and_none_is_another_s():

@@ -5,7 +5,7 @@ elasticity, which is set up once: the tangent differs from it by what strain mak
 """
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -26,6 +26,7 @@ from pipeline.stages import stage
 _LINEAR, _MOST_LINEAR = 1e-4, 400
 # Residual that is left, relative to the forces on what is prescribed, and the most steps to get there.
 _LEFT, _MOST_STEPS = 1e-9, 25
+_INDEFINITE = PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC
 # A step that turns tissue inside out is halved, at most this often.
 _HALVINGS = 12
 # Of the gain that the slope promises, a step must bring so much.
@@ -84,8 +85,7 @@ class Equilibrium:
             result.array[self._held] = prescribed.array[self._held]
             ksp.setInitialGuessNonzero(True)
             ksp.setOperators(self.tangent)
-            self._checked(ksp, lambda: ksp.solve(load, result))
-            self.iterations += ksp.its
+            self._run(ksp, ksp, lambda: ksp.solve(load, result))
 
     @stage("Newton's method")
     def settle(self, displacement: PETSc.Vec, scale: float) -> int:
@@ -109,8 +109,7 @@ class Equilibrium:
                 snes.setFromOptions()
                 PETSc.Options().delValue(prefix + "snes_linesearch_type")
                 snes.setTolerances(rtol=0.0, atol=_LEFT * scale, stol=0.0, max_it=_MOST_STEPS)
-                self._checked(snes, lambda: snes.solve(None, displacement))
-                self.iterations += snes.getLinearSolveIterations()
+                self._run(snes, snes.ksp, lambda: snes.solve(None, displacement))
                 return int(snes.getIterationNumber())
             finally:
                 snes.destroy()
@@ -164,15 +163,26 @@ class Equilibrium:
             if own:
                 ksp.destroy()
 
-    @staticmethod
-    def _checked(solver: Any, solve: Any) -> None:
-        """Run a solver of PETSc, and see that it has converged."""
+    def _run(self, solver: Any, ksp: PETSc.KSP, solve: Callable[[], None]) -> None:
+        """Run a solver of PETSc, whose linear systems are those of ``ksp``, and see that it has converged; collective.
+
+        Where the preconditioner turns out not to be definite, it is made so, and the solver goes on.
+
+        Raises:
+            LargeError: if it has not.
+        """
         try:
-            solve()
+            self._counted(solver, solve)
+            if ksp.getConvergedReason() == _INDEFINITE and self._solver.look_closer():
+                self._counted(solver, solve)
         except PETSc.Error as error:
             raise LargeError(explain(error)) from error
         if solver.getConvergedReason() <= 0:
             raise LargeError(f"reason {solver.getConvergedReason()}")
+
+    def _counted(self, solver: Any, solve: Callable[[], None]) -> None:
+        solve()
+        self.iterations += solver.getLinearSolveIterations() if isinstance(solver, PETSc.SNES) else solver.its
 
 
 class _Preconditioner:
