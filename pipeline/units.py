@@ -125,7 +125,7 @@ def parse_quantity(text: Any, unit: str) -> float:
         raise _refusal(unit, finite + _foreign(plain))
     value, rest = float(found.group()), plain[found.end() :].strip()
     factor = _factor(rest, unit)
-    if not rest and abs(value) >= 1:
+    if not rest and 1 <= abs(value) < inf:
         raise _refusal(unit, f'{found.group()} without a unit would be {100 * value:g} %: is "{value:g} %" meant, that '
                              f"is {value / 100:g}?")  # fmt: skip
     if not abs(value * factor) < inf:

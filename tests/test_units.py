@@ -57,6 +57,7 @@ REFUSED = {
     ("1 rad", ""): "`rad` is no unit of a share",
     ("1 mm/mm", ""): "`mm/mm` is no unit of a share",
     ("5", ""): '5 without a unit would be 500 %: is "5 %" meant, that is 0.05?',
+    ("1e999", ""): "the number must be finite",
     ("1e999 kPa", "Pa"): "the number must be finite",
     ("1e308 GPa", "Pa"): "the number must be finite",
     ("inf m", "m"): "the number must be finite",

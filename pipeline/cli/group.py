@@ -3,6 +3,7 @@
 import errno
 import os
 import sys
+from collections.abc import Sequence
 from typing import Any
 
 import typer
@@ -23,16 +24,19 @@ _UNUSABLE = (errno.EACCES, errno.EPERM, errno.EISDIR, errno.ENOTDIR, errno.ENAME
 class Commands(TyperGroup):
     """A group of commands that knows before any of them begins whether its words ask for JSON."""
 
+    words: Sequence[str] = ()
+
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the words of the command line."""
         words = args[: args.index("--")] if "--" in args else args
         JSON.set({"wanted": "--json" in words, "printed": False})
+        self.words = list(args)
         if foreign := [word for word in args if not is_utf8(word)]:
             fail(*(Fault(f"{visible(word)}: {NOT_UTF8}", value=visible(word)) for word in foreign))
         try:
             return super().parse_args(ctx, args)
         except Exception as wrong:
-            _tell(wrong)
+            _tell(wrong, self.words)
             raise
 
     def invoke(self, ctx: Any) -> Any:
@@ -44,12 +48,12 @@ class Commands(TyperGroup):
                 fail(of_unwritten(wrong))
             if wrong.errno in _UNUSABLE and wrong.filename is not None:
                 fail(of_file(wrong.filename, f"cannot be used: {wrong.strerror}"))
-            _tell(wrong)
+            _tell(wrong, self.words)
             raise
         except (Exception, KeyboardInterrupt) as wrong:
             plain = isinstance(wrong, typer.Exit) or not _is_of_interrupt(wrong)
             ended = wrong if plain else KeyboardInterrupt()
-            _tell(ended)
+            _tell(ended, self.words)
             if isinstance(ended, KeyboardInterrupt):
                 _end_ranks()
             if ended is wrong:
@@ -75,8 +79,8 @@ def _end_ranks() -> None:
     os._exit(INTERRUPTED)
 
 
-def _tell(wrong: BaseException) -> None:
-    """Print what ended a command as JSON, if that was asked for and the command itself has not printed any."""
+def _tell(wrong: BaseException, words: Sequence[str]) -> None:
+    """Print what ended a command of these ``words`` as JSON, if it was asked for that and has printed none itself."""
     # An exit tells its reason before; help is no error.
     if isinstance(wrong, typer.Exit) or has_printed_json() or not is_first_rank():
         return
@@ -84,16 +88,28 @@ def _tell(wrong: BaseException) -> None:
     if isinstance(wrong, KeyboardInterrupt):
         found, status = Fault("interrupted"), INTERRUPTED
     elif usage is not None:
-        found, status = _of_usage(wrong, usage()), int(getattr(wrong, "exit_code", 2))
+        found, status = _of_usage(wrong, usage(), words), int(getattr(wrong, "exit_code", 2))
     else:
         found, status = Fault(f"{type(wrong).__name__}: {wrong}"), SOME_FAILED
     print_json(as_data([found], status))
 
 
-def _of_usage(wrong: Any, message: str) -> Fault:
-    """Return words that make no command as a fault."""
+def _of_usage(wrong: Any, message: str, words: Sequence[str]) -> Fault:
+    """Return ``words`` that make no command as a fault."""
     parameter = getattr(wrong, "param", None)
     options = [word for word in getattr(parameter, "opts", ()) if word.startswith("--")]
     argument = getattr(parameter, "metavar", None) or str(getattr(parameter, "name", None) or "").upper()
     names = (*options, getattr(wrong, "option_name", None), argument)
-    return Fault(message, key=next((name for name in names if name), None))
+    value = _after(options, words)
+    allowed = None if value is None else getattr(wrong, "message", None)
+    return Fault(message, key=next((name for name in names if name), None), value=value, allowed=allowed)
+
+
+def _after(options: Sequence[str], words: Sequence[str]) -> str | None:
+    """Return the last value that ``words`` give an option, None if they give none."""
+    found = None
+    for word, following in zip(words, [*words[1:], None], strict=True):
+        name, equals, value = word.partition("=")
+        if name in options:
+            found = value if equals else following
+    return found

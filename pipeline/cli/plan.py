@@ -172,13 +172,16 @@ def _planned(
     return replace(make_plan(study, done, without) if done else bare, cost=cost), records
 
 
-def find_case(study: "Study", text: str) -> "Case":
-    """Return the case of a number, or of labels, the first of several; fail with what there is to choose from."""
+def find_case(study: "Study", text: str, word: str = "CASE") -> "Case":
+    """Return the case of a number, or of labels, the first of several; fail with what there is to choose from.
+
+    ``word`` is what names the case on the command line.
+    """
     cases = list(study.cases())
     if text.strip().isdecimal():
         number = int(text)
         if number >= len(cases):
-            fail(_of_case(text, f"there are {len(cases)} cases, counted from 0"))
+            fail(_of_case(word, text, f"there are {len(cases)} cases, counted from 0"))
         return cases[number]
     wanted: dict[str, str] = {}
     names = [axis.name for axis in study.axes]
@@ -186,22 +189,22 @@ def find_case(study: "Study", text: str) -> "Case":
     for part in re.split(r",(?=\s*\w+\s*=)", text):
         name, _, value = (word.strip() for word in part.partition("="))
         if name not in names:
-            fail(_of_case(text, f"nothing called {name!r} is swept; swept are {', '.join(names) or 'no keys'}"))
+            fail(_of_case(word, text, f"nothing called {name!r} is swept; swept are {', '.join(names) or 'no keys'}"))
         wanted[name] = value
     found = [case for case in cases if _matches(case, wanted)]
     if not found:
         choices = {axis.name: [axis.write(label) for label in axis.labels] for axis in study.axes}
         listed = "; ".join(f"{name} = {', '.join(choices[name])}" for name in wanted)
-        fail(_of_case(text, f"there is none; there are {listed}"))
+        fail(_of_case(word, text, f"there is none; there are {listed}"))
     if len(found) > 1 and is_first_rank():
         left = ", ".join(axis.name for axis in study.axes if axis.name not in wanted and len(axis) > 1)
         print(f"{found[0]}: the first of {len(found)} such cases, which differ in {left}", file=sys.stderr)
     return found[0]
 
 
-def _of_case(text: str, allowed: str) -> Fault:
+def _of_case(word: str, text: str, allowed: str) -> Fault:
     shown = text if text.strip().isdecimal() else repr(text)
-    return Fault(f"case {shown}: {allowed}", key="CASE", value=text, allowed=allowed)
+    return Fault(f"case {shown}: {allowed}", key=word, value=text, allowed=allowed)
 
 
 def _matches(case: "Case", wanted: dict[str, str]) -> bool:

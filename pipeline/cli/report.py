@@ -119,5 +119,5 @@ def _read(file: Path, output: Path) -> "tuple[Path, xr.Dataset]":
 
 def _compare(file: Path, path: Path, dataset: "xr.Dataset") -> None:
     """Warn if the study file is not the one that the dataset was made from."""
-    if file.is_file() and file.read_text(encoding="utf-8", errors="replace") != dataset.attrs.get("study"):
+    if file.is_file() and file.read_text(encoding="utf-8-sig", errors="replace") != dataset.attrs.get("study"):
         warning(f"{file} has changed since {path} was made; the report shows the study as it was run")

@@ -30,7 +30,7 @@ def scene_of(path: Path, dataset: xr.Dataset, text: str) -> str:
             text = _number_of_answer(dataset)
         except DatasetError as wrong:
             fail(of_file(path, f"--scene {_ANSWER} needs an answer: {wrong}; name a case by its number"))
-    chosen = find_case(study, text)
+    chosen = find_case(study, text, "--scene")
     from pipeline.view.page import render
     from pipeline.workflow import world
 

@@ -66,7 +66,9 @@ def test_unknown_commands_and_missing_words_are_told(epsmesh):
     (error,) = failed(epsmesh("plan", "--json"))
     assert error["key"] == "FILE"
     (error,) = failed(epsmesh("verify", "--count", "many", "--json"))
-    assert error["key"] == "--count"
+    assert (error["key"], error["value"], bool(error["allowed"])) == ("--count", "many", True)
+    (error,) = failed(epsmesh("plan", "a.toml", "--memory=-1", "--json"))
+    assert (error["key"], error["value"], "0.1" in error["allowed"]) == ("--memory", "-1", True)
 
 
 @pytest.mark.parametrize("command", ["plan", "run", "status", "explain", "merge", "view", "export"])

@@ -1,5 +1,6 @@
 """The case that a report turns round: the answer's where its mesh takes seconds, another one, or none."""
 
+import json
 import re
 from html import unescape
 from pathlib import Path
@@ -51,3 +52,11 @@ def test_a_machine_that_cannot_mesh_has_a_report_all_the_same(epsmesh, results, 
     monkeypatch.chdir(results)
     monkeypatch.setenv(name, str(results / "small.toml"))
     assert scene(epsmesh) == ""
+
+
+def test_a_case_that_is_none_is_told_with_its_option(epsmesh, results, monkeypatch):
+    monkeypatch.chdir(results)
+    done = epsmesh("report", "small.nc", "--scene", "77", "--json")
+    assert done.exit_code == 2
+    (error,) = json.loads(done.stdout)["errors"]
+    assert (error["key"], error["value"]) == ("--scene", "77")

@@ -238,6 +238,8 @@ def test_commands_take_a_study_file(tmp_path):
     done = epsmesh("report", study, "--output", tmp_path)
     assert (done.exit_code, done.stdout.strip()) == (0, str(tmp_path / "small.html"))
     assert "has changed since" in done.stderr
+    study.write_text("title = 'x'", encoding="utf-8-sig")  # the mark of some editors is no part of it
+    assert epsmesh("report", study, "--output", tmp_path).stderr == ""
     done = epsmesh("plot", study, "--output", tmp_path)
     assert done.stdout.split() == [str(tmp_path / f"small.{suffix}") for suffix in ("png", "svg")]
 
