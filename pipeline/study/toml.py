@@ -14,6 +14,7 @@ from typing import Any
 
 from pipeline.study.problems import Problem, Problems, StudyError
 
+_LARGEST = 2**63
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -72,8 +73,11 @@ def _value(value: Any, place: str, problems: Problems) -> str:
             return "true" if value else "false"
         case str():
             return _text(value)
-        case Integral():
+        case Integral() if -_LARGEST <= int(value) < _LARGEST:
             return str(int(value))
+        case Integral():
+            problems.errors.append(Problem(place, None, "has more than 64 bits: write 1e30 for a large number"))
+            return ""
         case Real():
             number = float(value)
             return "nan" if isnan(number) else f"{'-' * (number < 0)}inf" if isinf(number) else repr(number)

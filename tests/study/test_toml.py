@@ -66,3 +66,9 @@ def test_what_has_no_place_in_a_study_is_refused_all_at_once():
     for name in ("../mine", "a b", ""):
         with pytest.raises(ValueError, match="must be letters"):
             pipeline.load(raw(), name=name)
+
+
+def test_an_integer_that_toml_does_not_take_is_told_with_its_place():
+    for number in (2**63, -(2**63) - 1, 10**5000):
+        with pytest.raises(pipeline.StudyError, match=r"material\.poisson.* 64 bits"):
+            pipeline.load(raw(material={"poisson": number}))
