@@ -20,12 +20,18 @@ _TOUCHING = 1e-9
 _FARTHEST_OFF = 0.1
 
 
-@lru_cache(_MANY)
 def place_error(body: Body, probe: Probe) -> PlaceError | None:
     """Return why the probe cannot touch the body where it is told to; None if it can."""
+    # Probes are equal whether their direction is the default or was given.
+    return _place_error(body, probe, "direction" in probe.model_fields_set)
+
+
+@lru_cache(_MANY)
+def _place_error(body: Body, probe: Probe, is_directed: bool) -> PlaceError | None:
     try:
         frame = probe.frame_on(body)
-        _check_directions(probe, frame)
+        if is_directed:
+            _check_directions(probe, frame)
         if is_level(body, frame):
             _check_fit(body, probe, frame)
         if not is_level(body, frame) or isinstance(body, FromFile):
@@ -52,8 +58,8 @@ def is_clear(body: Body, probe: Probe) -> bool:
 
 
 def _check_directions(probe: Probe, frame: Frame) -> None:
-    """Refuse a direction that was given and says nothing: left out, it is y where the probe advances along x."""
-    if "direction" in probe.model_fields_set and frame.is_replaced(probe.lies_along):
+    """Refuse a given direction that says nothing: left out, it is y where the probe advances along x."""
+    if frame.is_replaced(probe.lies_along):
         frame.refuse_direction()
 
 

@@ -224,6 +224,15 @@ def test_a_mistake_of_one_probe_hides_none_of_another():
     ]
 
 
+def test_what_is_refused_does_not_hang_on_what_was_read_before():
+    """A direction along the axis is refused where it was given; the same one, left out, is another one there."""
+    on_side = BLADE | {"at": ["20 mm", "1.25 mm", "-9 mm"]}
+    study(probe=on_side)
+    with pytest.raises(StudyError, match="10° aside"):
+        study(probe=on_side | {"direction": [1.0, 0.0, 0.0]})
+    study(probe=on_side)
+
+
 @pytest.mark.parametrize("name", MISTAKES)
 def test_each_mistake_gets_its_message(name):
     changes, words = MISTAKES[name]
