@@ -30,7 +30,7 @@ def parse(data: bytes) -> Raw:
     values, counts = read
     points = values[(np.cumsum(counts) - counts)[:, None] + np.arange(3)]
     corners, counts = _facets(lines, is_facet, np.cumsum(is_point)[is_facet])
-    if corners.min() < 0 or corners.max() >= len(points):
+    if corners.min(initial=0) < 0 or corners.max(initial=0) >= len(points):
         wrong = corners[(corners < 0) | (corners >= len(points))][0] + 1
         raise SurfaceError(f"a facet has point {wrong:,}, and there are {len(points):,}: truncated? export it again")
     return Raw(points, triangulate(points, corners, counts))

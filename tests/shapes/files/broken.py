@@ -151,6 +151,7 @@ def corpus() -> list[Broken]:
             "letter.stl", b"Dear colleague, here is the liver that you asked for.\n" * 9, ("not an STL file", "Dear")
         ),
         Broken("letter.ply", b"Dear colleague\n", ("not a PLY file",)),
+        Broken("cornerless.obj", lines[: lines.index(b"\nf ")] + b"\nf \n", ("a facet with 0 corners",)),
         Broken("letter.obj", b"Dear colleague\n", ("not an OBJ surface", "0 lines of points")),
         Broken("word.stl", _changed(text, b"vertex", b"corner"), ("239 times `vertex` in 80 facets",)),
         Broken("comma.stl", text.replace(b".", b","), ("line 4", "three numbers")),
