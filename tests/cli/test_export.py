@@ -5,6 +5,7 @@ import subprocess
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 
 from tests.commands import ENVIRONMENT, ROOT, command, epsmesh
@@ -62,7 +63,7 @@ def test_a_refused_tool_is_named_by_its_key(tmp_path, line, word):
 
 def children(process):
     """Return the processes that a process has started."""
-    return [int(number) for number in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
+    return [child.pid for child in psutil.Process(process).children()]
 
 
 def loads_mpi(process):

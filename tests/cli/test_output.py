@@ -188,7 +188,9 @@ def test_streams_that_are_closed_are_none_of_a_commands_files(results, tmp_path,
 def test_a_name_that_no_file_can_have_is_told_without_a_word_of_writing(epsmesh, command):
     done = epsmesh(command, f"{'a' * 300}.nc")
     assert done.exit_code == 2
-    assert "File name too long" in done.stderr and "written" not in done.stderr
+    # Since Python 3.14 a file of such a name is one that is not there.
+    assert "File name too long" in done.stderr or "no such dataset" in done.stderr
+    assert "written" not in done.stderr
 
 
 @pytest.mark.parametrize("words", [["run", "l\udce9.toml"], ["plan", "small.toml", "--output", "l\udce9", "--json"]])
