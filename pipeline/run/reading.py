@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 from pipeline.plan.cost import CostModel
 from pipeline.plan.work import Plan
 from pipeline.run.record import Record
-from pipeline.run.store import PATIENCE, SCHEMA, DamagedStoreError, Records, Row, StoreError, damaged, guard
+from pipeline.run.store import PATIENCE, SCHEMA, DamagedStoreError, Records, Row, StoreError, damaged, guard, reason
 
 
 @contextmanager
@@ -24,7 +24,7 @@ def open_to_read(path: Path) -> Iterator[Records]:
         with _connection(path) as database:
             yield Records(path, database)
     except sqlite3.OperationalError as error:
-        raise StoreError(f"the case store {path} cannot be read: {error}") from error
+        raise StoreError(f"the case store {path} cannot be read: {reason(error)}") from error
     except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
         raise DamagedStoreError(damaged(path, error)) from error
     except OSError as error:
@@ -55,7 +55,7 @@ def read_rows(path: Path) -> list[Row]:
                 raise sqlite3.DatabaseError(wrong)
             return records.rows()
     except (sqlite3.Error, UnicodeDecodeError, OSError) as error:
-        raise StoreError(f"{path}: damaged, left out: {error}") from error
+        raise StoreError(f"{path}: damaged, left out: {reason(error)}") from error
 
 
 @contextmanager

@@ -10,13 +10,18 @@ from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 from shlex import quote
+from textwrap import shorten
 
 from pipeline.plan.cost import CostModel, fit
 from pipeline.run.record import Record
 from pipeline.stages import stage
+from pipeline.visible import visible
 
 _COLUMNS = "records (key TEXT PRIMARY KEY, record TEXT NOT NULL, stored REAL NOT NULL)"
 SCHEMA = f"CREATE TABLE IF NOT EXISTS {_COLUMNS}"
+# What has another type than its column is damaged, and is read all the same, to be told or removed.
+_KEY, _TEXT = "coalesce(CAST(key AS TEXT), '')", "coalesce(CAST(record AS TEXT), '')"
+_STORED = "coalesce(CAST(stored AS REAL), 0.0)"
 # As SQLite writes it into the file, and how it begins what else is no program.
 _RECORDS, _PLAIN = f"CREATE TABLE {_COLUMNS}", re.compile(r"CREATE (TABLE|(UNIQUE )?INDEX) ", re.IGNORECASE)
 # Two runs may share a store: each write takes milliseconds, so half a minute means that something hangs.
@@ -26,6 +31,7 @@ _RECENT = 500
 
 # The longest text of a record (bytes): ten times that of a hundred motions' stiffness.
 _LONGEST = 16_000_000
+_LONGEST_REASON = 200  # letters
 
 Row = tuple[str, str, float]  # key, record as text, seconds since 1970 at which it was stored
 
@@ -55,7 +61,7 @@ class Records:
 
     def rows(self) -> list[Row]:
         """Return what is on disk as it is, in the order of the keys."""
-        return self._database.execute("SELECT key, record, stored FROM records ORDER BY key").fetchall()
+        return self._database.execute(f"SELECT {_KEY}, {_TEXT}, {_STORED} FROM records ORDER BY key").fetchall()
 
     def get(self, keys: Iterable[str]) -> dict[str, Record]:
         """Return the records on disk among ``keys``.
@@ -99,9 +105,9 @@ class Records:
         for key, text, _ in self.rows():
             record = _readable(text)
             if fault := _fault(key, record):
-                yield f"record {key}: {fault}"
+                yield f"record {visible(key)}: {fault}"
             elif record and record.status == "ok" and not (isfinite(record.force) and record.force > 0):
-                yield f"record {key}: is ok, and its force {record.force}"
+                yield f"record {visible(key)}: is ok, and its force {record.force}"
 
     def doomed(self, *, older_than: float | None = None, failed: bool = False) -> list[Doomed]:
         """Return records stored ``older_than`` seconds ago or before, failed ones, and what is no record of its key."""
@@ -137,10 +143,12 @@ class Store(Records):
             path.parent.mkdir(parents=True, exist_ok=True)
             super().__init__(path, _open(path))
         except sqlite3.OperationalError as error:
-            raise StoreError(f"the case store {path} cannot be opened: {error}") from error
+            raise StoreError(f"the case store {path} cannot be opened: {reason(error)}") from error
         except sqlite3.DatabaseError as error:
             aside = _move_aside(path)
-            self.notice = f"the case store {path} is damaged ({error}); it was moved to {aside} and a new one begun"
+            self.notice = (
+                f"the case store {path} is damaged ({reason(error)}); it was moved to {aside} and a new one begun"
+            )
             super().__init__(path, _open(path))
         except OSError as error:
             raise StoreError(f"the case store {path} cannot be made: {error.strerror}") from error
@@ -156,7 +164,7 @@ class Store(Records):
         try:
             self._database.execute("INSERT OR REPLACE INTO records VALUES (?, ?, ?)", row)
         except sqlite3.Error as error:
-            raise StoreError(f"the case store {self.path} cannot be written: {error}") from error
+            raise StoreError(f"the case store {self.path} cannot be written: {reason(error)}") from error
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
@@ -174,7 +182,7 @@ class Store(Records):
                 raise
             self._database.execute("COMMIT")
         except sqlite3.Error as error:
-            raise StoreError(f"the case store {self.path} cannot be read or written: {error}") from error
+            raise StoreError(f"the case store {self.path} cannot be read or written: {reason(error)}") from error
 
     def put_rows(self, rows: Iterable[Row]) -> None:
         """Write rows of another store, times and all, in place of earlier ones of the same keys."""
@@ -188,7 +196,11 @@ class Store(Records):
         """
         with self.transaction():
             gone = self.doomed(older_than=older_than, failed=failed)
-            self._database.executemany("DELETE FROM records WHERE key = ?", [(one.key,) for one in gone])
+            keys = {one.key for one in gone}
+            rows = self._database.execute(f"SELECT rowid, {_KEY} FROM records").fetchall()
+            # Not by the key: one that is no text is not found by how it is written.
+            numbers = [(number,) for number, key in rows if key in keys]
+            self._database.executemany("DELETE FROM records WHERE rowid = ?", numbers)
         if gone:
             with suppress(sqlite3.Error):  # it takes a second file's room, and saves no more than that
                 self._database.execute("VACUUM")
@@ -204,6 +216,8 @@ def guard(database: sqlite3.Connection) -> None:
         sqlite3.DatabaseError: if it holds views, triggers or tables that are programs, or if its records are not plain
             columns (those that are computed would fill the memory): a case store has none.
     """
+    # JSON with a byte that is no UTF-8 is none either: one record cannot be read, and the others can.
+    database.text_factory = lambda data: data.decode(errors="backslashreplace")
     database.execute("PRAGMA trusted_schema = OFF")
     database.execute("PRAGMA cell_size_check = ON")
     database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LONGEST)
@@ -239,7 +253,12 @@ def _move_aside(path: Path) -> Path:
 
 def damaged(path: Path, error: Exception) -> str:
     """Return what to say of a store that cannot be read."""
-    return f"the case store {path} is damaged ({error}); {_mend(path)} moves it aside and begins a new one"
+    return f"the case store {path} is damaged ({reason(error)}); {_mend(path)} moves it aside and begins a new one"
+
+
+def reason(error: Exception) -> str:
+    """Return what SQLite says on one short line: it quotes all of a text that it cannot decode."""
+    return shorten(visible(str(error)), _LONGEST_REASON, placeholder=" …")
 
 
 def _mend(path: Path) -> str:

@@ -1,11 +1,12 @@
 """The case store: what is put is there, whole, and damage loses nothing silently."""
 
 import sqlite3
+from contextlib import closing
 from math import nan
 
 import pytest
 
-from pipeline.run.reading import open_to_read
+from pipeline.run.reading import open_to_read, read_rows
 from pipeline.run.record import Record
 from pipeline.run.store import Store, StoreError
 
@@ -59,6 +60,26 @@ def test_a_store_that_is_read_is_left_alone(tmp_path):
     with pytest.raises(StoreError, match="cannot be read"):
         open_to_read(tmp_path / "absent.sqlite").__enter__()
     assert {file.name for file in tmp_path.iterdir()} == {"cases.sqlite"}
+
+
+@pytest.mark.parametrize(
+    "row",
+    ["('k', CAST(x'ff1b0a' AS TEXT), 0)", "(x'ff', '{}', 0)", "(7, 8, 'nine')", "(CAST(x'ff' AS TEXT), x'00', x'')"],
+)
+def test_a_damaged_record_is_told_on_one_line_and_removed_and_costs_no_other(tmp_path, row):
+    path = tmp_path / "cases.sqlite"
+    store = Store(path)
+    store.put(Record("sound", "ok", force=1.5))
+    with closing(sqlite3.connect(path)) as database, database:
+        database.execute(f"INSERT INTO records VALUES {row}")
+    with open_to_read(path) as opened:
+        assert opened.get(["sound"])["sound"].force == 1.5
+        (problem,) = opened.problems()
+        assert "cannot be read" in problem
+    assert [key for key, *_ in read_rows(path)].count("sound") == 1
+    assert store.prune() == 1
+    assert not list(store.problems())
+    assert [record.key for record in store.records()] == ["sound"]
 
 
 def test_a_stored_force_that_is_no_number_is_not_relied_on(tmp_path):
