@@ -111,7 +111,7 @@ resolution: setup ## what a file's resolution, noise and voxels change of F (a q
 stress: setup ## numerical stability: a matrix of extremes (10 minutes)
 	$(EPSMESH) stress
 
-fuzz: setup ## eight thousand study files, and damaged surfaces, datasets, stores and models (minutes)
+fuzz: setup ## ten thousand study files, and damaged surfaces, datasets, stores and models (minutes)
 	EPSMESH_FUZZ=$(FUZZ) $(MPI_ENV) $(PYTHON) -m pytest tests/fuzz -q $(PYTEST_ARGS)
 
 soak: setup ## 20,000 cases on 2,000 meshes in one run: memory and pace stay flat (a quarter of an hour; SOAK_ARGS=2000: a part)

@@ -1,11 +1,13 @@
 """An early stop along ε: once F stays near F_exact, larger ε are not run."""
 
 from collections.abc import Callable, Collection, Mapping
+from math import inf
 
 from pipeline.plan.plan import Plan
 from pipeline.plan.steps import Solve
 from pipeline.quantities import write
 from pipeline.run.record import Record
+from pipeline.study.sweep import Case
 
 SKIPPED = "skipped"
 # F "stays" near F_exact if it is at this many values of ε in a row.
@@ -23,12 +25,22 @@ def waves(plan: Plan, todo: Collection[Solve]) -> list[tuple[Solve, ...]]:
 
 
 def reason_to_skip(plan: Plan, solve: Solve, find: Callable[[str], Record | None]) -> str:
-    """Return why a solve need not be run: what smaller ε of the same case, and F_exact, are found to give."""
-    limit, case = plan.study.planning.stop_when, solve.case
+    """Return why a solve need not be run: what smaller ε of all cases that it serves, and F_exact, are found to give.
+
+    One of full order serves every outside, and is run for the one that needs it.
+    """
+    limit = plan.study.planning.stop_when
     if limit is None or solve.is_reference or not plan.reference_keys:
         return ""
+    reasons = [_reason(plan, solve.case, row, limit, find) for row in _rows(plan, solve)]
+    return reasons[0] if reasons and all(reasons) else ""
+
+
+def _reason(
+    plan: Plan, case: Case, row: list[tuple[float, str, str]], limit: float, find: Callable[[str], Record | None]
+) -> str:
     near = []
-    for other, key, exact_key in _smaller(plan, solve):
+    for other, key, exact_key in row:
         record, exact = find(key), find(exact_key)
         if record is not None and record.status == SKIPPED:
             return record.message
@@ -53,18 +65,21 @@ def skipped(plan: Plan, records: Mapping[str, Record]) -> dict[str, Record]:
     return {key: record for key, record in known.items() if key not in records}
 
 
-def _smaller(plan: Plan, solve: Solve) -> list[tuple[float, str, str]]:
-    """Return ε and keys of the cases that differ from a solve's in a smaller ε only, skipped ones left out."""
+def _rows(plan: Plan, solve: Solve) -> list[list[tuple[float, str, str]]]:
+    """Return, for all that the cases of a solve have but ε, this and the keys of the cases of smaller ε."""
     axes = plan.study.axes
     position = next((i for i, axis in enumerate(axes) if axis.path == "mesh.epsilon"), None)
     if position is None:
         return []
+    labels = [float(label) for label in axes[position].labels]
+    least: dict[tuple[tuple[int, ...], tuple[int, ...]], float] = {}
+    for index in solve.serves or (solve.case.index,):
+        row = index[:position], index[position + 1 :]
+        least[row] = min(labels[index[position]], least.get(row, inf))
     found = []
-    for number, epsilon in enumerate(axes[position].labels):
-        if float(epsilon) < solve.case.mesh.epsilon:
-            index = (*solve.case.index[:position], number, *solve.case.index[position + 1 :])
-            flat = _flat(plan, index)
-            found.append((float(epsilon), plan.keys[flat], plan.reference_keys[flat]))
+    for (before, after), most in least.items():
+        flats = [(epsilon, _flat(plan, (*before, i, *after))) for i, epsilon in enumerate(labels) if epsilon < most]
+        found.append([(epsilon, plan.keys[flat], plan.reference_keys[flat]) for epsilon, flat in flats])
     return found
 
 

@@ -83,7 +83,7 @@ def test_more_shards_than_steps(whole, meshes, tmp_path):
 def test_early_stop_in_shards(whole, meshes, tmp_path):
     """Which cases are skipped is decided within a shard, and told in the merged dataset."""
     study = tmp_path / "small.toml"
-    study.write_text(SMALL.replace("exact = false", '[plan]\nstop_when = "8 %"'))
+    study.write_text(SMALL.replace("exact = false", '[plan]\nstop_when = "40 %"'))
     outputs = [run(study, tmp_path, meshes, "--shard", f"{number}/2") for number in (1, 2)]
     assert [output.exit_code for output in outputs] == [0, 0]
     assert epsmesh("merge", study, "--output", tmp_path).exit_code == 0
