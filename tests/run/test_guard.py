@@ -21,7 +21,8 @@ pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts processe
 
 # Cases a to e; what comes of each is told by what stands in `ENDS`.
 RUN = """
-import os, sys, time
+import os, signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # who starts the tests may have it ignored
 from pipeline.run.guard import guarded
 with guarded(print) as guard:
     for case in "abcde":
