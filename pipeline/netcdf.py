@@ -5,8 +5,9 @@ HDF5 survives neither a full disk nor, one time in ten, a damaged file: it frees
 
 from collections.abc import Mapping
 from hashlib import sha256
+from os import SEEK_END
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, BinaryIO, Literal
 
 import numpy as np
 
@@ -42,8 +43,8 @@ def write_netcdf(
         temporary.write_bytes(bytes(most_bytes(dataset)))
         dataset.to_netcdf(temporary, format=kind, engine="netcdf4", encoding=encoding)
         if kind == "NETCDF4":
-            with temporary.open("ab") as file:
-                file.write(_SEAL + _sum_of(temporary, temporary.stat().st_size))
+            with temporary.open("rb+") as file:
+                file.write(_seal(file, file.seek(0, SEEK_END)))
 
 
 def is_as_written(path: Path) -> bool | None:
@@ -52,22 +53,22 @@ def is_as_written(path: Path) -> bool | None:
     Raises:
         OSError: if it cannot be read.
     """
-    length = path.stat().st_size - len(_SEAL) - _SUM
-    if length < 0:
-        return None
-    with path.open("rb") as file:
+    with path.open("rb") as file:  # once: a run may put a new one in its place meanwhile
+        length = file.seek(0, SEEK_END) - len(_SEAL) - _SUM
+        if length < 0:
+            return None
         file.seek(length)
         found = file.read()
-    return found == _SEAL + _sum_of(path, length) if found.startswith(_SEAL) else None
+        return found == _seal(file, length) if found.startswith(_SEAL) else None
 
 
-def _sum_of(path: Path, length: int) -> bytes:
-    """Return the SHA-256 of the first ``length`` bytes of a file."""
+def _seal(file: BinaryIO, length: int) -> bytes:
+    """Return what belongs behind the first ``length`` bytes of a file, which is then read up to there."""
+    file.seek(0)
     found = sha256()
-    with path.open("rb") as file:
-        for start in range(0, length, _PIECE):
-            found.update(file.read(min(_PIECE, length - start)))
-    return found.digest()
+    for start in range(0, length, _PIECE):
+        found.update(file.read(min(_PIECE, length - start)))
+    return _SEAL + found.digest()
 
 
 def most_bytes(dataset: "xr.Dataset") -> int:

@@ -32,13 +32,11 @@ def reason_to_skip(plan: Plan, solve: Solve, find: Callable[[str], Record | None
     limit = plan.study.planning.stop_when
     if limit is None or solve.is_reference or not plan.reference_keys:
         return ""
-    reasons = [_reason(plan, solve.case, row, limit, find) for row in _rows(plan, solve)]
+    reasons = [_reason(solve.case, row, limit, find) for row in _rows(plan, solve)]
     return reasons[0] if reasons and all(reasons) else ""
 
 
-def _reason(
-    plan: Plan, case: Case, row: list[tuple[float, str, str]], limit: float, find: Callable[[str], Record | None]
-) -> str:
+def _reason(case: Case, row: list[tuple[float, str, str]], limit: float, find: Callable[[str], Record | None]) -> str:
     near = []
     for other, key, exact_key in row:
         record, exact = find(key), find(exact_key)

@@ -257,7 +257,7 @@ def damaged(path: Path, error: Exception) -> str:
 
 
 def reason(error: Exception) -> str:
-    """Return what SQLite says on one short line: it quotes all of a text that it cannot decode."""
+    """Return what is wrong with a store on one short line: names in a damaged file may be of any length."""
     return shorten(visible(str(error)), _LONGEST_REASON, placeholder=" …")
 
 

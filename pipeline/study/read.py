@@ -16,7 +16,7 @@ _DEEPEST = 12
 # Parts of a dotted key: the library's time grows with the square of their number.
 _LONG_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){20}""")
 # Integers of TOML, and of what is made of them.
-_LARGEST = 2**63
+LARGEST = 2**63
 # Control characters and what turns the direction of writing: on a terminal they make a line say something else.
 _CONTROLS = ("Cc", "Cs", "Zl", "Zp")
 _TURNS = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
@@ -59,7 +59,7 @@ def toml_of(text: str, file: str) -> dict[str, Any]:
         raise _refused(file, "TOML syntax", str(error)) from None
     layer: list[Any] = [raw]
     for _ in range(_DEEPEST):
-        if any(isinstance(value, int) and not -_LARGEST <= value < _LARGEST for value in layer):
+        if any(isinstance(value, int) and not -LARGEST <= value < LARGEST for value in layer):
             raise _refused(file, "TOML", "has an integer of more than 64 bits: write 1e30 for a large number")
         layer = list(_inside(layer))
     if layer:

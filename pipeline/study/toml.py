@@ -13,8 +13,8 @@ from os import PathLike, fspath
 from typing import Any
 
 from pipeline.study.problems import Problem, Problems, StudyError
+from pipeline.study.read import LARGEST
 
-_LARGEST = 2**63
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -73,7 +73,7 @@ def _value(value: Any, place: str, problems: Problems) -> str:
             return "true" if value else "false"
         case str():
             return _text(value)
-        case Integral() if -_LARGEST <= int(value) < _LARGEST:
+        case Integral() if -LARGEST <= int(value) < LARGEST:
             return str(int(value))
         case Integral():
             problems.errors.append(Problem(place, None, "has more than 64 bits: write 1e30 for a large number"))

@@ -1,12 +1,14 @@
 """A dataset is read whole, or said to be damaged: whatever byte of it has changed, whoever wrote it."""
 
 import subprocess
+from threading import Thread
 
 import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
 
+from pipeline.netcdf import is_as_written
 from pipeline.report import load as loading
 from pipeline.report.dataset import write
 from pipeline.report.load import load
@@ -59,6 +61,23 @@ def test_what_another_program_wrote_is_tried_in_a_process_of_its_own(file, monke
     with pytest.raises(DatasetError, match=r"known.nc: cannot be read as netCDF: it is damaged$"):
         load(file)
     assert tried == [("pipeline.report.load", str(file))]
+
+
+def test_a_file_that_a_run_replaces_meanwhile_is_never_taken_for_a_damaged_one(file, tmp_path):
+    write(dataset(), tmp_path / "other.nc")
+    contents, written = [file.read_bytes(), (tmp_path / "other.nc").read_bytes()], tmp_path / "written"
+
+    def replace():
+        for number in range(1000):
+            written.write_bytes(contents[number % 2])
+            written.replace(file)
+
+    writer, found = Thread(target=replace), set()
+    writer.start()
+    while writer.is_alive():
+        found.add(is_as_written(file))
+    writer.join()
+    assert found == {True}
 
 
 def test_what_is_wrong_is_said_as_it_was_found_there(file):
