@@ -1,16 +1,19 @@
 """What is not done: each reduction is a function from plan to plan whose docstring is the reason that users read."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
 from pipeline.plan import estimate
 from pipeline.plan.basis import use_reduced_basis
 from pipeline.plan.deeper import Deeper, deeper_than, depth_key
-from pipeline.plan.images import NOWHERE, Image, Matrix, from_place, image_key, moved_key
-from pipeline.plan.key import case_key, digest, mesh_key
+from pipeline.plan.far_fields import far_regions
+from pipeline.plan.images import Image, Matrix, from_place, image_key, moved_key
+from pipeline.plan.key import case_key, digest
 from pipeline.plan.steps import MOST_DOFS, MeshStep, OperatorStep, Solve, mesh_steps
 from pipeline.plan.symmetry import is_round, model_planes
 from pipeline.plan.work import Plan, Struck, reason_of
+from pipeline.shapes.body import Body
+from pipeline.study.closure import FarRegion
 from pipeline.study.sweep import Case
 
 _OF_STRESS_ALONE = (
@@ -118,21 +121,22 @@ def use_symmetry(plan: Plan) -> Plan:
 
 def share_meshes(plan: Plan) -> Plan:
     """Cases on the same geometry and sizes share one mesh, and its set-up if they differ in the material only; half
-    balls that the body's own far field closes, in the place, too.
+    balls that the body's own far field closes, in the place, too. The far fields of many places share a mesh as well.
     """
-    first: dict[str, tuple[float, ...]] = {}
-    solves = tuple(_standing(solve, first) for solve in plan.solves)
-    plan = replace(plan, solves=solves, shared=True)
+    regions = far_regions([solve.case for solve in plan.solves])
+    solves = tuple(_with_far_region(solve, regions) for solve in plan.solves)
+    new = {old.key: solve.key for old, solve in zip(plan.solves, solves, strict=True)}
+    plan = replace(plan, solves=solves, keys=tuple(new.get(k, k) for k in plan.keys), shared=True)
     return plan.struck_by("sharing", len(plan.solves) - len(mesh_steps(plan.solves)), reason_of(share_meshes))
 
 
-def _standing(solve: Solve, first: dict[str, tuple[float, ...]]) -> Solve:
-    """Return a solve of a half ball with the place of the ``first`` one that is the same but for its place."""
-    if not solve.case.is_closed:
+def _with_far_region(solve: Solve, regions: Mapping[Body, FarRegion]) -> Solve:
+    """Return ``solve`` with the far field of a mesh that many places share: another force, hence another key."""
+    region = regions.get(solve.case.body) if solve.case.has_own_far_field else None
+    if region is None:
         return solve
-    at = tuple(solve.case.probe.at)
-    nowhere = replace(solve, stands=NOWHERE).ground
-    return replace(solve, stands=first.setdefault(f"{mesh_key(nowhere)} {solve.mirrors}", at))
+    key = digest(f"{solve.key} far field {region}")
+    return replace(solve, key=key, case=replace(solve.case, far_region=region))
 
 
 def reuse_solutions(plan: Plan) -> Plan:

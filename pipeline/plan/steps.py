@@ -8,6 +8,8 @@ from pipeline.plan.key import mesh_key, operator_key
 from pipeline.plan.recipe import MARGIN, Rung
 from pipeline.study.sweep import Case
 
+# Coordinates on the top of the place in its middle.
+CENTRE = (0.0, 0.0)
 # From so many depths of found contact on a small body on, the body is condensed to the surface that may touch.
 FEWEST_DEPTHS = 10
 # Unknowns up to which a body counts as small there, measured: docs/solvers.md.
@@ -21,8 +23,7 @@ class Solve:
     ``mirrors`` are the planes of symmetry ("x": x = 0) that leave half or a quarter of the body to be solved;
     ``axisymmetric`` leaves the meridian; ``reduced`` may be answered from a reduced basis. A case with a ``goal``, the
     relative error asked for, is tried again with the meshes of ``later`` until its error bar is below it; ``expected``
-    is the bar to expect of its present mesh. ``stands`` is where the probe of the case stands whose mesh it shares, if
-    that is elsewhere on the body.
+    is the bar to expect of its present mesh.
     """
 
     key: str
@@ -35,14 +36,13 @@ class Solve:
     expected: float = nan
     is_reference: bool = False
     reduced: bool = False
-    stands: tuple[float, ...] | None = None
 
     @property
     def ground(self) -> Case:
-        """The case on whose mesh it is solved: but for its place, itself."""
-        if self.stands is None:
+        """The case on whose mesh it is solved: itself, but half balls of all places share the one at the centre."""
+        if not self.case.is_closed:
             return self.case
-        return replace(self.case, probe=self.case.probe.model_copy(update={"at": self.stands}))
+        return replace(self.case, probe=self.case.probe.model_copy(update={"at": CENTRE}))
 
     @property
     def label(self) -> str:

@@ -149,9 +149,7 @@ class StepRunner:
         plan = self._plan
         if plan.shared and not self._has_far_fields:
             self._has_far_fields = True
-            # Images are not solved; which places are on record makes no difference.
-            places = [case for case in plan.study.cases() if not case.absence and case.index not in plan.images]
-            self._caught(lambda: share_far_fields(places, [solve.case for solve in plan.solves]))
+            self._caught(lambda: share_far_fields(solve.case for solve in plan.solves))
 
     def _reduce(self, step: OperatorStep, problem: DisplacementProblem, ground: Ground) -> None:
         """Solve a few and finish the rest from their basis; without a basis those are left to be solved, too."""

@@ -22,6 +22,8 @@ from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
 # on three scenes displacement elements differ from mixed ones by 5e-9 to 1e-8 at ν = 0.45 and by 2e-8 at 0.49, take
 # half the time (0.3 s, not 0.65), and have bars of 3e-6 at most, where 1e-5 is asked for.
 MIXED_FROM = 0.49
+# The ratio comes from Lamé's constants: rounding must not decide which element a Poisson's ratio of 0.49 has.
+_ROUNDING = 1e-9
 # Per cent of memory beyond MUMPS's estimate, which pivoting exceeds.
 _SPARE_MEMORY = 100
 
@@ -56,7 +58,7 @@ def forms_of(meshes: Meshes, degree: int, law: MaterialLaw) -> tuple[MeridianFor
     parts, weights, definite = [], [], True
     for region, (mesh, facets) in meshes.items():
         lame_lambda, lame_mu = law.lame_lambda[region], law.lame_mu[region]
-        mixed = poisson_of(lame_lambda, lame_mu) >= MIXED_FROM
+        mixed = poisson_of(lame_lambda, lame_mu) >= MIXED_FROM - _ROUNDING
         part = MeridianForms(mesh, facets, degree, mixed)
         part.set_ratio(lame_lambda / lame_mu)
         parts.append(part)

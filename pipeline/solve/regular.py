@@ -128,20 +128,11 @@ class BodyField:
         return float(near.force(1.0) * up - 2 * mixed - weights @ (inside * pulled).sum(axis=1))
 
 
-def regular_part(body: BodyMesh, force: PointForce) -> Smooth:
-    """Return R for a unit of the field of ``force``, on a mesh of this process alone, as it is within its radius.
-
-    ``body`` may be the half or the quarter of which planes through the centre make the whole.
-
-    Raises:
-        SolveError: if that cannot be solved.
-    """
-    return next(regular_parts(body, [force]))
-
-
 def regular_parts(body: BodyMesh, forces: Sequence[PointForce], law: MaterialLaw | None = None) -> Iterator[Smooth]:
-    """Yield R for each of ``forces``, of one Poisson's ratio, as ``regular_part`` does: one factorisation for all.
+    """Yield R for a unit of the field of each of ``forces``, as it is within its radius: one factorisation for all.
 
+    The mesh is of this process alone; it may be the half or the quarter of which planes through the centre of one force
+    make the whole. All forces have one Poisson's ratio.
     A ``law`` of several regions is in units of μ where the forces act: the half-space is of that material, and R has
     what other regions make of its field as loads.
 

@@ -1,6 +1,7 @@
 """What a half ball, closed by the far field of a point force, can be cut out of, and for which tools."""
 
 from math import inf
+from typing import NamedTuple
 
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.contact import is_level
@@ -11,6 +12,16 @@ from pipeline.study.schema import Material, Mesh
 
 # The regular part of a body's far field is found by displacement elements of degree 2; beyond this they lock.
 _MOST = 0.49
+
+
+class FarRegion(NamedTuple):
+    """The part of a body's top on which one mesh gives the far fields of many places: a rectangle (m), and the radius
+    (m) of the smallest half ball there.
+    """
+
+    low: tuple[float, float]
+    high: tuple[float, float]
+    radius: float
 
 
 def check_closure(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:

@@ -14,6 +14,7 @@ from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.shapes.tissue import Tissue
+from pipeline.study.closure import FarRegion
 from pipeline.study.loads import Load
 from pipeline.study.place import CLEAR, is_clear, place_error
 from pipeline.study.schema import Drawing, Material, Mesh, Planning, Solving, material_of
@@ -73,7 +74,10 @@ class Scale:
 
 @dataclass(frozen=True)
 class Case:
-    """One scene with one mesh setting: yields one force."""
+    """One scene with one mesh setting: yields one force.
+
+    ``far_region`` is set where the body's far field is found on a mesh that many places share; None if on its own.
+    """
 
     index: tuple[int, ...]
     axes: tuple[Axis, ...]
@@ -83,6 +87,7 @@ class Case:
     mesh: Mesh
     solve: Solving
     load: Load = field(default_factory=Load)
+    far_region: FarRegion | None = None
 
     @property
     def labels(self) -> tuple[tuple[str, float | int | str], ...]:

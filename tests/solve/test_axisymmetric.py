@@ -51,6 +51,16 @@ def test_half_space(bonded, poisson):
     assert solve_axisymmetric(Meridian(1e6, 1e6, 1), poisson, bonded).reaction[2] == pytest.approx(exact, rel=3e-6)
 
 
+def test_element_does_not_depend_on_youngs_modulus():
+    """F/E is one number whatever the unit of E, at the Poisson's ratio where mixed elements begin, too."""
+    meridian = Meridian(20.0, 10.0, 1.0)
+    moduli = (1.0, 23.0, 820000.0)  # the last two give λ and μ of a ratio below 0.49 by rounding
+    found = [solve_axisymmetric(meridian, 0.49, True, young=young) for young in moduli]
+    assert len({solution.dofs for solution in found}) == 1
+    ratios = [solution.reaction[2] / young for solution, young in zip(found, moduli, strict=True)]
+    assert ratios == pytest.approx([ratios[0]] * len(ratios), rel=1e-10)
+
+
 @pytest.mark.parametrize("ratio", known.LAYER)
 def test_layer_on_rigid_base(ratio):
     force = solve_axisymmetric(Meridian(100, 1 / ratio, 1), 0.3, False).reaction[2]
