@@ -18,7 +18,7 @@ from pipeline.stages import stage
 class BodyMesh:
     """A distributed mesh and the facets, local to this rank, of each boundary group.
 
-    ``regions`` numbers the material of each local cell, ghosts too; None where there is one only.
+    ``regions`` numbers the region of each local cell, ghosts too; None for a body of one material.
     """
 
     mesh: Any

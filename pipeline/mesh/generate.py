@@ -48,7 +48,8 @@ class MeshArrays:
 
     ``points`` (n, 3) in metres; ``cells`` (m, 4), or (m, 10) once curved; ``facets`` maps the name of a group
     to its boundary triangles (k, 3); ``rim`` holds the points on the probe's edge; ``seconds`` is what it took.
-    ``regions`` (m) numbers the material of each cell, None where there is one only. ``bent``, until cells are curved,
+    ``regions`` (m) numbers the region of each cell, among those of the body; None for a body of one material. A region
+    that the mesh does not reach has no cell. ``bent``, until cells are curved,
     holds edges (k, 2) on faces that only the geometry kernel knows, and the mid nodes (k, 3) that it gave them, in m.
     """
 
@@ -157,7 +158,7 @@ def _collect(scene: Scene, rim_curves: list[int], start: float) -> MeshArrays:
     cells = _elements(3, [tag for _, tag in gmsh.model.getEntities(3)], 4, position)
     if not len(cells):
         raise MeshError("gmsh made no tetrahedra")
-    regions = _regions()
+    regions = _regions() if scene.body.regions else None
     facets = {}
     for dim, group in gmsh.model.getPhysicalGroups(2):
         name = gmsh.model.getPhysicalName(dim, group)
@@ -171,13 +172,10 @@ def _collect(scene: Scene, rim_curves: list[int], start: float) -> MeshArrays:
     return MeshArrays(points, orient(points, cells), facets, rim_points, time.perf_counter() - start, regions, bent)
 
 
-def _regions() -> IntArray | None:
-    """Return the region of each tetrahedron, in the order of the entities, None if there is one only."""
-    groups = gmsh.model.getPhysicalGroups(3)
-    if len(groups) == 1 and gmsh.model.getPhysicalName(*groups[0]) == TISSUE:
-        return None
+def _regions() -> IntArray:
+    """Return the region of each tetrahedron, in the order of the entities."""
     number: dict[int, int] = {}
-    for dim, group in groups:
+    for dim, group in gmsh.model.getPhysicalGroups(3):
         region = int(gmsh.model.getPhysicalName(dim, group).removeprefix(TISSUE) or 0)
         number |= dict.fromkeys(gmsh.model.getEntitiesForPhysicalGroup(dim, group), region)
     tags = [tag for _, tag in gmsh.model.getEntities(3)]

@@ -21,6 +21,10 @@ from pipeline.study.sweep import Case
 if TYPE_CHECKING:
     from pipeline.mesh.organ.base import Kept
 
+# A free column wider than a round footprint by this share of its radius, or less, ends at the footprint's edge: gmsh
+# leaves flat tetrahedra in so thin a ring. F is then too small by twice this share.
+_THINNEST_RING = 1e-5
+
 
 def mesh_arrays(case: Case, mirrors: tuple[str, ...], kept: "Kept | None" = None) -> MeshArrays:
     """Return the mesh of a case as arrays, of the part that ``mirrors`` leave of it.
@@ -31,12 +35,19 @@ def mesh_arrays(case: Case, mirrors: tuple[str, ...], kept: "Kept | None" = None
     straight, planes, sizes = case.mesh.degree == 1, mirror_planes(case), sizes_of(case)
     segments = sizes.rim_segments(case.probe)
     held, ball = case.mesh.outside not in ("coarse", "free"), case.is_closed
-    scene = Scene(case.body, case.probe, case.column, held, segments, straight, planes, ball)
+    scene = Scene(case.body, case.probe, _column(case), held, segments, straight, planes, ball)
     arrays = _of_triangles(scene, case.body, sizes, kept) if isinstance(case.body, Scanned) else generate(scene, sizes)
     arrays = open_slit(arrays, scene) if scene.has_inner_slit else arrays
     arrays = arrays if straight else curve(arrays, scene)
     whole = reflect(arrays, tuple(plane for plane in planes if plane not in mirrors))
     return replace(whole, seconds=perf_counter() - start)
+
+
+def _column(case: Case) -> float:
+    """Return the radius (m) of the kept column as it is meshed, infinite if the whole body is kept."""
+    column, footprint = case.column, case.probe.circumradius
+    is_thin = 0 < column - footprint <= _THINNEST_RING * footprint
+    return footprint if is_thin and case.mesh.outside == "free" and case.probe.is_round else column
 
 
 def _of_triangles(scene: Scene, body: Scanned, sizes: Sizes, kept: "Kept | None") -> MeshArrays:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from math import inf
 
 import numpy as np
@@ -38,8 +39,10 @@ def region_sizes(scene: Scene, growth: float) -> Iterator[str]:
     They grow by ``growth`` for each unit of distance.
     """
     body, unit = scene.body, 1 / scene.scale
-    tops = (body.heights[1], *body.interfaces)
-    for top, bottom in zip(tops, body.interfaces, strict=False):
+    low, high = body.heights
+    # What lies below the last interface, a layer or the rest of the body, is a layer like the others.
+    heights = (high, *body.interfaces, low) if body.interfaces else ()
+    for top, bottom in pairwise(heights):
         yield _in_layer(scene, (unit * bottom, unit * top), growth)
     for inclusion in inclusion_sizes(body, growth):
         yield from inclusion.terms(unit)

@@ -12,6 +12,7 @@ import pytest
 from pipeline.compat import gmsh_session
 from pipeline.mesh.curve import curve
 from pipeline.mesh.generate import MeshArrays, MeshError, generate
+from pipeline.mesh.of_case import mesh_arrays
 from pipeline.mesh.reflect import reflect
 from pipeline.mesh.size import Sizes
 from pipeline.scene.model import Scene
@@ -101,6 +102,15 @@ def test_column(column, held):
     mesh = generate(scene(column, held), replace(SIZES, column=column))
     assert ("cut" in mesh.facets) is not held
     assert volume(mesh) == pytest.approx({25e-3: 31.14e-6}.get(column, pi * column**2 * 20e-3), rel=0.06)
+
+
+@pytest.mark.parametrize("gap", [1e-9, 1e-7, 1e-6, 1e-5, 1e-4])
+@pytest.mark.parametrize("rim", ["0.4 mm", "0.1 mm"])
+def test_a_free_column_a_hair_wider_than_the_disc_is_meshed(gap, rim):
+    body = {"shape": "cylinder", "radius": "20 mm", "height": "20 mm"}
+    sizes = {"epsilon": f"{2 * (1 + gap):.12g} mm", "fine": "4 mm", "rim": rim, "growth": 0.5, "outside": "free"}
+    mesh = mesh_arrays(study(body=body, probe={"radius": "2 mm"}, mesh=sizes).case(()), ("x", "y"))
+    assert area(mesh, "probe") == pytest.approx(pi * 1e-6, rel=0.01)  # a polygon's
 
 
 def test_curved_rim_and_sides_are_round():

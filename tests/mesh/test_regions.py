@@ -14,7 +14,7 @@ from pipeline.mesh.of_case import mesh_arrays
 from pipeline.mesh.reflect import reflect
 from pipeline.plan.symmetry import mirror_planes
 from pipeline.run.mesh_cache import MeshCache
-from tests.cases import study
+from tests.cases import solve, study
 
 SKIN = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.3}
 BALL = {"name": "tumour", "at": ["0 mm", "0 mm", "-12 mm"], "radius": "4 mm", "young": "50 kPa", "poisson": 0.3}
@@ -87,6 +87,47 @@ def test_a_column_cuts_an_inclusion_or_passes_it(epsilon):
     radius, whole = float(epsilon.split()[0]), 4 / 3 * pi * 4**3
     cut = whole - 4 / 3 * pi * (16 - radius**2) ** 1.5 if radius < 4 else whole
     assert found[1] == pytest.approx(cut, rel=2e-3)
+
+
+def test_the_lowest_layer_has_elements_as_small_as_its_thickness_asks_for():
+    """Whether it is the last of the layers, or what remains below them."""
+    body = {"shape": "box", "size": ["40 mm", "40 mm", "5 mm"]}
+    thick, rest = SKIN | {"thickness": "4 mm"}, {"name": "fascia", "young": "900 kPa", "poisson": 0.3}
+    for layers in ([thick], [thick, rest]):
+        mesh = mesh_arrays(case_of(body | {"layers": layers}), ())
+        low = mesh.points[mesh.cells[mesh.regions != 1][:, :4]]
+        near = np.linalg.norm(low.mean(axis=1)[:, :2], axis=1) < 5e-3
+        longest = np.linalg.norm(low[near][:, :, None] - low[near][:, None], axis=-1).max(axis=(1, 2))
+        assert np.median(longest) < 0.9e-3
+
+
+@pytest.mark.parametrize("contact", ["frictionless", "bonded"])
+def test_a_column_without_the_inclusion_is_one_of_the_other_tissue(contact):
+    """From the study to the force, by displacements and by displacements and pressures."""
+    for poisson in (0.3, 0.49):
+        changes = {
+            "mesh": {"epsilon": ["6 mm", "full"], "outside": "free"},
+            "material": {"poisson": poisson},
+            "probe": {"contact": contact},
+        }
+        aside = BALL | {"at": ["15 mm", "0 mm", "-10 mm"], "poisson": poisson}
+        stiff, same = (
+            solve(body={"inclusion": [aside | {"young": young}]}, **changes) for young in ("50 kPa", "10 kPa")
+        )
+        column, whole = ((0,), (1,))
+        assert {record.status for record in (*stiff.values(), *same.values())} == {"ok"}
+        assert stiff[column].force == pytest.approx(same[column].force, rel=1e-8)
+        assert stiff[whole].force > (1 + 1e-5) * same[whole].force
+
+
+def test_cells_of_a_kept_column_have_their_regions_whichever_it_reaches(tmp_path):
+    aside = BALL | {"at": ["15 mm", "0 mm", "-10 mm"]}
+    case = case_of({"inclusion": [aside]}, epsilon="6 mm", outside="free")
+    cache, made = MeshCache(tmp_path), mesh_arrays(case, ())
+    cache.put(path := cache.path(case, ()), made)
+    for mesh in (made, cache.get(path)):
+        assert mesh.regions.shape == (len(mesh.cells),)
+        assert not mesh.regions.any()
 
 
 def test_an_inclusion_near_the_surface_is_resolved():
