@@ -52,14 +52,12 @@ def view(
     from pipeline.workflow import abort_on_exception, ended_soon, world
 
     comm = world()
-    if missing:
-        (error if comm.rank == 0 else _say_nothing)(f"a page instead of pictures: these need {missing}")
-        export = "html"
+    export = "html" if missing else export
     load_solvers()
     with abort_on_exception(comm), ended_soon():
         fields = fields_of(study, chosen, comm, mesh_only, export == "html", meshes)
         if fields is not None:
-            _write(study, fields, stem, export, as_json=as_json)
+            _write(study, fields, stem, export, missing, as_json=as_json)
 
 
 def fields_of(
@@ -94,8 +92,8 @@ def fields_of(
     fail(Fault(why, file=study.file, key="CASE", value=str(case)), status=SOME_FAILED)
 
 
-def _write(study: "Study", fields: "Fields", stem: Path, export: str | None, *, as_json: bool) -> None:
-    """Write what was asked for, and say what is in it."""
+def _write(study: "Study", fields: "Fields", stem: Path, export: str | None, missing: str, *, as_json: bool) -> None:
+    """Write what was asked for, and say what is in it, and what pictures would need."""
     written = _written(study, fields, stem, export)
     if as_json:
         print_json({"cells": len(fields.cells), "dofs": fields.dofs, "files": [str(path) for path in written]})
@@ -104,6 +102,8 @@ def _write(study: "Study", fields: "Fields", stem: Path, export: str | None, *, 
     print(f"{len(fields.cells):,} elements{unknowns}")
     for path, remark in written.items():
         print(f"wrote {path}{remark}")
+    if missing:
+        print(f"Optional: with {missing}, this command draws PNG pictures.")
 
 
 def _written(study: "Study", fields: "Fields", stem: Path, export: str | None) -> dict[Path, str]:
@@ -142,13 +142,13 @@ def _missing() -> str:
     from importlib.util import find_spec
 
     if find_spec("pyvista") is None:
-        return "PyVista (`make setup EXTRAS=view`, or `pip install '.[view]'` in the project's folder)"
+        return "PyVista installed (`make setup EXTRAS=view`, or `pip install '.[view]'` in the project's folder)"
     if not os.environ.get("DISPLAY"):
         # VTK ends the process, without a word, where it finds nothing to draw with.
         try:
             ctypes.CDLL("libEGL.so.1")
         except OSError:
-            return "libEGL to draw without a display (`make setup EXTRAS=view`, or `apt-get install libegl1`)"
+            return "libEGL installed (`make setup EXTRAS=view`, or `apt-get install libegl1`)"
     return ""
 
 

@@ -12,20 +12,23 @@ from threadpoolctl import threadpool_limits
 from pipeline import compat
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.distribute import BodyMesh, distribute
-from pipeline.mesh.generate import MeshArrays
+from pipeline.mesh.generate import MeshArrays, MeshError
 from pipeline.mesh.of_case import upright
 from pipeline.mesh.reflect import reflect, reflect_vectors
 from pipeline.plan import estimate
 from pipeline.plan.plan import declare, first_attempts
 from pipeline.plan.steps import Solve
 from pipeline.plan.symmetry import mirror_planes, model_planes
+from pipeline.run.attempts import Attempts
 from pipeline.run.compile import prepare
 from pipeline.run.measure import record_of
 from pipeline.run.memory import FreeMemory
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import cached_arrays, on_first_rank
-from pipeline.run.problem import check_memory, lacks_memory, memory_of, problem_of, solve_problem
+from pipeline.run.problem import CaseFailure, check_memory, lacks_memory, memory_of, problem_of, solve_problem
+from pipeline.run.record import Record
 from pipeline.solve.compiled import vector_space
+from pipeline.solve.linear import SolveError
 from pipeline.solve.solution import FieldProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.study.sweep import Case, Study
@@ -42,14 +45,19 @@ def solve_to_view(study: Study, case: Case) -> Solve:
 
 
 def compute_fields(
-    solve: Solve, comm: MPI.Comm, *, mesh_only: bool = False, bar: bool = False, cache: MeshCache | None = None,
+    solve: Solve,
+    comm: MPI.Comm,
+    *,
+    mesh_only: bool = False,
+    bar: bool = False,
+    cache: MeshCache | None = None,
     note: Note = lambda text: None,
-) -> Fields | None:  # fmt: skip
+) -> Fields | None:
     """Return the fields of a case, on rank 0 (None elsewhere); collective.
 
-    Where an accuracy is asked for, they are those of the first mesh that proves it, or of the finest that is tried;
-    of the first mesh if ``mesh_only``. With ``bar`` the force has its error bar, if there is the memory for it.
-    ``note`` is told, on every rank, what is being worked on.
+    Where an accuracy is asked for, meshes are tried and judged as in a run: the fields are those of its mesh, with its
+    force; with ``mesh_only``, those of the first mesh. With ``bar`` the force has its error bar, if there is the memory
+    for it. ``note`` receives, on every rank, what is being worked on.
 
     Raises:
         CaseFailure, MeshError, SolveError: on every rank, with what to tell the user.
@@ -59,17 +67,24 @@ def compute_fields(
         if mesh_only:
             arrays = _arrays(solve, comm, cache, note)
             return _whole(solve, arrays) if arrays is not None else None
-        while True:
-            fields, proved = _attempt(solve, comm, bar, cache, note)
-            if solve.goal is None or 0 <= proved <= solve.goal or not solve.later:
-                return fields
-            solve = solve.again(proved)
+        attempts = Attempts()
+        best, fields = _attempt(solve, comm, bar, cache, note)
+        record = best
+        while attempts.judge(solve, record) is None:
+            (solve,) = attempts.take_again()
+            try:
+                record, found = _attempt(solve, comm, bar, cache, note)
+            except (CaseFailure, MeshError, SolveError):
+                break  # no finer mesh: a run concludes with the best force so far, too
+            if record.force_error < best.force_error:
+                best, fields = record, found
+        return fields
 
 
 def _attempt(
     solve: Solve, comm: MPI.Comm, bar: bool, cache: MeshCache | None, note: Note
-) -> tuple[Fields | None, float]:
-    """Solve on one mesh; return the fields on rank 0, and the error bar of F."""
+) -> tuple[Record, Fields | None]:
+    """Solve on one mesh; return the record that a run would have of it and, on rank 0, the fields."""
     case = solve.case
     arrays = _arrays(solve, comm, cache, note)
     prepare(comm, [solve])
@@ -84,11 +99,11 @@ def _attempt(
         displacement, strain = _gathered(mesh, problem, points)
         if case.frame.turn is not None:
             displacement = displacement @ case.frame.turn  # back to the body's coordinates
-    if arrays is None:
-        return None, solution.bar
     record = record_of(solve, solution)
+    if arrays is None:
+        return record, None
     fields = _whole(solve, arrays, displacement, strain)
-    return replace(fields, dofs=solution.dofs, force=record.force, force_error=record.force_error), solution.bar
+    return record, replace(fields, dofs=solution.dofs, force=record.force, force_error=record.force_error)
 
 
 def _arrays(solve: Solve, comm: MPI.Comm, cache: MeshCache | None, note: Note) -> MeshArrays | None:

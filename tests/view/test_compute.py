@@ -108,7 +108,7 @@ def test_nothing_is_solved_where_the_mesh_alone_is_asked_for(monkeypatch):
 
 def test_accuracy_is_shown_on_the_mesh_that_proves_it():
     none = dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))
-    changes = {"mesh": none | {"accuracy": "3 %"}}
+    changes = {"mesh": none | {"accuracy": "1 %"}}
     made = study(**changes)
     (case,) = made.cases()
     # A first mesh that cannot do it is passed over.
@@ -119,6 +119,16 @@ def test_accuracy_is_shown_on_the_mesh_that_proves_it():
     found = compute_fields(start, MPI.COMM_SELF)
     assert found.case.mesh != poor
     assert found.dofs == compute_fields(first, MPI.COMM_SELF).dofs
+
+
+@pytest.mark.parametrize("accuracy", ["5 %", "1 %"])
+def test_mesh_and_force_of_an_accuracy_are_the_run_s(accuracy):
+    none = dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))
+    changes = {"mesh": none | {"accuracy": accuracy}}
+    (record,) = solve(**changes).values()
+    found = fields(**changes)
+    assert (found.dofs, len(found.cells)) == (record.dofs, record.cells)
+    assert (found.force, found.force_error) == pytest.approx((record.force, record.force_error), rel=1e-9)
 
 
 @pytest.mark.mpi
