@@ -84,10 +84,14 @@ _RESULTS = (
     Quantity("force_vector", "N", "force of the tissue on the probe"),
     Quantity("force_vector_error", "N",
              "error bar (95 %) on force_vector; not a number across the movements that were solved for"),
-    Quantity("stiffness", "1",
-             "force (x, y, z: N) and torque about the point of contact (rx, ry, rz: N m) on the tissue for a unit of "
-             "each rigid motion of the probe (m, rad): N/m, N/rad = N m/m, N m/rad"),
-    Quantity("stiffness_error", "1", "error bar (95 %) on stiffness, in its units"),
+    Quantity("stiffness", "",
+             "force (x, y, z) and torque about the point of contact (rx, ry, rz) on the tissue for a unit of each "
+             "rigid motion of the probe; the unit of each entry is in stiffness_unit"),
+    Quantity("stiffness_error", "", "error bar (95 %) on stiffness, in the units of stiffness_unit"),
+    Quantity("stiffness_unit", "", "unit of each entry of stiffness"),
+    Quantity("movement", "", "rigid motion of the probe: translation (m) or rotation (rad) about the point of contact"),
+    Quantity("conjugate", "", "component of what the tissue bears: force (N) or torque (N m)"),
+    Quantity("component", "", "component of a vector"),
     Quantity("at_x", "m", "x of the point where the probe's axis meets the body"),
     Quantity("at_y", "m", "y of the point where the probe's axis meets the body"),
     Quantity("at_z", "m", "z of the point where the probe's axis meets the body"),
@@ -141,8 +145,8 @@ _RESULTS = (
     Quantity("time_total", "s", "time that this case costs alone", "time", "run time of the case"),
     Quantity("time_spread", "1", "largest less smallest time_total of the repeats of a timed case, over their median",
              "spread of the repeats", in_per_cent=True),
-    Quantity("load", "1", "processes that ran or wanted to, a core, when the record was made (mean of a minute, the "
-             "program's own included): above 1 times are too long", "load of the machine"),
+    Quantity("machine_load", "1", "processes that ran or wanted to, a core, when the record was made (mean of a "
+             "minute, the program's own included): above 1 times are too long", "load of the machine"),
     Quantity("memory", "bytes", "peak memory of all ranks", "memory"),
     Quantity("dofs", "1", "unknowns of the whole body", "unknowns"),
     Quantity("cells", "1", "elements of the whole body", "cells"),
@@ -168,7 +172,21 @@ _OF_PIECES = (
     Quantity("at", "", "centre", "centre", "centre"),
     Quantity("axes", "", "semi-axes"),
 )
-QUANTITIES = {quantity.name: quantity for quantity in (*_MESH, *_SCENE, *_RESULTS)}
+
+
+def _table(*quantities: Quantity) -> dict[str, Quantity]:
+    """Return quantities by name: a dataset has one namespace, so that no two may share a name."""
+    table: dict[str, Quantity] = {}
+    for quantity in quantities:
+        if quantity.name in table:
+            raise ValueError(f"two quantities of a dataset are called {quantity.name}")
+        table[quantity.name] = quantity
+    return table
+
+
+QUANTITIES = _table(*_MESH, *_SCENE, *_RESULTS)
+# Names of the dataset's own variables and coordinates: no swept input may have them as its dimension.
+RESERVED = frozenset(quantity.name for quantity in _RESULTS)
 MESH_DIMENSIONS = tuple(quantity.name for quantity in _MESH)
 
 # Factor and unit of what people do not read in SI.
@@ -218,6 +236,11 @@ def write(name: str, value: Value, unit: str | None = None) -> str:
         return "full"
     factor, word = readable(name, unit)
     return "" if isnan(value) else f"{value * factor:.6g} {word}".rstrip()
+
+
+def counted(number: int, noun: str) -> str:
+    """Write a number with its noun: ``1 case``, ``2 cases``."""
+    return f"{number} {noun}{'s' * (number != 1)}"
 
 
 def symbol(name: str) -> str:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from pipeline.cli.console import print_json
+from pipeline.cli.console import print_json, warning
 from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail
 from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output
 
@@ -36,7 +36,7 @@ def compare(a: Dataset, b: Dataset, output: Output = DEFAULT_OUTPUT, as_json: Js
     paths, datasets, faults = [], [], []
     for file in (a, b):
         try:
-            datasets.append(read(file, output))
+            datasets.append(read(file, output, warning))
             paths.append(str(dataset_path(file, output)))
         except DatasetError as wrong:
             faults.append(Fault(str(wrong), file=str(file)))

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from pipeline.cli.console import print_json
+from pipeline.cli.console import print_json, warning
 from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail
 from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output
 
@@ -42,7 +42,7 @@ def guide(
         except ValueError as wrong:
             fail(Fault(str(wrong), key=name, value=value, allowed=str(wrong).rpartition(": ")[2], howto=_HOWTO))
     try:
-        found = make_guide(read(file, output), accuracy, budget)
+        found = make_guide(read(file, output, warning), accuracy, budget)
     except DatasetError as wrong:
         fail(
             Fault(str(wrong) if str(wrong).startswith(str(file)) else f"{file}: {wrong}", file=str(file), howto=_HOWTO)

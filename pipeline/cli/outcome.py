@@ -9,6 +9,7 @@ from pipeline.cli.console import error
 from pipeline.cli.words import axes_of, warn
 from pipeline.plan.plan import Plan
 from pipeline.plan.shard import Shard
+from pipeline.quantities import counted
 from pipeline.run.remaining import format_seconds
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def announce(plan: Plan, opened: "Opened", *, quiet: bool, verbose: bool) -> Non
         return
     study = plan.study
     warn(study)
-    print(f"{study.title}: {len(plan.keys)} cases{axes_of(study)}")
+    print(f"{study.title}: {counted(len(plan.keys), 'case')}{axes_of(study)}")
     for struck in plan.struck:
         print(f"  {struck.name:13} {struck.count:6}  {struck.reason}")
     if study.solve.timing:

@@ -26,6 +26,7 @@ from pipeline.cli.words import (
     warn,
 )
 from pipeline.files import STORE_NAME
+from pipeline.quantities import counted
 from pipeline.run.remaining import format_seconds
 
 if TYPE_CHECKING:
@@ -91,16 +92,16 @@ def _show(study: "Study", found: dict[str, Any], *, quiet: bool, verbose: bool, 
     on = f"on {found['ranks']} {'rank' if found['ranks'] == 1 else 'ranks'}"
     cost = f"{format_seconds(found['seconds'])} {on}, {found['memory'] / 1e9:,.1f} GB for the largest step"
     if quiet:
-        print(f"{study.file}: {found['cases']} cases; to do: {to_do}{f'; {cost}' if found['steps'] else ''}")
+        print(f"{study.file}: {counted(found['cases'], 'case')}; to do: {to_do}{f'; {cost}' if found['steps'] else ''}")
         return
     warn(study)
-    print(f"{study.title}: {found['cases']} cases{axes_of(study)}")
+    print(f"{study.title}: {counted(found['cases'], 'case')}{axes_of(study)}")
     for struck in found["struck"]:
         print(f"  {struck['name']:13} {struck['count']:6}  {struck['reason']}")
     print(f"  to do: {to_do}")
     if found["steps"]:
         print(f"  estimate: {cost}")
-        ground = f"{found['fitted_to']} cases on record" if found["fitted_to"] else "no case on record yet"
+        ground = f"{counted(found['fitted_to'], 'case')} on record" if found["fitted_to"] else "no case on record yet"
         print(f"    ({ground}; a step's time is typically right within a factor of {found['factor']:.1f})")
         _list_steps(found["steps"], None if verbose else _MOST_STEPS)
 

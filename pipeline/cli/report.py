@@ -93,8 +93,6 @@ def report(
     check_output(path.with_suffix(".html"), room=_PAGE if wanted in ("", _NONE) else _PAGE_WITH_SCENE)
     if wanted not in ("", _NONE):
         check_machine()
-    if file.suffix != ".nc":
-        _compare(file, path, dataset)
     from pipeline.cli.scene import scene_at_hand, scene_of
     from pipeline.report.page import write_page
 
@@ -112,12 +110,6 @@ def _read(file: Path, output: Path) -> "tuple[Path, xr.Dataset]":
     from pipeline.report.table import DatasetError
 
     try:
-        return dataset_path(file, output), read(file, output)
+        return dataset_path(file, output), read(file, output, warning)
     except DatasetError as wrong:
         fail(Fault(str(wrong), file=str(file)))
-
-
-def _compare(file: Path, path: Path, dataset: "xr.Dataset") -> None:
-    """Warn if the study file is not the one that the dataset was made from."""
-    if file.is_file() and file.read_text(encoding="utf-8-sig", errors="replace") != dataset.attrs.get("study"):
-        warning(f"{file} has changed since {path} was made; the report shows the study as it was run")

@@ -35,6 +35,7 @@ from pipeline.cli.words import (
     warn,
 )
 from pipeline.files import STORE_NAME, result_files
+from pipeline.quantities import counted
 
 if TYPE_CHECKING:
     from pipeline.plan.plan import Plan
@@ -65,7 +66,7 @@ def validate(files: Files, as_json: Json = False) -> None:
         report.append({"file": str(file), "errors": [], "warnings": list(study.warnings), "cases": cases})
         if not as_json:
             warn(study)
-            print(f"{file}: fine; {cases} cases{axes_of(study)}")
+            print(f"{file}: fine; {counted(cases, 'case')}{axes_of(study)}")
     if as_json:
         print_json(report)
     raise typer.Exit(BAD_INPUT if failed else DONE)

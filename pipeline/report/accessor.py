@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 _MOST_CURVES = 7
 # Dimensions of what a case has several of.
 _INNER = ("component", "movement", "conjugate")
+# The coordinate with the unit of each entry of a stiffness.
+_UNIT = "stiffness_unit"
 
 
 @xr.register_dataset_accessor("epsmesh")
@@ -41,19 +43,23 @@ class Accessor:
         """
         inner = [name for name in _INNER if name in self._dataset.dims]
         parts = [name for name, values in self._dataset.data_vars.items() if set(values.dims) & set(inner)]
-        data = self._dataset.drop_vars([*inner, *parts])
+        data = self._dataset.drop_vars([*inner, *parts, _UNIT], errors="ignore")
+        of_entries: dict[str, str] = {}
         for name in parts:
             values = self._dataset[name]
             own = [dim for dim in inner if dim in values.dims]
             for labels in itertools.product(*(values[dim].values for dim in own)):
                 column = "_".join([str(name).replace("_vector", ""), *map(str, labels)])
-                data[column] = values.sel(dict(zip(own, labels, strict=True)), drop=True)
+                entry = values.sel(dict(zip(own, labels, strict=True)))
+                if _UNIT in entry.coords:
+                    of_entries[column] = str(entry[_UNIT].values)
+                data[column] = entry.drop_vars([*own, _UNIT], errors="ignore")
         dims = list(self._dataset["force"].dims)
         if dims:
             frame = data.to_dataframe(dim_order=dims).reset_index()
         else:
             frame = data.expand_dims("case").to_dataframe().reset_index(drop=True)
-        units = {str(n): v.attrs["units"] for n, v in data.variables.items() if "units" in v.attrs}
+        units = {str(n): v.attrs["units"] for n, v in data.variables.items() if "units" in v.attrs} | of_entries
         frame.attrs["units"] = {name: units[name] for name in frame.columns if name in units}
         return frame
 

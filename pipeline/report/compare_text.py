@@ -4,7 +4,7 @@ from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
-from pipeline.quantities import readable
+from pipeline.quantities import counted, readable
 from pipeline.report.compare import Comparison, Pair
 from pipeline.report.guide_words import percent, table
 
@@ -15,15 +15,17 @@ _MOST = 20
 def verdict(found: Comparison) -> str:
     """Return the verdict in a sentence."""
     if found.agrees:
-        return f"agree within bars: {_count(len(found.pairs), 'value')} of {_count(found.compared, 'case')}"
-    return f"do not agree: {len(found.apart)} of {_count(len(found.pairs), 'value')} are apart by more than their bars"
+        return f"agree within bars: {counted(len(found.pairs), 'value')} of {counted(found.compared, 'case')}"
+    return f"do not agree: {len(found.apart)} of {counted(len(found.pairs), 'value')} are apart by more than their bars"
 
 
 def text(found: Comparison, names: tuple[str, str], doubts: dict[str, list[str]]) -> str:
     """Return what came of it for people: ``names`` are those of A and B, ``doubts`` what makes their times doubtful."""
     lines = [f"{letter}: {name}" for letter, name in zip("AB", names, strict=True)]
     lines += [f"  {key} differs: {one} in A, {other} in B" for key, one, other in found.settings]
-    lines.append(f"{found.cases} cases in both, {len(found.only_a)} in A only, {len(found.only_b)} in B only")
+    lines.append(
+        f"{counted(found.cases, 'case')} in both, {len(found.only_a)} in A only, {len(found.only_b)} in B only"
+    )
     if found.again_a or found.again_b:
         lines.append(
             f"  {found.again_a} of A, {found.again_b} of B are others again: the full order is one, whatever is outside"
@@ -72,7 +74,3 @@ def _listed(lines: list[str]) -> list[str]:
 
 def _size(pair: Pair) -> float:
     return abs(pair.difference)
-
-
-def _count(number: int, word: str) -> str:
-    return f"{number} {word}{'s' * (number != 1)}"

@@ -25,8 +25,10 @@ from pipeline.study.sweep import Axis, Case, Scale, Study
 # The variables that are taken as they are from the records of the cases, and from those of F_exact.
 _FLOATS = (
     "force", "force_error", "energy", "max_strain", "balance", "time_mesh", "time_assemble", "time_setup", "time_solve",
-    "time_error", "time_total", "time_spread", "load", "memory",
+    "time_error", "time_total", "time_spread", "machine_load", "memory",
 )  # fmt: skip
+# What a record calls otherwise than the dataset.
+_IN_RECORD = {"machine_load": "load"}
 # Those of contact that is found, if any of the study's is.
 _FOUND = ("contact_area", "contact_radius")
 _COUNTS = ("dofs", "cells", "iterations")
@@ -61,7 +63,7 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     variables |= _of_places(study) | _texts(plan, flat, exact)
     coordinates = {axis.name: _coordinate(axis) for axis in study.axes} | {"component": ["x", "y", "z"]}
     if "stiffness" in variables:
-        coordinates |= {"movement": list(_MOTIONS), "conjugate": list(_MOTIONS)}
+        coordinates |= _motions()
     dataset = xr.Dataset(variables, coordinates, _attributes(plan, flat, run or {}))
     if any(case.is_closed for case in study.cases() if not case.absence):
         dataset["force_error"].attrs["comment"] = _OF_CLOSURE
@@ -82,7 +84,7 @@ def _of_records(study: Study, flat: Sequence[Record | None], exact: Sequence[Rec
     variables: dict[str, Any] = {}
     found = _FOUND if any(case.probe.is_unilateral for case in study.cases()) else ()
     for name in (*_FLOATS, *found):
-        variables[name] = _variable(study, name, [getattr(r, name) if r else nan for r in flat])
+        variables[name] = _variable(study, name, [getattr(r, _IN_RECORD.get(name, name)) if r else nan for r in flat])
     for name in _COUNTS:
         values = [getattr(r, name) if r and r.status == "ok" else _MISSING for r in flat]
         dims, array, attrs = _variable(study, name, values, dtype=np.int64)
@@ -105,6 +107,17 @@ def _of_movements(study: Study, flat: Sequence[Record | None]) -> dict[str, Any]
         values = [(r and getattr(r, name)) or _NO_STIFFNESS for r in flat]
         variables[name] = _variable(study, name, values, "movement", "conjugate")
     return variables
+
+
+def _motions() -> dict[str, Any]:
+    """Return the coordinates of stiffness: its rows, its columns, and the unit of each entry, which differ by block."""
+    rotates = [name.startswith("r") for name in _MOTIONS]
+    units = [[("N/m", "N", "N m")[one + other] for other in rotates] for one in rotates]
+    return {
+        "movement": ("movement", list(_MOTIONS), attributes("movement")),
+        "conjugate": ("conjugate", list(_MOTIONS), attributes("conjugate")),
+        "stiffness_unit": (("movement", "conjugate"), np.array(units, dtype=object), attributes("stiffness_unit")),
+    }
 
 
 def _of_slits(study: Study, flat: Sequence[Record | None], exact: Sequence[Record | None]) -> dict[str, Any]:
@@ -275,6 +288,7 @@ def _attributes(plan: Plan, records: list[Record | None], run: Mapping[str, Any]
         "study": study.text,
         "study_hash": digest(study.text),
         "study_file": Path(study.file).name,
+        "study_folder": str(Path(study.file).absolute().parent),
         "reductions": json.dumps([vars(struck) for struck in plan.struck], ensure_ascii=False),
         "epsilon_is_full": int(all(isinf(epsilon) for epsilon in epsilons)),
         "timing": int(study.solve.timing),

@@ -1,5 +1,7 @@
 """Read a dataset that a run has written: by its own name, or by its study's."""
 
+import warnings
+from collections.abc import Callable
 from pathlib import Path
 from shlex import quote
 
@@ -35,8 +37,10 @@ def dataset_path(file: str | Path, output: str | Path = "results") -> Path:
     return path
 
 
-def read(file: str | Path, output: str | Path = "results") -> xr.Dataset:
+def read(file: str | Path, output: str | Path = "results", warn: Callable[[str], None] = warnings.warn) -> xr.Dataset:
     """Return the dataset meant by ``file``, in memory: a later run may write it anew.
+
+    ``warn`` is called if ``file`` is a study that has changed since its dataset was made.
 
     Raises:
         DatasetError: if there is none, or if it is not a study's.
@@ -45,7 +49,14 @@ def read(file: str | Path, output: str | Path = "results") -> xr.Dataset:
     dataset = _shown(load(path))
     if missing := [name for name in _NEEDED if name not in {*dataset.data_vars, *dataset.attrs}]:
         raise DatasetError(f"{path}: not a study's dataset: it has no {', '.join(missing)}")
+    study = Path(file)
+    if study != path and study.is_file() and _text_of(study) != dataset.attrs["study"]:
+        warn(f"{study} has changed since {path} was made, which answers for the study as it was: run it again")
     return dataset
+
+
+def _text_of(study: Path) -> str:
+    return study.read_text(encoding="utf-8-sig", errors="replace")
 
 
 def _shown(dataset: xr.Dataset) -> xr.Dataset:

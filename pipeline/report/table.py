@@ -111,15 +111,19 @@ def arrange(dataset: xr.Dataset) -> Table:
 def study_of(dataset: xr.Dataset) -> Study | None:
     """Return the study whose text the dataset carries, or None if this version does not read it.
 
-    The text may be a stranger's: it is held to all that a file is held to.
+    The text may be a stranger's: it is held to all that a file is held to. Files of bodies are looked for in the
+    study's folder, then, for a study that was moved, in the current one.
     """
-    return _study(str(dataset.attrs.get("study", "")))
+    name = str(dataset.attrs.get("study_file", "")) or "study.toml"
+    folder = str(dataset.attrs.get("study_folder", "."))
+    text = str(dataset.attrs.get("study", ""))
+    return _study(text, f"{folder}/{name}") or _study(text, name)
 
 
-@lru_cache(4)  # figures, report and guide of a dataset ask for it again and again
-def _study(text: str) -> Study | None:
+@lru_cache(8)  # figures, report and guide of a dataset ask for it again and again
+def _study(text: str, file: str) -> Study | None:
     try:
-        return parse(toml_of(text, "study"), text=text, trusted=False)
+        return parse(toml_of(text, file), file=file, text=text, trusted=False)
     except StudyError:
         return None
 

@@ -4,6 +4,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.arrays import BoolArray
+from pipeline.quantities import counted
 from pipeline.report.table import words
 
 # Processes for each core above which some of them wait: times are then longer than what was done.
@@ -51,16 +52,16 @@ def slower(dataset: xr.Dataset) -> str:
         return ""
     worst = found.where(found == found.min(), drop=True)
     case = words({str(dim): worst[dim].values[0] for dim in dataset["speedup"].dims})
-    cases = "1 case" if count == 1 else f"{count} cases"
-    return f"fewer unknowns were slower than the full order: {cases}, most of all {case}, {float(found.min()):.2g} ×"
+    most = f"most of all {case}, {float(found.min()):.2g} ×"
+    return f"fewer unknowns were slower than the full order: {counted(count, 'case')}, {most}"
 
 
 def _of_load(dataset: xr.Dataset) -> str:
     """Say how many times were taken while more processes wanted to run than there are cores."""
     taken = _timed(dataset)
-    if "load" not in dataset or not taken.any():
+    if "machine_load" not in dataset or not taken.any():
         return ""
-    load = dataset["load"].values
+    load = dataset["machine_load"].values
     busy = taken & (load > LOADED)
     if not busy.any():
         return ""

@@ -124,7 +124,7 @@ def _kind(annotation: Any, unit: str) -> str:
     if kind is Annotated:
         return _kind(parts[0], _unit(parts[0], parts[1:]) or unit)
     if kind is Literal:
-        return " | ".join(map(json.dumps, parts))
+        return " | ".join(json.dumps(part, ensure_ascii=False) for part in parts)
     if kind in (Union, UnionType):
         return " | ".join(_kind(part, unit) for part in parts if part is not NoneType)
     if kind is tuple and ... in parts:

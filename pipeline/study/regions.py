@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import cast
 
+from pipeline.quantities import RESERVED
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.regions import Inclusion
 from pipeline.shapes.section import Section, in_mm
@@ -137,7 +138,14 @@ def _distance(room: float) -> str:
 def _check_axes(axes: tuple[Axis, ...], problems: Problems) -> None:
     names = [axis.name for axis in axes]
     for axis in axes:
-        if axis.owner and names.count(axis.name) > 1:
+        if axis.name in RESERVED:
+            problems.error(
+                axis.path,
+                None,
+                f"its sweep would be a dimension {axis.name}, the name of a result of the dataset"
+                + (f": give {axis.owner} another name" if axis.owner else ""),
+            )
+        elif axis.owner and names.count(axis.name) > 1:
             problems.error(
                 axis.path, None, f"its sweep would be a second dimension {axis.name}: give {axis.owner} another name"
             )

@@ -6,7 +6,7 @@ import pytest
 
 from pipeline.report.dataset import write
 from tests.commands import epsmesh
-from tests.report.chosen import dataset
+from tests.report.chosen import TEXT, dataset
 
 
 def call(*arguments: object):
@@ -68,3 +68,17 @@ def test_bad_input_ends_with_2(results, arguments, message):
 
 def test_help_has_an_example():
     assert "Example: epsmesh guide studies/figure3.toml --accuracy 5%" in call("--help").stdout
+
+
+@pytest.mark.parametrize("command", ["guide", "plot", "compare", "report"])
+def test_commands_that_answer_for_a_study_that_has_changed_since_say_so(results, command):
+    """From one place, and alike; nothing is said where the study is as it was run, or the dataset was named."""
+    study, options = results / "known.toml", ["--output", results]
+    options += {"guide": ["--accuracy", "5%"], "compare": [results / "known.nc"], "report": ["--scene", "none"]}.get(
+        command, []
+    )
+    study.write_text(TEXT)
+    assert "has changed since" not in epsmesh(command, study, *options).stderr
+    study.write_text(f"{TEXT}\n# later")
+    assert f"{study} has changed since" in epsmesh(command, study, *options).stderr
+    assert "has changed since" not in epsmesh(command, results / "known.nc", *options).stderr

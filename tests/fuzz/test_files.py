@@ -13,10 +13,6 @@ from hypothesis import strategies as st
 from pipeline.plan.plan import make_plan
 from pipeline.realtime import ModelError
 from pipeline.realtime import load as load_model
-from pipeline.report.dataset import write
-from pipeline.report.guide import guide
-from pipeline.report.read import read
-from pipeline.report.table import DatasetError
 from pipeline.run.reading import known_of, open_to_read, read_rows
 from pipeline.run.record import Record
 from pipeline.run.store import Store, StoreError
@@ -28,7 +24,6 @@ from tests.cases import study
 from tests.fuzz.profile import thrown
 from tests.organs import box, write_stl
 from tests.realtime.synthetic import write_random
-from tests.report.synthetic import dataset
 
 PLAN = make_plan(study(material={"young": "10 kPa", "poisson": [0.3, 0.4]}))
 STEP = b"""ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;
@@ -72,7 +67,6 @@ def good(tmp_path_factory):
         nibabel.save(image, folder / f"ball.{ending}")
     nrrd.write(str(folder / "ball.nrrd"), ball, {"space directions": 2 * np.eye(3), "space origin": np.zeros(3),
                "space": "right-anterior-superior", "space units": ["mm"] * 3})  # fmt: skip
-    write(dataset(), folder / "known.nc")
     write_random(folder / "box.epsm.nc")
     store = Store(folder / "cases.sqlite")
     for key in PLAN.keys:
@@ -159,36 +153,6 @@ def looked_through(file):
         for problem in store.problems():
             readable(problem)
         assert all(one.size >= 0 for one in store.doomed(older_than=0.0))
-
-
-@given(data=st.data())
-@thrown(0.1)
-def test_datasets(good, thrown_at, data):
-    file, (whole, seal) = thrown_at / "known.nc", parts(good / "known.nc")
-    file.write_bytes((bytes_ := data.draw(damaged(whole))) + seal)
-    try:
-        guide(read(file), "5%")
-        assert bytes_ == whole
-    except DatasetError as refused:
-        readable(refused)
-
-
-@given(data=st.data())
-@thrown(0.01)  # another process reads each first: a second
-def test_datasets_of_others(good, thrown_at, data):
-    file, (whole, _) = thrown_at / "known.nc", parts(good / "known.nc")
-    file.write_bytes(data.draw(damaged(whole)))
-    try:
-        guide(read(file), "5%")
-    except DatasetError as refused:
-        readable(refused)
-
-
-def parts(file):
-    """Return what of a dataset is netCDF's, and the sum behind it."""
-    data = file.read_bytes()
-    end = data.rindex(b"epsmesh:sha256:")
-    return data[:end], data[end:]
 
 
 def readable(refused: Exception | str) -> None:

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.report.dataset import write
+import pipeline.report.accessor  # noqa: F401
+from pipeline import quantities
+from pipeline.plan.plan import make_plan
+from pipeline.report.dataset import build, write
+from pipeline.report.read import read
+from pipeline.report.table import study_of
+from pipeline.study.load import load
+from pipeline.study.problems import StudyError
+from tests.cases import raw
+from tests.fuzz.studies import toml
 from tests.organs import ellipsoid, write_stl
 from tests.report.synthetic import FIGURE, dataset
 
@@ -90,3 +99,39 @@ def test_what_was_done_to_a_bodys_file_is_told_beside_its_forces(tmp_path):
     assert "body_message" not in dataset(body=whole, probe=probe)
     data = dataset(body=mended, probe=probe)
     assert data["status"] == "ok" and "repaired: 1 inverted facets turned" in str(data["body_message"].values)
+
+
+def test_names_of_the_dataset_are_refused_as_dimensions_before_anything_is_computed():
+    """Tables of loads are a dimension; what would bear the name of a result is refused with the study."""
+    pressed = {"traction": [{"on": "free", "pressure": "1 kPa"}]}
+    assert dataset(load=[{"name": "pressed", **pressed}, {"name": "plain"}])["force"].dims == ("load",)
+    ball = {"name": "contact", "at": ["0 mm", "0 mm", "-12 mm"], "radius": ["2 mm", "3 mm"], "young": "50 kPa"}
+    with pytest.raises(StudyError, match=r"a dimension contact_radius, the name of a result .* another name"):
+        dataset(body={"inclusion": [ball | {"poisson": 0.4}]})
+    with pytest.raises(ValueError, match="two quantities of a dataset are called force"):
+        quantities._table(quantities.QUANTITIES["force"], quantities.QUANTITIES["force"])
+
+
+def test_a_dataset_finds_the_files_of_its_study_from_any_folder(tmp_path, monkeypatch):
+    (tmp_path / "study").mkdir()
+    write_stl(tmp_path / "study" / "whole.stl", *ellipsoid())
+    body = {"shape": "surface", "unit": "mm", "fixed": {"below": "-10 mm"}, "file": "whole.stl"}
+    content = raw(body=body, probe={"at": ["5 mm", "3 mm"], "radius": "4 mm"})
+    file = tmp_path / "study" / "own.toml"
+    file.write_text(toml(content))
+    data = build(make_plan(load(file)), {})
+    monkeypatch.chdir(tmp_path)
+    write(data, tmp_path / "own.nc")
+    found = study_of(read(tmp_path / "own.nc"))
+    assert found is not None and found.text == file.read_text()
+
+
+def test_every_entry_of_a_stiffness_has_its_unit(tmp_path):
+    write(dataset(probe={"motion": "all"}), tmp_path / "a.nc")
+    data = read(tmp_path / "a.nc")
+    assert "units" not in data["stiffness"].attrs
+    unit = {"x": "N/m", "rx": "N m"}
+    for one, other in (("x", "x"), ("x", "rx"), ("rx", "x"), ("rx", "rx")):
+        expected = unit[one] if one == other else "N"
+        assert str(data["stiffness"].sel(movement=one, conjugate=other)["stiffness_unit"].values) == expected
+        assert data.epsmesh.to_frame().attrs["units"][f"stiffness_{one}_{other}"] == expected

@@ -25,10 +25,10 @@ def test_times_of_an_idle_machine_need_no_words(timed):
 
 
 def test_a_loaded_machine_is_told_of(timed):
-    timed["load"][0, 0] = 3.2
+    timed["machine_load"][0, 0] = 3.2
     (told,) = doubts(timed)
     assert f"1 of {timed['force'].size} times were taken on a loaded machine (up to 3.2 processes a core)" in told
-    timed["load"][:] = 2.0
+    timed["machine_load"][:] = 2.0
     assert doubts(timed)[0].startswith("all times were taken on a loaded machine")
     assert f"times        {doubts(timed)[0]}" in str(guide(timed, accuracy="50 %"))
     assert ("speed-ups", doubts(timed)[0]) in facts(timed)
