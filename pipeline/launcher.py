@@ -23,6 +23,12 @@ def is_first_rank() -> bool:
     return next((rank for rank in ranks if rank is not None), "0") == "0"
 
 
+def is_interrupt(error: BaseException) -> bool:
+    """Tell whether it is Ctrl-C that an import, or a library, has made another exception of."""
+    cause = error.__cause__ or error.__context__
+    return cause is not None and (isinstance(cause, KeyboardInterrupt) or is_interrupt(cause))
+
+
 def environment_alone() -> dict[str, str]:
     """Return the environment for a process that is none of the launcher's."""
     return {key: value for key, value in os.environ.items() if not key.startswith(_PREFIXES)}

@@ -4,7 +4,7 @@ import signal
 import threading
 import time
 import traceback
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -17,8 +17,7 @@ from pipeline.plan.cost import CostModel
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.plan.shard import Shard
 from pipeline.report.publish import publish
-from pipeline.run.deadline import watched
-from pipeline.run.guard import Guard, Guarded
+from pipeline.run.begun import ENDING, Begun, fail_begun
 from pipeline.run.outcome import count_states, failures
 from pipeline.run.progress import Silent, Terminal
 from pipeline.run.reading import read_rows
@@ -34,7 +33,14 @@ _ECHO = 0.5
 
 
 class ResultsError(Exception):
-    """Dataset or figure cannot be written; what was computed is in the case store."""
+    """Dataset or figure cannot be made; what was computed is in the case store.
+
+    ``is_unwritable`` tells that it is for want of a disk, and not because of what was computed.
+    """
+
+    def __init__(self, message: str, *, is_unwritable: bool):
+        super().__init__(message)
+        self.is_unwritable = is_unwritable
 
 
 @dataclass
@@ -44,12 +50,8 @@ class Opened:
     store: Store | None = None
     meshes: Path | None = None
     records: dict[str, Record] = field(default_factory=dict)
-    guard: Guard = field(default_factory=Guard)
-
-    @property
-    def notice(self) -> str:
-        """What the user should know of the store."""
-        return self.store.notice if self.store else ""
+    begun: Begun = field(default_factory=Begun)
+    notices: tuple[str, ...] = ()  # what the user should know of the store
 
 
 @dataclass(frozen=True)
@@ -77,19 +79,18 @@ def prepare(
     meshes: Path | None = None,
     shard: Shard | None = None,
     beside: Path | None = None,
-    guard: Guard | None = None,
 ) -> tuple[Plan, Opened]:
     """Open the case store and plan, on every rank alike, what is not on record; collective.
 
     ``fresh`` computes again what is stored; a timing study always does, but for F_exact. ``without`` names reductions
     that are not to be used. A ``shard`` plans its own part only, and reads, but never writes, the store ``beside``
-    its own, too. A ``guard`` knows what this run came to before it lost its process: that is on record, whatever
-    ``fresh`` says.
+    its own, too. Cases with which the process of an earlier run ended are on record as failed, whatever ``fresh`` says:
+    this run leaves them out, and the next one tries them again.
 
     Raises:
         StoreError: on every rank, if the store cannot be used.
     """
-    opened, message, cost = Opened(meshes=meshes, guard=guard or Guard()), "", CostModel()
+    opened, message, cost = Opened(meshes=meshes, begun=Begun(store_path)), "", CostModel()
     if comm.rank == 0:
         try:
             opened.store = Store(store_path)
@@ -102,7 +103,9 @@ def prepare(
                 opened.records = {key: record for key, record in found.items() if record.is_ok}
                 if shard is not None:
                     opened.records = _known_beside(beside, wanted) | opened.records
-            opened.records |= opened.guard.records(opened.store, {*declared.keys, *declared.reference_keys})
+            ended = fail_begun(opened.store, {*declared.keys, *declared.reference_keys})
+            opened.records |= ended
+            opened.notices = tuple(filter(None, (opened.store.notice, _what_ended(len(ended)))))
         except StoreError as error:
             message = str(error)
     message, stored, cost = comm.bcast((message, sorted(opened.records), cost))
@@ -131,7 +134,7 @@ def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Term
     except KeyboardInterrupt:
         interrupted = True
     files: tuple[Path, ...] = ()
-    wrong = ""
+    wrong, is_unwritable = "", False
     if opened.store is not None:
         opened.store.close()
         if plan.part is None:
@@ -139,15 +142,19 @@ def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Term
                 with stage("results"):
                     files = publish(plan, opened.records, {"start": start, "end": _now()}, output)
             except (OSError, RuntimeError) as error:  # of a full disk HDF5 tells the latter
-                wrong = (
-                    f"{output}: the results of {plan.study.file} cannot be written: {error}; all forces are on record"
-                )
+                is_unwritable, wrong = True, _unmade(plan, output, "written", str(error))
+            except Exception as error:
+                wrong = _unmade(plan, output, "built", f"{type(error).__name__}: {error}")
     counts = count_states(plan, opened.records)
     if not interrupted:
-        counts, wrong = comm.bcast((counts, wrong))
+        counts, wrong, is_unwritable = comm.bcast((counts, wrong, is_unwritable))
     if wrong:
-        raise ResultsError(wrong)
+        raise ResultsError(wrong, is_unwritable=is_unwritable)
     return Outcome(counts, failures(plan, opened.records), files, interrupted)
+
+
+def _unmade(plan: Plan, output: Path, what: str, why: str) -> str:
+    return f"{output}: the results of {plan.study.file} cannot be {what}: {why}; all forces are on record"
 
 
 def leave_broken_pipes() -> None:
@@ -178,23 +185,13 @@ def abort_on_exception(comm: MPI.Comm) -> Iterator[None]:
 
 @contextmanager
 def ended_soon() -> Iterator[None]:
-    """Turn the signals that ask the program to end into KeyboardInterrupt; it is gone in 20 s, whatever C computes.
-
-    That is for what has no records to write: nothing waits for Python to be asked twice.
-    """
+    """Turn the signals that ask the program to end into KeyboardInterrupt: for what has no records to write."""
 
     def interrupt(*_: Any) -> None:
         raise KeyboardInterrupt
 
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    with watched(*before):
-        try:
-            for number in before:
-                signal.signal(number, interrupt)
-            yield
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
+    with _heard_by(interrupt):
+        yield
 
 
 def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | None, signals: list[int]) -> None:
@@ -208,15 +205,14 @@ def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | No
 
     def keep(record: Record) -> None:
         assert opened.store is not None
-        opened.guard.keep(record.key)  # before it is: one that the process ends with is computed again, not blamed
         if record.status != SKIPPED:  # why it was depends on this study
             opened.store.put(record)
         opened.records[record.key] = record
         if signals:
             raise KeyboardInterrupt
 
-    with progress or nullcontext():
-        execute(plan, comm, keep, Guarded(progress or Silent(), opened.guard), opened.records, cache)
+    with progress or nullcontext(), opened.begun as begun:
+        execute(plan, comm, keep, progress or Silent(), known=opened.records, cache=cache, begun=begun)
 
 
 @contextmanager
@@ -234,18 +230,33 @@ def _interruptible() -> Iterator[list[int]]:
             return
         first = time.monotonic()
         received.append(number)
-        watch.answer()
         raise KeyboardInterrupt
 
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    with watched(*before) as watch:
-        try:
-            for number in before:
-                signal.signal(number, interrupt)
-            yield received
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
+    with _heard_by(interrupt):
+        yield received
+
+
+@contextmanager
+def _heard_by(handler: Callable[..., None]) -> Iterator[None]:
+    """Let ``handler`` answer what asks the program to end: Ctrl-C and SIGTERM, and a closed terminal but for nohup."""
+    before = {number: signal.getsignal(number) for number in ENDING}
+    if before[signal.SIGHUP] is signal.SIG_IGN:
+        del before[signal.SIGHUP]
+    try:
+        for number in before:
+            signal.signal(number, handler)
+        yield
+    finally:
+        for number, answer in before.items():
+            signal.signal(number, answer)
+
+
+def _what_ended(count: int) -> str:
+    """Say that the process of an earlier run ended with so many cases, "" if with none."""
+    if not count:
+        return ""
+    what = "the case that it was at has failed" if count == 1 else f"the {count} cases that it was at have failed"
+    return f"the process of an earlier run ended: {what}, and the others go on; the next run tries again"
 
 
 def _known_beside(path: Path | None, keys: Collection[str]) -> dict[str, Record]:

@@ -12,7 +12,6 @@ from pipeline.cli import checks, compare, evaluator, export, guide, merge, new, 
 from pipeline.cli.console import error, make_patient, what_was_not_written
 from pipeline.cli.faults import BAD_INPUT
 from pipeline.cli.group import Commands
-from pipeline.cli.words import OWN_PROCESS
 
 _HELP = """How fine must a mesh be, and where, for the reaction force of a surgical tool?
 
@@ -64,7 +63,7 @@ def main() -> None:
     if _COMPLETING not in os.environ:  # what a shell reads has tabs, and is none of a terminal's
         make_patient()
     try:
-        app(prog_name="epsmesh", obj=OWN_PROCESS)
+        app(prog_name="epsmesh")
     finally:
         if why := what_was_not_written():
             error(f"standard output: {why}")

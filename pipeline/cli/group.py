@@ -12,7 +12,7 @@ from typer.core import TyperGroup
 from pipeline.cli.console import JSON, has_printed_json, print_json
 from pipeline.cli.faults import INTERRUPTED, SOME_FAILED, Fault, as_data, fail, of_file, of_unwritten
 from pipeline.files import NOT_UTF8, is_utf8
-from pipeline.launcher import is_first_rank, is_launched
+from pipeline.launcher import is_first_rank, is_interrupt, is_launched
 from pipeline.visible import visible
 
 # What a disk says that cannot be written to, be it only found when all is done.
@@ -51,7 +51,7 @@ class Commands(TyperGroup):
             _tell(wrong, self.words)
             raise
         except (Exception, KeyboardInterrupt) as wrong:
-            plain = isinstance(wrong, typer.Exit) or not _is_of_interrupt(wrong)
+            plain = isinstance(wrong, typer.Exit) or not is_interrupt(wrong)
             ended = wrong if plain else KeyboardInterrupt()
             _tell(ended, self.words)
             if isinstance(ended, KeyboardInterrupt):
@@ -59,12 +59,6 @@ class Commands(TyperGroup):
             if ended is wrong:
                 raise
             raise ended from wrong
-
-
-def _is_of_interrupt(wrong: BaseException) -> bool:
-    """Tell whether it is Ctrl-C that an import, or a library, has made another exception of."""
-    cause = wrong.__cause__ or wrong.__context__
-    return cause is not None and (isinstance(cause, KeyboardInterrupt) or _is_of_interrupt(cause))
 
 
 def _end_ranks() -> None:

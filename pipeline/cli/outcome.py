@@ -23,8 +23,8 @@ _MOST_REASONS = 2
 
 def announce(plan: Plan, opened: "Opened", *, quiet: bool, verbose: bool) -> None:
     """Say, before the run, what is to be done and what is not, and why."""
-    if opened.notice:
-        error(opened.notice)
+    for notice in opened.notices:
+        error(notice)
     if quiet:
         return
     study = plan.study

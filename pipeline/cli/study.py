@@ -2,19 +2,17 @@
 
 import sys
 import time
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from pipeline import __version__
-from pipeline.cli.console import error, print_json
+from pipeline.cli.console import print_json
 from pipeline.cli.faults import BAD_INPUT, DONE, INTERRUPTED, SOME_FAILED, Fault, as_data, fail, of_study, tell
 from pipeline.cli.words import (
     DEFAULT_MESHES,
     DEFAULT_OUTPUT,
-    OWN_PROCESS,
     File,
     Files,
     Json,
@@ -73,7 +71,6 @@ def validate(files: Files, as_json: Json = False) -> None:
 
 
 def run(
-    context: typer.Context,
     files: Files,
     output: Annotated[Path, typer.Option(metavar="DIR", help="Folder for <study>.nc and the figure.")] = DEFAULT_OUTPUT,
     store: StoreFile = None,
@@ -112,50 +109,54 @@ def run(
     for study in () if part else studies:
         check_output(*result_files(output, study.name))
     check_machine()
+    from pipeline import workflow
     from pipeline.cli.outcome import announce, conclude, print_stages
     from pipeline.cli.outcome import as_data as outcome_data
-    from pipeline.run.guard import Guard, guarded
+    from pipeline.run.store import StoreError
 
-    # Memory that runs out ends one case: another process waits, where this one is the command's own.
-    with guarded(error) if context.obj == OWN_PROCESS else nullcontext(Guard()) as guard:
-        from pipeline import workflow
-        from pipeline.run.store import StoreError
-
-        comm, found = workflow.world(), list[dict[str, Any]]()
-        speaks, failed = comm.rank == 0, False
-        for study in studies:
-            start = time.monotonic()
-            try:
-                main = output / STORE_NAME
-                path = store or (part.store(output, study) if part else main)
-                plan, opened = workflow.prepare(
-                    study, comm, path, fresh=fresh, without=left_out, meshes=meshes, shard=part,
-                    beside=main if part else None, guard=guard,
-                )  # fmt: skip
-                if speaks:
-                    announce(plan, opened, quiet=quiet or as_json, verbose=verbose)
-                    if as_json and not quiet:
-                        warn(study)
-                progress = _progress(plan, verbose=verbose) if speaks and not quiet else None
-                with workflow.abort_on_exception(comm):
-                    outcome = workflow.run(plan, opened, comm, output, progress)
-            except (StoreError, workflow.ResultsError) as wrong:
-                fail(Fault(str(wrong), file=study.file))
+    comm, found = workflow.world(), list[dict[str, Any]]()
+    speaks, failed = comm.rank == 0, False
+    for study in studies:
+        start = time.monotonic()
+        try:
+            main = output / STORE_NAME
+            path = store or (part.store(output, study) if part else main)
+            plan, opened = workflow.prepare(
+                study,
+                comm,
+                path,
+                fresh=fresh,
+                without=left_out,
+                meshes=meshes,
+                shard=part,
+                beside=main if part else None,
+            )
             if speaks:
-                seconds = time.monotonic() - start
-                conclude(plan, opened, outcome, seconds, part, quiet=quiet or as_json)
-                found.append(outcome_data(plan, opened, outcome, seconds))
-            failed = failed or outcome.counts["failed"] > 0
-            if outcome.interrupted:
-                break
-        ended = INTERRUPTED if outcome.interrupted else SOME_FAILED if failed else DONE
-        if speaks and profile:
-            print_stages(sys.stderr if as_json else sys.stdout)
-        if speaks and as_json:
-            print_json({"status": ended, "studies": found})
+                announce(plan, opened, quiet=quiet or as_json, verbose=verbose)
+                if as_json and not quiet:
+                    warn(study)
+            progress = _progress(plan, verbose=verbose) if speaks and not quiet else None
+            with workflow.abort_on_exception(comm):
+                outcome = workflow.run(plan, opened, comm, output, progress)
+        except StoreError as wrong:
+            fail(Fault(str(wrong), file=study.file))
+        except workflow.ResultsError as wrong:
+            fail(Fault(str(wrong), file=study.file), status=BAD_INPUT if wrong.is_unwritable else SOME_FAILED)
+        if speaks:
+            seconds = time.monotonic() - start
+            conclude(plan, opened, outcome, seconds, part, quiet=quiet or as_json)
+            found.append(outcome_data(plan, opened, outcome, seconds))
+        failed = failed or outcome.counts["failed"] > 0
         if outcome.interrupted:
-            workflow.end_ranks(comm, INTERRUPTED)
-        raise typer.Exit(ended)
+            break
+    ended = INTERRUPTED if outcome.interrupted else SOME_FAILED if failed else DONE
+    if speaks and profile:
+        print_stages(sys.stderr if as_json else sys.stdout)
+    if speaks and as_json:
+        print_json({"status": ended, "studies": found})
+    if outcome.interrupted:
+        workflow.end_ranks(comm, INTERRUPTED)
+    raise typer.Exit(ended)
 
 
 def status(

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from pipeline.run.record import Record
     from pipeline.study.sweep import Study
 
-# What a command finds as its context's object where it was started as a program, and not by a test.
-OWN_PROCESS = "own process"
 _SKIPPING, CLUSTER = "docs/skipping.md", "docs/cluster.md"  # what tells more
 _SQLITE = b"SQLite format 3\0"
 _UNWRITABLE = ": cannot be written: "

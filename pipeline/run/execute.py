@@ -8,6 +8,7 @@ from threadpoolctl import threadpool_limits
 from pipeline.plan.plan import Plan
 from pipeline.plan.schedule import schedule
 from pipeline.plan.steps import Solve, mesh_steps
+from pipeline.run.begun import Begun
 from pipeline.run.compile import prepare
 from pipeline.run.groups import run_phase
 from pipeline.run.memory import FreeMemory, keep_imports
@@ -22,19 +23,27 @@ Keep = Callable[[Record], None]
 
 
 def execute(
-    plan: Plan, comm: MPI.Comm, keep: Keep, progress: Progress,
-    known: Mapping[str, Record] | None = None, cache: MeshCache | None = None,
-) -> int:  # fmt: skip
+    plan: Plan,
+    comm: MPI.Comm,
+    keep: Keep,
+    progress: Progress,
+    *,
+    known: Mapping[str, Record] | None = None,
+    cache: MeshCache | None = None,
+    begun: Begun | None = None,
+) -> int:
     """Carry out ``plan``; collective. ``keep`` is called on rank 0 with each record, as soon as it arrives there.
 
-    ``known`` are rank 0's records of what the plan takes from the store; meshes are kept in ``cache``. Returns the
+    ``known`` are rank 0's records of what the plan takes from the store; meshes are kept in ``cache``, and the cases
+    under way are told to ``begun``, on each rank. Returns the
     number of cases that failed, the same on every rank: each has a record with its message, and the rest went on.
     """
     keep_imports()
     desk = _Desk(plan, keep if comm.rank == 0 else None, progress, comm.bcast(dict(known or {})))
 
     def make(group: MPI.Comm, post: Keep) -> StepRunner:
-        return StepRunner(plan, group, post, progress, cache, comm.size)
+        told = begun or Begun()
+        return StepRunner(plan, group, keep=post, progress=progress, begun=told, cache=cache, ranks=comm.size)
 
     # A rank is one thread: OpenBLAS's own would wait for work by spinning, and take the other ranks' cores.
     with threadpool_limits(limits=1, user_api="blas"):

@@ -28,11 +28,16 @@ class Runner(Protocol):
     def run(self, step: MeshStep) -> None:
         """Carry out a step; collective."""
 
+    def free(self) -> None:
+        """Free what belongs to the communicator; collective."""
+
 
 def run_phase(
-    comm: MPI.Comm, phase: Phase, make: Callable[[MPI.Comm, Callable[[Record], None]], Runner],
+    comm: MPI.Comm,
+    phase: Phase,
+    make: Callable[[MPI.Comm, Callable[[Record], None]], Runner],
     keep: Callable[[Record], None],
-) -> None:  # fmt: skip
+) -> None:
     """Carry out a phase; collective. ``make`` returns a runner on a communicator, that posts records to a function.
 
     ``keep`` is called on rank 0 with every record, from whatever group it comes.
@@ -41,6 +46,7 @@ def run_phase(
         runner = make(comm, keep)
         for step in phase.steps:
             runner.run(step)
+        runner.free()
         return
     group = comm.Split(comm.rank // phase.size, comm.rank)
     groups = -(-comm.size // phase.size)
@@ -49,6 +55,7 @@ def run_phase(
         while (number := group.bcast(counter.next() if group.rank == 0 else None)) < len(phase.steps):
             runner.run(phase.steps[number])
             mailbox.look()
+        runner.free()
     group.Free()
 
 

@@ -5,11 +5,12 @@ from typing import TypeVar
 
 from mpi4py import MPI
 
+from pipeline.launcher import is_interrupt
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.mesh.generate import MeshArrays, MeshError
 from pipeline.mesh.of_case import mesh_arrays, upright
+from pipeline.run.failure import describe
 from pipeline.run.mesh_cache import MeshCache
-from pipeline.solve.linear import SolveError
 from pipeline.study.sweep import Case
 
 T = TypeVar("T")
@@ -52,10 +53,10 @@ def on_first_rank(comm: MPI.Comm, compute: Callable[[], T]) -> T | None:
     if comm.rank == 0:
         try:
             result = compute()
-        except (MeshError, SolveError) as error:
-            message = str(error)
-        except (MemoryError, RuntimeError) as error:
-            message = f"{type(error).__name__}: {error}"
+        except Exception as error:
+            if is_interrupt(error):
+                raise
+            message = describe(error)
     message = comm.bcast(message)
     if message is not None:
         raise MeshError(message)

@@ -2,7 +2,6 @@
 
 import sys
 import time
-from collections.abc import Collection
 from types import TracebackType
 from typing import Any, Protocol
 
@@ -25,9 +24,6 @@ class Progress(Protocol):
     def note(self, text: str) -> None:
         """Say what is being worked on."""
 
-    def begin(self, keys: Collection[str]) -> None:
-        """Say which solves are under way, and nothing else: the first of them, or the mesh of all."""
-
 
 class Silent:
     """Reports nothing: for ranks other than the first, and for scripts."""
@@ -36,9 +32,6 @@ class Silent:
         """Report nothing."""
 
     def note(self, text: str) -> None:
-        """Report nothing."""
-
-    def begin(self, keys: Collection[str]) -> None:
         """Report nothing."""
 
 
@@ -114,9 +107,6 @@ class Terminal:
             self._bar.update(self._task, description=visible(text))
         elif self._verbose or time.monotonic() - self._told > _SILENCE:
             self._line(f"… {text}")
-
-    def begin(self, keys: Collection[str]) -> None:
-        """Show nothing: people read labels."""
 
     def _is_worth_a_line(self) -> bool:
         if self._verbose:

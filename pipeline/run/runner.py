@@ -1,7 +1,7 @@
 """Carry out the steps of a plan on one communicator: mesh, operators, solves, and a record of each."""
 
 import statistics
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from enum import Enum
@@ -9,25 +9,24 @@ from functools import partial
 from math import nan
 from typing import TypeVar
 
-import numpy as np
 from mpi4py import MPI
 
 from pipeline.mesh.distribute import BodyMesh
-from pipeline.mesh.generate import MeshError
 from pipeline.plan import estimate
 from pipeline.plan.plan import Plan
 from pipeline.plan.steps import MOST_DOFS, MeshStep, OperatorStep, Solve, mesh_steps
 from pipeline.plan.symmetry import model_planes
 from pipeline.run.attempts import Attempts
 from pipeline.run.basis import reduced_records
+from pipeline.run.begun import Begun
 from pipeline.run.compile import prepare
+from pipeline.run.failure import AloneError, Attempt, Failure
 from pipeline.run.far_field import share_far_fields
 from pipeline.run.measure import BARS, TIMES, record_of
 from pipeline.run.memory import FreeMemory, PeakMemory, give_back
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import mesh_case, on_first_rank
 from pipeline.run.problem import (
-    CaseFailure,
     check_memory,
     lacks_memory,
     memory_of,
@@ -42,7 +41,6 @@ from pipeline.run.record import Record
 from pipeline.run.room import machine_load
 from pipeline.run.sweeping import in_order
 from pipeline.solve.displacement import DisplacementProblem
-from pipeline.solve.linear import SolveError
 from pipeline.solve.solution import FieldProblem
 from pipeline.solve.spaces import Spaces
 
@@ -56,13 +54,6 @@ class Bar(Enum):
     NONE = "no: the solve is timed"
     IF_ROOM = "if there is memory for it: the force is worth having without"
     NEEDED = "yes: it alone proves the accuracy that was asked for"
-
-
-@dataclass(frozen=True)
-class Failure:
-    """Why something could not be computed; all ranks agree on it."""
-
-    message: str
 
 
 @dataclass(frozen=True)
@@ -80,18 +71,31 @@ class Ground:
 
 
 class StepRunner:
-    """Carries out mesh steps on one communicator. ``keep`` is called on its rank 0 with each record.
+    """Carries out mesh steps on one communicator; ``free`` it in the end, collectively.
 
+    ``keep`` is called on its rank 0 with each record, ``begun`` is told on each rank which cases are under way, and
     ``ranks`` is how many the whole run has.
     """
 
-    def __init__(self, plan: Plan, comm: MPI.Comm, keep: Keep, progress: Progress, cache: MeshCache | None, ranks: int):
+    def __init__(
+        self,
+        plan: Plan,
+        comm: MPI.Comm,
+        *,
+        keep: Keep,
+        progress: Progress,
+        begun: Begun,
+        cache: MeshCache | None,
+        ranks: int,
+    ):
         self._plan, self._comm, self._keep, self._progress, self._cache = plan, comm, keep, progress, cache
+        self._begun, self._attempt = begun, Attempt(comm)
         self._provenance = provenance(ranks)
         self._free = FreeMemory(comm)
         self._attempts = Attempts()
         self._has_far_fields = False
         self._records: dict[str, Record] = {}
+        self._keys: list[str] = []
 
     def run(self, step: MeshStep) -> None:
         """Compute every case of a mesh step, and record each; collective.
@@ -101,11 +105,17 @@ class StepRunner:
         todo = [step]
         while todo:
             following = todo.pop(0)
-            self._way_of(following)(following, PeakMemory(self._comm))
+            found = self._caught(partial(self._way_of(following), following, PeakMemory(self._comm)))
+            if isinstance(found, Failure):
+                self._fail([solve for solve in following.solves if solve.key not in self._records], found)
             give_back(self._comm)
             if again := self._attempts.take_again():
                 prepare(self._comm, again)
                 todo += mesh_steps(again, shared=self._plan.shared)
+
+    def free(self) -> None:
+        """Free what belongs to the communicator; collective."""
+        self._attempt.free()
 
     def _way_of(self, step: MeshStep) -> Callable[[MeshStep, PeakMemory], None]:
         if step.axisymmetric:
@@ -252,10 +262,8 @@ class StepRunner:
 
     def _stamp(self, record: Record, memory: PeakMemory) -> Record:
         date = datetime.now(UTC).isoformat(timespec="seconds")
-        return replace(
-            record, memory=memory.peak(), load=machine_load(), group=self._comm.size,
-            provenance=self._provenance | {"date": date},
-        )  # fmt: skip
+        where = self._provenance | {"date": date}
+        return replace(record, memory=memory.peak(), load=machine_load(), group=self._comm.size, provenance=where)
 
     def _record(self, solve: Solve, compute: Callable[[], Record]) -> None:
         """Compute and keep a record; if that fails, keep a record of the failure."""
@@ -268,9 +276,10 @@ class StepRunner:
             self._finish(solve, found)
 
     def _begin(self, *solves: Solve) -> None:
-        self._progress.begin([solve.key for solve in solves if solve.key not in self._records])
+        self._keys = [solve.key for solve in solves if solve.key not in self._records]
+        self._begun.name(self._keys)
 
-    def _fail(self, solves: tuple[Solve, ...], failure: Failure) -> None:
+    def _fail(self, solves: Sequence[Solve], failure: Failure) -> None:
         for solve in solves:
             self._finish(solve, Record(solve.key, "failed", failure.message, provenance=self._provenance))
 
@@ -283,19 +292,15 @@ class StepRunner:
                 self._keep(judged)
 
     def _caught(self, compute: Callable[[], T]) -> T | Failure:
-        """Return what ``compute`` returns, or why it failed; collective.
+        """Return what ``compute`` returns, or why it failed, whatever it was; collective.
 
-        Failures that are raised on every rank come here; one that hits a single rank in the middle of a
-        collective call leaves the others waiting, so with several ranks it must end the run (the caller aborts).
+        Where the others cannot be told of it, the run ends, and the next one knows which cases failed, and why.
         """
         try:
-            return compute()
-        except (CaseFailure, MeshError, SolveError) as error:
-            return Failure(str(error))
-        except (MemoryError, RuntimeError, ArithmeticError, np.linalg.LinAlgError) as error:
-            if self._comm.size > 1:
-                raise
-            return Failure(f"{type(error).__name__}: {error}")
+            return self._attempt(compute)
+        except AloneError as error:
+            self._begun.name(self._keys, str(error))
+            raise
 
 
 def _spread(seconds: list[float]) -> float:

@@ -189,18 +189,57 @@ def test_wrong_solution_is_a_failed_case():
     assert "do not balance" in record.message
 
 
-@pytest.mark.skipif(WORLD.size > 1, reason="with several ranks such a failure ends the run")
-@pytest.mark.parametrize("error", [MemoryError("no room for 64 MB"), PETSc.Error(55), RuntimeError("std::bad_alloc")])
-def test_a_case_that_runs_out_of_memory_all_the_same_fails_alone(monkeypatch, error):
+UNFORESEEN = [
+    MemoryError("no room for 64 MB"),
+    PETSc.Error(55),
+    RuntimeError("std::bad_alloc"),
+    IndexError("tuple index out of range"),
+    AssertionError("a sentence of nobody's"),
+]
+
+
+@pytest.mark.mpi
+@pytest.mark.usefixtures("together")
+@pytest.mark.parametrize("error", UNFORESEEN)
+def test_whatever_is_raised_fails_its_case_alone(monkeypatch, error):
     def solve_problem(case, *arguments, **options):
         if case.material.poisson == 0.3:
             raise error
         return problem.solve_problem(case, *arguments, **options)
 
     monkeypatch.setattr("pipeline.run.runner.solve_problem", solve_problem)
-    records = solve(material={"poisson": [0.3, 0.4]})
+    records = solve(WORLD, material={"poisson": [0.3, 0.4]})
     assert [records[i,].status for i in range(2)] == ["failed", "ok"]
     assert str(error) in records[0,].message
+    assert f"{type(error).__name__}: " in records[0,].message
+
+
+@pytest.mark.mpi
+@pytest.mark.usefixtures("together")
+def test_whatever_is_raised_on_one_rank_fails_its_case_on_all(monkeypatch):
+    """The last rank alone has no room for the record of what all have solved."""
+
+    def solve_problem(case, *arguments, **options):
+        solution = problem.solve_problem(case, *arguments, **options)
+        if case.material.poisson == 0.3 and WORLD.rank == WORLD.size - 1:
+            raise ValueError("no room on the last rank")
+        return solution
+
+    monkeypatch.setattr("pipeline.run.runner.solve_problem", solve_problem)
+    records = solve(WORLD, material={"poisson": [0.3, 0.4]})
+    assert [records[i,].status for i in range(2)] == ["failed", "ok"]
+    assert "ValueError: no room on the last rank" in records[0,].message
+
+
+@pytest.mark.mpi
+def test_what_is_raised_beside_any_case_fails_those_of_the_step(monkeypatch):
+    def broken(*_, **__):
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setattr("pipeline.run.runner.StepRunner._assembles_parts", broken)
+    records = solve(WORLD, material={"poisson": [0.3, 0.4]})
+    assert [record.status for record in records.values()] == ["failed", "failed"]
+    assert all("ZeroDivisionError: division by zero" in record.message for record in records.values())
 
 
 def test_gmsh_failure_is_a_failed_case(monkeypatch):

@@ -56,6 +56,9 @@ def test_every_step_is_run_by_one_group(size):
             self.comm, self.post = comm, post
             assert comm.size == min(size, WORLD.size)
 
+        def free(self):
+            pass
+
         def run(self, step):
             if self.comm.rank == 0:
                 for solve in step.solves:

@@ -1,0 +1,159 @@
+"""A process that is ended from outside, or from below Python, costs the case that it was at, and no other."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from mpi4py import MPI
+
+from pipeline.run.begun import Begun, fail_begun
+from pipeline.run.record import Record
+from pipeline.run.store import Store
+from tests.commands import ENVIRONMENT, ROOT
+from tests.studies import small_text
+
+pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="starts processes itself")
+
+# The command, with a solve in it that ends the process, and one that only it is told of.
+COMMAND = """
+import os, sys
+from pipeline.run.runner import StepRunner
+solve = StepRunner._solve
+def fatal(self, case, *rest):
+    if "epsilon = 4 mm" in case.label or "poisson = 0.3" in case.label:
+        {ends}
+    return solve(self, case, *rest)
+StepRunner._solve = fatal
+from pipeline.__main__ import main
+main()
+"""
+BEGIN = """
+import os, signal, sys
+from pathlib import Path
+from pipeline.run.begun import Begun
+signal.signal(signal.SIGTERM, lambda *_: None)
+begun = Begun(Path(sys.argv[1]))
+begun.name(["a", "b"])
+os.kill(os.getpid(), signal.{asked})
+begun.name(["b"]) if {goes_on} else None
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def run(script: str, *arguments: object, ranks: int = 1) -> "subprocess.CompletedProcess[str]":
+    launcher = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
+    return subprocess.run(
+        [*launcher, sys.executable, "-c", script, *map(str, arguments)], cwd=ROOT, text=True, capture_output=True,
+        env=ENVIRONMENT | {"PYTHONPATH": str(ROOT)}, stdin=subprocess.DEVNULL, check=False, timeout=300,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def store(tmp_path: Path):
+    opened = Store(tmp_path / "cases.sqlite")
+    yield opened
+    opened.close()
+
+
+def test_the_cases_of_a_process_that_was_killed_have_failed(store: Store):
+    run(BEGIN.format(asked="SIGCONT", goes_on=True), store.path)
+    assert fail_begun(store, {"a", "c"}) == {}  # another study's
+    failed = fail_begun(store, {"b", "c"})
+    assert list(failed) == ["b"]
+    assert "the process ended while it computed this case" in failed["b"].message
+    assert store.get({"a", "b"})["b"].status == "failed"
+    assert fail_begun(store, {"b"}) == {}
+    assert [path.name for path in store.path.parent.iterdir()] == ["cases.sqlite"]
+
+
+def test_a_process_that_was_asked_to_end_blames_no_case(store: Store):
+    """Also where C code computes, and Python cannot answer: Slurm then sends SIGKILL."""
+    run(BEGIN.format(asked="SIGTERM", goes_on=False), store.path)
+    assert fail_begun(store, {"a", "b"}) == {}
+    assert [path.name for path in store.path.parent.iterdir()] == ["cases.sqlite"]
+
+
+def test_what_still_runs_or_has_ended_well_blames_no_case(store: Store):
+    with Begun(store.path) as begun:
+        begun.name(["a"])
+        assert len(list(store.path.parent.iterdir())) == 2
+        assert fail_begun(store, {"a"}) == {}
+        assert len(list(store.path.parent.iterdir())) == 2
+    assert [path.name for path in store.path.parent.iterdir()] == ["cases.sqlite"]
+
+
+def test_a_reason_that_was_written_is_that_of_the_failure(store: Store):
+    with Begun(store.path) as begun:
+        begun.name(["a"], "MemoryError: on rank 1")
+    assert fail_begun(store, {"a"})["a"].message == "MemoryError: on rank 1"
+
+
+def test_a_force_that_is_on_record_stays(store: Store):
+    store.put(Record("a", "ok", force=1.0))
+    run(BEGIN.format(asked="SIGCONT", goes_on=False), store.path)
+    assert list(fail_begun(store, {"a", "b"})) == ["b"]
+    assert store.get({"a"})["a"].is_ok
+
+
+def test_a_damaged_file_blames_no_case(store: Store):
+    for number, content in enumerate((b"", b"\0\xff", b"[1]\n", b'{"keys": 3, "why": ""}\n')):
+        store.path.with_name(f".{store.path.name}-begun-{number}").write_bytes(content)
+    assert fail_begun(store, {"a"}) == {}
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_case_that_ends_its_process_fails_in_the_next_run_alone(tmp_path: Path, ranks: int):
+    """The third run tries it again."""
+    file = tmp_path / "small.toml"
+    file.write_text(small_text(mesh={"epsilon": ["4 mm", "6 mm", "full"], "degree": 1}, solve={"exact": False}))
+    words = ("run", file, "--output", tmp_path, "--meshes", tmp_path / "meshes")
+    killed = run(COMMAND.format(ends="os.abort()"), *words, ranks=ranks)
+    assert killed.returncode not in (0, 1, 2)
+    following = run(COMMAND.format(ends="os.abort()"), *words)
+    assert following.returncode == 1, following.stderr
+    assert "the process of an earlier run ended: the case that it was at has failed" in following.stderr
+    assert "2 ok, 1 failed (the process ended while it computed this case" in following.stdout
+    data = xr.load_dataset(tmp_path / "small.nc").squeeze()
+    assert list(data["status"].values) == ["failed", "ok", "ok"]
+    assert np.isfinite(data["force"].values).tolist() == [False, True, True]
+    again = run(COMMAND.format(ends="pass"), *words)
+    assert (again.returncode, "3 ok" in again.stdout) == (0, True), again.stderr
+
+
+def test_a_rank_that_fails_where_the_others_cannot_know_ends_the_run_and_the_next_one_knows_why(tmp_path: Path):
+    ends = "\n        ".join(
+        (
+            "from pipeline.run import failure; failure.PATIENCE = 1.0",
+            "if self._comm.rank: raise MemoryError('no room')",
+            "self._comm.barrier()",
+        )
+    )
+    together = "from pipeline.plan import schedule\nschedule._FEWEST_CELLS = 1\n"
+    file = tmp_path / "small.toml"
+    ratios = {"material": {"poisson": [0.3, 0.4]}}
+    file.write_text(small_text(mesh={"epsilon": "full", "degree": 1}, solve={"exact": False}, **ratios))
+    words = ("run", file, "--output", tmp_path, "--meshes", tmp_path / "meshes")
+    ended = run(together + COMMAND.format(ends=ends), *words, ranks=2)
+    assert ended.returncode not in (0, 2)
+    following = run(COMMAND.format(ends="os.abort()"), *words)
+    assert following.returncode == 1, following.stderr
+    assert "1 failed (MemoryError: no room" in following.stdout
+
+
+def test_results_that_cannot_be_built_are_told_in_words(epsmesh, small, monkeypatch, tmp_path):
+    def broken(*_):
+        raise ValueError("dimension `load` against variable `load`")
+
+    monkeypatch.setattr("pipeline.workflow.publish", broken)
+    done = epsmesh("run", small, "--output", tmp_path / "out", "--json")
+    assert done.exit_code == 1
+    told = json.loads(done.stdout)
+    assert told["status"] == 1
+    assert "cannot be built: ValueError: dimension `load` against variable `load`" in told["errors"][0]["message"]
+    monkeypatch.undo()
+    again = epsmesh("run", small, "--output", tmp_path / "out", "--json")
+    assert (again.exit_code, json.loads(again.stdout)["studies"][0]["stored"]) == (0, 12)
