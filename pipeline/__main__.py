@@ -17,7 +17,6 @@ def main() -> None:
     listens = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # else it is ignored: nohup, or `&`
     if listens:
         signal.signal(signal.SIGINT, _leave)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # scripts/epsmesh keeps it back until now
     from pipeline.cli import main as run  # noqa: PLC0415 (what takes time to load)
 
     try:

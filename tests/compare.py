@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 # Times, memory, iterations and round-off say how the work was done.
-HOW = {"speedup", "load", "memory", "iterations", "balance"}
+HOW = {"speedup", "machine_load", "memory", "iterations", "balance"}
 
 
 def assert_same(one: Path, two: Path, *, rtol: float = 1e-7, alike: bool = True) -> None:

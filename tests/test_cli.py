@@ -147,6 +147,8 @@ def test_interrupted_parallel_run_writes_what_is_done(spawn, small, tmp_path):
 def test_run_killed_at_random_moments_yields_the_same_dataset(spawn, small, whole, tmp_path):
     """SIGKILL, again and again, at any moment: nothing finished is lost, and in the end nothing tells it happened.
 
+    Of the cases that were under way some may have failed in the run after it, and are tried again by the next.
+
     `make faults` does so a hundred times, with other signals, phases and ranks.
     """
     random = np.random.default_rng(1)
@@ -160,10 +162,13 @@ def test_run_killed_at_random_moments_yields_the_same_dataset(spawn, small, whol
             process.kill()
             process.wait()
         status = json.loads(spawn("status", small, "--output", tmp_path / "killed", "--json").stdout)
-        assert status["failed"] == 0
         assert status["ok"] >= done
         done = status["ok"]
-    assert spawn("run", small, "--output", tmp_path / "killed").returncode == 0
+    last = spawn("run", small, "--output", tmp_path / "killed")
+    if "the process of an earlier run ended" in last.stderr:
+        assert last.returncode == 1
+        last = spawn("run", small, "--output", tmp_path / "killed")
+    assert last.returncode == 0, last.stderr
     assert spawn("store", "verify", "--store", tmp_path / "killed" / "cases.sqlite").returncode == 0
     assert_same(*(folder / "small.nc" for folder in (tmp_path / "killed", whole)), alike=False)
 

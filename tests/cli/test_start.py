@@ -1,4 +1,4 @@
-"""Ctrl-C ends the command quietly at any moment of its start: also while Python itself starts."""
+"""Ctrl-C ends the command quietly while it loads, and whoever starts it."""
 
 import json
 import os
@@ -7,39 +7,39 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 
 from pipeline.__main__ import _have_a_home
 from tests.commands import ENVIRONMENT, ROOT, epsmesh
 
-LAUNCHER = ROOT / "scripts" / "epsmesh"
-PATHS = {"PYTHONPATH": str(ROOT), "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
-# Seconds after which Ctrl-C comes: in the shell's part of the command, in Python's start, in ours, and later.
-MOMENTS = (0.0, 0.005, 0.01, 0.02, 0.03, 0.05, 0.1, 0.3)
+# The command, which says when what answers Ctrl-C is in place: as it begins to load the rest.
+COMMAND = """
+import os, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # who starts the tests may have it ignored
+told = []
+def tell(event, words):
+    if event == "import" and words[0] == "pipeline.cli" and not told:
+        told.append(os.write(1, b"ready\\n"))
+sys.addaudithook(tell)
+from pipeline.__main__ import main
+main()
+"""
 
 
-@pytest.mark.parametrize("after", MOMENTS)
+@pytest.mark.parametrize("after", [0.0, 0.05, 0.2, 0.5])
 def test_an_interrupt_ends_it_with_130_and_without_a_word(after):
     command = subprocess.Popen(
-        [LAUNCHER, "plan", "studies/quick.toml"], cwd=ROOT, env=ENVIRONMENT | PATHS, text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        [sys.executable, "-c", COMMAND, "plan", "studies/quick.toml"], cwd=ROOT, text=True,
+        env=ENVIRONMENT | {"PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )  # fmt: skip
+    assert command.stdout is not None
+    assert command.stdout.readline() == "ready\n"
     time.sleep(after)
     command.send_signal(signal.SIGINT)
     said, errors = command.communicate(timeout=60)
     assert errors == ""
     assert command.returncode in (130, -signal.SIGINT) or (command.returncode, bool(said)) == (0, True)
-
-
-def test_the_launcher_hands_on_arguments_and_status():
-    done = subprocess.run(
-        [LAUNCHER, "validate", "a b'c.toml"], cwd=ROOT, env=ENVIRONMENT | PATHS, capture_output=True, text=True,
-        check=False,
-    )  # fmt: skip
-    assert done.returncode == 2
-    assert "a b'c.toml" in done.stderr
 
 
 def test_an_interrupt_of_which_an_import_made_another_exception_is_one(monkeypatch):
