@@ -31,7 +31,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's own mpirun: another one on PATH would not fit Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies docs test test-debian13 debian release slurm-test verify benchmark peers plain-loop realtime resolution stress fuzz soak faults mutants lint format clean
+.PHONY: help setup study studies docs test test-debian13 debian release slurm-test verify benchmark peers plain-loop realtime resolution stress pairs fuzz soak faults mutants lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -113,6 +113,9 @@ stress: setup ## numerical stability: a matrix of extremes (10 minutes)
 
 fuzz: setup ## ten thousand study files, and damaged surfaces, datasets, stores and models (minutes)
 	EPSMESH_FUZZ=$(FUZZ) $(MPI_ENV) $(PYTHON) -m pytest tests/fuzz -q $(PYTEST_ARGS)
+
+pairs: setup ## every feature of a study alone and with every other: taken, or refused with the reason: results/pairs.md
+	$(MPI_ENV) nice $(PYTHON) -m tests.pairs
 
 soak: setup ## 20,000 cases on 2,000 meshes in one run: memory and pace stay flat (a quarter of an hour; SOAK_ARGS=2000: a part)
 	$(MPI_ENV) $(PYTHON) -m benchmarks.soak $(SOAK_ARGS)

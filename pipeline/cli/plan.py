@@ -98,6 +98,9 @@ def _show(study: "Study", found: dict[str, Any], *, quiet: bool, verbose: bool, 
     print(f"{study.title}: {counted(found['cases'], 'case')}{axes_of(study)}")
     for struck in found["struck"]:
         print(f"  {struck['name']:13} {struck['count']:6}  {struck['reason']}")
+    if (unasked := found["exact_unasked"])["scenes"]:
+        more = format_seconds(unasked["seconds"])
+        print(f"  {'exact':13} {unasked['scenes']:6}  F_exact is not asked for: `exact = true` would add {more}.")
     print(f"  to do: {to_do}")
     if found["steps"]:
         print(f"  estimate: {cost}")

@@ -10,8 +10,6 @@ from pipeline.study.sweep import Case
 
 # Fewer Poisson's ratios than this are solved one by one: a basis needs about five solutions itself.
 _FEWEST_RATIOS = 8
-# Records that are called otherwise are not used: their bars in newtons were those of another Poisson's ratio.
-_RECORDS = "reduced, bars of its own"
 # What a basis would have to know besides Poisson's ratio: more parameters, or solutions that do not add up.
 _OBSTACLES: dict[str, Callable[[Case], bool]] = {
     "a body of several materials has more parameters than one": lambda case: bool(case.body.regions),
@@ -29,7 +27,7 @@ def use_reduced_basis(plan: Plan) -> Plan:
     obstacles = [_obstacle(operator.case) for operator in operators]
     tolerance = plan.study.planning.tolerance
     many = {
-        solve.key: digest(f"{solve.key} {_RECORDS} {tolerance!r}")
+        solve.key: digest(f"{solve.key} reduced {tolerance!r}")
         for operator, obstacle in zip(operators, obstacles, strict=True) if not obstacle
         for solve in operator.solves
     }  # fmt: skip

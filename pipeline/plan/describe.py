@@ -9,7 +9,7 @@ from pipeline.plan.deeper import depth_key
 from pipeline.plan.estimate import on_ranks
 from pipeline.plan.plan import Plan
 from pipeline.plan.schedule import schedule
-from pipeline.plan.steps import MeshStep, Solve
+from pipeline.plan.steps import MeshStep, Solve, mesh_steps
 from pipeline.study.sweep import Case
 
 
@@ -39,6 +39,7 @@ def summary(plan: Plan, ranks: int = 1) -> dict[str, Any]:
         "operators": sum(step["operators"] for step in steps),
         "solves": len(plan.solves),
         "exact": sum(solve.is_reference for solve in plan.solves),
+        "exact_unasked": _unasked(plan),
         "struck": [{"name": s.name, "count": s.count, "reason": s.reason} for s in plan.struck],
         "seconds": seconds,
         "memory": max((step["memory"] for step in steps), default=0.0),
@@ -47,6 +48,12 @@ def summary(plan: Plan, ranks: int = 1) -> dict[str, Any]:
         "factor": plan.cost.error,
         "steps": steps,
     }
+
+
+def _unasked(plan: Plan) -> dict[str, float]:
+    """Return how many scenes have no F_exact since nobody has asked for it, and the seconds that it would take."""
+    steps = mesh_steps(plan.unasked, shared=plan.shared)
+    return {"scenes": len(plan.unasked), "seconds": sum(plan.cost.step(step).seconds for step in steps)}
 
 
 def _makespan(costs: Iterable[float], groups: int) -> float:

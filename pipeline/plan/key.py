@@ -7,7 +7,7 @@ from functools import lru_cache
 from math import inf
 from typing import Any
 
-from pipeline.plan.symmetry import is_round, mirror_planes, movement_planes
+from pipeline.plan.symmetry import mirror_planes, movement_planes
 from pipeline.shapes.body import Body
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
@@ -17,30 +17,11 @@ from pipeline.study.sweep import Case
 from pipeline.units import canonical
 
 # Raise by hand when the same input gives another force: records made before are then not used any more.
-PHYSICS_VERSION = 5
+PHYSICS_VERSION = 6
 
-# Where an accuracy is asked for, records are not used whose bars were made without N, or of plates as of other bodies.
-_BARS_ANEW = "bars of N"
-# Above a layer that is thinner than this share of the elements along the probe's edge, those were too long: records of
-# then are not used.
-_THIN, _RIM_ANEW = 1.0, "a rim that follows the layer"
-# Round edges had at least as many elements once, and those of records that were made then are not used.
-_FEWEST, _MORE_EDGES = 8, "twelve edges"
-
+# Keys of a probe that no force depends on: what a blade does, its slice and its incision say.
+_UNPHYSICAL = ("action",)
 _MANY = 200_000  # sections of a large study
-# Keys that came later, with the value that stands for what was before: records of then stay valid.
-_LATER: dict[str, Any] = {
-    "motion": "press",
-    "density": None,
-    "layers": (),
-    "inclusion": (),
-    "axis": None,
-    "incision": 0.0,
-    "ahead": None,
-    "ends": "blade",
-    "depth_range": None,
-    "law": "linear",
-}
 # What a body may hold of other materials.
 _PIECES = ("layers", "inclusion")
 
@@ -56,19 +37,13 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
         str(PHYSICS_VERSION),
         _body_text(case.body, case.scale.stress if scaled else 1.0),
         text_of(case.material, ("density", *(case.material.PROPORTIONAL_TO if scaled else ()))),
-        text_of(case.probe, case.moves_in_proportion if scaled else ()),
+        text_of(case.probe, (*_UNPHYSICAL, *(case.moves_in_proportion if scaled else ()))),
         _ratios_text(case.probe) if scaled else "",
         _mesh_text(case.mesh, folded and case.is_full, case.probe.half_width, case.element),
         text_of(case.solve, ("timing", "repeats", "exact")),
     ]
     if case.load.acts:
         parts.append(_load_text(case.load, case.densities))
-    if case.mesh.accuracy is not None and _has_bars_anew(case):
-        parts.append(_BARS_ANEW)
-    if _has_thin_layer(case):
-        parts.append(_RIM_ANEW)
-    if _has_few_edges(case):
-        parts.append(_MORE_EDGES)
     if case.solve.timing:
         parts += [str(case.labels), str(case.solve.repeats)]
     return digest("\n".join(parts))
@@ -81,37 +56,9 @@ def reference_key(case: Case, accuracy: float) -> str:
     parts = [
         f"{PHYSICS_VERSION} exact {accuracy!r}", _body_text(case.body, case.scale.stress),
         text_of(case.material, ("density", *case.material.PROPORTIONAL_TO)),
-        text_of(probe, probe.proportional_to), ratios,
+        text_of(probe, (*_UNPHYSICAL, *probe.proportional_to)), ratios,
     ]  # fmt: skip
-    exact = replace(case, mesh=Mesh.model_construct({"accuracy"}, accuracy=accuracy))
-    if _has_bars_anew(exact) and not is_round(case):
-        parts.append(_BARS_ANEW)
-    if _has_thin_layer(exact) and not is_round(case):
-        parts.append(_RIM_ANEW)
     return digest("\n".join(parts))
-
-
-def _has_bars_anew(case: Case) -> bool:
-    """Tell whether bars of an accuracy on record may be too small: of mixed elements in thin bodies, and of plates."""
-    return not case.probe.is_unilateral and (case.element == "mixed" or case.is_plate) and case.is_even
-
-
-def _has_thin_layer(case: Case) -> bool:
-    """Tell whether elements along the probe's edge are, or may come to be, long beside a layer below it."""
-    if not case.body.interfaces:
-        return False
-    half_width = case.probe.half_width
-    longest = half_width if case.mesh.accuracy is not None else case.mesh.rim_size(half_width)
-    return case.body.heights[1] - case.body.interfaces[0] < _THIN * longest
-
-
-def _has_few_edges(case: Case) -> bool:
-    """Tell whether a round, singular edge would have no more than the fewest elements by the size that is given."""
-    probe, mesh = case.probe, case.mesh
-    is_chosen = mesh.accuracy is not None and "rim" not in mesh.model_fields_set  # as small as an accuracy takes
-    if is_chosen or not (probe.is_curved and probe.has_singular_edge):
-        return False
-    return probe.perimeter <= _FEWEST * case.mesh.rim_size(probe.half_width)
 
 
 def mesh_key(case: Case) -> str:
@@ -125,7 +72,7 @@ def operator_key(case: Case) -> str:
     """Key of the case's spaces and conditions on its mesh: all but the material's moduli, and the depth if contact is
     found.
     """
-    probe = text_of(case.probe, ("depth",) if case.probe.is_unilateral else ())
+    probe = text_of(case.probe, (*_UNPHYSICAL, "depth") if case.probe.is_unilateral else _UNPHYSICAL)
     law = [case.material.law] if case.material.is_large else []
     return digest("\n".join([mesh_key(case), probe, str(case.mesh.degree), case.element, *law]))
 
@@ -178,7 +125,7 @@ def _body_text(body: Body, stress: float | None = None) -> str:
         del piece["density"]  # written with the loads
         if stress is None:
             del piece["young"], piece["poisson"]
-    return _text({key: value for key, value in content.items() if _LATER.get(key) != value})
+    return _text(content)
 
 
 @lru_cache(_MANY)
@@ -200,9 +147,8 @@ def digest(text: str) -> str:
 
 @lru_cache(_MANY)
 def text_of(section: Section, without: tuple[str, ...] = ()) -> str:
-    """Write a section in canonical form, ``without`` some of its keys, and what was not there in earlier versions."""
-    content = {key: value for key, value in section.model_dump().items() if key not in without}
-    return _text({key: value for key, value in content.items() if _LATER.get(key) != value})
+    """Write a section in canonical form, ``without`` some of its keys."""
+    return _text({key: value for key, value in section.model_dump().items() if key not in without})
 
 
 def _mesh_text(mesh: Mesh, is_full: bool, half_width: float, element: str) -> str:
@@ -216,6 +162,8 @@ def _written(mesh: Mesh, given_keys: frozenset[str], is_full: bool, half_width: 
     content: dict[str, Any]
     if mesh.accuracy is not None:
         given = {key: getattr(mesh, key) for key in given_keys}
+        if is_full or mesh.outside == "coarse":  # what is meshed finely is then chosen
+            given = {key: value for key, value in given.items() if key not in ("epsilon", "outside")}
         content = {**given, "accuracy": mesh.accuracy, "model": mesh.model}
     else:
         content = {"epsilon": "full"}

@@ -76,13 +76,15 @@ def first_attempts(plan: Plan) -> Plan:
 def ask_for_exact(plan: Plan) -> Plan:
     """Add F_exact of every scene, once for all meshes, Young's moduli and depths: F is proportional to both.
 
-    There is none of neo-Hookean bodies.
+    There is none of neo-Hookean bodies, nor beside an accuracy unless `exact = true` asks for it.
     """
     plan = first_attempts(plan)
     if not plan.study.solve.exact:
         return plan
+    is_asked = "exact" in plan.study.solve.model_fields_set
     accuracy = min([EXACT, *(solve.goal * _EXACT_SHARE for solve in plan.solves if solve.goal)])
     found: dict[str, Solve] = {}
+    unasked: dict[str, Solve] = {}
     keys, large = [], 0
     for case in plan.study.cases():
         if case.absence:
@@ -98,11 +100,13 @@ def ask_for_exact(plan: Plan) -> Plan:
             case = plan.study.case(deeper.of)  # noqa: PLW2901
         enough = max(accuracy, EXACT_OF_SLIT) if case.probe.slit else accuracy
         key = reference_key(case, enough)
-        keys.append(key)
-        if key not in found:
-            found[key] = _reference(key, case, enough)
-    plan = plan.struck_by("exact", large, _NO_EXACT)
-    if large == len(keys):
+        is_wanted = is_asked or case.mesh.accuracy is None
+        wanted = found if is_wanted else unasked
+        keys.append(key if is_wanted else ABSENT)
+        if key not in wanted:
+            wanted[key] = _reference(key, case, enough)
+    plan = replace(plan.struck_by("exact", large, _NO_EXACT), unasked=tuple(unasked.values()))
+    if not any(keys):
         return plan
     return replace(plan, solves=(*plan.solves, *found.values()), reference_keys=tuple(keys))
 

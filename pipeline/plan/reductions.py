@@ -144,7 +144,7 @@ def reuse_solutions(plan: Plan) -> Plan:
     plan = replace(plan, reuse=True)
     operators = [operator for step in plan.meshes for operator in step.operators if not step.axisymmetric]
     count = sum(len(operator.solves) - _fresh(operator) for operator in operators)
-    if not count and _has_lone_depths(operators):
+    if not count and _has_lone_depths(operators) and not any(solve.goal for solve in plan.solves):
         return replace(plan, struck=(*plan.struck, Struck("reuse", 0, _LONE_DEPTHS)))
     return plan.struck_by("reuse", count, reason_of(reuse_solutions))
 

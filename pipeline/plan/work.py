@@ -33,7 +33,7 @@ class Plan:
     they begin from their neighbours' solutions, ``condensed`` that many depths of found contact on a small body are
     solved on its surface; ``cost`` estimates what steps take. Of a plan that is one shard's, ``part`` are the keys that
     are its own. ``images`` says, by index, of which other case a case is the image, ``deeper`` of which it is so many
-    times as deep.
+    times as deep. ``unasked`` are the solves that F_exact would take where nobody has asked for it.
     """
 
     study: Study
@@ -48,6 +48,7 @@ class Plan:
     condensed: bool = False
     cost: CostModel = field(default_factory=CostModel)
     part: frozenset[str] | None = None
+    unasked: tuple[Solve, ...] = ()
     images: Mapping[tuple[int, ...], Image] = field(default_factory=dict)
     deeper: Mapping[tuple[int, ...], Deeper] = field(default_factory=dict)
 

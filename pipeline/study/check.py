@@ -13,6 +13,7 @@ from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe, is_direction
 from pipeline.shapes.section import Section, in_mm
 from pipeline.study.check_mesh import (
+    check_chosen,
     check_column,
     check_depth_range,
     check_epsilon,
@@ -57,6 +58,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     for mesh in meshes:
         with problems.about(mesh=mesh):
             check_sizes(mesh, problems)
+    check_chosen(meshes, problems)
     for mesh, probe in itertools.product(meshes, probes):
         with problems.about(mesh=mesh, probe=probe):
             check_epsilon(mesh, probe, problems)

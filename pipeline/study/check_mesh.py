@@ -1,7 +1,7 @@
 """Physical sense of a mesh: its sizes among themselves, and with the body, probe and material that it is for."""
 
 from collections.abc import Sequence
-from math import isfinite
+from math import isfinite, isinf
 
 from pipeline.shapes.body import Body
 from pipeline.shapes.contact import is_flat, is_level
@@ -29,6 +29,20 @@ def check_sizes(mesh: Mesh, problems: Problems) -> None:
         problems.error("mesh.fine", in_mm(mesh.fine), f"must be at most coarse = {in_mm(mesh.coarse)}")
     if mesh.rim is not None and mesh.rim > mesh.fine:
         problems.error("mesh.rim", in_mm(mesh.rim), f"must be at most fine = {in_mm(mesh.fine)}")
+
+
+def check_chosen(meshes: Sequence[Mesh], problems: Problems) -> None:
+    """Refuse an ε that does nothing in all of a study: with an accuracy, sizes are chosen where no part is kept."""
+    if not all(mesh.accuracy is not None and mesh.outside == "coarse" for mesh in meshes):
+        return
+    for mesh in meshes:
+        if "epsilon" in mesh.model_fields_set:
+            problems.error(
+                "mesh.epsilon",
+                "full" if isinf(mesh.epsilon) else in_mm(mesh.epsilon),
+                "does nothing beside an accuracy, for which sizes are chosen: leave one of the two out, or keep a part "
+                'of the body, outside = "free"',
+            )
 
 
 def held_gaps(body: Body, probe: Probe, mesh: Mesh) -> dict[str, float]:

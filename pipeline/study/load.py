@@ -47,6 +47,16 @@ def load_mapping(study: Mapping[str, Any], name: str, folder: str | Path = ".") 
     return parse(raw, file=str(path), text=text)
 
 
+def load_text(text: str, name: str, folder: str | Path = ".") -> Study:
+    """Read the text of a study, such as a dataset carries, as the file ``name``.toml in ``folder`` would be read.
+
+    Raises:
+        StudyError: with every problem of it.
+    """
+    path = str(Path(folder) / f"{name}.toml")
+    return parse(toml_of(text, path), file=path, text=text, trusted=False)
+
+
 def parse(raw: dict[str, Any], *, file: str = "study", text: str = "", trusted: bool = True) -> Study:
     """Turn a study, read from TOML into ``raw``, into a :class:`Study`; ``file`` is for messages.
 

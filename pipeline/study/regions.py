@@ -162,6 +162,13 @@ def _check_sweep(bodies: Sequence[Body], axes: tuple[Axis, ...], problems: Probl
                 f"is a sweep: the whole body is made of {', then of '.join(names)}; layers of one body are "
                 f"[[body.layers]]: {page_of('body.layers')}",
             )  # fmt: skip
+        elif any(isinstance(body, Layered) and body.layers for body in bodies):
+            problems.warn(
+                "[[material]]",
+                None,
+                f"is a sweep, and no layer: below the layers the body is made of {', then of '.join(names)}, in a case "
+                "each; another layer is one more [[body.layers]]",
+            )
 
 
 def _check_material(

@@ -191,10 +191,17 @@ class Solving(Section):
     ] = "auto"
     tolerance: Annotated[
         float,
-        Field(ge=1e-14, le=1e-3),
+        Field(ge=1e-14, le=1e-6),  # above, forces do not balance to what every solve must show
         Words("Of the iterative solver, in its energy norm; the error of F is its square.", "1e-8"),
     ] = 1e-6
-    exact: Annotated[bool, Words("Whether F_exact, F without mesh error, is computed for every scene.", "true")] = True
+    exact: Annotated[
+        bool,
+        Words(
+            "Whether F_exact, F without mesh error, is computed for every scene.",
+            "true",
+            default="true, or false where an accuracy is asked for",
+        ),
+    ] = True
     timing: Annotated[bool, Words("Solve every case afresh and alone, for timings to be compared.", "false")] = False
     repeats: Annotated[
         int,

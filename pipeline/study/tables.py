@@ -16,6 +16,7 @@ from pipeline.study.read import check_text
 from pipeline.study.schema import NESTED, SECTIONS, SINGLE
 from pipeline.study.sweep import Axis
 from pipeline.study.swept import Place, axis_of, placed, sweeps, written
+from pipeline.study.vocabulary import NOT_COMPUTED
 
 # More values in a list, or more cases of a study, are a slip of the pen, or work for several studies: every case is
 # planned and reported, each in a few hundred bytes and a tenth of a millisecond.
@@ -200,6 +201,8 @@ def _possible(name: str, raw: dict[str, Any], problems: Problems, where: str = "
 
 def _lacking(models: Mapping[str, type[Section]] | type[Section], model: type[Section], shape: str, key: str) -> str:
     """Say that a section has no such key; if other shapes have it, or one like it, which do."""
+    if key in NOT_COMPUTED:
+        return NOT_COMPUTED[key]
     if not isinstance(models, Mapping):
         return f"unknown key; {nearest(key, model.model_fields)}"
     article = "an" if shape[0] in "aeiou" else "a"

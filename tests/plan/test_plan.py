@@ -1,7 +1,9 @@
 """The plan: every case gets its record, nothing is solved twice, timing strikes nothing."""
 
+from pipeline.plan.describe import summary
 from pipeline.plan.plan import declare, make_plan
-from tests.cases import study
+from pipeline.study.load import parse
+from tests.cases import BLADE, raw, study
 
 SWEEP = {"material": {"poisson": [0.3, 0.4]}, "mesh": {"epsilon": ["5 mm", "full"], "outside": ["coarse", "free"]}}
 
@@ -48,3 +50,39 @@ def test_timing_strikes_nothing():
     assert len(plan.meshes) == 8
     assert not plan.struck
     assert not any(solve.mirrors for solve in plan.solves)
+
+
+def test_what_a_blade_is_said_to_do_changes_no_force():
+    """A cut that neither slices nor has an incision is a press."""
+    pressed, cut = (study(probe=BLADE | {"action": action}) for action in ("pierce", "cut"))
+    assert make_plan(pressed).keys == make_plan(cut).keys
+
+
+def test_a_radius_that_an_accuracy_makes_meaningless_is_solved_once():
+    sizes = dict.fromkeys(("fine", "coarse", "rim", "growth", "degree"))
+    mesh = {"accuracy": "5 %", "epsilon": ["8 mm", "10 mm"], "outside": ["coarse", "free"]} | sizes
+    plan = make_plan(study(mesh=mesh))
+    assert len(plan.keys) == 4
+    assert len(plan.solves) == 3
+
+
+def test_f_exact_beside_an_accuracy_is_computed_only_where_it_is_asked_for():
+    """Its error bars tell enough; the plan says what F_exact would add."""
+    mesh = {"accuracy": "5 %"} | dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))
+    left_out, asked = (raw(mesh=mesh, solve=solve) for solve in ({"exact": None}, {"exact": True}))
+    plan = make_plan(parse(left_out))
+    assert not any(solve.is_reference for solve in plan.solves)
+    unasked = summary(plan)["exact_unasked"]
+    assert unasked["scenes"] == 1
+    assert unasked["seconds"] > 0
+    plan = make_plan(parse(asked))
+    assert sum(solve.is_reference for solve in plan.solves) == 1
+    assert summary(plan)["exact_unasked"]["scenes"] == 0
+
+
+def test_one_mesh_for_many_depths_is_not_recommended_where_it_is_refused():
+    sphere = {"shape": "sphere", "radius": "6 mm", "contact": "unilateral", "depth": ["0.2 mm", "0.3 mm"]}
+    mesh = {"accuracy": "5 %"} | dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))
+    for changes, is_told in (({}, True), ({"mesh": mesh}, False)):
+        plan = make_plan(study(probe=sphere, **changes))
+        assert any("depth_range" in struck.reason for struck in plan.struck) == is_told

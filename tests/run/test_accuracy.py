@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.plan.key import case_key, reference_key
+from pipeline.plan.key import case_key
 from pipeline.plan.plan import make_plan
 from pipeline.plan.recipe import rungs_for
 from pipeline.report.dataset import build
@@ -78,20 +78,6 @@ def test_what_is_known_of_an_accuracy_that_is_missed_is_how_far():
         assert np.isnan(data[name]).all()
 
 
-def test_records_whose_bars_may_be_too_small_are_not_used():
-    """Those of mixed elements in bodies of one material were made without N; others have the key that they had."""
-
-    def keys(poisson, **probe):
-        case = parse({**raw(material={"poisson": poisson}, probe=probe), "mesh": {"accuracy": "1 %"}}).case(())
-        return case_key(case), reference_key(case, 1e-3)
-
-    assert keys(0.3) == ("4f031aa91df92781458416a5", "8eef3f359c9746762e3cb760")
-    ball = {"shape": "sphere", "radius": "9 mm", "depth": "0.1 mm"}
-    assert keys(0.47, **ball) == ("6c2a4797c270b4c75f0a8f3b", "b4d750dcd52ad55cf85e7460")
-    before = ("1a2ecb93721440921723d91f", "925f3428b885e93a41621952")
-    assert not {*keys(0.47)} & {*before}
-
-
 def test_a_degree_that_is_given_is_another_case_in_any_order():
     """Without one the accuracy may take any."""
 
@@ -123,23 +109,6 @@ def test_a_slender_body_takes_a_coarser_mesh():
         return rungs_for(case, 0.003)[0].mesh.rim
 
     assert rim() > rim(fixed="bottom+sides")
-
-
-@pytest.mark.parametrize(
-    ("mesh", "is_anew"),
-    [
-        ({"rim": "2.9 mm"}, True),
-        ({"rim": "1.5 mm"}, False),
-        ({"rim": "2.9 mm", "accuracy": "2 %"}, True),
-        ({"accuracy": "2 %"}, False),
-    ],
-)
-def test_records_of_discs_that_had_eight_edges_are_not_used(mesh, is_anew, monkeypatch):
-    """Nor where an accuracy was asked for, and the rim given: it is kept."""
-    case = parse({**raw(), "mesh": {"epsilon": "full", "fine": "5 mm", "coarse": "8 mm", **mesh}}).case(())
-    now = case_key(case)
-    monkeypatch.setattr("pipeline.plan.key._FEWEST", 0)
-    assert (case_key(case) != now) == is_anew
 
 
 def test_tissue_that_hardly_changes_its_volume_takes_a_finer_mesh():

@@ -16,7 +16,7 @@ from petsc4py import PETSc
 from pipeline.plan.plan import make_plan
 from pipeline.run import meshing, problem
 from pipeline.run.basis import ReducedBasis
-from pipeline.run.execute import execute
+from pipeline.run.execute import compute, execute
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.progress import Silent
 from pipeline.solve.linear import SolveError
@@ -184,7 +184,10 @@ def test_bars_of_a_reduced_basis_are_unknown_where_a_neighbours_is(begin, monkey
 @pytest.mark.mpi
 def test_wrong_solution_is_a_failed_case():
     """A solver told to stop early returns a solution; the balance of forces gives it away."""
-    (record,) = solve(WORLD, solve={"method": "iterative", "tolerance": 1e-3}).values()
+    plan = make_plan(study(solve={"method": "iterative"}))
+    (solve_,) = plan.solves
+    loose = replace(solve_.case, solve=solve_.case.solve.model_copy(update={"tolerance": 1e-3}))
+    (record,) = compute(replace(plan, solves=(replace(solve_, case=loose),)), WORLD).values()
     assert record.status == "failed"
     assert "do not balance" in record.message
 

@@ -5,8 +5,10 @@ from pathlib import Path
 import pytest
 
 from pipeline.plan.key import case_key
-from pipeline.study.load import load, parse
+from pipeline.study.load import load, load_text, parse
 from pipeline.study.problems import StudyError
+from pipeline.study.toml import to_toml
+from tests import organs
 from tests.cases import BLADE, raw, study
 
 STUDIES = sorted(Path("studies").glob("*.toml"))
@@ -74,6 +76,16 @@ MISTAKES = {
     "truth for a degree": ({"mesh": {"degree": True}}, ["mesh.degree = true", "1, 2 or 3"]),
     "word for a radius": ({"mesh": {"epsilon": "Full"}}, ['mesh.epsilon = "Full"', 'or "full"']),
     "number for a radius": ({"mesh": {"epsilon": float("inf")}}, ['or "full"']),
+    "a loose solver": ({"solve": {"tolerance": 1e-3}}, ["solve.tolerance = 0.001", "at most 1e-06"]),
+    "friction": ({"probe": {"friction": 0.3}}, ["probe.friction = 0.3", "friction is not computed", "bonded"]),
+    "viscoelasticity": ({"material": {"relaxation": []}}, ["material.relaxation", "viscoelasticity is not computed"]),
+    "a radius beside an accuracy": (
+        {
+            "mesh": {"accuracy": "1 %", "epsilon": ["9 mm", "full"]}
+            | dict.fromkeys(("fine", "coarse", "rim", "growth", "degree"))
+        },
+        ["mesh.epsilon", "does nothing beside an accuracy", 'outside = "free"'],
+    ),
     "text for a truth": ({"solve": {"exact": "yes"}}, ['solve.exact = "yes"', "true or false"]),
     "text for a list": ({"plan": {"without": "symmetry"}}, ["plan.without", 'must be a list, such as ["symmetry"]']),
     "cap of two coordinates": (
@@ -335,3 +347,22 @@ def test_equal_cases_have_equal_keys():
     assert key(material={"poisson": 0}) == key(material={"poisson": 0.0})
     assert key(probe={"radius": "3 mm"}) != key(probe={"radius": "3.001 mm"})
     assert key(mesh={"degree": 3}) != key()
+
+
+def test_the_text_of_a_study_is_read_as_if_it_lay_in_its_folder(tmp_path):
+    """A dataset carries the text, and the folder from which files of bodies are found."""
+    organs.write_stl(tmp_path / "box.stl", *organs.box(40e-3, 40e-3, 20e-3))
+    body = {"shape": "surface", "file": "box.stl", "unit": "mm", "fixed": {"below": "-16 mm"}}
+    text = to_toml(raw(body=body), "study.toml")
+    (case,) = load_text(text, "study", tmp_path).cases()
+    assert case.body.volume == pytest.approx(32e-6)
+    with pytest.raises(StudyError, match=r"box\.stl"):
+        load_text(text, "study", tmp_path / "elsewhere")
+
+
+def test_several_materials_beside_layers_are_told_to_be_a_sweep():
+    layers = [{"name": "skin", "thickness": "2 mm", "young": "30 kPa", "poisson": 0.3}]
+    materials = [{"name": name, "young": "10 kPa", "poisson": 0.3} for name in ("a", "b")]
+    content = raw(body={"layers": layers}) | {"material": materials}
+    (warning,) = (text for text in parse(content).warnings if "[[material]]" in text)
+    assert "is a sweep, and no layer" in warning

@@ -1,0 +1,309 @@
+"""Features of studies, alone and in pairs: which are taken, which are refused and why, and whether the taken ones run.
+
+`make pairs` runs all of them and writes results/pairs.md; `tests/test_pairs.py` runs a seeded sample.
+A pair is the base study with the changes of two features. Two features of one slot, such as two bodies, are no pair.
+"""
+
+import argparse
+import copy
+import itertools
+import json
+import math
+import sys
+import tempfile
+import time
+import traceback
+from collections import Counter
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import asdict, dataclass
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+Study = dict[str, Any]
+
+# A bonded disc on a box: coarse meshes, less than a second a case.
+BASE: Study = {
+    "body": {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "bottom"},
+    "material": {"young": "10 kPa", "poisson": 0.3, "density": "1060 kg/m^3"},
+    "probe": {"action": "pierce", "shape": "disc", "radius": "4 mm", "depth": "0.2 mm"},
+    "mesh": {"epsilon": "8 mm", "fine": "3 mm", "coarse": "8 mm", "rim": "1 mm", "growth": 0.8, "outside": "coarse"},
+    "solve": {"exact": False},
+}
+_HELD = {"below": "-16 mm"}
+_CHOSEN_BY_ACCURACY = ("epsilon", "fine", "coarse", "rim", "growth")
+
+
+@dataclass(frozen=True)
+class Feature:
+    """One feature: its slot, of which a study has one value, and the change that brings it into a study."""
+
+    name: str
+    slot: str
+    change: Callable[[Study], None]
+
+
+@dataclass(frozen=True)
+class Result:
+    """What became of a study: taken, refused or failed, in how many seconds, and what was said."""
+
+    name: str
+    outcome: str  # taken | refused | failed | traceback
+    message: str = ""
+    force: float = math.nan
+    error: float = math.nan
+    seconds: float = 0.0
+
+
+def _update(section: str, **keys: Any) -> Callable[[Study], None]:
+    def change(study: Study) -> None:
+        study.setdefault(section, {}).update(copy.deepcopy(keys))
+
+    return change
+
+
+def _body(**keys: Any) -> Callable[[Study], None]:
+    def change(study: Study) -> None:
+        study["body"] = copy.deepcopy(keys)
+
+    return change
+
+
+def _probe(**keys: Any) -> Callable[[Study], None]:
+    def change(study: Study) -> None:
+        del study["probe"]["radius"]
+        study["probe"].update(copy.deepcopy(keys))
+
+    return change
+
+
+def _indenter(**keys: Any) -> Callable[[Study], None]:
+    """Return the change to a tool that finds its contact, whose edge asks for smaller elements."""
+
+    def change(study: Study) -> None:
+        _probe(**keys, contact="unilateral")(study)
+        study["mesh"]["rim"] = "0.3 mm"
+
+    return change
+
+
+def _inclusion(study: Study) -> None:
+    middle = 10 if study["body"]["shape"] == "ellipsoid" else -9
+    inclusion = {"name": "tumour", "at": ["4 mm", "8 mm", f"{middle} mm"], "radius": "3 mm"}
+    study["body"]["inclusion"] = [inclusion | {"young": "50 kPa", "poisson": 0.3, "density": "1060 kg/m^3"}]
+
+
+def _layers(study: Study) -> None:
+    skin = {"name": "skin", "thickness": "4 mm", "young": "30 kPa", "poisson": 0.3, "density": "1060 kg/m^3"}
+    study["body"]["layers"] = [skin]
+
+
+def _poisson(value: float) -> Callable[[Study], None]:
+    def change(study: Study) -> None:
+        for tissue in (study["material"], *study["body"].get("layers", ()), *study["body"].get("inclusion", ())):
+            tissue["poisson"] = value
+
+    return change
+
+
+def _traction(study: Study) -> None:
+    study.setdefault("load", {})["traction"] = [{"on": "free", "pressure": "0.2 kPa"}]
+
+
+def _path(study: Study) -> None:
+    study["probe"]["path"] = {"line": {"from": ["1 mm", "0 mm"], "to": ["4 mm", "0 mm"], "steps": 2}}
+
+
+def _accuracy(study: Study) -> None:
+    mesh = study["mesh"]
+    kept = ("epsilon",) if mesh["outside"] != "coarse" else ()
+    study["mesh"] = {key: value for key, value in mesh.items() if key not in _CHOSEN_BY_ACCURACY or key in kept}
+    study["mesh"]["accuracy"] = "5 %"
+
+
+_BLADE = {"shape": "blade", "length": "8 mm", "width": "2 mm"}
+_CUT = _BLADE | {"action": "cut", "slice": "0.3 mm"}
+_SLIT = _BLADE | {"action": "cut", "width": "1 mm", "incision": "8 mm", "ahead": "3 mm"}
+# In the order in which their changes are made: what a later one does rests on what the earlier ones have set.
+FEATURES = (
+    Feature("cylinder", "body", _body(shape="cylinder", radius="20 mm", height="20 mm", fixed="bottom")),
+    Feature("ellipsoid", "body", _body(shape="ellipsoid", axes=["24 mm", "24 mm", "20 mm"], fixed={"below": "-8 mm"})),
+    Feature("cad", "body", _body(shape="cad", file="box.brep", unit="mm", fixed=_HELD)),
+    Feature("surface", "body", _body(shape="surface", file="box.stl", unit="mm", fixed=_HELD)),
+    Feature("image", "body", _body(shape="image", file="box.nrrd", label=1, fixed=_HELD)),
+    Feature("layers", "layers", _layers),
+    Feature("inclusion", "inclusion", _inclusion),
+    Feature("nu .49", "poisson", _poisson(0.49)),
+    Feature("nu .5", "poisson", _poisson(0.5)),
+    Feature("neo-hookean", "law", _update("material", law="neo-hookean")),
+    Feature("ellipse", "probe", _probe(shape="ellipse", axes=["4 mm", "2.5 mm"])),
+    Feature("blade", "probe", _probe(**_BLADE)),
+    Feature("sphere", "probe", _indenter(shape="sphere", radius="5 mm")),
+    Feature("cone", "probe", _indenter(shape="cone", angle="70 deg", radius="8 mm", tip="1 mm")),
+    Feature("wedge", "probe", _indenter(shape="wedge", angle="75 deg", length="8 mm", tip="1 mm")),
+    Feature("cut", "probe", _probe(**_CUT)),
+    Feature("slit", "probe", _probe(**_SLIT)),
+    Feature("frictionless", "contact", _update("probe", contact="frictionless")),
+    Feature("unilateral", "contact", _update("probe", contact="unilateral")),
+    Feature("gravity", "gravity", _update("load", gravity=["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"])),
+    Feature("traction", "traction", _traction),
+    Feature("free", "outside", _update("mesh", outside="free")),
+    Feature("fixed", "outside", _update("mesh", outside="fixed")),
+    Feature("halfspace", "outside", _update("mesh", outside="halfspace")),
+    Feature("green", "outside", _update("mesh", outside="green")),
+    Feature("off-centre", "place", _update("probe", at=["3 mm", "2 mm"])),
+    Feature("path", "place", _path),
+    Feature("tilted", "tilt", _update("probe", axis=[0.1736, 0.0, -0.9848])),
+    Feature("six motions", "motion", _update("probe", motion="all")),
+    Feature("2 mm deep", "depth", _update("probe", depth="2 mm")),
+    Feature("degree 1", "degree", _update("mesh", degree=1)),
+    Feature("degree 3", "degree", _update("mesh", degree=3)),
+    Feature("accuracy", "accuracy", _accuracy),
+    Feature("model 3d", "model", _update("mesh", model="3d")),
+    Feature("F_exact", "exact", _update("solve", exact=True)),
+    Feature("swept E", "young", _update("material", young=["10 kPa", "20 kPa"])),
+)  # fmt: skip
+
+
+def pairs() -> Iterator[tuple[Feature, ...]]:
+    """Yield every feature alone, then every pair of two slots."""
+    yield from ((feature,) for feature in FEATURES)
+    yield from (pair for pair in itertools.combinations(FEATURES, 2) if pair[0].slot != pair[1].slot)
+
+
+def name_of(features: tuple[Feature, ...]) -> str:
+    """Return the name of a pair."""
+    return " + ".join(feature.name for feature in features)
+
+
+def study_of(features: tuple[Feature, ...]) -> Study:
+    """Return the base study with the changes of ``features``."""
+    study = copy.deepcopy(BASE)
+    for feature in features:
+        feature.change(study)
+    return study
+
+
+def write_bodies(folder: Path) -> None:
+    """Write the box of the base study as a CAD file, as a surface and as an image, a bit rounded there."""
+    import gmsh
+    import nrrd
+    import numpy as np
+
+    from tests import organs
+
+    organs.write_stl(folder / "box.stl", *organs.box(40e-3, 40e-3, 20e-3))
+    label = np.zeros((24, 24, 14), dtype=np.uint8)
+    label[2:-2, 2:-2, 2:-2] = 1
+    header = {
+        "space": "left-posterior-superior",
+        "space directions": np.diag([2.0, 2.0, 2.0]),
+        "space units": ["mm"] * 3,
+    }
+    nrrd.write(str(folder / "box.nrrd"), label, header | {"space origin": np.array([-23.0, -23.0, -23.0])})
+    gmsh.initialize([""], readConfigFiles=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.occ.addBox(-20, -20, -20, 40, 40, 20)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(folder / "box.brep"))
+    finally:
+        gmsh.finalize()
+
+
+def run(features: tuple[Feature, ...], folder: Path, *, solved: bool = True) -> Result:
+    """Run one study in ``folder``, which has the files of :func:`write_bodies`; only read it unless ``solved``."""
+    from pipeline.study.load import load_mapping
+    from pipeline.study.problems import StudyError
+
+    name, start = name_of(features), time.process_time()
+    done = partial(Result, name)
+    try:
+        study = load_mapping(study_of(features), "pair", folder)
+    except StudyError as error:
+        return done("refused", " | ".join(str(problem) for problem in error.problems))
+    except Exception:
+        return done("traceback", traceback.format_exc(limit=-3))
+    if not solved:
+        return done("taken")
+    from mpi4py import MPI
+
+    from pipeline.plan.plan import make_plan
+    from pipeline.run.execute import compute
+
+    try:
+        plan = make_plan(study)
+        records = compute(plan, MPI.COMM_SELF)
+    except Exception:
+        return done("traceback", traceback.format_exc(limit=-3), seconds=time.process_time() - start)
+    seconds = time.process_time() - start
+    for key in (*plan.keys, *plan.reference_keys):
+        if key and not records[key].is_ok:
+            return done("failed", records[key].message, seconds=seconds)
+    first = records[plan.keys[0]]
+    outcome = "taken" if math.isfinite(first.force) and math.isfinite(first.force_error) else "failed"
+    return done(outcome, "" if outcome == "taken" else "no finite force", first.force, first.force_error, seconds)
+
+
+def _run(number: int, folder: str) -> Result:
+    return run(tuple(pairs())[number], Path(folder))
+
+
+def run_all(folder: Path, log: Path, numbers: list[int]) -> list[Result]:
+    """Run pairs, one after another in a process of their own; what kills the process is told of the pair it had."""
+    results: list[Result] = []
+    names = [name_of(pair) for pair in pairs()]
+    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"))
+    with log.open("w", encoding="utf-8") as file:
+        for number in numbers:
+            try:
+                result = pool.submit(_run, number, str(folder)).result()
+            except BrokenProcessPool:
+                result = Result(names[number], "traceback", "the process died")
+                pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"))
+            results.append(result)
+            print(json.dumps(asdict(result)), file=file, flush=True)
+    pool.shutdown()
+    return results
+
+
+def report(results: list[Result]) -> str:
+    """Return the table of what was taken, refused and failed."""
+    count = Counter(result.outcome for result in results)
+    lines = [
+        f"# Features and pairs: taken {count['taken']} of {len(results)}", "",
+        f"refused {count['refused']}, failed {count['failed']}, tracebacks {count['traceback']}; "
+        f"{sum(result.seconds for result in results):.0f} processor seconds", "",
+        "| study | outcome | reason |", "|---|---|---|",
+    ]  # fmt: skip
+    for outcome in ("traceback", "failed", "refused"):
+        for result in results:
+            if result.outcome == outcome:
+                message = " ".join(result.message.split()).replace("|", "/")
+                lines.append(f"| {result.name} | {outcome} | {message[-400:]} |")
+    return "\n".join(lines) + "\n"
+
+
+def main() -> int:
+    """Run the pairs and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", default="", help="pairs with this feature")
+    parser.add_argument("--output", type=Path, default=Path("results"))
+    arguments = parser.parse_args()
+    arguments.output.mkdir(exist_ok=True)
+    every = [[feature.name for feature in pair] for pair in pairs()]
+    numbers = [n for n, names in enumerate(every) if not arguments.only or arguments.only in names]
+    with tempfile.TemporaryDirectory() as folder:
+        write_bodies(Path(folder))
+        results = run_all(Path(folder), arguments.output / "pairs.jsonl", numbers)
+    text = report(results)
+    (arguments.output / "pairs.md").write_text(text, encoding="utf-8")
+    print("\n".join(text.splitlines()[:3]))
+    return int(any(result.outcome in ("failed", "traceback") for result in results))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
