@@ -27,10 +27,10 @@ from benchmarks.ranks import LARGE
 from pipeline import stages
 from pipeline.run.meshing import mesh_case
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.linear import LinearSolver
 from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
+from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.study.load import parse
 from pipeline.verify.machine import MPI_ENVIRONMENT, machine
@@ -48,7 +48,7 @@ def measure(fine: str, degree: int) -> dict[str, Any]:
     case = parse(study).case(())
     body, _ = mesh_case(case, (), comm)
     law, loads = MaterialLaw.of_moduli(10e3, 0.3), Loads.along((0.0, 0.0, -0.2e-3))
-    with Spaces(body) as spaces, _watched() as sent, DisplacementProblem(spaces, degree, Conditions()) as problem:
+    with Spaces(body) as spaces, _watched() as sent, QuasiStaticProblem(spaces, degree, Conditions()) as problem:
         solution = problem.solve(law, loads, method="iterative", estimate=True)
         work = _stages()
     local = {name: sent[name] / sent["iterations"] for name in _MPI} | work

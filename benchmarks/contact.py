@@ -25,8 +25,7 @@ from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of, loads_of, tool_of
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.contact.problem import ContactProblem
-from pipeline.solve.displacement import DisplacementProblem
-from pipeline.solve.mixed import MixedProblem
+from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Solution
 from pipeline.solve.spaces import Spaces
 from pipeline.study.load import parse
@@ -61,8 +60,10 @@ def found(body: BodyMesh, case: Case, *, estimate: bool) -> Solution:
 
 def prescribed(body: BodyMesh, case: Case, *, estimate: bool) -> Solution:
     """Press all that a tool may touch, on the same mesh, as a frictionless punch would; collective."""
-    kind = MixedProblem if case.element == "mixed" else DisplacementProblem
-    with Spaces(body) as spaces, kind(spaces, case.mesh.degree, Conditions(bonded=False)) as problem:
+    with (
+        Spaces(body) as spaces,
+        QuasiStaticProblem(spaces, case.mesh.degree, Conditions(bonded=False), case.element) as problem,
+    ):
         return problem.solve(law_of(case), loads_of(case), estimate=estimate)
 
 

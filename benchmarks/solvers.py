@@ -45,18 +45,18 @@ def measure(element: str, degree: int, poisson: float, size: tuple[float, float]
     from pipeline.run.memory import PeakMemory
     from pipeline.run.meshing import mesh_case
     from pipeline.solve.conditions import Conditions
-    from pipeline.solve.displacement import DisplacementProblem
     from pipeline.solve.material import MaterialLaw
-    from pipeline.solve.mixed import MixedProblem
+    from pipeline.solve.quasi_static import QuasiStaticProblem
     from pipeline.solve.spaces import Spaces
 
     with threadpool_limits(limits=1), ExitStack() as stack:
         mesh, _ = mesh_case(_case(degree, size), ("x", "y"), MPI.COMM_SELF)
         base = PeakMemory(MPI.COMM_SELF)
         held = base.peak()
-        make = MixedProblem if element == "mixed" else DisplacementProblem
-        problem = stack.enter_context(make(stack.enter_context(Spaces(mesh)), degree, Conditions()))
-        run = _mixed_run if isinstance(problem, MixedProblem) else _elastic_run
+        problem = stack.enter_context(
+            QuasiStaticProblem(stack.enter_context(Spaces(mesh)), degree, Conditions(), element)
+        )
+        run = _mixed_run if isinstance(problem, "mixed") else _elastic_run
         matrix, once = run(problem, MaterialLaw.of_moduli(YOUNG, poisson), method, stack)
         runs = []
         for _ in range(repeats):
@@ -96,7 +96,7 @@ def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple
     from pipeline.solve.solution import TOLERANCE
     from pipeline.solve.vectors import vector
 
-    space = problem.space
+    space = problem.elements.displacements
     unit, _ = stack.enter_context(space.operators.lend(law, blocked=space.degree > 1))
     held = space.dofs.held(PRESS)
 
@@ -121,13 +121,13 @@ def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple
 
 def _mixed_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[Any, Callable[[], Any]]:
     """The same for mixed elements; a set-up that serves all ratios counts for one."""
-    from pipeline.solve.mixed import LAME, STRICTER
+    from pipeline.solve.elements import LAME
     from pipeline.solve.saddle import SaddleSolver
     from pipeline.solve.solution import TOLERANCE
 
-    direct, space, c = method == "direct", problem.space, 1 / (law.ratio - LAME.lame[0])
+    direct, space, c = method == "direct", problem.elements.space, 1 / (law.ratio - LAME.lame[0])
     start = time.process_time()
-    saddle, _ = problem.saddle(direct=direct)
+    saddle = problem.elements.saddle(LAME, stack, direct=direct)
     assemble = time.process_time() - start
     # Neither a product without entries nor the matrix of a direct solve is what others multiply with.
     unit, _ = stack.enter_context(space.displacements.operators.lend(LAME, blocked=True))
@@ -139,7 +139,7 @@ def _mixed_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[A
             start = time.process_time()
             with SaddleSolver(saddle, direct=direct) as solver:
                 ready = time.process_time()
-                iterations = solver.solve(c, [rhs], [unknown], STRICTER * TOLERANCE)
+                iterations = solver.solve(c, [rhs], [unknown], problem.elements.stricter * TOLERANCE)
                 return assemble, ready - start, time.process_time() - ready, iterations
 
     return unit, once

@@ -9,7 +9,7 @@ from pipeline.run.measure import turned_back
 from pipeline.run.problem import loads_of
 from pipeline.run.record import Record
 from pipeline.shapes.frame import Vector
-from pipeline.solve.displacement import DisplacementProblem
+from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.reduced_basis import Reduced, ReducedBasis
 
 Compute = Callable[[Solve], Record | None]
@@ -17,7 +17,7 @@ Finish = Callable[[Solve, Record], None]
 
 
 def reduced_records(
-    solves: tuple[Solve, ...], problem: DisplacementProblem, tolerance: float, compute: Compute, finish: Finish
+    solves: tuple[Solve, ...], problem: QuasiStaticProblem, tolerance: float, compute: Compute, finish: Finish
 ) -> None:
     """Solve a few of ``solves`` by ``compute``, which returns None where it fails, and ``finish`` the rest; collective.
 
@@ -34,7 +34,7 @@ def reduced_records(
             todo.remove(following)
             record = compute(following)
             if record is not None and problem.corrections:
-                (correction,) = problem.corrections.values()
+                ((correction,),) = problem.corrections.values()
                 basis.add(correction)
                 solved[_ratio(following)] = record
             if ends or not solved:
@@ -72,9 +72,7 @@ def _ratio(solve: Solve) -> float:
     return lame_lambda / mu
 
 
-def _record(
-    solve: Solve, reduced: Reduced, source: Record, problem: DisplacementProblem, basis: ReducedBasis
-) -> Record:
+def _record(solve: Solve, reduced: Reduced, source: Record, problem: QuasiStaticProblem, basis: ReducedBasis) -> Record:
     """Return the record of an evaluation, which is for μ = 1."""
     scale, (_, mu) = solve.case.scale, solve.case.material.lame
     x, y, z = (mu * component for component in reduced.response.force)

@@ -17,7 +17,6 @@ from pipeline.solve.axisymmetric import MeridianProblem
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.contact.problem import DEGREE, ContactProblem, Tool
 from pipeline.solve.contact.sets import ContactError
-from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.large.newton import LargeError
 from pipeline.solve.large.problem import LargeProblem
 from pipeline.solve.linear import SolveError, is_direct
@@ -25,7 +24,7 @@ from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.meridian_contact import MeridianContact
 from pipeline.solve.meridian_trials import RoundTool
-from pipeline.solve.mixed import MixedProblem
+from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.release import Front
 from pipeline.solve.solution import FieldProblem, Problem, Solution
 from pipeline.solve.spaces import Spaces
@@ -57,9 +56,7 @@ def problem_of(
         return ContactProblem(spaces, tool_of(case), case.element, reuse=reuse, condense=condense)
     if case.material.is_large:
         return LargeProblem(spaces, case.mesh.degree, conditions_of(case))
-    if case.element == "mixed":
-        return MixedProblem(spaces, case.mesh.degree, conditions_of(case))
-    return DisplacementProblem(spaces, case.mesh.degree, conditions_of(case), shared=shared, reuse=reuse)
+    return QuasiStaticProblem(spaces, case.mesh.degree, conditions_of(case), case.element, shared=shared, reuse=reuse)
 
 
 def memory_of(case: Case, dofs: int) -> tuple[float, float]:
@@ -194,7 +191,7 @@ def solve_problem(case: Case, problem: Problem, *, estimate: bool, meshed: Case 
             raise
         solution = problem.solve(law, loads, method="direct", tolerance=tolerance, estimate=estimate)
     if loads.far is not None:
-        solution = replace(solution, time_setup=solution.time_setup + loads.far.seconds)
+        solution.times.setup += loads.far.seconds
     if solution.is_shut:
         raise SolveError("the blade's travel presses the slit shut at its front, where its faces would pass each other")
     return solution

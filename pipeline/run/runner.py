@@ -40,7 +40,7 @@ from pipeline.run.provenance import provenance
 from pipeline.run.record import Record
 from pipeline.run.room import machine_load
 from pipeline.run.sweeping import in_order
-from pipeline.solve.displacement import DisplacementProblem
+from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import FieldProblem
 from pipeline.solve.spaces import Spaces
 
@@ -148,7 +148,7 @@ class StepRunner:
         if step.case.has_own_far_field:
             self._share_far_fields()
         with problem:
-            if step.solves[0].reduced and isinstance(problem, DisplacementProblem):
+            if step.solves[0].reduced and isinstance(problem, QuasiStaticProblem):
                 self._reduce(step, problem, ground)
             for solve in in_order(step, condensed=condense) if reuse or condense else step.solves:
                 if solve.key not in self._records:
@@ -161,7 +161,7 @@ class StepRunner:
             self._has_far_fields = True
             self._caught(lambda: share_far_fields(solve.case for solve in plan.solves))
 
-    def _reduce(self, step: OperatorStep, problem: DisplacementProblem, ground: Ground) -> None:
+    def _reduce(self, step: OperatorStep, problem: QuasiStaticProblem, ground: Ground) -> None:
         """Solve a few and finish the rest from their basis; without a basis those are left to be solved, too."""
 
         def compute(solve: Solve) -> Record | None:

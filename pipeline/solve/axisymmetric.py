@@ -26,7 +26,6 @@ from pipeline.solve.material import MaterialLaw
 from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
 from pipeline.solve.meridian_refine import DirectProblem, best_answer, error_bar, meshes_of, only_along_axis, refined
 from pipeline.solve.meridian_system import (
-    Clock,
     HalfPlane,
     Meshes,
     factorised,
@@ -36,7 +35,7 @@ from pipeline.solve.meridian_system import (
 )
 from pipeline.solve.reaction import reaction
 from pipeline.solve.solution import Solution
-from pipeline.stages import stage
+from pipeline.stages import recorded, stage
 
 DEGREE = 5
 
@@ -68,23 +67,28 @@ class MeridianProblem(DirectProblem):
         for nu in map(poisson_of, law.lame_lambda, law.lame_mu):
             if not 0 <= nu <= 0.5:
                 raise SolveError(f"Poisson's ratio is {nu:g}, must be between 0 and 0.5")
-        clock = Clock()
 
         def solve_on(grading: Grading) -> _Scaled:
-            return _solve_on(self._meridian.mesh(grading), law, self._bonded, self._degree, clock)
+            with stage("meshing"):
+                arrays = self._meridian.mesh(grading)
+            return _solve_on(arrays, law, self._bonded, self._degree)
 
-        best = best_answer(solve_on, self._accuracy)
+        with recorded() as times:
+            best = best_answer(solve_on, self._accuracy)
         a, mu, (amount,) = self._meridian.unit, law.lame_mu[0], loads.amounts
         response = reaction(
             loads, np.array([[mu * a * best.stationary]]), np.array([[0.0, 0.0, mu * a * best.on_probe]]),
             balance=best.balance,
         )  # fmt: skip
         return Solution(
-            response, abs(amount) / a * best.max_strain, best.forms.dofs, best.cells, best.iterations,
+            response=response,
+            max_strain=abs(amount) / a * best.max_strain,
+            dofs=best.forms.dofs,
+            cells=best.cells,
+            iterations=best.iterations,
+            times=times,
             bars=best.error * response.stiffness,
-            time_mesh=clock.seconds["mesh"], time_assemble=clock.seconds["assemble"],
-            time_setup=clock.seconds["setup"], time_solve=clock.seconds["solve"],
-        )  # fmt: skip
+        )
 
 
 def compile_axisymmetric(degree: int = DEGREE, *, curved: bool = False, lowest: int = 0) -> None:
@@ -116,21 +120,20 @@ class _Scaled:
     cells: int = 0
 
 
-def _solve_on(arrays: MeridianArrays, law: MaterialLaw, bonded: bool, degree: int, clock: Clock) -> _Scaled:
+def _solve_on(arrays: MeridianArrays, law: MaterialLaw, bonded: bool, degree: int) -> _Scaled:
     """Solve with degrees p - 1 and p on one mesh: the answer is that of p, its error bar comes from the difference."""
-    clock.seconds["mesh"] += arrays.seconds
-    with clock("mesh"):
+    with stage("meshing"):
         meshes = meshes_of(arrays)
-    coarse = _solve_degree(meshes, degree - 1, law, bonded, clock)
-    fine = _solve_degree(meshes, degree, law, bonded, clock)
+    coarse = _solve_degree(meshes, degree - 1, law, bonded)
+    fine = _solve_degree(meshes, degree, law, bonded)
     error = error_bar(coarse.on_probe, fine.on_probe, degree, max(coarse.balance, fine.balance))
-    with clock("solve"):
+    with stage("solve"):
         return replace(fine, error=error, max_strain=max_strain(fine.forms, arrays), cells=len(arrays.cells))
 
 
-def _solve_degree(meshes: Meshes, degree: int, law: MaterialLaw, bonded: bool, clock: Clock) -> _Scaled:
+def _solve_degree(meshes: Meshes, degree: int, law: MaterialLaw, bonded: bool) -> _Scaled:
     """Solve with one degree; refine the solution until round-off stops it."""
-    with clock("assemble"):
+    with stage("assembly"):
         forms, definite = forms_of(meshes, degree, law)
         stiffness = forms.stiffness()
         probe, support = forms.locate(PROBE, 1), forms.locate(FIXED, 1)
@@ -139,7 +142,7 @@ def _solve_degree(meshes: Meshes, degree: int, law: MaterialLaw, bonded: bool, c
             zero.append(forms.locate(PROBE, 0))
         free = np.setdiff1d(np.arange(forms.dofs), np.concatenate([probe, *zero]))
         unknown = stiffness[free][:, free]
-    with factorised(unknown, definite=definite, clock=clock) as solve, clock("solve"):
+    with factorised(unknown, definite=definite) as solve, stage("solve"):
         solution, residual, balance, steps = refined(forms, solve, free, probe, support, np.full(len(probe), -1.0))
     on_probe, twice_energy = (2 * pi * float(work) for work in (residual[probe].sum(), solution @ residual))
     if on_probe >= 0:

@@ -28,11 +28,11 @@ from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.meridian_refine import DirectProblem, best_answer, error_bar, only_along_axis
 from pipeline.solve.meridian_signs import LiftsOff, check_signs
-from pipeline.solve.meridian_system import Clock, HalfPlane, max_strain
+from pipeline.solve.meridian_system import HalfPlane, max_strain
 from pipeline.solve.meridian_trials import STEP, Rings, RoundTool, Trial, Trials
 from pipeline.solve.reaction import reaction
 from pipeline.solve.solution import Solution
-from pipeline.stages import stage
+from pipeline.stages import recorded, stage
 
 DEGREE = 5
 # A depth this near to the one asked for is near enough: F errs by its square.
@@ -66,27 +66,33 @@ class MeridianContact(DirectProblem):
                 found; if a solve fails a check, or the error bar stays above 1e-3.
         """
         only_along_axis(loads)
-        (depth,), clock = loads.amounts, Clock()
-        search = _Search(self._meridian, self._tool, law, clock)
-        patch = search.find(depth)
-        try:
-            best = self._settled(search, patch, depth)
-        except LiftsOff:
-            if isinstance(self._meridian, EllipticMeridian):
-                raise
-            best = self._settled(search, search.find_rings(patch, depth), depth)
+        (depth,) = loads.amounts
+        with recorded() as times:
+            search = _Search(self._meridian, self._tool, law)
+            patch = search.find(depth)
+            try:
+                best = self._settled(search, patch, depth)
+            except LiftsOff:
+                if isinstance(self._meridian, EllipticMeridian):
+                    raise
+                best = self._settled(search, search.find_rings(patch, depth), depth)
         scale = law.lame_mu[0] * best.trial.unit
         per_depth = scale * best.force / depth
         response = reaction(
             loads, np.array([[per_depth]]), np.array([[0.0, 0.0, -per_depth]]), balance=best.trial.balance
         )
         return Solution(
-            response, best.max_strain, best.trial.forms.dofs, best.cells, search.trials.count,
-            bars=best.error * response.stiffness, contact_area=best.area, contact_radius=(best.area / pi) ** 0.5,
+            response=response,
+            max_strain=best.max_strain,
+            dofs=best.trial.forms.dofs,
+            cells=best.cells,
+            iterations=search.trials.count,
+            times=times,
+            bars=best.error * response.stiffness,
+            contact_area=best.area,
+            contact_radius=(best.area / pi) ** 0.5,
             stored=scale * best.twice_energy / 2,
-            time_mesh=clock.seconds["mesh"], time_assemble=clock.seconds["assemble"],
-            time_setup=clock.seconds["setup"], time_solve=clock.seconds["solve"],
-        )  # fmt: skip
+        )
 
     def _settled(self, search: "_Search", patch: "_Patch", depth: float) -> "_Found":
         return best_answer(lambda grading: search.settle(patch, depth, grading, self._degree), self._accuracy)
@@ -126,15 +132,15 @@ class _Found:
 class _Search:
     """Looks for the radii of contact of a tool on the meridian of a body."""
 
-    def __init__(self, meridian: HalfPlane, tool: RoundTool, law: MaterialLaw, clock: Clock):
-        self._tool, self._clock = tool, clock
+    def __init__(self, meridian: HalfPlane, tool: RoundTool, law: MaterialLaw):
+        self._tool = tool
         kept = meridian.radius if isinstance(meridian, EllipticMeridian) else meridian.kept_radius
         # A flat tool that covers all of a column ends where that does; contact that grows must not get there.
         covers = tool.limit >= kept and tool.is_flat(kept)
         self._widest = kept if covers else _WIDEST * kept
         self._limit = min(tool.limit, self._widest)
         self._covers = covers
-        self.trials = Trials(meridian, tool, law, clock)
+        self.trials = Trials(meridian, tool, law)
 
     def find(self, depth: float) -> _Patch:
         """Return the round patch of contact."""
@@ -212,7 +218,7 @@ class _Search:
             error += max(np.square(misses)) * fine.stiffness * depth / force / patch.power
             radius *= exp(-misses[1] / patch.power)
         error += patch.off**2 * fine.stiffness * depth / force
-        with self._clock("solve"):
+        with stage("solve"):
             solution = depth * fine.punch + fine.pressed
             residual = fine.forms.residual(solution)
             check_signs(fine.forms, arrays, solution, residual, depth, self._tool.gap, self._tool.limit)

@@ -1,6 +1,5 @@
-"""What problems on the meridian share: the operator of all materials, its factor, and the seconds spent."""
+"""What problems on the meridian share: the operator of all materials, and its factor."""
 
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -17,6 +16,7 @@ from pipeline.quantities import CLEAR
 from pipeline.solve.linear import SolveError
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
+from pipeline.stages import stage
 
 # Later than in three dimensions (Mesh.MIXED_FROM, 0.45), since elements of degree 5 lock later than those of degree 2:
 # on three scenes displacement elements differ from mixed ones by 5e-9 to 1e-8 at ν = 0.45 and by 2e-8 at 0.49, take
@@ -35,22 +35,6 @@ Meshes = dict[int, tuple[Any, dict[str, Int32Array]]]
 
 class Unbalanced(SolveError):
     """Round-off has spoilt the solution."""
-
-
-class Clock:
-    """Seconds spent, by kind of work."""
-
-    def __init__(self) -> None:
-        self.seconds = dict.fromkeys(("mesh", "assemble", "setup", "solve"), 0.0)
-
-    @contextmanager
-    def __call__(self, kind: str) -> Iterator[None]:
-        """Count what is done within as seconds of a ``kind``."""
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[kind] += time.perf_counter() - start
 
 
 def forms_of(meshes: Meshes, degree: int, law: MaterialLaw) -> tuple[MeridianForms | JoinedForms, bool]:
@@ -73,7 +57,7 @@ def poisson_of(lame_lambda: float, lame_mu: float) -> float:
 
 
 @contextmanager
-def factorised(matrix: sp.csr_matrix, *, definite: bool, clock: Clock) -> Iterator[Callable[[FloatArray], FloatArray]]:
+def factorised(matrix: sp.csr_matrix, *, definite: bool) -> Iterator[Callable[[FloatArray], FloatArray]]:
     """Factorise by MUMPS, Cholesky if ``definite``, else LDLᵀ with pivoting; lend the function that solves."""
     matrix.sort_indices()
     csr = matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), matrix.data
@@ -89,7 +73,7 @@ def factorised(matrix: sp.csr_matrix, *, definite: bool, clock: Clock) -> Iterat
         return np.array(right.array)
 
     try:
-        with clock("setup"):
+        with stage("set-up"):
             operator.setOption(PETSc.Mat.Option.SYMMETRIC, True)
             if definite:
                 operator.setOption(PETSc.Mat.Option.SPD, True)

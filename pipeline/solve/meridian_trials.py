@@ -19,7 +19,8 @@ from pipeline.solve.linear import SolveError
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
 from pipeline.solve.meridian_refine import meshes_of, refined
-from pipeline.solve.meridian_system import Clock, HalfPlane, Meshes, factorised, forms_of
+from pipeline.solve.meridian_system import HalfPlane, Meshes, factorised, forms_of
+from pipeline.stages import stage
 
 # Trials are on this mesh, by elements of this degree: the depth of a radius comes out to some 1e-5.
 TRIAL_DEGREE = 3
@@ -91,8 +92,8 @@ class Trial:
 class Trials:
     """Solves for contact of one tool on the meridian of one body; ``count`` says how often it did."""
 
-    def __init__(self, meridian: HalfPlane, tool: RoundTool, law: MaterialLaw, clock: Clock):
-        self._meridian, self._tool, self._law, self._clock = meridian, tool, law, clock
+    def __init__(self, meridian: HalfPlane, tool: RoundTool, law: MaterialLaw):
+        self._meridian, self._tool, self._law = meridian, tool, law
         self.count = 0
 
     def at(self, radius: float) -> Trial:
@@ -110,14 +111,14 @@ class Trials:
         meridian = replace(self._meridian, probe_radius=radius, kinks=tuple(sorted(kinks | set(marks))))
         if lost and not isinstance(meridian, EllipticMeridian):
             meridian = replace(meridian, lost=lost)
-        with self._clock("mesh"):
+        with stage("meshing"):
             arrays = meridian.mesh(grading)
             return arrays, meshes_of(arrays)
 
     def solve(self, meshes: Meshes, arrays: MeridianArrays, radius: float, degree: int) -> Trial:
         """Solve for a flat punch and for the gap, with one degree."""
         self.count += 1
-        with self._clock("assemble"):
+        with stage("assembly"):
             forms, definite = forms_of(meshes, degree, self._law)
             stiffness = forms.stiffness()
             dofs, places = forms.on(PROBE)
@@ -128,7 +129,7 @@ class Trials:
             gap = self._tool.gap(np.minimum(places[:, 0] * arrays.unit, self._tool.limit))
             edge = probe[np.argmax(places[:, 0])]
         balance, solutions, residuals = 0.0, [], []
-        with factorised(unknown, definite=definite, clock=self._clock) as solve, self._clock("solve"):
+        with factorised(unknown, definite=definite) as solve, stage("solve"):
             for held in (np.full(len(probe), -1.0), gap):
                 solution, residual, off, _ = refined(forms, solve, free, probe, support, held)
                 solutions.append(solution)
@@ -151,7 +152,7 @@ class Trials:
             SolveError: if the set does not settle.
         """
         arrays, meshes = self.mesh(radius, _TRIAL, marks=marks)
-        with self._clock("assemble"):
+        with stage("assembly"):
             forms, definite = forms_of(meshes, TRIAL_DEGREE, self._law)
             stiffness = forms.stiffness()
             dofs, places = forms.on(PROBE)
@@ -169,8 +170,8 @@ class Trials:
             solution: FloatArray = np.zeros(forms.dofs)
             solution[probe[active]] = bounds[active]
             with (
-                factorised(stiffness[free][:, free], definite=definite, clock=self._clock) as solve,
-                self._clock("solve"),
+                factorised(stiffness[free][:, free], definite=definite) as solve,
+                stage("solve"),
             ):
                 for _ in range(2):
                     solution[free] -= solve(forms.residual(solution)[free])

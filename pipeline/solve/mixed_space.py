@@ -3,7 +3,6 @@
 Pressures are continuous, but from one region of the body to the next.
 """
 
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from functools import cached_property
@@ -27,6 +26,7 @@ from pipeline.solve.straight import assembles, pressure
 from pipeline.solve.straight import mixed as straight
 from pipeline.solve.straight.pressure import CellPressures, Coupling, Mass
 from pipeline.solve.vectors import add_from_ghosts, fill, vector
+from pipeline.stages import stage
 
 
 class MixedSpace:
@@ -49,10 +49,9 @@ class MixedSpace:
         self.dofs = displacements.dofs.dofs + index_map.size_global
         self.whole_dofs = displacements.dofs.whole_dofs + whole_points(self.pressures, body)
         self._body, self._stack = body, ExitStack()
-        start = time.perf_counter()
-        self._products = self._lay_out()
-        self.unit = self._unit()
-        self.assembly_seconds = time.perf_counter() - start
+        with stage("assembly"):
+            self._products = self._lay_out()
+            self.unit = self._unit()
 
     def close(self) -> None:
         """Free the matrices that pressures take part in."""
@@ -164,9 +163,9 @@ class MixedSpace:
         return mass, coupling
 
     @cached_property
+    @stage("assembly")
     def _assembled(self) -> tuple[PETSc.Mat, PETSc.Mat]:
         """M and B; collective."""
-        start = time.perf_counter()
         mass, coupling = self._bare
         free = coupling.createVecRight()
         free.set(1.0)
@@ -175,7 +174,6 @@ class MixedSpace:
         free.destroy()
         mass.scale(self.unit**2)
         coupling.scale(self.unit)
-        self.assembly_seconds += time.perf_counter() - start
         return mass, coupling
 
     def _dilate(self, result: PETSc.Vec, *, checked: bool) -> None:

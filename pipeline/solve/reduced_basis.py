@@ -17,10 +17,10 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.enrich import smallest_eigenvalue
 from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
+from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.reaction import Response, reaction
 from pipeline.solve.vectors import global_sum, vector
 
@@ -41,9 +41,9 @@ class Reduced:
 class ReducedBasis:
     """Solutions of a problem for a few t, and what follows from them for others; a context manager."""
 
-    def __init__(self, problem: DisplacementProblem, loads: Loads, smallest: float, method: str):
+    def __init__(self, problem: QuasiStaticProblem, loads: Loads, smallest: float, method: str):
         """Begin with no solutions, for ``loads`` of one motion; ``smallest`` is the least t asked for. Collective."""
-        self._problem, self._space = problem, problem.space
+        self._problem, self._space = problem, problem.elements.displacements
         (motion,) = loads.motions
         self._loads, self._mirrored = loads, self._space.dofs.body.mirrored
         self._stack = ExitStack()

@@ -72,16 +72,28 @@ class Front:
 class Release:
     """What a unit of advance of a front releases, for the fields of some forms."""
 
-    def __init__(self, body: BodyMesh, front: Front, displacement: Any, lame: tuple[Any, Any], pressure: Any = None):
-        """Compile; collective. ``pressure`` and the λ₀ and μ of ``lame`` are those of mixed elements."""
-        self._comm = body.comm
+    def __init__(
+        self,
+        body: BodyMesh,
+        front: Front,
+        displacement: Any,
+        lame: tuple[Any, Any],
+        pressure: Any = None,
+        *,
+        unit: float = 1.0,
+    ):
+        """Compile; collective.
+
+        ``pressure`` and the λ₀ and μ of ``lame`` are those of mixed elements, moduli are in a ``unit`` (Pa).
+        """
+        self._comm, self._unit = body.comm, unit
         advance = fem.Function(scalar_space(body.mesh, 1))
         advance.interpolate(front.advance)
         self._form = _form(displacement, advance, lame, pressure)
 
     def __call__(self) -> float:
         """Return −dU (J/m) for the present fields, of the modelled part; collective."""
-        return float(self._comm.allreduce(fem.assemble_scalar(self._form), op=MPI.SUM))
+        return self._unit * float(self._comm.allreduce(fem.assemble_scalar(self._form), op=MPI.SUM))
 
     def matrix(self, count: int, put: Callable[[FloatArray], None]) -> FloatArray:
         """Return R (n, n): −dU = c·R·c (J/m), where ``put(c)`` sets the fields of the sum of ``count`` motions c."""

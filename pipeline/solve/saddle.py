@@ -10,7 +10,6 @@ mesh changes the iterations much.
 """
 
 import itertools
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -20,6 +19,7 @@ from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.linear import Level, LinearSolver, SolveError, explain, reason_name
+from pipeline.stages import stage
 
 Pair = tuple[PETSc.Vec, PETSc.Vec]
 Weight = float | FloatArray
@@ -59,7 +59,6 @@ class SaddleSolver:
     """Solves a saddle point for any c; a context manager, which frees what it made.
 
     c is one number, or one for each pressure of this rank. What does not depend on it is set up once.
-    ``setup_seconds`` is the time of all set-up that the last solve relied on, whether it was done for it or before;
     ``first_energies`` are the energy norms, squared, of the errors that an iterative solve began with, as its
     preconditioner sees them, one for each right-hand side.
     """
@@ -67,17 +66,14 @@ class SaddleSolver:
     def __init__(self, saddle: Saddle, *, direct: bool, below: "SaddleSolver | None" = None):
         """Set up; collective. ``below`` is one for elements of one degree less, if there is: see ``LinearSolver``."""
         self._saddle, self._direct = saddle, direct
-        self.setup_seconds = 0.0
         self.first_energies: list[float] = []
-        start = time.perf_counter()
-        with ExitStack() as stack:
+        with ExitStack() as stack, stage("set-up"):
             if not direct:
                 known = None if below is None else below.multigrid
                 self._multigrid = LinearSolver(saddle.levels, direct=False, tolerance=0.5, below=known)
                 stack.callback(self._multigrid.close)
                 self._mass = self._mass_solver(stack)
             self._stack = stack.pop_all()
-        self._shared_seconds = time.perf_counter() - start
 
     def __enter__(self) -> "SaddleSolver":
         return self
@@ -136,8 +132,8 @@ class SaddleSolver:
         blocks = [[saddle.levels[-1].matrix, _keep(stack, transpose)], [saddle.coupling, mass]]
         return _keep(stack, PETSc.Mat().createNest(blocks, comm=saddle.mass.comm))
 
+    @stage("set-up")
     def _factors(self, nest: PETSc.Mat, stack: ExitStack) -> PETSc.KSP:
-        start = time.perf_counter()
         matrix = _keep(stack, nest.convert("aij", PETSc.Mat()))
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         ksp = _krylov(matrix, stack)
@@ -147,14 +143,12 @@ class SaddleSolver:
         with _options(ksp, {"mat_mumps_icntl_14": _PIVOTING}):
             ksp.setFromOptions()
             ksp.setUp()
-        self.setup_seconds = time.perf_counter() - start
         return ksp
 
     def _preconditioner(self, c: Weight, stack: ExitStack) -> "_BlockTriangular":
         saddle = self._saddle
         block = _BlockTriangular(self._multigrid, saddle.coupling, self._mass, c + _SCHUR / saddle.stiffness)
         stack.callback(block.close)
-        self.setup_seconds = self._shared_seconds
         return block
 
     def _mass_solver(self, stack: ExitStack) -> PETSc.KSP:

@@ -13,6 +13,7 @@ from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads, Vector
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.reaction import Response
+from pipeline.stages import Times
 
 # F·d = 2U and F_probe + F_support = 0 hold for the exact solution of the discrete system, and are linear in the
 # solver's error: what misses them by this much has not been solved.
@@ -46,9 +47,9 @@ def check_balance(balance: float) -> None:
         raise SolveError(f"forces do not balance: relative error {balance:.1e}, allowed {BALANCE_LIMIT:.0e}")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Solution:
-    """What one solve gives; all values global and equal on every rank, times in seconds.
+    """What one solve gives; all values global and equal on every rank.
 
     ``max_strain`` is the largest principal strain of a cell's mean strain, clear of singular edges
     (:mod:`pipeline.solve.strain`); ``dofs`` are those of the whole body, ``cells`` those of the part that is modelled,
@@ -69,15 +70,11 @@ class Solution:
     dofs: int
     cells: int
     iterations: int
-    time_assemble: float
-    time_setup: float
-    time_solve: float
-    time_mesh: float = 0.0
+    times: Times
     decrements: FloatArray | None = None
     bars: FloatArray | None = None
     plain: float = nan
     estimate_iterations: int = 0
-    time_estimate: float = 0.0
     contact_area: float = nan
     contact_radius: float = nan
     stored: float | None = None

@@ -57,13 +57,13 @@ class ElasticSpace:
         rhs.array[self.dofs.prescribed_owned] = 0.0
 
     @stage("loads")
-    def applied(self, loads: DeadLoads | None) -> list[Applied]:
-        """Return the dead loads on the dofs of the space, none if there are none; collective.
+    def applied(self, loads: DeadLoads) -> Applied:
+        """Return dead loads on the dofs of the space; collective.
 
         Raises:
             SolveError: if no facet carries a traction.
         """
-        return [] if loads is None else [apply_loads(loads, self.dofs.body, self.dofs.space)]
+        return apply_loads(loads, self.dofs.body, self.dofs.space)
 
     def put(self, rhs: PETSc.Vec, applied: Applied, factor: float = 1.0) -> None:
         """Add ``factor`` times loads to ``rhs``, but for the prescribed dofs."""

@@ -14,7 +14,7 @@ from pipeline.run.problem import law_of
 from pipeline.run.record import Record
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.dead_loads import apply_loads
-from pipeline.solve.displacement import DisplacementProblem
+from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.solve.vectors import global_sum, vector
 from pipeline.study.load import parse
@@ -63,11 +63,11 @@ def _work_without_probe(comm: MPI.Comm, load: Section) -> float:
     found, _ = mesh_case(case, (), comm)
     dead = dead_loads_of(case)
     assert dead is not None
-    with Spaces(found) as spaces, DisplacementProblem(spaces, 2, Conditions(unilateral=True)) as problem:
-        dofs = problem.space.dofs
+    with Spaces(found) as spaces, QuasiStaticProblem(spaces, 2, Conditions(unilateral=True)) as problem:
+        dofs = problem.elements.displacements.dofs
         applied = apply_loads(dead, found, dofs.space)
         with vector(dofs.space) as rhs, vector(dofs.space) as unknown, problem.solver(law_of(case), "direct") as solver:
-            problem.space.put(rhs, applied)
+            problem.elements.displacements.put(rhs, applied)
             solver.solve(rhs, unknown)
             return float(global_sum(comm, np.array([unknown.array @ applied.forces]))[0])
 

@@ -16,9 +16,9 @@ from pipeline.run.problem import conditions_of
 from pipeline.run.record import Record
 from pipeline.scene.model import FIXED, FREE, PROBE, SLIT
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
+from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.study.load import parse
 from pipeline.verify.row import Row
@@ -74,7 +74,7 @@ def strip(comm: MPI.Comm, degree: int) -> tuple[float, float]:
     body = distribute(comm, on_first_rank(comm, relabelled))
     front = conditions_of(case).front
     assert front is not None
-    with Spaces(body) as spaces, DisplacementProblem(spaces, degree, Conditions(front=front)) as problem:
+    with Spaces(body) as spaces, QuasiStaticProblem(spaces, degree, Conditions(front=front)) as problem:
         loads = Loads((), ()).opened(front.normal, _MOVED)
         found = problem.solve(MaterialLaw.of_moduli(_YOUNG, 0.0), loads, estimate=True)
     return found.release / _WIDTH, found.release_bar

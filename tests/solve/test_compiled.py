@@ -14,7 +14,7 @@ from pipeline import compat
 from pipeline.solve.cache import compiling, form_cache
 from pipeline.solve.compiled import form, scalar_space, vector_space
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.displacement import DisplacementProblem
+from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.solve.straight import arrays, product
 from pipeline.solve.straight.stiffness import cell_kernel
@@ -136,7 +136,7 @@ def test_without_products_ranks_multiply_what_they_assemble(monkeypatch):
 
 def iterated():
     """Return the force on a small body, all ranks at it."""
-    with Spaces(make_mesh(MPI.COMM_WORLD)) as spaces, DisplacementProblem(spaces, 2, Conditions()) as problem:
+    with Spaces(make_mesh(MPI.COMM_WORLD)) as spaces, QuasiStaticProblem(spaces, 2, Conditions()) as problem:
         return problem.solve(law(0.3), PRESS, method="iterative").reaction[2]
 
 

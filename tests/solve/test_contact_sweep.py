@@ -52,6 +52,9 @@ def test_force_is_that_of_each_depth_by_itself(plainly, without):
     np.testing.assert_allclose(found["force"], plainly["force"], rtol=1e-8)
     for name in ("contact_area", "energy", "max_strain"):
         np.testing.assert_allclose(found[name], plainly[name], rtol=1e-6)
+    # What elements take to make belongs to every depth that they serve.
+    assert (found["time_assemble"] > 0).all()
+    assert (found["time_setup"] > 0).all()
     assert float(found["iterations"].mean()) < 0.75 * float(plainly["iterations"].mean())
 
 

@@ -12,13 +12,12 @@ from petsc4py import PETSc
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.run.meshing import mesh_arrays, mesh_case
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.error import error_bar
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
-from pipeline.solve.mixed import MixedProblem
 from pipeline.solve.mixed_space import MixedSpace
+from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Solution
 from pipeline.solve.spaces import Spaces
 from pipeline.verify import known
@@ -44,7 +43,7 @@ def make_mesh(comm: MPI.Comm = MPI.COMM_SELF, mirrors: tuple[str, ...] = QUARTER
 
 
 def solve(body: BodyMesh, poisson: float, degree: int = 2, *, bonded: bool = True, **options: Any) -> Solution:
-    with MixedProblem(Spaces(body), degree, Conditions(bonded)) as mixed:
+    with QuasiStaticProblem(Spaces(body), degree, Conditions(bonded), "mixed") as mixed:
         return mixed.solve(law(poisson), PRESS, **options)
 
 
@@ -88,7 +87,7 @@ def test_cylinder_is_within_the_bar(name, poisson):
 def test_agrees_with_displacement_elements(degree):
     body = make_mesh(mesh={"rim": "0.5 mm"})
     mixed = solve(body, 0.4, degree, estimate=True)
-    with DisplacementProblem(Spaces(body), degree, Conditions()) as elastic:
+    with QuasiStaticProblem(Spaces(body), degree, Conditions()) as elastic:
         other = elastic.solve(law(0.4), PRESS, estimate=True)
     bars = mixed.bar * mixed.reaction[2] + error_bar(other.decrement, degree) * other.reaction[2]
     assert mixed.reaction[2] == pytest.approx(other.reaction[2], abs=bars)
@@ -127,7 +126,7 @@ def test_force_is_quadratic_in_the_tolerance():
 
 def test_incompressible_is_the_limit():
     """F is linear in 1 - 2ν towards ½, on one mesh and with one assembly."""
-    with MixedProblem(Spaces(make_mesh()), 2, Conditions()) as body:
+    with QuasiStaticProblem(Spaces(make_mesh()), 2, Conditions(), "mixed") as body:
         near, nearer, limit = (body.solve(law(0.5 - x), PRESS).reaction[2] for x in (2e-5, 1e-5, 0.0))
     assert limit == pytest.approx(2 * nearer - near, rel=1e-8)
     assert limit == pytest.approx(near, rel=1e-4)
@@ -139,7 +138,7 @@ def test_iterations_are_bounded(bonded):
     counts, dofs = [], []
     for rim, fine in (("1 mm", "5 mm"), ("0.25 mm", "3 mm")):
         body = make_mesh(mesh={"rim": rim, "fine": fine, "growth": 0.5})
-        with MixedProblem(Spaces(body), 2, Conditions(bonded)) as mixed:
+        with QuasiStaticProblem(Spaces(body), 2, Conditions(bonded), "mixed") as mixed:
             counts.append(
                 [mixed.solve(law(nu), PRESS, method="iterative").iterations for nu in (0.4, 0.45, 0.4999, 0.5)]
             )
@@ -156,7 +155,7 @@ def test_units_do_not_matter(method):
     numbers = []
     for young, size in ((1e-3, 1.0), (YOUNG, 1.0), (1e12, 1.0), (YOUNG, 0.025), (YOUNG, 250.0)):
         body = distribute(MPI.COMM_SELF, replace(arrays, points=size * arrays.points))
-        with MixedProblem(Spaces(body), 2, Conditions()) as mixed:
+        with QuasiStaticProblem(Spaces(body), 2, Conditions(), "mixed") as mixed:
             s = mixed.solve(law(0.4999, young), PRESS.times(size), method=method, estimate=True)
         unit = young * (DEPTH * size) * size
         numbers.append((s.reaction[2] / unit, s.energy / unit / (DEPTH * size), s.max_strain, s.decrement, s.bar))

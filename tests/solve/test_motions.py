@@ -13,10 +13,9 @@ from pipeline.report import accessor  # noqa: F401 (registers dataset.epsmesh)
 from pipeline.report.dataset import build
 from pipeline.run.execute import compute
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.material import MaterialLaw
-from pipeline.solve.mixed import MixedProblem
+from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.reaction import Sums
 from pipeline.solve.spaces import Spaces
 from pipeline.study.problems import StudyError
@@ -26,11 +25,14 @@ from tests.solve.test_mixed import law, make_mesh
 
 TRAVEL = (0.1e-3, 0.05e-3, -0.2e-3)
 OFF = {"probe": {"at": ["4 mm", "2 mm"]}}
-KINDS = pytest.mark.parametrize(("kind", "poisson"), [(DisplacementProblem, 0.3), (MixedProblem, 0.49)])
+KINDS = pytest.mark.parametrize(("kind", "poisson"), [("displacement", 0.3), ("mixed", 0.49)])
 
 
 def run(kind, loads, poisson=0.3, comm=MPI.COMM_SELF, mesh=None, **options):
-    with Spaces(mesh or make_mesh(comm, (), **OFF)) as spaces, kind(spaces, 2, Conditions()) as problem:
+    with (
+        Spaces(mesh or make_mesh(comm, (), **OFF)) as spaces,
+        QuasiStaticProblem(spaces, 2, Conditions(), kind) as problem,
+    ):
         return problem.solve(law(poisson), loads, **options)
 
 
@@ -73,8 +75,8 @@ def test_stiffness_of_all_motions(kind, poisson):
 
 def test_rotations_are_those_of_the_residuals():
     """Reciprocity: the torque of the pressed probe's residual is what turning it takes along the axis."""
-    found = run(DisplacementProblem, all_six(), tolerance=1e-10)
-    with Spaces(make_mesh(mirrors=(), **OFF)) as spaces, DisplacementProblem(spaces, 2, Conditions()) as problem:
+    found = run("displacement", all_six(), tolerance=1e-10)
+    with Spaces(make_mesh(mirrors=(), **OFF)) as spaces, QuasiStaticProblem(spaces, 2, Conditions()) as problem:
         turned = problem.solve(law(0.3), Loads((all_six().motions[3],), (1.0,)), tolerance=1e-10)
         assert turned.response.forces[0] == pytest.approx(-found.stiffness[:3, 3], rel=1e-6)
         assert 2 * turned.energy == pytest.approx(found.stiffness[3, 3], rel=1e-9)
@@ -90,7 +92,7 @@ def on_half_space(poisson):
     }
     spaces = Spaces(make_mesh(mirrors=(), **changes))
     material = MaterialLaw.of_moduli(2 * (1 + poisson), poisson)
-    with spaces, DisplacementProblem(spaces, 2, Conditions()) as problem:
+    with spaces, QuasiStaticProblem(spaces, 2, Conditions()) as problem:
         loads = Loads.all((0.0, 0.0, -1.0), (0.0, 0.0, 0.0))
         solution = problem.solve(material, loads, estimate=True).extrapolated(2, "displacement")
     unit = 1e-3 * np.outer([1, 1, 1, 1e-3, 1e-3, 1e-3], [1, 1, 1, 1e-3, 1e-3, 1e-3])
@@ -125,7 +127,7 @@ def test_slide_and_tilt_of_a_bonded_disc():
         "mesh": {"fine": "20 mm", "coarse": "20 mm", "rim": "0.3 mm", "growth": 0.6},
     }
     spaces = Spaces(make_mesh(mirrors=(), **changes))
-    with spaces, MixedProblem(spaces, 2, Conditions()) as problem:
+    with spaces, QuasiStaticProblem(spaces, 2, Conditions(), "mixed") as problem:
         loads = Loads.all((0.0, 0.0, -1.0), (0.0, 0.0, 0.0))
         solution = problem.solve(MaterialLaw.of_moduli(3.0, 0.5), loads, estimate=True).extrapolated(2, "mixed")
     unit = 1e-3 * np.outer([1, 1, 1, 1e-3, 1e-3, 1e-3], [1, 1, 1, 1e-3, 1e-3, 1e-3])
@@ -142,10 +144,8 @@ def test_bars_of_movements_hold_those_of_finer_meshes(kind, poisson):
     """The entries of the stiffness, and the forces, of a coarse mesh against those of a finer one of higher degree."""
     coarse, fine = (make_mesh(mirrors=(), mesh={"rim": rim}, **OFF) for rim in ("1.5 mm", "0.5 mm"))
     rough = run(kind, all_six(), poisson, mesh=coarse, estimate=True)
-    with Spaces(fine) as spaces, kind(spaces, 3, Conditions()) as problem:
-        exact = problem.solve(law(poisson), all_six(), estimate=True).extrapolated(
-            3, "mixed" if kind is MixedProblem else "displacement"
-        )
+    with Spaces(fine) as spaces, QuasiStaticProblem(spaces, 3, Conditions(), kind) as problem:
+        exact = problem.solve(law(poisson), all_six(), estimate=True).extrapolated(3, kind)
     assert np.all(np.abs(rough.stiffness - exact.stiffness) <= rough.bars + exact.bars)
     gaps, bars = np.subtract(rough.reaction, exact.reaction), np.add(rough.reaction_bars, exact.reaction_bars)
     assert np.all(np.abs(gaps) <= bars)
@@ -154,7 +154,7 @@ def test_bars_of_movements_hold_those_of_finer_meshes(kind, poisson):
 def test_one_movement_is_a_matrix_of_one():
     """What one degree more takes away, and the bars, are the same whether a movement is solved for alone or not."""
     press = Loads.along((0.0, 0.0, -1.0))
-    alone, among = (run(DisplacementProblem, loads, estimate=True) for loads in (press, Loads.along((1.0, 0.0, -1.0))))
+    alone, among = (run("displacement", loads, estimate=True) for loads in (press, Loads.along((1.0, 0.0, -1.0))))
     assert among.stiffness[0, 0] == pytest.approx(alone.stiffness[0, 0], rel=1e-9)
     assert among.decrements[0, 0] == pytest.approx(alone.decrements[0, 0], rel=1e-6)
     assert among.bars[0, 0] == pytest.approx(alone.bars[0, 0], rel=1e-6)
@@ -163,8 +163,8 @@ def test_one_movement_is_a_matrix_of_one():
 def test_decrements_are_those_of_the_higher_degree():
     """K_p - K_{p+1}, entry by entry, to what the few iterations leave of it."""
     mesh = make_mesh(mirrors=(), **OFF)
-    found = run(DisplacementProblem, all_six(), mesh=mesh, estimate=True)
-    with Spaces(mesh) as spaces, DisplacementProblem(spaces, 3, Conditions()) as problem:
+    found = run("displacement", all_six(), mesh=mesh, estimate=True)
+    with Spaces(mesh) as spaces, QuasiStaticProblem(spaces, 3, Conditions()) as problem:
         wanted = found.stiffness - problem.solve(law(0.3), all_six()).stiffness
     root = np.sqrt(np.diag(wanted))
     assert np.all(np.abs(found.decrements - wanted) <= 0.05 * np.outer(root, root))

@@ -8,9 +8,9 @@ from mpi4py import MPI
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.run.meshing import mesh_case
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
+from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from tests.cases import study
 from tests.organs import ellipsoid, write_stl
@@ -29,7 +29,7 @@ def meshed(body) -> BodyMesh:
 
 
 def force(mesh: BodyMesh, law: MaterialLaw, method: str = "iterative") -> float:
-    with Spaces(mesh) as spaces, DisplacementProblem(spaces, 2, Conditions()) as problem:
+    with Spaces(mesh) as spaces, QuasiStaticProblem(spaces, 2, Conditions()) as problem:
         return problem.solve(law, PRESS, method=method).reaction[2]
 
 

@@ -6,10 +6,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.material import MaterialLaw
-from pipeline.solve.mixed import MixedProblem
 from pipeline.solve.mixed_space import MixedSpace
+from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.single import cycle
 from pipeline.solve.single.blocks import UpperBlocks
 from pipeline.solve.spaces import ElasticSpace, Spaces
@@ -88,7 +87,7 @@ def product_of(multiply, x, like):
 
 @pytest.mark.parametrize(
     ("kind", "degree", "poisson"),
-    [(DisplacementProblem, 1, 0.3), (DisplacementProblem, 2, 0.49), (MixedProblem, 2, 0.5)],
+    [("displacement", 1, 0.3), ("displacement", 2, 0.49), ("mixed", 2, 0.5)],
 )
 def test_forces_and_bars_are_those_of_matrices(kind, degree, poisson, monkeypatch):
     found = solved(kind, degree, poisson)
@@ -104,6 +103,6 @@ def test_forces_and_bars_are_those_of_matrices(kind, degree, poisson, monkeypatc
 def solved(kind, degree, poisson):
     with (
         Spaces(make_mesh(mesh={"rim": "0.5 mm", "fine": "3 mm"})) as spaces,
-        kind(spaces, degree, Conditions()) as problem,
+        QuasiStaticProblem(spaces, degree, Conditions(), kind) as problem,
     ):
         return problem.solve(law(poisson), PRESS, method="iterative", estimate=True)

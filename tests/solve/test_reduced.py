@@ -6,8 +6,8 @@ import pytest
 from mpi4py import MPI
 
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.material import MaterialLaw
+from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.reduced_basis import ReducedBasis
 from pipeline.solve.spaces import Spaces
 from tests.solve.test_mixed import DEPTH, PRESS, make_mesh
@@ -28,7 +28,7 @@ def law_of(poisson: float) -> MaterialLaw:
 @pytest.mark.mpi
 def test_energy_falls_towards_that_of_a_solve_with_each_solution():
     """A combination of more solutions has less energy, never less than the solution itself."""
-    with DisplacementProblem(Spaces(make_mesh(MPI.COMM_WORLD)), 2, Conditions()) as problem:
+    with QuasiStaticProblem(Spaces(make_mesh(MPI.COMM_WORLD)), 2, Conditions()) as problem:
         wanted = problem.solve(law_of(0.4), PRESS).energy
         found = []
         with ReducedBasis(problem, PRESS, t_of(0.0), "auto") as basis:
@@ -49,7 +49,7 @@ def test_energy_falls_towards_that_of_a_solve_with_each_solution():
 def test_many_evaluations_keep_no_memory():
     mesh = make_mesh(mesh={"fine": "2 mm", "rim": "0.5 mm"})
     with (
-        DisplacementProblem(Spaces(mesh), 2, Conditions()) as problem,
+        QuasiStaticProblem(Spaces(mesh), 2, Conditions()) as problem,
         ReducedBasis(problem, PRESS, t_of(0.0), "auto") as basis,
     ):
         problem.solve(law_of(0.3), PRESS)

@@ -5,11 +5,10 @@ import pytest
 from mpi4py import MPI
 
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.displacement import DisplacementProblem
 from pipeline.solve.linear import Level, LinearSolver, SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
-from pipeline.solve.mixed import MixedProblem
+from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.single import code, cycle
 from pipeline.solve.spaces import Spaces
 from tests.solve.test_mixed import PRESS, law, make_mesh
@@ -19,18 +18,18 @@ FINE = {"mesh": {"rim": "0.5 mm", "fine": "3 mm"}}
 
 
 def solved(kind, degree, material, loads=PRESS, **options):
-    with Spaces(make_mesh(**FINE)) as spaces, kind(spaces, degree, Conditions()) as problem:
+    with Spaces(make_mesh(**FINE)) as spaces, QuasiStaticProblem(spaces, degree, Conditions(), kind) as problem:
         return problem.solve(material, loads, method="iterative", estimate=True, **options)
 
 
 @pytest.mark.parametrize(
     ("kind", "degree", "poisson"),
     [
-        (DisplacementProblem, 2, 0.3),
-        (DisplacementProblem, 2, 0.49),
-        (DisplacementProblem, 3, 0.3),
-        (MixedProblem, 2, 0.5),
-        (MixedProblem, 3, 0.47),
+        ("displacement", 2, 0.3),
+        ("displacement", 2, 0.49),
+        ("displacement", 3, 0.3),
+        ("mixed", 2, 0.5),
+        ("mixed", 3, 0.47),
     ],
 )
 def test_force_and_iterations_are_those_of_double_precision(kind, degree, poisson, monkeypatch):
@@ -43,37 +42,37 @@ def test_force_and_iterations_are_those_of_double_precision(kind, degree, poisso
 
 
 def test_a_tolerance_below_that_of_a_float_is_met():
-    exact, found = (solved(DisplacementProblem, 2, law(0.3), tolerance=tolerance) for tolerance in (1e-12, 1e-6))
+    exact, found = (solved("displacement", 2, law(0.3), tolerance=tolerance) for tolerance in (1e-12, 1e-6))
     assert exact.balance < 1e-9
     assert exact.reaction[2] == pytest.approx(found.reaction[2], rel=1e-9)
 
 
 def test_a_smoother_that_took_its_largest_eigenvalue_for_too_small_looks_closer(monkeypatch):
     """As a few slender elements make it do, of which a few steps from noise tell nothing."""
-    known = solved(DisplacementProblem, 2, law(0.3))
+    known = solved("displacement", 2, law(0.3))
     monkeypatch.setattr(cycle, "_LANCZOS", 1)
-    found = solved(DisplacementProblem, 2, law(0.3))
+    found = solved("displacement", 2, law(0.3))
     assert found.reaction[2] == pytest.approx(known.reaction[2], rel=1e-8)
     assert found.bar == pytest.approx(known.bar, rel=0.02)
     monkeypatch.setattr(cycle.SingleCycle, "look_closer", lambda self: None)
     with pytest.raises(SolveError, match="indefinite"):
-        solved(DisplacementProblem, 2, law(0.3))
+        solved("displacement", 2, law(0.3))
 
 
 @pytest.mark.parametrize("stiffer", [1e-20, 1e25])
 @pytest.mark.parametrize("deeper", [1e-15, 1e10])
 def test_no_unit_runs_out_of_numbers(stiffer, deeper):
     (lame_lambda, mu), depth = law(0.3).lame, PRESS.amounts[0]
-    known = solved(DisplacementProblem, 2, law(0.3))
+    known = solved("displacement", 2, law(0.3))
     material = MaterialLaw.of(stiffer * lame_lambda, stiffer * mu)
-    found = solved(DisplacementProblem, 2, material, Loads(PRESS.motions, (deeper * depth,)))
+    found = solved("displacement", 2, material, Loads(PRESS.motions, (deeper * depth,)))
     assert found.reaction[2] == pytest.approx(stiffer * deeper * known.reaction[2], rel=1e-8)
 
 
 def test_it_is_symmetric_and_positive():
     with (
         Spaces(make_mesh(**FINE)) as spaces,
-        DisplacementProblem(spaces, 3, Conditions()) as problem,
+        QuasiStaticProblem(spaces, 3, Conditions()) as problem,
         problem.solver(law(0.4), "iterative") as lent,
     ):
         solver = LinearSolver(lent.levels, direct=False, tolerance=0.5)
@@ -98,7 +97,7 @@ def test_what_a_bound_is_made_of_is_linear_to_the_last_digit():
     """The bound of a reduced basis is what is left of large terms that cancel."""
     with (
         Spaces(make_mesh(**FINE)) as spaces,
-        DisplacementProblem(spaces, 2, Conditions()) as problem,
+        QuasiStaticProblem(spaces, 2, Conditions()) as problem,
         problem.solver(law(0.4), "iterative") as solver,
     ):
         x, y, total, result = (solver.matrix.createVecRight() for _ in range(4))
@@ -114,11 +113,11 @@ def test_what_a_bound_is_made_of_is_linear_to_the_last_digit():
 
 
 def test_without_a_compiler_petsc_s_own_cycle_serves(monkeypatch):
-    wanted = solved(DisplacementProblem, 2, law(0.3))
+    wanted = solved("displacement", 2, law(0.3))
     monkeypatch.setattr(code, "library", lambda: (_ for _ in ()).throw(RuntimeError("no compiler")))
     code.compiles.cache_clear()
     try:
-        assert solved(DisplacementProblem, 2, law(0.3)).reaction[2] == pytest.approx(wanted.reaction[2], rel=1e-9)
+        assert solved("displacement", 2, law(0.3)).reaction[2] == pytest.approx(wanted.reaction[2], rel=1e-9)
     finally:
         code.compiles.cache_clear()
 
@@ -126,7 +125,7 @@ def test_without_a_compiler_petsc_s_own_cycle_serves(monkeypatch):
 def test_an_operator_that_is_not_positive_is_refused():
     with (
         Spaces(make_mesh()) as spaces,
-        DisplacementProblem(spaces, 2, Conditions()) as problem,
+        QuasiStaticProblem(spaces, 2, Conditions()) as problem,
         problem.solver(law(0.3), "iterative") as solver,
     ):
         coarse, fine = solver.levels
@@ -139,7 +138,7 @@ def test_an_operator_that_is_not_positive_is_refused():
 
 def test_moduli_out_of_range_are_refused():
     with (
-        DisplacementProblem(Spaces(make_mesh()), 2, Conditions()) as problem,
+        QuasiStaticProblem(Spaces(make_mesh()), 2, Conditions()) as problem,
         pytest.raises(SolveError, match="the range of single precision"),
     ):
         problem.solve(MaterialLaw.of(1e-38, 1e-38), PRESS, method="iterative")

@@ -5,7 +5,6 @@ inverse of the stiffness condensed to these nodes. Of a set A that is moved to b
 C_AA r = b, exact as those of a direct solve: what is found does not depend on where the search began.
 """
 
-import time
 from contextlib import ExitStack
 
 import numpy as np
@@ -48,14 +47,12 @@ class CondensedElements(DisplacementElements):
         self._multigrid: Hierarchy | None = None
         self._free = self._factor()
         stack.callback(self._free.close)
-        self.setup_seconds = self._free.setup_seconds
         self._dofs = self.numbering.normal_dofs(self.nodes)
         order = np.argsort(3 * self.numbering.local + 2)
         self._place = np.empty_like(order)
         self._place[order] = np.arange(len(order))  # of each candidate among the sorted dofs
-        start = time.perf_counter()
-        self._compliance = self._condense()
-        self.setup_seconds += time.perf_counter() - start
+        with stage("set-up"):
+            self._compliance = self._condense()
 
     def _factor(self) -> LinearSolver:
         space = self.space.dofs

@@ -1,6 +1,5 @@
 """Displacement elements whose nodes below the probe are held where they touch it."""
 
-import time
 from contextlib import ExitStack
 
 import numpy as np
@@ -13,6 +12,7 @@ from pipeline.solve.linear import Level, LinearSolver, is_direct
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.vectors import vector
+from pipeline.stages import stage
 
 
 class DisplacementElements:
@@ -34,13 +34,7 @@ class DisplacementElements:
         self.displacement = stack.enter_context(vector(self.space.dofs.space))
         self._held: Int32Array = np.empty(0, dtype=np.int32)
         self._solver: LinearSolver | None = None
-        self.setup_seconds = 0.0
         stack.callback(self.close)
-
-    @property
-    def assembly_seconds(self) -> float:
-        """What one assembly of all levels takes."""
-        return self.hierarchy.seconds
 
     def close(self) -> None:
         """Free the solver."""
@@ -48,6 +42,7 @@ class DisplacementElements:
             self._solver.close()
             self._solver = None
 
+    @stage("set-up")
     def hold(self, active: BoolArray) -> None:
         """Hold the ``active`` candidates (n) from now on; collective.
 
@@ -55,14 +50,12 @@ class DisplacementElements:
             SolveError: if the solver cannot be set up.
         """
         self._active, self._held = active, self.numbering.normal_dofs(active, owned=True)
-        start = time.perf_counter()
         levels = self.hierarchy.hold(active)
         if self._solver is not None and self._solver.is_single:
             self._solver.hold(levels)
         else:
             self.close()
             self._solver = LinearSolver(levels, direct=self._direct, tolerance=_ANY)
-        self.setup_seconds += time.perf_counter() - start
 
     def improve(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
         """Move what is held to ``bounds`` (n, m), and then the rest; return the iterations: see ``Elements``.

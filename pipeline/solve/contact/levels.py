@@ -38,7 +38,6 @@ class Hierarchy:
         matrices = [stack.enter_context(s.operators.lend_for_cycles(law) if s.degree > 1 and not direct else
                                         s.operators.lend(law, blocked=False)) for s in found]  # fmt: skip
         is_masked = masks and not direct and suits([matrix for matrix, _ in matrices])
-        self.seconds = sum(seconds for _, seconds in matrices)
         self._operators = [
             HeldOperator(space, matrix, law, stack, masked=is_masked and space.degree > 1)
             for space, (matrix, _) in zip(found, matrices, strict=True)

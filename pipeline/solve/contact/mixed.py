@@ -3,7 +3,6 @@
 Equations and solver are those of :mod:`pipeline.solve.mixed`; reactions are those of K₀ u + Bᵀ p.
 """
 
-import time
 from contextlib import ExitStack
 
 import numpy as np
@@ -13,12 +12,13 @@ from pipeline.arrays import BoolArray, FloatArray, Int32Array
 from pipeline.solve.contact.levels import CONDITIONS, Hierarchy, normal_dofs
 from pipeline.solve.contact.sets import State
 from pipeline.solve.contact.surface import Candidates
+from pipeline.solve.elements import DIRECT_LIMIT
 from pipeline.solve.linear import Level
 from pipeline.solve.material import MaterialLaw, SplitLaw
-from pipeline.solve.mixed import DIRECT_LIMIT
 from pipeline.solve.mixed_space import MixedSpace
 from pipeline.solve.saddle import Pair, Saddle, SaddleSolver
 from pipeline.solve.spaces import ElasticSpace, Spaces
+from pipeline.stages import stage
 
 
 class MixedElements:
@@ -47,14 +47,8 @@ class MixedElements:
         self._coupling, self._mass = self.mixed.blocks(entries=self._direct)
         self._held: Int32Array = np.empty(0, dtype=np.int32)
         self._solving: ExitStack | None = None
-        self.setup_seconds = 0.0
         self.first_energy = 0.0
         stack.callback(self.close)
-
-    @property
-    def assembly_seconds(self) -> float:
-        """What one assembly of all blocks takes."""
-        return self.hierarchy.seconds + self.mixed.assembly_seconds
 
     def close(self) -> None:
         """Free the solver."""
@@ -81,9 +75,9 @@ class MixedElements:
         self._active = np.zeros_like(self.nodes)
         self._set_up(self.hierarchy.hold_facets(facets), dofs[dofs < self.space.dofs.owned])
 
+    @stage("set-up")
     def _set_up(self, levels: list[Level], held: Int32Array) -> None:
         self.close()
-        start = time.perf_counter()
         with ExitStack() as stack:
             self._held = held
             coupling = self._holding(stack)
@@ -92,7 +86,6 @@ class MixedElements:
             saddle = Saddle(levels, coupling, self._mass, stiffness, self.space.degree - 1)
             self._solver = stack.enter_context(SaddleSolver(saddle, direct=self._direct))
             self._solving = stack.pop_all()
-        self.setup_seconds += time.perf_counter() - start
 
     def _holding(self, stack: ExitStack) -> PETSc.Mat:
         """Return B with columns of zeros for what is held."""

@@ -5,7 +5,6 @@ their reactions are forces of K u on single nodes, mid nodes and corners alike. 
 mesh it is no bound: a coarse contact area may be too large or too small.
 """
 
-import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -34,6 +33,7 @@ from pipeline.solve.solution import TOLERANCE, Solution, check_balance
 from pipeline.solve.spaces import Spaces
 from pipeline.solve.strain import largest_strain, principal_strains
 from pipeline.solve.vectors import global_sum
+from pipeline.stages import Times, recharge, recorded, stage
 
 DEGREE = 2
 # Energy norm of the error to which each set but the last one is solved, relative to that of the solution.
@@ -112,47 +112,44 @@ class ContactProblem:
             ContactError: if the contact does not settle, reaches the candidates' edge where the probe does not end, or
                 what is held of the body.
         """
-        start = time.perf_counter()
-        depth, before = loads.amounts[0], self._sweep
-        setup = 0.0 if before is None else before.elements.setup_seconds
+        depth = loads.amounts[0]
         self.obstacle = obstacle = Obstacle(self._candidates, self._heights - depth, depth)
         if np.any(obstacle.bounds[self._supported] < 0):
             raise ContactError("the probe runs into what is held of the body: no displacement satisfies both")
-        with ExitStack() as stack:
-            sweep, first, found = self._find(law, method, (_LOOSE, _STRICTER * tolerance), stack)
-            elements = sweep.elements
-            elements.show()
-            self._check_edge(found.active)
-            self.found = found
-            response = self._response(elements, found, loads)
-            check_balance(response.balance)
-            if self._reuse:
-                sweep.keep(depth, found)
-            seconds = elements.assembly_seconds, elements.setup_seconds
-            if sweep is before:  # nothing is assembled for a further depth
-                seconds = 0.0, seconds[1] - setup
-            solution = self._solution(first, found, response, (*seconds, time.perf_counter() - start - sum(seconds)))
+        with recorded() as times, ExitStack() as stack:
+            with stage("solve"):
+                sweep, first, found = self._find(law, method, (_LOOSE, _STRICTER * tolerance), stack)
+                sweep.elements.show()
+                self._check_edge(found.active)
+                self.found = found
+                response = self._response(sweep.elements, found, loads)
+                check_balance(response.balance)
+                if self._reuse:
+                    sweep.keep(depth, found)
+            solution = self._solution(first, found, response, times)
             if not estimate:
                 return solution
-            start = time.perf_counter()
             taken, share, more = self._estimate(sweep, obstacle, found)
         return replace(
             solution, decrements=taken * response.stiffness, bars=share * response.stiffness,
-            plain=plain_share(self._body), estimate_iterations=more, time_estimate=time.perf_counter() - start,
+            plain=plain_share(self._body), estimate_iterations=more,
         )  # fmt: skip
 
-    def _solution(self, first: int, found: Found, response: Response, seconds: tuple[float, float, float]) -> Solution:
-        """Return the solution, which took ``first`` sets of degree 1 to begin with, and ``seconds`` for assembly,
-        set-up and the rest; collective.
-        """
+    def _solution(self, first: int, found: Found, response: Response, times: Times) -> Solution:
+        """Return the solution, which took ``first`` sets of degree 1 to begin with; collective."""
         assert self.obstacle is not None
         area = self._whole * contact_area(self.obstacle, found.active, found.state)
         return Solution(
-            response, largest_strain(self._strain, self._body), self._fine.dofs.whole_dofs, self._body.cells,
-            first + found.sets, *seconds,
-            contact_area=area, contact_radius=(area / np.pi) ** 0.5,
+            response=response,
+            max_strain=largest_strain(self._strain, self._body),
+            dofs=self._fine.dofs.whole_dofs,
+            cells=self._body.cells,
+            iterations=first + found.sets,
+            times=times,
+            contact_area=area,
+            contact_radius=(area / np.pi) ** 0.5,
             stored=None if self._is_as_prescribed(found) else self._whole * found.state.energy / 2,
-        )  # fmt: skip
+        )
 
     def _is_as_prescribed(self, found: Found) -> bool:
         """Tell whether all of a face touches and moves by the depth: the area of contact was no question."""
@@ -202,10 +199,10 @@ class ContactProblem:
             except SolveError:  # afresh, then
                 self._forget()
         with ExitStack() as inner:
-            elements, first = self._start(law, method, inner)
+            elements, first, cost = self._start(law, method, inner)
             active = self._candidates.spread(first.active)
             found = find_set(elements, self.obstacle, active, tolerances, first.state.energy)
-            sweep = Sweep(law, method, elements, inner.pop_all())
+            sweep = Sweep(law, method, elements, inner.pop_all(), cost)
         if self._reuse:
             self._forget()
             self._sweep = sweep
@@ -216,12 +213,13 @@ class ContactProblem:
     def _sweep_of(self, law: MaterialLaw, method: str) -> Sweep | None:
         """Return what is kept of a material, or else, if the surface is to be condensed, that; collective."""
         if self._sweep is not None and (self._sweep.law, self._sweep.method) == (law, method):
+            recharge(self._sweep.cost)
             return self._sweep
         self._forget()
         if self._condense and not self._is_mixed and suits(self._fine, self._candidates, method):
-            with ExitStack() as stack:
+            with ExitStack() as stack, recorded() as cost:
                 elements = CondensedElements(self._spaces, DEGREE, law, self._candidates, stack)
-                self._sweep = Sweep(law, method, elements, stack.pop_all())
+                self._sweep = Sweep(law, method, elements, stack.pop_all(), cost)
         return self._sweep
 
     def _forget(self) -> None:
@@ -229,8 +227,10 @@ class ContactProblem:
             self._sweep.close()
             self._sweep = None
 
-    def _start(self, law: MaterialLaw, method: str, stack: ExitStack) -> tuple[Kind, Found]:
-        """Return the elements, with a displacement to start from, and the set found on elements of degree 1."""
+    def _start(self, law: MaterialLaw, method: str, stack: ExitStack) -> tuple[Kind, Found, Times]:
+        """Return the elements, with a displacement to start from, the set found on elements of degree 1, and what the
+        elements cost to make.
+        """
         assert self.obstacle is not None
         with ExitStack() as inner:
             coarse = DisplacementElements(self._spaces, 1, _softer(law), self._candidates, method, inner)
@@ -240,9 +240,10 @@ class ContactProblem:
             first = find_set(coarse, self.obstacle, below, (_LOOSE,))
             coarse.show()
             kind = MixedElements if self._is_mixed else DisplacementElements
-            elements = kind(self._spaces, DEGREE, law, self._candidates, method, stack)
+            with recorded() as cost:
+                elements = kind(self._spaces, DEGREE, law, self._candidates, method, stack)
             elements.start_from(coarse.space)
-        return elements, first
+        return elements, first, cost
 
     def _held_by_support(self) -> BoolArray:
         """Tell which candidates (n) are held by the support; collective. Of them none is ever found to touch."""

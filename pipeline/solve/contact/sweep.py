@@ -9,6 +9,7 @@ from pipeline.solve.contact.mixed import MixedElements
 from pipeline.solve.contact.neighbours import Neighbours
 from pipeline.solve.contact.sets import Found, Obstacle, find_set
 from pipeline.solve.material import MaterialLaw
+from pipeline.stages import Times
 
 Kind = DisplacementElements | MixedElements | CondensedElements
 
@@ -20,12 +21,16 @@ _SAFE = 1.25
 
 @dataclass(eq=False)
 class Sweep:
-    """Depths of the material of ``law``, by ``elements`` that live until ``close``; ``method`` was asked for."""
+    """Depths of the material of ``law``, by ``elements`` that live until ``close``; ``method`` was asked for.
+
+    ``cost`` is what the elements took to make.
+    """
 
     law: MaterialLaw
     method: str
     elements: Kind
     stack: ExitStack
+    cost: Times = field(default_factory=Times)
     neighbours: Neighbours = field(default_factory=Neighbours)
     _bars: dict[float, tuple[float, float]] = field(default_factory=dict)
 

@@ -13,7 +13,6 @@ of linear elasticity: at moderate depths the result is the same to a few per cen
 degree more give way at the probe's edge, where the tangent is not definite.
 """
 
-import time
 from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
@@ -22,7 +21,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.displacement import DisplacementProblem
+from pipeline.solve.elements import DisplacementElements
 from pipeline.solve.enrich import energy_decrements
 from pipeline.solve.error import error_bar
 from pipeline.solve.large.forms import NeoHookeanForms
@@ -30,12 +29,13 @@ from pipeline.solve.large.newton import Equilibrium, LargeError, assemble, tange
 from pipeline.solve.linear import Level, LinearSolver, is_direct
 from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
+from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.reaction import Response, reaction, sums
 from pipeline.solve.rim import plain_share
 from pipeline.solve.solution import BALANCE_LIMIT, TOLERANCE, Solution
 from pipeline.solve.strain import largest_of
 from pipeline.solve.vectors import vector
-from pipeline.stages import stage
+from pipeline.stages import recorded, stage
 
 # The depth is reached in so many steps at least; smaller ones than this share of it are not tried.
 _FEWEST, _SMALLEST = 3, 1 / 50
@@ -48,7 +48,7 @@ _EASY = 4
 _WORK, _ROUNDING = 3e-4, 1e-13
 
 
-class LargeProblem(DisplacementProblem):
+class LargeProblem(QuasiStaticProblem):
     """The spaces of a mesh, a degree and conditions, for neo-Hookean bodies of one material; a context manager."""
 
     def solve(
@@ -63,34 +63,39 @@ class LargeProblem(DisplacementProblem):
             LargeError: if Newton's method does not get there, or what it finds fails a check.
         """
         (motion,), (depth,) = loads.motions, loads.amounts
-        fine, held = self._fine, self._fine.dofs.held(motion)
+        elements, fine = self.elements, self.elements.displacements
+        assert isinstance(elements, DisplacementElements)
+        held = fine.dofs.held(motion)
         self._forms = NeoHookeanForms(fine.dofs.space, fine.forms)
-        with ExitStack() as stack:
+        with recorded() as times, ExitStack() as stack:
             direct = is_direct(method, self.dofs, fine.degree)
-            levels, assembly = self._hierarchy.levels(law, stack, direct=direct)
+            levels = elements.levels(law, stack, direct=direct)
             solver = LinearSolver(levels, direct=direct, tolerance=TOLERANCE)
             stack.callback(solver.close)
-            start = time.perf_counter()
             body = Equilibrium(fine, self._forms, solver)
             stack.callback(body.close)
             displacement, rate = (stack.enter_context(vector(fine.dofs.space)) for _ in range(2))
-            path = self._press(body, displacement, held, depth, law)
-            response = self._reaction_at(body, displacement, held, loads)
-            self._check(path, law)
-            fine.set_displacement(displacement)
-            seconds = time.perf_counter() - start
+            with stage("solve"):
+                path = self._press(body, displacement, held, depth, law)
+                response = self._reaction_at(body, displacement, held, loads)
+                self._check(path, law)
+                fine.set_displacement(displacement)
             whole = 2.0 ** len(self._body.mirrored)
             solution = Solution(
-                response, self._largest_strain(), fine.dofs.whole_dofs, self._body.cells, body.iterations,
-                assembly, solver.setup_seconds, seconds, stored=whole * path[-1, 2],
-            )  # fmt: skip
+                response=response,
+                max_strain=self._largest_strain(),
+                dofs=fine.dofs.whole_dofs,
+                cells=self._body.cells,
+                iterations=body.iterations,
+                times=times,
+                stored=whole * path[-1, 2],
+            )
             if not estimate:
                 return solution
-            start = time.perf_counter()
-            with vector(fine.dofs.space) as unit:
+            with stage("error bar"), vector(fine.dofs.space) as unit:
                 unit.array[:] = held[: fine.dofs.owned]
                 body.move(displacement, unit, rate)
-            found, more = self._decrement(law, levels, displacement, rate, stack)
+            found, more = self._decrement(elements, law, levels, displacement, rate, stack)
             fine.set_displacement(displacement)
         plain = plain_share(self._body)
         decrement = whole * np.sqrt(found[0, 0] * found[1, 1])
@@ -102,12 +107,12 @@ class LargeProblem(DisplacementProblem):
         bar = error_bar(decrement / (response.stiffness[0, 0] * depth), fine.degree, plain=plain)
         return replace(
             solution, decrements=np.array([[decrement / depth]]), plain=plain, bars=bar * response.stiffness,
-            estimate_iterations=more, time_estimate=time.perf_counter() - start,
+            estimate_iterations=more,
         )  # fmt: skip
 
     def fields(self) -> tuple[Any, FloatArray]:
         """Return the last displacement (m) and each owned cell's principal stretches, less 1; collective."""
-        return self._fine.forms.displacement, self._forms.principal_strains(self._body)
+        return self.elements.displacements.forms.displacement, self._forms.principal_strains(self._body)
 
     def _largest_strain(self) -> float:
         return largest_of(self._forms.principal_strains(self._body), self._body, self._conditions.front)
@@ -123,8 +128,9 @@ class LargeProblem(DisplacementProblem):
         Raises:
             LargeError: if that gets too small.
         """
-        space, owned = self._fine.dofs.space, self._fine.dofs.owned
-        self._fine.forms.set_law(law)
+        fine = self.elements.displacements
+        space, owned = fine.dofs.space, fine.dofs.owned
+        fine.forms.set_law(law)
         path, step = [(0.0, 0.0, 0.0)], depth / _FEWEST
         with vector(space) as unit, vector(space) as rate, vector(space) as trial, vector(space) as forces:
             unit.array[:] = held[:owned]
@@ -150,7 +156,7 @@ class LargeProblem(DisplacementProblem):
         reached, step, depth = way
         if step > (1 - _SLIVER) * (depth - reached):
             step = depth - reached  # not one more for what rounding leaves
-        with vector(self._fine.dofs.space) as forces:
+        with vector(self.elements.displacements.dofs.space) as forces:
             while True:
                 trial.array[:] = displacement.array + step * rate.array
                 try:
@@ -164,15 +170,16 @@ class LargeProblem(DisplacementProblem):
                         raise LargeError(_stopped(reached, depth, error)) from error
 
     def _norm_on_held(self, forces: PETSc.Vec) -> float:
-        on_held = forces.array[self._fine.dofs.prescribed_owned]
-        return float(np.sqrt(self._fine.dofs.comm.allreduce(float(on_held @ on_held))))
+        on_held = forces.array[self.elements.displacements.dofs.prescribed_owned]
+        return float(np.sqrt(self.elements.displacements.dofs.comm.allreduce(float(on_held @ on_held))))
 
     def _work(self, forces: PETSc.Vec, held: FloatArray) -> float:
-        return float(self._fine.dofs.comm.allreduce(float(forces.array @ held[: self._fine.dofs.owned])))
+        dofs = self.elements.displacements.dofs
+        return float(dofs.comm.allreduce(float(forces.array @ held[: dofs.owned])))
 
     def _reaction_at(self, body: Equilibrium, displacement: PETSc.Vec, held: FloatArray, loads: Loads) -> Response:
         """Return the response of the whole body, as a secant; see that forces balance."""
-        (depth,), fine = loads.amounts, self._fine
+        (depth,), fine = loads.amounts, self.elements.displacements
         with vector(fine.dofs.space) as forces:
             body.forces(displacement, forces)
             found = sums(fine.dofs, [forces.array / depth], [held])
@@ -206,14 +213,21 @@ class LargeProblem(DisplacementProblem):
 
     @stage("error bar")
     def _decrement(
-        self, law: MaterialLaw, levels: list[Level], displacement: PETSc.Vec, rate: PETSc.Vec, stack: ExitStack
+        self,
+        elements: DisplacementElements,
+        law: MaterialLaw,
+        levels: list[Level],
+        displacement: PETSc.Vec,
+        rate: PETSc.Vec,
+        stack: ExitStack,
     ) -> tuple[FloatArray, int]:
         """Return a·K⁻¹·b (2, 2) of the residuals of the solution and of its ``rate`` in the space of one degree more.
 
         And the iterations that it took.
         """
-        fine = self._fine
-        finer, solver = self._hierarchy.finer(law, levels, stack)
+        fine = elements.displacements
+        above, solver = elements.finer(law, levels, stack)
+        finer = above.displacements
         forms = NeoHookeanForms(finer.dofs.space, finer.forms)
         finer.forms.set_law(law)
         residuals = [stack.enter_context(vector(finer.dofs.space)) for _ in range(2)]

@@ -1,0 +1,350 @@
+"""A body, a probe that displaces part of its surface, and the force that this takes, whatever the elements.
+
+    Find u with K u = 0 inside, u = the probe's motion on its footprint (bonded) or its normal part only
+    (frictionless), u = 0 on the support.
+
+Where loads f act, w with K w = f and w = 0 on footprint and support is one column more (:mod:`pipeline.solve.carried`).
+Where the cut face moves with a far field (:mod:`pipeline.solve.far_field`), a unit of that field is one, too. With K
+the stiffness of a unit of the tool's movement (0) and a unit of the far field (1), that of what is beyond the cut added
+to K₁₁, the energy is stationary where the share s of the field is -K₁₀ / K₁₁. The work of the tool is then that of both
+sides of the cut together, F d = 2 (U within + U beyond).
+
+The force is the reaction (:mod:`pipeline.solve.reaction`). Stress integrated under the probe is wrong by tens of per
+cent on the same solution.
+"""
+
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from typing import Any, Self
+
+import numpy as np
+from petsc4py import PETSc
+
+from pipeline.arrays import FloatArray
+from pipeline.solve.carried import Carried, carried_of, imbalance, shares
+from pipeline.solve.conditions import Conditions
+from pipeline.solve.earlier import Earlier
+from pipeline.solve.elements import Column, DisplacementElements, DisplacementSolver, Elements, Solver, elements_of
+from pipeline.solve.error import error_bar, stiffness_bars
+from pipeline.solve.forms import mean_strain_form
+from pipeline.solve.linear import LinearSolver, SolveError
+from pipeline.solve.loads import Loads, Motion
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.reaction import Response, reaction, sums
+from pipeline.solve.release import Front, Released
+from pipeline.solve.rim import plain_share
+from pipeline.solve.solution import MOST_ROUNDS, TOLERANCE, Solution, check_balance, rest
+from pipeline.solve.spaces import Spaces
+from pipeline.solve.strain import largest_strain, principal_strains
+from pipeline.solve.vectors import global_sum
+from pipeline.stages import recorded, stage
+
+# The work of both sides of a cut balances where each motion's does to this share of what is asked of it.
+TWO_SIDED = 0.1
+
+
+class QuasiStaticProblem:
+    """Elements on a mesh with conditions: solves for any material and loads. A context manager.
+
+    ``corrections`` are, by motion, the last solution for a unit of it less the prescribed displacements, owned dofs.
+    """
+
+    def __init__(
+        self,
+        spaces: Spaces,
+        degree: int,
+        conditions: Conditions,
+        element: str = "displacement",
+        *,
+        shared: bool = False,
+        reuse: bool = False,
+    ):
+        """Prepare elements of a ``degree``, of a kind, "displacement" or "mixed"; collective.
+
+        ``shared`` assembles A_λ and A_μ apart, once, for many pairs of λ and μ. ``reuse`` begins each solve from the
+        solution of the one before. What the spaces hold is freed with them.
+
+        Raises:
+            SolveError: if footprint and support share a point: no displacement satisfies both.
+        """
+        self.elements: Elements = elements_of(spaces, degree, conditions, element, shared=shared)
+        self.corrections: dict[Motion, tuple[FloatArray, ...]] = {}
+        self._earlier: Earlier | None = None  # of a tool and the far fields of its places
+        self._reuse = reuse and element == "displacement"
+        self._body, self._conditions = spaces.body, conditions
+        displacements = self.elements.displacements
+        self._strain = mean_strain_form(displacements.dofs.space, displacements.forms.displacement)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.corrections.clear()
+        self._earlier = None
+        self.elements.close()
+
+    @property
+    def dofs(self) -> int:
+        """Unknowns of the modelled part."""
+        return self.elements.dofs
+
+    def solve(
+        self,
+        law: MaterialLaw,
+        loads: Loads,
+        *,
+        method: str = "auto",
+        tolerance: float = TOLERANCE,
+        estimate: bool = False,
+    ) -> Solution:
+        """Solve for each motion of ``loads``, with one set-up, and return forces and checks; collective.
+
+        ``tolerance`` is that of the energy norm of the solver's error. ``estimate`` goes on in elements of one degree
+        more, for the solution's ``decrements``, which may be negative for mixed ones, and ``bars``.
+
+        Raises:
+            SolveError: if the elements are not for the law, the solver did not converge, or the solution fails a check.
+        """
+        elements, direct = self.elements, self.elements.is_direct(method)
+        with recorded() as times, ExitStack() as stack:
+            earlier = self._earlier_of(law, loads, direct=direct)
+            solver = elements.set_up(law, stack, direct=direct, keep=earlier is not None)
+            with stage("assembly"):
+                columns = elements.columns(loads, stack)
+                for column in columns:
+                    elements.lift(column, law)
+            with stage("solve"):
+                self._guess(columns, loads, earlier)
+                iterations, response, carried = self._iterate(
+                    solver, columns, law, loads, earlier, direct=direct, tolerance=tolerance
+                )
+                if loads.far is not None:
+                    loads = _close(columns, response)
+                    response = _balanced(self._response(elements, columns, law, loads)[0])
+                self.corrections = {
+                    motion: tuple(part.array.copy() for part in column.unknown)
+                    for motion, column in zip(loads.motions, columns, strict=False)
+                }
+                self._show(columns, loads)
+            released, pushed = self._released(elements, columns, law, loads)
+            self._show(columns, loads)
+            solution = Solution(
+                response=response,
+                carried=carried,
+                max_strain=self._largest_strain(),
+                dofs=elements.whole_dofs,
+                cells=self._body.cells,
+                iterations=iterations,
+                times=times,
+                released=released,
+                pushed=pushed,
+            )
+            if estimate:
+                solution = self._estimated(solution, solver, columns, law, loads)
+                self._show(columns, loads)
+        return solution
+
+    def _iterate(
+        self,
+        solver: Solver,
+        columns: list[Column],
+        law: MaterialLaw,
+        loads: Loads,
+        earlier: Earlier | None,
+        *,
+        direct: bool,
+        tolerance: float,
+    ) -> tuple[int, Response, Carried | None]:
+        """Solve for ``columns`` until forces balance; return the iterations, and what the solutions do.
+
+        Raises:
+            SolveError: if they do not.
+        """
+        aim = tolerance * min(self.elements.stricter, TWO_SIDED if loads.far is not None else 1.0)
+        known = {} if earlier is None else earlier.known
+        todo = [column for number, column in enumerate(columns) if _motion(loads, number) not in known]
+        iterations = solver.solve(todo, aim)
+        for further in range(MOST_ROUNDS + 1):
+            response, carried = self._response(self.elements, columns, law, loads)
+            share = rest(response.balance, tolerance)
+            if direct or share == 1.0 or further == MOST_ROUNDS:
+                break
+            iterations += solver.improve(columns, share)
+        check_balance(response.balance)
+        if earlier is not None and isinstance(solver, DisplacementSolver):
+            solver.remember(earlier, loads.motions, columns)
+        return iterations, response, carried
+
+    def _earlier_of(self, law: MaterialLaw, loads: Loads, *, direct: bool) -> Earlier | None:
+        """Return what was solved with a law, for far fields of many places: of one law at a time it is kept."""
+        if not self._reuse or loads.far is None or direct:
+            return None
+        if self._earlier is None or self._earlier.law != law:
+            dofs = self.elements.displacements.dofs
+            self._earlier = Earlier(dofs.comm, dofs.owned, law)
+        return self._earlier
+
+    def _guess(self, columns: Sequence[Column], loads: Loads, earlier: Earlier | None) -> None:
+        """Begin with the last solution for each motion, or with what ``earlier`` ones tell of it."""
+        for motion, column in zip(loads.motions, columns, strict=False):
+            if self._reuse and motion in self.corrections:
+                for part, values in zip(column.unknown, self.corrections[motion], strict=True):
+                    part.array[:] = values
+            elif earlier is not None:
+                known = earlier.known.get(motion)
+                column.unknown[0].array[:] = earlier.guess(column.right[0].array) if known is None else known
+
+    def _response(
+        self, elements: Elements, columns: Sequence[Column], law: MaterialLaw, loads: Loads, *, checked: bool = True
+    ) -> tuple[Response, Carried | None]:
+        """Return the response to the motions, and what dead loads do, of which the last column is; collective.
+
+        ``checked``: see :meth:`ElasticSpace.apply`.
+        """
+        found = elements.products(law, columns, checked=checked)
+        count, mirrored = len(loads.motions), self._body.mirrored
+        motions, loaded = columns[:count], columns[count:]
+        residuals = [
+            residual if column.applied is None else residual - column.applied.forces
+            for residual, column in zip(found.residuals, columns, strict=True)
+        ]
+        dofs = elements.displacements.dofs
+        total = sums(dofs, residuals, [column.prescribed for column in motions])
+        beyond = _energy_beyond(loads, law.lame_mu[0], mirrored)
+        response = reaction(loads, found.stationary[:count, :count] + beyond, total.on_probe[:count], mirrored)
+        balance = total.imbalance(found.energies[:count], loads, mirrored)
+        if not loaded:
+            return replace(response, balance=balance), None
+        (applied,) = (column.applied for column in loaded)
+        assert applied is not None
+        works = global_sum(dofs.comm, np.array([u @ applied.forces for u in found.moved]))
+        balance = max(balance, imbalance(total, found.energies, works, applied, loads, mirrored))
+        carried = carried_of(found.stationary, works, total.on_probe[-1], mirrored, apart=loads.apart)
+        return replace(response, balance=balance), carried
+
+    @stage("error bar")
+    def _estimated(
+        self, solution: Solution, solver: Solver, columns: Sequence[Column], law: MaterialLaw, loads: Loads
+    ) -> Solution:
+        """Return the last ``solution`` with its bars; collective."""
+        elements, whole = self.elements, 2.0 ** len(self._body.mirrored)
+        with ExitStack() as stack:
+            finer = solver.enrich(columns, loads, stack, keep=self._conditions.front is not None)
+            form = _form(solution.response, solution.carried)
+            if finer.decrements is None:
+                decrements = form - _form(*self._response(finer.elements, finer.columns, law, loads, checked=False))
+            else:
+                decrements = whole * finer.decrements
+            released, pushed = None, None
+            if finer.columns:
+                released, pushed = self._released(finer.elements, finer.columns, law, loads)
+        plain = plain_share(self._body)
+        unseen = None if finer.unseen is None else shares(np.diag(whole * finer.unseen), form)
+        relative = [
+            error_bar(share, elements.degree, elements.element, plain=plain, unseen=rest)
+            for share, rest in zip(
+                shares(decrements, form), np.zeros(len(form)) if unseen is None else unseen, strict=True
+            )
+        ]
+        bars = stiffness_bars(form, np.array(relative))
+        return replace(
+            solution.with_bars(decrements, bars, elements.element, apart=loads.apart),
+            plain=plain,
+            unseen=None if unseen is None else unseen[: len(loads.motions)],
+            released_finer=released,
+            pushed_finer=pushed,
+            estimate_iterations=finer.iterations,
+        ).with_release_bar(elements.degree)
+
+    @stage("energy release")
+    def _released(self, elements: Elements, columns: Sequence[Column], law: MaterialLaw, loads: Loads) -> Released:
+        """Return what a slit's front and the blade's tip in the whole body release (J/m), by pairs of motions."""
+        motions = columns[: len(loads.motions)]
+
+        def of(line: Front | None) -> FloatArray | None:
+            if line is None:
+                return None
+            release = elements.release(law, line)
+            found = release.matrix(len(motions), lambda amounts: elements.show(motions, list(amounts)))
+            return 2.0 ** len(self._body.mirrored) * found
+
+        return of(self._conditions.front), of(self._conditions.tip)
+
+    def _show(self, columns: Sequence[Column], loads: Loads) -> None:
+        """Make the sum of the motions, and what loads do, the fields of the forms; collective."""
+        self.elements.show(columns, [*loads.amounts, *(1.0 for _ in columns[len(loads.motions) :])])
+
+    @contextmanager
+    def solver(self, law: MaterialLaw, method: str = "auto", *, linear: bool = True) -> Iterator[LinearSolver]:
+        """Lend a solver for a material, of displacement elements; collective.
+
+        ``linear``: its preconditioner is, to the last digit.
+
+        Raises:
+            SolveError: if it cannot be set up.
+        """
+        elements = self.elements
+        assert isinstance(elements, DisplacementElements)
+        direct = elements.is_direct(method)
+        with ExitStack() as stack:
+            levels = elements.levels(law, stack, direct=direct, entries=linear)
+            solver = LinearSolver(levels, direct=direct, tolerance=0.5, linear=linear)
+            stack.callback(solver.close)
+            yield solver
+
+    def fields(self) -> tuple[Any, FloatArray]:
+        """Return the last solution's displacement (m) and the principal strains of each owned cell; collective."""
+        return self.elements.displacements.forms.displacement, principal_strains(self._strain, self._body)
+
+    def largest_strain(self, displacement: PETSc.Vec) -> float:
+        """Return the largest principal strain of ``displacement``; collective."""
+        self.elements.displacements.set_displacement(displacement)
+        return self._largest_strain()
+
+    def _largest_strain(self) -> float:
+        return largest_strain(self._strain, self._body, self._conditions.front)
+
+
+def _motion(loads: Loads, number: int) -> Motion | None:
+    return loads.motions[number] if number < len(loads.motions) else None
+
+
+def _close(columns: list[Column], response: Response) -> Loads:
+    """Make one motion, with its share of the far field, of two: return it.
+
+    Raises:
+        SolveError: if the tool's movement has none.
+    """
+    share = -float(response.stiffness[1, 0] / response.stiffness[1, 1])
+    if not np.isfinite(share):
+        raise SolveError("the far field is not a number")
+    tool, far = columns[0], columns.pop(1)
+    for part, of_field in zip(tool.unknown, far.unknown, strict=True):
+        part.axpy(share, of_field)
+    tool.prescribed = tool.prescribed + share * far.prescribed
+    return response.loads.closed(share)
+
+
+def _form(response: Response, carried: Carried | None) -> FloatArray:
+    """Return the stiffness, with a row more for loads."""
+    return response.stiffness if carried is None else carried.form
+
+
+def _energy_beyond(loads: Loads, mu: float, mirrored: Sequence[int]) -> FloatArray | float:
+    """Return twice the strain energies (n, n), by pairs of motions, beyond the cut face of the part modelled."""
+    if loads.far is None:
+        return 0.0
+    return np.outer(loads.shares, loads.shares) * loads.far.stiffness(mu) / 2.0 ** len(mirrored)
+
+
+def _balanced(response: Response) -> Response:
+    """Return the response of tool and far field together, its balance with F d = 2 (U within + U beyond).
+
+    Raises:
+        SolveError: if that does not hold.
+    """
+    force, taken = float(response.forces[0, 2]), float(response.stiffness[0, 0])
+    balance = max(response.balance, abs(force - taken) / taken)
+    check_balance(balance)
+    return replace(response, balance=balance)
