@@ -7,22 +7,16 @@ from typing import Any
 import numpy as np
 
 from pipeline.files import write_whole
-from pipeline.html import joined, json_in_page, render_page
 from pipeline.realtime.blade import RECTANGLE
 from pipeline.realtime.surface import Surface
 from pipeline.realtime.touch import SENTENCES
 from pipeline.view import palette
-from pipeline.view.page import TEMPLATES as OF_VIEW
-from pipeline.view.page.numbers import layout, packed
+from pipeline.view.numbers import layout, packed
+from pipeline.view.page import render_scene
 
 _TEMPLATES = Path(__file__).parent / "templates"
 # Each knows those before it.
-_SCRIPTS = (
-    _TEMPLATES / "tools.js", _TEMPLATES / "evaluate.js",
-    OF_VIEW / "mesh.js", OF_VIEW / "scene.js", OF_VIEW / "camera.js",
-    _TEMPLATES / "near.js", _TEMPLATES / "surface.js", _TEMPLATES / "tool.js", _TEMPLATES / "touch.js",
-)  # fmt: skip
-_STYLES = (OF_VIEW / "view.css", _TEMPLATES / "touch.css")
+_SCRIPTS = [_TEMPLATES / name for name in ("tools.js", "evaluate.js", "near.js", "surface.js", "touch.js")]
 _MM = 1e3
 # Of the way to the nearest side or to the bottom: the radius that the page begins with, and the depths that it offers.
 _RADIUS, _RADII, _DEPTH, _DEPTHS = 0.12, (0.02, 0.4), 0.04, (-0.02, 0.15)
@@ -40,11 +34,17 @@ def write_touch_page(surface: Surface, path: Path, title: str) -> Path:
 def render(surface: Surface, title: str) -> str:
     """Return the page of a model as HTML; it loads nothing else."""
     arrays = _arrays(surface)
-    return render_page(
-        _TEMPLATES / "touch.html.j2", joined(*_SCRIPTS),
-        title=title, facts=_facts(surface), sliders=_sliders(surface), tools=_tools(surface),
-        style=joined(*_STYLES), told=json_in_page(_told(surface, arrays)), numbers=packed(arrays),
-    )  # fmt: skip
+    return render_scene(
+        _TEMPLATES / "touch.html.j2",
+        _SCRIPTS,
+        [_TEMPLATES / "touch.css"],
+        told=_told(surface, arrays),
+        numbers=packed(arrays),
+        title=title,
+        facts=_facts(surface),
+        sliders=_sliders(surface),
+        tools=_tools(surface),
+    )
 
 
 def _tools(surface: Surface) -> list[str]:
@@ -117,6 +117,5 @@ def _told(surface: Surface, arrays: dict[str, Any]) -> dict[str, Any]:
         "centre": (_MM * (low + high) / 2).tolist(),
         "radius": float(_MM * np.linalg.norm(high - low) / 2),
         "stops": palette.YLGNBU,
-        "ink": {"footprint": palette.FOOTPRINT, "held": palette.HELD, "probe": palette.TOOL},
         "sentences": SENTENCES,
     }

@@ -9,17 +9,15 @@ import numpy.typing as npt
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.scene.model import FIXED, PROBE
-from pipeline.shapes.indenter import Indenter
 from pipeline.view.fields import Fields
 from pipeline.view.palette import FOOTPRINT, HELD, INK, OUTLINE, TOOL
+from pipeline.view.tool import tool_of
 from pipeline.view.viewpoint import Viewpoint
 
 # On a machine without a display VTK would ask for one first, and complain.
 if not os.environ.get("DISPLAY"):
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 import pyvista as pv
-
-from pipeline.view.tool import tool_surface
 
 MM = 1e3
 # How often the triangles at ε are halved, so that its outline is smooth on coarse ones.
@@ -30,8 +28,8 @@ _CLOSE = 2.2
 _MARGIN = 1.05
 # Degrees between the faces at an edge of the body.
 _SHARP = 40
-# Length of what is drawn of the tool, in radii of the footprint, and how much of what is behind it is seen.
-_TOOL, _GLASS = 2.5, 0.35
+# Opacity of the tool.
+_GLASS = 0.35
 # What is nearer to 1 is one, of a unit vector's parts.
 _ALIGNED = 1 - 1e-9
 # Light that reaches every face alike, and where the rest comes from: of the cut the colours are those of the scale.
@@ -82,17 +80,9 @@ class Drawing:
         )
         parts = surface, sharp, edge, self._at_epsilon(surface), patch, held
         self._surface, self._sharp, self._edge, self._ring, patch, self._held = (_moved(part, factor) for part in parts)
-        length = _TOOL * MM * fields.case.probe.circumradius
-        self._tool = self._indenter(factor, length) or patch.extrude(length * self._view.outward, capping=True)
-
-    def _indenter(self, factor: float, length: float) -> Any:
-        """Return a tool that is not flat, pushed in by ``factor`` times its depth, None if it is flat."""
-        case = self._fields.case
-        if not isinstance(case.probe, Indenter):
-            return None
-        tool = tool_surface(case.probe, case.frame, length / MM)
-        tool.points = MM * (tool.points - factor * case.probe.depth * self._view.outward)
-        return tool
+        tool = tool_of(fields)
+        corners = np.hstack([np.full((len(tool.triangles), 1), 3), tool.triangles])
+        self._tool = pv.PolyData(MM * (tool.points + factor * tool.moved), corners)
 
     def render(self, size: tuple[int, int], *, close: bool) -> npt.NDArray[np.uint8]:
         """Return a picture of ``size`` pixels (width, height), of the whole or ``close`` to the probe."""

@@ -8,6 +8,7 @@ import numpy as np
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.shapes.bodies.cad import FromCad
 from pipeline.shapes.body import Drawn
+from pipeline.shapes.indenter import Indenter
 from pipeline.study.sweep import Case
 
 # Displacements are drawn so large that the largest is about this share of the body's smallest extent.
@@ -83,8 +84,16 @@ class Fields:
         return np.asarray(np.linalg.norm(self.displacement, axis=1))
 
     @property
+    def drawn_factor(self) -> float:
+        """How many times as large as they are displacements are drawn at first.
+
+        A tool that is not flat keeps its shape and its depth, so that tissue drawn to scale is what fits it.
+        """
+        return 1.0 if isinstance(self.case.probe, Indenter) else self.visible_factor
+
+    @property
     def visible_factor(self) -> float:
-        """How many times as large as they are displacements are drawn: 1, 2, 5, 10, …
+        """How many times as large as they are displacements are to be drawn to be seen: 1, 2, 5, 10, …
 
         Raises:
             ValueError: if the fields hold no displacement.

@@ -8,7 +8,7 @@ REGIONS = (
 VIRIDIS = ("#440154", "#472d7b", "#3b528b", "#2c728e", "#21918c", "#28ae80", "#5ec962", "#addc30", "#fde725")
 YLGNBU = ("#ffffd9", "#edf8b1", "#c7e9b4", "#7fcdbb", "#41b6c4", "#1d91c0", "#225ea8", "#253494", "#081d58")
 YLORRD = ("#ffffcc", "#ffeda0", "#fed976", "#feb24c", "#fd8d3c", "#fc4e2a", "#e31a1c", "#bd0026", "#800026")
-INK, OUTLINE, FOOTPRINT, HELD = "#111111", "#b5b5b5", "#e8110f", "#4a5a70"
+INK, OUTLINE, FOOTPRINT, HELD = "#111111", "#8c9199", "#e8110f", "#4a5a70"
 TOOL = "#7c8794"
 
 

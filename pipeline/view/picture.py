@@ -52,7 +52,7 @@ def draw_deformed(fields: Fields, path: Path, title: str) -> tuple[Path, float]:
     Raises:
         ValueError: if the fields hold no displacement.
     """
-    factor = fields.visible_factor
+    factor = fields.drawn_factor
     moved = fields.magnitude
     largest = float(moved.max())
     unit, scale = ("µm", 1e6) if largest < _SMALL else ("mm", MM)

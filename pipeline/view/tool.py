@@ -1,23 +1,49 @@
-"""The surface of a tool that is not flat, for pictures."""
+"""The tool as triangles, for pictures and pages."""
+
+from dataclasses import dataclass
 
 import numpy as np
-import pyvista as pv
 
-from pipeline.arrays import FloatArray
-from pipeline.shapes.frame import Frame
+from pipeline.arrays import FloatArray, IntArray
+from pipeline.scene.model import PROBE
 from pipeline.shapes.indenter import Indenter
+from pipeline.view.fields import Fields
 
-# Lines over the surface, and the points of each.
-_LINES, _POINTS = 97, 120
-# How far lines go, in units of what the tool may touch: round the axis, up to where it ends; across a long tool.
+# Length of the drawn part, in radii of the footprint.
+_LENGTH = 2.5
+# Lines over the surface of a tool that is not flat, and the points of each.
+_LINES, _POINTS = 49, 60
+# Length of these lines, in units of what the tool may touch: round the axis; across a long tool.
 _ROUND, _ACROSS = 4.0, 1.5
 
 
-def tool_surface(probe: Indenter, frame: Frame, length: float) -> pv.PolyData:
-    """Return what of a tool is at most ``length`` (m) above its lowest point, before it is pushed in; in m."""
-    places = frame.world(tool_points(probe, length).reshape(-1, 3)).reshape(_LINES, -1, 3)
-    grid = pv.StructuredGrid(*(places[None, :, :, k] for k in range(3)))
-    return grid.extract_surface(algorithm="dataset_surface")
+@dataclass(frozen=True)
+class Tool:
+    """Its ``points`` (n, 3) before it is pushed in and their displacements ``moved``, in m; ``triangles`` (k, 3)."""
+
+    points: FloatArray
+    triangles: IntArray
+    moved: FloatArray
+
+
+def tool_of(fields: Fields) -> Tool:
+    """Return the tool of a case: its footprint, extruded, with the footprint's displacement; or its own surface."""
+    case = fields.case
+    length, outward = _LENGTH * case.probe.circumradius, np.array(case.frame.outward)
+    if isinstance(case.probe, Indenter):
+        lines = tool_points(case.probe, length)
+        points = np.asarray(case.frame.world(lines.reshape(-1, 3)))
+        return Tool(points, _between_lines(*lines.shape[:2]), np.tile(case.travel, (len(points), 1)))
+    used, corners = np.unique(fields.facets[PROBE], return_inverse=True)
+    base, below = fields.points[used], corners.reshape(-1, 3)
+    moved = np.zeros_like(base) if fields.displacement is None else fields.displacement[used]
+    count, (first, second) = len(used), _rim(below).T
+    sides = np.column_stack([first, second, first + count]), np.column_stack([first + count, second + count, second])
+    return Tool(
+        points=np.vstack([base, base + length * outward]),
+        triangles=np.vstack([below, below + count, *sides]),
+        moved=np.vstack([moved, moved]),
+    )
 
 
 def tool_points(probe: Indenter, length: float) -> FloatArray:
@@ -41,3 +67,17 @@ def _line(probe: Indenter, start: FloatArray, along: FloatArray, length: float) 
     last = np.flatnonzero(heights <= length)[-1]
     ray[last:], heights[last + 1 :] = ray[last], length
     return np.vstack([np.column_stack([ray, heights]), [*ray[-1], length]])
+
+
+def _between_lines(lines: int, points: int) -> IntArray:
+    """Return the triangles (k, 3) between neighbours of ``lines`` of ``points`` each."""
+    first = np.add.outer(points * np.arange(lines - 1), np.arange(points - 1)).ravel()
+    ends = first + 1, first + points, first + points + 1
+    return np.vstack([np.column_stack([first, ends[0], ends[2]]), np.column_stack([first, ends[2], ends[1]])])
+
+
+def _rim(triangles: IntArray) -> IntArray:
+    """Return the edges (k, 2) that belong to one triangle only."""
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
+    unique, count = np.unique(edges, axis=0, return_counts=True)
+    return np.asarray(unique[count == 1])

@@ -9,7 +9,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from pipeline.html import json_in_page
+from pipeline.pages import json_in_page
 from pipeline.report import page
 from pipeline.report.dataset import write
 from pipeline.report.figures import draw

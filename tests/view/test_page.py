@@ -6,6 +6,7 @@ import re
 import zlib
 from base64 import b64decode
 from dataclasses import replace
+from html import escape
 
 import numpy as np
 import pytest
@@ -14,9 +15,10 @@ from mpi4py import MPI
 
 from pipeline.scene.model import FIXED, PROBE
 from pipeline.shapes.frame import Frame
-from pipeline.view.boundary import FACES, boundary
 from pipeline.view.compute import compute_fields, solve_to_view
+from pipeline.view.numbers import FACES, mesh_numbers
 from pipeline.view.page import render, write_page
+from pipeline.view.tool import tool_of
 from pipeline.view.viewpoint import Viewpoint
 from tests.cases import solve, study
 from tests.report.browser import CHROMIUM, Browser
@@ -114,9 +116,33 @@ def test_mesh_alone_has_no_force_and_no_displacement():
     assert [c["name"] for c in json.loads(element(text, "told"))["colours"]] == ["region", "element size"]
 
 
-def test_a_triangle_that_bounds_nothing_is_told():
+def test_a_triangle_that_bounds_nothing_is_refused(fields):
+    facets = fields.facets | {"more": fields.cells[[[0, 0, -1]], [[0, 1, 0]]]}
     with pytest.raises(ValueError, match="1 triangles"):
-        boundary(np.array([[0, 1, 2, 3]]), {"free": np.array([[0, 1, 2], [0, 1, 4]])})
+        mesh_numbers(replace(fields, facets=facets))
+
+
+def test_a_ball_has_its_shape_and_its_depth():
+    made = study(probe={"shape": "sphere", "radius": "6 mm", "depth": "0.5 mm", "contact": "unilateral"})
+    (case,) = made.cases()
+    found = compute_fields(solve_to_view(made, case), MPI.COMM_SELF)
+    tool, centre = tool_of(found), found.contact + np.array((0, 0, 6e-3))
+    below = tool.points[tool.points[:, 2] < 5e-3]
+    np.testing.assert_allclose(np.linalg.norm(below - centre, axis=1), 6e-3, rtol=1e-6)
+    np.testing.assert_allclose(tool.moved, np.broadcast_to([0, 0, -0.5e-3], tool.moved.shape), atol=1e-12)
+    assert found.drawn_factor == 1 < found.visible_factor
+    told = json.loads(element(render(found, "ball"), "told"))
+    assert (told["start"], told["factor"], told["keeps_depth"]) == (1, found.visible_factor, True)
+
+
+def test_a_flat_tool_moves_with_its_footprint(fields):
+    tool = tool_of(fields)
+    on_face = tool.points[:, 2] > -1e-9
+    assert on_face.all()
+    np.testing.assert_allclose(tool.moved[:, 2], -0.2e-3, rtol=1e-9)
+    edges = np.sort(tool.triangles[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
+    assert set(np.unique(edges, axis=0, return_counts=True)[1]) == {2}  # closed
+    assert fields.drawn_factor == fields.visible_factor > 1
 
 
 @pytest.mark.parametrize(
@@ -212,6 +238,38 @@ def test_turns_with_the_mouse_and_by_touch_and_zooms(browser, seen):
     assert differ(turned, tilted) > 0.1
     browser.call("Input.dispatchMouseEvent", type="mouseWheel", x=300, y=300, deltaX=0, deltaY=-300)
     assert drawn(seen()) > drawn(tilted)
+    assert browser.messages == []
+
+
+@in_browser
+def test_turns_and_zooms_with_keys(browser, seen):
+    first = seen()
+    browser.ask("document.querySelector('canvas').focus()")
+    for key in ("ArrowLeft", "ArrowUp"):
+        browser.call("Input.dispatchKeyEvent", type="keyDown", key=key)
+        turned = seen()
+        assert differ(first, turned) > 0.1
+        first = turned
+    browser.call("Input.dispatchKeyEvent", type="keyDown", key="-")
+    assert drawn(seen()) < drawn(first)
+    assert browser.messages == []
+
+
+@in_browser
+def test_a_frame_that_gets_its_size_after_the_script_ran_is_drawn(browser, page, tmp_path):
+    scene = escape(page.read_text(encoding="utf-8"))
+    path = tmp_path / "frame.html"
+    path.write_text(f'<!DOCTYPE html><iframe style="display: none" srcdoc="{scene}"></iframe>')
+    browser.look_like(900, 600)
+    browser.open(path)
+    browser.ask("new Promise(done => setTimeout(done, 500))")
+    style = "{display: 'block', width: '800px', height: '500px'}"
+    browser.ask(f"void Object.assign(document.querySelector('iframe').style, {style})")
+    browser.ask("new Promise(done => setTimeout(done, 500))")
+    inside = "document.querySelector('iframe').contentDocument.querySelector"
+    assert re.fullmatch(r"[125]0* mm", browser.ask(f"{inside}('#bar').textContent"))
+    browser.screenshot(tmp_path / "seen.png", whole=False)
+    assert drawn(imread(tmp_path / "seen.png")[100:400, 100:500, :3]) > 0.3
     assert browser.messages == []
 
 

@@ -9,7 +9,7 @@ from urllib.parse import quote
 import xarray as xr
 
 from pipeline.files import write_whole
-from pipeline.html import joined, render_page
+from pipeline.pages import joined, render_page
 from pipeline.report.figures import FIGURES, choose, figure
 from pipeline.report.figures.parts import parts
 from pipeline.report.page.cases import FIRST_ROWS, case_table
@@ -45,7 +45,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
     return render_page(
         _TEMPLATES / "page.html.j2", joined(_TEMPLATES / "page.js"),
         title=dataset.attrs.get("title", name), name=name, style=joined(_TEMPLATES / "page.css"),
-        scene=scene, scene_scripts=_SCRIPT.findall(scene)[:1],
+        scene=scene, scene_scripts=_SCRIPT.findall(scene)[:2],
         facts=[fact for fact in facts(dataset) if not (guide and fact[0] == _TOLD)],
         failures=failures(dataset), without_exact=without_exact(dataset),
         figures=_figures(dataset), guide=guide, table=table, first_rows=FIRST_ROWS,

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 from markupsafe import Markup
 
-from pipeline.html import json_in_page
+from pipeline.pages import json_in_page
 from pipeline.quantities import QUANTITIES
 from pipeline.report.words import is_numeric, number, scale, symbol
 

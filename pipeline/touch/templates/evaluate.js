@@ -1,4 +1,3 @@
-"use strict";
 // The forces of pipeline/realtime/, in the same order and under the same names; SI units, E = 1 within.
 
 const LEAST = {

@@ -1,10 +1,8 @@
 // The page: a hand that moves the tool, and what it feels.
 
-const field = (name) => document.querySelector(`[name=${name}]`);
 const say = (id, text) => {
   document.getElementById(id).textContent = text;
 };
-const short = (value, digits = 3) => String(Number(value.toPrecision(digits)));
 const MM = 1e3;
 const DEGREE = Math.PI / 180;
 // The arrow of the largest force so far is this share of the body's size; arrows are this thick.
@@ -12,8 +10,8 @@ const ARROW = 0.35;
 const THICK = 0.008;
 // The error bar that fills its gauge.
 const DOUBT = 0.05;
-// Steps along the eye's ray, and halvings of the last one, that find where it meets a face that is not flat.
-const STEPS = 60;
+// Steps along the eye's ray through the body's height, and halvings of the last one, that find where it meets the face.
+const STEPS = 120;
 const HALVINGS = 30;
 // Points along the border of the region, so far above the face, in units of the body's size.
 const BORDER = 200;
@@ -21,80 +19,112 @@ const ABOVE = 0.002;
 // What is asked for by one tool, or by all but one.
 const OF_ONE = { angle: "cone", length: "blade", width: "blade", turn: "blade" };
 
+const between = (low, value, high) => Math.max(low, Math.min(high, value));
+// Turn a line of (ρ, z) round the z axis.
+const turned = (line) => new THREE.LatheGeometry(line.map((point) => new THREE.Vector2(...point)), 40).rotateX(Math.PI / 2);
+
+// The tool above its lowest point, with a shaft; a disc has the mean curvature of the face.
+function geometryOf({ tool, radius, angle, length, width }, bend) {
+  const long = 4 * radius;
+  if (tool === "blade") return new THREE.BoxGeometry(length, width, width).translate(0, 0, 0.51 * width);
+  if (tool === "disc") {
+    // A little above the face, which it would else fight with for the same pixels.
+    const flat = [0, 0.25, 0.5, 0.75, 1].map((share) => [share * radius, (0.02 - 0.5 * bend * radius * share ** 2) * radius]);
+    return turned([...flat, [radius, long]]);
+  }
+  const rise = radius / Math.tan(angle);
+  if (tool === "cone") return turned([[0, 0], [radius, rise], [radius, rise + long]]);
+  const ball = Array.from({ length: 17 }, (_, i) => (Math.PI * i) / 20);
+  const round = ball.map((t) => [radius * Math.sin(t), radius * (1 - Math.cos(t))]);
+  return turned([...round, [round.at(-1)[0], round.at(-1)[1] + long]]);
+}
+
+// An arrow along z, with a whisker from 1 - error to 1 + error of its length.
+function arrow(length, error, thick) {
+  const head = length - Math.min(4 * thick, length);
+  const cap = (z) => [[2.6, z - 0.25 * thick], [2.6, z + 0.25 * thick]].map(([rho, at]) => [rho * thick, at]);
+  const [low, high] = [cap(length * (1 - error)), cap(length * (1 + error))];
+  const whisker = [[0, low[0][1]], ...low, [0.4 * thick, low[1][1]], [0.4 * thick, high[0][1]], ...high, [0, high[1][1]]];
+  return turned([[thick, 0], [thick, head], [2.2 * thick, head], [0, length], ...whisker]);
+}
+
 class Page {
-  constructor(told, arrays, gl) {
+  constructor(told, arrays) {
     this.told = told;
     this.model = new Model(told.model);
     this.surface = new Surface(this.model, arrays, told.shape);
-    this.canvas = gl.canvas;
     this.made = new Vertices();
-    this.heights = this.findHeights();
-    this.scene = new Scene(gl, told.ink);
-    this.scene.colour({ stops: told.stops, labels: null });
     this.largest = 0;
     this.size = told.radius;
-    this.scene.outline.fill(linesOf([this.border()]));
+    this.stage = new Stage(told, 1e-3 * told.radius);
+    this.stage.colour({ stops: told.stops });
+    this.stage.addLines([this.border()]);
+    this.arrow = this.stage.addSolid(told.ink.footprint);
     this.listen();
-    this.camera = new Camera(gl.canvas, told.eye, told.radius, 1e-3 * told.radius);
-    this.camera.listen(() => this.redraw());
-    this.camera.look(told.centre, 0);
-    if (innerWidth < 600) document.getElementById("panel").open = false;
     this.whole();
+    this.update();
   }
   listen() {
     for (const { name } of document.querySelectorAll("#panel [name]")) {
-      field(name).addEventListener("input", () => this.redraw());
+      field(name).addEventListener("input", () => this.update());
     }
     field("whole").addEventListener("click", () => this.whole());
-    addEventListener("resize", () => this.redraw());
-    const { canvas } = this;
+    const { canvas } = this.stage;
     let held = null;
     // Before the camera's own: what begins on the face moves the tool.
-    canvas.addEventListener("pointerdown", (event) => {
-      const place = event.button === 0 && !event.shiftKey && held === null && this.under(event);
-      if (!place) return;
+    const listen = (kind, heard) => canvas.addEventListener(kind, heard, { capture: true });
+    listen("pointerdown", (event) => {
+      const place = event.button === 0 && !event.shiftKey && held === null && this.onFace(event);
+      if (!place || !this.isOn(place)) return;
       held = event.pointerId;
       canvas.setPointerCapture(held);
       event.stopImmediatePropagation();
       this.moveTo(place);
     });
-    canvas.addEventListener("pointermove", (event) => {
+    listen("pointermove", (event) => {
       if (event.pointerId !== held) return;
       event.stopImmediatePropagation();
       const place = this.onFace(event);
       if (place) this.moveTo(place);
     });
-    for (const end of ["pointerup", "pointercancel"]) {
-      canvas.addEventListener(end, (event) => {
-        if (event.pointerId === held) held = null;
-      });
-    }
+    const end = (event) => {
+      if (event.pointerId === held) held = null;
+    };
+    listen("pointerup", end);
+    listen("pointercancel", end);
   }
-  // Where the eye's ray meets the face (x and y, mm), or the plane of its lowest point; or nothing.
+
+  // ---- places ----------------------------------------------------------------------------------------------------
+  // Where the eye's ray meets the face (x and y, mm), from above; or nothing.
   onFace({ clientX, clientY }) {
-    const { camera, canvas, heights: [low, high] } = this;
-    const [right, up, back] = camera.basis();
-    if (back[2] < 0.05) return null;
-    const [dx, dy] = [clientX - canvas.clientWidth / 2, canvas.clientHeight / 2 - clientY].map((d) => d * camera.scale());
-    const from = along(along(camera.target, dx, right), dy, up);
-    const at = (z) => along(from, (z - from[2]) / back[2], back);
+    const { camera, canvas } = this.stage;
+    const back = this.stage.basis()[2];
+    if (back.z < 0.05) return null;
+    const from = vector([(2 * clientX) / canvas.clientWidth - 1, 1 - (2 * clientY) / canvas.clientHeight, 0]).unproject(camera);
+    const at = (z) => from.clone().addScaledVector(back, (z - from.z) / back.z);
     const isAbove = (z) => {
-      const [x, y] = at(z);
+      const { x, y } = at(z);
       return z > this.heightAt(x, y);
     };
-    let [last, z] = [high, high];
-    for (let i = 1; i <= STEPS && isAbove(z); i++) [last, z] = [z, high - ((high - low) * i) / STEPS];
-    for (let i = 0; i < HALVINGS && z < last; i++) {
+    const steps = this.model.isFlat ? [1e-9, -1e-9] : Array.from({ length: STEPS }, (_, i) => this.size * (1 - (2 * i) / STEPS));
+    const below = steps.findIndex((z) => !isAbove(z));
+    if (below < 1) return null;
+    let [last, z] = [steps[below - 1], steps[below]];
+    for (let i = 0; i < HALVINGS; i++) {
       const middle = (z + last) / 2;
       if (isAbove(middle)) last = middle;
       else z = middle;
     }
-    return at(z).slice(0, 2);
+    return at(z).toArray().slice(0, 2);
+  }
+  // Whether a place is on the face, or on what is known of it.
+  isOn([x, y]) {
+    const [a, b] = (this.model.isFlat ? this.model.sides : this.model.reach).map((side) => MM * side);
+    return this.model.is_round ? Math.hypot(x, y) <= a : Math.abs(x) <= a && Math.abs(y) <= b;
   }
   // The height (mm) of the face at x and y (mm), beyond the region that of its border.
   heightAt(x, y) {
-    const { model } = this;
-    return model.isFlat ? 0 : MM * model.spot(...this.inRegion(x, y)).height;
+    return this.model.isFlat ? 0 : MM * this.model.spot(...this.inRegion(x, y)).height;
   }
   // The nearest place (m) of the region, but for rounding.
   inRegion(x, y) {
@@ -102,14 +132,6 @@ class Page {
     if (!this.model.is_round) return [between(-a, x / MM, a), between(-b, y / MM, b)];
     const share = Math.min(1, (a * MM) / Math.max(Math.hypot(x, y), 1e-9));
     return [(share * x) / MM, (share * y) / MM];
-  }
-  // The lowest and the highest point (mm) of the face.
-  findHeights() {
-    if (this.model.isFlat) return [0, 0];
-    const shares = Array.from({ length: 33 }, (_, i) => (i - 16) / 16);
-    const [a, b] = this.model.reach;
-    const found = shares.flatMap((x) => shares.map((y) => this.heightAt(MM * a * x, MM * b * y)));
-    return [Math.min(...found) - 1e-9, Math.max(...found) + 1e-9];
   }
   // The border of the region, a little above the face.
   border() {
@@ -120,32 +142,29 @@ class Page {
       const [c, s] = [Math.cos(angle), Math.sin(angle)];
       const out = model.is_round ? 1 : 1 / Math.max(Math.abs(c), Math.abs(s));
       const [x, y] = [0.9999 * a * c * out, 0.9999 * b * s * out];
-      const spot = model.spot(x, y);
-      return along([MM * x, MM * y, MM * spot.height], ABOVE * this.size, spot.turn[2]);
+      const { height, turn: [, , normal] } = model.spot(x, y);
+      return vector([x, y, height]).multiplyScalar(MM).addScaledVector(vector(normal), ABOVE * this.size).toArray();
     });
   }
-  under(event) {
-    const place = this.onFace(event);
-    if (!place) return null;
-    const [a, b] = (this.model.isFlat ? this.model.sides : this.model.reach).map((side) => MM * side);
-    const [x, y] = place;
-    const isOn = this.model.is_round ? Math.hypot(x, y) <= a : Math.abs(x) <= a && Math.abs(y) <= b;
-    return isOn ? place : null;
+  // The face below the tool, and where its axis meets it (mm).
+  get foothold() {
+    const [x, y] = [field("x").valueAsNumber, field("y").valueAsNumber];
+    return { spot: this.model.spot(...this.inRegion(x, y)), at: [x, y, this.heightAt(x, y)] };
   }
   moveTo([x, y]) {
     field("x").value = x;
     field("y").value = y;
-    this.redraw();
+    this.update();
   }
   whole() {
-    const [, up] = this.camera.basis();
-    const panel = innerWidth < 600 ? 0 : document.getElementById("panel").offsetWidth;
-    const wide = (this.canvas.clientWidth - panel) / this.canvas.clientHeight;
-    this.camera.look(along(this.told.centre, 0.25 * this.size, up), this.size * Math.max(1.05, 1 / wide));
-    this.camera.pan(-panel / 2, 0);
-    this.redraw();
+    this.stage.follow(() => {
+      const centre = vector(this.told.centre).addScaledVector(this.stage.basis()[1], 0.25 * this.size);
+      return [centre, 1.05 * this.size, this.size];
+    });
   }
-  // What is asked, in SI units.
+
+  // ---- what is asked, and what is shown --------------------------------------------------------------------------
+  // In SI units.
   get query() {
     const value = (name) => field(name).valueAsNumber;
     const { model } = this;
@@ -159,33 +178,35 @@ class Page {
       along: model.body([Math.cos(turn), Math.sin(turn), 0]), young: value("young") * 1e3, poisson: value("poisson"),
     };
   }
-  redraw() {
-    if (!this.asked) requestAnimationFrame(() => this.draw());
-    this.asked = true;
+  // Evaluate once before the next picture.
+  update() {
+    this.stage.beforeDrawing = () => {
+      this.stage.beforeDrawing = () => {};
+      this.show();
+    };
+    this.stage.redraw();
   }
-  draw() {
-    this.asked = false;
-    const { query, model } = this;
+  show() {
+    const { query, stage } = this;
     for (const [name, tool] of Object.entries(OF_ONE)) field(name).parentElement.hidden = query.tool !== tool;
     field("radius").parentElement.hidden = query.tool === "blade";
     const began = performance.now();
-    const touch = model.query(query);
+    const touch = this.model.query(query);
     const isIn = touch.status === "ok";
     const triangles = isIn ? this.surface.press(query, touch, true) : null;
     const took = performance.now() - began;
-    this.made.size = 0;
     this.fillBody(triangles, query.depth * MM);
-    if (isIn) this.fillArrow(query, touch);
-    this.scene.body.fill(this.made);
-    this.fillTool(query, isIn);
-    this.scene.draw(this.camera, {
-      factor: 1, plane: null, epsilon: 0, edges: field("edges").checked, marks: true, tool: true,
-    });
+    stage.fill(stage.body, this.made.geometry());
+    stage.uniforms.edges.value = field("edges").checked;
+    this.arrow.visible = isIn;
+    if (isIn) this.point(query, touch);
+    this.place(query, isIn);
     this.tell(query, touch, took);
   }
   fillBody(pressed, deepest) {
     const { made, surface } = this;
-    const { rest, moved, n, m } = surface;
+    const { rest, moved, m } = surface;
+    made.size = 0;
     const count = pressed ? pressed.length : 3 * m;
     for (let i = 0; i < count; i++) {
       const v = pressed ? pressed[i] : surface.triangles[(i % 3) * m + Math.floor(i / 3)];
@@ -200,33 +221,31 @@ class Page {
         data[first + 8 + k] = k === i % 3 ? 1 : 0;
       }
       data[first + 6] = Math.sqrt(square) / deepest;
-      data[first + 7] = FREE;
+      data[first + 7] = 0;
     }
   }
-  // The face below the tool, and where its axis meets it (mm).
-  get foothold() {
-    const [x, y] = [field("x").valueAsNumber, field("y").valueAsNumber];
-    return { spot: this.model.spot(...this.inRegion(x, y)), at: [x, y, this.heightAt(x, y)] };
-  }
-  fillArrow({ depth }, { force, error }) {
+  // Draw the force, from the tool's tip.
+  point({ depth }, { force, error }) {
     const { spot, at } = this.foothold;
-    const local = this.model.axes.map((axis) => inner(axis, force));
-    const size = Math.hypot(...local);
-    this.largest = Math.max(this.largest, size);
-    const length = (ARROW * this.size * size) / this.largest;
-    const foot = along(at, -MM * depth, spot.turn[2]);
-    arrow(this.made, foot, local.map((value) => value / size), length, error, THICK * this.size);
+    const local = vector(this.model.axes.map((axis) => inner(axis, force)));
+    this.largest = Math.max(this.largest, local.length());
+    const length = (ARROW * this.size * local.length()) / this.largest;
+    this.stage.fill(this.arrow, arrow(length, error, THICK * this.size));
+    this.arrow.position.copy(vector(at)).addScaledVector(vector(spot.turn[2]), -MM * depth);
+    this.arrow.quaternion.setFromUnitVectors(vector([0, 0, 1]), local.normalize());
   }
-  fillTool(query, isIn) {
-    const made = new Vertices();
+  // Put the tool on the face, or in it; red where there is no answer.
+  place(query, isIn) {
+    const { tool } = this.stage;
     const { spot, at } = this.foothold;
-    const down = isIn || query.depth <= 0 ? -MM * query.depth : 0;
     const [radius, length, width] = [query.radius, query.length, query.width].map((size) => MM * size);
-    const place = { at, turn: spot.turn, down };
-    if (query.tool === "blade") block(made, [length / 2, width / 2], field("turn").valueAsNumber * DEGREE, place);
-    else turned(made, profileOf(query.tool, radius, query.angle, spot.bend / MM), place);
-    this.scene.gl.uniform3fv(this.scene.at("probe"), rgb(isIn ? this.told.ink.probe : this.told.ink.footprint));
-    this.scene.tool.fill(made);
+    this.stage.fill(tool, geometryOf({ ...query, radius, length, width }, spot.bend / MM));
+    const axes = new THREE.Matrix4().makeBasis(...spot.turn.map(vector));
+    tool.quaternion.setFromRotationMatrix(axes);
+    if (query.tool === "blade") tool.rotateZ(field("turn").valueAsNumber * DEGREE);
+    const down = isIn || query.depth <= 0 ? -MM * query.depth : 0;
+    tool.position.copy(vector(at)).addScaledVector(vector(spot.turn[2]), down);
+    tool.material.uniforms.colour.value = rgb(isIn ? this.told.ink.probe : this.told.ink.footprint);
   }
   tell(query, touch, took) {
     for (const { name } of document.querySelectorAll("#panel input[type=range]")) {
@@ -259,10 +278,4 @@ class Page {
   }
 }
 
-let page = null;
-(async () => {
-  const gl = openCanvas();
-  if (!gl) return;
-  const told = JSON.parse(document.getElementById("told").textContent);
-  page = new Page(told, await unpack(document.getElementById("numbers").textContent, told.arrays), gl);
-})();
+start(Page);

@@ -15,9 +15,9 @@ import numpy.typing as npt
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.scene.model import CUT, FIXED, PROBE
-from pipeline.view.boundary import boundary
 from pipeline.view.fields import Fields
 from pipeline.view.palette import VIRIDIS, YLGNBU, YLORRD, region_colours
+from pipeline.view.tool import tool_of
 
 _MM = 1e3
 # Numbers that the script knows groups of the boundary by; 0 is free.
@@ -30,7 +30,11 @@ _SMALL = 1e-4
 _HALF = 32767
 # Bits of a coordinate along Morton's curve.
 _BITS = 10
-_DEFLATE = 6
+_DEFLATE = 9
+# Bits of a point's number: three of them fit one integer.
+_POINT_BITS = 21
+# The corners of a tetrahedron's face, by the corner that it lies opposite to.
+FACES = np.array(((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)))
 
 
 @dataclass(frozen=True)
@@ -52,7 +56,8 @@ def mesh_numbers(fields: Fields) -> Numbers:
     ``points`` (3, n) in mm from the contact; ``cells`` (4, m), each number the difference to the corner before it, the
     first one's to the cell before; ``faces`` of the boundary, 4 × cell + the corner that it lies opposite to, each the
     difference to the one before, and their ``groups``; ``shift`` (3, n), displacements; ``regions``, ``sizes`` and
-    ``strains`` (m), the last two in 0 … 255 of the scale of their colours.
+    ``strains`` (m), the last two in 0 … 255 of the scale of their colours; ``tool_points``, ``tool_moved`` (k, 3), mm,
+    and ``tool_triangles``.
     """
     used, number = _along_curve(fields.points, fields.cells[:, :4])
     corners = np.sort(number[fields.cells[:, :4]], axis=1)
@@ -65,6 +70,10 @@ def mesh_numbers(fields: Fields) -> Numbers:
     }
     regions = np.zeros(len(corners), dtype=np.int64) if fields.regions is None else fields.regions
     arrays["regions"] = regions[order].astype("u1")
+    tool = tool_of(fields)
+    arrays["tool_points"] = (_MM * (tool.points - fields.contact)).astype("<f4")
+    arrays["tool_moved"] = (_MM * tool.moved).astype("<f4")
+    arrays["tool_triangles"] = tool.triangles.astype("<i4")
     names = list(fields.region_names)
     colours: list[dict[str, Any]] = [
         {"name": "region", "array": "regions", "labels": names, "stops": region_colours(len(names))}
@@ -107,11 +116,27 @@ def _along_curve(points: FloatArray, corners: IntArray) -> tuple[IntArray, IntAr
 
 
 def _faces(corners: IntArray, facets: dict[str, IntArray]) -> dict[str, npt.NDArray[Any]]:
-    found = boundary(corners, facets)
-    groups = np.array([_GROUPS.get(name, 0) for name in found.names])[found.groups]
-    codes = 4 * found.cells + found.opposite
+    """Find the boundary's triangles ``facets`` among the faces of cells, by their ``corners`` (m, 4).
+
+    Raises:
+        ValueError: if a triangle is the face of no cell.
+    """
+    known = _keys(np.vstack(list(facets.values())))
+    groups = np.repeat([_GROUPS.get(name, 0) for name in facets], [len(facet) for facet in facets.values()])
+    _, codes, found = np.intersect1d(_keys(corners[:, FACES].reshape(-1, 3)), known, return_indices=True)
+    if len(found) < len(known):
+        raise ValueError(f"{len(known) - len(found)} triangles of the boundary are the face of no cell")
     order = np.argsort(codes)
-    return {"faces": np.diff(codes[order], prepend=0).astype("<i4"), "groups": groups[order].astype("u1")}
+    return {
+        "faces": np.diff(codes[order], prepend=0).astype("<i4"),
+        "groups": groups[found[order]].astype("u1"),
+    }
+
+
+def _keys(triples: IntArray) -> IntArray:
+    """Return one integer for each triple (k, 3) of numbers of points, whatever their order."""
+    low, middle, high = np.sort(triples, axis=1).T.astype(np.int64)
+    return np.asarray((low << 2 * _POINT_BITS) | (middle << _POINT_BITS) | high)
 
 
 def _steps(values: FloatArray, low: float, high: float) -> npt.NDArray[np.uint8]:
@@ -127,6 +152,11 @@ def layout(arrays: dict[str, npt.NDArray[Any]]) -> list[tuple[str, str, int]]:
 
 
 def packed(arrays: dict[str, npt.NDArray[Any]]) -> str:
-    """Return arrays, of each first every number's first byte, then every second one, deflated, as base64."""
+    """Return arrays, of each first every number's first byte, then every second one, as compressed text."""
     planes = [np.ascontiguousarray(a).view("u1").reshape(-1, a.itemsize).T.tobytes() for a in arrays.values()]
-    return b64encode(zlib.compress(b"".join(planes), _DEFLATE)).decode()
+    return compressed(b"".join(planes))
+
+
+def compressed(content: bytes) -> str:
+    """Return bytes, deflated, as base64."""
+    return b64encode(zlib.compress(content, _DEFLATE)).decode()

@@ -11,14 +11,24 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 
-def render_page(template: Path, script: str, **content: Any) -> str:
-    """Return a page from its ``template``, that is given ``content``, the ``script`` and its hash for the policy."""
+def render_page(template: Path, script: str, base: Path | None = None, **content: Any) -> str:
+    """Return a page from its ``template``, with ``content``, the ``script`` and its hash for the policy.
+
+    ``base`` is the folder of a template that this one extends.
+    """
     environment = Environment(
-        loader=FileSystemLoader(template.parent), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        loader=FileSystemLoader([template.parent, base or template.parent]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
         lstrip_blocks=True,
-    )  # fmt: skip
-    allowed = b64encode(sha256(script.encode()).digest()).decode()
-    return environment.get_template(template.name).render(script=script, script_hash=allowed, **content)
+    )
+    return environment.get_template(template.name).render(script=script, script_hash=hash_of(script), **content)
+
+
+def hash_of(script: str) -> str:
+    """Return the hash by which a page's policy allows a script."""
+    return b64encode(sha256(script.encode()).digest()).decode()
 
 
 def joined(*files: Path) -> str:

@@ -1,0 +1,125 @@
+// The page of a case: what is shown, and its legend.
+
+const add = (parent, kind, name = "", text = "") => {
+  const made = document.createElement(kind);
+  made.className = name;
+  made.textContent = text;
+  parent.append(made);
+  return made;
+};
+
+class Page {
+  constructor(told, { tool_points, tool_moved, tool_triangles, ...arrays }) {
+    this.told = told;
+    this.mesh = new Mesh(arrays, told.shift, told.largest);
+    this.stage = new Stage(told, 1e-3 * told.tool);
+    this.stage.beforeDrawing = () => this.prepare();
+    this.stage.addLines(told.outline);
+    const tool = new THREE.BufferGeometry().setIndex(new THREE.BufferAttribute(Uint32Array.from(tool_triangles), 1));
+    tool.setAttribute("position", new THREE.BufferAttribute(tool_points, 3));
+    this.stage.fill(this.stage.tool, tool.setAttribute("moved", new THREE.BufferAttribute(tool_moved, 3)));
+    this.label();
+    field("whole").addEventListener("click", () => this.whole());
+    field("close").addEventListener("click", () => this.close());
+    field("colour").addEventListener("change", () => this.recolour());
+    field("plane").addEventListener("change", () => this.replane());
+    field("offset").addEventListener("input", () => this.recut());
+    for (const name of ["deformation", "edges", "ring", "probe", "marks"]) {
+      field(name).addEventListener("input", () => this.stage.redraw());
+    }
+    this.whole();
+    this.replane();
+    this.recolour();
+  }
+  // Name what can be shown, and choose what is first; browsers keep fields over a reload.
+  label() {
+    const { told } = this;
+    for (const { name } of told.colours) field("colour").append(new Option(name));
+    field("colour").selectedIndex = told.colours[0].labels.length > 1 ? 0 : 1;
+    field("plane").selectedIndex = 0;
+    document.getElementById("deformed").hidden = !told.factor;
+    Object.assign(field("deformation"), { max: told.factor, value: told.start });
+    field("ring").parentElement.hidden = !told.epsilon;
+    document.querySelector(".ring + span").textContent = `ε = ${short(told.epsilon || 0)} mm`;
+    for (const name of ["footprint", "held", "probe"]) document.querySelector(`i.${name}`).style.background = told.ink[name];
+  }
+  // All corners of the box round the body.
+  whole() {
+    const { low, high } = this.told;
+    const centre = vector(low).add(vector(high)).multiplyScalar(0.5);
+    const corners = Array.from({ length: 8 }, (_, k) => vector(low.map((end, i) => ((k >> i) & 1 ? high[i] : end))));
+    this.stage.follow(() => {
+      const reach = (along) => 1.1 * Math.max(...corners.map((corner) => Math.abs(corner.clone().sub(centre).dot(along))));
+      const [right, up] = this.stage.basis();
+      return [centre, reach(up), reach(right)];
+    });
+  }
+  close() {
+    const half = 3 * this.told.tool;
+    this.stage.follow(() => [vector([0, 0, 0]), half, half]);
+  }
+  get colour() {
+    return this.told.colours[field("colour").selectedIndex];
+  }
+  get normal() {
+    return this.told[field("plane").value];
+  }
+  recolour() {
+    this.stage.colour(this.colour);
+    this.stage.fill(this.stage.body, this.mesh.surface(this.colour).geometry());
+    this.describe();
+    this.recut();
+  }
+  // The slider's ends are those of the body; it begins at the contact, or, across the axis, a little within.
+  replane() {
+    if (this.normal) {
+      const heights = this.mesh.heights(this.normal);
+      const [min, max] = ["min", "max"].map((end) => heights.reduce((a, b) => Math[end](a, b)));
+      Object.assign(field("offset"), { min, max, value: this.normal === this.told.outward ? -this.told.tool : 0 });
+    }
+    this.recut();
+  }
+  recut() {
+    const { normal, stage } = this;
+    const offset = field("offset").valueAsNumber;
+    document.getElementById("place").hidden = !normal;
+    document.querySelector("#place output").textContent = `${offset.toFixed(2)} mm`;
+    stage.section.visible = Boolean(normal);
+    // What of the surface lies in the plane gives way to the section.
+    stage.uniforms.plane.value = normal ? [...normal, offset - 1e-5 * this.told.radius] : [0, 0, 0, 1];
+    if (normal) stage.fill(stage.section, this.mesh.section(normal, offset, this.colour).geometry());
+    stage.redraw();
+  }
+  prepare() {
+    const { uniforms, tool } = this.stage;
+    const factor = field("deformation").valueAsNumber;
+    document.querySelector("#deformed output").textContent = `× ${short(factor)}`;
+    uniforms.factor.value = factor;
+    // A tool that is not flat is drawn where it is: its shape is not drawn larger, either.
+    tool.material.uniforms.factor.value = this.told.keeps_depth ? Math.min(factor, 1) : factor;
+    tool.visible = field("probe").checked;
+    uniforms.epsilon.value = (field("ring").checked && this.told.epsilon) || 0;
+    for (const name of ["edges", "marks"]) uniforms[name].value = field(name).checked;
+  }
+  describe() {
+    const legend = document.getElementById("legend");
+    const { labels, stops, limits, unit, array } = this.colour;
+    legend.replaceChildren();
+    if (labels) {
+      const list = add(legend, "ul");
+      labels.forEach((label, i) => {
+        const line = add(list, "li");
+        add(line, "i").style.background = stops[i];
+        line.append(` ${label}`);
+      });
+      return;
+    }
+    add(legend, "div", "ramp").style.background = `linear-gradient(to right, ${stops})`;
+    const [low, high] = limits;
+    const middle = array ? Math.sqrt(low * high) : (low + high) / 2;
+    const ticks = add(legend, "div", "ticks");
+    [low, middle, high].forEach((value, i) => add(ticks, "span", "", short(value, 2) + (i === 2 ? ` ${unit}` : "")));
+  }
+}
+
+start(Page, unpackMesh);
