@@ -34,7 +34,6 @@ from pipeline.shapes.files.stl import parse as read_stl
 from pipeline.shapes.files.stl import written
 from pipeline.study.load import parse
 from pipeline.study.toml import to_toml
-from pipeline.within import VARIABLE
 
 MESHES = Path(__file__).parents[1] / "meshes"
 LIVER = {"shape": "surface", "file": "liver.stl", "unit": "mm", "fixed": {"below": "-20 mm"}}
@@ -181,7 +180,6 @@ def whole_commands(folder: Path) -> list[dict[str, Any]]:
 
 def main(output: Path = Path("results")) -> None:
     """Measure, print, and write ``organs.json`` and ``organs.md``."""
-    os.environ[VARIABLE] = str(MESHES)
     with TemporaryDirectory(prefix="organs-") as folder:
         rows = [row for name in SCENES for row in measure(name, Path(folder))]
     with TemporaryDirectory(prefix="organs-") as folder:

@@ -123,7 +123,7 @@ def study_of(dataset: xr.Dataset) -> Study | None:
 @lru_cache(8)  # figures, report and guide of a dataset ask for it again and again
 def _study(text: str, file: str) -> Study | None:
     try:
-        return parse(toml_of(text, file), file=file, text=text, trusted=False)
+        return parse(toml_of(text, file), file=file, text=text)
     except StudyError:
         return None
 

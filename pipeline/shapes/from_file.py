@@ -12,7 +12,6 @@ from pipeline.shapes.files.loaded import Loaded
 from pipeline.shapes.section import Words
 from pipeline.shapes.support import Below, Fixed
 from pipeline.shapes.triangles import SurfaceError, Triangles
-from pipeline.within import Outside
 
 # Raise by hand when the same file gives another place, mesh or force: records made before are then not used any more.
 _VERSION = 2
@@ -50,13 +49,6 @@ class FromFile(Facetted):
         Raises:
             SurfaceError: if it does not bound one piece of tissue.
         """
-
-    @field_validator("file", mode="before", check_fields=False)
-    @classmethod
-    def _within(cls, file: Any) -> Any:
-        if isinstance(file, Outside):
-            raise PydanticCustomError("outside", "{what}", {"what": file.why})
-        return file
 
     @field_validator("file", check_fields=False)
     @classmethod

@@ -17,7 +17,6 @@ from pipeline.study.schema import NESTED, SECTIONS, Mesh
 from pipeline.study.sweep import Axis, Study
 from pipeline.study.tables import MOST_CASES, read_section
 from pipeline.study.toml import to_toml
-from pipeline.within import Outside, folders_of, outside
 
 
 def load(path: str | Path) -> Study:
@@ -27,7 +26,7 @@ def load(path: str | Path) -> Study:
         StudyError: with every problem of the file: key, value found, what is allowed.
     """
     text, raw = read(Path(path))
-    return parse(raw, file=str(path), text=text, trusted=False)
+    return parse(raw, file=str(path), text=text)
 
 
 def load_mapping(study: Mapping[str, Any], name: str, folder: str | Path = ".") -> Study:
@@ -54,16 +53,16 @@ def load_text(text: str, name: str, folder: str | Path = ".") -> Study:
         StudyError: with every problem of it.
     """
     path = str(Path(folder) / f"{name}.toml")
-    return parse(toml_of(text, path), file=path, text=text, trusted=False)
+    return parse(toml_of(text, path), file=path, text=text)
 
 
-def parse(raw: dict[str, Any], *, file: str = "study", text: str = "", trusted: bool = True) -> Study:
-    """Turn a study, read from TOML into ``raw``, into a :class:`Study`; ``file`` is for messages.
+def parse(raw: dict[str, Any], *, file: str = "study", text: str = "") -> Study:
+    """Turn a study, read from TOML into ``raw``, into a :class:`Study`.
 
-    One that is not ``trusted``, as it comes from a file, may name files of its own project only.
+    ``file`` is for messages, and the files of bodies are looked for from its folder.
     """
     problems = Problems(tables=_names_of(raw))
-    raw = _beside(raw, Path(file).parent, trusted=trusted)
+    raw = _beside(raw, Path(file).parent)
     _check_top(raw, problems)
     axes: list[Axis] = []
     sections: dict[str, tuple[Section, ...]] = {}
@@ -107,17 +106,13 @@ def _names_of(raw: dict[str, Any]) -> dict[str, tuple[str, ...]]:
     }
 
 
-def _beside(raw: dict[str, Any], folder: Path, *, trusted: bool) -> dict[str, Any]:
+def _beside(raw: dict[str, Any], folder: Path) -> dict[str, Any]:
     """Return the study with the files that bodies name found from the ``folder`` of the study."""
-    folders = () if trusted else folders_of(folder)
 
     def found(value: Any) -> Any:
         if isinstance(value, list):
             return [found(v) for v in value]
-        if not isinstance(value, str):
-            return value
-        path = folder / value
-        return Outside(str(path), why) if folders and (why := outside(path, folders)) else str(path)
+        return str(folder / value) if isinstance(value, str) else value
 
     def table(body: Any) -> Any:
         return body | {"file": found(body["file"])} if isinstance(body, dict) and "file" in body else body

@@ -2,10 +2,9 @@
 
 import pytest
 
-from benchmarks.organs import MESHES, PARTS, SCENES, parts_of, study_of
+from benchmarks.organs import PARTS, SCENES, parts_of, study_of
 from pipeline.plan.plan import make_plan
 from pipeline.study.load import parse
-from pipeline.within import VARIABLE
 
 
 def test_parts_hold_all_seconds():
@@ -19,8 +18,7 @@ def test_parts_hold_all_seconds():
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_each_place_is_solved(name, monkeypatch):
-    monkeypatch.setenv(VARIABLE, str(MESHES))
+def test_each_place_is_solved(name):
     _, ratios, _, places = SCENES[name]
     plan = make_plan(parse(study_of(SCENES[name])))
     assert len(plan.solves) == len(ratios) * len(places)

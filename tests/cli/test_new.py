@@ -100,7 +100,7 @@ def test_the_file_of_a_body_is_taken_along_within_the_project(elsewhere):
     assert new("mine", "--like", "organ").exit_code == 2
     assert not mesh.exists()
     wrong = new(str(elsewhere.parent / "alone" / "mine.toml"), "--like", "organ")
-    assert (wrong.exit_code, "begin the study by a NAME" in wrong.stderr) == (2, True)
+    assert (wrong.exit_code, "copy it there first" in wrong.stderr) == (2, True)
     assert not (elsewhere.parent / "meshes").exists()
 
 

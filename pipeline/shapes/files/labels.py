@@ -11,7 +11,6 @@ from typing import Any
 
 from pipeline.shapes.arrays import FloatArray, np
 from pipeline.shapes.triangles import SurfaceError
-from pipeline.within import folders_of, outside
 
 ENDINGS = (".nii", ".nii.gz", ".nrrd", ".nhdr")
 _UNITS = {"m": 1.0, "meter": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "micron": 1e-6}
@@ -54,11 +53,7 @@ def is_image(path: Path) -> bool:
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
-    """Return the files that hold a label map: its own, and the one of the data where a NRRD header names another.
-
-    Raises:
-        SurfaceError: if a header names a file outside its own project.
-    """
+    """Return the files that hold a label map: its own, and the one of the data where a NRRD header names another."""
     if not is_image(path) or path.name.lower().endswith(ENDINGS[:2]):
         return (path,)
     import nrrd  # noqa: PLC0415
@@ -68,12 +63,7 @@ def files_of(path: Path) -> tuple[Path, ...]:
     except Exception:  # what is wrong with it is told as it is read
         return (path,)
     data = header.get("datafile", header.get("data file"))
-    if data is None:
-        return (path,)
-    beside = path.parent / str(data)
-    if why := outside(beside, folders_of(path.parent)):
-        raise SurfaceError(f"the file of its data, `{data}`, {why}")
-    return (path, beside)
+    return (path,) if data is None else (path, path.parent / str(data))
 
 
 def read_labels(path: Path, unit: float | None) -> LabelMap:

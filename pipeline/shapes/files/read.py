@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
+from stat import S_ISREG
 
 from pipeline.shapes.files import obj, ply, stl
 from pipeline.shapes.files.checked import kept_whole
@@ -32,12 +33,14 @@ def state_of(path: Path) -> tuple[int, int]:
     """Return when a file was changed last (ns), and its size (bytes): what it is read again for.
 
     Raises:
-        SurfaceError: if it is not there.
+        SurfaceError: if it is not there, or is no file that has an end.
     """
     try:
         state = path.stat()
     except OSError as error:
         raise SurfaceError(f"cannot be read: {error.strerror or error}") from None
+    if not S_ISREG(state.st_mode):
+        raise SurfaceError("cannot be read: it is no plain file")
     return state.st_mtime_ns, state.st_size
 
 
