@@ -239,8 +239,9 @@ def write(name: str, value: Value, unit: str | None = None) -> str:
 
 
 def counted(number: int, noun: str) -> str:
-    """Write a number with its noun: ``1 case``, ``2 cases``."""
-    return f"{number} {noun}{'s' * (number != 1)}"
+    """Write a number with its noun: ``1 case``, ``2 meshes``."""
+    plural = f"{noun}es" if noun.endswith("sh") else f"{noun}s"
+    return f"{number} {noun if number == 1 else plural}"
 
 
 def symbol(name: str) -> str:

@@ -10,7 +10,7 @@ from io import TextIOWrapper
 from math import inf, isfinite
 from typing import Any, TextIO
 
-from pipeline.visible import visible_json, visible_lines
+from pipeline.printable import printable_json, printable_lines
 
 # Of the command that runs: whether JSON was asked for, and whether any has been printed.
 JSON: ContextVar[dict[str, bool]] = ContextVar("JSON")
@@ -33,12 +33,12 @@ def paint(text: str, colour: str, stream: TextIO) -> str:
 
 def error(text: str) -> None:
     """Print to standard error, in red."""
-    print(paint(visible_lines(text), "red", sys.stderr), file=sys.stderr, flush=True)
+    print(paint(printable_lines(text), "red", sys.stderr), file=sys.stderr, flush=True)
 
 
 def warning(text: str) -> None:
     """Print a warning to standard error, in yellow."""
-    print(paint(f"warning: {visible_lines(text)}", "yellow", sys.stderr), file=sys.stderr, flush=True)
+    print(paint(f"warning: {printable_lines(text)}", "yellow", sys.stderr), file=sys.stderr, flush=True)
 
 
 def is_json_wanted() -> bool:
@@ -55,7 +55,7 @@ def print_json(value: Any) -> None:
     """Print ``value`` as JSON: an infinite ε is "full", as in a study file, and null is what JSON has no number for."""
     if is_json_wanted():
         JSON.get()["printed"] = True
-    print(visible_json(json.dumps(plain(value), indent=2, ensure_ascii=False, allow_nan=False)), flush=True)
+    print(printable_json(json.dumps(plain(value), indent=2, ensure_ascii=False, allow_nan=False)), flush=True)
 
 
 def plain(value: Any, key: str = "") -> Any:
@@ -84,7 +84,7 @@ class Patient:
 
     def write(self, text: str) -> int:
         """Write ``text``, or drop it."""
-        text = visible_lines(text)
+        text = printable_lines(text)
         _leave_broken_pipes()
         try:
             self._stream.write(text)

@@ -10,7 +10,7 @@ import typer
 
 from pipeline.cli.console import error, is_json_wanted, print_json
 from pipeline.launcher import is_first_rank
-from pipeline.visible import visible
+from pipeline.printable import printable
 
 if TYPE_CHECKING:
     from pipeline.study.problems import StudyError
@@ -42,7 +42,7 @@ def of_option(name: str, value: Any, allowed: str, howto: str | None = None) -> 
 
 def of_file(path: str | Path, why: str, howto: str | None = None) -> Fault:
     """Return what is wrong with a file."""
-    return Fault(f"{visible(str(path))}: {why}", file=str(path), howto=howto)
+    return Fault(f"{printable(str(path))}: {why}", file=str(path), howto=howto)
 
 
 def of_unwritten(problem: OSError, path: str | Path | None = None) -> Fault:
@@ -55,7 +55,7 @@ def of_unwritten(problem: OSError, path: str | Path | None = None) -> Fault:
 def of_study(wrong: "StudyError", hint: str = "") -> list[Fault]:
     """Return what is wrong with a study file, each problem by itself; ``hint`` goes with what people read."""
     return [
-        Fault(f"{visible(wrong.file)}: {one}{hint}", wrong.file, one.key, one.value, one.allowed, one.howto or None)
+        Fault(f"{printable(wrong.file)}: {one}{hint}", wrong.file, one.key, one.value, one.allowed, one.howto or None)
         for one in wrong.problems
     ]
 

@@ -13,7 +13,7 @@ from pipeline.cli.console import JSON, has_printed_json, print_json
 from pipeline.cli.faults import INTERRUPTED, SOME_FAILED, Fault, as_data, fail, of_file, of_unwritten
 from pipeline.files import NOT_UTF8, is_utf8
 from pipeline.launcher import is_first_rank, is_interrupt, is_launched
-from pipeline.visible import visible
+from pipeline.printable import printable
 
 # What a disk says that cannot be written to, be it only found when all is done.
 _UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
@@ -32,7 +32,7 @@ class Commands(TyperGroup):
         JSON.set({"wanted": "--json" in words, "printed": False})
         self.words = list(args)
         if foreign := [word for word in args if not is_utf8(word)]:
-            fail(*(Fault(f"{visible(word)}: {NOT_UTF8}", value=visible(word)) for word in foreign))
+            fail(*(Fault(f"{printable(word)}: {NOT_UTF8}", value=printable(word)) for word in foreign))
         try:
             return super().parse_args(ctx, args)
         except Exception as wrong:

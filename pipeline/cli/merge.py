@@ -23,6 +23,7 @@ from pipeline.cli.words import (
     load_all,
 )
 from pipeline.files import STORE_NAME, result_files
+from pipeline.quantities import counted
 
 if TYPE_CHECKING:
     from pipeline.plan.plan import Plan
@@ -81,7 +82,7 @@ def merge(
         print_json(found)
     else:
         for source in sources:
-            print(f"{source.path}: {source.records} records, {source.taken} of them new")
+            print(f"{source.path}: {counted(source.records, 'record')}, {source.taken} of them new")
         for case, message in failed:
             error(f"failed: {case}: {message}")
         told = ", ".join(f"{count} {state}" for state, count in counts.items() if count)

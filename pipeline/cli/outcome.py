@@ -36,9 +36,9 @@ def announce(plan: Plan, opened: "Opened", *, quiet: bool, verbose: bool) -> Non
         print(f"  timing: every case afresh and alone, median of {study.solve.repeats}; nothing is struck out")
     if plan.solves:
         steps = plan.meshes
-        print(f"  to do: {len(steps)} meshes, {len(plan.solves)} solves", flush=True)
+        print(f"  to do: {counted(len(steps), 'mesh')}, {counted(len(plan.solves), 'solve')}", flush=True)
         for number, step in enumerate(steps if verbose else (), start=1):
-            print(f"    step {number}: {len(step.solves)} solves: {step.solves[0].label}", flush=True)
+            print(f"    step {number}: {counted(len(step.solves), 'solve')}: {step.solves[0].label}", flush=True)
 
 
 def as_data(plan: Plan, opened: "Opened", outcome: "Outcome", seconds: float) -> dict[str, Any]:

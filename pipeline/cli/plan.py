@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from pipeline.run.record import Record
     from pipeline.study.sweep import Case, Study
 
+# What there is to do, as it is called in the summary of a plan, and one of it.
+_TO_DO = {"meshes": "mesh", "operators": "operator", "solves": "solve"}
 # Longer lists of steps than this are cut: the costliest are shown.
 _MOST_STEPS = 20
 
@@ -88,7 +90,7 @@ def _show(study: "Study", found: dict[str, Any], *, quiet: bool, verbose: bool, 
         print_json(found)
         return
     exact = f" ({found['exact']} of them for F_exact)" if found["exact"] else ""
-    to_do = f"{found['meshes']} meshes, {found['operators']} operators, {found['solves']} solves{exact}"
+    to_do = f"{', '.join(counted(found[name], noun) for name, noun in _TO_DO.items())}{exact}"
     on = f"on {found['ranks']} {'rank' if found['ranks'] == 1 else 'ranks'}"
     cost = f"{format_seconds(found['seconds'])} {on}, {found['memory'] / 1e9:,.1f} GB for the largest step"
     if quiet:
@@ -185,7 +187,7 @@ def find_case(study: "Study", text: str, word: str = "CASE") -> "Case":
     if text.strip().isdecimal():
         number = int(text)
         if number >= len(cases):
-            fail(_of_case(word, text, f"there are {len(cases)} cases, counted from 0"))
+            fail(_of_case(word, text, f"there are {counted(len(cases), 'case')}, counted from 0"))
         return cases[number]
     wanted: dict[str, str] = {}
     names = [axis.name for axis in study.axes]

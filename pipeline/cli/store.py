@@ -12,6 +12,7 @@ from pipeline.cli.console import print_json, warning
 from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_file
 from pipeline.cli.words import DEFAULT_OUTPUT, Json, check_store
 from pipeline.files import STORE_NAME
+from pipeline.quantities import counted
 
 if TYPE_CHECKING:
     from pipeline.run.store import Records
@@ -41,7 +42,9 @@ def list_records(store: StoreFile = DEFAULT_STORE, as_json: Json = False) -> Non
     if as_json:
         print_json(content)
         return
-    print(f"{store}: {len(rows)} records, {content['bytes'] / 1e6:.2g} MB, {content['seconds']:.0f} s of work")
+    print(
+        f"{store}: {counted(len(rows), 'record')}, {content['bytes'] / 1e6:.2g} MB, {content['seconds']:.0f} s of work"
+    )
     for name in ("status", "origin", "versions"):
         for value, count in content[name].items():
             print(f"  {count:6} {value}")
@@ -137,7 +140,7 @@ def verify(store: StoreFile = DEFAULT_STORE, as_json: Json = False) -> None:
     else:
         for problem in problems:
             print(problem)
-        print(f"{store}: {f'{len(problems)} problems' if problems else 'sound'}")
+        print(f"{store}: {counted(len(problems), 'problem') if problems else 'sound'}")
     raise typer.Exit(SOME_FAILED if problems else DONE)
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import xarray as xr
 
+from pipeline.printable import printable
 from pipeline.report.table import DatasetError
-from pipeline.visible import visible
 
 # Twice what the most cases that a study may have take.
 _LARGEST = 1_000_000_000  # bytes
@@ -29,7 +29,7 @@ def load(path: Path) -> xr.Dataset:
     except Exception as error:  # of a damaged file the libraries raise many kinds
         why = next(iter(str(error).splitlines()), type(error).__name__)
         raise DatasetError(
-            f"{path}: cannot be read as netCDF: {visible(why)}: it is damaged, or no dataset; "
+            f"{path}: cannot be read as netCDF: {printable(why)}: it is damaged, or no dataset; "
             "`epsmesh run` writes that of a study again, of what the case store holds"
         ) from None
 

@@ -8,9 +8,9 @@ from shlex import quote
 import numpy as np
 import xarray as xr
 
+from pipeline.printable import printable_lines
 from pipeline.report.load import load
 from pipeline.report.table import DatasetError
-from pipeline.visible import visible_lines
 
 # What every dataset of a study has, and figures and report are made from.
 _NEEDED = (
@@ -63,10 +63,13 @@ def _shown(dataset: xr.Dataset) -> xr.Dataset:
     """Return a dataset whose texts, but for the study's own, move no cursor of the terminal that shows them."""
     for held in (dataset, *dataset.variables.values()):
         texts = {name: text for name, text in held.attrs.items() if isinstance(text, str) and name != "study"}
-        held.attrs.update({name: visible_lines(text) for name, text in texts.items()})
+        held.attrs.update({name: printable_lines(text) for name, text in texts.items()})
     of_text = {name: v for name, v in dataset.variables.items() if v.dtype.kind in "OU"}
     changed = {
-        name: (v.dims, np.array([visible_lines(str(text)) for text in v.values.ravel()], dtype=object).reshape(v.shape))
+        name: (
+            v.dims,
+            np.array([printable_lines(str(text)) for text in v.values.ravel()], dtype=object).reshape(v.shape),
+        )
         for name, v in of_text.items()
         if not all(str(text).isprintable() for text in v.values.ravel())
     }

@@ -11,8 +11,8 @@ import numpy as np
 
 from pipeline.compat import versions
 from pipeline.files import atomic, room_on_disk
-from pipeline.kept import load_kept
 from pipeline.mesh.generate import MeshArrays
+from pipeline.npz import read_npz
 from pipeline.plan.key import digest, mesh_key
 from pipeline.stages import stage
 from pipeline.study.sweep import Case
@@ -37,7 +37,7 @@ class MeshCache:
     def get(self, path: Path) -> MeshArrays | None:
         """Return the mesh in ``path``; a file that cannot be read is removed."""
         try:
-            content = load_kept(path)
+            content = read_npz(path)
             facets = {name.removeprefix("facets_"): content[name] for name in content if name.startswith("facets_")}
             mesh = MeshArrays(
                 content["points"], content["cells"], facets, content["rim"], float(content["seconds"]),
@@ -66,7 +66,7 @@ class MeshCache:
         """Return the arrays kept under ``key``, or those that ``make`` returns, which are then kept."""
         path = self._folder / f"{digest(key)}.npz"
         try:
-            found = load_kept(path)
+            found = read_npz(path)
             _touch(path)
             return found
         except (OSError, ValueError):

@@ -5,8 +5,8 @@ import time
 from types import TracebackType
 from typing import Any, Protocol
 
+from pipeline.printable import printable
 from pipeline.run.remaining import Remaining, format_seconds
-from pipeline.visible import visible
 
 # In a file a line is written for each of these shares of the work, and when this many seconds went by without one.
 _SHARE, _SILENCE = 0.05, 30.0
@@ -104,7 +104,7 @@ class Terminal:
         step = self._remaining.step_of(text.removeprefix(_MESHING)) if self._remaining is not None else None
         self._step = self._step if step is None else step
         if self._bar is not None:
-            self._bar.update(self._task, description=visible(text))
+            self._bar.update(self._task, description=printable(text))
         elif self._verbose or time.monotonic() - self._told > _SILENCE:
             self._line(f"… {text}")
 
@@ -118,7 +118,7 @@ class Terminal:
 
     def _line(self, text: str, style: str = "") -> None:
         self._told, self._told_count = time.monotonic(), self._count
-        line = f"[{self._count}/{self._total}] {self._times()}  {visible(text)}"
+        line = f"[{self._count}/{self._total}] {self._times()}  {printable(text)}"
         if self._bar is not None:
             self._bar.console.print(line, style=style, markup=False, highlight=False, soft_wrap=True)
         else:

@@ -13,9 +13,9 @@ from shlex import quote
 from textwrap import shorten
 
 from pipeline.plan.cost import CostModel, fit
+from pipeline.printable import printable
 from pipeline.run.record import Record
 from pipeline.stages import stage
-from pipeline.visible import visible
 
 _COLUMNS = "records (key TEXT PRIMARY KEY, record TEXT NOT NULL, stored REAL NOT NULL)"
 SCHEMA = f"CREATE TABLE IF NOT EXISTS {_COLUMNS}"
@@ -105,9 +105,9 @@ class Records:
         for key, text, _ in self.rows():
             record = _readable(text)
             if fault := _fault(key, record):
-                yield f"record {visible(key)}: {fault}"
+                yield f"record {printable(key)}: {fault}"
             elif record and record.status == "ok" and not (isfinite(record.force) and record.force > 0):
-                yield f"record {visible(key)}: is ok, and its force {record.force}"
+                yield f"record {printable(key)}: is ok, and its force {record.force}"
 
     def doomed(self, *, older_than: float | None = None, failed: bool = False) -> list[Doomed]:
         """Return records stored ``older_than`` seconds ago or before, failed ones, and what is no record of its key."""
@@ -258,7 +258,7 @@ def damaged(path: Path, error: Exception) -> str:
 
 def reason(error: Exception) -> str:
     """Return what is wrong with a store on one short line: names in a damaged file may be of any length."""
-    return shorten(visible(str(error)), _LONGEST_REASON, placeholder=" …")
+    return shorten(printable(str(error)), _LONGEST_REASON, placeholder=" …")
 
 
 def _mend(path: Path) -> str:

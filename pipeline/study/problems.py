@@ -10,9 +10,9 @@ from typing import Any, Literal, get_origin
 
 from pydantic import BaseModel, ValidationError
 
+from pipeline.printable import printable
 from pipeline.shapes.section import Section, words_of
 from pipeline.study.howto import page_of
-from pipeline.visible import visible
 
 # Letters of a value, or of a key, that a message repeats.
 _QUOTED = 200
@@ -41,7 +41,7 @@ class Problem:
     def __str__(self) -> str:
         found = "" if self.found is None else f" = {shortened(_toml(self.found))}"
         names = ", ".join(f'{section} "{name}"' for section, name in self.tables)
-        return visible(f"{shortened(self.key)}{found}: {self.allowed}{f' ({shortened(names)})' if names else ''}")
+        return printable(f"{shortened(self.key)}{found}: {self.allowed}{f' ({shortened(names)})' if names else ''}")
 
     @property
     def value(self) -> Any:
@@ -113,7 +113,7 @@ class Problems:
             listed = ", ".join(dict.fromkeys(values)) if len(values) <= _MOST_VALUES else (
                 f"{len(values)} more values up to {values[-1]}"
             )  # fmt: skip
-            yield f"{first}; so for {visible(listed)}" if listed else str(first)
+            yield f"{first}; so for {printable(listed)}" if listed else str(first)
 
     def named(self, problems: Iterable[Problem]) -> list[Problem]:
         """Return ``problems`` without the names of tables where they are about all of an array."""

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.files import atomic, cache_folder
-from pipeline.kept import load_kept
 from pipeline.launcher import run_alone
+from pipeline.npz import read_npz
 from pipeline.shapes.arrays import FloatArray, IntArray, np
 from pipeline.shapes.files import check
 from pipeline.shapes.files.edges import Edges, oriented
@@ -68,13 +68,13 @@ def _tessellated(path: Path, unit: str, content: str) -> dict[str, Any]:
     name = "um" if unit == "µm" else unit
     kept = cache_folder() / "cad" / f"{content[:32]}-{name}-{_VERSION}.npz"
     try:
-        return load_kept(kept)
+        return read_npz(kept)
     except (OSError, ValueError):
         pass
     try:
         with atomic(kept) as target:
             _run(path, name, target)
-            return load_kept(target)
+            return read_npz(target)
     except OSError as error:
         raise SurfaceError(f"{kept.parent}, for what is made of it, cannot be written: set EPSMESH_CACHE") from error
 

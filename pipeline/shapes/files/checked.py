@@ -5,7 +5,7 @@ from hashlib import file_digest, sha256
 from pathlib import Path
 
 from pipeline.files import atomic, cache_folder
-from pipeline.kept import load_kept
+from pipeline.npz import read_npz
 from pipeline.shapes.arrays import np
 from pipeline.shapes.triangles import Triangles
 
@@ -43,7 +43,7 @@ def _kept(key: str, make: Callable[[], Whole]) -> Whole:
     """Return what is on disk under a key, or make it and write it there."""
     path = cache_folder() / "surfaces" / f"{key[:32]}.npz"
     try:
-        found = load_kept(path)
+        found = read_npz(path)
         return Triangles(found["points"], found["facets"]), tuple(found["notices"].tolist())
     except (OSError, KeyError, ValueError):
         pass  # not there, or cut short

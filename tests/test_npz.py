@@ -6,7 +6,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from pipeline.kept import load_kept
+from pipeline.npz import read_npz
 
 ARRAYS = {"points": np.arange(12.0).reshape(4, 3), "cells": np.arange(40), "seconds": np.float64(1.5)}
 
@@ -22,7 +22,7 @@ def is_whole(found):
 
 
 def test_they_come_back(kept):
-    assert is_whole(load_kept(kept))
+    assert is_whole(read_npz(kept))
 
 
 def test_no_flipped_bit_gives_others(kept):
@@ -31,7 +31,7 @@ def test_no_flipped_bit_gives_others(kept):
     for place in range(len(content)):
         kept.write_bytes(content[:place] + bytes([content[place] ^ (1, 8, 64, 128)[place % 4]]) + content[place + 1 :])
         try:
-            found = load_kept(kept)
+            found = read_npz(kept)
         except (ValueError, OSError):
             damaged += 1
         else:
@@ -44,7 +44,7 @@ def test_no_cut_gives_others(kept):
     for length in range(0, len(content), 7):
         kept.write_bytes(content[:length])
         with pytest.raises(ValueError, match="is damaged"):
-            load_kept(kept)
+            read_npz(kept)
 
 
 def test_an_array_that_is_shorter_than_what_was_written_is_none(kept):
@@ -55,4 +55,4 @@ def test_an_array_that_is_shorter_than_what_was_written_is_none(kept):
         archive.writestr("cells.npy", text.getvalue().replace(b"(10,)", b"(1,) "))
     assert len(np.load(kept)["cells"]) == 1
     with pytest.raises(ValueError, match="is damaged"):
-        load_kept(kept)
+        read_npz(kept)

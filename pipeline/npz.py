@@ -9,7 +9,7 @@ import numpy as np
 _ZIP64 = b"\x01\x00"  # what an entry of a file beyond 4 GB has besides
 
 
-def load_kept(path: Path) -> dict[str, Any]:
+def read_npz(path: Path) -> dict[str, Any]:
     """Return by name the arrays of a file that ``np.savez`` wrote.
 
     ``np.load`` takes an array that is shorter than what was written, by a damaged header, for whole: the sum that

@@ -8,17 +8,17 @@ import unicodedata
 _UNSEEN = re.compile(r"[^ -~\n]")
 
 
-def visible(text: str) -> str:
+def printable(text: str) -> str:
     """Return ``text`` with what one cannot see written out, the ends of lines as well."""
     return text if text.isprintable() else "".join(map(_written, text))
 
 
-def visible_lines(text: str) -> str:
-    """Return ``text`` as :func:`visible` does, but for the ends of its lines."""
-    return text if text.isprintable() else "\n".join(map(visible, text.split("\n")))
+def printable_lines(text: str) -> str:
+    """Return ``text`` as :func:`printable` does, but for the ends of its lines."""
+    return text if text.isprintable() else "\n".join(map(printable, text.split("\n")))
 
 
-def visible_json(text: str) -> str:
+def printable_json(text: str) -> str:
     """Return JSON of the same value, in which signs that one cannot see are written as JSON writes them."""
     return _UNSEEN.sub(lambda found: found[0] if _is_seen(found[0]) else json.dumps(found[0])[1:-1], text)
 
