@@ -112,8 +112,10 @@ _RESULTS = (
              "speed-up $t_{full}/t$"),
     Quantity("contact_area", "m2", "area in contact, of unilateral contact, projected along the probe's axis", "area",
              "area in contact"),
+    Quantity("contact_area_error", "1", "relative error bar (95 %) on contact_area", "± area", in_per_cent=True),
     Quantity("contact_radius", "m", "radius in contact, of unilateral contact; if it is not round, of the circle of "
              "that area", "a", "radius in contact a"),
+    Quantity("contact_radius_error", "1", "relative error bar (95 %) on contact_radius", "± a", in_per_cent=True),
     Quantity("energy", "J", "strain energy", "energy"),
     Quantity("energy_release", "J/m^2",
              "energy that the front of the slit ahead of the blade releases for each area that it opens, mean along it",

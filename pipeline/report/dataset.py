@@ -30,7 +30,7 @@ _FLOATS = (
 # What a record calls otherwise than the dataset.
 _IN_RECORD = {"machine_load": "load"}
 # Those of contact that is found, if any of the study's is.
-_FOUND = ("contact_area", "contact_radius")
+_FOUND = ("contact_area", "contact_area_error", "contact_radius", "contact_radius_error")
 _COUNTS = ("dofs", "cells", "iterations")
 # Of loads, if any of the study's acts; nought where none does.
 _OF_LOADS = ("load_force", "load_force_error", "load_energy", "sag")
@@ -224,8 +224,8 @@ def _scaled(record: Record | None, scale: Scale) -> Record | None:
     return replace(
         record, force=nan, force_vector=(nan, nan, nan), force_vector_error=(nan, nan, nan), stiffness=(),
         stiffness_error=(), energy=nan, energy_release=nan, max_strain=nan, balance=nan, contact_area=nan,
-        contact_radius=nan, load_force=nan, load_force_error=nan, load_energy=nan, sag=nan,
-        load_force_vector=(nan, nan, nan),
+        contact_radius=nan, contact_area_error=nan, contact_radius_error=nan, load_force=nan,
+        load_force_error=nan, load_energy=nan, sag=nan, load_force_vector=(nan, nan, nan),
     )  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """From solutions to records: the force along the probe's axis, its error bar, and what it cost."""
 
 from dataclasses import replace
-from math import nan
+from math import isnan, nan
 from typing import Any
 
 import numpy as np
@@ -55,6 +55,8 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         max_strain=solution.max_strain,
         contact_area=solution.contact_area,
         contact_radius=solution.contact_radius,
+        contact_area_error=solution.contact_area_bar,
+        contact_radius_error=solution.contact_area_bar / 2,
         **_of_loads(solution, turn),
         balance=solution.balance,
         dofs=solution.dofs,
@@ -74,6 +76,10 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
 def _of_loads(solution: Solution, turn: FloatArray | None) -> dict[str, Any]:
     """Return what a record holds of loads, nothing where there are none."""
     loaded, loads = solution.carried, solution.response.loads
+    if not isnan(solution.sag):  # of found contact: loads bend the surface, and the depth counts from the first touch
+        none = (0.0, 0.0, 0.0)
+        touching = {"load_force": 0.0, "load_force_error": 0.0, "load_force_vector": none}
+        return touching | {"load_energy": solution.load_energy, "sag": solution.sag}
     if loaded is None:
         return {}
     force, axis = loaded.force(loads), (0.0, 0.0, -1.0)

@@ -15,8 +15,8 @@ from pipeline.run.room import MEMORY_SHARE
 from pipeline.shapes.probes.round_indenter import RoundIndenter
 from pipeline.solve.axisymmetric import MeridianProblem
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.contact.problem import DEGREE, ContactProblem, Tool
-from pipeline.solve.contact.sets import ContactError
+from pipeline.solve.contact.active_set import ContactError
+from pipeline.solve.contact.problem import ContactProblem, Tool
 from pipeline.solve.large.newton import LargeError
 from pipeline.solve.large.problem import LargeProblem
 from pipeline.solve.linear import SolveError, is_direct
@@ -49,11 +49,9 @@ def problem_of(
     ``condense`` says that many depths are to come.
     """
     if case.probe.is_unilateral:
-        if case.load.acts:
-            raise CaseFailure("loads are not computed where the area of contact is found")
-        if case.mesh.degree != DEGREE:
-            raise CaseFailure(f"unilateral contact is found by elements of degree {DEGREE}, not {case.mesh.degree}")
-        return ContactProblem(spaces, tool_of(case), case.element, reuse=reuse, condense=condense)
+        return ContactProblem(
+            spaces, tool_of(case), case.element, degree=case.mesh.degree, reuse=reuse, condense=condense
+        )
     if case.material.is_large:
         return LargeProblem(spaces, case.mesh.degree, conditions_of(case))
     return QuasiStaticProblem(spaces, case.mesh.degree, conditions_of(case), case.element, shared=shared, reuse=reuse)

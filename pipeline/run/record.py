@@ -46,6 +46,8 @@ class Record:
     strain_clearance: float = CLEAR
     contact_area: float = nan
     contact_radius: float = nan
+    contact_area_error: float = nan
+    contact_radius_error: float = nan
     load_force: float = nan
     load_force_error: float = nan
     load_force_vector: tuple[float, float, float] = (nan, nan, nan)

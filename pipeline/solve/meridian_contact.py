@@ -91,6 +91,7 @@ class MeridianContact(DirectProblem):
             bars=best.error * response.stiffness,
             contact_area=best.area,
             contact_radius=(best.area / pi) ** 0.5,
+            contact_area_bar=best.error,
             stored=scale * best.twice_energy / 2,
         )
 

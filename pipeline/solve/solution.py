@@ -57,9 +57,11 @@ class Solution:
     stiffness, and ``bars`` (n, n) the 95 % error bars on its entries, made with ``plain``, the share of edges at the
     rim without quarter points, and for mixed elements with ``unseen`` (n), N in units of the energies on the diagonal
     (see :mod:`pipeline.solve.error`). Of unilateral contact, ``contact_area`` (m²) and ``contact_radius`` (m) are those
-    found, ``iterations`` the linear solves that it took, and ``stored`` (J) is its strain energy, which is not half of
-    F d. ``released`` (n, n) is the energy (J) that a metre of advance of a slit's front releases, a form of the amounts
-    of the motions (:mod:`pipeline.solve.release`), ``released_finer`` what one degree more makes of it, and
+    found, ``contact_area_bar`` the relative 95 % bar on the area, ``sag`` (m) how far loads have moved the first touch,
+    ``load_energy`` (J) their strain energy without the probe, ``iterations`` the linear solves that it took, and
+    ``stored`` (J) is its strain energy, which is not half of F d. ``released`` (n, n) is the energy (J) that a metre of
+    advance of a slit's front releases, a form of the amounts of the motions (:mod:`pipeline.solve.release`),
+    ``released_finer`` what one degree more makes of it, and
     ``release_bar`` the relative 95 % bar on what they release. ``pushed``, ``pushed_finer`` and ``push_bar`` are the
     same of the tip of a blade along which tissue slides: what its advance takes, less than nothing is released, is the
     force on it. ``carried`` is what loads do while the probe is held.
@@ -77,6 +79,9 @@ class Solution:
     estimate_iterations: int = 0
     contact_area: float = nan
     contact_radius: float = nan
+    contact_area_bar: float = nan
+    sag: float = nan
+    load_energy: float = nan
     stored: float | None = None
     released: FloatArray | None = None
     released_finer: FloatArray | None = None

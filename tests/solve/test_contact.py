@@ -2,7 +2,6 @@
 
 import json
 from contextlib import contextmanager
-from dataclasses import replace
 from math import pi, sqrt, tan
 
 import numpy as np
@@ -11,9 +10,8 @@ from mpi4py import MPI
 
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of, loads_of, tool_of
-from pipeline.solve.contact.area import contact_area
+from pipeline.solve.contact.active_set import ContactError, Obstacle, State, next_set
 from pipeline.solve.contact.problem import ContactProblem, Tool
-from pipeline.solve.contact.sets import ContactError, Obstacle, State, next_set
 from pipeline.solve.spaces import Spaces
 from pipeline.study.problems import StudyError
 from tests.cases import solve, study
@@ -66,7 +64,7 @@ def test_candidates_end_where_their_circle_does():
         candidates = problem._candidates
     away = np.hypot(*candidates.points[:, :2].T)
     assert np.array_equal(candidates.is_edge, away > (1 - 1e-6) * away.max())
-    assert np.count_nonzero(candidates.is_edge & (candidates.corners >= 0)) > 5
+    assert np.count_nonzero(candidates.is_edge & candidates.is_corner) > 5
 
 
 def test_every_set_that_was_solved_for_is_counted():
@@ -89,7 +87,7 @@ def test_nothing_pulls_and_nothing_comes_through(element):
         solution = problem.solve(law, loads)
     state, active, obstacle = problem.found.state, problem.found.active, problem.obstacle
     apart = obstacle.bounds - state.moved
-    assert (state.reactions[active & (obstacle.candidates.corners < 0)] < 0).all()
+    assert (state.reactions[active & ~obstacle.candidates.is_corner] < 0).all()
     assert np.abs(state.reactions[~active]).max() < 1e-6 * solution.reaction[2]
     assert apart.min() > -1e-9 * obstacle.depth
     assert np.abs(apart[active]).max() < 1e-9 * obstacle.depth
@@ -102,16 +100,33 @@ def test_what_is_pressed_stays_what_pulls_goes_and_what_came_through_is_held():
     assert next_set(obstacle, np.array([True, False, False, True]), state).tolist() == [True, True, False, False]
 
 
-def test_area_between_nodes_is_that_of_a_gap_that_opens_like_beside_a_smooth_tool():
-    """On four elements a radius, to 1 %."""
-    with pressed() as (problem, law, loads):
-        problem.solve(law, loads)
-        obstacle, state = replace(problem.obstacle, bounds=np.zeros(len(problem.found.active))), problem.found.state
-        distance = np.hypot(*obstacle.candidates.points[:, :2].T)
-        for radius in (0.8e-3, 1e-3):
-            parted = replace(state, moved=-(np.maximum(distance - radius, 0.0) ** 1.5))
-            found = contact_area(obstacle, distance <= radius, parted)
-            assert found == pytest.approx(pi / 4 * radius**2, rel=0.01)
+def swept(mesh, depths, probe=SPHERE, body=LARGE, **changes):
+    """Return the records of depths (mm) of a tool on one mesh."""
+    ends = {"depth_range": [f"{d:.6g} mm" for d in (depths[0], depths[-1])]} | probe
+    ends["depth"] = [f"{d:.6g} mm" for d in depths]
+    found = solve(body=body, probe=ends, mesh=COARSE | {"fine": "20 mm", "coarse": "20 mm"} | mesh, **changes)
+    return list(found.values())
+
+
+def test_contact_radius_grows_smoothly_with_depth():
+    """Hertz: a² = R d. Within 3 % on meshes of one and a half to five elements a radius, between nodes as well."""
+    depths = np.geomspace(0.02e-3, 0.2e-3, 25)
+    found = swept({"rim": "0.3 mm"}, 1e3 * depths)
+    radii = np.array([record.contact_radius for record in found])
+    ratio = radii / np.sqrt(10e-3 * depths)
+    assert np.abs(ratio - 1).max() < 0.03
+    assert (np.diff(radii) > 0).all()
+    assert np.abs(np.diff(ratio)).max() < 0.025
+    bars = np.array([record.contact_area_error for record in found])
+    assert (np.abs(ratio**2 - 1) < bars).all()
+    assert bars.max() < 0.25
+
+
+def test_contact_on_few_nodes_has_an_error_bar_that_tells_how_coarse_its_elements_are():
+    """Of a cone that touches four nodes; Sneddon's force, with the share that the body's end adds."""
+    (found,) = swept({"rim": "0.3 mm"}, [0.02], CONE | {"depth_range": ["0.02 mm", "0.2 mm"]})
+    exact = 2 / pi * MODULUS * tan(86 * pi / 180) * 0.02e-3**2
+    assert abs(found.force / exact - 1) < found.force_error < 0.15
 
 
 def test_flat_probe_that_does_not_lift_off_is_the_frictionless_one():

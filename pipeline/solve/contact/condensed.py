@@ -11,10 +11,11 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
+from pipeline.solve.contact.active_set import State
+from pipeline.solve.contact.candidates import Candidates, Surface
 from pipeline.solve.contact.displacement import DisplacementElements
+from pipeline.solve.contact.elements import FarShare, Unknowns
 from pipeline.solve.contact.levels import Hierarchy
-from pipeline.solve.contact.sets import State
-from pipeline.solve.contact.surface import Candidates
 from pipeline.solve.linear import Level, LinearSolver, SolveError
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.spaces import ElasticSpace, Spaces
@@ -34,20 +35,20 @@ def suits(space: ElasticSpace, candidates: Candidates, method: str) -> bool:
 
 
 class CondensedElements(DisplacementElements):
-    """Displacements of degree 2 on one process, with the compliance of the candidates. Freed with the stack."""
+    """Displacements on one process, with the compliance of the candidates. Freed with the stack."""
 
-    def __init__(self, spaces: Spaces, degree: int, law: MaterialLaw, candidates: Candidates, stack: ExitStack):
+    def __init__(self, spaces: Spaces, degree: int, law: MaterialLaw, surface: Surface, stack: ExitStack):
         """Assemble, factorise and condense.
 
         Raises:
             SolveError: if the factorisation fails.
         """
-        super().__init__(spaces, degree, law, candidates, "direct", stack)
+        super().__init__(spaces, degree, law, surface, "direct", stack)
         self._stack = stack
         self._multigrid: Hierarchy | None = None
         self._free = self._factor()
         stack.callback(self._free.close)
-        self._dofs = self.numbering.normal_dofs(self.nodes)
+        self._dofs = self.numbering.normal_dofs(np.ones(len(self.candidates), dtype=bool))
         order = np.argsort(3 * self.numbering.local + 2)
         self._place = np.empty_like(order)
         self._place[order] = np.arange(len(order))  # of each candidate among the sorted dofs
@@ -76,7 +77,7 @@ class CondensedElements(DisplacementElements):
         """Hold the ``active`` candidates (n) from now on."""
         self._active = active
 
-    def improve(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
+    def approach(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
         """Find the reactions that move what is held to ``bounds`` (n, m): exactly, whatever the ``tolerance``.
 
         Raises:
@@ -91,22 +92,46 @@ class CondensedElements(DisplacementElements):
         self._reactions[held] = pressed
         return 1
 
-    def state(self) -> State:
-        """Return what the candidates do."""
+    def near_state(self) -> State:
+        """Return what the candidates do, far field aside."""
         moved = self._compliance @ self._reactions
         return State(moved, self._reactions, float(moved @ self._reactions))
 
-    def show(self) -> None:
-        """Make the displacement, of the whole body for the reactions found, that of the space's forms."""
+    def condense_far(self, far: FarShare) -> None:
+        """Take in what the far field adds to the compliance: φ φᵀ / k."""
+        self._compliance += np.outer(far.unit.moved, far.unit.moved) / far.stiffness
+
+    def improve(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
+        """Find the reactions that move what is held to ``bounds`` (n, m), and the share of the far field."""
+        iterations = self.approach(bounds, tolerance, energy)
+        if self.far is not None:
+            self.far.share = self.far.wanted(self._reactions)
+        return iterations
+
+    def state(self) -> State:
+        """Return what the candidates do."""
+        return self.near_state()
+
+    def unknowns(self) -> Unknowns:
+        """Return the displacement (m) of the whole body, owned dofs, for the reactions found."""
         with vector(self.space.dofs.space) as loads:
             self.numbering.put(loads.array, self._reactions, self._active)
             self._free.solve(loads, self.displacement)
-        super().show()
+        return super().unknowns()
+
+    def relax(self, tolerance: float, load: Unknowns) -> Unknowns:
+        """Return the solution for a ``load`` with nothing held by the probe."""
+        space = self.space.dofs
+        with vector(space.space) as rhs, vector(space.space) as found:
+            (rhs.array[:],) = load
+            rhs.array[space.prescribed_owned] = 0.0
+            self._free.solve(rhs, found)
+            return (np.array(found.array),)
 
     def held_levels(self, facets: Int32Array, stack: ExitStack) -> list[Level]:
         """Return the levels of multigrid, which are kept for the next depth, with the local ``facets`` held."""
         if self._multigrid is None:
             self._multigrid = Hierarchy(
-                self._spaces, self.space.degree, self._law, self._candidates, self._stack, direct=False
+                self._spaces, self.space.degree, self._law, self._surface, self._stack, direct=False
             )
         return self._multigrid.hold_facets(facets)

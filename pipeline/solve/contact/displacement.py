@@ -5,9 +5,10 @@ from contextlib import ExitStack
 import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
-from pipeline.solve.contact.levels import CONDITIONS, Hierarchy
-from pipeline.solve.contact.sets import State
-from pipeline.solve.contact.surface import Candidates, Numbering
+from pipeline.solve.contact.active_set import State
+from pipeline.solve.contact.candidates import CONDITIONS, Candidates, Numbering, Surface
+from pipeline.solve.contact.elements import ContactElements, Unknowns
+from pipeline.solve.contact.levels import Hierarchy
 from pipeline.solve.linear import Level, LinearSolver, is_direct
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.spaces import ElasticSpace, Spaces
@@ -15,21 +16,17 @@ from pipeline.solve.vectors import vector
 from pipeline.stages import stage
 
 
-class DisplacementElements:
-    """Displacements of degree 1 or 2, with one operator for every set.
+class DisplacementElements(ContactElements):
+    """Displacements of one degree; what they make is freed with the stack."""
 
-    What they make is freed with the stack.
-    """
-
-    def __init__(
-        self, spaces: Spaces, degree: int, law: MaterialLaw, candidates: Candidates, method: str, stack: ExitStack
-    ):
+    def __init__(self, spaces: Spaces, degree: int, law: MaterialLaw, surface: Surface, method: str, stack: ExitStack):
         """Assemble; collective."""
+        super().__init__()
         self.space: ElasticSpace = spaces.get(degree, CONDITIONS)
-        self._spaces, self._law, self._candidates = spaces, law, candidates
+        self._spaces, self._law, self._surface = spaces, law, surface
+        self.candidates: Candidates = surface.of(degree)
         self._direct = is_direct(method, self.space.dofs.dofs, degree)
-        self.hierarchy = Hierarchy(spaces, degree, law, candidates, stack, direct=self._direct)
-        self.nodes = candidates.corners >= 0 if degree == 1 else np.ones(len(candidates), dtype=bool)
+        self.hierarchy = Hierarchy(spaces, degree, law, surface, stack, direct=self._direct)
         self.numbering: Numbering = self.hierarchy.numbering
         self.displacement = stack.enter_context(vector(self.space.dofs.space))
         self._held: Int32Array = np.empty(0, dtype=np.int32)
@@ -57,8 +54,8 @@ class DisplacementElements:
             self.close()
             self._solver = LinearSolver(levels, direct=self._direct, tolerance=_ANY)
 
-    def improve(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
-        """Move what is held to ``bounds`` (n, m), and then the rest; return the iterations: see ``Elements``.
+    def approach(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
+        """Move what is held to ``bounds`` (n, m), and then the rest; return the iterations.
 
         Raises:
             SolveError: if the solver does not converge.
@@ -69,6 +66,8 @@ class DisplacementElements:
         with vector(space.space) as residual, vector(space.space) as correction:
             self.hierarchy.finest.mult(self.displacement, residual)
             residual.scale(-1.0)
+            if self.load is not None:
+                residual.array[:] += self.load[0]
             residual.array[space.prescribed_owned] = 0.0
             residual.array[self._held] = 0.0
             target = None if energy is None else tolerance * energy**0.5
@@ -76,8 +75,8 @@ class DisplacementElements:
             self.displacement.axpy(1.0, correction)
         return iterations
 
-    def state(self) -> State:
-        """Return what the candidates do; collective."""
+    def near_state(self) -> State:
+        """Return what the candidates do, far field aside; collective."""
         with vector(self.space.dofs.space) as forces:
             self.hierarchy.finest.mult(self.displacement, forces)
             energy = float(self.displacement.dot(forces))
@@ -88,13 +87,15 @@ class DisplacementElements:
         """Return the levels of multigrid with the local ``facets`` held, in the place of any set; collective."""
         self.close()
         if self._direct:
-            hierarchy = Hierarchy(self._spaces, self.space.degree, self._law, self._candidates, stack, direct=False)
+            hierarchy = Hierarchy(self._spaces, self.space.degree, self._law, self._surface, stack, direct=False)
             return hierarchy.hold_facets(facets)
         return self.hierarchy.hold_facets(facets)
 
-    def show(self) -> None:
-        """Make the displacement that of the space's forms; collective."""
-        self.space.set_displacement(self.displacement)
+    def put_fields(self, unknowns: Unknowns) -> None:
+        """Make ``unknowns`` the displacement of the space's forms; collective."""
+        with vector(self.space.dofs.space) as displacement:
+            (displacement.array[:],) = unknowns
+            self.space.set_displacement(displacement)
 
     def residual(self) -> FloatArray:
         """Return K u (N) with the unmodified operator, owned dofs, for the forms' displacement; collective."""
@@ -102,18 +103,30 @@ class DisplacementElements:
             self.space.apply(forces, self._law)
             return np.array(forces.array)
 
-    def unknowns(self) -> tuple[FloatArray, ...]:
+    def lift(self, held: FloatArray) -> Unknowns:
+        """Return the right-hand side of prescribed displacements ``held`` (m, with ghosts); collective."""
+        with vector(self.space.dofs.space) as rhs:
+            self.space.lift(rhs, held, self._law)
+            return (np.array(rhs.array),)
+
+    def pulled(self, forces: FloatArray) -> Unknowns:
+        """Return the right-hand side of ``forces`` (N), owned dofs."""
+        return (forces,)
+
+    def unknowns(self) -> Unknowns:
         """Return a copy of the displacement (m), owned dofs."""
         return (np.array(self.displacement.array),)
 
-    def start_at(self, unknowns: tuple[FloatArray, ...]) -> None:
+    def start_at(self, unknowns: Unknowns) -> None:
         """Take over a displacement (m), owned dofs."""
         (self.displacement.array[:],) = unknowns
 
-    def start_from(self, coarse: ElasticSpace) -> None:
-        """Take over the displacement of the forms of another space; collective."""
-        self.space.forms.displacement.interpolate(coarse.forms.displacement)
+    def start_from(self, coarse: ContactElements) -> None:
+        """Take over the displacement of the forms of elements of a lower degree; collective."""
+        self.space.forms.displacement.interpolate(coarse.space.forms.displacement)
         self.displacement.array[:] = self.space.forms.displacement.x.array[: self.space.dofs.owned]
+        if coarse.far is not None:
+            self.hold_prescribed()
 
 
 # The solver is made for any tolerance: each solve has its own.

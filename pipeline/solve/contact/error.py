@@ -1,8 +1,11 @@
-"""How far the force of found contact is from the truth: solve on in degree 3, with the area of contact held.
+"""How far the force of found contact is from the truth: solve on in one degree more.
 
-Where the three mid nodes of a facet touch, all of it is held along the axis at the displacement found; other facets
-are free. The force of that problem is wrong, since its area is; but the share s of the energy that it takes away tells
-how much F errs by. F is no bound: the bar is on both sides.
+The area of contact is held: where all nodes of a facet but its corners touch, the facet is held along the axis at the
+displacement found, and other facets are free. The force of that problem is wrong, since its area is; but the share s
+of the energy that it takes away tells how much F errs by. F is no bound: the bar is on both sides.
+
+Where too little of the area is made of such facets, the elements are as large as the contact: then the contact is
+found again in one degree more, and the bar is on both sides of the force by what that changes.
 """
 
 from contextlib import ExitStack
@@ -10,10 +13,11 @@ from contextlib import ExitStack
 import numpy as np
 
 from pipeline.arrays import Int32Array
+from pipeline.solve.contact.active_set import Found, Obstacle, find_set
+from pipeline.solve.contact.candidates import CONDITIONS, Surface
 from pipeline.solve.contact.displacement import DisplacementElements
-from pipeline.solve.contact.levels import CONDITIONS, hold, mask, normal_dofs
+from pipeline.solve.contact.levels import hold, mask, normal_dofs
 from pipeline.solve.contact.mixed import MixedElements
-from pipeline.solve.contact.surface import Candidates
 from pipeline.solve.enrich import energy_decrements
 from pipeline.solve.linear import LinearSolver
 from pipeline.solve.material import MaterialLaw
@@ -22,12 +26,17 @@ from pipeline.solve.spaces import Spaces
 from pipeline.solve.vectors import vector
 from pipeline.stages import stage
 
+# Relative energy norm of the error to which the solution of the next degree is found for the error bar.
+_ESTIMATE_TOLERANCE = 0.1
+# And to which contact is found again in it: loosely first.
+_AGAIN = (1e-3, 1e-5)
+
 
 @stage("error bar")
 def displacement_decrement(
     spaces: Spaces, elements: DisplacementElements, law: MaterialLaw, facets: Int32Array
 ) -> tuple[float, int]:
-    """Return what degree 3 takes away of twice the energy (J) of the part that is modelled, and the iterations.
+    """Return what one degree more takes away of twice the energy (J) of the modelled part, and the iterations.
 
     Collective. The local ``facets`` are held; the displacement is that of the forms of ``elements``, whose operators
     serve on.
@@ -58,9 +67,9 @@ def displacement_decrement(
 
 @stage("error bar")
 def mixed_decrement(
-    spaces: Spaces, elements: MixedElements, law: MaterialLaw, candidates: Candidates, facets: Int32Array
+    spaces: Spaces, elements: MixedElements, law: MaterialLaw, surface: Surface, facets: Int32Array
 ) -> tuple[float, float, int]:
-    """Return what degree 3 takes away of twice the energy (J), maybe less than nothing, and the iterations.
+    """Return what one degree more takes away of twice the energy (J), maybe less than nothing, and the iterations.
 
     In between is the energy norm squared of the first correction (J): what is taken away may vanish by chance.
     Collective. The local ``facets`` are held; the fields are those of the forms of ``elements``.
@@ -70,13 +79,33 @@ def mixed_decrement(
     """
     elements.close()
     with ExitStack() as stack:
-        finer = MixedElements(spaces, elements.space.degree + 1, law, candidates, "iterative", stack)
-        finer.continue_from(elements)
+        finer = MixedElements(spaces, elements.space.degree + 1, law, surface, "iterative", stack)
+        finer.start_from(elements)
         finer.hold_facets(facets)
         before = elements.energy()
-        iterations = finer.improve(np.zeros(len(candidates)), _ESTIMATE_TOLERANCE, None)  # nothing held moves
+        iterations = finer.approach(np.zeros(len(finer.candidates)), _ESTIMATE_TOLERANCE, None)  # nothing held moves
         return before - finer.energy(), finer.first_energy, iterations
 
 
-# Relative energy norm of the error to which the solution of degree 3 is found for the error bar.
-_ESTIMATE_TOLERANCE = 0.1
+@stage("error bar")
+def found_again(
+    spaces: Spaces, elements: DisplacementElements | MixedElements, law: MaterialLaw, surface: Surface, tool: Obstacle,
+    found: Found,
+) -> tuple[float, int]:  # fmt: skip
+    """Return the share of the force that one degree more takes away, contact found again, and the sets; collective.
+
+    ``tool`` is what is in the way of the nodes of that degree, far field aside.
+
+    Raises:
+        SolveError: if the solver does not converge.
+        ContactError: if the contact does not settle.
+    """
+    elements.close()
+    kind = MixedElements if isinstance(elements, MixedElements) else DisplacementElements
+    with ExitStack() as stack:
+        finer = kind(spaces, elements.space.degree + 1, law, surface, "iterative", stack)
+        finer.start_from(elements)
+        active = elements.candidates.raised(found.active, finer.candidates)
+        again = find_set(finer, tool, active, _AGAIN, found.state.energy)
+    force, finer_force = (float(-one.state.reactions[one.active].sum()) for one in (found, again))
+    return 1 - finer_force / force, again.sets

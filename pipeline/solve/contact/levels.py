@@ -7,16 +7,13 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from pipeline.arrays import BoolArray, Int32Array
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.contact.surface import Candidates, Numbering
+from pipeline.solve.contact.candidates import CONDITIONS, Numbering, Surface
 from pipeline.solve.linear import Level
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.single.cycle import suits
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.straight.product import is_product
 
-# What is held is the contact set's alone; of the footprint as such nothing is.
-CONDITIONS = Conditions(bonded=False, unilateral=True)
 _SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
 
 
@@ -28,21 +25,24 @@ class Hierarchy:
     """
 
     def __init__(
-        self, spaces: Spaces, degree: int, law: MaterialLaw, candidates: Candidates, stack: ExitStack, *, direct: bool,
+        self, spaces: Spaces, degree: int, law: MaterialLaw, surface: Surface, stack: ExitStack, *, direct: bool,
         masks: bool = True,
     ):  # fmt: skip
         """Assemble; collective. What is made is given back with the ``stack``."""
-        self._candidates = candidates
         degrees = [degree] if direct else range(1, degree + 1)
         found = [spaces.get(d, CONDITIONS) for d in degrees]
-        matrices = [stack.enter_context(s.operators.lend_for_cycles(law) if s.degree > 1 and not direct else
-                                        s.operators.lend(law, blocked=False)) for s in found]  # fmt: skip
+        lent = [
+            s.operators.lend_for_cycles(law) if s.degree > 1 and not direct else s.operators.lend(law, blocked=False)
+            for s in found
+        ]
+        matrices = [stack.enter_context(matrix) for matrix in lent]
         is_masked = masks and not direct and suits([matrix for matrix, _ in matrices])
         self._operators = [
             HeldOperator(space, matrix, law, stack, masked=is_masked and space.degree > 1)
             for space, (matrix, _) in zip(found, matrices, strict=True)
         ]
-        self._numberings = [Numbering(s.dofs.space, candidates.numbers(s.degree)) for s in found]
+        self._candidates = [surface.of(d) for d in degrees]
+        self._numberings = [Numbering(s.dofs.space, c.numbers) for s, c in zip(found, self._candidates, strict=True)]
 
     @property
     def finest(self) -> PETSc.Mat:
@@ -56,7 +56,8 @@ class Hierarchy:
 
     def hold(self, active: BoolArray) -> list[Level]:
         """Return the levels with the ``active`` candidates (n) held, good until the next call; collective."""
-        sets = [self._candidates.majority(active)] * (len(self._operators) - 1) + [active]
+        *coarser, finest = self._candidates
+        sets = [*(finest.lowered(active, lower) for lower in coarser), active]
         return [
             operator.hold(numbering.normal_dofs(chosen))
             for operator, numbering, chosen in zip(self._operators, self._numberings, sets, strict=True)

@@ -1,6 +1,6 @@
 """Taylor–Hood elements whose nodes below the probe are held where they touch it: up to ν = ½.
 
-Equations and solver are those of :mod:`pipeline.solve.mixed`; reactions are those of K₀ u + Bᵀ p.
+Equations and solver are those of :mod:`pipeline.solve.elements`; reactions are those of K₀ u + Bᵀ p.
 """
 
 from contextlib import ExitStack
@@ -9,9 +9,10 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
-from pipeline.solve.contact.levels import CONDITIONS, Hierarchy, normal_dofs
-from pipeline.solve.contact.sets import State
-from pipeline.solve.contact.surface import Candidates
+from pipeline.solve.contact.active_set import State
+from pipeline.solve.contact.candidates import CONDITIONS, Candidates, Surface
+from pipeline.solve.contact.elements import ContactElements, Unknowns
+from pipeline.solve.contact.levels import Hierarchy, normal_dofs
 from pipeline.solve.elements import DIRECT_LIMIT
 from pipeline.solve.linear import Level
 from pipeline.solve.material import MaterialLaw, SplitLaw
@@ -21,16 +22,15 @@ from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.stages import stage
 
 
-class MixedElements:
-    """Displacements of degree 2 or 3 and pressures of one less, with one operator for every set.
+class MixedElements(ContactElements):
+    """Displacements of degree 2 or more and pressures of one less.
 
     What they make is freed with the stack. Moduli are in the law's unit, energies and forces in J and N.
     """
 
-    def __init__(
-        self, spaces: Spaces, degree: int, law: MaterialLaw, candidates: Candidates, method: str, stack: ExitStack
-    ):
+    def __init__(self, spaces: Spaces, degree: int, law: MaterialLaw, surface: Surface, method: str, stack: ExitStack):
         """Assemble; collective."""
+        super().__init__()
         self.space: ElasticSpace = spaces.get(degree, CONDITIONS)
         self.mixed = MixedSpace(spaces.body, self.space)
         stack.callback(self.mixed.close)
@@ -38,9 +38,9 @@ class MixedElements:
         self._direct = method == "direct" or (method == "auto" and self.mixed.dofs <= DIRECT_LIMIT)
         # The residual of held displacements must vanish: it is part of the norm that is made small.
         self.hierarchy = Hierarchy(
-            spaces, degree, self._split.elastic, candidates, stack, direct=self._direct, masks=False
+            spaces, degree, self._split.elastic, surface, stack, direct=self._direct, masks=False
         )
-        self.nodes = np.ones(len(candidates), dtype=bool)
+        self.candidates: Candidates = surface.of(degree)
         self.numbering = self.hierarchy.numbering
         self.unknown: Pair = stack.enter_context(self.mixed.pair())
         self.compliance = self.mixed.by_region(self._split.compliance)
@@ -72,7 +72,7 @@ class MixedElements:
             SolveError: if the solver cannot be set up.
         """
         dofs = normal_dofs(self.space, facets)
-        self._active = np.zeros_like(self.nodes)
+        self._active = np.zeros(len(self.candidates), dtype=bool)
         self._set_up(self.hierarchy.hold_facets(facets), dofs[dofs < self.space.dofs.owned])
 
     @stage("set-up")
@@ -102,8 +102,8 @@ class MixedElements:
         free.destroy()
         return coupling
 
-    def improve(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
-        """Move what is held to ``bounds`` (n, m), and then the rest; return the iterations: see ``Elements``.
+    def approach(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
+        """Move what is held to ``bounds`` (n, m), and then the rest; return the iterations.
 
         Raises:
             SolveError: if the solver does not converge.
@@ -114,6 +114,9 @@ class MixedElements:
             self._product(rest)
             for part in rest:
                 part.scale(-1.0)
+            if self.load is not None:
+                for part, values in zip(rest, self.load, strict=True):
+                    part.array[:] += values
             rest[0].array[self.space.dofs.prescribed_owned] = 0.0
             rest[0].array[self._held] = 0.0
             target = None if energy is None else tolerance * (energy / self._split.unit) ** 0.5
@@ -123,8 +126,8 @@ class MixedElements:
             pressure.axpy(1.0, correction[1])
         return iterations
 
-    def state(self) -> State:
-        """Return what the candidates do; collective."""
+    def near_state(self) -> State:
+        """Return what the candidates do, far field aside; collective."""
         displacement, _ = self.unknown
         with self.mixed.pair() as forces:
             self._product(forces)
@@ -132,10 +135,16 @@ class MixedElements:
         return State(moved, self._split.unit * reactions, self.energy())
 
     def energy(self) -> float:
-        """Return twice the energy (J) of the part that is modelled, stationary at the solution; collective."""
-        displacement, pressure = self.unknown
+        """Return twice the energy (J) of the part that is modelled, stationary at the solution, less a constant.
+
+        The constant is that of what is prescribed, if that is not nothing; collective.
+        """
         with self.mixed.pair() as result:
             self._product(result)
+            if self.load is not None:
+                for part, values in zip(result, self.load, strict=True):
+                    part.array[:] -= 2 * values
+            displacement, pressure = self.unknown
             return self._split.unit * float(displacement.dot(result[0]) + pressure.dot(result[1]))
 
     def _product(self, result: Pair) -> None:
@@ -150,9 +159,12 @@ class MixedElements:
             result[1].array[:] *= -self.compliance
             result[1].axpy(1.0, dilation)
 
-    def show(self) -> None:
-        """Make displacement and pressure those of the forms; collective."""
-        self.mixed.set_fields(self.unknown)
+    def put_fields(self, unknowns: Unknowns) -> None:
+        """Make ``unknowns`` displacement and pressure of the forms; collective."""
+        with self.mixed.pair() as fields:
+            for part, values in zip(fields, unknowns, strict=True):
+                part.array[:] = values
+            self.mixed.set_fields(fields)
 
     def residual(self) -> FloatArray:
         """Return K₀ u + Bᵀ p (N) with the unmodified operator, owned dofs, for the forms' fields; collective."""
@@ -160,21 +172,35 @@ class MixedElements:
             self.mixed.apply(residual, pull, dilation, self._split.elastic)
             return np.asarray(self._split.unit * (residual.array + pull.array))
 
-    def unknowns(self) -> tuple[FloatArray, ...]:
+    def lift(self, held: FloatArray) -> Unknowns:
+        """Return the right-hand side of prescribed displacements ``held`` (m, with ghosts); collective."""
+        with self.mixed.pair() as rhs:
+            self.mixed.lift(rhs, held, self._split.elastic)
+            return tuple(np.array(part.array) for part in rhs)
+
+    def pulled(self, forces: FloatArray) -> Unknowns:
+        """Return the right-hand side of ``forces`` (N), owned dofs."""
+        return forces / self._split.unit, np.zeros_like(self.unknown[1].array)
+
+    def unknowns(self) -> Unknowns:
         """Return a copy of displacement (m) and pressure (in the law's unit), owned dofs."""
         return tuple(np.array(part.array) for part in self.unknown)
 
-    def start_at(self, unknowns: tuple[FloatArray, ...]) -> None:
+    def start_at(self, unknowns: Unknowns) -> None:
         """Take over displacement and pressure, owned dofs."""
         for part, values in zip(self.unknown, unknowns, strict=True):
             part.array[:] = values
 
-    def start_from(self, coarse: ElasticSpace) -> None:
-        """Take over the displacement of the forms of another space; collective. There is no pressure yet."""
-        self.space.forms.displacement.interpolate(coarse.forms.displacement)
-        self.unknown[0].array[:] = self.space.forms.displacement.x.array[: self.space.dofs.owned]
+    def start_from(self, coarse: ContactElements) -> None:
+        """Take over the fields of the forms of elements of a lower degree; collective.
 
-    def continue_from(self, coarse: "MixedElements") -> None:
-        """Take over displacement and pressure of the forms of elements of a lower degree; collective."""
+        Of displacement elements there is no pressure.
+        """
+        if not isinstance(coarse, MixedElements):
+            self.space.forms.displacement.interpolate(coarse.space.forms.displacement)
+            self.unknown[0].array[:] = self.space.forms.displacement.x.array[: self.space.dofs.owned]
+            return
         nothing = np.zeros_like(self.space.forms.displacement.x.array)
         self.mixed.start_from(coarse.mixed, self.unknown, nothing)
+        if coarse.far is not None:
+            self.hold_prescribed()

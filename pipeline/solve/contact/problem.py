@@ -1,8 +1,11 @@
 """A probe pressed onto a body that finds where it touches: frictionless, without tension or penetration.
 
-The set of nodes that touch is found on elements of degree 1, which costs little, and from there on those of degree 2:
-their reactions are forces of K u on single nodes, mid nodes and corners alike. F is their sum. As a function of the
-mesh it is no bound: a coarse contact area may be too large or too small.
+The set of nodes that touch is found on elements of degree 1, which costs little, and from there on those of higher
+degrees: their reactions are forces of K u on single nodes. F is their sum. As a function of the mesh it is no bound: a
+coarse contact area may be too large or too small.
+
+Loads bend the surface before the probe touches it. The depth counts from the first touch of the surface as loads leave
+it, along the axis.
 """
 
 from collections.abc import Callable
@@ -13,16 +16,18 @@ from typing import Any
 import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
+from pipeline.solve.contact.active_set import ContactError, Found, Obstacle, find_set
 from pipeline.solve.contact.area import contact_area
+from pipeline.solve.contact.candidates import CONDITIONS, Candidates, Numbering, Surface
 from pipeline.solve.contact.condensed import CondensedElements, suits
 from pipeline.solve.contact.displacement import DisplacementElements
-from pipeline.solve.contact.error import displacement_decrement, mixed_decrement
-from pipeline.solve.contact.levels import CONDITIONS
+from pipeline.solve.contact.elements import FarShare, FreeResponse
+from pipeline.solve.contact.error import displacement_decrement, found_again, mixed_decrement
 from pipeline.solve.contact.mixed import MixedElements
-from pipeline.solve.contact.sets import ContactError, Found, Obstacle, find_set
-from pipeline.solve.contact.surface import Numbering, find_candidates
 from pipeline.solve.contact.sweep import Kind, Sweep
-from pipeline.solve.error import error_bar, found_bar
+from pipeline.solve.contact.touch import Touch
+from pipeline.solve.dead_loads import Applied
+from pipeline.solve.error import error_bar, found_again_bar, found_bar
 from pipeline.solve.forms import mean_strain_form
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads
@@ -33,9 +38,8 @@ from pipeline.solve.solution import TOLERANCE, Solution, check_balance
 from pipeline.solve.spaces import Spaces
 from pipeline.solve.strain import largest_strain, principal_strains
 from pipeline.solve.vectors import global_sum
-from pipeline.stages import Times, recharge, recorded, stage
+from pipeline.stages import recharge, recorded, stage
 
-DEGREE = 2
 # Energy norm of the error to which each set but the last one is solved, relative to that of the solution.
 _LOOSE = 1e-3
 # Stricter than what serves a prescribed displacement: F is linear in the solver's error here.
@@ -44,6 +48,8 @@ _STRICTER = 0.01
 _SAME = 1e-9
 # The first set is looked for in a material that elements of degree 1 do not lock in: λ/μ at most (ν = 0.3).
 _FIRST_RATIO = 1.5
+# Where facets with all nodes in contact cover less than this share of its area, contact is found again for the bar.
+_COVERED = 0.3
 
 
 @dataclass(frozen=True)
@@ -52,11 +58,13 @@ class Tool:
 
     ``height`` gives, at points (n, 3) of the undeformed surface (m), how far above each the probe's surface is before
     it moves, infinite where there is no probe. ``ends_at`` tells of points (n, 3) on the candidates' edge whether the
-    probe itself ends there: elsewhere contact must not reach that edge.
+    probe itself ends there: elsewhere contact must not reach that edge. ``first`` (m) is the least height, none where
+    it touches on its axis first.
     """
 
     height: Callable[[FloatArray], FloatArray]
     ends_at: Callable[[FloatArray], BoolArray]
+    first: float = 0.0
 
 
 class ContactProblem:
@@ -66,9 +74,10 @@ class ContactProblem:
     """
 
     def __init__(
-        self, spaces: Spaces, tool: Tool, element: str = "displacement", *, reuse: bool = False, condense: bool = False
-    ):
-        """Prepare for elements of a kind; collective.
+        self, spaces: Spaces, tool: Tool, element: str = "displacement", *, degree: int = 2, reuse: bool = False,
+        condense: bool = False,
+    ):  # fmt: skip
+        """Prepare for elements of a kind and a ``degree``; collective.
 
         With ``reuse``, a depth begins with what is known of others of the same material. ``condense`` says that many
         depths of each material are to come: where the body is small, its surface is condensed for them, and they share
@@ -76,10 +85,9 @@ class ContactProblem:
 
         """
         self._spaces, self._tool, self._body = spaces, tool, spaces.body
-        self._is_mixed = element == "mixed"
-        self._fine, coarse = (spaces.get(degree, CONDITIONS) for degree in (DEGREE, 1))
-        self._candidates = find_candidates(self._body, self._fine.dofs.space, coarse.dofs.space)
-        self._heights = tool.height(self._candidates.points)
+        self._is_mixed, self._degree = element == "mixed", degree
+        self._surface, self._touch = Surface(spaces), Touch(tool.height, tool.first)
+        self._fine, self._candidates = spaces.get(degree, CONDITIONS), self._surface.of(degree)
         self._supported = self._held_by_support()
         self.obstacle: Obstacle | None = None
         self.found: Found | None = None
@@ -104,153 +112,243 @@ class ContactProblem:
     ) -> Solution:  # fmt: skip
         """Find the contact, and return the force and checks; collective.
 
-        ``tolerance`` is that of the energy norm of the solver's error, relative. ``estimate`` goes on in degree 3, for
-        the error bar.
+        ``tolerance`` is that of the energy norm of the solver's error, relative. ``estimate`` goes on in one degree
+        more, for the error bar.
 
         Raises:
             SolveError: if a linear solver fails, or the solution a check.
             ContactError: if the contact does not settle, reaches the candidates' edge where the probe does not end, or
                 what is held of the body.
         """
-        depth = loads.amounts[0]
-        self.obstacle = obstacle = Obstacle(self._candidates, self._heights - depth, depth)
-        if np.any(obstacle.bounds[self._supported] < 0):
-            raise ContactError("the probe runs into what is held of the body: no displacement satisfies both")
         with recorded() as times, ExitStack() as stack:
             with stage("solve"):
-                sweep, first, found = self._find(law, method, (_LOOSE, _STRICTER * tolerance), stack)
-                sweep.elements.show()
+                sweep = self._sweep_of(law, method, stack)
+                elements, strict = sweep.elements, _STRICTER * tolerance
+                elements.far = self._far_share(elements, law, loads, strict)
+                loaded = self._loaded(elements, loads, strict)
+                depth = loads.amounts[0]
+                heights = self._touch.heights(self._candidates, loaded)
+                self.obstacle = obstacle = Obstacle(self._candidates, heights - depth, depth)
+                if np.any(obstacle.bounds[self._supported] < 0):
+                    raise ContactError("the probe runs into what is held of the body: no displacement satisfies both")
+                first, found = self._find(sweep, (_LOOSE, strict), loaded)
+                elements.show()
                 self._check_edge(found.active)
                 self.found = found
-                response = self._response(sweep.elements, found, loads)
+                response = self._response(elements, found, loads)
                 check_balance(response.balance)
                 if self._reuse:
                     sweep.keep(depth, found)
-            solution = self._solution(first, found, response, times)
-            if not estimate:
-                return solution
-            taken, share, more = self._estimate(sweep, obstacle, found)
+            bar = self._estimate_of(sweep, obstacle, found, loaded) if estimate else None
+            if loaded is not None:
+                elements.show(loaded)
+            area = contact_area(obstacle, found.active, found.state, self._modulus(law), self._body.mirrored)
+            whole = self._whole * area.value
+            solution = Solution(
+                response=response,
+                max_strain=largest_strain(self._strain, self._body),
+                dofs=self._fine.dofs.whole_dofs,
+                cells=self._body.cells,
+                iterations=first + found.sets,
+                times=times,
+                contact_area=whole,
+                contact_radius=(whole / np.pi) ** 0.5,
+                stored=None if self._is_as_prescribed(found) else self._whole * found.state.energy / 2,
+                sag=np.nan if loaded is None else self._touch.sag(self._candidates, loaded),
+                load_energy=np.nan if loaded is None else self._whole * loaded.energy / 2,
+            )
+        if bar is None:
+            return solution
         return replace(
-            solution, decrements=taken * response.stiffness, bars=share * response.stiffness,
-            plain=plain_share(self._body), estimate_iterations=more,
-        )  # fmt: skip
-
-    def _solution(self, first: int, found: Found, response: Response, times: Times) -> Solution:
-        """Return the solution, which took ``first`` sets of degree 1 to begin with; collective."""
-        assert self.obstacle is not None
-        area = self._whole * contact_area(self.obstacle, found.active, found.state)
-        return Solution(
-            response=response,
-            max_strain=largest_strain(self._strain, self._body),
-            dofs=self._fine.dofs.whole_dofs,
-            cells=self._body.cells,
-            iterations=first + found.sets,
-            times=times,
-            contact_area=area,
-            contact_radius=(area / np.pi) ** 0.5,
-            stored=None if self._is_as_prescribed(found) else self._whole * found.state.energy / 2,
+            solution,
+            decrements=bar.taken * response.stiffness,
+            bars=bar.share * response.stiffness,
+            plain=plain_share(self._body),
+            estimate_iterations=bar.iterations,
+            contact_area_bar=area.bar + bar.share,
         )
-
-    def _is_as_prescribed(self, found: Found) -> bool:
-        """Tell whether all of a face touches and moves by the depth: the area of contact was no question."""
-        assert self.obstacle is not None
-        return bool(found.active.all() and np.ptp(self.obstacle.bounds) <= _SAME * self.obstacle.depth)
-
-    def _estimate(self, sweep: Sweep, obstacle: Obstacle, found: Found) -> tuple[float, float, int]:
-        """Return the share of the energy that degree 3 takes away, that of the force's bar, and the iterations."""
-        if known := sweep.bar(obstacle.depth):
-            return *known, 0
-        taken, share, more = self._estimated(sweep.elements, sweep.law, found)
-        sweep.keep_bar(obstacle.depth, taken, share)
-        return taken, share, more
-
-    def _estimated(self, elements: Kind, law: MaterialLaw, found: Found) -> tuple[float, float, int]:
-        facets = self._candidates.closed_facets(found.active)
-        if isinstance(elements, MixedElements):
-            taken, unseen, more = mixed_decrement(self._spaces, elements, law, self._candidates, facets)
-        else:
-            taken, more = displacement_decrement(self._spaces, elements, law, facets)
-            unseen = 0.0
-        share, unseen = taken / found.state.energy, unseen / found.state.energy
-        if (found.active & self._candidates.is_edge).any():  # the probe ends there, and the pressure is singular
-            element = "mixed" if self._is_mixed else "displacement"
-            return share, error_bar(share, DEGREE, element, plain=plain_share(self._body), unseen=unseen), more
-        return share, found_bar(share, unseen), more
 
     def fields(self) -> tuple[Any, FloatArray]:
         """Return the last solution's displacement (m) and the principal strains of each owned cell; collective."""
         return self._fine.forms.displacement, principal_strains(self._strain, self._body)
 
-    @property
-    def _whole(self) -> float:
-        """How many times what is modelled makes the body."""
-        return 2.0 ** len(self._body.mirrored)
+    # ---- what acts besides the probe ------------------------------------------------------------------
 
-    def _find(
-        self, law: MaterialLaw, method: str, tolerances: tuple[float, float], stack: ExitStack
-    ) -> tuple[Sweep, int, Found]:
-        """Return the elements, how many sets of degree 1 were solved, and what was found; collective."""
+    def _far_share(self, elements: Kind, law: MaterialLaw, loads: Loads, tolerance: float) -> FarShare | None:
+        """Return the far field on the cut face, None without; collective. What is known of it is kept."""
+        if loads.far is None:
+            return None
+        if elements.far is None:
+            motion = next(motion for motion in loads.motions if motion.far is not None)
+            held = self._fine.dofs.held(motion)
+            unit = elements.free_response(tolerance, elements.lift(held), held[: self._fine.dofs.owned])
+            far = FarShare(unit, unit.energy + loads.far.stiffness(law.lame_mu[0]) / self._whole)
+            if isinstance(elements, CondensedElements):
+                elements.condense_far(far)
+            return far
+        return elements.far
+
+    def _loaded(self, elements: Kind, loads: Loads, tolerance: float) -> FreeResponse | None:
+        """Return what loads do to the body without the probe; collective.
+
+        Raises:
+            SolveError: if they are not in balance.
+        """
+        if loads.dead is None:
+            return None
+        applied = self._fine.applied(loads.dead)
+        loaded = elements.free_response(tolerance, elements.pulled(applied.forces))
+        check_balance(self._imbalance(elements, applied, loaded))
+        return loaded
+
+    def _imbalance(self, elements: Kind, applied: Applied, loaded: FreeResponse) -> float:
+        """Return the relative error of work and forces of loads, ``loaded`` being in the forms; collective."""
+        space = self._fine.dofs
+        residual = elements.residual().reshape(-1, 3)
+        sums = [*residual[space.fixed_owned].sum(axis=0), loaded.unknowns[0] @ applied.forces]
+        *support, work = global_sum(space.comm, np.array(sums))
+        rest = [s + f for axis, (s, f) in enumerate(zip(support, applied.resultant, strict=True))
+                if axis not in self._body.mirrored]  # fmt: skip
+        return max(float(np.linalg.norm(rest)) / applied.size, abs(loaded.energy / work - 1) if work else 0.0)
+
+    # ---- contact --------------------------------------------------------------------------------------
+
+    def _find(self, sweep: Sweep, tolerances: tuple[float, float], loaded: FreeResponse | None) -> tuple[int, Found]:
+        """Return how many sets of lower degrees were solved, and what was found; collective."""
         assert self.obstacle is not None
-        if sweep := self._sweep_of(law, method):
-            try:
-                found = sweep.find(self.obstacle, tolerances)
-                if found is not None:
-                    return sweep, 0, found
-            except SolveError:  # afresh, then
-                self._forget()
-        with ExitStack() as inner:
-            elements, first, cost = self._start(law, method, inner)
-            active = self._candidates.spread(first.active)
-            found = find_set(elements, self.obstacle, active, tolerances, first.state.energy)
-            sweep = Sweep(law, method, elements, inner.pop_all(), cost)
-        if self._reuse:
-            self._forget()
-            self._sweep = sweep
-        else:
-            stack.callback(sweep.close)
-        return sweep, first.sets, found
+        try:
+            found = sweep.find(self.obstacle, tolerances)
+            if found is not None:
+                return 0, found
+        except SolveError:  # afresh, then
+            if isinstance(sweep.elements, CondensedElements):
+                raise
+        with ExitStack() as stack:
+            first, elements, before = self._first_set(sweep, loaded, stack)
+            sweep.elements.start_from(elements)
+            active = elements.candidates.raised(before.active, self._candidates)
+        return first, find_set(sweep.elements, self.obstacle, active, tolerances, before.state.energy)
 
-    def _sweep_of(self, law: MaterialLaw, method: str) -> Sweep | None:
-        """Return what is kept of a material, or else, if the surface is to be condensed, that; collective."""
+    def _first_set(
+        self, sweep: Sweep, loaded: FreeResponse | None, stack: ExitStack
+    ) -> tuple[int, DisplacementElements | MixedElements, Found]:
+        """Return sets solved, the elements of one degree less, and what was found on them; collective."""
+        sets, found = 0, None
+        elements: DisplacementElements | MixedElements | None = None
+        for degree in range(1, self._degree):
+            kind = MixedElements if self._is_mixed and degree > 1 else DisplacementElements
+            law = sweep.law if kind is MixedElements else _softer(sweep.law)
+            lower = kind(self._spaces, degree, law, self._surface, sweep.method, stack)
+            obstacle = self._obstacle_of(lower.candidates, loaded)
+            if elements is None or found is None:
+                active = obstacle.bounds < 0
+                if not active.any():
+                    raise ContactError("the probe reaches no corner of an element: use smaller elements below it")
+            else:
+                lower.start_from(elements)
+                active = elements.candidates.raised(found.active, lower.candidates)
+            energy = None if found is None else found.state.energy
+            found = find_set(lower, obstacle, active, (_LOOSE,), energy)
+            lower.show()
+            elements, sets = lower, sets + found.sets
+        assert elements is not None
+        assert found is not None
+        return sets, elements, found
+
+    def _obstacle_of(self, candidates: Candidates, loaded: FreeResponse | None) -> Obstacle:
+        """Return what is in the way of candidates of another degree, far field aside."""
+        assert self.obstacle is not None
+        heights = self._touch.heights(candidates, loaded, self._candidates)
+        return Obstacle(candidates, heights - self.obstacle.depth, self.obstacle.depth)
+
+    def _sweep_of(self, law: MaterialLaw, method: str, stack: ExitStack) -> Sweep:
+        """Return what is kept of a material, or new elements, which are freed with the ``stack`` if not to be kept.
+
+        Where the surface is to be condensed, it is; collective.
+        """
         if self._sweep is not None and (self._sweep.law, self._sweep.method) == (law, method):
             recharge(self._sweep.cost)
             return self._sweep
         self._forget()
-        if self._condense and not self._is_mixed and suits(self._fine, self._candidates, method):
-            with ExitStack() as stack, recorded() as cost:
-                elements = CondensedElements(self._spaces, DEGREE, law, self._candidates, stack)
-                self._sweep = Sweep(law, method, elements, stack.pop_all(), cost)
-        return self._sweep
+        with ExitStack() as inner, recorded() as cost:
+            elements: Kind
+            if self._condense and not self._is_mixed and suits(self._fine, self._candidates, method):
+                elements = CondensedElements(self._spaces, self._degree, law, self._surface, inner)
+            else:
+                kind = MixedElements if self._is_mixed else DisplacementElements
+                elements = kind(self._spaces, self._degree, law, self._surface, method, inner)
+            sweep = Sweep(law, method, elements, inner.pop_all(), cost)
+        if self._reuse:
+            self._sweep = sweep
+        else:
+            stack.callback(sweep.close)
+        return sweep
 
     def _forget(self) -> None:
         if self._sweep is not None:
             self._sweep.close()
             self._sweep = None
 
-    def _start(self, law: MaterialLaw, method: str, stack: ExitStack) -> tuple[Kind, Found, Times]:
-        """Return the elements, with a displacement to start from, the set found on elements of degree 1, and what the
-        elements cost to make.
-        """
+    # ---- error bar ------------------------------------------------------------------------------------
+
+    def _estimate_of(self, sweep: Sweep, obstacle: Obstacle, found: Found, loaded: FreeResponse | None) -> "_Bar":
+        """Return the error bar on the force; collective."""
+        known = sweep.bar(obstacle.depth) if loaded is None else None
+        if known is not None:
+            return _Bar(*known, 0)
+        taken, share, more = self._estimated(sweep.elements, sweep.law, found, loaded)
+        sweep.keep_bar(obstacle.depth, taken, share)
+        return _Bar(taken, share, more)
+
+    def _estimated(
+        self, elements: Kind, law: MaterialLaw, found: Found, loaded: FreeResponse | None
+    ) -> tuple[float, float, int]:
+        """Return the share of the energy that one degree more takes away, that of the bar, and the iterations."""
+        candidates, at_edge = self._candidates, bool((found.active & self._candidates.is_edge).any())
+        touching = float(candidates.weights[found.active].sum())
+        covered = float(candidates.areas[candidates.closed(found.active)].sum())
+        if covered < _COVERED * touching and not at_edge:
+            finer = self._obstacle_of(self._surface.of(self._degree + 1), loaded)
+            share, more = found_again(self._spaces, elements, law, self._surface, finer, found)
+            return *found_again_bar(share), more
+        facets, element = candidates.held_facets(found.active), "mixed" if self._is_mixed else "displacement"
+        if isinstance(elements, MixedElements):
+            taken, unseen, more = mixed_decrement(self._spaces, elements, law, self._surface, facets)
+        else:
+            taken, more = displacement_decrement(self._spaces, elements, law, facets)
+            unseen = 0.0
+        share, unseen = taken / found.state.energy, unseen / found.state.energy
+        if at_edge:  # the probe ends there, and the pressure is singular
+            bar = error_bar(share, self._degree, element, plain=plain_share(self._body), unseen=unseen)
+            return share, bar, more
+        return share, found_bar(share, unseen), more
+
+    # ---- the force ------------------------------------------------------------------------------------
+
+    @property
+    def _whole(self) -> float:
+        """How many times what is modelled makes the body."""
+        return 2.0 ** len(self._body.mirrored)
+
+    def _is_as_prescribed(self, found: Found) -> bool:
+        """Tell whether all of a face touches and moves by the depth: the area of contact was no question."""
         assert self.obstacle is not None
-        with ExitStack() as inner:
-            coarse = DisplacementElements(self._spaces, 1, _softer(law), self._candidates, method, inner)
-            below = (self.obstacle.bounds < 0) & coarse.nodes
-            if not below.any():
-                raise ContactError("the probe reaches no corner of an element: use smaller elements below it")
-            first = find_set(coarse, self.obstacle, below, (_LOOSE,))
-            coarse.show()
-            kind = MixedElements if self._is_mixed else DisplacementElements
-            with recorded() as cost:
-                elements = kind(self._spaces, DEGREE, law, self._candidates, method, stack)
-            elements.start_from(coarse.space)
-        return elements, first, cost
+        return bool(found.active.all() and np.ptp(self.obstacle.bounds) <= _SAME * self.obstacle.depth)
+
+    def _modulus(self, law: MaterialLaw) -> FloatArray:
+        """Return E / (1 - ν²) (Pa) of the tissue below each candidate (n)."""
+        plane = [4 * mu * (1 - mu / (lame + 2 * mu)) for lame, mu in zip(law.lame_lambda, law.lame_mu, strict=True)]
+        regions = np.zeros_like(self._candidates.regions) if law.is_uniform else self._candidates.regions
+        found = np.empty(len(self._candidates))
+        found[self._candidates.facets] = np.array(plane)[regions][:, None]
+        return found
 
     def _held_by_support(self) -> BoolArray:
         """Tell which candidates (n) are held by the support; collective. Of them none is ever found to touch."""
         space = self._fine.dofs
         is_held = np.zeros(space.owned)
         is_held[3 * space.fixed_owned + 2] = 1.0
-        return np.asarray(Numbering(space.space, self._candidates.nodes).gather(is_held) > 0)
+        return np.asarray(Numbering(space.space, self._candidates.numbers).gather(is_held) > 0)
 
     def _check_edge(self, active: BoolArray) -> None:
         points = self._candidates.points[active & self._candidates.is_edge]
@@ -271,7 +369,17 @@ class ContactProblem:
         if not (np.isfinite(balance) and force > 0):
             raise SolveError(f"the solution is not a number or has no force ({force:g} N)")
         stiffness = self._whole * force / loads.amounts[0]
-        return Response(loads, np.array([[stiffness]]), np.array([[0.0, 0.0, stiffness]]), balance)
+        pressed = Loads(loads.motions[:1], loads.amounts[:1], apart=loads.apart, dead=loads.dead)
+        return Response(pressed, np.array([[stiffness]]), np.array([[0.0, 0.0, stiffness]]), balance)
+
+
+@dataclass(frozen=True)
+class _Bar:
+    """The share of the energy that one degree more takes away, the force's bar, and the iterations."""
+
+    taken: float
+    share: float
+    iterations: int
 
 
 def _softer(law: MaterialLaw) -> MaterialLaw:

@@ -3,11 +3,13 @@
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 
+import numpy as np
+
+from pipeline.arrays import BoolArray, FloatArray
+from pipeline.solve.contact.active_set import Found, Obstacle, find_set
 from pipeline.solve.contact.condensed import CondensedElements
 from pipeline.solve.contact.displacement import DisplacementElements
 from pipeline.solve.contact.mixed import MixedElements
-from pipeline.solve.contact.neighbours import Neighbours
-from pipeline.solve.contact.sets import Found, Obstacle, find_set
 from pipeline.solve.material import MaterialLaw
 from pipeline.stages import Times
 
@@ -17,6 +19,26 @@ Kind = DisplacementElements | MixedElements | CondensedElements
 NEAR = 2.0
 # And this many times the larger of both: nodes of contact are gained one by one, and bars jump with them.
 _SAFE = 1.25
+# So many depths are remembered: in a sweep in order the last ones are the neighbours.
+_REMEMBERED = 2
+# Two depths tell of a third that is at most so many times as far from them as they are from each other.
+_FARTHEST = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Guess:
+    """Where to begin: a set (n), what the elements solve for (owned dofs), twice the energy (J) about."""
+
+    active: BoolArray
+    unknowns: tuple[FloatArray, ...]
+    energy: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Known:
+    depth: float
+    found: Found
+    unknowns: tuple[FloatArray, ...]
 
 
 @dataclass(eq=False)
@@ -31,7 +53,7 @@ class Sweep:
     elements: Kind
     stack: ExitStack
     cost: Times = field(default_factory=Times)
-    neighbours: Neighbours = field(default_factory=Neighbours)
+    _known: list[_Known] = field(default_factory=list)
     _bars: dict[float, tuple[float, float]] = field(default_factory=dict)
 
     def close(self) -> None:
@@ -47,21 +69,48 @@ class Sweep:
             SolveError: if the solver fails.
             ContactError: if the contact does not settle.
         """
-        start = self.neighbours.start(obstacle)
+        guess = self.guess(obstacle)
         if isinstance(self.elements, CondensedElements):  # every solve is exact
-            active = obstacle.bounds < 0 if start is None else start.active
+            active = obstacle.bounds < 0 if guess is None else guess.active
             return find_set(self.elements, obstacle, active, tolerances[-1:])
-        if start is None:
+        if guess is None:
             return None
-        self.elements.start_at(start.unknowns)
-        return find_set(self.elements, obstacle, start.active, tolerances, start.energy)
+        self.elements.start_at(guess.unknowns)
+        return find_set(self.elements, obstacle, guess.active, tolerances, guess.energy)
+
+    def guess(self, obstacle: Obstacle) -> Guess | None:
+        """Return what to begin with at the depth of an ``obstacle``, or None: what is nearest is scaled, or
+        extrapolated where two are known.
+        """
+        if not self._known:
+            return None
+        *others, last = sorted(self._known, key=lambda known: -abs(known.depth - obstacle.depth))
+        mix = [(obstacle.depth / last.depth, last)]
+        if others:
+            beyond = (obstacle.depth - last.depth) / (last.depth - others[0].depth)
+            if abs(beyond) <= _FARTHEST:
+                mix = [(1 + beyond, last), (-beyond, others[0])]
+        moved, reactions = (
+            np.sum([share * getattr(known.found.state, name) for share, known in mix], axis=0)
+            for name in ("moved", "reactions")
+        )
+        active = np.where(last.found.active, reactions < 0, moved > obstacle.bounds)
+        active |= obstacle.candidates.enclosed(active)
+        if not active.any():
+            return None
+        unknowns = tuple(
+            np.sum([share * known.unknowns[number] for share, known in mix], axis=0)
+            for number in range(len(last.unknowns))
+        )
+        return Guess(active, unknowns, last.found.state.energy * (obstacle.depth / last.depth) ** 2)
 
     def keep(self, depth: float, found: Found) -> None:
         """Remember what was found at a ``depth`` (m)."""
-        self.neighbours.add(depth, found, self.elements.unknowns())
+        others = [known for known in self._known if known.depth != depth]
+        self._known = [*others, _Known(depth, found, self.elements.unknowns())][-_REMEMBERED:]
 
     def keep_bar(self, depth: float, taken: float, share: float) -> None:
-        """Remember the share of the energy that degree 3 takes away at a ``depth`` (m), and the force's bar."""
+        """Remember the share of the energy that one degree more takes away at a ``depth`` (m), and the force's bar."""
         self._bars[depth] = taken, share
 
     def bar(self, depth: float) -> tuple[float, float] | None:

@@ -6,9 +6,9 @@ with b the height above the node of the probe's surface, pushed in, and r the re
 tissue down. Nodes that touch are held at b; those that are pulled are let go, those that have come through the probe's
 surface are held, until nothing changes (M. Hintermüller, K. Ito and K. Kunisch, SIAM J. Optim. 13, 865, 2002).
 
-What an even pressure does on quadratic facets it does at their mid nodes. A corner takes nothing of it, and what its
-reaction is, of either sign, comes of the pressure's slope: within the contact, where all of a corner's mid nodes are
-held, it is held with them.
+An even pressure on quadratic facets acts on their mid nodes alone, and on cubic ones hardly on their corners. The
+reaction of a corner, of either sign, comes of the pressure's slope: within the contact, where all nodes beside a
+corner on its edges are held, it is held with them.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from typing import Protocol
 import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
-from pipeline.solve.contact.surface import Candidates
+from pipeline.solve.contact.candidates import Candidates
 from pipeline.solve.linear import SolveError
 from pipeline.stages import stage
 
@@ -34,7 +34,7 @@ class ContactError(SolveError):
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Of one solution: the candidates' displacement along z (n, m), the reactions there (n, N), both 0 off its nodes.
+    """Of one solution: the candidates' displacement along z (n, m), and the reactions there (n, N).
 
     ``energy`` (J) is twice that of the part that is modelled.
     """
@@ -46,10 +46,6 @@ class State:
 
 class Elements(Protocol):
     """Elements whose nodes may be held where they touch; they keep the solution found last."""
-
-    @property
-    def nodes(self) -> BoolArray:
-        """Which candidates are nodes of these elements (n)."""
 
     def hold(self, active: BoolArray) -> None:
         """Hold the ``active`` candidates (n) from now on; collective."""
@@ -105,7 +101,7 @@ def find_set(
             count += 1
             state = elements.state()
             energy = state.energy
-            following = next_set(obstacle, active, state) & elements.nodes
+            following = next_set(obstacle, active, state)
             following |= obstacle.candidates.enclosed(following)
             if np.array_equal(following, active):
                 break
