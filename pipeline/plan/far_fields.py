@@ -1,13 +1,14 @@
 """The meshes on which far fields of a body are found: one for a place, or one for many places of a study."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import replace
+from typing import Any
 
 from pipeline.plan import estimate
 from pipeline.plan.symmetry import mirror_planes
 from pipeline.shapes.body import Body
-from pipeline.shapes.probes.blade import Blade
-from pipeline.shapes.probes.disc import Disc
+from pipeline.shapes.probe import Probe
+from pipeline.shapes.registry import PROBES
 from pipeline.study.closure import FarRegion, room
 from pipeline.study.schema import Mesh
 from pipeline.study.sweep import Case
@@ -31,13 +32,14 @@ def far_regions(cases: Collection[Case]) -> dict[Body, FarRegion]:
 
 def far_mesh(case: Case) -> Case:
     """Return the case on whose mesh the far field of ``case`` is found; its probe only marks fine elements."""
+    shapes: Mapping[str, Any] = PROBES  # loaded when asked for
     if (region := case.far_region) is None:
         low, high = case.body.heights
         radius = room(case.body, case.probe)
-        disc = Disc.model_construct(shape="disc", radius=radius / 2, depth=radius, at=case.probe.at)
+        disc = shapes["disc"].model_construct(shape="disc", radius=radius / 2, depth=radius, at=case.probe.at)
         return _meshed_round(case, disc, radius, max(radius / _NEAR, (high - low) / _THROUGH))
     (left, front), (right, back) = region.low, region.high
-    blade = Blade.model_construct(
+    blade = shapes["blade"].model_construct(
         shape="blade",
         length=right - left,
         width=back - front,
@@ -48,7 +50,7 @@ def far_mesh(case: Case) -> Case:
     return _meshed_round(case, blade, region.radius, max(region.radius / _NEAR, (top - bottom) / _THROUGH_FOR_MANY))
 
 
-def _meshed_round(case: Case, probe: Disc | Blade, radius: float, coarse: float) -> Case:
+def _meshed_round(case: Case, probe: Probe, radius: float, coarse: float) -> Case:
     near = radius / _NEAR
     mesh = Mesh.model_construct(epsilon=radius, fine=near, coarse=coarse, rim=near, growth=_GROWTH)
     return replace(case, probe=probe, mesh=mesh)

@@ -6,7 +6,7 @@ from itertools import accumulate
 from math import inf
 from typing import Annotated, Any
 
-from pipeline.shapes.arrays import FloatArray
+from pipeline.arrays import FloatArray
 from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.half_plane import HalfPlane
 from pipeline.shapes.ovoid import Ovoid

@@ -1,9 +1,11 @@
 """Faces of a solid that is known by triangles, and points of its true surface between their corners."""
 
-from pipeline.shapes.arrays import BoolArray, FloatArray, IntArray, np
+import numpy as np
+
+from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.shapes.skin import Skin
 from pipeline.shapes.surface import Surface
-from pipeline.shapes.triangles import Triangles
+from pipeline.shapes.triangles import Triangles, half_edges
 
 
 class CadFace(Surface):
@@ -59,7 +61,7 @@ def plane_piece(triangles: Triangles, start: int, same: float = 1e-9) -> IntArra
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     off = np.abs((points[facets] - a[start]) @ normals[start]).max(axis=1)
     (flat,) = np.nonzero((off < same * triangles.extent) & (normals @ normals[start] > 0))
-    half = np.stack([facets[flat], np.roll(facets[flat], -1, axis=1)], axis=2).reshape(-1, 2)
+    half = half_edges(facets[flat])
     key = np.sort(half, axis=1) @ np.array([len(points), 1])
     _, first, count = np.unique(key, return_index=True, return_counts=True)
     ends: IntArray = half[first[count == 1]]

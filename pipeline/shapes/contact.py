@@ -5,7 +5,9 @@ The footprint is what projects along the axis into the probe's outline. It must 
 
 from math import isfinite, radians, tan
 
-from pipeline.shapes.arrays import FloatArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import MOST_INCLINED, Frame, PlaceError
 from pipeline.shapes.probe import Probe

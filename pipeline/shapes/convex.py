@@ -1,6 +1,8 @@
 """Convex bodies: how far they reach from a probe, and where lines enter what bounds them."""
 
-from pipeline.shapes.arrays import FloatArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray
 from pipeline.shapes.frame import Frame, Vector
 
 

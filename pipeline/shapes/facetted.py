@@ -3,8 +3,11 @@
 from abc import abstractmethod
 from functools import lru_cache
 from math import inf
+from typing import ClassVar
 
-from pipeline.shapes.arrays import FloatArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, PlaceError
 from pipeline.shapes.ovoid import Ovoid
@@ -19,6 +22,8 @@ _MANY = 10_000  # places of a large study
 
 class Facetted(Body):
     """A body that triangles bound, or nearly so."""
+
+    is_round: ClassVar[bool] = False
 
     @property
     @abstractmethod
@@ -91,11 +96,6 @@ class Facetted(Body):
     def mirror_planes(self) -> tuple[str, ...]:
         """Return none: what was measured or modelled is not looked at for symmetry."""
         return ()
-
-    @property
-    def is_round(self) -> bool:
-        """Return that nothing is known of an axis."""
-        return False
 
     @property
     def half_sides(self) -> None:

@@ -6,7 +6,9 @@ from functools import cached_property
 from math import acos, atan2, degrees, hypot, sqrt
 from typing import Any, NoReturn
 
-from pipeline.shapes.arrays import FloatArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray
 
 Vector = tuple[float, float, float]
 # Turns a length (m) into the units of a model.

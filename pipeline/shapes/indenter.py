@@ -8,10 +8,11 @@ to end, and nothing is singular at the edge of the candidates.
 from abc import abstractmethod
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import BeforeValidator
 from pydantic_core import PydanticCustomError
 
-from pipeline.shapes.arrays import FloatArray, np
+from pipeline.arrays import FloatArray
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.probe import Probe
@@ -46,6 +47,9 @@ class Indenter(Probe):
 
     Sizes, symmetry and outline are those of its ``footprint``.
     """
+
+    # Contact ends where the pressure has fallen to nought.
+    has_singular_edge: ClassVar[bool] = False
 
     PROPORTIONAL_TO = ()
     # On meshes graded to where contact ends nothing is singular: not more than a disc's.
@@ -114,7 +118,7 @@ class Indenter(Probe):
 
     @property
     def half_length(self) -> float:
-        """Half the length (m) along which it touches at any depth; none, unless it has a straight edge."""
+        """Half the length (m) along which it touches at any depth; 0 unless it has a straight edge."""
         return 0.0
 
     @property
@@ -128,11 +132,6 @@ class Indenter(Probe):
     def rim_offset(self) -> float:
         """How far (m) the candidates reach past where contact is expected to end."""
         return self.footprint.half_width - self.edge_band[1]
-
-    @property
-    def has_singular_edge(self) -> bool:
-        """Contact ends where the pressure has fallen to nought."""
-        return False
 
     @property
     def lies_along(self) -> Vector:

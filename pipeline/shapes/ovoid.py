@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 from math import pi
 
-from pipeline.shapes.arrays import FloatArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray
 from pipeline.shapes.frame import Vector
 from pipeline.shapes.surface import Surface
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import AfterValidator
 from pydantic_core import PydanticCustomError
 
-from pipeline.shapes.arrays import BoolArray, FloatArray
+from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.section import Problems, Section, Words

@@ -2,15 +2,21 @@
 
 from abc import abstractmethod
 from math import inf
-from typing import Literal
+from typing import ClassVar, Literal
 
-from pipeline.shapes.arrays import BoolArray, FloatArray, np
+import numpy as np
+
+from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.probe import Probe
 
 
 class Punch(Probe):
     """A tool with a flat face, whose edge is where contact ends, unless it lifts off."""
+
+    has_singular_edge: ClassVar[bool] = True
+    # None (m): contact is expected to end at the edge of the face.
+    rim_offset: ClassVar[float] = 0.0
 
     NOT_DRAWN = ("action", "depth", "contact", "slice", "motion")
 
@@ -32,19 +38,9 @@ class Punch(Probe):
         return np.ones(len(points), dtype=bool)
 
     @property
-    def has_singular_edge(self) -> bool:
-        """It has one."""
-        return True
-
-    @property
     def rim_size(self) -> tuple[float, float]:
         """Length (m) of the edge, and no area."""
         return self.perimeter, 0.0
-
-    @property
-    def rim_offset(self) -> float:
-        """None (m): contact is expected to end at the edge of the face."""
-        return 0.0
 
     def rim_distance(self, along: str, across: str, height: str, unit: float) -> str:
         """Write the distance to the edge of the face."""

@@ -2,7 +2,10 @@
 
 from typing import Any
 
-from pipeline.shapes.arrays import FloatArray, IntArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
+from pipeline.shapes.triangles import half_edges
 
 # Points and facets that are looked at together: arrays of some ten megabytes.
 _AT_ONCE = 2_000_000
@@ -99,10 +102,9 @@ def _areas(corners: FloatArray) -> FloatArray:
 
 def _connected(facets: IntArray, start: int) -> IntArray:
     """Return the numbers of the facets that are joined to one of them through edges."""
-    pairs = np.sort(np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]]), axis=1)
-    owner = np.tile(np.arange(len(facets)), 3)
+    pairs = np.sort(half_edges(facets), axis=1)
     order = np.lexsort((pairs[:, 1], pairs[:, 0]))
-    pairs, owner = pairs[order], owner[order]
+    pairs, owner = pairs[order], order // 3
     (same,) = np.nonzero((pairs[1:] == pairs[:-1]).all(axis=1))
     one, other = owner[same], owner[same + 1]
     reached = np.zeros(len(facets), dtype=bool)

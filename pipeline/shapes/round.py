@@ -3,7 +3,9 @@
 from math import pi
 from typing import Any
 
-from pipeline.shapes.arrays import FloatArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray
 from pipeline.shapes.frame import Frame, Units
 
 

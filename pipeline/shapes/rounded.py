@@ -4,7 +4,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from math import cos, inf, log, pi, sin, tan
 
-from pipeline.shapes.arrays import FloatArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray
 
 # Points of Gauss's rule over a quarter of a turn, and halvings until a half width is known to rounding.
 _POINTS, _HALVINGS = 64, 60

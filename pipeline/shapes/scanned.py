@@ -1,13 +1,16 @@
 """Bodies whose surface is a file's triangles: where a probe meets them, and how large they are."""
 
 from math import inf
+from typing import ClassVar
 
-from pipeline.shapes.arrays import FloatArray, IntArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
 from pipeline.shapes.facetted import Facetted, skin_of
 from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.rays import facing, pierce
 from pipeline.shapes.surface import Surface
-from pipeline.shapes.triangles import Triangles, doubled_normals
+from pipeline.shapes.triangles import Triangles, closed_edges, doubled_normals
 
 # The normal is that of the tissue below the footprint: rays over a disc, sunflower-wise, and twice, since the disc
 # turns with it.
@@ -25,6 +28,8 @@ _MOST_CURVED = 10.0
 
 class Scanned(Facetted):
     """A body bounded by triangles."""
+
+    is_smooth: ClassVar[bool] = True
 
     # ---- under a probe --------------------------------------------------------------------------------
 
@@ -78,11 +83,6 @@ class Scanned(Facetted):
     def gap(self, point: Vector) -> float:
         """Return that there is no edge: how far a footprint reaches is told by where its edge can be lifted."""
         return inf
-
-    @property
-    def is_smooth(self) -> bool:
-        """Return that all edges are those of facets."""
-        return True
 
     # ---- geometry -------------------------------------------------------------------------------------
 
@@ -141,12 +141,9 @@ def _smoothed(
 
 
 def _silhouettes(triangles: Triangles) -> list[FloatArray]:
-    facets, points = triangles.facets, triangles.points
-    pairs = np.sort(np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]]), axis=1)
-    order = np.lexsort((pairs[:, 1], pairs[:, 0]))
-    owner = np.tile(np.arange(len(facets)), 3)[order].reshape(-1, 2)
-    edges = pairs[order].reshape(-1, 2, 2)[:, 0]
-    normals = doubled_normals(points, facets)
+    points = triangles.points
+    edges, owner = closed_edges(triangles.facets)
+    normals = doubled_normals(points, triangles.facets)
     lines = []
     for axis in range(3):
         side = normals[:, axis] > 0

@@ -4,7 +4,9 @@ from functools import cached_property
 from importlib import import_module
 from typing import Any
 
-from pipeline.shapes.arrays import FloatArray, IntArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
 from pipeline.shapes.surface import Surface
 from pipeline.shapes.triangles import Triangles
 

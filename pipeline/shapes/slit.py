@@ -7,7 +7,9 @@ faces, along its length and from the surface down to its tip; beyond that, by ``
 from dataclasses import dataclass
 from math import inf, isfinite
 
-from pipeline.shapes.arrays import FloatArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray
 from pipeline.shapes.body import Body
 
 # A point is on a line of the slit if it is this near, in units of its depth.

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict
 from pydantic_core import PydanticCustomError
 
-from pipeline.shapes.arrays import FloatArray, np
+from pipeline.arrays import FloatArray
 from pipeline.shapes.section import Problems, in_mm
 from pipeline.shapes.surface import Surface
 from pipeline.units import Coordinate

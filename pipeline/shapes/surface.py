@@ -3,7 +3,9 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
-from pipeline.shapes.arrays import FloatArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray
 from pipeline.shapes.frame import Vector
 
 

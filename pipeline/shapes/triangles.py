@@ -4,7 +4,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
 
-from pipeline.shapes.arrays import FloatArray, IntArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
 from pipeline.shapes.frame import Vector
 
 
@@ -40,11 +42,10 @@ class Triangles:
     @cached_property
     def curvature(self) -> float:
         """Integral (m) of the mean curvature over it, twice: by how much facets turn at each edge, times its length."""
-        pairs = np.sort(np.stack([self.facets, np.roll(self.facets, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-        order = np.lexsort((pairs[:, 1], pairs[:, 0]))
-        start, end = self.points[pairs[order[::2]].T]
+        edges, owners = closed_edges(self.facets)
+        start, end = self.points[edges.T]
         normals = doubled_normals(self.points, self.facets)
-        one, other = normals[(order // 3).reshape(-1, 2).T]
+        one, other = normals[owners.T]
         turn = np.arctan2(np.linalg.norm(np.cross(one, other), axis=1), (one * other).sum(axis=1))
         return float((turn * np.linalg.norm(end - start, axis=1)).sum())
 
@@ -67,6 +68,18 @@ class Triangles:
         content.update(np.ascontiguousarray(self.points, dtype="<f8").data)
         content.update(np.ascontiguousarray(self.facets, dtype="<i8").data)
         return content.hexdigest()
+
+
+def half_edges(facets: IntArray) -> IntArray:
+    """Return from which point to which (3m, 2): row 3f + k is the edge of facet f from its corner k to the next one."""
+    return np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2)
+
+
+def closed_edges(facets: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the edges (k, 2) of a closed surface, lower number first, and the two facets (k, 2) of each."""
+    pairs = np.sort(half_edges(facets), axis=1)
+    order = np.lexsort((pairs[:, 1], pairs[:, 0]))
+    return pairs[order[::2]], (order // 3).reshape(-1, 2)
 
 
 def doubled_normals(points: FloatArray, facets: IntArray) -> FloatArray:

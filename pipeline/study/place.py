@@ -3,7 +3,8 @@
 from functools import lru_cache
 from math import dist, inf
 
-from pipeline.shapes.arrays import np
+import numpy as np
+
 from pipeline.shapes.body import Body
 from pipeline.shapes.contact import check_contact, check_first_touch, edge_gap, is_level, lifted_edge
 from pipeline.shapes.frame import Frame, PlaceError

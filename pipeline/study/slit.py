@@ -2,7 +2,8 @@
 
 from math import inf, isfinite
 
-from pipeline.shapes.arrays import np
+import numpy as np
+
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.contact import is_level
 from pipeline.shapes.frame import Frame

@@ -22,7 +22,7 @@ finally:
 # What nothing that answers at once needs: the figures' and the files' libraries, and the solvers.
 _SLOW = {"dolfinx", "gmsh", "petsc4py", "mpi4py", "matplotlib", "xarray", "pandas", "netCDF4", "rich", "jinja2"}
 # What a study of plain shapes, in units that people write, does without, too.
-_ELSEWHERE = {"numpy", "scipy", "pint", "sqlite3", "http", "asyncio"}
+_ELSEWHERE = {"scipy", "pint", "sqlite3", "http", "asyncio"}
 
 
 def loaded(*arguments: object, within: Path = ROOT) -> set[str]:
@@ -60,7 +60,7 @@ def test_help_loads_no_study_no_plan_and_no_shape():
 
 
 @pytest.mark.parametrize("command", ["validate", "plan", "status", "explain"])
-def test_a_study_loads_the_shapes_that_it_names_and_no_arrays(command, study, tmp_path):
+def test_a_study_loads_the_shapes_that_it_names_alone(command, study, tmp_path):
     modules = loaded(command, study, within=tmp_path)
     assert not libraries(modules) & (_SLOW | _ELSEWHERE - ({"sqlite3"} if command == "status" else set()))
     assert shapes(modules) == {"box", "disc"}

@@ -2,9 +2,11 @@
 
 from itertools import pairwise, product
 from math import copysign, hypot, inf
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from pipeline.shapes.arrays import FloatArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray
 from pipeline.shapes.body import Layered
 from pipeline.shapes.convex import farthest_of, reach_of, slab
 from pipeline.shapes.frame import Frame, Units, Vector
@@ -18,6 +20,11 @@ _ROUNDING = 1e-12
 
 class Box(Layered):
     """A box with its top face centred on the origin, tissue at z <= 0."""
+
+    is_smooth: ClassVar[bool] = False
+    has_round_top: ClassVar[bool] = False
+    # Infinite: all is flat.
+    bend: ClassVar[float] = inf
 
     shape: Literal["box"]
     size: Annotated[
@@ -106,11 +113,6 @@ class Box(Layered):
         beside = [(c, sides) for n, (c, sides) in enumerate(zip(point, self._sides, strict=True)) if n != number]
         return min(min(c - low, high - c) for c, (low, high) in beside)
 
-    @property
-    def is_smooth(self) -> bool:
-        """Return that it has edges."""
-        return False
-
     def to_side(self, point: tuple[float, float], direction: tuple[float, float]) -> float:
         """Return the distance (m) to the first of the four sides."""
         sizes = zip(point, direction, self.size, strict=False)
@@ -140,11 +142,6 @@ class Box(Layered):
         return "x", "y"
 
     @property
-    def has_round_top(self) -> bool:
-        """Return that it has corners."""
-        return False
-
-    @property
     def half_sides(self) -> tuple[float, float]:
         """Half the extents along x and y (m)."""
         return self.size[0] / 2, self.size[1] / 2
@@ -168,11 +165,6 @@ class Box(Layered):
         )
         bottom = Plane((0.0, 0.0, -z), (0.0, 0.0, -1.0))
         return {"top": (Plane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),), "bottom": (bottom,), "sides": sides}
-
-    @property
-    def bend(self) -> float:
-        """Infinite: all is flat."""
-        return inf
 
     def outline(self) -> list[FloatArray]:
         """Return the twelve edges."""

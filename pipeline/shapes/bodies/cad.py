@@ -6,10 +6,11 @@ from math import inf
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, Field, PrivateAttr, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
-from pipeline.shapes.arrays import FloatArray, IntArray, np
+from pipeline.arrays import FloatArray, IntArray
 from pipeline.shapes.cad_face import CadFace, plane_piece, raised
 from pipeline.shapes.facetted import skin_of
 from pipeline.shapes.files.loaded import Solid
@@ -19,7 +20,7 @@ from pipeline.shapes.rays import facing, pierce
 from pipeline.shapes.section import Words
 from pipeline.shapes.support import Below, NamedFace
 from pipeline.shapes.surface import Surface
-from pipeline.shapes.triangles import doubled_normals
+from pipeline.shapes.triangles import closed_edges, doubled_normals
 
 SIZES = UNITS | {"in": 0.0254}
 # A face rounder than this share of the extent is an edge rounded off: elements are small along it alone.
@@ -46,6 +47,8 @@ def _held(value: Any) -> Any:
 
 class FromCad(FromFile):
     """The solid of a STEP or BREP file, in the file's own frame; elements are bent to its true faces."""
+
+    is_smooth: ClassVar[bool] = False
 
     READ_BY: ClassVar[frozenset[str]] = frozenset({"unit"})
     HAS_NAMES: ClassVar[bool] = True
@@ -186,11 +189,6 @@ class FromCad(FromFile):
         off = float(skin.distance(at)[0])
         return -off if off > _NEAR * self.extent else _to_edge(self, facet, at[0])
 
-    @property
-    def is_smooth(self) -> bool:
-        """Return that it may have edges anywhere."""
-        return False
-
     # ---- geometry -------------------------------------------------------------------------------------
 
     def surfaces(self) -> dict[str, tuple[Surface, ...]]:
@@ -206,12 +204,8 @@ class FromCad(FromFile):
     def outline(self) -> list[FloatArray]:
         """Return the edges between faces."""
         triangles, face = self.triangles, self.solid.face
-        half = np.stack([triangles.facets, np.roll(triangles.facets, -1, axis=1)], axis=2).reshape(-1, 2)
-        owner = np.repeat(face, 3)
-        order = np.lexsort(np.sort(half, axis=1).T)
-        pairs = order.reshape(-1, 2)
-        between = owner[pairs[:, 0]] != owner[pairs[:, 1]]
-        return list(triangles.points[half[pairs[between, 0]]])
+        edges, owners = closed_edges(triangles.facets)
+        return list(triangles.points[edges[np.diff(face[owners])[:, 0] != 0]])
 
 
 def _axial(normal: FloatArray, least: float) -> Vector:

@@ -1,9 +1,11 @@
 """An upright cylinder."""
 
 from math import atan2, hypot, pi, sqrt
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from pipeline.shapes.arrays import FloatArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray
 from pipeline.shapes.body import Layered
 from pipeline.shapes.convex import ball, farthest_of, reach_of, slab
 from pipeline.shapes.frame import Frame, PlaceError, Units, Vector
@@ -20,6 +22,9 @@ _ROUNDING = 1e-12
 
 class Cylinder(Layered):
     """A cylinder about the z axis with its top face in z = 0."""
+
+    is_smooth: ClassVar[bool] = False
+    has_round_top: ClassVar[bool] = True
 
     shape: Literal["cylinder"]
     radius: Annotated[Length, Words("Radius; the axis is z, and the top face in z = 0.", '"30 mm"')]
@@ -106,11 +111,6 @@ class Cylinder(Layered):
             return min(-point[2], point[2] + self.height)
         return self.radius - hypot(point[0], point[1])
 
-    @property
-    def is_smooth(self) -> bool:
-        """Return that it has edges."""
-        return False
-
     def to_side(self, point: tuple[float, float], direction: tuple[float, float]) -> float:
         """Return the distance (m) to the circle."""
         (x, y), (a, b) = point, direction
@@ -138,11 +138,6 @@ class Cylinder(Layered):
     def mirror_planes(self) -> tuple[str, ...]:
         """Return both planes."""
         return "x", "y"
-
-    @property
-    def has_round_top(self) -> bool:
-        """Return that it is a circle."""
-        return True
 
     @property
     def half_sides(self) -> tuple[float, float]:

@@ -1,12 +1,13 @@
 """An ellipsoid."""
 
 from math import atan2, hypot, inf, pi, sqrt
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import BeforeValidator
 from pydantic_core import PydanticCustomError
 
-from pipeline.shapes.arrays import FloatArray, np
+from pipeline.arrays import FloatArray
 from pipeline.shapes.body import Drawn
 from pipeline.shapes.convex import ball
 from pipeline.shapes.frame import Frame, PlaceError, Units, Vector, unit
@@ -35,6 +36,8 @@ def _below(value: Any) -> Any:
 
 class Ellipsoid(Drawn):
     """An ellipsoid about the origin, its semi-axes along x, y and z."""
+
+    is_smooth: ClassVar[bool] = True
 
     shape: Literal["ellipsoid"]
     axes: Annotated[
@@ -131,11 +134,6 @@ class Ellipsoid(Drawn):
     def gap(self, point: Vector) -> float:
         """Return infinity: its surface has no edge."""
         return inf
-
-    @property
-    def is_smooth(self) -> bool:
-        """Return that it has none."""
-        return True
 
     @property
     def face(self) -> str:

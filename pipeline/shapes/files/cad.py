@@ -6,10 +6,12 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
 from pipeline.files import atomic, cache_folder
 from pipeline.launcher import run_alone
 from pipeline.npz import read_npz
-from pipeline.shapes.arrays import FloatArray, IntArray, np
 from pipeline.shapes.files import check
 from pipeline.shapes.files.edges import Edges, oriented
 from pipeline.shapes.files.loaded import Solid

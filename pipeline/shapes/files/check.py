@@ -3,7 +3,9 @@
 Places in the messages are in the file's own numbers, by which other programs find them.
 """
 
-from pipeline.shapes.arrays import BoolArray, FloatArray, IntArray, np
+import numpy as np
+
+from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.shapes.files.crossings import crossings
 from pipeline.shapes.files.edges import Edges, components, oriented
 from pipeline.shapes.files.mend import flats

@@ -4,9 +4,10 @@ from collections.abc import Callable, Iterable
 from hashlib import file_digest, sha256
 from pathlib import Path
 
+import numpy as np
+
 from pipeline.files import atomic, cache_folder
 from pipeline.npz import read_npz
-from pipeline.shapes.arrays import np
 from pipeline.shapes.triangles import Triangles
 
 # Raise by hand when the same file gives another surface, or is judged in another way.

@@ -3,7 +3,9 @@
 from fractions import Fraction
 from functools import cache
 
-from pipeline.shapes.arrays import FloatArray, IntArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
 
 _Exact = tuple[Fraction, Fraction, Fraction]
 

@@ -3,7 +3,10 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-from pipeline.shapes.arrays import IntArray, np
+import numpy as np
+
+from pipeline.arrays import IntArray
+from pipeline.shapes.triangles import half_edges
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,7 +18,7 @@ class Edges:
     @cached_property
     def half(self) -> IntArray:
         """From which point to which (3m, 2): half edge 3f + k is that of facet f from its corner k to the next one."""
-        return np.stack([self.facets, np.roll(self.facets, -1, axis=1)], axis=2).reshape(-1, 2)
+        return half_edges(self.facets)
 
     @cached_property
     def order(self) -> IntArray:

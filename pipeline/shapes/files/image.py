@@ -10,7 +10,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from pipeline.shapes.arrays import FloatArray, IntArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
 from pipeline.shapes.files.checked import kept_image
 from pipeline.shapes.files.labels import LARGEST_IMAGE, LabelMap, files_of, of_label, read_labels
 from pipeline.shapes.files.loaded import Loaded

@@ -9,7 +9,9 @@ from math import prod
 from pathlib import Path
 from typing import Any
 
-from pipeline.shapes.arrays import FloatArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray
 from pipeline.shapes.triangles import SurfaceError
 
 ENDINGS = (".nii", ".nii.gz", ".nrrd", ".nhdr")

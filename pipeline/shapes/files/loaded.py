@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from pipeline.shapes.arrays import BoolArray, FloatArray, IntArray
+from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.shapes.triangles import Triangles
 
 

@@ -1,6 +1,8 @@
 """What is mended unasked, because nothing is lost by it, and told."""
 
-from pipeline.shapes.arrays import FloatArray, IntArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
 from pipeline.shapes.files.edges import Edges
 from pipeline.shapes.files.weld import weld
 

@@ -1,6 +1,8 @@
 """OBJ: lines of points (v) and of facets (f); all else, textures, normals, groups, is passed over."""
 
-from pipeline.shapes.arrays import BoolArray, IntArray, np
+import numpy as np
+
+from pipeline.arrays import BoolArray, IntArray
 from pipeline.shapes.files.raw import Raw, is_number, limit, table, triangulate
 from pipeline.shapes.triangles import SurfaceError
 

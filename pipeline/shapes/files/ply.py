@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 
-from pipeline.shapes.arrays import FloatArray, IntArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
 from pipeline.shapes.files.raw import Raw, limit, numbers, triangulate, whole
 from pipeline.shapes.triangles import SurfaceError
 

@@ -3,7 +3,9 @@
 import warnings
 from dataclasses import dataclass
 
-from pipeline.shapes.arrays import BoolArray, FloatArray, IntArray, np
+import numpy as np
+
+from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.shapes.triangles import SurfaceError
 
 # More facets than any surface to be remeshed needs: those of a whole body scanned at 1 mm.

@@ -4,7 +4,9 @@ First what is exact, facets turned and crumbs left out; then MeshFix (M. Attene,
 which closes holes, and cuts out and closes anew where facets cross.
 """
 
-from pipeline.shapes.arrays import FloatArray, IntArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
 from pipeline.shapes.files.check import check_whole
 from pipeline.shapes.files.edges import Edges, oriented
 from pipeline.shapes.files.mend import joined

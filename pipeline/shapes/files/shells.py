@@ -1,6 +1,8 @@
 """Crumbs beside a surface and bubbles in it."""
 
-from pipeline.shapes.arrays import FloatArray, IntArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
 from pipeline.shapes.files.check import check_shells, shell_volumes
 from pipeline.shapes.files.edges import Edges
 

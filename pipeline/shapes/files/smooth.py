@@ -2,7 +2,9 @@
 
 from typing import Any
 
-from pipeline.shapes.arrays import FloatArray, IntArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
 from pipeline.shapes.files.weld import drop_unused
 from pipeline.shapes.triangles import SurfaceError, enclosed
 

@@ -2,7 +2,9 @@
 
 import re
 
-from pipeline.shapes.arrays import FloatArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray
 from pipeline.shapes.triangles import SurfaceError
 
 _ENTITY = re.compile(r"#(\d{1,18})\s*=\s*((?:'(?:[^']|'')*'|[^';])*);")

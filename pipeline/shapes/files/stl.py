@@ -1,6 +1,8 @@
 """STL, binary and text: triangles one by one, each with its own three corners."""
 
-from pipeline.shapes.arrays import FloatArray, IntArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
 from pipeline.shapes.files.raw import Raw, is_number, limit, numbers
 from pipeline.shapes.files.weld import weld
 from pipeline.shapes.triangles import SurfaceError

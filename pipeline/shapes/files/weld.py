@@ -1,6 +1,8 @@
 """Points that are one."""
 
-from pipeline.shapes.arrays import BoolArray, FloatArray, IntArray, np
+import numpy as np
+
+from pipeline.arrays import BoolArray, FloatArray, IntArray
 
 
 def weld(points: FloatArray) -> tuple[FloatArray, IntArray]:

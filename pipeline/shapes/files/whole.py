@@ -1,6 +1,8 @@
 """From facets as a file holds them to a surface that bounds tissue."""
 
-from pipeline.shapes.arrays import FloatArray, IntArray, np
+import numpy as np
+
+from pipeline.arrays import FloatArray, IntArray
 from pipeline.shapes.files import check
 from pipeline.shapes.files.edges import Edges
 from pipeline.shapes.files.mend import joined, without_flats

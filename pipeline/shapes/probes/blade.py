@@ -2,11 +2,12 @@
 
 from functools import cached_property
 from math import hypot
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
+import numpy as np
 from pydantic import Field
 
-from pipeline.shapes.arrays import BoolArray, FloatArray, np
+from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.probe import ON_EDGE
@@ -21,6 +22,9 @@ _CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 
 class Blade(Punch):
     """A flat rectangular punch; its length lies along ``direction``. With an ``incision`` it stands in a slit."""
+
+    is_round: ClassVar[bool] = False
+    is_curved: ClassVar[bool] = False
 
     PROPORTIONAL_TO = ("depth", "slice")
     EXPECTED_ERROR = 0.75
@@ -104,11 +108,6 @@ class Blade(Punch):
             corners = [(side * self.slit.on_surface, 0.0) for side in (-1, 1)]
         return min(body.gap(frame.at(*corner)) for corner in corners)
 
-    @property
-    def is_round(self) -> bool:
-        """It is not."""
-        return False
-
     def is_mirrored(self, along: float, across: float) -> bool:
         """Tell that it is in its two middle lines only."""
         return min(abs(along), abs(across)) < _ALIGNED
@@ -119,11 +118,6 @@ class Blade(Punch):
         tag = int(kernel.addRectangle(x - a / 2, y - b / 2, z, a, b))
         frame.place(kernel, [(2, tag)], units)
         return tag
-
-    @property
-    def is_curved(self) -> bool:
-        """It is not: it has four straight sides."""
-        return False
 
     def inscribed(self, edges: int) -> Self:
         """Return the blade itself: straight elements follow it."""

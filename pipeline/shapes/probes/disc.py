@@ -1,9 +1,11 @@
 """A disc."""
 
 from math import pi, sin, sqrt
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pipeline.shapes.arrays import BoolArray, FloatArray, np
+import numpy as np
+
+from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.probe import ON_EDGE
@@ -19,15 +21,15 @@ _ROUND = 200
 class Disc(Straight):
     """A flat round punch, such as the tip of a blunt needle."""
 
+    # Any direction is as good: that of x.
+    lies_along: ClassVar[Vector] = 1.0, 0.0, 0.0
+    is_round: ClassVar[bool] = True
+    is_curved: ClassVar[bool] = True
+
     EXPECTED_ERROR = 1.0
 
     shape: Literal["disc"]
     radius: Annotated[Length, Words("Radius of the footprint.", '"2 mm"', is_used=True)]
-
-    @property
-    def lies_along(self) -> Vector:
-        """Any direction is as good: that of x."""
-        return 1.0, 0.0, 0.0
 
     @property
     def circumradius(self) -> float:
@@ -53,11 +55,6 @@ class Disc(Straight):
         """Return the distance (m) from the circle to the edge of the face."""
         return body.gap(frame.point) - self.radius
 
-    @property
-    def is_round(self) -> bool:
-        """It is."""
-        return True
-
     def is_mirrored(self, along: float, across: float) -> bool:
         """Tell that it is, in any line."""
         return True
@@ -65,11 +62,6 @@ class Disc(Straight):
     def draw(self, kernel: Any, frame: Frame, units: Units) -> int:
         """Add the disc."""
         return draw_ellipse(kernel, (self.radius, self.radius), frame, units)
-
-    @property
-    def is_curved(self) -> bool:
-        """It is."""
-        return True
 
     def inscribed(self, edges: int) -> Self:
         """Return the larger disc whose regular polygon has this one's area."""

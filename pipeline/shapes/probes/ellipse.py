@@ -1,9 +1,11 @@
 """An ellipse."""
 
 from math import pi, sqrt
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pipeline.shapes.arrays import BoolArray, FloatArray, np
+import numpy as np
+
+from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.probe import ON_EDGE
@@ -23,6 +25,8 @@ _ITERATIONS = 12
 
 class Ellipse(Straight):
     """A flat elliptical punch; its first semi-axis lies along ``direction``."""
+
+    is_curved: ClassVar[bool] = True
 
     EXPECTED_ERROR = 0.9
 
@@ -76,11 +80,6 @@ class Ellipse(Straight):
     def draw(self, kernel: Any, frame: Frame, units: Units) -> int:
         """Add the ellipse."""
         return draw_ellipse(kernel, self.axes, frame, units)
-
-    @property
-    def is_curved(self) -> bool:
-        """It is."""
-        return True
 
     def inscribed(self, edges: int) -> Self:
         """Return the larger ellipse whose polygon of equal edges, from the end of an axis on, has this one's area."""

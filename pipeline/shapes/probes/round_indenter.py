@@ -3,7 +3,9 @@
 from abc import abstractmethod
 from math import pi
 
-from pipeline.shapes.arrays import BoolArray, FloatArray, np
+import numpy as np
+
+from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.indenter import CANDIDATES, Indenter
 from pipeline.shapes.probe import ON_EDGE, Probe
 from pipeline.shapes.probes.disc import Disc

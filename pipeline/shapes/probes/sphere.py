@@ -1,6 +1,6 @@
 """A sphere."""
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pipeline.shapes.probes.round_indenter import RoundIndenter
 from pipeline.shapes.rounded import Rounded
@@ -11,6 +11,9 @@ from pipeline.units import Length
 class Sphere(RoundIndenter):
     """A ball, such as the tip of a palpating probe."""
 
+    # 3/2 (H. Hertz), as long as contact is small beside the ball.
+    force_exponent: ClassVar[float | None] = 1.5
+
     shape: Literal["sphere"]
     radius: Annotated[Length, Words("Radius of the ball.", '"6 mm"', is_used=True)]
 
@@ -18,11 +21,6 @@ class Sphere(RoundIndenter):
     def section(self) -> Rounded:
         """A circle: it has no flank."""
         return Rounded(0.0, self.radius)
-
-    @property
-    def force_exponent(self) -> float | None:
-        """3/2 (H. Hertz), as long as contact is small beside the ball."""
-        return 1.5
 
     @property
     def mean_square(self) -> float:

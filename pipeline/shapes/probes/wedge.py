@@ -1,9 +1,11 @@
 """A wedge, sharp or rounded."""
 
 from math import hypot, nan
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
-from pipeline.shapes.arrays import BoolArray, FloatArray, np
+import numpy as np
+
+from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.indenter import CANDIDATES, Indenter
 from pipeline.shapes.probe import ON_EDGE, Probe
 from pipeline.shapes.probes.blade import Blade
@@ -14,6 +16,11 @@ from pipeline.units import Angle, Length, Rounding
 
 class Wedge(Indenter):
     """The edge of a scalpel or a chisel: two flanks that meet in a line, which may be rounded; its ends are flat."""
+
+    # None: the line load of an edge of some length goes with its depth and the logarithm of it.
+    force_exponent: ClassVar[float | None] = None
+    # Not known.
+    mean_square: ClassVar[float] = nan
 
     shape: Literal["wedge"]
     angle: Annotated[Angle, Words("Half angle to the axis: the larger, the blunter.", '"70 deg"', is_used=True)]
@@ -47,16 +54,6 @@ class Wedge(Indenter):
     def pressed(self) -> float:
         """Distance (m) of the corners of what the undeformed tool presses below the surface."""
         return hypot(self.length / 2, self.section.reach(self.depth))
-
-    @property
-    def force_exponent(self) -> float | None:
-        """None: the line load of an edge of some length goes with its depth and the logarithm of it."""
-        return None
-
-    @property
-    def mean_square(self) -> float:
-        """Not known."""
-        return nan
 
     @property
     def contact_width(self) -> float:
