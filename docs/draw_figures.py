@@ -108,17 +108,17 @@ def of_kind(kind: str) -> Callable[[xr.Dataset], Figure]:
 
 # By picture: the study, and what draws it.
 FIGURES: dict[str, tuple[str, Callable[[xr.Dataset], Figure]]] = {
-    "figure3": ("figure3", of_kind("epsilon")),
-    "speedup": ("speedup", of_kind("epsilon")),
+    "figure3": ("figure3", of_kind("ratio")),
+    "speedup": ("speedup", of_kind("ratio")),
     "guideline": ("guideline", guideline),
     "compliance": ("compliance", of_kind("compliance")),
     "one_number": ("compliance", one_number),
     "closure": ("closure", closure),
-    "needle": ("needle", of_kind("contact")),
+    "needle": ("needle", of_kind("force")),
     "path": ("path", of_kind("map")),
     "path_excess": ("path", path_excess),
-    "retractor": ("retractor", of_kind("loads")),
-    "large_depth": ("large_depth", of_kind("linear")),
+    "retractor": ("retractor", of_kind("force")),
+    "large_depth": ("large_depth", of_kind("force")),
 }
 
 

@@ -99,17 +99,17 @@ _RESULTS = (
     Quantity("force_error", "1", "relative error bar (95 %) on force, against the exact solution of the case's scene",
              "± F", in_per_cent=True),
     Quantity("force_max", "N", "force of the full-order mesh of the same study (F_max)", "F_max"),
-    Quantity("force_ratio", "1", "F / F_max", "F/F_max"),
+    Quantity("force_ratio", "1", "F / F_max", "F/F_max", "F / $F_{max}$"),
     Quantity("force_exact", "N", "force converged well below every error in the study, whole body (F_exact)",
              "F_exact"),
     Quantity("force_exact_error", "1", "relative error bar (95 %) on force_exact", "± F_exact", in_per_cent=True),
-    Quantity("accuracy", "1", "F / F_exact", "F/F_exact"),
+    Quantity("accuracy", "1", "F / F_exact", "F/F_exact", "F / $F_{exact}$"),
     Quantity("compliance", "m-1", "what the mesh adds to the compliance E d / F of the body: 1/F = 1/F_exact + c/(E d)",
              "c", "added compliance c"),
     Quantity("compliance_error", "m-1", "error bar on compliance, of the bars of both forces", "± c"),
     Quantity("compliance_message", "", "why compliances do not add"),
     Quantity("speedup", "1", "time of the full-order case over time of this case", "speed-up",
-             "speed-up $t_{full}/t$"),
+             "speed-up over full order"),
     Quantity("contact_area", "m2", "area in contact, of unilateral contact, projected along the probe's axis", "area",
              "area in contact"),
     Quantity("contact_area_error", "1", "relative error bar (95 %) on contact_area", "± area", in_per_cent=True),
@@ -122,7 +122,7 @@ _RESULTS = (
              "G", "energy release G"),
     Quantity("energy_release_error", "1", "relative error bar (95 %) on energy_release", "± G", in_per_cent=True),
     Quantity("energy_release_ratio", "1", "energy_release over that of the full-order mesh of the same study",
-             "G/G_max"),
+             "G/G_max", "energy release G / $G_{max}$"),
     Quantity("energy_release_exact", "J/m^2", "energy_release converged as force_exact is (G_exact)", "G_exact"),
     Quantity("load_force", "N",
              "what loads add to force while the probe is held; with the depth measured from the unloaded surface, the "
@@ -134,7 +134,8 @@ _RESULTS = (
     Quantity("load_energy", "J", "strain energy of the loads while the probe is held; energy is what the depth adds"),
     Quantity("sag", "m", "how far along its axis loads take a probe that is free to follow: the depth, from the "
              "unloaded surface, at which it bears no force", "sag", "sag of the surface under the probe"),
-    Quantity("linear_ratio", "1", "force over that of linear elasticity in the same study", "F/F_linear"),
+    Quantity("linear_ratio", "1", "force over that of linear elasticity in the same study", "F/F_linear",
+             "F / $F_{linear}$"),
     Quantity("max_strain", "1", "largest principal strain of a cell's mean strain, a tenth of the probe's half width "
              "or farther from its edge and from those of what is held",
              "largest strain", in_per_cent=True),
@@ -150,7 +151,7 @@ _RESULTS = (
     Quantity("machine_load", "1", "processes that ran or wanted to, a core, when the record was made (mean of a "
              "minute, the program's own included): above 1 times are too long", "load of the machine"),
     Quantity("memory", "bytes", "peak memory of all ranks", "memory"),
-    Quantity("dofs", "1", "unknowns of the whole body", "unknowns"),
+    Quantity("dofs", "1", "unknowns of the whole body", "unknowns", "unknowns"),
     Quantity("cells", "1", "elements of the whole body", "cells"),
     Quantity("iterations", "1", "iterations of the linear solver; of unilateral contact, linear solves until the "
              "area in contact was found", "iterations"),

@@ -27,8 +27,7 @@ def plot(
     kind: Annotated[
         list[str] | None,
         typer.Option(
-            help="A figure to draw; may be repeated: epsilon (ratio and speedup), exact, convergence, accuracy, map, "
-            "force, compliance, linear, contact, loads. Default: all that suit the study.",
+            help="A figure to draw; may be repeated: ratio, error, force, map, compliance. Default: all that suit.",
             show_default=False,
         ),
     ] = None,
@@ -43,7 +42,7 @@ def plot(
 
     Example: epsmesh plot results/figure3.nc
 
-    Example: epsmesh plot studies/figure3.toml --kind accuracy --kind exact
+    Example: epsmesh plot studies/figure3.toml --kind error --kind force
     """
     path, dataset = _read(file, output)
     from pipeline.report.figures import KINDS, choose, draw, files, lacks

@@ -135,10 +135,10 @@ class Accessor:
             _draw_bands(ax, data, others, by)
         if variable == "force_ratio":
             ax.axhline(1.0, color="black", linewidth=0.7)
-        ax.set_xlabel("ε (mm)")
+        ax.set_xlabel("ε, mm")
         ax.set_ylabel(formula(variable) if variable in ("force_ratio", "accuracy") else variable)
         if ax.get_legend_handles_labels()[1]:
-            ax.legend(fontsize=8)
+            ax.legend(fontsize=9)
         return ax
 
 

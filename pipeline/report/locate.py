@@ -44,8 +44,8 @@ class Located:
         if ax is None:
             ax = plt.figure(figsize=(5, 3.4), layout="constrained").subplots()
         if (drawn := draw_excess(ax, self.excess, self.bar, self.point)) is not None:
-            ax.get_figure().colorbar(drawn, ax=ax, label="excess of F (%)")
-            ax.legend(fontsize=7, loc="upper left")
+            ax.get_figure().colorbar(drawn, ax=ax, label="excess of F, %")
+            ax.legend(fontsize=9, loc="upper left")
         return ax
 
     def __str__(self) -> str:

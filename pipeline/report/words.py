@@ -64,7 +64,7 @@ def heading(array: xr.DataArray) -> str:
     known = quantities.quantity_of(name)
     text = (known.axis if known else "") or str(array.attrs.get("long_name", name))
     unit = scale(array)[1]
-    return f"{text} ({unit})" if unit else text
+    return f"{text}, {unit}" if unit else text
 
 
 def formula(name: str) -> str:

@@ -134,7 +134,7 @@ def test_an_exception_is_told_and_goes_on(epsmesh, small, monkeypatch):
 
 def test_what_is_written_is_told(epsmesh, small, here):
     assert json.loads(epsmesh("new", "mine", "--json").stdout) == {"file": "studies/mine.toml"}
-    assert json.loads(epsmesh("plot", "known.nc", "--kind", "accuracy", "--json").stdout)["files"] != []
+    assert json.loads(epsmesh("plot", "known.nc", "--kind", "error", "--json").stdout)["files"] != []
     page = json.loads(epsmesh("report", "known.nc", "--json").stdout)["page"]
     assert (here / page).is_file()
     seen = json.loads(epsmesh("view", small, "--mesh-only", "--export", "html", "--output", here, "--json").stdout)

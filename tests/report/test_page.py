@@ -252,8 +252,8 @@ def test_commands_take_a_study_file(tmp_path):
         (["report", "pyproject.toml", "--output", "/nowhere"], "no such dataset"),
         (["report", "{bad}"], "cannot be read as netCDF"),
         (["plot", "{other}"], "not a study's dataset: it has no force"),
-        (["plot", "{good}", "--kind", "pie"], "no figure is called so; there are epsilon"),
-        (["plot", "{good}", "--kind", "exact"], "needs a swept quantity, and F_exact"),
+        (["plot", "{good}", "--kind", "pie"], "no figure is called so; there are ratio"),
+        (["plot", "{good}", "--kind", "map"], "needs a raster of places"),
     ],
 )
 def test_bad_input_is_told(arguments, words, tmp_path):

@@ -30,9 +30,9 @@ def test_a_map_is_the_main_figure_of_a_raster_and_a_curve_that_of_a_line(tmp_pat
     assert choose(raster)[0] == "map"
     assert choose(line)[0] == "force"
     text = draw(raster, tmp_path / "a", ["svg"], ["map"])[0].read_text()
-    for word in ("ill", "healthy", "its error bar (mN)", "x (mm)", "95 %"):
+    for word in ("ill", "healthy", "its error bar, mN", "x, mm", "95 %"):
         assert word in text
-    assert "length along the path (mm)" in draw(line, tmp_path / "b", ["svg"])[0].read_text()
+    assert "length along the path, mm" in draw(line, tmp_path / "b", ["svg"])[0].read_text()
 
 
 def test_where_contact_is_lost_the_map_says_so_and_keeps_its_colours(tmp_path):
@@ -52,7 +52,7 @@ def test_the_centre_of_the_excess_is_found_within_a_third_of_a_step(path):
     assert not found.reaches_edge
     assert 0 < found.error[0] < 5e-3
     assert "mm" in str(found)
-    assert found.plot().get_xlabel() == ("x (mm)" if path is RASTER else "length along the path (mm)")
+    assert found.plot().get_xlabel() == ("x, mm" if path is RASTER else "length along the path, mm")
 
 
 def test_an_excess_at_the_edge_is_said_to_go_on():

@@ -1,36 +1,77 @@
 """The figures of a study, drawn from its dataset alone."""
 
+import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import matplotlib as mpl
+import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
 from pipeline.files import FIGURE_FORMATS
-from pipeline.report.figures.accuracy import accuracy
-from pipeline.report.figures.choose import KINDS, choose, lacks
+from pipeline.report.compliance import tool_dimension
 from pipeline.report.figures.compliance import compliance
-from pipeline.report.figures.contact import contact
-from pipeline.report.figures.convergence import convergence
-from pipeline.report.figures.epsilon import epsilon, ratio, speedup
-from pipeline.report.figures.exact import exact
+from pipeline.report.figures.error import error, error_facets
+from pipeline.report.figures.facets import Facets, is_meshed, rest, swept
 from pipeline.report.figures.force import force, nothing
-from pipeline.report.figures.linear import linear
-from pipeline.report.figures.loads import loads
 from pipeline.report.figures.map import force_map
-from pipeline.report.figures.parts import parts
+from pipeline.report.figures.ratio import ratio, ratio_facets
 from pipeline.report.figures.style import STYLE, save
-from pipeline.report.figures.text import shortened
+from pipeline.report.table import study_of
 from pipeline.report.words import is_numeric
+from pipeline.study.vocabulary import FIGURES
 
-__all__ = ["FIGURES", "KINDS", "STYLE", "choose", "draw", "figure", "files", "lacks", "save"]
+__all__ = ["KINDS", "STYLE", "choose", "describe", "draw", "figure", "files", "lacks", "save"]
 
-FIGURES: dict[str, Callable[[xr.Dataset, str, str], Figure]] = {
-    "epsilon": epsilon, "exact": exact, "convergence": convergence, "accuracy": accuracy, "map": force_map,
-    "force": force, "compliance": compliance, "linear": linear, "contact": contact, "loads": loads,
-    "nothing": nothing, "ratio": ratio, "speedup": speedup,
-}  # fmt: skip
+_DRAWN: dict[str, Callable[[xr.Dataset, str, str], Figure]] = {
+    "ratio": ratio,
+    "error": error,
+    "force": force,
+    "map": force_map,
+    "compliance": compliance,
+    "nothing": nothing,
+}
+# What can be drawn on request.
+KINDS = (*FIGURES, "nothing")
+_FACETS: dict[str, Callable[[xr.Dataset], Facets]] = {"ratio": ratio_facets, "error": error_facets}
+_NEEDS = {
+    "ratio": "several ε, and the full order among them",
+    "error": "swept meshes, and F_exact or F_max",
+    "compliance": "several tools and ε, the full order among them, in scenes whose compliances add",
+    "map": "a raster of places ([probe.path])",
+    "force": "a case that has a force",
+    "nothing": "that no case has a force",
+}
+_LONG_NAME = 34  # letters of a name that a figure shows
+
+
+def choose(dataset: xr.Dataset) -> list[str]:
+    """Return the kinds of figures that suit ``dataset``, its main one first: what its study asks for, if it suits."""
+    if not _known(dataset, "force"):
+        return ["nothing"]
+    is_of_depth = dataset.sizes.get("depth", 0) > 1
+    suits = {
+        "force": is_of_depth and (_known(dataset, "linear_ratio") or _known(dataset, "contact_area")),
+        "ratio": dataset.sizes.get("epsilon", 0) > 1 and _known(dataset, "force_ratio"),
+        "error": is_meshed(dataset) and (_known(dataset, "accuracy") or _known(dataset, "force_ratio")),
+        "map": all(dataset.sizes.get(name, 0) > 1 for name in ("x", "y")),
+    }
+    kinds = [*(kind for kind, is_suited in suits.items() if is_suited), "force"]
+    kinds += ["compliance"] if "ratio" in kinds and tool_dimension(dataset) else []
+    study = study_of(dataset)
+    asked = study.drawing.kind if study else "auto"
+    return sorted(dict.fromkeys(kinds), key=asked.__ne__)
+
+
+def describe(kind: str) -> str:
+    """Return what a kind of figure shows, in a sentence without its stop."""
+    return (_DRAWN[kind].__doc__ or "").strip().rstrip(".")
+
+
+def lacks(dataset: xr.Dataset, kind: str) -> str:
+    """Return what ``dataset`` lacks for a figure of this kind, '' if nothing."""
+    return "" if kind in choose(dataset) else f"needs {_NEEDS[kind]}"
 
 
 def draw(
@@ -51,9 +92,9 @@ def draw(
         for kind, paths in files(dataset, stem, formats, kinds).items():
             drawn = figure(dataset, kind)
             written += [save(drawn, path) for path in paths]
-            for number, (words, part) in enumerate(parts(dataset, kind) if rest else [], start=2):
-                titled = part.assign_attrs(title=" – ".join(filter(None, (str(part.attrs.get("title", "")), words))))
-                drawn = figure(titled, kind)
+            for number, (words, part) in enumerate(_rest(dataset, kind) if rest else [], start=2):
+                title = " – ".join(filter(None, (str(dataset.attrs.get("title", "")), words)))
+                drawn = figure(part.assign_attrs(title=title), kind)
                 written += [save(drawn, stem.with_name(f"{stem.name}_{kind}_{number}.{suffix}")) for suffix in formats]
     return written
 
@@ -72,25 +113,32 @@ def files(
 def figure(dataset: xr.Dataset, kind: str, *, titled: bool = True) -> Figure:
     """Draw the figure of one ``kind``, with the study's title or without."""
     title = _plain(str(dataset.attrs.get("title", ""))) if titled else ""
-    dataset = _with_short_names(dataset)
     with mpl.rc_context(STYLE):
-        return FIGURES[kind](dataset, title, _missing(dataset))
+        return _DRAWN[kind](_with_short_names(dataset), title, _missing(dataset))
+
+
+def _rest(dataset: xr.Dataset, kind: str) -> list[tuple[str, xr.Dataset]]:
+    return list(rest(dataset, _FACETS[kind](dataset))) if kind in _FACETS else []
 
 
 def _with_short_names(dataset: xr.Dataset) -> xr.Dataset:
-    """Return ``dataset`` with names that fit a figure, and that are no formulas."""
+    """Return ``dataset`` with names that fit a figure, differ from one another, and are no formulas."""
     plain = {}
-    for dim, values in dataset.indexes.items():
-        names = [str(value) for value in values]
-        shown = [_plain(name) for name in shortened(names)]
-        if not is_numeric(dataset[dim]) and shown != names:
-            plain[dim] = (dim, shown, dataset[dim].attrs)
+    for dim in (dim for dim in swept(dataset) if not is_numeric(dataset[dim])):
+        names = [str(value) for value in dataset[dim].values]
+        short = [_plain(textwrap.shorten(name, _LONG_NAME, placeholder="…")) for name in names]
+        if len(set(short)) == len(names) and short != names:
+            plain[dim] = (dim, short, dataset[dim].attrs)
     return dataset.assign_coords(plain) if plain else dataset
 
 
 def _plain(text: str) -> str:
-    """Return ``text`` so that it is no formula, whatever stands in it."""
+    """Return ``text`` so that it is no formula, whatever is in it."""
     return text.replace("$", r"\$")
+
+
+def _known(dataset: xr.Dataset, name: str) -> bool:
+    return name in dataset and bool(np.isfinite(dataset[name]).any())
 
 
 def _missing(dataset: xr.Dataset) -> str:

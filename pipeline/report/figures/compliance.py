@@ -6,8 +6,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.report.compliance import sinking, tool_dimension
-from pipeline.report.figures.layout import arrange
-from pipeline.report.figures.panels import grid, panels, share_columns
+from pipeline.report.figures.curves import grid, share
+from pipeline.report.figures.facets import arrange
 from pipeline.report.figures.style import finish, look
 from pipeline.report.words import choice
 
@@ -20,23 +20,20 @@ _OF_CONTACT = {"bonded": {"linestyle": "--", "markerfacecolor": "none"}}
 def compliance(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     """E d / F of tools with a known footprint, for each ε; lines: full order's, raised by one c for all of a kind."""
     data, heading = _with_positions(dataset)
-    layout = arrange(data, (_WHOLE,), tool_dimension(dataset), flat=("epsilon",), most=(1, 3, 3))
-    figure = grid(layout, (_WHOLE,), height=2.4)
-    shown = list(panels(figure, data, layout, (_WHOLE,)))
-    for panel in shown:
+    facets = arrange(data, (_WHOLE,), tool_dimension(dataset), flat=("epsilon",), most=(1, 3, 3))
+    figure, panels = grid(data, facets, (_WHOLE,))
+    for panel in panels:
         _draw(panel.ax, panel.data)
-        if panel.title:
-            panel.ax.set_title(panel.title)
-        if panel.is_first:
-            panel.ax.set_ylabel("$E d/F$ (1/mm)")
-        if panel.is_last:
+        if panel.ax.get_xlabel():
             panel.ax.set_xlabel(heading)
-    share_columns(shown, layout)
+        if panel.column == 0:
+            panel.ax.set_ylabel("compliance $E d/F$, 1/mm")
+    share(panels, facets)
     # All share it: not before all are drawn.
     figure.axes[0].set_xlim(0, _ROOM * figure.axes[0].get_xlim()[1])
     contacts = np.unique(data["touch"].values.astype(str))
     bonded = "dashed: bonded" if "bonded" in contacts and len(contacts) > 1 else ""
-    finish(figure, title, "; ".join(filter(None, (bonded, layout.note))), warning)
+    finish(figure, title, "; ".join(filter(None, (bonded, facets.note))), warning)
     return figure
 
 
@@ -57,7 +54,7 @@ def _with_positions(dataset: xr.Dataset) -> tuple[xr.Dataset, str]:
     contact = np.array([one.contact for one in known.ravel()], dtype=object).reshape(known.shape)
     data = dataset.assign({_WHOLE: whole, "position": inverse if is_round else full, "of_full_order": full,
                            "touch": (dataset["force"].dims, contact)})  # fmt: skip
-    return data, "1/a (1/mm)" if is_round else "$E d/F_{max}$ (1/mm)"
+    return data, "1 / radius a, 1/mm" if is_round else "$E d/F_{max}$, 1/mm"
 
 
 def _draw(ax: Axes, data: xr.Dataset) -> None:

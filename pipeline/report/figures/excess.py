@@ -19,8 +19,8 @@ def draw_excess(ax: Axes, excess: xr.DataArray, bar: xr.DataArray, point: tuple[
         (dim,) = excess.dims
         ax.errorbar(1e3 * excess[dim], 100 * excess, 100 * bar, capsize=2, elinewidth=0.8, **look(1))
         ax.axhline(0.0, color=LINE, linewidth=0.7)
-        ax.set_xlabel("length along the path (mm)")
-        ax.set_ylabel("excess of F (%)")
+        ax.set_xlabel("length along the path, mm")
+        ax.set_ylabel("excess of F, %")
         return None
     seen = excess.transpose("y", "x")
     beyond = (excess > bar).transpose("y", "x")
@@ -30,6 +30,6 @@ def draw_excess(ax: Axes, excess: xr.DataArray, bar: xr.DataArray, point: tuple[
     x, y = 1e3 * seen["x"].values, 1e3 * seen["y"].values
     ax.plot(x[columns], y[rows], ".", color="white", markersize=3, label="beyond the error bars")
     ax.plot(1e3 * point[0], 1e3 * point[1], "+", color=CLAIM, markersize=12, markeredgewidth=2, label="centre")
-    ax.set_xlabel("x (mm)")
-    ax.set_ylabel("y (mm)")
+    ax.set_xlabel("x, mm")
+    ax.set_ylabel("y, mm")
     return drawn

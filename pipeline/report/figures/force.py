@@ -1,4 +1,4 @@
-"""The force against everything that a study sweeps, and what there is to say where no case has one."""
+"""The force, and what goes with it, against everything that a study sweeps."""
 
 import textwrap
 from collections import Counter
@@ -8,94 +8,117 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pipeline.report.figures.layout import arrange
-from pipeline.report.figures.panels import Panel, draw_curves
-from pipeline.report.figures.style import FAILED, QUIET, finish, look, new_figure
-from pipeline.report.figures.text import width_of, wrapped
-from pipeline.report.words import choices, heading
+from pipeline.report.figures.curves import Panel, draw
+from pipeline.report.figures.facets import arrange, swept
+from pipeline.report.figures.style import FAILED, LINE, QUIET, finish, look, new_figure
+from pipeline.report.words import at_most, choices, heading, scale
 
-_COLUMNS, _MOST_PANELS, _MOST_CURVES = 3, 6, 4
-_LEGEND_ROW = 0.1  # of a panel's height
-_HANDLE = 0.6  # inches
-_AT, _NAMES = 7.0, 6.5  # points
+_MOST_PANELS, _MOST_CURVES = 4, 4
+_WIDTH, _HEIGHT, _LINE = 3.1, 2.2, 0.17  # inches: of a panel, and of a line of the legend above it
+# What is drawn below the force where a study has it; those that are shares of something have a line at 1.
+_WITH_FORCE = ("contact_area", "load_force", "sag", "linear_ratio", "accuracy")
+_SHARES = ("linear_ratio", "accuracy")
+_RELATIVE = {"force": "force_error", "accuracy": "force_error"}
+_LOAD_BAR = "load_force_share"
 
 
 def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
-    """The force with its error bar, one panel for each swept quantity, the others at the values that it names."""
-    swept = [str(dim) for dim in dataset["force"].dims if dataset.sizes[dim] > 1]
-    dims = swept[:_MOST_PANELS] or [str(dim) for dim in dataset["force"].dims[:1]]
-    columns = 2 if len(dims) == 4 else min(max(len(dims), 1), _COLUMNS)
-    rows = -(-max(len(dims), 1) // columns)
-    figure = new_figure({1: 4.8, 2: 6.4}.get(columns, 8.4), 2.6 * rows + 0.7)
-    axes = figure.subplots(rows, columns, squeeze=False)
-    for ax in axes.ravel()[max(len(dims), 1) :]:
-        ax.remove()
-    width = figure.get_figwidth() / columns - 0.6
-    parts = [_draw_against(ax, dataset, dim, width) for dim, ax in zip(dims, axes.ravel(), strict=False)]
-    drawn = axes.ravel()[: len(dims)]
-    top = max((ax.get_ylim()[1] for ax in drawn), default=0.0)
-    for ax in drawn:  # a glance compares panels
-        ax.set_ylim(min(ax.get_ylim()[0] for ax in drawn), top)
+    """The force, area in contact, loads and F/F_exact, where a study has them, against each swept quantity."""
+    dims = swept(dataset)
     if not dims:
-        _draw_one(axes[0, 0], dataset)
-    for ax in axes[:, 0]:
-        ax.set_ylabel(heading(dataset["force"]))
-    known = dict.fromkeys(words for part in parts for words in part)
-    left_out = [f"curves: {', '.join(known)}"] if known else []
-    left_out += [f"not shown: against {', '.join(swept[_MOST_PANELS:])}"] if swept[_MOST_PANELS:] else []
-    finish(figure, title, "; ".join(("bars: 95 % error bars", *left_out)), warning, legend=False)
+        return _one(dataset, title, warning)
+    shown = sorted(dims, key="depth".__ne__)[:_MOST_PANELS]
+    quantities = ["force", *(name for name in _WITH_FORCE if _varies(dataset, name))]
+    if "load_force" in quantities:
+        dataset = dataset.assign({_LOAD_BAR: dataset["load_force_error"] / abs(dataset["load_force"])})
+    figure = new_figure(max(_WIDTH * len(shown), 4.6) + 0.6, _HEIGHT * len(quantities) + 1.6)
+    axes = figure.subplots(len(quantities), len(shown), squeeze=False, sharex="col", sharey="row")
+    left_out = [_draw_column(column, dataset, dim, quantities) for dim, column in zip(shown, axes.T, strict=True)]
+    for row, name in zip(axes, quantities, strict=True):
+        row[0].set_ylabel(textwrap.fill(heading(dataset[name]), 28))
+        low, high = row[0].get_ylim()
+        if name not in _SHARES and low * high > 0 and low > -0.05 * high:
+            row[0].set_ylim(0, 1.05 * high)  # a small change then looks small
+    band = f"grey: error bar of F_exact{at_most(dataset['force_exact_error'])}" if "accuracy" in quantities else ""
+    more = f"not shown: against {', '.join(dims[_MOST_PANELS:])}" if dims[_MOST_PANELS:] else ""
+    figure.set_figheight(figure.get_figheight() + _LINE * max(map(_legend_lines, axes[0])))
+    part = dict.fromkeys(words for column in left_out for words in column)
+    notes = ("bars: 95 % error bars", band, f"curves: {', '.join(part)}" if part else "", more)
+    finish(figure, title, "; ".join(filter(None, notes)), warning, legend=False)
     return figure
 
 
-def _draw_against(ax: Axes, dataset: xr.Dataset, dim: str, width: float) -> tuple[str, ...]:
-    """Draw the force against one dimension; return which values of the curves' are left out, in words."""
-    layout = arrange(dataset, ("force",), dim, most=(_MOST_CURVES, 1, 1))
-    panel = Panel(ax, dataset.sel(layout.at), "force", "", width, column=0, is_last=True)
-    draw_curves(panel, layout, factor=1e3, errors="force_error")
-    if layout.fixed:
-        words = f"at {choices(dataset, layout.fixed).removeprefix('at ')}"
-        ax.set_title(wrapped(words, width, _AT, most=3), fontsize=_AT, color=QUIET)
-    _from_zero(ax)
-    if len(layout.curves) > 1:
-        _write_legend(ax, width)
-    return layout.part
+def _varies(dataset: xr.Dataset, name: str) -> bool:
+    """Tell whether ``dataset`` has values of a quantity, other than nought."""
+    if name not in dataset or (name == "linear_ratio" and "law" not in dataset.dims):
+        return False
+    return bool((np.isfinite(dataset[name]) & (dataset[name] != 0)).any())
 
 
-def _write_legend(ax: Axes, width: float) -> None:
-    """Name the curves above them, in two columns where two fit ``width`` inches."""
+def _draw_column(axes: np.ndarray, dataset: xr.Dataset, dim: str, quantities: list[str]) -> tuple[str, ...]:
+    """Draw every quantity against one dimension; return what is left out, in words."""
+    facets = arrange(dataset, quantities, dim, most=(_MOST_CURVES, 1, 1))
+    data = dataset.sel(facets.at)
+    for row, (ax, name) in enumerate(zip(axes, quantities, strict=True)):
+        draw(Panel(ax, data, name, 0, row), facets, _LOAD_BAR if name == "load_force" else _RELATIVE.get(name, ""))
+        if name in _SHARES:
+            ax.axhline(1.0, color=LINE, linewidth=0.7)
+        if name == "accuracy" and np.isfinite(bar := float(dataset["force_exact_error"].max())):
+            ax.axhspan(1 - bar, 1 + bar, color=QUIET, alpha=0.25, linewidth=0)
+    axes[-1].set_xlabel(heading(dataset[dim]))
+    at = textwrap.fill(choices(dataset, facets.fixed), 34)
+    if len(facets.curves) > 1:
+        _write_legend(axes[0], at)
+    else:
+        axes[0].set_title(at, color=QUIET)
+    return facets.part
+
+
+def _write_legend(ax: Axes, title: str) -> None:
+    """Name the curves above their panel."""
     handles, texts = ax.get_legend_handles_labels()
-    texts = [wrapped(text, width - _HANDLE, _NAMES, most=1) for text in texts]
-    columns = 2 if 2 * (_HANDLE + max((width_of(text, _NAMES) for text in texts), default=0.0)) < width else 1
-    rows = -(-len(texts) // columns)
-    low, high = ax.get_ylim()
-    ax.set_ylim(low, high + (high - low) * _LEGEND_ROW * rows / (1 - _LEGEND_ROW * rows))
-    look_of = {"fontsize": _NAMES, "frameon": False, "handlelength": 1.6, "columnspacing": 1.0}
-    ax.legend(handles, texts, loc="upper center", ncol=columns, **look_of)
+    texts = [textwrap.fill(text, 34) for text in texts]
+    columns = 2 if max(map(len, texts), default=0) <= 12 else 1
+    ax.legend(
+        handles,
+        texts,
+        title=title,
+        title_fontsize="medium",
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.01),
+        borderaxespad=0.0,
+        ncol=columns,
+        frameon=False,
+    )
 
 
-def _draw_one(ax: Axes, dataset: xr.Dataset) -> None:
-    value = 1e3 * float(dataset["force"])
-    bar = np.nan_to_num(abs(value) * float(dataset["force_error"]))
-    ax.errorbar([0], [value], [bar], capsize=3, linestyle="none", **look(0))
-    ax.set_xticks([0], [f"{value:.4g} mN ± {100 * float(dataset['force_error']):.2g} %"])
-    _from_zero(ax)
+def _legend_lines(ax: Axes) -> int:
+    legend = ax.get_legend()
+    return sum(text.get_text().count("\n") + 1 for text in legend.get_texts()) if legend else 0
 
 
-def _from_zero(ax: Axes) -> None:
-    """Let the axis begin at zero, where forces are positive: a small change then looks small."""
-    low, high = ax.get_ylim()
-    if high > 0 and low > -0.05 * high:
-        ax.set_ylim(0, 1.02 * high)
+def _one(dataset: xr.Dataset, title: str, warning: str) -> Figure:
+    """Draw the force of the one case."""
+    factor, unit = scale(dataset["force"])
+    value, share = factor * float(dataset["force"].squeeze()), float(dataset["force_error"].squeeze())
+    figure = new_figure(4.6, 3.3)
+    ax = figure.subplots()
+    ax.errorbar([0], [value], [np.nan_to_num(abs(value) * share)], capsize=3, linestyle="none", **look(0))
+    ax.set_xticks([0], [f"{value:.4g} {unit} ± {100 * share:.2g} %"])
+    ax.set_ylim(bottom=min(0.0, 1.1 * value))
+    ax.set_ylabel(heading(dataset["force"]))
+    finish(figure, title, "bar: 95 % error bar", warning)
+    return figure
 
 
-def nothing(dataset: xr.Dataset, title: str, warning: str) -> Figure:
+def nothing(dataset: xr.Dataset, title: str, _warning: str) -> Figure:
     """Say, where no case has a force, how many failed and of what."""
     states = Counter(map(str, dataset["status"].values.ravel()))
     messages = Counter(str(m) for m in dataset["message"].values.ravel() if m)
     lines = [f"No case has a force: {', '.join(f'{count} {state}' for state, count in states.items())}."]
     lines += [f"{count} ×  {message}" for message, count in messages.most_common(4)]
     text = "\n".join(textwrap.fill(line, 62, subsequent_indent="      ") for line in lines)
-    figure = new_figure(4.8, 1.0 + 0.17 * text.count("\n"))
+    figure = new_figure(5.4, 1.0 + 0.19 * text.count("\n"))
     figure.text(0.04, 0.5, text, va="center", color=FAILED)
     finish(figure, title)
     return figure

@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pipeline.report.figures.layout import arrange
+from pipeline.report.figures.facets import arrange
 from pipeline.report.figures.style import FAILED, LINE, finish, new_figure
 from pipeline.report.words import choices, heading, scale
 
@@ -22,14 +22,14 @@ def force_map(dataset: xr.Dataset, title: str, warning: str) -> Figure:
 
     Places where contact is lost have a ring, those without a force a cross.
     """
-    layout = arrange(dataset, ("force",), None, flat=PLACES, most=(_MOST_PANELS, 1, 1))
-    parts = [dataset.sel(layout.at | curve).transpose("y", "x", ...) for curve in layout.curves]
-    titles = [choices(dataset, curve) for curve in layout.curves]
+    facets = arrange(dataset, ("force",), None, flat=PLACES, most=(_MOST_PANELS, 1, 1))
+    parts = [dataset.sel(facets.at | curve).transpose("y", "x", ...) for curve in facets.curves]
+    titles = [choices(dataset, curve) for curve in facets.curves]
     (width, height), rows = _extent(dataset), (_forces(parts), _bars(parts))
     panel = _PANEL * min(1.0, max(0.4, height / width))
     figure = new_figure(_PANEL * len(parts) + 1.2, 2 * panel + 1.3)
     axes = figure.subplots(2, len(parts), squeeze=False, sharex=True, sharey=True)
-    for row, (maps, label) in enumerate(zip(rows, (heading(dataset["force"]), "its error bar (mN)"), strict=True)):
+    for row, (maps, label) in enumerate(zip(rows, (heading(dataset["force"]), "its error bar, mN"), strict=True)):
         known = np.concatenate([values[np.isfinite(values)] for values in maps])
         limits = {"vmin": known.min(), "vmax": known.max()} if known.size else {}
         for column, (ax, values) in enumerate(zip(axes[row], maps, strict=True)):
@@ -38,7 +38,7 @@ def force_map(dataset: xr.Dataset, title: str, warning: str) -> Figure:
             ax.set_xlabel(heading(dataset["x"]) if row == 1 else "")
             ax.set_ylabel(heading(dataset["y"]) if column == 0 else "")
         figure.colorbar(drawn, ax=axes[row].tolist(), label=label)
-    finish(figure, title, f"seen from above; bars: 95 %{f'; {layout.note}' if layout.note else ''}", warning)
+    finish(figure, title, f"seen from above; bars: 95 %{f'; {facets.note}' if facets.note else ''}", warning)
     return figure
 
 

@@ -1,34 +1,43 @@
-"""What all figures share: colours, sizes, files."""
+"""Style of all figures: colours, sizes, legend, notes, files."""
 
-import re
+import textwrap
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.style.core import STYLE_BLACKLIST
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from pipeline.files import atomic
-from pipeline.report.figures.text import width_of, wrapped
 
-WIDTH, PANEL_HEIGHT = 7.1, 1.75  # inches: the width of a page's text
+WIDTH, LEGEND = 7.1, 1.9  # inches: the width of a page's text, and of the legend beside the panels
 # From dark to light, told apart by the colour-blind and in grey; markers tell them apart as well.
 COLOURS = ("#00204d", "#1f5fa8", "#2a9d8f", "#b87d00", "#b0413e", "#9030f0", "#480000")
 MARKERS = "osD^vPX"
 CLAIM, FAILED, QUIET, LINE, GRID, PAPER = "#d81b60", "#c62828", "#555555", "#000000", "#dddddd", "#ffffff"
-_TITLE, _LEGEND, _NOTE = 9.5, 7.5, 7.0  # points
-_TITLE_LINES = 4
-# Of an SVG: its tags, and in these a name that matplotlib makes up.
-_TAG, _NAME = re.compile(r"<[^<>]*>"), re.compile(r'(?<=["#])[a-zA-Z][0-9a-f]{10}(?=["\)])')
-_EDGE, _HANDLE = 0.2, 0.55  # inches: beside a figure's text, and of a legend's entry beside its words
-# Whatever a matplotlibrc says, the user's own or one in the folder that one is in: the same dataset, the same file.
+SIZE = 9.0  # points
+# Letters of SIZE in an inch of a line, and in a line of the legend.
+_LETTERS, _LEGEND_LETTERS = 13, 24
+_DECADES = {"x": 1.4, "y": 2.2}  # from here on a logarithmic axis writes powers of ten alone
+_NARROW = 3.0  # below this ratio of its ends, even steps
+# A matplotlibrc, of the user or of the current folder, changes nothing: the same dataset gives the same file.
 DEFAULTS = {name: value for name, value in mpl.rcParamsDefault.items() if name not in STYLE_BLACKLIST}
 STYLE = DEFAULTS | {
-    "font.size": 8, "axes.titlesize": 8, "legend.fontsize": _LEGEND, "svg.fonttype": "none", "axes.grid": True,
-    "grid.linewidth": 0.4, "grid.color": GRID, "lines.linewidth": 1.2, "lines.markersize": 3.5,
+    "font.size": SIZE,
+    "axes.titlesize": SIZE,
+    "legend.fontsize": SIZE,
+    "svg.fonttype": "none",
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.linewidth": 0.4,
+    "grid.color": GRID,
+    "lines.linewidth": 1.2,
+    "lines.markersize": 4,
     "svg.hashsalt": "epsmesh",
-}  # fmt: skip
+}
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -44,35 +53,58 @@ def look(position: int) -> dict[str, str]:
 
 
 def finish(figure: Figure, title: str, note: str = "", warning: str = "", *, legend: bool = True) -> None:
-    """Add title, legend, and the notes below: what is shown of a large study, and what is missing."""
+    """Add the title, a legend beside the panels, and notes below them; with a warning these are red."""
+    letters = int(_LETTERS * figure.get_figwidth())
     if title:
-        words = wrapped(title, figure.get_figwidth() - _EDGE, _TITLE, bold=True, most=_TITLE_LINES)
-        figure.suptitle(words, fontsize=_TITLE, fontweight="bold")
-    lines, bottom = [], 0.0
-    for text, colour in ((note, QUIET), (warning, FAILED)):
-        for line in reversed(wrapped(text, figure.get_figwidth() - _EDGE, _NOTE).splitlines()):
-            lines.append((line, colour))
-    for line, colour in lines:
-        figure.text(0.01, (0.04 + bottom) / figure.get_figheight(), line, fontsize=_NOTE, color=colour, va="bottom")
-        bottom += 0.14
-    entries: dict[str, Any] = {}
-    for ax in figure.axes if legend else ():
-        handles, labels = ax.get_legend_handles_labels()
-        entries = dict(zip(labels, handles, strict=True)) | entries
-    labels = list(entries)
-    if len(labels) > 1:
-        room = figure.get_figwidth() - _EDGE
-        labels = [wrapped(label, room - _HANDLE, _LEGEND, most=1) for label in labels]
-        columns = max(1, min(len(labels), int(room / (_HANDLE + max(width_of(label, _LEGEND) for label in labels)))))
-        columns = -(-len(labels) // -(-len(labels) // columns))  # rows as even as can be
-        anchor = (0.5, bottom / figure.get_figheight())
-        figure.legend(
-            list(entries.values()), labels, loc="lower center", ncol=columns, frameon=False, bbox_to_anchor=anchor
-        )
-        bottom += 0.12 + 0.16 * -(-len(labels) // columns)
-    share = (bottom + 0.02) / figure.get_figheight()
+        figure.suptitle(textwrap.fill(title, int(0.9 * letters)), fontsize=SIZE + 1, fontweight="bold")
+    if lines := [textwrap.fill(text, letters) for text in (note, warning) if text]:
+        colour = FAILED if warning else QUIET
+        figure.supxlabel("\n".join(lines), x=0.01, ha="left", fontsize=SIZE, color=colour)
+    if legend:
+        write_legend(figure)
     figure.align_ylabels()
-    figure.get_layout_engine().set(rect=(0, share, 1, 1 - share))
+
+
+def write_legend(figure: Figure) -> None:
+    """Name the curves of all panels, to the right of the upper right one."""
+    known = [ax.get_legend_handles_labels() for ax in figure.axes]
+    entries = {
+        label: handle for handles, labels in reversed(known) for handle, label in zip(handles, labels, strict=True)
+    }
+    if len(entries) < 2:
+        return
+    names = list(dict.fromkeys(label for _, labels in known for label in labels))
+    first = figure.axes[0].get_subplotspec()
+    last = first.get_gridspec().ncols - 1 if first else 0
+    beside = next(ax for ax in figure.axes if not first or ax.get_subplotspec().colspan.start == last)
+    beside.legend(
+        [entries[name] for name in names],
+        [textwrap.fill(name, _LEGEND_LETTERS) for name in names],
+        loc="upper left",
+        bbox_to_anchor=(1.02, 1.0),
+        borderaxespad=0.0,
+        frameon=False,
+    )
+
+
+def log_scale(ax: Axes, which: str = "y") -> None:
+    """Make an axis logarithmic, with round numbers written as people write them."""
+    getattr(ax, f"set_{which}scale")("log")
+    axis: Axis = getattr(ax, f"{which}axis")
+    low, high = sorted(axis.get_view_interval())
+    if high < _NARROW * low:
+        axis.set_major_locator(MaxNLocator(3 if which == "x" else 6))
+        axis.set_minor_locator(NullLocator())
+        axis.set_major_formatter(FuncFormatter(_written))
+        return
+    subs = (1.0,) if high > 10 ** _DECADES[which] * low else (1.0, 2.0, 5.0)
+    axis.set_major_locator(LogLocator(subs=subs, numticks=5 if which == "x" else 10))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(FuncFormatter(_written))
+
+
+def _written(value: float, _position: int | None = None) -> str:
+    return f"{value:,.12g}"
 
 
 def save(figure: Figure, path: Path) -> Path:
@@ -80,16 +112,4 @@ def save(figure: Figure, path: Path) -> Path:
     with atomic(path) as temporary:
         # Without a date, the same dataset gives the same file.
         figure.savefig(temporary, dpi=200, metadata={"Date": None} if path.suffix == ".svg" else None)
-        if path.suffix == ".svg":
-            temporary.write_text(_numbered(temporary.read_text(encoding="utf-8")), encoding="utf-8")
     return path
-
-
-def _numbered(svg: str) -> str:
-    """Return ``svg`` with the names of its parts numbered: matplotlib makes them of sizes down to their last digit."""
-    numbers: dict[str, str] = {}
-
-    def number(name: re.Match[str]) -> str:
-        return numbers.setdefault(name[0], f"{name[0][0]}{len(numbers)}")
-
-    return _TAG.sub(lambda tag: _NAME.sub(number, tag[0]), svg)

@@ -10,8 +10,7 @@ import xarray as xr
 
 from pipeline.files import write_whole
 from pipeline.pages import joined, render_page
-from pipeline.report.figures import FIGURES, choose, figure
-from pipeline.report.figures.parts import parts
+from pipeline.report.figures import choose, describe, figure
 from pipeline.report.page.cases import FIRST_ROWS, case_table
 from pipeline.report.page.facts import facts, failures, provenance, reproduce, without_exact
 from pipeline.report.page.guideline import guide_section
@@ -20,8 +19,6 @@ from pipeline.report.page.skipped import origins, skipped, struck
 
 # What the answer says of times, and the headlines need not say again.
 _TOLD = "speed-ups"
-# Parts of the main figure, beside itself, that the page holds.
-_MOST_PARTS = 6
 _TEMPLATES = Path(__file__).parent / "templates"
 _SCRIPT = re.compile(r"'sha256-[A-Za-z0-9+/=]+'")
 
@@ -62,16 +59,5 @@ def _figures(dataset: xr.Dataset) -> list[dict[str, Any]]:
     for kind in choose(dataset):
         if kind != "nothing":
             svg, width = inline_svg(figure(dataset, kind, titled=False), kind)
-            caption = (FIGURES[kind].__doc__ or "").strip().rstrip(".")
-            left_out = [] if found else parts(dataset, kind)
-            drawn = [_part(kind, place, *part) for place, part in enumerate(left_out[:_MOST_PARTS], start=2)]
-            unseen = len(left_out) - len(drawn)
-            found.append(
-                {"kind": kind, "caption": caption, "svg": svg, "width": width, "parts": drawn, "unseen": unseen}
-            )
+            found.append({"kind": kind, "caption": describe(kind), "svg": svg, "width": width})
     return found
-
-
-def _part(kind: str, place: int, words: str, dataset: xr.Dataset) -> dict[str, Any]:
-    """Return a part of what a figure leaves out, as SVG, with what it shows."""
-    return {"caption": words, "svg": inline_svg(figure(dataset, kind, titled=False), f"{kind}-{place}")[0]}

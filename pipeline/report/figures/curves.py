@@ -1,0 +1,134 @@
+"""Curves of quantities against a swept dimension, in a grid of panels."""
+
+import textwrap
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pipeline.report.figures.facets import Facets, Selection, title_of
+from pipeline.report.figures.style import FAILED, LEGEND, WIDTH, log_scale, look, new_figure
+from pipeline.report.words import choices, heading, is_numeric, lengths, scale
+
+_HEIGHT = 2.0  # inches of a panel
+_BESIDE = 1.6  # inches: what a figure takes besides its panels, above and below them
+_LONG = 30.0  # values that span more than this have a logarithmic axis
+_WORD, _LINE, _TITLE = 14, 36, 34  # letters: of a word's line at an axis, of all words there, of a panel's title
+BARS = {"capsize": 2, "elinewidth": 0.8}
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One panel: its axes, the part of the dataset that it shows, its quantity, its column, its row of quantities."""
+
+    ax: Axes
+    data: xr.Dataset
+    quantity: str
+    column: int
+    row: int
+
+
+def grid(dataset: xr.Dataset, facets: Facets, quantities: Sequence[str]) -> tuple[Figure, list[Panel]]:
+    """Return a figure with a row of panels for each row of facets and each quantity."""
+    rows, columns = len(facets.rows) * len(quantities), len(facets.columns)
+    figure = new_figure(WIDTH * max(columns, 2) / 3 + LEGEND, _HEIGHT * rows + _BESIDE)
+    axes = figure.subplots(rows, columns, squeeze=False, sharex=True)
+    panels = []
+    for i, j, selection in facets.panels:
+        for k, quantity in enumerate(quantities):
+            ax = axes[i * len(quantities) + k, j]
+            panels.append(Panel(ax, dataset.sel(facets.at | selection), quantity, j, i))
+            if k == 0:
+                ax.set_title(textwrap.fill(title_of(dataset, selection), _TITLE))
+            if j == 0:
+                ax.set_ylabel(textwrap.fill(heading(dataset[quantity]), 26))
+    if facets.x:
+        for ax in axes[-1]:
+            ax.set_xlabel(heading(dataset[facets.x]))
+    return figure, panels
+
+
+def share(panels: Sequence[Panel], facets: Facets) -> None:
+    """Give panels of a quantity one scale: all or, where columns are kinds of outside, those of each column."""
+    by_column = any("outside" in column for column in facets.columns)
+    first: dict[tuple[str, int], Axes] = {}
+    for panel in panels:
+        key = panel.quantity, panel.column if by_column and panel.quantity != "speedup" else 0
+        if first.setdefault(key, panel.ax) is not panel.ax:
+            panel.ax.sharey(first[key])
+            panel.ax.autoscale_view()
+
+
+def draw(panel: Panel, facets: Facets, bar: str = "") -> None:
+    """Draw the curves of a panel, with bars of the relative errors in ``bar``, and crosses where cases failed."""
+    assert facets.x is not None
+    x = positions(panel.data[facets.x])
+    joins = is_numeric(panel.data[facets.x]) and len(x) > 1
+    factor = scale(panel.data[panel.quantity])[0]
+    for position, (curve, line) in enumerate(lines(panel.data, facets.curves)):
+        y = factor * line[panel.quantity].values.astype(float)
+        if not np.isfinite(y).any():
+            continue
+        style = look(position) | ({} if joins else {"linestyle": "none"})
+        label = choices(panel.data, curve) or None
+        beside = x if joins else x + 0.12 * (position - (len(facets.curves) - 1) / 2)
+        if bar:
+            panel.ax.errorbar(beside, y, np.nan_to_num(np.abs(y * line[bar].values)), label=label, **BARS, **style)
+        else:
+            panel.ax.plot(beside, y, label=label, **style)
+        failed = line["status"].values == "failed"
+        place = {"transform": panel.ax.get_xaxis_transform(), "zorder": 6}
+        panel.ax.plot(x[failed], np.full(failed.sum(), 0.04), "x", color=FAILED, **place)
+    write_ticks(panel.ax, panel.data[facets.x])
+
+
+def lines(data: xr.Dataset, curves: Sequence[Selection]) -> Iterator[tuple[Selection, xr.Dataset]]:
+    """Yield the selection and the data of each curve."""
+    for curve in curves:
+        yield curve, data.sel(curve)
+
+
+def positions(coordinate: xr.DataArray) -> np.ndarray:
+    """Return where the values of a dimension are on an axis: words in a row, full order a step past the largest."""
+    values = coordinate.values
+    if not is_numeric(coordinate):
+        return np.arange(len(values), dtype=float)
+    scaled = scale(coordinate)[0] * values.astype(float)
+    finite = scaled[np.isfinite(scaled)]
+    if not finite.size:
+        return np.zeros(len(values))
+    past = finite.max() * 1.3 if _is_long(finite) else finite.max() + 0.2 * max(np.ptp(finite), finite.max() / 3)
+    return np.where(np.isfinite(scaled), scaled, past)
+
+
+def write_ticks(ax: Axes, coordinate: xr.DataArray) -> None:
+    """Write words at an axis, or numbers, and "full" for the full order."""
+    x, values = positions(coordinate), coordinate.values
+    if not is_numeric(coordinate):
+        words = [lengths(coordinate, str(value)) for value in values]
+        texts = [textwrap.fill(text, _WORD) for text in words]
+        if sum(2 + max(map(len, text.splitlines())) for text in texts) < _LINE:
+            ax.set_xticks(x, texts)
+        else:
+            shown = [textwrap.shorten(text, 2 * _WORD, placeholder="…") for text in words]
+            ax.set_xticks(x, shown, rotation=30, ha="right", rotation_mode="anchor")
+        ax.set_xlim(-0.5, len(x) - 0.5)
+        return
+    finite = x[np.isfinite(values)]
+    if finite.size and _is_long(finite):
+        log_scale(ax, "x")
+    if finite.size == len(x):
+        return
+    ax.margins(x=0.05)
+    low, high = (finite.min(), finite.max()) if finite.size else (0.0, 0.0)
+    ticks = [tick for tick in ax.get_xticks() if low - 1e-9 <= tick <= high] if finite.size else []
+    full = x[~np.isfinite(values)][0]
+    ticks = [tick for tick in ticks if full - tick > 0.12 * (full - low)]
+    ax.set_xticks([*ticks, full], [*(f"{tick:g}" for tick in ticks), "full"])
+
+
+def _is_long(finite: np.ndarray) -> bool:
+    return bool(finite.min() > 0 and finite.max() > _LONG * finite.min())
