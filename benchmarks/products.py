@@ -50,8 +50,8 @@ def measure(size: tuple[float, float], degrees: list[int]) -> list[dict[str, Any
 
 
 def _row(space: Any, law: Any) -> dict[str, Any]:
-    from pipeline.solve.single.blocks import SymmetricProduct, UpperBlocks
-    from pipeline.solve.straight.product import library
+    from pipeline.solve.kernels.blocks import SymmetricProduct, UpperBlocks
+    from pipeline.solve.kernels.product import library
 
     library()
     with ExitStack() as stack:

@@ -6,16 +6,14 @@ from mpi4py import MPI
 
 from pipeline.plan.steps import Solve
 from pipeline.solve.axisymmetric import compile_axisymmetric
-from pipeline.solve.cache import compiling
+from pipeline.solve.compiled import compiling
 from pipeline.solve.forms import compile_elastic
+from pipeline.solve.kernels import native
 from pipeline.solve.large.forms import compile_neo_hookean
 from pipeline.solve.meridian_trials import TRIAL_DEGREE
 from pipeline.solve.mixed_forms import compile_mixed
 from pipeline.solve.regular import compile_regular
 from pipeline.solve.release import compile_release
-from pipeline.solve.single.code import compiles
-from pipeline.solve.straight import product
-from pipeline.solve.straight.pattern import library
 from pipeline.stages import stage
 
 # What the regular part of a Green's function takes, whatever the elements of the case.
@@ -27,16 +25,26 @@ _compiled: set[tuple[str, int, bool, bool]] = set()
 
 @stage("compiler")
 def prepare(comm: MPI.Comm, solves: Collection[Solve]) -> None:
-    """Compile what ``solves`` need and the cache does not have; collective."""
+    """Compile what ``solves`` need and the cache does not have; collective.
+
+    Raises:
+        CompilerError: on every rank, if no C compiler works here.
+    """
+    message = None
     if comm.rank == 0:
         needed = {_forms(solve) for solve in solves}
         needed |= {_REGULAR for solve in solves if solve.case.has_own_far_field}
         if missing := needed - _compiled:
-            with compiling():
-                for element, degree, of_regions, of_slit in sorted(missing):
-                    _compile(element, degree, of_regions=of_regions, of_slit=of_slit)
-            _compiled.update(missing)
-    comm.barrier()
+            try:
+                with compiling():
+                    native.library()
+                    for element, degree, of_regions, of_slit in sorted(missing):
+                        _compile(element, degree, of_regions=of_regions, of_slit=of_slit)
+                _compiled.update(missing)
+            except native.CompilerError as error:
+                message = str(error)
+    if message := comm.bcast(message):
+        raise native.CompilerError(message)
 
 
 def _forms(solve: Solve) -> tuple[str, int, bool, bool]:
@@ -58,9 +66,6 @@ def _compile(element: str, degree: int, *, of_regions: bool, of_slit: bool) -> N
     if element == _REGULAR[0]:
         compile_regular()
         return
-    library()
-    compiles()
-    product.compiles()
     compile_elastic(degree, straight=degree == 1, of_regions=of_regions)
     if element == "mixed":
         compile_mixed(degree)

@@ -28,7 +28,6 @@ from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.release import Front
 from pipeline.solve.solution import FieldProblem, Problem, Solution
 from pipeline.solve.spaces import Spaces
-from pipeline.solve.straight.product import compiles
 from pipeline.study.sweep import Case
 
 # Unknowns up to which a direct solve is a way out where iterations do not converge.
@@ -60,7 +59,7 @@ def problem_of(
 def memory_of(case: Case, dofs: int) -> tuple[float, float]:
     """Return the bytes that a solve of ``case`` with so many ``dofs`` takes, and its error bar."""
     degree, direct = case.mesh.degree, is_direct(case.solve.method, dofs, case.mesh.degree)
-    kind = {"mixed": case.element == "mixed", "matrices": not compiles(), "large": case.material.is_large}
+    kind = {"mixed": case.element == "mixed", "large": case.material.is_large}
     return (
         estimate.solving_memory(dofs, degree, direct=direct, **kind),
         estimate.enriched_memory(dofs, degree, **kind),

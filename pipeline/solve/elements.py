@@ -30,13 +30,13 @@ from pipeline.solve.conditions import Conditions
 from pipeline.solve.dead_loads import Applied
 from pipeline.solve.earlier import Earlier
 from pipeline.solve.enrich import energy_decrements
+from pipeline.solve.kernels.multigrid import takes_product
 from pipeline.solve.linear import Level, LinearSolver, SolveError, is_direct
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.material import MaterialLaw, SplitLaw
 from pipeline.solve.mixed_space import MixedSpace
 from pipeline.solve.release import Front, Release
 from pipeline.solve.saddle import Saddle, SaddleSolver
-from pipeline.solve.single.cycle import takes_product
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.vectors import global_sum, vector
 from pipeline.stages import Times, recharge, recorded, stage

@@ -19,10 +19,10 @@ from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import distribute
 from pipeline.mesh.generate import MeshArrays
 from pipeline.solve.compiled import cellwise_space, form, vector_space
+from pipeline.solve.kernels import assembles, has_kernel
+from pipeline.solve.kernels.curved import quadrature_degree
+from pipeline.solve.kernels.stiffness import cell_kernel
 from pipeline.solve.material import MaterialLaw
-from pipeline.solve.straight import assembles, has_kernel
-from pipeline.solve.straight.curved import quadrature_degree
-from pipeline.solve.straight.stiffness import cell_kernel
 
 # Marks of cells, and the bulge of an edge, in units of its length, that rounding may leave.
 _NEITHER, _STRAIGHT, _CURVED = 0, 1, 2
@@ -66,17 +66,17 @@ class ElasticForms:
     @cached_property
     def stiffness(self) -> Any:
         """K."""
-        return self._form("stiffness", ufl.TrialFunction(self._space), dx(self._space), self._kernels())
+        return self._form(ufl.TrialFunction(self._space), dx(self._space), self._kernels())
 
     @cached_property
     def curved_stiffness(self) -> Any:
         """The part of K from cells with curved edges: the same code, but no other cell is marked for it."""
-        return self._form("stiffness", ufl.TrialFunction(self._space), dx(self._space, curved_only=True))
+        return self._form(ufl.TrialFunction(self._space), dx(self._space, curved_only=True))
 
     @cached_property
     def action(self) -> Any:
         """K u."""
-        return self._form("action", self.displacement, dx(self._space))
+        return self._form(self.displacement, dx(self._space))
 
     def _kernels(self) -> dict[int, int]:
         """Return a kernel for the straight cells, which takes a twelfth of the time of the generated one."""
@@ -86,11 +86,10 @@ class ElasticForms:
         kernel = cell_kernel(degree, of_regions=self._regions is not None)
         return {compat.EVERYWHERE if curved_cells(mesh) is None else _STRAIGHT: kernel}
 
-    def _form(self, name: str, u: Any, measure: Any, kernels: dict[int, int] | None = None) -> Any:
+    def _form(self, u: Any, measure: Any, kernels: dict[int, int] | None = None) -> Any:
         v, (lame_lambda, lame_mu) = ufl.TestFunction(self._space), self.lame
         energy = lame_lambda * ufl.div(u) * ufl.div(v) + 2 * lame_mu * ufl.inner(strain(u), strain(v))
-        name = name if self._regions is None else f"{name} of regions"
-        return form(energy * measure, form_name(name, self._space), kernels)
+        return form(energy * measure, kernels)
 
 
 def dx(space: Any, *, curved_only: bool = False, more: int = 0) -> Any:
@@ -107,12 +106,6 @@ def dx(space: Any, *, curved_only: bool = False, more: int = 0) -> Any:
     marks = np.where(curved, _CURVED, _NEITHER if curved_only else _STRAIGHT)
     measure = ufl.Measure("dx", domain=mesh, subdomain_data=compat.cell_tags(mesh, marks))
     return measure(_STRAIGHT, metadata=exact) + measure(_CURVED, metadata=enough)
-
-
-def form_name(name: str, *spaces: Any) -> str:
-    """Return a name for a form with the measure of :func:`dx`: its code depends on elements and coordinates alone."""
-    mesh = spaces[0].mesh
-    return " ".join([name, *(repr(s.ufl_element()) for s in spaces), f"{compat.geometry_dofs(mesh).shape[1]} nodes"])
 
 
 def curved_cells(mesh: Any) -> BoolArray | None:
@@ -149,12 +142,7 @@ def mean_strain_form(space: Any, displacement: Any) -> tuple[Any, Any]:
     test = ufl.TestFunction(tensors)
     measure = dx(space)
     one = ufl.as_tensor(np.ones((3, 3)).tolist())
-    integrands = (ufl.inner(strain(displacement), test), ufl.inner(one, test))
-    integral, volume = (
-        form(integrand * measure, form_name(name, space, tensors))
-        for name, integrand in zip(("mean strain", "volume"), integrands, strict=True)
-    )
-    return integral, volume
+    return form(ufl.inner(strain(displacement), test) * measure), form(ufl.inner(one, test) * measure)
 
 
 def compile_elastic(degree: int, *, straight: bool, of_regions: bool) -> None:

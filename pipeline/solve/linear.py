@@ -16,10 +16,10 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.arrays import FloatArray
-from pipeline.solve.single.blocks import SymmetricOperator, SymmetricProduct, UpperBlocks
-from pipeline.solve.single.cycle import SingleCycle, SmoothedLevel, suits
-from pipeline.solve.single.interpolation import interpolation, masks
-from pipeline.solve.straight.product import is_product
+from pipeline.solve.kernels.blocks import SymmetricOperator, SymmetricProduct, UpperBlocks
+from pipeline.solve.kernels.interpolation import interpolation, masks
+from pipeline.solve.kernels.multigrid import SingleCycle, SmoothedLevel, suits
+from pipeline.solve.kernels.product import is_product
 from pipeline.solve.transfer import transfer
 from pipeline.stages import stage
 

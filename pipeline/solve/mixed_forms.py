@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from pipeline.mesh.distribute import distribute
 from pipeline.solve.compiled import form, scalar_space, vector_space
-from pipeline.solve.forms import dx, form_name, one_cell
+from pipeline.solve.forms import dx, one_cell
 
 
 class MixedForms:
@@ -48,25 +48,23 @@ class MixedForms:
     @cached_property
     def dilation(self) -> Any:
         """B u, a vector on pressures."""
-        return self._form("dilation", ufl.TestFunction(self._pressures) * ufl.div(self._displacement))
+        return self._form(ufl.TestFunction(self._pressures) * ufl.div(self._displacement))
 
     @cached_property
     def pull(self) -> Any:
         """Bᵀ p, a vector on displacements."""
-        return self._form("pull", self.pressure * ufl.div(ufl.TestFunction(self._displacement.function_space)))
+        return self._form(self.pressure * ufl.div(ufl.TestFunction(self._displacement.function_space)))
 
     def _mass(self, *, curved_only: bool) -> Any:
         p, q = ufl.TrialFunction(self._pressures), ufl.TestFunction(self._pressures)
-        return self._form("mass", p * q, curved_only=curved_only)
+        return self._form(p * q, curved_only=curved_only)
 
     def _coupling(self, *, curved_only: bool) -> Any:
         u, q = ufl.TrialFunction(self._displacement.function_space), ufl.TestFunction(self._pressures)
-        return self._form("coupling", q * ufl.div(u), curved_only=curved_only)
+        return self._form(q * ufl.div(u), curved_only=curved_only)
 
-    def _form(self, name: str, integrand: Any, *, curved_only: bool = False) -> Any:
-        space = self._displacement.function_space
-        name = form_name(name, space, self._pressures)
-        return form(integrand * dx(space, curved_only=curved_only), name)
+    def _form(self, integrand: Any, *, curved_only: bool = False) -> Any:
+        return form(integrand * dx(self._displacement.function_space, curved_only=curved_only))
 
 
 def compile_mixed(degree: int) -> None:

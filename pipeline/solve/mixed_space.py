@@ -9,7 +9,6 @@ from functools import cached_property
 
 import numpy as np
 from dolfinx.fem import petsc as fem_petsc
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline import compat
@@ -17,14 +16,14 @@ from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.conditions import whole_points
 from pipeline.solve.forms import curved_cells, has_curved_cells
+from pipeline.solve.kernels import assembles
+from pipeline.solve.kernels import coupling as straight
+from pipeline.solve.kernels.pressure import CellPressures, Coupling, Mass
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.mixed_forms import MixedForms
 from pipeline.solve.region_space import region_wise_space
 from pipeline.solve.saddle import Pair
 from pipeline.solve.spaces import ElasticSpace
-from pipeline.solve.straight import assembles, pressure
-from pipeline.solve.straight import mixed as straight
-from pipeline.solve.straight.pressure import CellPressures, Coupling, Mass
 from pipeline.solve.vectors import add_from_ghosts, fill, vector
 from pipeline.stages import stage
 
@@ -126,9 +125,8 @@ class MixedSpace:
 
     def _lay_out(self) -> CellPressures | None:
         """Return what multiplies with M and B cell by cell, None where nothing does; collective."""
-        works = self.comm.allreduce(pressure.compiles(), op=MPI.LAND)
         operators = self.displacements.operators
-        return CellPressures(self.pressures, operators.cells) if operators.multiplies and works else None
+        return CellPressures(self.pressures, operators.cells) if operators.multiplies else None
 
     def _unit(self) -> float:
         if self._products is not None:

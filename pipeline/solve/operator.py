@@ -5,18 +5,16 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Any, Protocol
 
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.arrays import FloatArray, Int32Array
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.forms import ElasticForms, curved_cells, has_curved_cells
+from pipeline.solve.kernels import assembles, product
+from pipeline.solve.kernels.product import CellOperator, CellStiffness
+from pipeline.solve.kernels.stiffness import StraightStiffness
 from pipeline.solve.material import MaterialLaw
-from pipeline.solve.single.cycle import takes_product
-from pipeline.solve.straight import assembles, product
-from pipeline.solve.straight.product import CellOperator, CellStiffness
-from pipeline.solve.straight.stiffness import StraightStiffness
 from pipeline.stages import stage
 
 _SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
@@ -87,10 +85,9 @@ class Operators:
 
     @property
     def multiplies(self) -> bool:
-        """Tell whether :meth:`lend_product` can: where C can be compiled; collective."""
+        """Tell whether :meth:`lend_product` can."""
         degree = compat.degree(self._space.space)
-        can = assembles(self._space.space) and degree in product.DEGREES and product.compiles() and takes_product([])
-        return bool(self._space.body.comm.allreduce(can, op=MPI.LAND))
+        return assembles(self._space.space) and degree in product.DEGREES
 
     @contextmanager
     def lend_product(self, law: MaterialLaw) -> Iterator[tuple[PETSc.Mat, float]]:

@@ -42,7 +42,7 @@ _prefixes = itertools.count()
 class Saddle:
     """The blocks: ``levels`` end with K₀, ``coupling`` is B, with columns of zeros for prescribed displacements.
 
-    For a direct solve all have entries; else these may be products, as of :mod:`pipeline.solve.straight.pressure`.
+    For a direct solve all have entries; else these may be products, as of :mod:`pipeline.solve.kernels.pressure`.
 
     ``stiffness`` is λ₀ + 2μ in units of the pressure, one number or one for each pressure of this rank; ``degree`` is
     that of the pressure.

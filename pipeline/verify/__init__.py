@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     """Yield every comparison as it is made, the same on every rank; ``quick`` leaves a few of each kind; collective."""
-    from pipeline.solve.cache import compiling  # noqa: PLC0415 (the folder's face loads no solver)
+    from pipeline.solve.compiled import compiling  # noqa: PLC0415 (the folder's face loads no solver)
     from pipeline.verify.bodies import body_rows  # noqa: PLC0415
     from pipeline.verify.closure import closure_rows  # noqa: PLC0415
     from pipeline.verify.compliance import compliance_rows  # noqa: PLC0415

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.mesh.meridian import Grading, Meridian, generate_meridian
 from pipeline.solve.axisymmetric import MeridianProblem, compile_axisymmetric
-from pipeline.solve.cache import compiling
+from pipeline.solve.compiled import compiling
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads, Motion

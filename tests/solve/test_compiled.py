@@ -11,15 +11,11 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from pipeline import compat
-from pipeline.solve.cache import compiling, form_cache
-from pipeline.solve.compiled import form, scalar_space, vector_space
-from pipeline.solve.conditions import Conditions
-from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Spaces
-from pipeline.solve.straight import arrays, product
-from pipeline.solve.straight.stiffness import cell_kernel
+from pipeline.solve.compiled import compiling, form, form_cache, scalar_space, vector_space
+from pipeline.solve.kernels import arrays
+from pipeline.solve.kernels.stiffness import cell_kernel
 from tests.cases import force
-from tests.solve.test_mixed import PRESS, law, make_mesh
+from tests.solve.test_mixed import make_mesh
 
 _EVERY_MODULE = """
 import importlib, pkgutil, sys
@@ -124,20 +120,6 @@ def test_without_the_arrays_of_petsc_dolfinx_assembles(changes, monkeypatch):
     wanted = force(MPI.COMM_WORLD, **changes)
     monkeypatch.setattr(arrays, "available", lambda: False)
     assert force(MPI.COMM_WORLD, **changes) == pytest.approx(wanted, rel=1e-9)
-
-
-@pytest.mark.mpi
-def test_without_products_ranks_multiply_what_they_assemble(monkeypatch):
-    """Where C with vectors does not compile."""
-    wanted = iterated()
-    monkeypatch.setattr(product, "compiles", lambda: False)
-    assert iterated() == pytest.approx(wanted, rel=1e-8)
-
-
-def iterated():
-    """Return the force on a small body, all ranks at it."""
-    with Spaces(make_mesh(MPI.COMM_WORLD)) as spaces, QuasiStaticProblem(spaces, 2, Conditions()) as problem:
-        return problem.solve(law(0.3), PRESS, method="iterative").reaction[2]
 
 
 def test_the_arrays_of_petsc_are_tried_before_they_are_relied_on(monkeypatch):

@@ -10,13 +10,14 @@ from pipeline.run.meshing import mesh_case
 from pipeline.scene.model import FIXED
 from pipeline.solve.compiled import vector_space
 from pipeline.solve.forms import ElasticForms
+from pipeline.solve.kernels import multigrid
 from pipeline.solve.large.forms import NeoHookeanForms
 from pipeline.solve.large.newton import LargeError
 from pipeline.solve.large.problem import LargeProblem
 from pipeline.solve.material import MaterialLaw
-from pipeline.solve.single import cycle
 from pipeline.study.problems import StudyError
 from tests.cases import BLADE, force, solve, study
+from tests.solve.test_mixed import make_mesh
 
 LARGE = {"law": "neo-hookean"}
 SKIN = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.4}
@@ -83,9 +84,9 @@ def test_a_preconditioner_that_is_not_definite_is_mended(monkeypatch):
     """It is set up on a guess of the largest eigenvalue, which a few slender elements make too small."""
     changes = {"material": LARGE, "solve": {"method": "iterative"}}
     known = force(**changes)
-    monkeypatch.setattr(cycle, "_LANCZOS", 1)
+    monkeypatch.setattr(multigrid, "_LANCZOS", 1)
     assert force(**changes) == pytest.approx(known, rel=1e-8)
-    monkeypatch.setattr(cycle.SingleCycle, "look_closer", lambda self: None)
+    monkeypatch.setattr(multigrid.SingleCycle, "look_closer", lambda self: None)
     (record,) = solve(**changes).values()
     assert record.status == "failed"
 
@@ -138,3 +139,17 @@ def test_a_force_that_is_not_the_derivative_of_the_energy_is_refused(monkeypatch
     with pytest.raises(LargeError, match="not the derivative"):
         problem._check(wrong, law)
     problem._check(wrong * (1e-5, 1e-5, 1e-10), law)  # of so little energy rounding takes more away
+
+
+def test_a_second_law_on_the_same_space_has_forms_of_its_own():
+    class Stiffer(NeoHookeanForms):
+        @property
+        def _energy(self):
+            return 3 * super()._energy
+
+    space = vector_space(make_mesh(mesh={"degree": 1, "fine": "8 mm", "rim": "3 mm"}).mesh, 1)
+    linear = ElasticForms(space)
+    linear.displacement.interpolate(lambda x: 0.1 * x[::-1])
+    first, second = (fem.assemble_scalar(law(space, linear).energy) for law in (NeoHookeanForms, Stiffer))
+    assert second == pytest.approx(3 * first, rel=1e-12)
+    assert first > 0

@@ -15,7 +15,7 @@ from pipeline.scene.model import PROBE
 from pipeline.shapes.rounded import Rounded
 from pipeline.solve import meridian_signs
 from pipeline.solve.axisymmetric import MeridianProblem, compile_axisymmetric
-from pipeline.solve.cache import compiling
+from pipeline.solve.compiled import compiling
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads

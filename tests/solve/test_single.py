@@ -5,11 +5,11 @@ import pytest
 from mpi4py import MPI
 
 from pipeline.solve.conditions import Conditions
+from pipeline.solve.kernels import multigrid
 from pipeline.solve.linear import Level, LinearSolver, SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.single import code, cycle
 from pipeline.solve.spaces import Spaces
 from tests.solve.test_mixed import PRESS, law, make_mesh
 
@@ -22,25 +22,6 @@ def solved(kind, degree, material, loads=PRESS, **options):
         return problem.solve(material, loads, method="iterative", estimate=True, **options)
 
 
-@pytest.mark.parametrize(
-    ("kind", "degree", "poisson"),
-    [
-        ("displacement", 2, 0.3),
-        ("displacement", 2, 0.49),
-        ("displacement", 3, 0.3),
-        ("mixed", 2, 0.5),
-        ("mixed", 3, 0.47),
-    ],
-)
-def test_force_and_iterations_are_those_of_double_precision(kind, degree, poisson, monkeypatch):
-    single = solved(kind, degree, law(poisson))
-    monkeypatch.setattr(cycle, "available", lambda: False)
-    double = solved(kind, degree, law(poisson))
-    assert single.reaction[2] == pytest.approx(double.reaction[2], rel=1e-9)
-    assert single.bar == pytest.approx(double.bar, rel=0.02)
-    assert single.iterations <= 1.2 * double.iterations + 1
-
-
 def test_a_tolerance_below_that_of_a_float_is_met():
     exact, found = (solved("displacement", 2, law(0.3), tolerance=tolerance) for tolerance in (1e-12, 1e-6))
     assert exact.balance < 1e-9
@@ -50,11 +31,11 @@ def test_a_tolerance_below_that_of_a_float_is_met():
 def test_a_smoother_that_took_its_largest_eigenvalue_for_too_small_looks_closer(monkeypatch):
     """As a few slender elements make it do, of which a few steps from noise tell nothing."""
     known = solved("displacement", 2, law(0.3))
-    monkeypatch.setattr(cycle, "_LANCZOS", 1)
+    monkeypatch.setattr(multigrid, "_LANCZOS", 1)
     found = solved("displacement", 2, law(0.3))
     assert found.reaction[2] == pytest.approx(known.reaction[2], rel=1e-8)
     assert found.bar == pytest.approx(known.bar, rel=0.02)
-    monkeypatch.setattr(cycle.SingleCycle, "look_closer", lambda self: None)
+    monkeypatch.setattr(multigrid.SingleCycle, "look_closer", lambda self: None)
     with pytest.raises(SolveError, match="indefinite"):
         solved("displacement", 2, law(0.3))
 
@@ -110,16 +91,6 @@ def test_what_a_bound_is_made_of_is_linear_to_the_last_digit():
             result.axpy(factor, total)
         solver.precondition(y, total)
         assert result.norm() < 1e-13 * 1e6 * total.norm()
-
-
-def test_without_a_compiler_petsc_s_own_cycle_serves(monkeypatch):
-    wanted = solved("displacement", 2, law(0.3))
-    monkeypatch.setattr(code, "library", lambda: (_ for _ in ()).throw(RuntimeError("no compiler")))
-    code.compiles.cache_clear()
-    try:
-        assert solved("displacement", 2, law(0.3)).reaction[2] == pytest.approx(wanted.reaction[2], rel=1e-9)
-    finally:
-        code.compiles.cache_clear()
 
 
 def test_an_operator_that_is_not_positive_is_refused():

@@ -13,10 +13,10 @@ from pipeline.mesh.generate import MeshArrays
 from pipeline.solve import forms, operator
 from pipeline.solve.compiled import vector_space
 from pipeline.solve.conditions import Conditions
+from pipeline.solve.kernels.pattern import pattern
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import ElasticSpace, Spaces
-from pipeline.solve.straight.pattern import pattern
 from pipeline.solve.vectors import vector
 from tests.solve.test_mixed import PRESS, law, make_mesh
 from tests.solve.test_regions import SKIN

@@ -19,9 +19,9 @@ from pipeline.solve.contact.displacement import DisplacementElements
 from pipeline.solve.contact.levels import hold, mask, normal_dofs
 from pipeline.solve.contact.mixed import MixedElements
 from pipeline.solve.enrich import energy_decrements
+from pipeline.solve.kernels.multigrid import suits, takes_product
 from pipeline.solve.linear import LinearSolver
 from pipeline.solve.material import MaterialLaw
-from pipeline.solve.single.cycle import suits, takes_product
 from pipeline.solve.spaces import Spaces
 from pipeline.solve.vectors import vector
 from pipeline.stages import stage

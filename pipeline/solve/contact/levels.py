@@ -8,11 +8,11 @@ from petsc4py import PETSc
 
 from pipeline.arrays import BoolArray, Int32Array
 from pipeline.solve.contact.candidates import CONDITIONS, Numbering, Surface
+from pipeline.solve.kernels.multigrid import suits
+from pipeline.solve.kernels.product import is_product
 from pipeline.solve.linear import Level
 from pipeline.solve.material import MaterialLaw
-from pipeline.solve.single.cycle import suits
 from pipeline.solve.spaces import ElasticSpace, Spaces
-from pipeline.solve.straight.product import is_product
 
 _SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
 

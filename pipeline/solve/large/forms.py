@@ -19,7 +19,7 @@ from mpi4py import MPI
 from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve.compiled import cellwise_space, form, vector_space
-from pipeline.solve.forms import ElasticForms, dx, form_name, one_cell
+from pipeline.solve.forms import ElasticForms, dx, one_cell
 
 
 class NeoHookeanForms:
@@ -50,36 +50,32 @@ class NeoHookeanForms:
     @cached_property
     def energy(self) -> Any:
         """Stored energy; not a number where J < 0 anywhere."""
-        return form(self._energy, form_name("neo-Hookean energy", self._space))
+        return form(self._energy)
 
     @cached_property
     def residual(self) -> Any:
         """Nodal forces."""
-        return form(self._residual, form_name("neo-Hookean residual", self._space))
+        return form(self._residual)
 
     @cached_property
     def tangent(self) -> Any:
         """Derivative K of the nodal forces."""
         tangent = ufl.derivative(self._residual, self._displacement, ufl.TrialFunction(self._space))
-        return form(tangent, form_name("neo-Hookean tangent", self._space))
+        return form(tangent)
 
     @cached_property
     def product(self) -> Any:
         """K w."""
         product = ufl.derivative(self._residual, self._displacement, self.direction)
-        return form(product, form_name("neo-Hookean product", self._space))
+        return form(product)
 
     @cached_property
     def _mean_gradient(self) -> tuple[Any, Any]:
         tensors = cellwise_space(self._space.mesh, (3, 3))
         test = ufl.TestFunction(tensors)
         ones = ufl.as_tensor(np.ones((3, 3)).tolist())
-        integrands = {"mean gradient": ufl.grad(self._displacement), "volume": ones}
-        gradient, volume = (
-            form(ufl.inner(what, test) * dx(self._space), form_name(name, self._space, tensors))
-            for name, what in integrands.items()
-        )
-        return gradient, volume
+        gradient = form(ufl.inner(ufl.grad(self._displacement), test) * dx(self._space))
+        return gradient, form(ufl.inner(ones, test) * dx(self._space))
 
     def principal_strains(self, body: BodyMesh) -> FloatArray:
         """Return the principal stretches, less 1, of the mean of F over each owned cell, (cells, 3); collective."""

@@ -4,36 +4,15 @@ At each point of the quadrature a cell has the gradient of its map; ``curved.c``
 by side.
 """
 
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pipeline import compat
 from pipeline.arrays import FloatArray, Int32Array
-from pipeline.solve.straight.lanes import LANES, Lanes
-from pipeline.solve.straight.native import Library
-from pipeline.solve.straight.pattern import reference
-
-_PRODUCT = """
-void {name}(int points, int quadrature, int batches, const int* dofs, const {type}* maps, const {type}* lame,
-            const {type}* signs, const {type}* gradients, const {type}* x, {type}* y);
-"""
-_DECLARATIONS = """
-void map_curved(int count, int width, int quadrature, const double* nodes, const double* gradients,
-                const double* weights, double* maps, double* roots);
-void add_curved_diagonal(int points, int quadrature, int batches, const int* dofs, const double* maps,
-                         const double* lame, const double* signs, const double* gradients, float* diagonal);
-""" + "".join(
-    _PRODUCT.format(name=name, type=kind) for name, kind in (("add_curved", "float"), ("add_curved_double", "double"))
-)
-
-
-@cache
-def library() -> Library:
-    """Return the functions of ``curved.c``, compiled if they are not yet."""
-    return Library(Path(__file__).with_name("curved.c"), _DECLARATIONS)
+from pipeline.solve.kernels.lanes import LANES, Lanes
+from pipeline.solve.kernels.native import call
+from pipeline.solve.kernels.pattern import reference
 
 
 def quadrature_degree(degree: int) -> int:
@@ -60,7 +39,7 @@ class CurvedCells:
         nodes = space.mesh.geometry.x[compat.geometry_dofs(space.mesh)[which]]
         self.roots = np.zeros((self.lanes.batches, len(weights), LANES))
         maps = np.zeros((self.lanes.batches, len(weights), 9, LANES))
-        library()("map_curved", len(which), nodes.shape[1], len(weights), nodes, _by_points(of_geometry), weights,
+        call("map_curved", len(which), nodes.shape[1], len(weights), nodes, _by_points(of_geometry), weights,
                   maps, self.roots)  # fmt: skip
         self.maps = _in_both(maps)
         self.signs = _in_both(np.sign(weights))  # not all weights are positive
@@ -78,13 +57,13 @@ class CurvedCells:
     def add_product(self, lame: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:
         """Add A x to ``y``, all in one precision; ``lame`` is of the lanes, what is prescribed is as any other."""
         end, kind = "_double" if x.dtype == np.float64 else "", x.dtype.name
-        library()(f"add_curved{end}", *self.sizes, self.lanes.dofs, self.maps[kind], lame, self.signs[kind],
+        call(f"add_curved{end}", *self.sizes, self.lanes.dofs, self.maps[kind], lame, self.signs[kind],
                   self.gradients[kind], x, y)  # fmt: skip
 
     def add_diagonal(self, lame: FloatArray, blocks: np.ndarray) -> None:
         """Add the blocks on the diagonal to ``blocks`` (local, 9)."""
         kind = "float64"
-        library()("add_curved_diagonal", *self.sizes, self.lanes.dofs, self.maps[kind], lame, self.signs[kind],
+        call("add_curved_diagonal", *self.sizes, self.lanes.dofs, self.maps[kind], lame, self.signs[kind],
                   self.gradients[kind], blocks)  # fmt: skip
 
     @property

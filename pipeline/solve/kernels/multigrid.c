@@ -3,6 +3,9 @@
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
+#include <stdint.h>
+
+#include "kernels.h"
 
 /* The upper blocks of a matrix of all blocks, by columns, whose columns ascend. */
 void take_upper(int rows, const int* offsets, const int* columns, const double* blocks, const int* upper_offsets,

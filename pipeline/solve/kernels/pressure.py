@@ -1,12 +1,10 @@
 """What pressures take part in, ∫ p q and ∫ q div u, as products cell by cell (``pressure.c``): contexts for PETSc.
 
 On several ranks each multiplies with its own cells; what others' points have is read first, and what they get added
-last, as :class:`~pipeline.solve.straight.product.CellOperator` does. All of it is collective.
+last, as :class:`~pipeline.solve.kernels.product.CellOperator` does. All of it is collective.
 """
 
 from copy import copy
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,46 +12,10 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.arrays import FloatArray, Int32Array
+from pipeline.solve.kernels.native import call
+from pipeline.solve.kernels.pattern import corners, owned_cells, reference
+from pipeline.solve.kernels.product import CellStiffness, bernstein
 from pipeline.solve.parcels import Shared, ghosts_of
-from pipeline.solve.straight import native
-from pipeline.solve.straight.native import Library
-from pipeline.solve.straight.pattern import corners, owned_cells, reference
-from pipeline.solve.straight.product import CellStiffness, bernstein
-
-_COUPLING = """
-void {name}(int points, int count, int batches, const int* dofs, const int* pressures, const double* maps,
-            const double* roots, const int* first, const int* column, const double* weight, const int* first_back,
-            const int* column_back, const double* weight_back, const int* raised, const double* mass, const double* x,
-            double* y);
-"""
-_CURVED_COUPLING = """
-void {name}(int points, int count, int quadrature, int batches, const int* dofs, const int* pressures,
-            const double* maps, const double* roots, const double* signs, const double* gradients,
-            const double* values, const double* x, double* y);
-"""
-_DECLARATIONS = """
-void add_mass(int count, int batches, const int* pressures, const double* roots, const double* mass, const double* x,
-              double* y);
-void add_curved_mass(int count, int quadrature, int batches, const int* pressures, const double* roots,
-                     const double* signs, const double* values, const double* x, double* y);
-""" + "".join(
-    text.format(name=name)
-    for text, names in ((_COUPLING, ("add_dilation", "add_pull")),
-                        (_CURVED_COUPLING, ("add_curved_dilation", "add_curved_pull")))
-    for name in names
-)  # fmt: skip
-
-
-@cache
-def library() -> Library:
-    """Return the functions of ``pressure.c``, compiled if they are not yet."""
-    return Library(Path(__file__).with_name("pressure.c"), _DECLARATIONS)
-
-
-@cache
-def compiles() -> bool:
-    """Tell whether they can be compiled here."""
-    return native.compiles(library)
 
 
 class CellPressures:
@@ -120,10 +82,10 @@ class CellPressures:
         """Return M x for owned pressures."""
         given, found, curved = _extended(x, self.shared, 1), np.zeros(self.local), self.cells.curved
         count, batches = len(self._mass), self.cells.lanes.batches
-        library()("add_mass", count, batches, self._dofs, self._roots, self._mass, given, found)
+        call("add_mass", count, batches, self._dofs, self._roots, self._mass, given, found)
         if curved is not None:
             _, quadrature, batches = curved.sizes
-            library()("add_curved_mass", count, quadrature, batches, self._bent, curved.roots, curved.signs["float64"],
+            call("add_curved_mass", count, quadrature, batches, self._bent, curved.roots, curved.signs["float64"],
                       self._values, given, found)  # fmt: skip
         return self.unit**2 * _folded(found, self.points, self.shared, 1)
 
@@ -133,14 +95,14 @@ class CellPressures:
         table, pressures = bernstein(cells.degree, kind), bernstein(self.degree, kind).transform
         there, back = (table.transform, pressures) if which == "dilation" else (pressures, table.transform)
         points, count = cells.lanes.dofs.shape[1], len(self._mass)
-        library()(
+        call(
             f"add_{which}", points, count, cells.lanes.batches, cells.lanes.dofs, self._dofs, cells.maps[kind],
             self._roots, there.first, there.column, there.weight, back.first_back, back.column_back, back.weight_back,
             table.raised, self._coupled, x, y,
         )  # fmt: skip
         if (curved := cells.curved) is not None:
             _, quadrature, batches = curved.sizes
-            library()(
+            call(
                 f"add_curved_{which}", points, count, quadrature, batches, curved.lanes.dofs, self._bent,
                 curved.maps[kind], curved.roots, curved.signs[kind], curved.gradients[kind], self._values, x, y,
             )  # fmt: skip

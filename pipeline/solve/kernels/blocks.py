@@ -8,9 +8,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline.arrays import Int32Array
-from pipeline.solve.single.beyond import beyond
-from pipeline.solve.single.code import Single, library
-from pipeline.solve.straight.arrays import blocks_to_read
+from pipeline.solve.kernels.arrays import blocks_to_read
+from pipeline.solve.kernels.beyond import beyond
+from pipeline.solve.kernels.native import Single, call
 
 
 class SymmetricOperator(Protocol):
@@ -50,13 +50,13 @@ class UpperBlocks:
         self._offsets = np.concatenate([[0], np.cumsum(upper)]).astype(np.int32)
         self._columns = np.empty(self._offsets[-1], dtype=np.int32)
         self._values = np.empty((self._offsets[-1], 9), dtype=np.float32)
-        library()("take_upper", self.rows, offsets, columns, inside.values, self._offsets, self._columns, self._values)
-        self._beyond = beyond(matrix, np.float32, partial(library(), "multiply_beyond"))
+        call("take_upper", self.rows, offsets, columns, inside.values, self._offsets, self._columns, self._values)
+        self._beyond = beyond(matrix, np.float32, partial(call, "multiply_beyond"))
 
     def multiply(self, x: Single, y: Single) -> None:
         """Write A x into ``y``; collective."""
         begun = self._beyond and self._beyond.begin(x)
-        library()("multiply", self.rows, self._offsets, self._offsets, self._columns, self._values, x, y)
+        call("multiply", self.rows, self._offsets, self._offsets, self._columns, self._values, x, y)
         if self._beyond and begun:
             self._beyond.add(begun, y)
 
@@ -75,7 +75,7 @@ class SymmetricProduct:
         """Refer to the entries of a matrix, in blocks, which must live as long; collective."""
         inside, _, _ = blocks_to_read(matrix)
         self._offsets, self._columns, self._blocks = inside.offsets, inside.columns, inside.values
-        self._beyond = beyond(matrix, np.float64, partial(library(), "multiply_beyond_double"))
+        self._beyond = beyond(matrix, np.float64, partial(call, "multiply_beyond_double"))
         rows = np.repeat(np.arange(len(self._offsets) - 1, dtype=np.int32), np.diff(self._offsets))
         self._diagonal = np.flatnonzero(self._columns == rows).astype(np.int32)
 
@@ -83,7 +83,7 @@ class SymmetricProduct:
         """Write A x into ``y``."""
         given, result = x.array_r, y.array_w
         begun = self._beyond and self._beyond.begin(given)
-        library()("multiply_double", len(self._diagonal), self._diagonal, self._offsets, self._columns, self._blocks,
+        call("multiply_double", len(self._diagonal), self._diagonal, self._offsets, self._columns, self._blocks,
                   given, result)  # fmt: skip
         if self._beyond and begun:
             self._beyond.add(begun, result)

@@ -15,6 +15,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "kernels.h"
+
 enum { MOST_PAIRS = 630 }; /* the 35 points of degree 4 */
 
 /* Fill `places`, (cells, height, width): the number of the entry that each pair of points of a cell has in a matrix.

@@ -7,6 +7,9 @@
 
 #include <stddef.h>
 #include <string.h>
+#include <stdint.h>
+
+#include "kernels.h"
 
 enum { LANES = 16, WIDTH = 8, MOST_POINTS = 35, MOST_PRESSURES = 20 }; /* of degree 4, and of 3 */
 
@@ -43,7 +46,7 @@ static inline __attribute__((always_inline)) void transform(
     }
 }
 
-static inline void multiply(int count, const double* restrict mass, const doubles* restrict from, doubles* restrict to)
+static inline void apply_mass(int count, const double* restrict mass, const doubles* restrict from, doubles* restrict to)
 {
   for (int b = 0; b < count; ++b)
   {
@@ -84,7 +87,7 @@ void add_dilation(int points, int count, int batches, const int* dofs, const int
           sum += (c[up[a + 1]][r] - c[up[0]][r]) * K[3 * a + r];
       p[b] = root * sum;
     }
-    multiply(count, mass, p, d);
+    apply_mass(count, mass, p, d);
     transform(count, 1, first_back, column_back, weight_back, d, p);
     add(count, 1, pressures + batch * count * LANES + begin, p, y);
   END
@@ -104,7 +107,7 @@ void add_pull(int points, int count, int batches, const int* dofs, const int* pr
     memcpy(&root, roots + LANES * batch + begin, sizeof root);
     load(count, 1, pressures + batch * count * LANES + begin, x, p);
     transform(count, 1, first, column, weight, p, d);
-    multiply(count, mass, d, p);
+    apply_mass(count, mass, d, p);
     memset(c, 0, 3 * points * sizeof c[0][0]);
     for (int b = 0; b < count; ++b)
     {
@@ -131,7 +134,7 @@ void add_mass(int count, int batches, const int* pressures, const double* roots,
     doubles p[MOST_PRESSURES], d[MOST_PRESSURES], root;
     memcpy(&root, roots + LANES * batch + begin, sizeof root);
     load(count, 1, pressures + batch * count * LANES + begin, x, p);
-    multiply(count, mass, p, d);
+    apply_mass(count, mass, p, d);
     for (int b = 0; b < count; ++b)
       d[b] *= root * root;
     add(count, 1, pressures + batch * count * LANES + begin, d, y);

@@ -9,55 +9,24 @@ from copy import copy
 from dataclasses import dataclass
 from functools import cache
 from math import factorial, prod
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
+from pipeline.solve.kernels.curved import CurvedCells
+from pipeline.solve.kernels.lanes import LANES, Lanes
+from pipeline.solve.kernels.native import Single, call
+from pipeline.solve.kernels.pattern import corners, owned_cells, reference, straight_cells
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.parcels import ghosts_of
-from pipeline.solve.straight import native
-from pipeline.solve.straight.curved import CurvedCells
-from pipeline.solve.straight.curved import library as curved_library
-from pipeline.solve.straight.lanes import LANES, Lanes
-from pipeline.solve.straight.native import Library
-from pipeline.solve.straight.pattern import corners, owned_cells, reference, straight_cells
-
-Single = npt.NDArray[np.float32]
 
 DEGREES = (2, 3, 4)
 # What takes points to coefficients is sparse but for rounding.
 _NOTHING = 1e-12
-
-_PRODUCT = """
-void {name}(int degree, int batches, const int* dofs, const {type}* maps, const {type}* lame, const int* first,
-            const int* column, const {type}* weight, const int* first_back, const int* column_back,
-            const {type}* weight_back, const int* raised, const {type}* mass, const {type}* x, {type}* y);
-"""
-_DECLARATIONS = """
-void map_cells(int count, const int* which, const double* corners, double* maps);
-void add_diagonal(int count, int points, const int* dofs, const double* maps, const double* lame, const double* S,
-                  float* diagonal);
-""" + "".join(
-    _PRODUCT.format(name=name, type=kind) for name, kind in (("add_product", "float"), ("add_product_double", "double"))
-)
-
-
-@cache
-def library() -> Library:
-    """Return the functions of ``product.c``, compiled if they are not yet."""
-    return Library(Path(__file__).with_name("product.c"), _DECLARATIONS)
-
-
-@cache
-def compiles() -> bool:
-    """Tell whether C with vectors can be compiled here."""
-    return native.compiles(library) and native.compiles(curved_library)
 
 
 @dataclass(frozen=True)
@@ -117,7 +86,7 @@ class CellStiffness:
         dofs, self._regions = owned_cells(space), regions
         self.lanes = Lanes(straight_cells(curved, len(dofs)), dofs)
         maps = np.zeros((self.lanes.batches, 9, LANES))
-        library()("map_cells", len(self.lanes.which), self.lanes.which, corners(space.mesh), maps)
+        call("map_cells", len(self.lanes.which), self.lanes.which, corners(space.mesh), maps)
         self.maps: dict[str, np.ndarray] = {"float64": maps, "float32": maps.astype(np.float32)}
         bent = np.empty(0) if curved is None else np.flatnonzero(curved[: len(dofs)])
         self.curved = CurvedCells(space, bent.astype(np.int32), dofs) if len(bent) else None
@@ -138,7 +107,7 @@ class CellStiffness:
         kind = x.dtype.name
         end, table = "_double" if kind == "float64" else "", bernstein(self.degree, kind)
         by = table.transform
-        library()(
+        call(
             f"add_product{end}", self.degree, self.lanes.batches, self.lanes.dofs, self.maps[kind], lame[0], by.first,
             by.column, by.weight, by.first_back, by.column_back, by.weight_back, table.raised, table.mass, x, y,
         )  # fmt: skip
@@ -150,7 +119,7 @@ class CellStiffness:
         blocks = np.zeros((self.local, 9), dtype=np.float32)
         weights, _, gradients = reference(self.degree, 2 * self.degree - 2)
         tensors = np.einsum("q,aqi,bqi->abi", weights, gradients, gradients)
-        library()("add_diagonal", len(self.lanes.which), self.lanes.dofs.shape[1], self.lanes.dofs,
+        call("add_diagonal", len(self.lanes.which), self.lanes.dofs.shape[1], self.lanes.dofs,
                   self.maps["float64"], lame[0], np.ascontiguousarray(tensors), blocks)  # fmt: skip
         if self.curved is not None:
             self.curved.add_diagonal(lame[1], blocks)

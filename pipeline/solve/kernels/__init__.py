@@ -1,6 +1,6 @@
 """Operators cell by cell. Without curved edges, as most are, they need no quadrature, and every entry knows its place.
 
-``kernels.c`` has the formulas. They take a sixth of the time of dolfinx's general kernels and PETSc's insertion, entry
+``assembly.c`` has the formulas. They take a sixth of the time of dolfinx's general kernels and PETSc's insertion, entry
 by entry (docs/solvers.md). On several ranks each adds its own cells; what they add to rows of others is sent there.
 dolfinx assembles the curved cells of matrices, and everything where this PETSc does not lend the arrays of its
 matrices; for products (``product.py``, ``curved.py``) nothing is assembled.
@@ -12,7 +12,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline import compat
-from pipeline.solve.straight import arrays
+from pipeline.solve.kernels import arrays
 
 DEGREES = (1, 2, 3, 4)
 

@@ -7,8 +7,8 @@ import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from pipeline.solve.kernels.arrays import blocks_to_read
 from pipeline.solve.parcels import Shared
-from pipeline.solve.straight.arrays import blocks_to_read
 
 
 class Beyond:

@@ -15,12 +15,12 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline.arrays import Int32Array
-from pipeline.solve.single.beyond import summed
-from pipeline.solve.single.blocks import SymmetricOperator
-from pipeline.solve.single.code import Single, compiles, library
-from pipeline.solve.single.interpolation import Interpolation
-from pipeline.solve.straight.arrays import available
-from pipeline.solve.straight.product import is_product
+from pipeline.solve.kernels.arrays import available
+from pipeline.solve.kernels.beyond import summed
+from pipeline.solve.kernels.blocks import SymmetricOperator
+from pipeline.solve.kernels.interpolation import Interpolation
+from pipeline.solve.kernels.native import Single, call
+from pipeline.solve.kernels.product import is_product
 
 # Chebyshev's iteration: steps, the share of the spectrum that is left to the coarser level, and by how much the
 # largest eigenvalue that so many of Lanczos' steps find is raised. Measured: docs/solvers.md.
@@ -35,19 +35,15 @@ _BLOCKED = ("seqbaij", "mpibaij")
 
 
 def suits(matrices: list[PETSc.Mat]) -> bool:
-    """Tell whether a cycle over operators of degrees 1, 2, … can be made: where C can be compiled; collective."""
+    """Tell whether a cycle over operators of degrees 1, 2, … can be made."""
     return len(matrices) > 1 and takes_product(matrices)
 
 
 def takes_product(matrices: list[PETSc.Mat]) -> bool:
-    """Tell whether a cycle could be made over these operators and one of the next degree, maybe without entries.
-
-    Collective.
-    """
+    """Tell whether a cycle could be made over these operators and one of the next degree, maybe without entries."""
     if not all(matrix.getType() in _BLOCKED or is_product(matrix) for matrix in matrices[1:]):
         return False
-    works = available() and compiles()
-    return bool(summed(matrices[0].comm.tompi4py(), works, MPI.MIN)) if matrices else works
+    return available()
 
 
 class SmoothedLevel:
@@ -62,7 +58,7 @@ class SmoothedLevel:
         self._operator, self._comm, rows = operator, operator.comm, operator.rows
         self._rows, self._blocks = rows, operator.diagonal()
         self._inverse = np.empty((rows, 9), dtype=np.float32)
-        singular = library()("invert_diagonal", rows, np.arange(rows, dtype=np.int32), self._blocks, self._inverse)
+        singular = call("invert_diagonal", rows, np.arange(rows, dtype=np.int32), self._blocks, self._inverse)
         if summed(self._comm, singular):
             raise ArithmeticError("the operator is not positive definite")
         self.size, self._held = 3 * rows, np.empty(0, dtype=np.int32)
@@ -100,7 +96,7 @@ class SmoothedLevel:
     def subtract_product(self, x: Single, r: Single) -> None:
         """Take A x away from ``r``."""
         self._multiply(x)
-        library()("subtract", self.size, self._product, r)
+        call("subtract", self.size, self._product, r)
 
     def smooth(self, x: Single, r: Single) -> Single:
         """Improve ``x``, of which ``r`` is the residual, by Chebyshev's iteration.
@@ -110,11 +106,11 @@ class SmoothedLevel:
         theta, delta = (1 + _LEFT) * self._most / 2, (1 - _LEFT) * self._most / 2
         d, rho = self._direction, delta / theta
         d[:] = 0.0
-        library()("advance", self._rows, self._inverse, 0.0, 1 / theta, r, d, x)
+        call("advance", self._rows, self._inverse, 0.0, 1 / theta, r, d, x)
         for _ in range(_STEPS - 1):
             self.subtract_product(d, r)
             previous, rho = rho, 1 / (2 * theta / delta - rho)
-            library()("advance", self._rows, self._inverse, rho * previous, 2 * rho / delta, r, d, x)
+            call("advance", self._rows, self._inverse, rho * previous, 2 * rho / delta, r, d, x)
         return d
 
     def _multiply(self, x: Single) -> None:
@@ -132,7 +128,7 @@ class SmoothedLevel:
         previous = step = 0.0
         for _ in range(steps):
             z[:] = 0.0
-            library()("advance", self._rows, self._inverse, 0.0, 1.0, r, self._direction, z)
+            call("advance", self._rows, self._inverse, 0.0, 1.0, r, self._direction, z)
             rz = self._dot(r, z)
             ratio = rz / previous if previous else 0.0
             p *= ratio
@@ -144,12 +140,12 @@ class SmoothedLevel:
             if not isfinite(diagonal[-1]):
                 raise ArithmeticError("moduli or sizes leave the range of single precision")
             self._product *= step
-            library()("subtract", self.size, self._product, r)
+            call("subtract", self.size, self._product, r)
             previous = rz
         return float(np.linalg.eigvalsh(np.diag(diagonal) + np.diag(beside[1:], 1) + np.diag(beside[1:], -1))[-1])
 
     def _dot(self, x: Single, y: Single) -> float:
-        return summed(self._comm, library()("dot", self.size, x, y))
+        return summed(self._comm, call("dot", self.size, x, y))
 
 
 class SingleCycle:
@@ -186,10 +182,10 @@ class SingleCycle:
     def apply(self, _: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Write one cycle's correction for ``residual`` into ``result``; collective."""
         top, given = len(self._levels), residual.array_r
-        scale = summed(self._comm, library()("largest", len(given), given), MPI.MAX)
-        library()("to_single", len(given), 1 / scale if scale else 0.0, given, self._r[top])
+        scale = summed(self._comm, call("largest", len(given), given), MPI.MAX)
+        call("to_single", len(given), 1 / scale if scale else 0.0, given, self._r[top])
         self._cycle(top)
-        library()("to_double", len(self._x[top]), scale, self._x[top], result.array_w)
+        call("to_double", len(self._x[top]), scale, self._x[top], result.array_w)
 
     def destroy(self, _: PETSc.PC) -> None:
         """Free the vectors of the coarsest level."""
@@ -216,6 +212,6 @@ class SingleCycle:
 
     def _solve_coarsest(self, x: Single, r: Single) -> None:
         solution, rhs = self._bottom
-        library()("to_double", len(r), 1.0, r, rhs.array_w)
+        call("to_double", len(r), 1.0, r, rhs.array_w)
         self._coarse.apply(rhs, solution)
         x[:] = solution.array_r

@@ -11,9 +11,10 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, IntArray
-from pipeline.solve.straight.arrays import set_local_numbers
-from pipeline.solve.straight.pattern import corners, library, reference, straight_cells
-from pipeline.solve.straight.rows import Rows, rows
+from pipeline.solve.kernels.arrays import set_local_numbers
+from pipeline.solve.kernels.native import call
+from pipeline.solve.kernels.pattern import corners, reference, straight_cells
+from pipeline.solve.kernels.rows import Rows, rows
 
 
 def mass(pressures: Any, curved: BoolArray | None) -> PETSc.Mat:
@@ -39,7 +40,7 @@ def _matrix(
     _, terms, size = factors.shape
     which = straight_cells(curved, len(found.places))
     values = np.zeros((found.inside.count + found.rest, size))
-    library()(
+    call(
         "add_products", len(which), which, tensors[0].size, terms, size, np.ascontiguousarray(factors), tensors,
         found.places, values,
     )  # fmt: skip

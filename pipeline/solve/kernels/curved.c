@@ -6,6 +6,9 @@
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
+#include <stdint.h>
+
+#include "kernels.h"
 
 enum { LANES = 16, MOST_POINTS = 35 }; /* of degree 4 */
 

@@ -12,8 +12,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from pipeline.arrays import FloatArray, Int32Array, IntArray
+from pipeline.solve.kernels.pattern import Pattern, pattern
 from pipeline.solve.parcels import Parcels, owners
-from pipeline.solve.straight.pattern import Pattern, pattern
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,9 @@
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
+#include <stdint.h>
+
+#include "kernels.h"
 
 enum { LANES = 16, MOST_POINTS = 35, MOST_COEFFICIENTS = 20 }; /* of degree 4, and of its gradient */
 

@@ -1,8 +1,6 @@
 """Which entries an operator has, and which of them each cell adds to."""
 
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import basix
@@ -11,32 +9,7 @@ import scipy.sparse as sp
 
 from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
-from pipeline.solve.straight.native import Library
-
-_DECLARATIONS = """
-void find_entries(int rows, int height, int width, const int* dofs, const int* offsets, const int* columns,
-                  const int* first_visit, const int* visits, int* entry, int* places);
-void add_stiffness(int count, const int* which, int points, const double* corners, const int* dofs, const int* places,
-                   const double* S, const double* free, const int* region, const double* lambda, const double* mu,
-                   int inside, double* blocks, double* rest);
-void add_products(int count, const int* which, int pairs, int terms, int size, const double* factors, const double* R,
-                  const int* places, double* values);
-extern const double *tensors_1, *tensors_2, *tensors_3, *tensors_4;
-void kernel_1(double* A, const double* w, const double* c, const double* x, const int* l, const uint8_t* p);
-void kernel_2(double* A, const double* w, const double* c, const double* x, const int* l, const uint8_t* p);
-void kernel_3(double* A, const double* w, const double* c, const double* x, const int* l, const uint8_t* p);
-void kernel_4(double* A, const double* w, const double* c, const double* x, const int* l, const uint8_t* p);
-void regions_1(double* A, const double* w, const double* c, const double* x, const int* l, const uint8_t* p);
-void regions_2(double* A, const double* w, const double* c, const double* x, const int* l, const uint8_t* p);
-void regions_3(double* A, const double* w, const double* c, const double* x, const int* l, const uint8_t* p);
-void regions_4(double* A, const double* w, const double* c, const double* x, const int* l, const uint8_t* p);
-"""
-
-
-@cache
-def library() -> Library:
-    """Return the functions of ``kernels.c``, compiled if they are not yet."""
-    return Library(Path(__file__).with_name("kernels.c"), _DECLARATIONS)
+from pipeline.solve.kernels.native import call
 
 
 @dataclass(frozen=True)
@@ -61,7 +34,7 @@ def pattern(rows: Any, columns: Any) -> Pattern:
     visited.data = np.arange(row_dofs.size, dtype=np.int32)
     visits = visited.T.tocsr()
     places = np.empty((count, height, width), dtype=np.int32)
-    library()(
+    call(
         "find_entries", graph.shape[0], height, width, column_dofs, graph.indptr, graph.indices, visits.indptr,
         visits.data, np.empty(graph.shape[1], dtype=np.int32), places,
     )  # fmt: skip

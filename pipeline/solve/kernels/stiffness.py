@@ -8,10 +8,11 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
+from pipeline.solve.kernels.arrays import entries_of_parts, set_local_numbers, shared_matrix, sparse_matrix
+from pipeline.solve.kernels.native import address, call, point_at
+from pipeline.solve.kernels.pattern import corners, owned_cells, reference, straight_cells
+from pipeline.solve.kernels.rows import Part, rows
 from pipeline.solve.material import MaterialLaw
-from pipeline.solve.straight.arrays import entries_of_parts, set_local_numbers, shared_matrix, sparse_matrix
-from pipeline.solve.straight.pattern import corners, library, owned_cells, reference, straight_cells
-from pipeline.solve.straight.rows import Part, rows
 
 
 class StraightStiffness:
@@ -71,7 +72,7 @@ class StraightStiffness:
         # A law of one material holds for every region.
         regions = self._regions if len(law.lame_mu) > 1 else np.zeros_like(self._regions)
         rest = np.zeros((self._rows.rest, 9))
-        library()(
+        call(
             "add_stiffness", len(self._which), self._which, self._dofs.shape[1], self._corners, self._dofs,
             self._rows.places, self._tensors, self._free, regions, np.array(law.lame_lambda, dtype=float),
             np.array(law.lame_mu, dtype=float), self._rows.inside.count, blocks, rest,
@@ -115,8 +116,8 @@ def cell_kernel(degree: int, *, of_regions: bool) -> int:
 
     λ and μ are constants of the form, or, ``of_regions``, functions that are constant on each cell.
     """
-    library().set(f"tensors_{degree}", _reference_tensors(degree))
-    return library().address(f"regions_{degree}" if of_regions else f"kernel_{degree}")
+    point_at(f"tensors_{degree}", _reference_tensors(degree))
+    return address(f"regions_{degree}" if of_regions else f"kernel_{degree}")
 
 
 @cache

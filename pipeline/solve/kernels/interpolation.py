@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays import Int32Array
+from pipeline.solve.kernels.native import Single, call
 from pipeline.solve.parcels import Shared, ghosts_of
-from pipeline.solve.single.code import Single, library
 from pipeline.solve.transfer import Side, free, point_weights
 
 
@@ -29,13 +29,13 @@ class Interpolation:
         """Add the interpolation of ``coarse`` to ``fine``."""
         if self.shared is not None:
             coarse = self.shared.extend(coarse)
-        library()("prolong", len(self.offsets) - 1, self.offsets, self.points, self.weights, self.coarse_free,
+        call("prolong", len(self.offsets) - 1, self.offsets, self.points, self.weights, self.coarse_free,
                   self.fine_free, coarse, fine)  # fmt: skip
 
     def restrict(self, fine: Single, coarse: Single) -> None:
         """Write the transposed interpolation of ``fine`` into ``coarse``."""
         found = coarse if self.shared is None else np.empty(len(self.coarse_free), dtype=np.float32)
-        library()("restrict_to", len(self.offsets) - 1, self.offsets, self.points, self.weights, len(found),
+        call("restrict_to", len(self.offsets) - 1, self.offsets, self.points, self.weights, len(found),
                   self.coarse_free, self.fine_free, fine, found)  # fmt: skip
         if self.shared is not None:
             coarse[:] = 0.0

@@ -1,0 +1,94 @@
+"""The C code of this folder, compiled into one library for this machine when first needed.
+
+The compiler is the one that dolfinx compiles its forms with; the library is kept beside them.
+"""
+
+import hashlib
+import importlib.util
+import sysconfig
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import cffi
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.solve.compiled import form_cache, quiet_compiler
+
+# Vectors of the cycle, and what products take in single precision.
+Single = npt.NDArray[np.float32]
+
+_FLAGS = ("-O3", "-march=native", "-fvisibility=hidden")
+_FOLDER = Path(__file__).parent
+
+
+class CompilerError(Exception):
+    """No C compiler works here."""
+
+
+def call(name: str, *arguments: Any) -> Any:
+    """Call a function; arrays are passed as they are, and must be contiguous and of the declared type."""
+    module = library()
+    function = getattr(module.lib, name)
+    passed = [
+        module.ffi.from_buffer(f"{kind.item.cname}[]", value) if isinstance(value, np.ndarray) else value
+        for kind, value in zip(module.ffi.typeof(function).args, arguments, strict=True)
+    ]
+    return function(*passed)
+
+
+def address(name: str) -> int:
+    """Return where a function begins."""
+    module = library()
+    return int(module.ffi.cast("uintptr_t", module.ffi.addressof(module.lib, name)))
+
+
+def point_at(name: str, values: np.ndarray) -> None:
+    """Let a pointer of the library point at ``values``, which the caller keeps."""
+    module = library()
+    setattr(module.lib, name, module.ffi.from_buffer("double[]", values))
+
+
+@cache
+def library() -> Any:
+    """Return the compiled module, compiled now if the cache does not have it.
+
+    Raises:
+        CompilerError: if that fails.
+    """
+    header, sources = _FOLDER / "kernels.h", sorted(_FOLDER.glob("*.c"))
+    suffix = sysconfig.get_config_var("EXT_SUFFIX")
+    texts = [file.read_text() for file in (header, *sources)]
+    name = "epsmesh_" + hashlib.sha256("".join((*texts, suffix, *_FLAGS)).encode()).hexdigest()[:16]
+    path = form_cache() / f"{name}{suffix}"
+    if not path.exists():
+        _compile(name, path, header, sources)
+    specification = importlib.util.spec_from_file_location(name, path)
+    assert specification is not None and specification.loader is not None
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    return module
+
+
+def _compile(name: str, path: Path, header: Path, sources: list[Path]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    builder = cffi.FFI()
+    builder.cdef(header.read_text())
+    builder.set_source(
+        name,
+        '#include "kernels.h"',
+        sources=[str(source) for source in sources],
+        include_dirs=[str(_FOLDER)],
+        extra_compile_args=list(_FLAGS),
+    )
+    with TemporaryDirectory(dir=path.parent) as folder, quiet_compiler():  # others see nothing of it, or all
+        try:
+            made = Path(builder.compile(tmpdir=folder))
+        except Exception as error:  # distutils raises many kinds
+            raise CompilerError(
+                f"the C code of epsmesh does not compile ({error}): dolfinx needs a working C compiler, too; "
+                "install one, or set CC"
+            ) from error
+        made.replace(path)
