@@ -70,9 +70,10 @@ def mesh_key(case: Case) -> str:
 
 def operator_key(case: Case) -> str:
     """Key of the case's spaces and conditions on its mesh: all but the material's moduli, and the depth if contact is
-    found.
+    found, or if displacements are large.
     """
-    probe = text_of(case.probe, (*_UNPHYSICAL, "depth") if case.probe.is_unilateral else _UNPHYSICAL)
+    walks = case.probe.is_unilateral or case.material.is_large
+    probe = text_of(case.probe, (*_UNPHYSICAL, "depth") if walks else _UNPHYSICAL)
     law = [case.material.law] if case.material.is_large else []
     return digest("\n".join([mesh_key(case), probe, str(case.mesh.degree), case.element, *law]))
 

@@ -52,7 +52,7 @@ def problem_of(
             spaces, tool_of(case), case.element, degree=case.mesh.degree, reuse=reuse, condense=condense
         )
     if case.material.is_large:
-        return LargeProblem(spaces, case.mesh.degree, conditions_of(case))
+        return LargeProblem(spaces, case.mesh.degree, conditions_of(case), reuse=reuse)
     return QuasiStaticProblem(spaces, case.mesh.degree, conditions_of(case), case.element, shared=shared, reuse=reuse)
 
 

@@ -1,4 +1,4 @@
-"""In which order the depths of found contact are solved: each next to one that is known, or those with bars first."""
+"""In which order depths are solved: each next to one that is known, or those with bars first."""
 
 from collections.abc import Iterator
 
@@ -7,11 +7,11 @@ from pipeline.solve.contact.sweep import NEAR
 
 
 def in_order(step: OperatorStep, *, condensed: bool) -> Iterator[Solve]:
-    """Yield the solves of an operator, by material and depth where contact is found.
+    """Yield the solves of an operator, by material and depth where contact is found, or displacements are large.
 
     On a ``condensed`` surface a depth costs less than its error bar. Those come first of which others take theirs.
     """
-    if not step.case.probe.is_unilateral:
+    if not (step.case.probe.is_unilateral or step.case.material.is_large):
         yield from step.solves
         return
     for sweep in step.sweeps:

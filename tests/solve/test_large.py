@@ -1,5 +1,7 @@
 """Large displacements: neo-Hookean bodies are linear ones at small depths, and obey closed forms at any."""
 
+import re
+
 import numpy as np
 import pytest
 from dolfinx import fem
@@ -102,7 +104,39 @@ def test_every_depth_is_solved_and_none_is_another_s():
 def test_a_depth_that_is_not_reached_fails_and_says_where():
     (record,) = solve(material=LARGE, probe={"depth": "9 mm"}).values()
     assert record.status == "failed"
-    assert "stopped at a depth of" in record.message
+    assert "mm of 9 mm, where F is" in record.message
+
+
+def test_depths_of_a_sweep_share_one_walk(monkeypatch):
+    """Those that are reached have the forces of depths alone; those beyond the walk's end fail, and say where it is."""
+    depths = {"depth": ["9 mm", "0.4 mm", "8 mm", "0.8 mm"]}
+    ends: list[tuple[float, float]] = []
+    step = LargeProblem._step
+
+    def counted(self, *arguments):
+        *_, walk, _, depth = arguments
+        ends.append((walk.reached, depth))
+        return step(self, *arguments)
+
+    monkeypatch.setattr(LargeProblem, "_step", counted)
+    deep, first, far, second = solve(material=LARGE, probe=depths).values()
+    shared = len(ends)
+    assert [reached for reached, _ in ends] == sorted(reached for reached, _ in ends)
+    assert [record.status for record in (first, second, far, deep)] == ["ok", "ok", "failed", "failed"]
+    reached = re.search(r"reached ([0-9.]+) mm of 8 mm, where F is ([0-9.]+) N", far.message)
+    assert reached is not None
+    assert float(reached[1]) >= 0.8
+    assert float(reached[2]) >= 0.999 * second.force
+    assert f"reached {reached[1]} mm of 9 mm" in deep.message
+    ends.clear()
+    for record, depth in ((first, 0.4), (second, 0.8)):
+        (alone,) = solve(material=LARGE, probe={"depth": f"{depth} mm"}).values()
+        assert record.force == pytest.approx(alone.force, rel=1e-8)
+        assert record.force_error == pytest.approx(alone.force_error, rel=1e-2)  # of iterations
+        assert record.max_strain == pytest.approx(alone.max_strain, rel=1e-6)
+    (alone,) = solve(material=LARGE, probe={"depth": "9 mm"}).values()
+    assert shared < len(ends)
+    assert second.time_solve > first.time_solve  # of a case alone
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,8 @@ degree more give way at the probe's edge, where the tangent is not definite.
 """
 
 from contextlib import ExitStack
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ from pipeline.solve.error import error_bar
 from pipeline.solve.large.forms import NeoHookeanForms
 from pipeline.solve.large.newton import Equilibrium, LargeError, assemble, tangent_product
 from pipeline.solve.linear import Level, LinearSolver, is_direct
-from pipeline.solve.loads import Loads
+from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.reaction import Response, reaction, sums
@@ -35,7 +36,7 @@ from pipeline.solve.rim import plain_share
 from pipeline.solve.solution import BALANCE_LIMIT, TOLERANCE, Solution
 from pipeline.solve.strain import largest_of
 from pipeline.solve.vectors import vector
-from pipeline.stages import recorded, stage
+from pipeline.stages import Times, recharge, recorded, stage
 
 # The depth is reached in so many steps at least; smaller ones than this share of it are not tried.
 _FEWEST, _SMALLEST = 3, 1 / 50
@@ -48,8 +49,36 @@ _EASY = 4
 _WORK, _ROUNDING = 3e-4, 1e-13
 
 
+@dataclass
+class Walk:
+    """How far a ``motion`` of the probe has gone in a body of a ``law``.
+
+    ``path`` has depth (m), force (N) and energy (J) of each step, of the modelled part; ``displacement`` (owned dofs)
+    is that at the last one. ``times`` and ``iterations`` are what it took, and no depth begins with a step of more than
+    the last one, ``step`` (m).
+    """
+
+    law: MaterialLaw
+    motion: Motion
+    displacement: FloatArray
+    path: list[tuple[float, float, float]] = field(default_factory=lambda: [(0.0, 0.0, 0.0)])
+    step: float = inf
+    iterations: int = 0
+    times: list[Times] = field(default_factory=list)
+
+    @property
+    def reached(self) -> float:
+        """The depth (m) of the last step."""
+        return self.path[-1][0]
+
+
 class LargeProblem(QuasiStaticProblem):
-    """The spaces of a mesh, a degree and conditions, for neo-Hookean bodies of one material; a context manager."""
+    """The spaces of a mesh, a degree and conditions, for neo-Hookean bodies of one material; a context manager.
+
+    A depth begins where the one before ended, if that was no deeper: depths of a sweep share one walk.
+    """
+
+    _walk: Walk | None = None
 
     def solve(
         self, law: MaterialLaw, loads: Loads, *, method: str = "auto", tolerance: float = TOLERANCE,
@@ -76,7 +105,8 @@ class LargeProblem(QuasiStaticProblem):
             stack.callback(body.close)
             displacement, rate = (stack.enter_context(vector(fine.dofs.space)) for _ in range(2))
             with stage("solve"):
-                path = self._press(body, displacement, held, depth, law)
+                walk = self._begun(law, motion, depth)
+                path = self._press(body, displacement, held, depth, walk)
                 response = self._reaction_at(body, displacement, held, loads)
                 self._check(path, law)
                 fine.set_displacement(displacement)
@@ -86,7 +116,7 @@ class LargeProblem(QuasiStaticProblem):
                 max_strain=self._largest_strain(),
                 dofs=fine.dofs.whole_dofs,
                 cells=self._body.cells,
-                iterations=body.iterations,
+                iterations=walk.iterations,
                 times=times,
                 stored=whole * path[-1, 2],
             )
@@ -117,43 +147,64 @@ class LargeProblem(QuasiStaticProblem):
     def _largest_strain(self) -> float:
         return largest_of(self._forms.principal_strains(self._body), self._body, self._conditions.front)
 
-    def _press(
-        self, body: Equilibrium, displacement: PETSc.Vec, held: FloatArray, depth: float, law: MaterialLaw
-    ) -> FloatArray:
-        """Take ``displacement`` to that at ``depth``; return depth (m), force (N) and energy (J) of each step.
+    def _begun(self, law: MaterialLaw, motion: Motion, depth: float) -> Walk:
+        """Return the walk that leads to ``depth``: that of the last solve, or a new one. What it took is charged."""
+        walk = self._walk
+        if walk is None or (walk.law, walk.motion) != (law, motion) or walk.reached > depth:
+            walk = Walk(law, motion, np.zeros(self.elements.displacements.dofs.owned))
+        self._walk = walk if self._reuse else None
+        for times in walk.times:
+            recharge(times)
+        return walk
 
-        Force and energy are those of the modelled part. Each step begins along the tangent; one that Newton's method
-        cannot end is halved.
+    def _press(
+        self, body: Equilibrium, displacement: PETSc.Vec, held: FloatArray, depth: float, walk: Walk
+    ) -> FloatArray:
+        """Take ``displacement`` along a ``walk`` to ``depth``; return its path, depth, force and energy of each step.
+
+        Each step begins along the tangent; one that Newton's method cannot end is halved.
 
         Raises:
-            LargeError: if that gets too small.
+            LargeError: if that gets too small; the walk has come as far as it says.
         """
         fine = self.elements.displacements
         space, owned = fine.dofs.space, fine.dofs.owned
-        fine.forms.set_law(law)
-        path, step = [(0.0, 0.0, 0.0)], depth / _FEWEST
-        with vector(space) as unit, vector(space) as rate, vector(space) as trial, vector(space) as forces:
+        fine.forms.set_law(walk.law)
+        displacement.array[:] = walk.displacement
+        longest = depth / _FEWEST
+        step, before = min(walk.step, longest), body.iterations
+        with recorded() as times, ExitStack() as stack:
+            walk.times.append(times)
+            unit, rate, trial, forces = (stack.enter_context(vector(space)) for _ in range(4))
             unit.array[:] = held[:owned]
-            while (reached := path[-1][0]) < depth:
+            while (reached := walk.reached) < depth:
                 body.move(displacement, unit, rate)
-                step, steps = self._step(body, displacement, rate, trial, (reached, step, depth))
+                step, steps = self._step(body, displacement, rate, trial, walk, step, depth)
                 displacement.array[:] = trial.array
                 energy = body.energy(displacement)
                 body.forces(displacement, forces)
                 there = depth if step >= depth - reached else reached + step
-                path.append((there, self._work(forces, held), energy))
-                step = min(step * (2 if steps <= _EASY else 1), depth / _FEWEST)
-        return np.array(path)
+                walk.path.append((there, self._work(forces, held), energy))
+                walk.displacement[:] = displacement.array
+                walk.iterations, before = walk.iterations + body.iterations - before, body.iterations
+                walk.step = step = min(step * (2 if steps <= _EASY else 1), longest)
+        return np.array(walk.path)
 
     def _step(
-        self, body: Equilibrium, displacement: PETSc.Vec, rate: PETSc.Vec, trial: PETSc.Vec,
-        way: tuple[float, float, float],
-    ) -> tuple[float, int]:  # fmt: skip
-        """Write the equilibrium a step farther into ``trial``; return the step (m), and Newton's steps to it.
+        self,
+        body: Equilibrium,
+        displacement: PETSc.Vec,
+        rate: PETSc.Vec,
+        trial: PETSc.Vec,
+        walk: Walk,
+        step: float,
+        depth: float,
+    ) -> tuple[float, int]:
+        """Write the equilibrium a ``step`` (m) farther into ``trial``; return the step, and Newton's steps to it.
 
-        ``rate`` is the tangent at ``displacement``, for a metre; ``way`` how far it is, the step to try, the depth (m).
+        ``rate`` is the tangent at ``displacement``, for a metre; at ``depth`` (m) the ``walk`` ends.
         """
-        reached, step, depth = way
+        reached = walk.reached
         if step > (1 - _SLIVER) * (depth - reached):
             step = depth - reached  # not one more for what rounding leaves
         with vector(self.elements.displacements.dofs.space) as forces:
@@ -167,7 +218,17 @@ class LargeProblem(QuasiStaticProblem):
                 except LargeError as error:
                     step /= 2
                     if step < _SMALLEST * depth:
-                        raise LargeError(_stopped(reached, depth, error)) from error
+                        raise LargeError(self._stopped(walk, depth, error)) from error
+
+    def _stopped(self, walk: Walk, depth: float, why: LargeError) -> str:
+        """Return what to say of a walk that ends before ``depth`` (m)."""
+        reached, force, _ = walk.path[-1]
+        whole = 2.0 ** len(self._body.mirrored) * force
+        return (
+            f"reached {reached * 1e3:.3g} mm of {depth * 1e3:.3g} mm, where F is {whole:.4g} N; Newton's method "
+            f"stopped there ({why}): the tissue gives way, or elements at the probe's edge are squeezed to nothing; "
+            "use a smaller depth, or a larger rim"
+        )
 
     def _norm_on_held(self, forces: PETSc.Vec) -> float:
         on_held = forces.array[self.elements.displacements.dofs.prescribed_owned]
@@ -246,11 +307,3 @@ class LargeProblem(QuasiStaticProblem):
             raise LargeError("elements of one degree more turn tissue inside out, so that no error bar can be made")
         found, _, iterations = energy_decrements(solver, residuals)
         return found, iterations
-
-
-def _stopped(reached: float, depth: float, why: LargeError) -> str:
-    """Return what to say of a path that ends."""
-    return (
-        f"Newton's method stopped at a depth of {reached * 1e3:.3g} mm of {depth * 1e3:.3g} mm ({why}): the tissue "
-        "gives way there, or elements at the probe's edge are squeezed to nothing; use a smaller depth, or a larger rim"
-    )
