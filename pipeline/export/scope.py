@@ -10,6 +10,7 @@ from pipeline.shapes.probes.cone import Cone
 from pipeline.shapes.section import in_mm
 from pipeline.shapes.support import Faces
 from pipeline.shapes.tissue import Tissue
+from pipeline.study.capabilities import obstacle
 from pipeline.study.sweep import Case, Study
 
 # Poisson's ratios that a model holds at least, and at most: beyond, displacement elements lock.
@@ -102,14 +103,10 @@ def _refusal(case: Case, first: Case) -> str:
     body, probe = case.body, case.probe
     if body != first.body:
         return "a model is of one body, and the study has several: export a study of each"
-    if case.load.acts:
-        return "[load]: gravity and tractions have no real-time model yet"
-    if case.material.is_large:
-        return 'material.law = "neo-hookean" has no real-time model: its force is not in proportion to anything'
+    if reason := obstacle("real-time model", case):
+        return reason
     if case.poisson > _MOST:
         return f"material.poisson = {case.poisson:g} is too near to 0.5 for a real-time model: at most {_MOST}"
-    if key := _other_than_pressing(case):
-        return f"{key}: a model is of tools that press straight down, and neither slide nor turn nor cut"
     if isinstance(body, Layered):
         return _flat_refusal(case, first, body)
     if not body.is_smooth:
@@ -146,13 +143,3 @@ def _flat_refusal(case: Case, first: Case, body: Layered) -> str:
     if isinstance(probe, Cone) and probe.tip:
         return f"probe.tip = {in_mm(probe.tip)}: a rounded cone has no real-time model yet: a sharp one has"
     return "" if case.frame.is_upright else "probe.axis: a model is of tools that press straight down: leave it out"
-
-
-def _other_than_pressing(case: Case) -> str:
-    """Return the key, and its value, by which a tool does anything but press; "" if it only presses."""
-    probe = case.probe
-    if probe.slit is not None:
-        return f"probe.incision = {in_mm(probe.slit.depth)}"
-    if probe.motion == "all":
-        return 'probe.motion = "all"'
-    return "" if probe.action == "pierce" else f'probe.action = "{probe.action}"'

@@ -1,22 +1,14 @@
 """Which sweeps of Poisson's ratio a reduced basis answers, and why not the others."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 from pipeline.plan.key import digest
 from pipeline.plan.steps import OperatorStep
 from pipeline.plan.work import Plan, Struck, reason_of
-from pipeline.study.sweep import Case
+from pipeline.study.capabilities import obstacle
 
 # Fewer Poisson's ratios than this are solved one by one: a basis needs about five solutions itself.
 _FEWEST_RATIOS = 8
-# What a basis would have to know besides Poisson's ratio: more parameters, or solutions that do not add up.
-_OBSTACLES: dict[str, Callable[[Case], bool]] = {
-    "a body of several materials has more parameters than one": lambda case: bool(case.body.regions),
-    "the area of contact changes with Poisson's ratio": lambda case: case.probe.is_unilateral,
-    "the far field changes with Poisson's ratio": lambda case: case.is_closed,
-    "large displacements are not sums of others": lambda case: case.material.is_large,
-}
 
 
 def use_reduced_basis(plan: Plan) -> Plan:
@@ -24,7 +16,7 @@ def use_reduced_basis(plan: Plan) -> Plan:
     if not plan.shared:
         return plan
     operators = [operator for step in plan.meshes for operator in step.operators if _sweeps_ratios(operator)]
-    obstacles = [_obstacle(operator.case) for operator in operators]
+    obstacles = [obstacle("reduced basis", operator.case) for operator in operators]
     tolerance = plan.study.planning.tolerance
     many = {
         solve.key: digest(f"{solve.key} reduced {tolerance!r}")
@@ -39,16 +31,9 @@ def use_reduced_basis(plan: Plan) -> Plan:
     return plan.struck_by("reduced", len(many), reason_of(use_reduced_basis))
 
 
-def _obstacle(case: Case) -> str:
-    """Return why no basis answers a case that is solved for many materials; nothing if one does."""
-    return next((reason for reason, is_one in _OBSTACLES.items() if is_one(case)), "")
-
-
 def _sweeps_ratios(operator: OperatorStep) -> bool:
     """Tell whether an operator is solved for many materials, with displacement elements, whose operator depends on one
     parameter, and for one force: the bound is on the work of one movement, not on forces that several take.
-
-    In a slit more is asked for than the work, and loads do work of their own.
     """
     solve, case = operator.solves[0], operator.case
     ratios = {solve.key if case.body.regions else solve.case.material.poisson for solve in operator.solves}
@@ -57,7 +42,5 @@ def _sweeps_ratios(operator: OperatorStep) -> bool:
         and case.element == "displacement"
         and solve.goal is None
         and not solve.axisymmetric
-        and not case.load.acts
-        and case.probe.slit is None
         and case.movements == 1 + case.is_closed
     )

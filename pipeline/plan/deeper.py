@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 from pipeline.plan.key import case_key
 from pipeline.shapes.contact import is_level
+from pipeline.study.capabilities import obstacle
 from pipeline.study.sweep import Case
 
 
@@ -41,9 +42,10 @@ def _is_lifted_in_proportion(case: Case) -> bool:
     """
     probe = case.probe
     is_flat = probe.is_unilateral and probe.has_singular_edge and is_level(case.body, case.frame)
-    return is_flat and not case.load.acts and not case.material.is_large
+    return is_flat and not obstacle("proportional depths", case)
 
 
 def _stands_and_slides(case: Case) -> bool:
     """Tell whether tissue slides along a blade that stands in a slit."""
-    return case.probe.slit is not None and case.probe.contact == "frictionless" and not case.load.acts
+    stands = case.probe.slit is not None and case.probe.contact == "frictionless"
+    return stands and not obstacle("proportional depths", case)

@@ -15,6 +15,7 @@ from pipeline.plan.symmetry import body_planes, is_body_round
 from pipeline.shapes.body import Layered
 from pipeline.shapes.contact import is_level
 from pipeline.shapes.frame import Vector
+from pipeline.study.capabilities import obstacle
 from pipeline.study.sweep import Case
 
 # Places that differ by less than this, in units of the body, are the same; so are directions.
@@ -56,7 +57,7 @@ def image_key(case: Case, *, scaled: bool) -> tuple[str, Matrix] | None:
     ``scaled`` leaves out what F is proportional to. None where no images are looked for: on bodies without symmetry,
     of tools whose stiffness is asked for, and where loads act, which tell one side from the other.
     """
-    if case.probe.motion == "all" or case.load.acts:
+    if obstacle("images", case):
         return None
     found = max(_compared(case), key=lambda pair: pair[0], default=None)
     if found is None:
@@ -75,9 +76,9 @@ def moved_key(case: Case, *, scaled: bool) -> str:
     or loads are, and not one that the body's own far field closes, which knows where it stands.
     """
     body, frame = case.body, case.frame
-    if not case.is_truncated or case.has_own_far_field or case.load.acts or not isinstance(body, Layered):
+    if not case.is_truncated or not isinstance(body, Layered) or obstacle("equivalent places", case):
         return ""
-    if body.inclusion or not is_level(body, frame) or body.gap(frame.point) <= (1 + _SAME) * case.column:
+    if not is_level(body, frame) or body.gap(frame.point) <= (1 + _SAME) * case.column:
         return ""
     elsewhere = replace(case, probe=case.probe.model_copy(update={"at": NOWHERE}))
     return digest("\n".join([case_key(elsewhere, scaled=scaled), "moved"]))

@@ -10,6 +10,7 @@ from pipeline.plan.shard import Shard, take
 from pipeline.plan.steps import Solve
 from pipeline.plan.symmetry import is_round, model_planes
 from pipeline.plan.work import ABSENT, Plan, Struck
+from pipeline.study.capabilities import obstacle
 from pipeline.study.schema import Mesh, Solving
 from pipeline.study.sweep import Case, Study
 
@@ -90,7 +91,7 @@ def ask_for_exact(plan: Plan) -> Plan:
         if case.absence:
             keys.append(ABSENT)
             continue
-        if case.material.is_large:
+        if obstacle("F_exact", case):
             keys.append(ABSENT)
             large += 1
             continue

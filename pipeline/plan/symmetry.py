@@ -8,6 +8,7 @@ from itertools import pairwise
 
 from pipeline.shapes.body import Body
 from pipeline.shapes.probe import PLANES, Probe
+from pipeline.study.capabilities import obstacle
 from pipeline.study.sweep import Case
 
 _MANY = 200_000  # pairs of body and probe of a large study
@@ -38,7 +39,7 @@ def is_round(case: Case) -> bool:
     """
     body, probe, frame = case.body, case.probe, case.frame
     half_plane = body.half_plane()
-    if half_plane is None or probe.motion == "all" or case.is_closed or case.load.acts or case.material.is_large:
+    if half_plane is None or obstacle("meridian", case):
         return False
     upright = frame.is_upright and frame.point[:2] == _ON_AXIS and case.travel[:2] == _ON_AXIS
     is_same = probe.is_round and is_body_round(body)

@@ -12,20 +12,18 @@ from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe, is_direction
 from pipeline.shapes.section import Section, in_mm
+from pipeline.study.capabilities import check_features
 from pipeline.study.check_mesh import (
     check_chosen,
     check_column,
-    check_depth_range,
     check_epsilon,
     check_gap,
     check_locking,
     check_outside,
     check_reference,
     check_sizes,
-    check_straight,
 )
-from pipeline.study.closure import check_closure, check_far_field
-from pipeline.study.large import check_large
+from pipeline.study.closure import check_ball
 from pipeline.study.place import place_error
 from pipeline.study.problems import Problems
 from pipeline.study.regions import tissues_of
@@ -53,7 +51,6 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         with problems.about(probe=probe):
             if linear:
                 _check_depth(probe, problems)
-            _check_motion(probe, problems)
             probe.check(problems)
     for mesh in meshes:
         with problems.about(mesh=mesh):
@@ -62,7 +59,6 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     for mesh, probe in itertools.product(meshes, probes):
         with problems.about(mesh=mesh, probe=probe):
             check_epsilon(mesh, probe, problems)
-            check_depth_range(mesh, probe, problems)
     for body, mesh in itertools.product(bodies, meshes):
         with problems.about(body=body, mesh=mesh):
             body.support.check(body.heights, mesh.fine, problems)
@@ -72,17 +68,15 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     for (body, probe), mesh in itertools.product(placed, meshes):
         with problems.about(body=body, probe=probe, mesh=mesh):
             check_column(body, probe, mesh, problems)
-            check_closure(body, probe, mesh, problems)
+            check_ball(body, probe, mesh, problems)
             check_gap(body, probe, mesh, problems)
-            check_straight(body, probe, mesh, problems)
             check_slit_in(body, probe, mesh, problems)
-    check_large(bodies, materials, probes, meshes, problems)
-    _check_stiffness(bodies, materials, problems)
+    check_features(sections, placed, problems)
+    _check_materials(bodies, materials, problems)
     for body, material, mesh in itertools.product(bodies, linear, meshes):
         with problems.about(body=body, material=material, mesh=mesh):
             ratios = {f"{key}.poisson": tissue.poisson for key, tissue in tissues_of(body, material)}
             check_locking(ratios, mesh, problems)
-            check_far_field(material, mesh, problems)
     check_reference(meshes, axes, problems)
     for solve in cast(Sequence[Solving], sections["solve"]):
         if "repeats" in solve.model_fields_set and not solve.timing:
@@ -122,16 +116,32 @@ def _check_depth(probe: Probe, problems: Problems) -> None:
         )
 
 
-def _check_stiffness(bodies: Sequence[Body], materials: Sequence[Material], problems: Problems) -> None:
-    """Warn of moduli that no tissue has: an m may stand for an M."""
+def _check_materials(bodies: Sequence[Body], materials: Sequence[Material], problems: Problems) -> None:
+    """Refuse what a law is not computed for, and warn of moduli that no tissue has: an m may stand for an M."""
+    for material in materials:
+        with problems.about(material=material):
+            _check_law(material, problems)
     for body, material in itertools.product(bodies, materials):
         with problems.about(body=body, material=material):
             for key, tissue in tissues_of(body, material):
                 if tissue.young < _SOFTEST:
                     problems.warn(
-                        f"{key}.young", f"{tissue.young:g} Pa",
+                        f"{key}.young",
+                        f"{tissue.young:g} Pa",
                         "is softer than any tissue; mPa are thousandths of a pascal, MPa are millions",
-                    )  # fmt: skip
+                    )
+
+
+def _check_law(material: Material, problems: Problems) -> None:
+    """Refuse Poisson's ratios for which large strains are not computed."""
+    least, most = material.OF_LARGE
+    if material.is_large and not least <= material.poisson <= most:
+        problems.error(
+            "material.poisson",
+            material.poisson,
+            f'must be {least} to {most} with law = "neo-hookean": below, tissue gives way at the probe\'s edge, and '
+            "elements of displacements alone lock above",
+        )
 
 
 def _check_thickness(body: Body, probe: Probe, problems: Problems) -> bool:
@@ -150,14 +160,6 @@ def _check_thickness(body: Body, probe: Probe, problems: Problems) -> bool:
             f"{_LINEAR:.0%} linear elasticity is an extrapolation",
         )  # fmt: skip
     return True
-
-
-def _check_motion(probe: Probe, problems: Problems) -> None:
-    if probe.motion == "all" and probe.contact != "bonded":
-        problems.error(
-            "probe.motion", probe.motion,
-            f'a {probe.contact} probe holds the tissue in one direction only: use contact = "bonded"',
-        )  # fmt: skip
 
 
 def _has_place(probe: Probe, problems: Problems) -> bool:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import product
-from math import dist, isfinite
+from math import dist
 from typing import cast
 
 from pipeline.shapes.body import Body
@@ -13,7 +13,7 @@ from pipeline.shapes.section import Section, in_mm
 from pipeline.shapes.support import Faces, NamedFace
 from pipeline.study.loads import FREE, Cap, Load, Traction
 from pipeline.study.problems import Problems, nearest
-from pipeline.study.schema import Material, Mesh
+from pipeline.study.schema import Material
 from pipeline.study.sweep import Axis
 
 # A centre this far off the surface, in units of the cap's radius, is not taken for a place on it.
@@ -25,13 +25,12 @@ def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     loads = [load for load in cast(Sequence[Load], sections["load"]) if _makes_sense(load, problems)]
     acting = [load for load in loads if load.acts]
     bodies, probes = cast(Sequence[Body], sections["body"]), cast(Sequence[Probe], sections["probe"])
-    meshes, materials = cast(Sequence[Mesh], sections["mesh"]), cast(Sequence[Material], sections["material"])
+    materials = cast(Sequence[Material], sections["material"])
     for axis in axes:
         if axis.section == "load" and axis.piece and not axis.owner:
             problems.error(axis.path, None, "its sweep needs a name: give its table one")
     if not acting:
         return
-    _check_combinations(probes, meshes, materials, problems)
     if any(any(load.gravity) for load in acting):
         for body, material in product(bodies, materials):
             with problems.about(body=body, material=material):
@@ -49,25 +48,6 @@ def _check_traction(body: Body, probes: Sequence[Probe], traction: Traction, key
                 _check_beside(body, probe, traction.on, key, problems)
 
 
-def _check_combinations(
-    probes: Sequence[Probe], meshes: Sequence[Mesh], materials: Sequence[Material], problems: Problems
-) -> None:
-    """Report what is not computed together with loads."""
-    for probe in probes:
-        with problems.about(probe=probe):
-            _check_probe(probe, problems)
-    for mesh in meshes:
-        if mesh.outside != "coarse" and isfinite(mesh.epsilon):
-            problems.error(
-                "mesh.outside", mesh.outside, "loads act on the whole body, and a part of it would carry others: "
-                'use outside = "coarse"',
-            )  # fmt: skip
-    for material in materials:
-        # A law that is not linear takes loads and depth in steps, and nothing of it adds up.
-        if (law := getattr(material, "law", "linear")) != "linear":
-            problems.error("material.law", law, 'loads are computed with law = "linear" only: leave [load] out')
-
-
 def _makes_sense(load: Load, problems: Problems) -> bool:
     sane = True
     for number, traction in enumerate(load.traction, start=1):
@@ -78,19 +58,6 @@ def _makes_sense(load: Load, problems: Problems) -> bool:
             )  # fmt: skip
             sane = False
     return sane
-
-
-def _check_probe(probe: Probe, problems: Problems) -> None:
-    if probe.is_unilateral:
-        problems.error(
-            "probe.contact", probe.contact, "where a tool touches depends on how loads have bent the surface, which is "
-            'not computed: use "bonded" or "frictionless", or leave [load] out',
-        )  # fmt: skip
-    if probe.slit is not None:
-        problems.error(
-            "probe.incision", in_mm(probe.slit.depth), "what loads do to a slit is not computed: leave the incision, "
-            "or [load], out",
-        )  # fmt: skip
 
 
 def _check_densities(body: Body, material: Material, problems: Problems) -> None:

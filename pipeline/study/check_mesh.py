@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from math import isfinite, isinf
 
 from pipeline.shapes.body import Body
-from pipeline.shapes.contact import is_flat, is_level
+from pipeline.shapes.contact import is_level
 from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import ON_EDGE, Probe
@@ -20,7 +20,6 @@ _LOCKING = {1: (0.45, 0.45), 2: (0.49, 0.495), 3: (0.49, 0.495)}
 
 # Mixed elements keep λ = μ, which is ν = 0.25, with the displacement and give the rest to the pressure.
 _LEAST_MIXED = 0.25
-_FINDS_CONTACT = 2  # the degree of elements that find where a tool touches
 
 
 def check_sizes(mesh: Mesh, problems: Problems) -> None:
@@ -60,7 +59,7 @@ def held_gaps(body: Body, probe: Probe, mesh: Mesh) -> dict[str, float]:
 
 
 def check_column(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
-    """Refuse a column below a face that is none to stand a column under, and one that contact runs out of."""
+    """Refuse a column that contact runs out of."""
     frame = probe.frame_on(body)
     column = mesh.column(body.reach(frame))
     if mesh.outside == "free" and isinstance(probe, Indenter) and column <= (1 + ON_EDGE) * probe.half_length:
@@ -68,12 +67,6 @@ def check_column(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> No
             "mesh.epsilon", in_mm(mesh.epsilon),
             f"keeps a column that contact along the {probe.shape} runs out of: must be above half its length, "
             f'{in_mm(probe.half_length)}, or use outside = "coarse"',
-        )  # fmt: skip
-    elif not mesh.is_closed and isfinite(column) and not is_level(body, frame):
-        problems.error(
-            "mesh.outside", mesh.outside,
-            "a column is kept below a level face that the probe presses straight down on only: "
-            'use outside = "coarse" here',
         )  # fmt: skip
 
 
@@ -125,16 +118,6 @@ def check_epsilon(mesh: Mesh, probe: Probe, problems: Problems) -> None:
         )
 
 
-def check_depth_range(mesh: Mesh, probe: Probe, problems: Problems) -> None:
-    """Refuse one mesh for many depths whose sizes are chosen for the accuracy of each."""
-    if mesh.accuracy is not None and isinstance(probe, Indenter) and probe.depth_range:
-        problems.error(
-            "probe.depth_range", [in_mm(depth) for depth in probe.depth_range],
-            "is for meshes with sizes of your own: where an accuracy is asked for, each depth has one that is chosen "
-            "for it; leave one of the two out",
-        )  # fmt: skip
-
-
 def check_outside(body: Body, mesh: Mesh, problems: Problems) -> None:
     """Refuse a column that nothing holds."""
     if mesh.outside == "free" and not body.support.holds_column() and isfinite(mesh.epsilon):
@@ -146,25 +129,15 @@ def check_outside(body: Body, mesh: Mesh, problems: Problems) -> None:
         )
 
 
-def check_straight(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
-    """Refuse what elements of a degree cannot follow: no error bar tells how much tissue straight ones leave out."""
-    if probe.is_unilateral and mesh.degree != _FINDS_CONTACT:
-        problems.error(
-            "mesh.degree", mesh.degree, f"must be {_FINDS_CONTACT} where contact is unilateral: its edge falls between "
-            "elements of degree 1, and on those of degree 3 forces at nodes do not tell pressure from tension",
-        )  # fmt: skip
-    if mesh.degree > 1:
-        return
-    if body.inclusion:
-        problems.error("mesh.degree", mesh.degree, "is too low for inclusions, which straight elements cut: use 2 or 3")
-    elif not is_flat(body, probe, probe.frame_on(body)):
-        problems.error("mesh.degree", mesh.degree, "is too low for a curved surface, or a tilted probe: use 2 or 3")
-
-
 def check_locking(poissons: dict[str, float], mesh: Mesh, problems: Problems) -> None:
     """Check elements against Poisson's ratios, by key, of all the materials of a body."""
     if mesh.element_for(max(poissons.values())) == "mixed":
-        _check_mixed(max(poissons.values()), mesh, problems)
+        if max(poissons.values()) <= _LEAST_MIXED:
+            problems.error(
+                "mesh.element",
+                mesh.element,
+                f'mixed elements are for Poisson\'s ratios above {_LEAST_MIXED}; use "auto" or "displacement"',
+            )
         return
     visible, most = _LOCKING[mesh.degree]
     for key, poisson in poissons.items():
@@ -177,16 +150,6 @@ def check_locking(poissons: dict[str, float], mesh: Mesh, problems: Problems) ->
             problems.warn(
                 key, poisson, f"displacement elements of degree {mesh.degree} lock at this value: F comes out too high"
             )
-
-
-def _check_mixed(largest: float, mesh: Mesh, problems: Problems) -> None:
-    if mesh.degree == 1:
-        problems.error("mesh.element", mesh.element, "there is no stable mixed element of degree 1: use 2 or 3")
-    if largest <= _LEAST_MIXED:
-        problems.error(
-            "mesh.element", mesh.element, f"mixed elements are for Poisson's ratios above {_LEAST_MIXED}; "
-            'use "auto" or "displacement"',
-        )  # fmt: skip
 
 
 def check_reference(meshes: Sequence[Mesh], axes: tuple[Axis, ...], problems: Problems) -> None:

@@ -96,7 +96,7 @@ def test_tools_that_make_no_sense_are_refused(probe, words):
 
 
 def test_straight_elements_are_refused():
-    with pytest.raises(StudyError, match="unilateral"):
+    with pytest.raises(StudyError, match="where contact is found"):
         study(probe=SPHERE, mesh={"degree": 1})
 
 

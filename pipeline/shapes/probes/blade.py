@@ -148,12 +148,7 @@ class Blade(Punch):
         return within
 
     def check(self, problems: Problems) -> None:
-        """Report a slice, or an incision, that makes no sense, and a cut that tissue lifts off."""
-        if self.action == "cut" and self.is_unilateral:
-            problems.error(
-                "probe.contact", self.contact, "tissue does not lift off a blade that cuts: use contact = 'bonded' or "
-                "'frictionless'",
-            )  # fmt: skip
+        """Report a slice, or an incision, that makes no sense."""
         if self.slit:
             self._check_slit(self.slit, problems)
         else:
@@ -163,11 +158,6 @@ class Blade(Punch):
                     problems.error(f"probe.{key}", found, "is of a slit: there is no incision")
         if self.slice > 0 and self.action != "cut":
             problems.error("probe.slice", in_mm(self.slice), 'only a cut slices: set action = "cut"')
-        if self.slice > 0 and self.contact == "frictionless":
-            problems.error(
-                "probe.slice", in_mm(self.slice), "a frictionless blade slides along without force: use "
-                "contact = 'bonded'",
-            )  # fmt: skip
 
     def _check_slit(self, slit: Slit, problems: Problems) -> None:
         if self.action != "cut":
@@ -191,8 +181,6 @@ class Blade(Punch):
                 "probe.depth", in_mm(self.depth), "does nothing where tissue slides along a blade that stands in a "
                 "slit: F is what it takes to push it on from where it stands, `incision` - `ahead` deep",
             )  # fmt: skip
-        if self.motion == "all":
-            problems.error("probe.motion", self.motion, "a blade in a slit is pressed and drawn only: leave it out")
 
     def _check_travel(self, slit: Slit, problems: Problems) -> None:
         """Report a blade that would run through the front of its slit: tissue there is not cut open by it."""
