@@ -40,7 +40,7 @@ def state_of(path: Path) -> tuple[int, int]:
     except OSError as error:
         raise SurfaceError(f"cannot be read: {error.strerror or error}") from None
     if not S_ISREG(state.st_mode):
-        raise SurfaceError("cannot be read: it is no plain file")
+        raise SurfaceError("cannot be read: it is no plain file, but a directory, a device or a pipe")
     return state.st_mtime_ns, state.st_size
 
 
