@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from pipeline.shapes.body import Body, Layered
-from pipeline.shapes.probes.cone import Cone
-from pipeline.shapes.section import in_mm
+from pipeline.shapes.registry import PROBES
 from pipeline.shapes.support import Faces
 from pipeline.shapes.tissue import Tissue
 from pipeline.study.capabilities import obstacle
@@ -16,9 +15,6 @@ from pipeline.study.sweep import Case, Study
 # Poisson's ratios that a model holds at least, and at most: beyond, displacement elements lock.
 _USUAL, _MOST = (0.3, 0.49), 0.49
 
-_CONTACTS = {
-    "disc": ("frictionless", "bonded"), "blade": ("frictionless",), "sphere": ("unilateral",), "cone": ("unilateral",),
-}  # fmt: skip
 # Depth of other tissue, at least, in units of half the smaller width: c varies over places as fast as that.
 _SHALLOWEST = 0.1
 
@@ -135,11 +131,12 @@ def _flat_refusal(case: Case, first: Case, body: Layered) -> str:
         return "other tissue so near to the surface has no real-time model: a tenth of half the width is the least"
     if not isinstance(body.support, Faces) or set(body.support.names) != {"bottom"}:
         return 'body.fixed: such a support has no real-time model yet: "bottom" has'
-    if probe.shape not in _CONTACTS:
-        return f'probe.shape = "{probe.shape}" has no real-time model yet: {", ".join(_CONTACTS)} have'
-    if probe.contact not in _CONTACTS[probe.shape]:
-        right = '" or "'.join(_CONTACTS[probe.shape])
+    if not probe.REALTIME:
+        known = ", ".join(shape for shape, kind in PROBES.items() if kind.REALTIME)
+        return f'probe.shape = "{probe.shape}" has no real-time model yet: {known} have'
+    if probe.contact not in probe.REALTIME:
+        right = '" or "'.join(probe.REALTIME)
         return f'probe.contact = "{probe.contact}" of a {probe.shape} has no real-time model yet: "{right}" has'
-    if isinstance(probe, Cone) and probe.tip:
-        return f"probe.tip = {in_mm(probe.tip)}: a rounded cone has no real-time model yet: a sharp one has"
+    if error := probe.realtime_error():
+        return error
     return "" if case.frame.is_upright else "probe.axis: a model is of tools that press straight down: leave it out"

@@ -12,7 +12,7 @@ from pipeline.run.dead_loads import dead_loads_of
 from pipeline.run.far_field import far_field_of
 from pipeline.run.memory import FreeMemory
 from pipeline.run.room import MEMORY_SHARE
-from pipeline.shapes.probes.round_indenter import RoundIndenter
+from pipeline.shapes.probes._round import RoundIndenter
 from pipeline.solve.axisymmetric import MeridianProblem
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.contact.active_set import ContactError

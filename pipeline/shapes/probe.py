@@ -93,6 +93,8 @@ class Probe(Section, ABC):
     NOT_DRAWN: ClassVar[tuple[str, ...]]
     # Keys that serve sweeps of a tool on one mesh, and say nothing of the tool itself.
     SWEPT: ClassVar[tuple[str, ...]] = ()
+    # Contacts for which real-time models know the tool.
+    REALTIME: ClassVar[tuple[Contact, ...]] = ()
     # Error of F on a mesh that is graded to the footprint's edge, in units of that of a disc: docs/accuracy.md.
     EXPECTED_ERROR: ClassVar[float]
 
@@ -270,6 +272,10 @@ class Probe(Section, ABC):
         the depth and the square of the radius with p: energies change by F² times the mean square. NaN where
         that is not known.
         """
+
+    def realtime_error(self) -> str:
+        """Return which of its keys no real-time model knows, and what would do; "" if all are known."""
+        return ""
 
     # ---- sense ----------------------------------------------------------------------------------------
 

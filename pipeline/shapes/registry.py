@@ -1,11 +1,13 @@
-"""The shapes that there are: one line each. What is not here is refused.
+"""The shapes that there are: one file each, in ``bodies/`` and ``probes/``, named like the shape.
 
 A shape is loaded when its class is first asked for: a study loads those that it names.
 """
 
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 from importlib import import_module
-from typing import Generic, TypeVar
+from pathlib import Path
+from typing import Any, Generic, TypeVar, get_args
 
 from pipeline.shapes.body import Body
 from pipeline.shapes.probe import Probe
@@ -15,45 +17,39 @@ Shape_co = TypeVar("Shape_co", bound=Section, covariant=True)
 
 
 class Shapes(Mapping[str, type[Shape_co]], Generic[Shape_co]):
-    """Classes by the names of their shapes; ``places`` says of each in which module of this folder it is."""
+    """Classes by the names of their shapes: of each file of a folder the class whose ``shape`` is its name."""
 
-    def __init__(self, places: Mapping[str, str]):
-        self._places = dict(places)
+    def __init__(self, folder: str):
+        self._folder = folder
+
+    @cached_property
+    def _names(self) -> tuple[str, ...]:
+        files = Path(__file__).with_name(self._folder).glob("[a-z]*.py")
+        return tuple(sorted(file.stem for file in files))
 
     def __getitem__(self, name: str) -> type[Shape_co]:
-        module, _, shape = self._places[name].rpartition(".")
-        found: type[Shape_co] = getattr(import_module(f"pipeline.shapes.{module}"), shape)
+        if name not in self._names:
+            raise KeyError(name)
+        module = import_module(f"pipeline.shapes.{self._folder}.{name}")
+        kinds: list[Any] = [kind for kind in vars(module).values() if isinstance(kind, type)]
+        found: type[Shape_co] = next(kind for kind in kinds if _shape(kind) == (name,))
         return found
 
     def __contains__(self, name: object) -> bool:
-        return name in self._places
+        return name in self._names
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._places)
+        return iter(self._names)
 
     def __len__(self) -> int:
-        return len(self._places)
+        return len(self._names)
 
 
-BODIES: Shapes[Body] = Shapes(
-    {
-        "box": "bodies.box.Box",
-        "cylinder": "bodies.cylinder.Cylinder",
-        "ellipsoid": "bodies.ellipsoid.Ellipsoid",
-        "cad": "bodies.cad.FromCad",
-        "surface": "bodies.surface.FromSurface",
-        "image": "bodies.image.FromImage",
-    }
-)
-PROBES: Shapes[Probe] = Shapes(
-    {
-        "disc": "probes.disc.Disc",
-        "blade": "probes.blade.Blade",
-        "ellipse": "probes.ellipse.Ellipse",
-        "sphere": "probes.sphere.Sphere",
-        "cone": "probes.cone.Cone",
-        "wedge": "probes.wedge.Wedge",
-    }
-)
-# Shapes of the format that this version does not compute: named as such, not as typing errors.
-LATER: dict[str, tuple[str, ...]] = {"body": (), "probe": ()}
+def _shape(kind: type) -> tuple[object, ...]:
+    """Return what the key ``shape`` of a section may be; nothing if it has none."""
+    field = kind.model_fields.get("shape") if issubclass(kind, Section) else None
+    return get_args(field.annotation) if field else ()
+
+
+BODIES: Shapes[Body] = Shapes("bodies")
+PROBES: Shapes[Probe] = Shapes("probes")

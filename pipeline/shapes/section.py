@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated, Any, Protocol
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
-from pydantic_core import PydanticCustomError
+from pydantic import BaseModel, ConfigDict, Field
 
 
 @dataclass(frozen=True)
@@ -48,18 +47,6 @@ def words_of(model: type[BaseModel], name: str) -> Words:
         if found:
             return found[-1]
     raise TypeError(f"{model.__name__}.{name} has no words: add them to its annotation")
-
-
-def refuse(kind: str, later: tuple[str, ...], supported: tuple[str, ...]) -> BeforeValidator:
-    """Refuse by name what the format describes and this version cannot compute."""
-
-    def check(value: Any) -> Any:
-        if value in later:
-            message = f'{kind} "{value}" is not supported; supported: {", ".join(supported)}'
-            raise PydanticCustomError("not_supported", message)
-        return value
-
-    return BeforeValidator(check)
 
 
 def in_mm(length: float) -> str:

@@ -8,7 +8,6 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from pipeline.shapes.registry import LATER
 from pipeline.shapes.section import Section
 from pipeline.study.path import Way, read_path
 from pipeline.study.problems import MOST_ERRORS, Problems, closest, nearest
@@ -240,8 +239,6 @@ def _model(name: str, raw: dict[str, Any], problems: Problems, where: str = "") 
             problems.error(f"{where}.shape", None, f"is required; supported are {supported}")
     elif isinstance(shape, list):
         problems.error(f"{where}.shape", shape, f"shapes are swept with an array of tables: write [[{name}]] for each")
-    elif shape in LATER[name]:
-        problems.error(f"{where}.shape", shape, f"not supported; supported are {supported}")
     else:
         problems.error(f"{where}.shape", shape, f"unknown shape; {nearest(str(shape), model)}")
     known = dict.fromkeys(key for kind in model.values() for key in kind.model_fields)

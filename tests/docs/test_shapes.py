@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from pipeline.shapes.registry import BODIES, LATER, PROBES
+from pipeline.shapes.registry import BODIES, PROBES
 from tests.docs.blocks import ROOT
 
 SHAPES = {"body": BODIES, "probe": PROBES}
@@ -15,14 +15,3 @@ def test_the_study_of_the_readme_offers_every_shape_and_no_other(section):
     study = (ROOT / "README.md").read_text(encoding="utf-8").split(f"\n[{section}]\n")[1]
     (offered,) = re.findall(r"^shape +=.*?# (.*)$", study.split("\n\n")[0], flags=re.M)
     assert set(re.findall(r"(\w+) \(", offered)) == set(SHAPES[section])
-
-
-@pytest.mark.parametrize("section", SHAPES)
-def test_the_changelog_names_every_shape(section):
-    named = re.findall(r"`(\w+)`", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"))
-    assert set(SHAPES[section]) <= set(named)
-
-
-@pytest.mark.parametrize("section", SHAPES)
-def test_what_there_is_is_not_announced_for_later(section):
-    assert not set(LATER[section]) & set(SHAPES[section])

@@ -27,6 +27,7 @@ class Blade(Punch):
     is_curved: ClassVar[bool] = False
 
     PROPORTIONAL_TO = ("depth", "slice")
+    REALTIME = ("frictionless",)
     EXPECTED_ERROR = 0.75
 
     shape: Literal["blade"]

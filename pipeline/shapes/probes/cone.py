@@ -3,7 +3,7 @@
 from math import nan
 from typing import Annotated, Literal
 
-from pipeline.shapes.probes.round_indenter import RoundIndenter
+from pipeline.shapes.probes._round import RoundIndenter
 from pipeline.shapes.rounded import Rounded
 from pipeline.shapes.section import Problems, Words, in_mm
 from pipeline.units import Angle, Length, Rounding
@@ -11,6 +11,8 @@ from pipeline.units import Angle, Length, Rounding
 
 class Cone(RoundIndenter):
     """A needle's tip: a cone, which may be rounded, on a shaft. Friction along the shaft is not computed."""
+
+    REALTIME = ("unilateral",)
 
     shape: Literal["cone"]
     angle: Annotated[Angle, Words("Half angle to the axis: the larger, the blunter.", '"70 deg"', is_used=True)]
@@ -36,6 +38,14 @@ class Cone(RoundIndenter):
     def limit(self) -> float:
         """Radius (m) of the shaft."""
         return self.radius
+
+    def realtime_error(self) -> str:
+        """Return that a rounding is not known."""
+        return (
+            f"probe.tip = {in_mm(self.tip)}: a rounded cone has no real-time model yet: a sharp one has"
+            if self.tip
+            else ""
+        )
 
     def check(self, problems: Problems) -> None:
         """Report a rounding that leaves no cone, and a cone that is pushed in as a whole."""

@@ -26,6 +26,7 @@ class Disc(Straight):
     is_round: ClassVar[bool] = True
     is_curved: ClassVar[bool] = True
 
+    REALTIME = ("frictionless", "bonded")
     EXPECTED_ERROR = 1.0
 
     shape: Literal["disc"]

@@ -2,7 +2,7 @@
 
 from typing import Annotated, ClassVar, Literal
 
-from pipeline.shapes.probes.round_indenter import RoundIndenter
+from pipeline.shapes.probes._round import RoundIndenter
 from pipeline.shapes.rounded import Rounded
 from pipeline.shapes.section import Problems, Words, in_mm
 from pipeline.units import Length
@@ -11,6 +11,7 @@ from pipeline.units import Length
 class Sphere(RoundIndenter):
     """A ball, such as the tip of a palpating probe."""
 
+    REALTIME = ("unilateral",)
     # 3/2 (H. Hertz), as long as contact is small beside the ball.
     force_exponent: ClassVar[float | None] = 1.5
 
