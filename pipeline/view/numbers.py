@@ -30,7 +30,7 @@ _SMALL = 1e-4
 _HALF = 32767
 # Bits of a coordinate along Morton's curve.
 _BITS = 10
-_DEFLATE = 9
+_DEFLATE = 6
 # Bits of a point's number: three of them fit one integer.
 _POINT_BITS = 21
 # The corners of a tetrahedron's face, by the corner that it lies opposite to.
@@ -121,11 +121,15 @@ def _faces(corners: IntArray, facets: dict[str, IntArray]) -> dict[str, npt.NDAr
     Raises:
         ValueError: if a triangle is the face of no cell.
     """
-    known = _keys(np.vstack(list(facets.values())))
+    triangles = np.vstack(list(facets.values()))
+    is_on = np.isin(np.arange(corners.max() + 1), triangles)
+    near = np.flatnonzero(is_on[corners[:, FACES]].all(axis=-1))  # 4 × cell + the corner opposite to the face
+    known, faces = _keys(triangles), _keys(corners[:, FACES].reshape(-1, 3)[near])
     groups = np.repeat([_GROUPS.get(name, 0) for name in facets], [len(facet) for facet in facets.values()])
-    _, codes, found = np.intersect1d(_keys(corners[:, FACES].reshape(-1, 3)), known, return_indices=True)
+    _, place, found = np.intersect1d(faces, known, return_indices=True)
     if len(found) < len(known):
         raise ValueError(f"{len(known) - len(found)} triangles of the boundary are the face of no cell")
+    codes = near[place]
     order = np.argsort(codes)
     return {
         "faces": np.diff(codes[order], prepend=0).astype("<i4"),
@@ -157,6 +161,6 @@ def packed(arrays: dict[str, npt.NDArray[Any]]) -> str:
     return compressed(b"".join(planes))
 
 
-def compressed(content: bytes) -> str:
+def compressed(content: bytes, level: int = _DEFLATE) -> str:
     """Return bytes, deflated, as base64."""
-    return b64encode(zlib.compress(content, _DEFLATE)).decode()
+    return b64encode(zlib.compress(content, level)).decode()

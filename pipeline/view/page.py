@@ -51,7 +51,7 @@ def render_scene(
         style=_joined(SCENE / "scene.css", *styles),
         told=json_in_page(told | {"ink": ink}),
         numbers=numbers,
-        library=compressed(library.encode()),
+        library=compressed(library.encode(), 9),
         library_hash=hash_of(library),
         **content,
     )

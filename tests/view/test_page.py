@@ -13,6 +13,7 @@ import pytest
 from matplotlib.image import imread
 from mpi4py import MPI
 
+from pipeline.report.page import write_page as write_report
 from pipeline.scene.model import FIXED, PROBE
 from pipeline.shapes.frame import Frame
 from pipeline.view.compute import compute_fields, solve_to_view
@@ -22,6 +23,7 @@ from pipeline.view.tool import tool_of
 from pipeline.view.viewpoint import Viewpoint
 from tests.cases import solve, study
 from tests.report.browser import CHROMIUM, Browser
+from tests.report.synthetic import dataset
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="one process")
 NAMES = ("skin", "fat </script>")
@@ -236,6 +238,12 @@ def test_turns_with_the_mouse_and_by_touch_and_zooms(browser, seen):
         browser.call("Input.dispatchTouchEvent", type=kind, touchPoints=points)
     tilted = seen()
     assert differ(turned, tilted) > 0.1
+    for kind, apart in (("touchStart", 40), ("touchMove", 80), ("touchEnd", 0)):
+        points = [{"x": 300 + sign * apart, "y": 300, "id": sign} for sign in (-1, 1) if apart]
+        browser.call("Input.dispatchTouchEvent", type=kind, touchPoints=points)
+    pinched = seen()
+    assert drawn(pinched) > drawn(tilted)
+    tilted = pinched
     browser.call("Input.dispatchMouseEvent", type="mouseWheel", x=300, y=300, deltaX=0, deltaY=-300)
     assert drawn(seen()) > drawn(tilted)
     assert browser.messages == []
@@ -271,6 +279,23 @@ def test_a_frame_that_gets_its_size_after_the_script_ran_is_drawn(browser, page,
     browser.screenshot(tmp_path / "seen.png", whole=False)
     assert drawn(imread(tmp_path / "seen.png")[100:400, 100:500, :3]) > 0.3
     assert browser.messages == []
+
+
+@in_browser
+def test_the_scene_of_a_report_is_drawn(browser, page, tmp_path):
+    path = write_report(dataset(), tmp_path / "report.html", page.read_text(encoding="utf-8"))
+    browser.look_like(900, 600)
+    browser.open(path)
+    browser.ask("document.getElementById('scene').scrollIntoView()")
+    for _ in range(50):
+        browser.ask("new Promise(done => setTimeout(done, 200))")
+        browser.screenshot(tmp_path / "seen.png", whole=False)
+        if drawn(imread(tmp_path / "seen.png")[150:400, 150:500, :3]) > 0.3:
+            break
+    else:
+        pytest.fail("the frame stayed empty")
+    assert browser.messages == []
+    assert browser.requests == [path.as_uri()]
 
 
 @in_browser

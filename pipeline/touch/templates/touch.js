@@ -10,9 +10,8 @@ const ARROW = 0.35;
 const THICK = 0.008;
 // The error bar that fills its gauge.
 const DOUBT = 0.05;
-// Steps along the eye's ray through the body's height, and halvings of the last one, that find where it meets the face.
-const STEPS = 120;
-const HALVINGS = 30;
+// What is so far from the face, in units of the body's size, is another side of the body.
+const BESIDE = 0.05;
 // Points along the border of the region, so far above the face, in units of the body's size.
 const BORDER = 200;
 const ABOVE = 0.002;
@@ -24,7 +23,7 @@ const between = (low, value, high) => Math.max(low, Math.min(high, value));
 const turned = (line) => new THREE.LatheGeometry(line.map((point) => new THREE.Vector2(...point)), 40).rotateX(Math.PI / 2);
 
 // The tool above its lowest point, with a shaft; a disc has the mean curvature of the face.
-function geometryOf({ tool, radius, angle, length, width }, bend) {
+function geometryOf({ tool, radius, angle, length, width, bend }) {
   const long = 4 * radius;
   if (tool === "blade") return new THREE.BoxGeometry(length, width, width).translate(0, 0, 0.51 * width);
   if (tool === "disc") {
@@ -75,7 +74,7 @@ class Page {
     const listen = (kind, heard) => canvas.addEventListener(kind, heard, { capture: true });
     listen("pointerdown", (event) => {
       const place = event.button === 0 && !event.shiftKey && held === null && this.onFace(event);
-      if (!place || !this.isOn(place)) return;
+      if (!place) return;
       held = event.pointerId;
       canvas.setPointerCapture(held);
       event.stopImmediatePropagation();
@@ -95,32 +94,11 @@ class Page {
   }
 
   // ---- places ----------------------------------------------------------------------------------------------------
-  // Where the eye's ray meets the face (x and y, mm), from above; or nothing.
-  onFace({ clientX, clientY }) {
-    const { camera, canvas } = this.stage;
-    const back = this.stage.basis()[2];
-    if (back.z < 0.05) return null;
-    const from = vector([(2 * clientX) / canvas.clientWidth - 1, 1 - (2 * clientY) / canvas.clientHeight, 0]).unproject(camera);
-    const at = (z) => from.clone().addScaledVector(back, (z - from.z) / back.z);
-    const isAbove = (z) => {
-      const { x, y } = at(z);
-      return z > this.heightAt(x, y);
-    };
-    const steps = this.model.isFlat ? [1e-9, -1e-9] : Array.from({ length: STEPS }, (_, i) => this.size * (1 - (2 * i) / STEPS));
-    const below = steps.findIndex((z) => !isAbove(z));
-    if (below < 1) return null;
-    let [last, z] = [steps[below - 1], steps[below]];
-    for (let i = 0; i < HALVINGS; i++) {
-      const middle = (z + last) / 2;
-      if (isAbove(middle)) last = middle;
-      else z = middle;
-    }
-    return at(z).toArray().slice(0, 2);
-  }
-  // Whether a place is on the face, or on what is known of it.
-  isOn([x, y]) {
-    const [a, b] = (this.model.isFlat ? this.model.sides : this.model.reach).map((side) => MM * side);
-    return this.model.is_round ? Math.hypot(x, y) <= a : Math.abs(x) <= a && Math.abs(y) <= b;
+  // Where the eye's ray meets the face (x and y, mm), if it does.
+  onFace(event) {
+    const hit = this.stage.under(event, this.stage.body);
+    if (!hit || Math.abs(hit.z - this.heightAt(hit.x, hit.y)) > BESIDE * this.size) return null;
+    return this.model.isFlat || this.model.table.holds(hit.x / MM, hit.y / MM) ? [hit.x, hit.y] : null;
   }
   // The height (mm) of the face at x and y (mm), beyond the region that of its border.
   heightAt(x, y) {
@@ -239,7 +217,9 @@ class Page {
     const { tool } = this.stage;
     const { spot, at } = this.foothold;
     const [radius, length, width] = [query.radius, query.length, query.width].map((size) => MM * size);
-    this.stage.fill(tool, geometryOf({ ...query, radius, length, width }, spot.bend / MM));
+    const shape = { tool: query.tool, radius, angle: query.angle, length, width, bend: spot.bend / MM };
+    if (JSON.stringify(shape) !== this.shape) this.stage.fill(tool, geometryOf(shape));
+    this.shape = JSON.stringify(shape);
     const axes = new THREE.Matrix4().makeBasis(...spot.turn.map(vector));
     tool.quaternion.setFromRotationMatrix(axes);
     if (query.tool === "blade") tool.rotateZ(field("turn").valueAsNumber * DEGREE);

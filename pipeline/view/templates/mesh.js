@@ -25,7 +25,9 @@ class Mesh {
   // The points' places along a direction.
   heights([x, y, z]) {
     const { points, n } = this;
-    return Float32Array.from({ length: n }, (_, a) => x * points[a] + y * points[n + a] + z * points[2 * n + a]);
+    const found = new Float32Array(n);
+    for (let a = 0; a < n; a++) found[a] = x * points[a] + y * points[n + a] + z * points[2 * n + a];
+    return found;
   }
   // The value of a cell: the number of its region, or a share of the scale; undefined where points have values.
   valueOf(cell, { array, labels }) {

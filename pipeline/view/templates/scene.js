@@ -48,13 +48,21 @@ class Vertices {
     this.size += WIDTH;
     return this.size - WIDTH;
   }
+  // What is drawn of them, in buffers that last until there are more vertices than they hold.
   geometry() {
-    const buffer = new THREE.InterleavedBuffer(this.data.subarray(0, this.size), WIDTH);
-    const made = new THREE.BufferGeometry();
-    for (const [name, size, first] of ATTRIBUTES) {
-      made.setAttribute(name, new THREE.InterleavedBufferAttribute(buffer, size, first));
+    if (this.buffer?.array !== this.data) {
+      this.buffer = new THREE.InterleavedBuffer(this.data, WIDTH);
+      this.made = new THREE.BufferGeometry();
+      for (const [name, size, first] of ATTRIBUTES) {
+        this.made.setAttribute(name, new THREE.InterleavedBufferAttribute(this.buffer, size, first));
+      }
     }
-    return made;
+    this.buffer.clearUpdateRanges();
+    this.buffer.addUpdateRange(0, this.size);
+    this.buffer.needsUpdate = true;
+    this.made.setDrawRange(0, this.size / WIDTH);
+    this.made.boundingSphere = null;
+    return this.made;
   }
 }
 
@@ -118,6 +126,7 @@ class Stage {
   constructor({ eye, radius, ink }, nearest) {
     const canvas = document.querySelector("canvas");
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
+    this.renderer.sortObjects = false; // that would measure every part for each picture
     this.scene = new THREE.Scene();
     this.camera = new THREE.OrthographicCamera();
     this.camera.up.set(0, 0, 1);
@@ -163,7 +172,7 @@ class Stage {
     this.scene.add(new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: this.ink.outline })));
   }
   fill(part, geometry) {
-    part.geometry.dispose();
+    if (part.geometry !== geometry) part.geometry.dispose();
     part.geometry = geometry;
     this.redraw();
   }
@@ -209,6 +218,13 @@ class Stage {
   // Millimetres of a pixel.
   scale() {
     return (2 * this.radius) / this.camera.zoom / this.canvas.clientHeight;
+  }
+  // The nearest point of a part that is seen at the pointer, where it was before it moved.
+  under({ clientX, clientY }, part) {
+    const { clientWidth, clientHeight } = this.canvas;
+    const ray = new THREE.Raycaster();
+    ray.setFromCamera(new THREE.Vector2((2 * clientX) / clientWidth - 1, 1 - (2 * clientY) / clientHeight), this.camera);
+    return ray.intersectObject(part)[0]?.point;
   }
   press(event) {
     const { controls } = this;
