@@ -53,11 +53,14 @@ def measure(fine: str, degree: int) -> dict[str, Any]:
         work = _stages()
     local = {name: sent[name] / sent["iterations"] for name in _MPI} | work
     return {
-        "ranks": comm.size, "dofs": solution.dofs, "iterations": solution.iterations, "force": solution.reaction[2],
+        "ranks": comm.size,
+        "dofs": solution.dofs,
+        "iterations": solution.iterations,
+        "force": solution.reaction[2],
         "bar": solution.bar,
         "most": {name: comm.allreduce(value, op=MPI.MAX) for name, value in local.items()},
         "sum": {name: comm.allreduce(value) for name, value in local.items()},
-    }  # fmt: skip
+    }
 
 
 def _stages() -> dict[str, float]:
@@ -100,9 +103,22 @@ def _watched() -> Iterator[dict[str, float]]:
 
 def _run(ranks: int, library: Path, fine: str, degree: int) -> dict[str, Any]:
     command = [
-        "/usr/bin/mpirun", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1", "-n", str(ranks), "-x",
-        f"LD_PRELOAD={library}", sys.executable, "-m", "benchmarks.communication", "--worker", fine, str(degree),
-    ]  # fmt: skip
+        "/usr/bin/mpirun",
+        "--oversubscribe",
+        "--mca",
+        "mpi_yield_when_idle",
+        "1",
+        "-n",
+        str(ranks),
+        "-x",
+        f"LD_PRELOAD={library}",
+        sys.executable,
+        "-m",
+        "benchmarks.communication",
+        "--worker",
+        fine,
+        str(degree),
+    ]
     done = subprocess.run(command, env=os.environ | MPI_ENVIRONMENT, capture_output=True, text=True, check=False)
     if done.returncode:
         raise RuntimeError(done.stderr)

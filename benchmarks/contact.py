@@ -47,9 +47,12 @@ _WAYS: dict[str, tuple[tuple[str, ...], bool]] = {
 
 def _study(poisson: float, rim: str, depth: str | list[str], **probe: Any) -> dict[str, Any]:
     return {
-        "body": _BODY, "material": {"young": "10 kPa", "poisson": poisson},
-        "probe": _BALL | {"depth": depth} | probe, "mesh": _MESH | {"rim": rim}, "solve": {"exact": False},
-    }  # fmt: skip
+        "body": _BODY,
+        "material": {"young": "10 kPa", "poisson": poisson},
+        "probe": _BALL | {"depth": depth} | probe,
+        "mesh": _MESH | {"rim": rim},
+        "solve": {"exact": False},
+    }
 
 
 def found(body: BodyMesh, case: Case, *, estimate: bool) -> Solution:
@@ -85,10 +88,13 @@ def in_linear_solves(poisson: float, rim: str = "0.12 mm", repeats: int = _REPEA
             seconds[name].append(time.process_time() - start)
     spent = {name: median(of_one) for name, of_one in seconds.items()}
     return {
-        "poisson": poisson, "element": case.element, "dofs": solutions["found, force"].dofs, "seconds": spent,
+        "poisson": poisson,
+        "element": case.element,
+        "dofs": solutions["found, force"].dofs,
+        "seconds": spent,
         "linear solves": spent["found, force"] / spent["prescribed, force"],
         "with the error bar": spent["found, force and bar"] / spent["prescribed, force and bar"],
-    }  # fmt: skip
+    }
 
 
 def sweeps(repeats: int = _REPEATS) -> dict[str, dict[str, float]]:

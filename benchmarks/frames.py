@@ -104,9 +104,14 @@ def main() -> None:
             rate = browser.ask(_PACED)
     print(f"{found['shown']} vertices, {len(surface.table.amounts)} modes")
     names = (
-        "formulas and surface", "triangles", "handed to WebGL", "of the surface: far field", "edges halved",
-        "near field", "all, until the picture is there",
-    )  # fmt: skip
+        "formulas and surface",
+        "triangles",
+        "handed to WebGL",
+        "of the surface: far field",
+        "edges halved",
+        "near field",
+        "all, until the picture is there",
+    )
     for name, took in zip(names, found["took"], strict=True):
         p50, p99 = np.percentile(took, [50, 99])
         print(f"{name:32} least {min(took):6.1f}  p50 {p50:6.1f}  p99 {p99:6.1f} ms")
@@ -131,9 +136,11 @@ def _random() -> Surface:
     face = np.stack(square, axis=-1).reshape(-1, 3)
     modes = rng.integers(-32767, 32768, (len(points), 3, _MODES)).astype(np.float32)
     table = replace(
-        made.table, points=points.astype(np.float32), modes=modes,
+        made.table,
+        points=points.astype(np.float32),
+        modes=modes,
         triangles=np.vstack([face, face[:, ::-1] + len(flat)]).astype(np.int32),
-    )  # fmt: skip
+    )
     return Surface(made.model, table)
 
 

@@ -46,13 +46,16 @@ Scene = tuple[dict[str, Any], list[float], dict[str, Any], dict[str, str]]
 # Body, ν, probe, places by name.
 SCENES: dict[str, Scene] = {
     "liver, disc": (
-        LIVER, [0.45, 0.49], DISC, THICK | {"middle": "10 mm 0 mm"} | THIN | {"from the side": "-75 mm 0 mm 5 mm"},
+        LIVER,
+        [0.45, 0.49],
+        DISC,
+        THICK | {"middle": "10 mm 0 mm"} | THIN | {"from the side": "-75 mm 0 mm 5 mm"},
     ),
     "liver, disc, compressible": (LIVER, [0.3], DISC, THICK | THIN),
     "liver, blade": (LIVER, [0.45], BLADE, THICK),
     "liver, ball, contact found": (LIVER, [0.45], BALL, THICK),
     "kidney, disc": (KIDNEY, [0.45], DISC, {"top": "0 mm 0 mm"}),
-}  # fmt: skip
+}
 # Parts of a place, by how the names of their stages begin; the rest is what none of them begins with.
 PARTS = {
     "far surface": ("mesh cache / far surface",),
@@ -62,9 +65,16 @@ PARTS = {
     "error bar": ("error bar",),
 }
 COLUMNS = {
-    "scene": "", "place": "", "nu": "g", "element": "", "meshes": "d", "dofs": ",d", "bar": ".2%",
-    "seconds": ".1f", **dict.fromkeys([*PARTS, "rest"], ".1f"),
-}  # fmt: skip
+    "scene": "",
+    "place": "",
+    "nu": "g",
+    "element": "",
+    "meshes": "d",
+    "dofs": ",d",
+    "bar": ".2%",
+    "seconds": ".1f",
+    **dict.fromkeys([*PARTS, "rest"], ".1f"),
+}
 WHOLE = {"what": "", "seconds": ".1f"}
 # How often each facet of the liver is cut into four to make a large file: 320,000 of them.
 _TIMES = 3
@@ -112,10 +122,12 @@ def study_of(scene: Scene) -> dict[str, Any]:
     """Return the study of a scene, asked to be right to 1 %."""
     body, ratios, probe, places = scene
     return {
-        "body": body | {"file": str(MESHES / body["file"])}, "material": {"young": "5 kPa", "poisson": ratios},
+        "body": body | {"file": str(MESHES / body["file"])},
+        "material": {"young": "5 kPa", "poisson": ratios},
         "probe": probe | {"at": [[f"{x} mm" for x in at.split(" mm")[:-1]] for at in places.values()]},
-        "mesh": {"accuracy": "1 %"}, "solve": {"exact": False},
-    }  # fmt: skip
+        "mesh": {"accuracy": "1 %"},
+        "solve": {"exact": False},
+    }
 
 
 def measure(name: str, folder: Path) -> list[dict[str, Any]]:
@@ -132,11 +144,22 @@ def measure(name: str, folder: Path) -> list[dict[str, Any]]:
         stages.table()
         parts = parts_of(stages.seconds)
         stages.seconds.clear()
-        rows.append({
-            "scene": name, "place": named[at], "nu": case.poisson, "element": case.element,
-            "meshes": meshes.taken(), "dofs": record.dofs, "cells": record.cells, "force": record.force,
-            "bar": record.force_error, "status": record.status, "seconds": sum(parts.values()), **parts,
-        })  # fmt: skip
+        rows.append(
+            {
+                "scene": name,
+                "place": named[at],
+                "nu": case.poisson,
+                "element": case.element,
+                "meshes": meshes.taken(),
+                "dofs": record.dofs,
+                "cells": record.cells,
+                "force": record.force,
+                "bar": record.force_error,
+                "status": record.status,
+                "seconds": sum(parts.values()),
+                **parts,
+            }
+        )
         print(markdown(rows[-1:], COLUMNS).splitlines()[-1], flush=True)
 
     prepare(MPI.COMM_SELF, plan.solves)
@@ -171,10 +194,12 @@ def whole_commands(folder: Path) -> list[dict[str, Any]]:
     run = ("run", "liver.toml", "--output", "results", "--meshes", "meshes")
     check = ("validate", "large.toml")
     told = {
-        "one place of the liver: file, force, bar, dataset, figures": run, "the same, stored": run,
-        f"validate, {len(facets):,} facets, first time": check, "again": check,
+        "one place of the liver: file, force, bar, dataset, figures": run,
+        "the same, stored": run,
+        f"validate, {len(facets):,} facets, first time": check,
+        "again": check,
         f"validate, {len(found.facets):,} facets": ("validate", "liver.toml"),
-    }  # fmt: skip
+    }
     return [{"what": what, "seconds": command(*arguments, folder=folder)} for what, arguments in told.items()]
 
 

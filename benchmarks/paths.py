@@ -51,9 +51,12 @@ def study_of(name: str, count: int) -> dict[str, Any]:
     steps = path if "raster" in path else {"line": path["line"] | {"steps": count}}
     where = {"path": steps} if count > 1 else {"at": START}
     return {
-        "body": BOX, "material": {"young": "10 kPa", "poisson": poisson}, "probe": DISC | where, "mesh": mesh,
+        "body": BOX,
+        "material": {"young": "10 kPa", "poisson": poisson},
+        "probe": DISC | where,
+        "mesh": mesh,
         "solve": {"exact": False},
-    }  # fmt: skip
+    }
 
 
 def measure(name: str, count: int) -> dict[str, Any]:
@@ -66,9 +69,10 @@ def measure(name: str, count: int) -> dict[str, Any]:
     if failed := [record.message for record in records if record.status != "ok"]:
         raise RuntimeError(f"{name}: {failed[0]}")
     return {
-        "seconds": processor_seconds() - start, "solved": len(plan.solves),
+        "seconds": processor_seconds() - start,
+        "solved": len(plan.solves),
         "bar": max(record.force_error for record in records),
-    }  # fmt: skip
+    }
 
 
 def in_a_process(name: str, count: int) -> dict[str, Any]:
@@ -93,10 +97,17 @@ def main() -> None:
     rows = []
     for name in SCENES:
         one, path = in_a_process(name, 1), in_a_process(name, arguments.places)
-        rows.append({
-            "scene": name, "places": arguments.places, "solved": path["solved"], "one place": one["seconds"],
-            "path": path["seconds"], "ratio": path["seconds"] / one["seconds"], "bar": path["bar"],
-        })  # fmt: skip
+        rows.append(
+            {
+                "scene": name,
+                "places": arguments.places,
+                "solved": path["solved"],
+                "one place": one["seconds"],
+                "path": path["seconds"],
+                "ratio": path["seconds"] / one["seconds"],
+                "bar": path["bar"],
+            }
+        )
         print(markdown(rows[-1:], COLUMNS).splitlines()[-1], flush=True)
     arguments.output.mkdir(parents=True, exist_ok=True)
     (arguments.output / "paths.json").write_text(json.dumps(rows, indent=1))

@@ -28,13 +28,18 @@ _GAMG = {"pc_type": "gamg", "pc_gamg_threshold": 0.01, "mg_levels_ksp_type": "ch
 SOLVERS: dict[str, dict[str, Any]] = {
     "gamg": _CG | _GAMG | {"mg_levels_pc_type": "jacobi", "mg_levels_ksp_max_it": 2},
     "gamg-default": _CG | {"pc_type": "gamg"},
-    "hypre": _CG | {
-        "pc_type": "hypre", "pc_hypre_type": "boomeramg", "pc_hypre_boomeramg_strong_threshold": 0.5,
-        "pc_hypre_boomeramg_nodal_coarsen": 4, "pc_hypre_boomeramg_vec_interp_variant": 3,
-        "pc_hypre_boomeramg_coarsen_type": "HMIS", "pc_hypre_boomeramg_interp_type": "ext+i",
+    "hypre": _CG
+    | {
+        "pc_type": "hypre",
+        "pc_hypre_type": "boomeramg",
+        "pc_hypre_boomeramg_strong_threshold": 0.5,
+        "pc_hypre_boomeramg_nodal_coarsen": 4,
+        "pc_hypre_boomeramg_vec_interp_variant": 3,
+        "pc_hypre_boomeramg_coarsen_type": "HMIS",
+        "pc_hypre_boomeramg_interp_type": "ext+i",
     },
     "mumps": {"ksp_type": "preonly", "pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"},
-}  # fmt: skip
+}
 # Unknowns up to which MUMPS is as fast: measured on meshes of figure3.toml, as are the options above.
 MOST_DIRECT = 150_000
 PREFIX = "plain_"
@@ -117,8 +122,10 @@ def make_mesh(case: Case) -> tuple[Any, dict[str, np.ndarray]]:
         groups = {gmsh.model.getPhysicalName(2, tag): tag for _, tag in gmsh.model.getPhysicalGroups(2)}
         mesh, tags = _model_to_mesh()
     mesh.geometry.x[:] *= scene.scale
-    return mesh, {name: tags.find(tag) if hasattr(tags, "find") else tags.indices[tags.values == tag]
-                  for name, tag in groups.items()}  # fmt: skip
+    return mesh, {
+        name: tags.find(tag) if hasattr(tags, "find") else tags.indices[tags.values == tag]
+        for name, tag in groups.items()
+    }
 
 
 def _model_to_mesh() -> tuple[Any, Any]:

@@ -84,8 +84,9 @@ def run_loop(cases: Sequence[tuple[Case, float]], solver: str, most_direct: int)
         found.append(solved)
         print(
             f"{number + 1:4}/{len(cases)} {solved.seconds:8.2f} s {solved.cpu:8.2f} s cpu {solved.dofs:9d} dofs "
-            f"{solved.iterations:4d} its  F {solved.force:.6g} N  {solved.case}", flush=True,
-        )  # fmt: skip
+            f"{solved.iterations:4d} its  F {solved.force:.6g} N  {solved.case}",
+            flush=True,
+        )
     return found
 
 
@@ -100,10 +101,12 @@ def report(study: Study, result: dict[str, Any]) -> str:
     """Return the comparison in markdown."""
     loop, program = result["plain_loop"], result["program"]
     lines = [
-        f"`{study.name}`: {result['cases']} cases, {len(result['measured'])} of them timed in the plain loop.", "",
-        "| | time (s) | processor time (s) | ratio | ratio, processor |", "|---|---|---|---|---|",
+        f"`{study.name}`: {result['cases']} cases, {len(result['measured'])} of them timed in the plain loop.",
+        "",
+        "| | time (s) | processor time (s) | ratio | ratio, processor |",
+        "|---|---|---|---|---|",
         f"| plain loop, no error bars, no F_exact | {loop['seconds']:.0f} | {loop['cpu']:.0f} | | |",
-    ]  # fmt: skip
+    ]
     names = {"with F_exact": "this program, error bars and F_exact", "without F_exact": "this program, error bars"}
     for key, name in names.items():
         own = program[key]
@@ -112,10 +115,12 @@ def report(study: Study, result: dict[str, Any]) -> str:
     parts = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in loop["parts"].items())
     worst = max(result["measured"], key=lambda one: abs(one["deviation"]))
     lines += [
-        "", f"Parts of the plain loop: {parts}.", "",
+        "",
+        f"Parts of the plain loop: {parts}.",
+        "",
         f"Its F differs from the program's by {100 * result['median_deviation']:.2f} % in the median, at most by "
         f"{100 * worst['deviation']:+.2f} % ({worst['case']}).",
-    ]  # fmt: skip
+    ]
     return "\n".join(lines) + "\n"
 
 
@@ -154,14 +159,19 @@ def main() -> int:
         deviations = compare(program["with F_exact"].pop("dataset"), solved)
     program["without F_exact"].pop("dataset")
     result = {
-        "study": study.name, "cases": len(list(study.cases())), "machine": machine(), "solver": options.solver,
-        "most_direct": options.most_direct, "program": program, "plain_loop": totals(cases, solved),
+        "study": study.name,
+        "cases": len(list(study.cases())),
+        "machine": machine(),
+        "solver": options.solver,
+        "most_direct": options.most_direct,
+        "program": program,
+        "plain_loop": totals(cases, solved),
         "median_deviation": float(np.median(np.abs(deviations))),
         "measured": [
             asdict(one) | {"stands_for": weight, "deviation": deviation}
             for (_, weight), one, deviation in zip(cases, solved, deviations, strict=True)
         ],
-    }  # fmt: skip
+    }
     text = report(study, result)
     options.output.mkdir(parents=True, exist_ok=True)
     (options.output / "plain_loop.json").write_text(json.dumps(result, indent=1) + "\n")

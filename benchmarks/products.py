@@ -23,10 +23,20 @@ from benchmarks.tables import markdown
 SIZES = ((3.0, 0.5), (1.7, 0.2), (1.0, 0.2))
 ROUNDS = 9
 COLUMNS = {
-    "degree": "d", "dofs": "d", "cells": "d", "assemble": ".2f", "lay_out": ".2f", "petsc": ".2f",
-    "upper_double": ".2f", "upper_single": ".2f", "cells_double": ".2f", "cells_single": ".2f", "ratio": ".1f",
-    "matrix_bytes": ".0f", "cells_bytes": ".0f",
-}  # fmt: skip
+    "degree": "d",
+    "dofs": "d",
+    "cells": "d",
+    "assemble": ".2f",
+    "lay_out": ".2f",
+    "petsc": ".2f",
+    "upper_double": ".2f",
+    "upper_single": ".2f",
+    "cells_double": ".2f",
+    "cells_single": ".2f",
+    "ratio": ".1f",
+    "matrix_bytes": ".0f",
+    "cells_bytes": ".0f",
+}
 
 
 def measure(size: tuple[float, float], degrees: list[int]) -> list[dict[str, Any]]:
@@ -77,10 +87,15 @@ def _row(space: Any, law: Any) -> dict[str, Any]:
         # Both triangles in double, and one in single precision, with their columns; or all that cells are laid out in.
         blocks = matrix.getInfo()["nz_used"] / 9
         return {
-            "degree": space.degree, "dofs": space.dofs.dofs, "assemble": assembled - laid_out,
-            "lay_out": laid_out - start, **found, "ratio": found["petsc"] / found["cells_single"],
-            "matrix_bytes": blocks * (76 + 40 / 2) / space.dofs.dofs, "cells_bytes": cells.nbytes / space.dofs.dofs,
-        }  # fmt: skip
+            "degree": space.degree,
+            "dofs": space.dofs.dofs,
+            "assemble": assembled - laid_out,
+            "lay_out": laid_out - start,
+            **found,
+            "ratio": found["petsc"] / found["cells_single"],
+            "matrix_bytes": blocks * (76 + 40 / 2) / space.dofs.dofs,
+            "cells_bytes": cells.nbytes / space.dofs.dofs,
+        }
 
 
 def _medians(ways: dict[str, Callable[[], Any]]) -> dict[str, float]:

@@ -49,8 +49,16 @@ def measure(name: str) -> dict[str, Any]:
     (first, *_) = records.values()
     solve = first.time_assemble + first.time_setup + first.time_solve
     failed = sum(not record.is_ok for record in records.values())
-    return {"wall": wall, "mesh": first.time_mesh, "solve": solve, "bar": first.time_error, "dofs": first.dofs,
-            "cases": len(records), "failed": failed, "force": first.force}  # fmt: skip
+    return {
+        "wall": wall,
+        "mesh": first.time_mesh,
+        "solve": solve,
+        "bar": first.time_error,
+        "dofs": first.dofs,
+        "cases": len(records),
+        "failed": failed,
+        "force": first.force,
+    }
 
 
 def _run(name: str, ranks: int) -> dict[str, Any]:

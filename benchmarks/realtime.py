@@ -71,18 +71,24 @@ name = "muscle"
 young = "20 kPa"
 poisson = 0.45
 """
-STUDIES = MappingProxyType({
-    "box": '[body]\nshape = "box"\nsize = ["80 mm", "80 mm", "40 mm"]\n' + _SOFT + _FLAT,
-    "cylinder": '[body]\nshape = "cylinder"\nradius = "30 mm"\nheight = "25 mm"\n' + _SOFT + _FLAT,
-    "tumour": '[body]\nshape = "box"\nsize = ["60 mm", "60 mm", "30 mm"]\n' + _TUMOUR
-    + _RANGE.replace("10 kPa", "8 kPa") + _FLAT,
-    "nodule": '[body]\nshape = "box"\nsize = ["70 mm", "50 mm", "35 mm"]\n' + _NODULE + _SOFT + _FLAT,
-    "layers": '[body]\nshape = "box"\nsize = ["60 mm", "60 mm", "30 mm"]\n' + _LAYERS + _SOFT + _FLAT,
-    "ellipsoid": '[body]\nshape = "ellipsoid"\naxes = ["40 mm", "40 mm", "25 mm"]\nfixed = {below = "-6 mm"}\n'
-    + _RANGE + _FLAT,
-    "liver": '[body]\nshape = "surface"\nfile = "../../meshes/liver.stl"\nunit = "mm"\nfixed = {below = "-20 mm"}\n'
-    + _SOFT + _FLAT.replace('depth =', 'at = ["-25 mm", "0 mm"]\ndepth ='),
-})  # fmt: skip
+STUDIES = MappingProxyType(
+    {
+        "box": '[body]\nshape = "box"\nsize = ["80 mm", "80 mm", "40 mm"]\n' + _SOFT + _FLAT,
+        "cylinder": '[body]\nshape = "cylinder"\nradius = "30 mm"\nheight = "25 mm"\n' + _SOFT + _FLAT,
+        "tumour": '[body]\nshape = "box"\nsize = ["60 mm", "60 mm", "30 mm"]\n'
+        + _TUMOUR
+        + _RANGE.replace("10 kPa", "8 kPa")
+        + _FLAT,
+        "nodule": '[body]\nshape = "box"\nsize = ["70 mm", "50 mm", "35 mm"]\n' + _NODULE + _SOFT + _FLAT,
+        "layers": '[body]\nshape = "box"\nsize = ["60 mm", "60 mm", "30 mm"]\n' + _LAYERS + _SOFT + _FLAT,
+        "ellipsoid": '[body]\nshape = "ellipsoid"\naxes = ["40 mm", "40 mm", "25 mm"]\nfixed = {below = "-6 mm"}\n'
+        + _RANGE
+        + _FLAT,
+        "liver": '[body]\nshape = "surface"\nfile = "../../meshes/liver.stl"\nunit = "mm"\nfixed = {below = "-20 mm"}\n'
+        + _SOFT
+        + _FLAT.replace("depth =", 'at = ["-25 mm", "0 mm"]\ndepth ='),
+    }
+)
 
 
 def main() -> None:
@@ -165,21 +171,29 @@ def _cells(model: Model, groups: Sequence[Sequence[Check]]) -> list[str]:
         np.abs([force(model, check) / check.full - 1 for check in of]) for force in (_half_space, _nearest)
     )
     return [
-        str(len(of)), str(len(groups)), _percent(np.median(errors)), _percent(errors.max()),
-        f"{sum(check.is_held for check in of)}", f"{np.sum(errors <= bars + [check.full_error for check in of])}",
+        str(len(of)),
+        str(len(groups)),
+        _percent(np.median(errors)),
+        _percent(errors.max()),
+        f"{sum(check.is_held for check in of)}",
+        f"{np.sum(errors <= bars + [check.full_error for check in of])}",
         f"{np.median(bars / np.maximum(errors, 1e-6)):.2g}",
         _percent(float(np.median([check.full_error for check in of]))),
         f"{_percent(np.median(plain))}, {_percent(plain.max())}",
         f"{_percent(np.median(nearest))}, {_percent(nearest.max())}",
-    ]  # fmt: skip
+    ]
 
 
 def _half_space(model: Model, check: Check) -> float:
     """Return F (N) of a half-space."""
     zero = replace(
-        model.table, reciprocal=np.ones((1, 1, 1)), curvature=np.zeros((1, 1, 1)), c_ref=1.0, leans=False,
+        model.table,
+        reciprocal=np.ones((1, 1, 1)),
+        curvature=np.zeros((1, 1, 1)),
+        c_ref=1.0,
+        leans=False,
         tensors=np.zeros((len(model.table.tensors), 1, 1, 1)),
-    )  # fmt: skip
+    )
     return with_bar(replace(model, table=zero), check).force
 
 
@@ -228,10 +242,12 @@ def _in_numpy(model: Model) -> Iterator[str]:
     size, rng = 0.05 * model.thickness, np.random.default_rng(11)
     blade = {"length": 2 * size, "width": 0.4 * size}
     tools = {
-        "disc": ("disc", {"radius": size}), "sphere": ("sphere", {"radius": size}),
-        "cone": ("cone", {"radius": size, "angle": 1.2}), "blade": ("blade", blade),
+        "disc": ("disc", {"radius": size}),
+        "sphere": ("sphere", {"radius": size}),
+        "cone": ("cone", {"radius": size, "angle": 1.2}),
+        "blade": ("blade", blade),
         "bonded": ("disc", {"radius": size, "contact": "bonded"}),
-    }  # fmt: skip
+    }
     if not len(model.table.tensors):
         del tools["blade"], tools["bonded"]
     took: dict[str, list[tuple[float, float]]] = {name: [] for name in (*tools, "nothing")}

@@ -41,9 +41,13 @@ def main(study: Path = Path("studies/figure3.toml"), output: Path = Path("result
         plain, without = run(study, Path(folder) / "without", "--without", "all")
     difference = float(np.abs(with_all["force"] / without["force"] - 1).max())
     found = {
-        "study": str(study), "with": reduced, "without": plain, "force_difference": difference,
-        "ratio_wall": plain["wall"] / reduced["wall"], "ratio_cpu": plain["cpu"] / reduced["cpu"],
-    }  # fmt: skip
+        "study": str(study),
+        "with": reduced,
+        "without": plain,
+        "force_difference": difference,
+        "ratio_wall": plain["wall"] / reduced["wall"],
+        "ratio_cpu": plain["cpu"] / reduced["cpu"],
+    }
     print(f"{study}: {reduced['wall']:.0f} s with all reductions, {plain['wall']:.0f} s without any")
     print(f"ratio {found['ratio_wall']:.1f}, of processor time {found['ratio_cpu']:.1f}")
     print(f"forces differ by at most {difference:.1e}")

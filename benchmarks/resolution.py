@@ -116,18 +116,24 @@ def solve(body: dict[str, Any], place: str, folder: Path, axis: list[float] | No
     probe: dict[str, Any] = {"action": "pierce", "shape": "disc", "radius": f"{RADIUS} mm", "depth": "0.3 mm"}
     probe["at"] = [f"{x} mm" for x in PLACES[place]]
     raw = {
-        "body": body | {"fixed": {"below": "-20 mm"}}, "material": {"young": "5 kPa", "poisson": 0.45},
-        "probe": probe | ({} if axis is None else {"axis": axis}), "mesh": {"accuracy": ACCURACY},
+        "body": body | {"fixed": {"below": "-20 mm"}},
+        "material": {"young": "5 kPa", "poisson": 0.45},
+        "probe": probe | ({} if axis is None else {"axis": axis}),
+        "mesh": {"accuracy": ACCURACY},
         "solve": {"exact": False},
-    }  # fmt: skip
+    }
     try:
         found = RunnableStudy(parse(raw, file="resolution.toml")).run(output=folder, meshes=folder / "meshes")
     except StudyError as error:
         return {"refused": str(error).splitlines()[-1].split(": ", 1)[-1]}
     if str(found["status"].values) != "ok":
         return {"refused": str(found["message"].values)}
-    return {"force": float(found["force"]), "bar": float(found["force_error"]), "z": float(found["at_z"]),
-            "axis": found["axis"].values.ravel().tolist()}  # fmt: skip
+    return {
+        "force": float(found["force"]),
+        "bar": float(found["force_error"]),
+        "z": float(found["at_z"]),
+        "axis": found["axis"].values.ravel().tolist(),
+    }
 
 
 def measure(folder: Path, files: tuple[File, ...] = FILES) -> dict[str, dict[str, Any]]:

@@ -50,10 +50,22 @@ model = "{model}"
 exact = false
 """
 COLUMNS = {
-    "degree": "d", "poisson": "g", "model": "", "ranks": "d", "bar": "", "dofs": "d", "iterations": "d",
-    "time_mesh": ".1f", "time_assemble": ".1f", "time_setup": ".1f", "time_solve": ".1f",
-    "memory": ".2f", "per_dof": ".0f", "slope": ".2f", "message": "",
-}  # fmt: skip
+    "degree": "d",
+    "poisson": "g",
+    "model": "",
+    "ranks": "d",
+    "bar": "",
+    "dofs": "d",
+    "iterations": "d",
+    "time_mesh": ".1f",
+    "time_assemble": ".1f",
+    "time_setup": ".1f",
+    "time_solve": ".1f",
+    "memory": ".2f",
+    "per_dof": ".0f",
+    "slope": ".2f",
+    "message": "",
+}
 
 
 def run_here(file: str, output: str, *, bar: bool) -> None:

@@ -18,13 +18,23 @@ from typing import Any
 BOX = {"shape": "box", "size": ["60 mm", "60 mm", "20 mm"], "fixed": "bottom"}
 DISC = {"action": "pierce", "shape": "disc", "radius": "2 mm", "depth": "0.2 mm"}
 BLADE = {
-    "action": "cut", "shape": "blade", "length": "6 mm", "width": "1 mm", "depth": "0.05 mm", "slice": "0.05 mm",
-}  # fmt: skip
+    "action": "cut",
+    "shape": "blade",
+    "length": "6 mm",
+    "width": "1 mm",
+    "depth": "0.05 mm",
+    "slice": "0.05 mm",
+}
 BALL = {"action": "pierce", "shape": "sphere", "radius": "8 mm", "depth": "0.3 mm", "contact": "unilateral"}
 FIGURE = {
-    "epsilon": "full", "outside": "coarse", "fine": "1.5 mm", "coarse": "6 mm", "rim": "0.05 mm", "growth": 0.4,
+    "epsilon": "full",
+    "outside": "coarse",
+    "fine": "1.5 mm",
+    "coarse": "6 mm",
+    "rim": "0.05 mm",
+    "growth": 0.4,
     "degree": 2,
-}  # fmt: skip
+}
 NEAR = FIGURE | {"epsilon": "10 mm"}
 ELLIPSOID = {"shape": "ellipsoid", "axes": ["40 mm", "30 mm", "20 mm"], "fixed": {"below": "-8 mm"}}
 # Body, ν, probe, mesh.
@@ -35,18 +45,35 @@ CASES: dict[str, tuple[dict[str, Any], float, dict[str, Any], dict[str, Any]]] =
     "mixed": (BOX, 0.49, DISC, NEAR),
     "large": (BOX, 0.3, DISC, FIGURE | {"fine": "0.95 mm", "coarse": "8 mm", "rim": "0.2 mm", "growth": 0.5}),
     "contact": (
-        BOX | {"size": ["40 mm", "40 mm", "20 mm"]}, 0.3, BALL, FIGURE | {"fine": "2 mm", "rim": "0.1 mm"},
+        BOX | {"size": ["40 mm", "40 mm", "20 mm"]},
+        0.3,
+        BALL,
+        FIGURE | {"fine": "2 mm", "rim": "0.1 mm"},
     ),
     "ellipsoid, mixed": (
-        ELLIPSOID, 0.45, DISC | {"at": ["10 mm", "4 mm"]}, FIGURE | {"fine": "3 mm", "rim": "0.2 mm"},
+        ELLIPSOID,
+        0.45,
+        DISC | {"at": ["10 mm", "4 mm"]},
+        FIGURE | {"fine": "3 mm", "rim": "0.2 mm"},
     ),
     "two million dofs": (
-        BOX, 0.3, DISC,
+        BOX,
+        0.3,
+        DISC,
         FIGURE | {"fine": "0.88 mm", "coarse": "8 mm", "rim": "0.3 mm", "growth": 0.5, "model": "3d"},
     ),
-}  # fmt: skip
-COLUMNS = {"case": "", "tree": "", "seconds": ".2f", "bar": ".2f", "share": ".0%", "memory": ".2f", "dofs": "d",
-           "force": ".12g", "force_error": ".6g"}  # fmt: skip
+}
+COLUMNS = {
+    "case": "",
+    "tree": "",
+    "seconds": ".2f",
+    "bar": ".2f",
+    "share": ".0%",
+    "memory": ".2f",
+    "dofs": "d",
+    "force": ".12g",
+    "force_error": ".6g",
+}
 
 
 def measure(name: str) -> None:
@@ -71,10 +98,15 @@ def measure(name: str) -> None:
     seconds = time.process_time() - start
     bar = sum(spent for stage, spent, _ in stages.table() if stage.startswith("error bar"))
     row = {
-        "case": name, "seconds": seconds, "bar": bar, "share": bar / seconds, "dofs": record.dofs,
-        "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, "force": record.force,
+        "case": name,
+        "seconds": seconds,
+        "bar": bar,
+        "share": bar / seconds,
+        "dofs": record.dofs,
+        "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6,
+        "force": record.force,
         "force_error": record.force_error,
-    }  # fmt: skip
+    }
     print(json.dumps(row), flush=True)
 
 

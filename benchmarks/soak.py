@@ -42,13 +42,24 @@ def study(cases: int) -> dict[str, object]:
     return {
         "body": {"shape": "box", "size": ["30 mm", "30 mm", "15 mm"], "fixed": "bottom"},
         "material": {"young": "10 kPa", "poisson": [0.04 * number for number in range(_ON_A_MESH)]},
-        "probe": {"action": "pierce", "shape": "disc", "radius": [f"{2 + i / meshes:.6f} mm" for i in range(meshes)],
-                  "depth": "0.1 mm"},
-        "mesh": {"epsilon": "full", "fine": "6 mm", "coarse": "6 mm", "rim": "1 mm", "growth": 0.9, "degree": 1,
-                 "model": "3d"},
+        "probe": {
+            "action": "pierce",
+            "shape": "disc",
+            "radius": [f"{2 + i / meshes:.6f} mm" for i in range(meshes)],
+            "depth": "0.1 mm",
+        },
+        "mesh": {
+            "epsilon": "full",
+            "fine": "6 mm",
+            "coarse": "6 mm",
+            "rim": "1 mm",
+            "growth": 0.9,
+            "degree": 1,
+            "model": "3d",
+        },
         "solve": {"exact": False},
         "plan": {"without": ["reduced"]},
-    }  # fmt: skip
+    }
 
 
 @dataclass
@@ -82,9 +93,11 @@ class Log:
         self.puts.clear()
         self.marks.append((self.count, memory, spent, put, found))
         each = self.pace(len(self.marks) - 2, len(self.marks) - 1) if len(self.marks) > 1 else spent / self.count
-        print(f"{self.count:6} cases {time.perf_counter() - self.start:7.0f} s {memory / 1e6:7.0f} MB "
-              f"{1e3 * each:6.1f} ms a case; store: {1e3 * put:.2f} ms to write, {1e3 * found:.2f} ms to find",
-              flush=True)  # fmt: skip
+        print(
+            f"{self.count:6} cases {time.perf_counter() - self.start:7.0f} s {memory / 1e6:7.0f} MB "
+            f"{1e3 * each:6.1f} ms a case; store: {1e3 * put:.2f} ms to write, {1e3 * found:.2f} ms to find",
+            flush=True,
+        )
 
     def pace(self, first: int, last: int) -> float:
         """Return the processor time of a case (s) between two marks."""

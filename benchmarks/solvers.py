@@ -32,9 +32,20 @@ RATIOS = {"displacement": (0.3, 0.45, 0.49), "mixed": (0.45, 0.49, 0.4999)}
 YOUNG = 10e3
 PRESS = Motion((0.0, 0.0, -1.0))
 COLUMNS = {
-    "element": "", "degree": "d", "poisson": "g", "dofs": "d", "method": "", "iterations": "d", "assemble": ".0f",
-    "setup": ".0f", "solve": ".0f", "total": ".0f", "application": ".2f", "bandwidth": ".2f", "bytes": ".0f",
-}  # fmt: skip
+    "element": "",
+    "degree": "d",
+    "poisson": "g",
+    "dofs": "d",
+    "method": "",
+    "iterations": "d",
+    "assemble": ".0f",
+    "setup": ".0f",
+    "solve": ".0f",
+    "total": ".0f",
+    "application": ".2f",
+    "bandwidth": ".2f",
+    "bytes": ".0f",
+}
 
 
 def measure(element: str, degree: int, poisson: float, size: tuple[float, float], method: str, repeats: int) -> None:
@@ -67,11 +78,20 @@ def measure(element: str, degree: int, poisson: float, size: tuple[float, float]
         assemble, setup, solve, unit = (statistics.median(values) for values in zip(*runs, strict=True))
         moved = matrix.getInfo()["nz_used"] * (8 + 4 / 9) + 16 * matrix.getSize()[0]
         row = {
-            "element": element, "degree": degree, "poisson": poisson, "dofs": problem.dofs, "method": method,
-            "iterations": iterations, "assemble": assemble, "setup": setup, "solve": solve, "total": setup + solve,
-            "application": 1e3 * unit, "bandwidth": moved / unit / _stream(),
+            "element": element,
+            "degree": degree,
+            "poisson": poisson,
+            "dofs": problem.dofs,
+            "method": method,
+            "iterations": iterations,
+            "assemble": assemble,
+            "setup": setup,
+            "solve": solve,
+            "total": setup + solve,
+            "application": 1e3 * unit,
+            "bandwidth": moved / unit / _stream(),
             "bytes": (base.peak() - held) / problem.dofs,
-        }  # fmt: skip
+        }
     print(json.dumps(row), flush=True)
 
 
@@ -83,10 +103,14 @@ def _case(degree: int, size: tuple[float, float]) -> Any:
         "material": {"young": "10 kPa", "poisson": 0.3},
         "probe": {"action": "pierce", "shape": "disc", "radius": "2 mm", "depth": "0.2 mm"},
         "mesh": {
-            "epsilon": "full", "fine": f"{size[0]} mm", "coarse": "20 mm", "rim": f"{size[1]} mm", "growth": 0.5,
+            "epsilon": "full",
+            "fine": f"{size[0]} mm",
+            "coarse": "20 mm",
+            "rim": f"{size[1]} mm",
+            "growth": 0.5,
             "degree": degree,
         },
-    }  # fmt: skip
+    }
     return parse(content).case(())
 
 

@@ -88,8 +88,10 @@ def _modules(tree: Path, arguments: list[str], place: Path) -> int:
     found = _run(tree, ["-c", "import pipeline, sys; print(pipeline.__file__, file=sys.stderr)"], place)
     if Path(found.strip()).parents[1] != tree:
         raise RuntimeError(f"{tree}: Python takes {found.strip()} for it")
-    return sum(line.startswith("import time:") for line in _run(tree, ["-X", "importtime", "-m", "pipeline",
-                                                                       *arguments], place).splitlines())  # fmt: skip
+    return sum(
+        line.startswith("import time:")
+        for line in _run(tree, ["-X", "importtime", "-m", "pipeline", *arguments], place).splitlines()
+    )
 
 
 if __name__ == "__main__":

@@ -125,11 +125,18 @@ def _solved(
         told = model.query_all(asked, young=1.0, poisson=poisson)
         soft = [depth / float(touch.force[2]) for depth, touch in zip(depths, own, strict=True)]
         truth = np.linalg.solve([[soft[0], felt], [felt, soft[1]]], depths)
-        yield poisson, [
-            Felt(hypot(x - to_x, y - to_y) / (a + b), 1 - force / float(single.force[2]),
-                 float(touch.force[2]) / force - 1, touch.force_error)
-            for force, single, touch in zip(truth.tolist(), own, told, strict=True)
-        ]  # fmt: skip
+        yield (
+            poisson,
+            [
+                Felt(
+                    hypot(x - to_x, y - to_y) / (a + b),
+                    1 - force / float(single.force[2]),
+                    float(touch.force[2]) / force - 1,
+                    touch.force_error,
+                )
+                for force, single, touch in zip(truth.tolist(), own, told, strict=True)
+            ],
+        )
 
 
 if __name__ == "__main__":

@@ -28,9 +28,11 @@ DPI = 130
 # Tools of compliance.toml, by their contact.
 MARKS = {"o": "slides", "s": "sticks", "^": "ball", "D": "cone"}
 KINDS: dict[str, Callable[[str], bool]] = {
-    "slides": lambda name: name.endswith("mm"), "sticks": lambda name: name.endswith("sticks"),
-    "ball": lambda name: name == "ball", "cone": lambda name: name == "cone",
-}  # fmt: skip
+    "slides": lambda name: name.endswith("mm"),
+    "sticks": lambda name: name.endswith("sticks"),
+    "ball": lambda name: name == "ball",
+    "cone": lambda name: name == "cone",
+}
 # What the paper claims of F/F_max, at ε (mm).
 PAPER = (10.0, 0.8)
 

@@ -12,9 +12,23 @@ DOCS = Path(__file__).parent
 PAGE, STUDIES, PICTURES = DOCS / "scenes.md", DOCS / "scenes", DOCS / "figures" / "scenes"
 # In the order of the page; studies that are not named here follow by their names.
 ORDER = (
-    "box", "blade", "incision", "cylinder", "column", "layers", "tumour", "ellipsoid", "sphere", "cone", "wedge",
-    "tilted", "cad", "organ", "organ-tumour", "image",
-)  # fmt: skip
+    "box",
+    "blade",
+    "incision",
+    "cylinder",
+    "column",
+    "layers",
+    "tumour",
+    "ellipsoid",
+    "sphere",
+    "cone",
+    "wedge",
+    "tilted",
+    "cad",
+    "organ",
+    "organ-tumour",
+    "image",
+)
 # Bytes of a picture.
 MOST = 150_000
 

@@ -17,11 +17,13 @@ from tests.report.browser import Browser
 
 FIGURES = Path(__file__).parent / "figures"
 # What the hand does: a ball, two millimetres deep, near a corner, beside the pole, or near the border.
-ASKED = MappingProxyType({
-    "touch": {"tool": "sphere", "x": 22, "y": -12, "radius": 7, "depth": 2.2},
-    "touch_curved": {"tool": "sphere", "x": 6, "y": -7, "radius": 6, "depth": 2},
-    "touch_organ": {"tool": "sphere", "x": 7.8, "y": -7.5, "radius": 6, "depth": 1.5},
-})  # fmt: skip
+ASKED = MappingProxyType(
+    {
+        "touch": {"tool": "sphere", "x": 22, "y": -12, "radius": 7, "depth": 2.2},
+        "touch_curved": {"tool": "sphere", "x": 6, "y": -7, "radius": 6, "depth": 2},
+        "touch_organ": {"tool": "sphere", "x": 7.8, "y": -7.5, "radius": 6, "depth": 1.5},
+    }
+)
 TITLES = MappingProxyType({"touch": "A soft pad", "touch_curved": "An ellipsoid", "touch_organ": "A liver"})
 _WAIT = "new Promise(done => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(done)), 500))"
 

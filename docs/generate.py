@@ -51,13 +51,14 @@ def write_reference(folder: Path) -> None:
 def study_page() -> str:
     """Return the page of every key of a study file."""
     lines = [
-        "# Study file", "",
+        "# Study file",
+        "",
         "TOML. A list where one value is expected is a sweep, and a dimension of the dataset; so is an array of tables "
         "(`[[body]]`, `[[material]]`, `[[probe]]`, `[[mesh]]`), labelled by the tables' `name`. Quantities are text, "
-        "one number and one unit (`\"10 mm\"`, `\"12 kPa\"`, `\"1 %\"`, `\"60 deg\"`): metre and pascal with their "
+        'one number and one unit (`"10 mm"`, `"12 kPa"`, `"1 %"`, `"60 deg"`): metre and pascal with their '
         "prefixes, `bar`, `%`, `deg` and `rad`; of loads kg/m^3 and m/s^2. A decimal comma, a ±, or a sum is an error. "
         "`title` stands before the sections.",
-    ]  # fmt: skip
+    ]
     for section in all_sections():
         lines += [
             "",
@@ -84,26 +85,31 @@ def dataset_page() -> str:
             study[section] = keys if "shape" in keys else study.get(section, {}) | keys
         found |= {name: variable.attrs for name, variable in build(make_plan(parse(study)), {}).data_vars.items()}
     lines = [
-        "# Dataset", "",
+        "# Dataset",
+        "",
         "`results/<study>.nc`: netCDF4, SI units, CF attributes. Its dimensions are what the study sweeps, in the "
         "file's order, with coordinates named like the keys of `body`, `material`, `probe` and `mesh`. An array of "
         "tables gives the dimension `body`, `material`, `probe` or `mesh`; a radius or shape is `probe_radius`, "
         "`body_radius`; a key of a layer or an inclusion has its name before it, `skin_young`. A path gives the "
         "dimension `path`, a raster `x` and `y`: lengths in m, and `at_x`, `at_y` and `at_z` are then coordinates. "
-        "`epsilon` is infinite for the full order.", "",
-        "What belongs to loads, slits, unilateral contact, `motion = \"all\"`, several laws or a mended file is there "
-        "only where the study has it.", "",
+        "`epsilon` is infinite for the full order.",
+        "",
+        'What belongs to loads, slits, unilateral contact, `motion = "all"`, several laws or a mended file is there '
+        "only where the study has it.",
+        "",
         *_table(("variable", "unit", "meaning")),
-    ]  # fmt: skip
+    ]
     for name, attrs in sorted(found.items()):
         unit = attrs.get("units", "text")
         lines.append(_row(f"`{name}`", "" if unit == "1" else unit, attrs.get("long_name", "")))
     lines += [
-        "", "Values are missing (NaN; -1 for counts) where a case failed, was skipped or has not been run. Where a "
-        "path has left the body, `status` is `lost` and `force` 0.", "",
+        "",
+        "Values are missing (NaN; -1 for counts) where a case failed, was skipped or has not been run. Where a "
+        "path has left the body, `status` is `lost` and `force` 0.",
+        "",
         "Attributes of the dataset: the study's text (`study`) and its hash, versions of the program and its "
         "libraries, git commit, host, ranks, start and end.",
-    ]  # fmt: skip
+    ]
     return "\n".join(lines) + "\n"
 
 
@@ -111,11 +117,13 @@ def commands_page() -> str:
     """Return the page of every command with its arguments and options."""
     root = typer.main.get_command(app)
     lines = [
-        "# Commands", "",
-        "`epsmesh COMMAND --help` says the same. `python -m pipeline` is the command, too.", "",
+        "# Commands",
+        "",
+        "`epsmesh COMMAND --help` says the same. `python -m pipeline` is the command, too.",
+        "",
         "Exit status: 0 done, 1 some cases failed, 2 the input is wrong, 130 interrupted. "
         "Errors and progress go to standard error. Colour is for terminals; `NO_COLOR=1` does without.",
-    ]  # fmt: skip
+    ]
     for name, command in _commands(root):
         lines += ["", f"## `epsmesh {name}`", "", *_help(command.help or "")]
         rows = [row for parameter in command.params if (row := _parameter(parameter))]

@@ -29,9 +29,10 @@ _MISSING = 1
 # What a run says of cases that failed because the process of an earlier one was killed.
 _BLAMED = "the process of an earlier run ended"
 STUDY = small_text(
-    material={"poisson": [0.3, 0.4]}, mesh={"epsilon": ["4 mm", "full"], "outside": ["coarse", "free"], "degree": 1},
+    material={"poisson": [0.3, 0.4]},
+    mesh={"epsilon": ["4 mm", "full"], "outside": ["coarse", "free"], "degree": 1},
     solve={"exact": False},
-)  # fmt: skip
+)
 
 
 def main(arguments: list[str]) -> int:

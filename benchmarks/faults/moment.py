@@ -119,9 +119,14 @@ class Scene:
         own = {"EPSMESH_CACHE": str(self.folder / "cache"), _MARK: str(self.folder), "PYTHONPATH": str(ROOT)}
         with (self.folder / "said").open("wb") as said:
             return subprocess.Popen(
-                command, cwd=ROOT, env={**kept, **_MPI, **own}, start_new_session=True, stdin=subprocess.DEVNULL,
-                stdout=said, stderr=subprocess.STDOUT,
-            )  # fmt: skip
+                command,
+                cwd=ROOT,
+                env={**kept, **_MPI, **own},
+                start_new_session=True,
+                stdin=subprocess.DEVNULL,
+                stdout=said,
+                stderr=subprocess.STDOUT,
+            )
 
     def run_on(self, ranks: int = 1) -> int:
         """Run to the end, and return the status."""

@@ -15,9 +15,11 @@ from pipeline.report.figures import STYLE, save
 from pipeline.report.pareto import front
 
 _LOOKS = {
-    "this program": ("#d81b60", "-", "*"), "this program, meridian": ("#2a9d8f", "-", "D"),
-    "NGSolve": ("#1f5fa8", "-", "o"), "scikit-fem": ("#c98a00", "-", "s"),
-}  # fmt: skip
+    "this program": ("#d81b60", "-", "*"),
+    "this program, meridian": ("#2a9d8f", "-", "D"),
+    "NGSolve": ("#1f5fa8", "-", "o"),
+    "scikit-fem": ("#c98a00", "-", "s"),
+}
 
 
 def draw(runs: Sequence[Run], path: Path) -> Path:

@@ -17,10 +17,21 @@ _CLOSE = 1e-6
 
 
 def solve(
-    scene: Task, threads: int, *, order: int, rim: float, maxh: float, grading: float, levels: int,
-    factor: float = 0.15, safety: float = 2.0, corners: bool = True,
-    solver: str = "sparsecholesky", gamma: float = 5.0, tolerance: float = 1e-3,
-) -> Answer:  # fmt: skip
+    scene: Task,
+    threads: int,
+    *,
+    order: int,
+    rim: float,
+    maxh: float,
+    grading: float,
+    levels: int,
+    factor: float = 0.15,
+    safety: float = 2.0,
+    corners: bool = True,
+    solver: str = "sparsecholesky",
+    gamma: float = 5.0,
+    tolerance: float = 1e-3,
+) -> Answer:
     """Return F: order p, elements of ``rim`` half widths at the probe's edge, growing by ``grading`` to ``maxh`` mm.
 
     The edge, and with ``corners`` a blade's corners, are then refined ``levels`` times towards themselves, each time by

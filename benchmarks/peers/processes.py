@@ -32,10 +32,15 @@ def ask(program: str, job: dict[str, Any]) -> Iterator[dict[str, Any]]:
     with (
         TemporaryFile("w+") as errors,
         subprocess.Popen(
-            command, cwd=ROOT, env=_environment(job), stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors,
+            command,
+            cwd=ROOT,
+            env=_environment(job),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=errors,
             text=True,
         ) as process,
-    ):  # fmt: skip
+    ):
         assert process.stdin is not None
         assert process.stdout is not None
         process.stdin.write(json.dumps(job))

@@ -53,10 +53,15 @@ def study(scene: Task, mesh: dict[str, Any]) -> Study:
     probe: dict[str, Any] = {"shape": scene.probe[0], "depth": f"{_depth(scene)} mm", "at": _mm(*scene.at)}
     body |= {"size": _mm(*scene.body[1:])} if scene.body[0] == "box" else _named(scene.body, "radius", "height")
     probe |= _PROBES[scene.probe[0]](scene.probe)
-    return parse({
-        "body": body, "probe": probe, "material": {"young": f"{YOUNG} Pa", "poisson": scene.poisson}, "mesh": mesh,
-        "solve": {"exact": False},
-    })  # fmt: skip
+    return parse(
+        {
+            "body": body,
+            "probe": probe,
+            "material": {"young": f"{YOUNG} Pa", "poisson": scene.poisson},
+            "mesh": mesh,
+            "solve": {"exact": False},
+        }
+    )
 
 
 def _depth(scene: Task) -> float:

@@ -158,6 +158,10 @@ def to_json(
         for s, by_cpu in zip(standings(runs), standings(runs, "cpu"), strict=True)
     ]
     return {
-        "machine": machine, "goal": GOAL, "ratios": ratios, "failures": failures,
-        "truths": {name: asdict(truth) for name, truth in truths.items()}, "runs": [asdict(run) for run in runs],
-    }  # fmt: skip
+        "machine": machine,
+        "goal": GOAL,
+        "ratios": ratios,
+        "failures": failures,
+        "truths": {name: asdict(truth) for name, truth in truths.items()},
+        "runs": [asdict(run) for run in runs],
+    }

@@ -58,9 +58,13 @@ def _mesh(scene: Task, rim: float, growth: float) -> tuple[np.ndarray, np.ndarra
     if not gmsh.isInitialized():
         gmsh.initialize([""], readConfigFiles=False)
         options = {
-            "General.Terminal": 0, "General.NumThreads": 1, "Mesh.Algorithm3D": _HXT, "Mesh.MeshSizeFromPoints": 0,
-            "Mesh.MeshSizeExtendFromBoundary": 0, "Mesh.ElementOrder": 2,
-        }  # fmt: skip
+            "General.Terminal": 0,
+            "General.NumThreads": 1,
+            "Mesh.Algorithm3D": _HXT,
+            "Mesh.MeshSizeFromPoints": 0,
+            "Mesh.MeshSizeExtendFromBoundary": 0,
+            "Mesh.ElementOrder": 2,
+        }
         for name, value in options.items():
             gmsh.option.setNumber(name, value)
     gmsh.clear()

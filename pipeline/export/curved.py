@@ -37,9 +37,14 @@ _OFF, _LEAST_OFF, _ALIGNED = 1.5, 1e-3, 0.1
 
 
 def curved_model(
-    scope: Scope, solver: Solver, accuracy: float, largest: float, bar: tuple[float, float, float, float], _: float,
+    scope: Scope,
+    solver: Solver,
+    accuracy: float,
+    largest: float,
+    bar: tuple[float, float, float, float],
+    _: float,
     ranks: Ranks = ALONE,
-) -> tuple[Model, float, int]:  # fmt: skip
+) -> tuple[Model, float, int]:
     """Return a model, by how much its table missed, and how many places were solved for; collective.
 
     Raises:
@@ -68,9 +73,20 @@ def curved_model(
     table = replace(table, leans=False)
     face, off, bend_error = _face(scope, table, middle)
     model = Model(
-        table, np.array([*middle, 0.0]), np.eye(3), region.sides, room, scope.young, scope.poisson, largest,
-        (*bar[:3], float(np.mean(told))), face, max(_OFF * off, _LEAST_OFF * room), _ALIGNED, bend_error,
-    )  # fmt: skip
+        table,
+        np.array([*middle, 0.0]),
+        np.eye(3),
+        region.sides,
+        room,
+        scope.young,
+        scope.poisson,
+        largest,
+        (*bar[:3], float(np.mean(told))),
+        face,
+        max(_OFF * off, _LEAST_OFF * room),
+        _ALIGNED,
+        bend_error,
+    )
     return model, missed, len(known) * len(ratios)
 
 

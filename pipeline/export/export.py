@@ -60,16 +60,27 @@ class Exported:
         """Return what there is to say of it, with what share of its judged touches is as near as was asked for."""
         errors = np.abs([check.error for check in self.judged])
         return {
-            "places": self.places, "coefficients": 2 * self.model.table.reciprocal.size, "judged": len(self.judged),
-            "held": self.held, "largest_error": float(errors.max()), "as_asked": float(np.mean(errors <= accuracy)),
-            "median_bar": float(np.median([check.bar for check in self.judged])), "table_missed": self.missed,
-        }  # fmt: skip
+            "places": self.places,
+            "coefficients": 2 * self.model.table.reciprocal.size,
+            "judged": len(self.judged),
+            "held": self.held,
+            "largest_error": float(errors.max()),
+            "as_asked": float(np.mean(errors <= accuracy)),
+            "median_bar": float(np.median([check.bar for check in self.judged])),
+            "table_missed": self.missed,
+        }
 
 
 def export(
-    scope: Scope, accuracy: float, checks: int, *, margin: float = MARGIN, largest: float = LARGEST,
-    surface: bool = False, ranks: Ranks = ALONE,
-) -> Exported:  # fmt: skip
+    scope: Scope,
+    accuracy: float,
+    checks: int,
+    *,
+    margin: float = MARGIN,
+    largest: float = LARGEST,
+    surface: bool = False,
+    ranks: Ranks = ALONE,
+) -> Exported:
     """Return the model of a study to a relative ``accuracy``, with half of ``checks`` fitted to and half judged on.
 
     With ``surface`` it holds what is seen of the body, too. Collective: ``ranks`` share what there is to solve.
@@ -108,9 +119,14 @@ def export(
 
 
 def _flat(
-    scope: Scope, _: Solver, accuracy: float, largest: float, bar: tuple[float, float, float, float], margin: float,
+    scope: Scope,
+    _: Solver,
+    accuracy: float,
+    largest: float,
+    bar: tuple[float, float, float, float],
+    margin: float,
     ranks: Ranks,
-) -> tuple[Model, float, int]:  # fmt: skip
+) -> tuple[Model, float, int]:
     """Return the model of a flat body, by how much its table missed, and the number of places solved; collective."""
     assert isinstance(scope.body, Layered)
     region = Region.of(scope.body, margin)
@@ -127,9 +143,17 @@ def _flat(
 
     table, missed = tabulate(region, scope.poissons, counted, _SHARE * accuracy)
     model = Model(
-        table, np.array([0.0, 0.0, scope.body.heights[1]]), np.eye(3), region.sides, region.thickness, scope.young,
-        scope.poisson, largest, bar, off=_OFF * region.thickness,
-    )  # fmt: skip
+        table,
+        np.array([0.0, 0.0, scope.body.heights[1]]),
+        np.eye(3),
+        region.sides,
+        region.thickness,
+        scope.young,
+        scope.poisson,
+        largest,
+        bar,
+        off=_OFF * region.thickness,
+    )
     return model, missed, len(solved)
 
 

@@ -65,10 +65,18 @@ def write_model(
     """Write a model with its ``checks``, (unit, values) by name, in one piece or not at all."""
     table = model.table
     numbers = {
-        "format": FORMAT, "c_ref": table.c_ref, "is_round": float(table.is_round), "thickness": model.thickness,
-        "young": model.young, "poisson": model.poisson, "largest": model.largest, "leans": float(table.leans),
-        "off": model.off, "aligned": model.aligned, "bend_error": model.bend_error,
-    }  # fmt: skip
+        "format": FORMAT,
+        "c_ref": table.c_ref,
+        "is_round": float(table.is_round),
+        "thickness": model.thickness,
+        "young": model.young,
+        "poisson": model.poisson,
+        "largest": model.largest,
+        "leans": float(table.leans),
+        "off": model.off,
+        "aligned": model.aligned,
+        "bend_error": model.bend_error,
+    }
     variables: dict[str, Variable] = {
         "reciprocal": (("poisson_node", "v", "u"), table.reciprocal, {"units": "m"}),
         "curvature": (("poisson_node", "v", "u"), table.curvature, {"units": "1"}),

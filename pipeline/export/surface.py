@@ -23,9 +23,9 @@ def tabulate_surface(far: FarFields, origin: FloatArray) -> SurfaceTable:
     """Return the modes of the whole boundary, and by how much of the depth they may be off at places held out."""
     boundary, sources = far.solved[0], len(far.sources)
     images = [image_of(boundary, motion) for motion in far.motions]
-    fields = np.array([
-        [image.of(values).ravel() for values in found.values[:sources] for image in images] for found in far.solved
-    ])  # fmt: skip
+    fields = np.array(
+        [[image.of(values).ravel() for values in found.values[:sources] for image in images] for found in far.solved]
+    )
     modes = _modes((fields * far.rooms[:, None]).reshape(-1, fields.shape[-1]))
     basis = far.basis()
     amounts = np.array([np.linalg.lstsq(basis, found @ modes, rcond=None)[0] for found in fields])
@@ -53,9 +53,14 @@ def _table(far: FarFields, modes: FloatArray, amounts: FloatArray, origin: Float
     quarters = boundary.triangles[:, _QUARTERS].reshape(-1, 3)
     whole = np.round(modes / units).astype(np.float32).reshape(-1, 3, rank)
     return SurfaceTable(
-        (boundary.nodes - origin).astype(np.float32), quarters.astype(np.int32), whole,
-        (coefficients * units[:, None, None, None]).astype(np.float32), 0.0, far.body.region.reach, far.poissons,
-    )  # fmt: skip
+        (boundary.nodes - origin).astype(np.float32),
+        quarters.astype(np.int32),
+        whole,
+        (coefficients * units[:, None, None, None]).astype(np.float32),
+        0.0,
+        far.body.region.reach,
+        far.poissons,
+    )
 
 
 def _judged(table: SurfaceTable, far: FarFields) -> SurfaceTable:

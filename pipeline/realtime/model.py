@@ -25,8 +25,11 @@ _SMALLEST = 1e-6
 _STICKS = 0.1
 # What may be said of the contact of a tool.
 _CONTACTS = {
-    "disc": ("frictionless", "bonded"), "blade": ("frictionless",), "sphere": ("unilateral",), "cone": ("unilateral",),
-}  # fmt: skip
+    "disc": ("frictionless", "bonded"),
+    "blade": ("frictionless",),
+    "sphere": ("unilateral",),
+    "cone": ("unilateral",),
+}
 
 
 class _Asked(NamedTuple):
@@ -164,18 +167,36 @@ class Model:
         return dict.fromkeys(broken, "damaged") if broken else found
 
     def _asked_of(
-        self, tool: str, *, at: Sequence[float], depth: float, radius: float = nan, angle: float = nan,
-        young: float | None = None, poisson: float | None = None, axis: Sequence[float] | None = None,
-        length: float = nan, width: float = nan, along: Sequence[float] | None = None, contact: str | None = None,
-    ) -> _Asked | str:  # fmt: skip
+        self,
+        tool: str,
+        *,
+        at: Sequence[float],
+        depth: float,
+        radius: float = nan,
+        angle: float = nan,
+        young: float | None = None,
+        poisson: float | None = None,
+        axis: Sequence[float] | None = None,
+        length: float = nan,
+        width: float = nan,
+        along: Sequence[float] | None = None,
+        contact: str | None = None,
+    ) -> _Asked | str:
         """As a query has it."""
         return self._asked(tool, at, depth, (radius, angle, length, width), young, poisson, axis, along, contact)
 
     def _asked(
-        self, tool: str, at: Sequence[float], depth: float, sizes: tuple[float, float, float, float],
-        young: float | None, poisson: float | None, axis: Sequence[float] | None, along: Sequence[float] | None,
+        self,
+        tool: str,
+        at: Sequence[float],
+        depth: float,
+        sizes: tuple[float, float, float, float],
+        young: float | None,
+        poisson: float | None,
+        axis: Sequence[float] | None,
+        along: Sequence[float] | None,
         contact: str | None,
-    ) -> _Asked | str:  # fmt: skip
+    ) -> _Asked | str:
         """Return a query, or the status of one that the model does not answer."""
         modulus = self.young if young is None else float(young)
         ratio = self.poisson if poisson is None else float(poisson)
@@ -210,11 +231,13 @@ class Model:
         modulus = asked.young
         (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = self._frame
         out_x, out_y, out_z = (modulus * part for part in asked.spot.force(found, asked.depth))
-        force = np.array([
-            out_x * xx + out_y * yx + out_z * zx,
-            out_x * xy + out_y * yy + out_z * zy,
-            out_x * xz + out_y * yz + out_z * zz,
-        ])  # fmt: skip
+        force = np.array(
+            [
+                out_x * xx + out_y * yx + out_z * zx,
+                out_x * xy + out_y * yy + out_z * zy,
+                out_x * xz + out_y * yz + out_z * zz,
+            ]
+        )
         if not (isfinite(out_x) and isfinite(out_y) and isfinite(out_z) and 0 <= error < inf):
             return refused("damaged")
         if not (found.force > 0 and found.stiffness > 0):

@@ -87,9 +87,11 @@ class Pairs:
         (a, b), (_, rows, columns) = self.reach, self.modes.shape
         (u, du, ddu), (v, dv, ddv) = polynomials(x / a, columns), polynomials(y / b, rows)
         return (
-            np.outer(v, u).ravel(), np.outer(v, du).ravel() / a, np.outer(dv, u).ravel() / b,
+            np.outer(v, u).ravel(),
+            np.outer(v, du).ravel() / a,
+            np.outer(dv, u).ravel() / b,
             np.outer(v, ddu).ravel() / a**2 + np.outer(ddv, u).ravel() / b**2,
-        )  # fmt: skip
+        )
 
 
 def read_pairs(found: Mapping[str, Array], reach: Pair, poisson: Pair) -> Pairs | None:
@@ -105,11 +107,13 @@ def read_pairs(found: Mapping[str, Array], reach: Pair, poisson: Pair) -> Pairs 
     rank, rows, columns = modes.shape
     fits = {
         "pair_modes": rank <= MOST_MODES and modes.size <= MOST_TERMS and max(rows, columns) <= 64,
-        "pair_links": links.shape[1:] == (rank, rank) and len(links) <= MOST_LINKS
-        and bool((links == links.transpose(0, 2, 1)).all()) and (len(links) == 1 or poisson[0] < poisson[1]),
+        "pair_links": links.shape[1:] == (rank, rank)
+        and len(links) <= MOST_LINKS
+        and bool((links == links.transpose(0, 2, 1)).all())
+        and (len(links) == 1 or poisson[0] < poisson[1]),
         "pair_error": bool(found["pair_error"] >= 0),
         "pair_aside": bool(found["pair_aside"] >= 0),
-    }  # fmt: skip
+    }
     for name, is_right in fits.items():
         if not is_right:
             raise ModelError(f"{name} is not that of a model")

@@ -127,9 +127,14 @@ class Patch:
                     self._fills[number] = np.clip(reached / self.tip.outline(depth), 0.2, 1.0)
 
     def query(
-        self, *, at: Sequence[float], depth: float, turn: float = 0.0, young: float | None = None,
+        self,
+        *,
+        at: Sequence[float],
+        depth: float,
+        turn: float = 0.0,
+        young: float | None = None,
         poisson: float | None = None,
-    ) -> Touch:  # fmt: skip
+    ) -> Touch:
         """Return what the tip feels, turned by ``turn`` (rad) about the outward normal from the face's x to its y.
 
         As ``Model.query`` else, which says why a query is refused; a tip whose contact comes near its rim is too large.

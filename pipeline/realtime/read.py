@@ -49,14 +49,27 @@ def model_of(data: bytes) -> Model:
     is_round, (even_x, even_y) = bool(found["is_round"] == 1.0), found["even"] == 1.0
     tensors = {"tensors": found["tensors"]} if "tensors" in found else {}
     table = Table(
-        found["reciprocal"], found["curvature"], float(found["c_ref"]), (reach[0], reach[1]), is_round,
-        (ratios[0], ratios[1]), (bool(even_x), bool(even_y)), leans=bool(found["leans"] == 1.0), **tensors,
-    )  # fmt: skip
+        found["reciprocal"],
+        found["curvature"],
+        float(found["c_ref"]),
+        (reach[0], reach[1]),
+        is_round,
+        (ratios[0], ratios[1]),
+        (bool(even_x), bool(even_y)),
+        leans=bool(found["leans"] == 1.0),
+        **tensors,
+    )
     table.prepare()
     return Model(
-        table, found["origin"], found["axes"], (sides[0], sides[1]), bar=(bar[0], bar[1], bar[2], bar[3]),
-        face=Face(found["height"], found["bend"]), pairs=read_pairs(found, table.reach, table.poisson), **rest,
-    )  # fmt: skip
+        table,
+        found["origin"],
+        found["axes"],
+        (sides[0], sides[1]),
+        bar=(bar[0], bar[1], bar[2], bar[3]),
+        face=Face(found["height"], found["bend"]),
+        pairs=read_pairs(found, table.reach, table.poisson),
+        **rest,
+    )
 
 
 def _check(found: dict[str, NDArray[np.float64]]) -> None:

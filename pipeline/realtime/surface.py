@@ -80,19 +80,38 @@ class Surface:
         return self.table.triangles
 
     def press(
-        self, tool: str, *, at: Sequence[float], depth: float, radius: float = nan, angle: float = nan,
-        young: float | None = None, poisson: float | None = None, length: float = nan, width: float = nan,
-        along: Sequence[float] | None = None, contact: str | None = None,
-    ) -> tuple[Touch, Array]:  # fmt: skip
+        self,
+        tool: str,
+        *,
+        at: Sequence[float],
+        depth: float,
+        radius: float = nan,
+        angle: float = nan,
+        young: float | None = None,
+        poisson: float | None = None,
+        length: float = nan,
+        width: float = nan,
+        along: Sequence[float] | None = None,
+        contact: str | None = None,
+    ) -> tuple[Touch, Array]:
         """Return what ``Model.query`` returns, and the displacement (n, 3), in m, of all points.
 
         It is 0 where the tool does not touch, and NaN if the model refuses.
         """
         model, table = self.model, self.table
         touch = model.query(
-            tool, at=at, depth=depth, radius=radius, angle=angle, young=young, poisson=poisson, length=length,
-            width=width, along=along, contact=contact,
-        )  # fmt: skip
+            tool,
+            at=at,
+            depth=depth,
+            radius=radius,
+            angle=angle,
+            young=young,
+            poisson=poisson,
+            length=length,
+            width=width,
+            along=along,
+            contact=contact,
+        )
         if touch.status != "ok":
             return touch, np.full(table.points.shape, 0.0 if touch.status == "lost" else nan)
         ratio = model.poisson if poisson is None else float(poisson)
@@ -147,7 +166,12 @@ def surface_of(data: bytes) -> Surface:
     if triangles.min(initial=0) < 0 or triangles.max(initial=0) >= count:
         raise ModelError("a triangle of the surface has a vertex that there is not")
     table = SurfaceTable(
-        points.astype(np.float32), triangles.astype(np.int32), modes.astype(np.float32), amounts.astype(np.float32),
-        float(parts["error"]), model.table.reach, model.table.poisson,
-    )  # fmt: skip
+        points.astype(np.float32),
+        triangles.astype(np.int32),
+        modes.astype(np.float32),
+        amounts.astype(np.float32),
+        float(parts["error"]),
+        model.table.reach,
+        model.table.poisson,
+    )
     return Surface(model, table)

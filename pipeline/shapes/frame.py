@@ -154,9 +154,7 @@ class Frame:
 
     def at(self, along: float, across: float) -> Vector:
         """Return the point (m) of the probe's own plane with these coordinates."""
-        x, y, z = (
-            p + along * t + across * s for p, t, s in zip(self.point, self.along, self.across, strict=True)
-        )  # fmt: skip
+        x, y, z = (p + along * t + across * s for p, t, s in zip(self.point, self.along, self.across, strict=True))
         return x, y, z
 
     def inward(self, length: float) -> Vector:

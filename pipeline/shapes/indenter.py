@@ -202,9 +202,11 @@ class Indenter(Probe):
             problems.error("probe.depth_range", _texts(self.depths), "must begin with the smaller depth")
         elif not (1 - _ROUNDING) * least <= self.depth <= (1 + _ROUNDING) * largest:
             problems.error(
-                "probe.depth", in_mm(self.depth), f"is not within depth_range, {in_mm(least)} to {in_mm(largest)}, "
+                "probe.depth",
+                in_mm(self.depth),
+                f"is not within depth_range, {in_mm(least)} to {in_mm(largest)}, "
                 "which the mesh is for: widen that, or leave it out for a mesh of each depth",
-            )  # fmt: skip
+            )
         slope = float(self.section.slope(np.array([self.contact_width]))[0])
         if slope > _STEEPEST:
             problems.warn(

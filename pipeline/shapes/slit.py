@@ -85,9 +85,11 @@ class Slit:
         along, down, close = np.abs(points[:, 0]), -points[:, 2], _ON * self.depth
         within, sunk = along < self.length / 2 + close, down < self.tip + close
         lines = [
-            within & (np.abs(down) < close), within & (np.abs(down - self.tip) < close),
-            sunk & (np.abs(along - self.length / 2) < close), np.abs(down - self.depth) < close,
-        ]  # fmt: skip
+            within & (np.abs(down) < close),
+            within & (np.abs(down - self.tip) < close),
+            sunk & (np.abs(along - self.length / 2) < close),
+            np.abs(down - self.depth) < close,
+        ]
         if isfinite(self.reach):
             lines.append(np.abs(along - self.reach) < close)
         return any(bool(line.all()) for line in lines)
@@ -95,8 +97,9 @@ class Slit:
     def edge_distance(self, along: str, across: str, height: str, unit: float) -> str:
         """Write the distance to the front and to the edge of the contact, in units of 1/``unit`` m."""
         half = self.tip / 2
-        touched = _to_rectangle(f"(Fabs({along})-{unit * self.length / 2:.12g})",
-                                f"(Fabs({height}+{unit * half:.12g})-{unit * half:.12g})")  # fmt: skip
+        touched = _to_rectangle(
+            f"(Fabs({along})-{unit * self.length / 2:.12g})", f"(Fabs({height}+{unit * half:.12g})-{unit * half:.12g})"
+        )
         front = f"(Fabs({height})-{unit * self.depth:.12g})"
         if isfinite(self.reach):
             # Mirrored in the surface: a slit has no edge at its mouth.

@@ -78,8 +78,9 @@ class Faces(Support):
         """Tell whether the face is one of those."""
         return any(
             bool(np.all(np.abs(surface.distance(points)) < tolerance))
-            for name in self.names for surface in surfaces[name]
-        )  # fmt: skip
+            for name in self.names
+            for surface in surfaces[name]
+        )
 
     def mirror_planes(self) -> tuple[str, ...]:
         """Return both planes: a name stands for a face and for its image."""

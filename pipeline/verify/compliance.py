@@ -16,9 +16,12 @@ _YOUNG, _DEPTH, _RADIUS = 10e3, 1e-5, 1e-3
 # sticks at ν = ½. (At smaller ν it is the first: what sticks to a half-space then pulls at it sideways.)
 _FOURTH, _SECOND = 1.0, 1.0
 _CASES = (
-    ("frictionless", 0.3, 0.05), ("frictionless", 0.3, 0.1), ("frictionless", 0.45, 0.1), ("bonded", 0.5, 0.05),
+    ("frictionless", 0.3, 0.05),
+    ("frictionless", 0.3, 0.1),
+    ("frictionless", 0.45, 0.1),
+    ("bonded", 0.5, 0.05),
     ("bonded", 0.5, 0.1),
-)  # fmt: skip
+)
 _PUBLISHED = 0.2  # a/h, the smallest in the table
 
 

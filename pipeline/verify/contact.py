@@ -32,7 +32,7 @@ _TOOLS: dict[str, Section] = {
     "sphere": {"shape": "sphere", "radius": "10 mm", "depth": "0.1 mm"},
     "cone": {"shape": "cone", "angle": "86 deg", "radius": "4 mm", "depth": "0.1 mm"},
     "rounded cone": {"shape": "cone", "angle": "84 deg", "tip": "5 mm", "radius": "4 mm", "depth": "0.12 mm"},
-}  # fmt: skip
+}
 _SKIN = {"name": "skin", "thickness": "0.6 mm", "young": "40 kPa", "poisson": 0.3}
 _SIZES = {"epsilon": "full", "fine": "2 mm", "coarse": "2 mm", "rim": "0.3 mm", "growth": 0.5, "degree": 2}
 # What the solver leaves of the difference between contact that is found and the same, prescribed.
@@ -58,9 +58,14 @@ def _half_space(comm: MPI.Comm) -> Iterator[Row]:
     a = ball.contact_radius(shallow)
     tools = (
         ("sphere", {"shape": "sphere", "radius": f"{_BALL} mm"}, shallow, plane * _ball_force(ball.tip, a), ball),
-        ("cone", {"shape": "cone", "angle": f"{_ANGLE} deg", "radius": "8 mm"}, deep,
-         2 / pi * plane * tan(cone.angle) * deep**2, cone),
-    )  # fmt: skip
+        (
+            "cone",
+            {"shape": "cone", "angle": f"{_ANGLE} deg", "radius": "8 mm"},
+            deep,
+            2 / pi * plane * tan(cone.angle) * deep**2,
+            cone,
+        ),
+    )
     for name, tool, depth, force, section in tools:
         record = _solved(comm, "2D", _cylinder(_FAR, _FAR), tool, depth)
         yield _row(f"half-space, {name}, F of depth", "2D", force, known.SNEDDON, record, 1e-4)
@@ -106,16 +111,23 @@ def _solid(comm: MPI.Comm) -> Iterator[Row]:
             for contact in ("unilateral", "frictionless")
         )
         yield Row(
-            f"disc that lifts off nowhere, on one mesh, ν = {nu:g}", "3D", known_one[0], "frictionless, prescribed",
-            found[0], _SAME, 0.0, found[2],
-        )  # fmt: skip
+            f"disc that lifts off nowhere, on one mesh, ν = {nu:g}",
+            "3D",
+            known_one[0],
+            "frictionless, prescribed",
+            found[0],
+            _SAME,
+            0.0,
+            found[2],
+        )
 
 
 def _scene(body: Section, tool: Section, poisson: float) -> Section:
     return {
-        "body": body, "material": {"young": f"{_YOUNG} Pa", "poisson": poisson},
+        "body": body,
+        "material": {"young": f"{_YOUNG} Pa", "poisson": poisson},
         "probe": {"contact": "unilateral"} | tool,
-    }  # fmt: skip
+    }
 
 
 def _layers(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
@@ -147,13 +159,15 @@ def _solved(
     comm: MPI.Comm, path: str, body: dict[str, Any], tool: dict[str, Any], depth: float, poisson: float = _POISSON
 ) -> Record:
     """Solve a scene to the accuracy of its path."""
-    study = parse({
-        "body": {"fixed": "bottom"} | body,
-        "material": {"young": f"{_YOUNG} Pa", "poisson": poisson},
-        "probe": tool | {"depth": f"{depth!r} m", "contact": "unilateral"},
-        "mesh": {"accuracy": _ACCURACY[path]},
-        "solve": {"exact": False},
-    })  # fmt: skip
+    study = parse(
+        {
+            "body": {"fixed": "bottom"} | body,
+            "material": {"young": f"{_YOUNG} Pa", "poisson": poisson},
+            "probe": tool | {"depth": f"{depth!r} m", "contact": "unilateral"},
+            "mesh": {"accuracy": _ACCURACY[path]},
+            "solve": {"exact": False},
+        }
+    )
     plan = make_plan(study, without=("axisymmetric",) if path == "3D" else ())
     (record,) = compute(plan, comm).values()
     return record

@@ -59,12 +59,14 @@ def _patch(degree: int, *, mixed: bool) -> float:
     """Largest nodal force inside a body in uniform strain, over the largest on its surface: a mesh with curved,
     quarter-point elements at the probe's edge.
     """
-    study = parse({
-        "body": {"shape": "cylinder", "radius": "20 mm", "height": "10 mm"},
-        "material": {"young": "1 kPa", "poisson": 0.4},
-        "probe": {"shape": "disc", "radius": "3 mm", "depth": "0.1 mm"},
-        "mesh": {"epsilon": "full", "fine": "8 mm", "coarse": "8 mm", "rim": "1 mm", "degree": degree},
-    })  # fmt: skip
+    study = parse(
+        {
+            "body": {"shape": "cylinder", "radius": "20 mm", "height": "10 mm"},
+            "material": {"young": "1 kPa", "poisson": 0.4},
+            "probe": {"shape": "disc", "radius": "3 mm", "depth": "0.1 mm"},
+            "mesh": {"epsilon": "full", "fine": "8 mm", "coarse": "8 mm", "rim": "1 mm", "degree": degree},
+        }
+    )
     (solve,) = [s for s in make_plan(study).solves if not s.is_reference]
     body = distribute(MPI.COMM_SELF, mesh_arrays(solve.case, ("x", "y")))
     space = vector_space(body.mesh, degree)

@@ -40,9 +40,7 @@ def _half_space(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
             force, source = known.half_space_disc(young, nu, a, depth, contact)
             scene = _scene(cylinder(FAR, FAR), nu, disc(1, contact=contact))
             for path in ("2D", "3D"):
-                yield against(
-                    comm, f"half-space, disc, {contact}, ν = {nu:g}", path, (force, source, 1e-4), scene
-                )  # fmt: skip
+                yield against(comm, f"half-space, disc, {contact}, ν = {nu:g}", path, (force, source, 1e-4), scene)
 
 
 def _rectangles(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
@@ -51,9 +49,12 @@ def _rectangles(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
         force = known.rectangle(stiffness, 10e3, 0.3, 1e-3, 1e-5)
         scene = _scene(cylinder(FAR, FAR), 0.3, blade(ratio, 1, contact="frictionless"))
         yield against(
-            comm, f"half-space, rectangle {ratio}:1, frictionless, ν = 0.3", "3D", (force, _RECTANGLE, error + 1e-4),
+            comm,
+            f"half-space, rectangle {ratio}:1, frictionless, ν = 0.3",
+            "3D",
+            (force, _RECTANGLE, error + 1e-4),
             scene,
-        )  # fmt: skip
+        )
 
 
 def _ellipses(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
@@ -63,9 +64,12 @@ def _ellipses(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
         for name, direction in (("", [1.0, 0.0, 0.0]), (", oblique", _OBLIQUE)):
             probe = ellipse((ratio, 1), contact="frictionless", direction=direction)
             yield against(
-                comm, f"half-space, ellipse {ratio:g}:1{name}, frictionless, ν = 0.3", "3D", (force, source, 1e-4),
+                comm,
+                f"half-space, ellipse {ratio:g}:1{name}, frictionless, ν = 0.3",
+                "3D",
+                (force, source, 1e-4),
                 _scene(cylinder(FAR, FAR), 0.3, probe),
-            )  # fmt: skip
+            )
 
 
 def _cylinders(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
@@ -99,9 +103,10 @@ def _incompressible(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
     for nu in (0.5,) if quick else _NEAR_HALF:
         for contact in ("bonded", "frictionless"):
             yield against_meridian(
-                comm, f"cylinder R = H = 20 mm, a = 2 mm, {contact}, ν = {nu:g}",
+                comm,
+                f"cylinder R = H = 20 mm, a = 2 mm, {contact}, ν = {nu:g}",
                 _scene(cylinder(20, 20), nu, disc(2, contact=contact)),
-            )  # fmt: skip
+            )
 
 
 def _scene(body: Section, nu: float, probe: Section) -> Section:

@@ -11,11 +11,17 @@ from scipy.special import ellipk
 # F / (E d) in mm, by contact and Poisson's ratio, of the cylinder R = H = 50 mm that is held at its bottom, under a
 # disc of 3 mm: axisymmetric, Taylor–Hood elements of degree 4 graded to 1e-5 of the radius at the rim.
 CYLINDER = {
-    ("bonded", 0.3): 7.126315, ("bonded", 0.45): 7.943726, ("bonded", 0.49): 8.325817,
-    ("bonded", 0.4999): 8.437103, ("bonded", 0.5): 8.438265,
-    ("frictionless", 0.3): 6.921313, ("frictionless", 0.45): 7.922109, ("frictionless", 0.49): 8.325029,
-    ("frictionless", 0.4999): 8.437071, ("frictionless", 0.5): 8.438229,
-}  # fmt: skip
+    ("bonded", 0.3): 7.126315,
+    ("bonded", 0.45): 7.943726,
+    ("bonded", 0.49): 8.325817,
+    ("bonded", 0.4999): 8.437103,
+    ("bonded", 0.5): 8.438265,
+    ("frictionless", 0.3): 6.921313,
+    ("frictionless", 0.45): 7.922109,
+    ("frictionless", 0.49): 8.325029,
+    ("frictionless", 0.4999): 8.437071,
+    ("frictionless", 0.5): 8.438229,
+}
 CYLINDER_ERROR = 2e-7
 CYLINDER_BODY = {"shape": "cylinder", "radius": "50 mm", "height": "50 mm"}
 CYLINDER_SOURCE = "axisymmetric, degree 4, converged to 1e-7"

@@ -24,18 +24,29 @@ def large_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
     value, _, more = solve(comm, "3D", nonlinear, sizes)
     name = "finite cylinder, disc, neo-Hookean"
     yield Row(
-        f"{name}, d = a/1000", "3D", reference, "linear elasticity, same mesh", value, 0.2 * _SMALL,
+        f"{name}, d = a/1000",
+        "3D",
+        reference,
+        "linear elasticity, same mesh",
+        value,
+        0.2 * _SMALL,
         message=message or more,
-    )  # fmt: skip
+    )
     for depth, ratio in _RATIO.items():
         if quick and depth > min(_RATIO):
             return
         exact, bar, message = solve(comm, "2D", _scene("linear", depth))
         value, own, more = solve(comm, "3D", _scene("neo-hookean", depth), mesh(rim=0.75, growth=0.5, fine=3))
         yield Row(
-            f"{name}, d = {depth:g} a", "3D", ratio * exact, f"F_linear × {ratio}, in the half plane", value, own,
-            bar + _RATIO_BAR, message or more,
-        )  # fmt: skip
+            f"{name}, d = {depth:g} a",
+            "3D",
+            ratio * exact,
+            f"F_linear × {ratio}, in the half plane",
+            value,
+            own,
+            bar + _RATIO_BAR,
+            message or more,
+        )
 
 
 def _scene(law: str, depth: float) -> dict[str, dict[str, object]]:

@@ -111,15 +111,26 @@ def _beside_a_disc(comm: MPI.Comm) -> Row:
     angles = 2 * pi * np.arange(80) / 80
     sinking = [[2 / pi * asin(1 / np.hypot(_AWAY + r * np.cos(t), r * np.sin(t))) for t in angles] for r in radii]
     mean = float(weights / 2 * _CAP * radii * 2 * pi @ np.mean(sinking, axis=1))
-    return _row("half-space, load beside a disc, frictionless, ν = 0.3", -_STRESS * mean * 1e-6, "I. N. Sneddon 1965",
-                record, 2e-3)  # fmt: skip
+    return _row(
+        "half-space, load beside a disc, frictionless, ν = 0.3",
+        -_STRESS * mean * 1e-6,
+        "I. N. Sneddon 1965",
+        record,
+        2e-3,
+    )
 
 
 def _solve(comm: MPI.Comm, body: Section, nu: float, probe: Section, load: Section) -> Record:
-    study = parse({
-        "body": body, "material": tissue(nu) | _HEAVY, "probe": probe, "load": load, "mesh": {"accuracy": "1 %"},
-        "solve": {"exact": False},
-    })  # fmt: skip
+    study = parse(
+        {
+            "body": body,
+            "material": tissue(nu) | _HEAVY,
+            "probe": probe,
+            "load": load,
+            "mesh": {"accuracy": "1 %"},
+            "solve": {"exact": False},
+        }
+    )
     (record,) = compute(make_plan(study), comm).values()
     return record
 

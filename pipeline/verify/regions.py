@@ -43,13 +43,12 @@ def _half_spaces(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
         force = layered_disc(solids[0], 1e-3 * thickness, solids[1], 1e-3, _DEPTH)
         force = known.in_cylinder(force, solids[1].young, nu_below, 1e-3 * FAR, _DEPTH)
         scene = {
-            "body": cylinder(FAR, FAR) | {"layers": layers([layer])}, "material": tissue(nu_below, young_below),
+            "body": cylinder(FAR, FAR) | {"layers": layers([layer])},
+            "material": tissue(nu_below, young_below),
             "probe": disc(1, contact="frictionless"),
-        }  # fmt: skip
+        }
         for path in ("2D", "3D"):
-            yield against(
-                comm, f"layer on a half-space, {name}, frictionless", path, (force, SOURCE, _SIZE), scene
-            )  # fmt: skip
+            yield against(comm, f"layer on a half-space, {name}, frictionless", path, (force, SOURCE, _SIZE), scene)
 
 
 def _springs(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
@@ -66,9 +65,15 @@ def _springs(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
         # The edge adds a share that falls like height / a, and its square: extrapolated to none.
         first, second, third = ratios
         yield Row(
-            f"wide punch on three layers, {contact}", "2D", 1.0, "springs in series, a / h to infinity",
-            (first - 6 * second + 8 * third) / 3, 0.0, _LEFT, message,
-        )  # fmt: skip
+            f"wide punch on three layers, {contact}",
+            "2D",
+            1.0,
+            "springs in series, a / h to infinity",
+            (first - 6 * second + 8 * third) / 3,
+            0.0,
+            _LEFT,
+            message,
+        )
 
 
 def _meridians(comm: MPI.Comm, quick: bool) -> Iterator[Row]:

@@ -53,20 +53,34 @@ def layers(stack: Iterable[tuple[float, float, float]]) -> list[Section]:
 
 
 def mesh(
-    rim: float = 0.4, growth: float = 0.5, fine: float = 8, coarse: float = 0.0, epsilon: float = inf, degree: int = 2,
+    rim: float = 0.4,
+    growth: float = 0.5,
+    fine: float = 8,
+    coarse: float = 0.0,
+    epsilon: float = inf,
+    degree: int = 2,
     **more: Any,
-) -> Section:  # fmt: skip
+) -> Section:
     """Return sizes; by default a mesh of 10,000 dofs for the default body and disc."""
     return {
-        "epsilon": "full" if epsilon == inf else mm(epsilon), "fine": mm(fine), "coarse": mm(coarse or max(fine, 8)),
-        "rim": mm(rim), "growth": growth, "degree": degree, **more,
-    }  # fmt: skip
+        "epsilon": "full" if epsilon == inf else mm(epsilon),
+        "fine": mm(fine),
+        "coarse": mm(coarse or max(fine, 8)),
+        "rim": mm(rim),
+        "growth": growth,
+        "degree": degree,
+        **more,
+    }
 
 
 def study(
-    nu: float = 0.3, body: Section | None = None, probe: Section | None = None, sizes: Section | None = None,
-    young: float = 1e4, **solve: Any,
-) -> Section:  # fmt: skip
+    nu: float = 0.3,
+    body: Section | None = None,
+    probe: Section | None = None,
+    sizes: Section | None = None,
+    young: float = 1e4,
+    **solve: Any,
+) -> Section:
     """Return a study of one case."""
     return {
         "body": body or cylinder(),

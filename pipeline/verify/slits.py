@@ -32,10 +32,18 @@ _HALF, _WIDTH, _MOVED = 5e-3, 4e-3, 1e-4
 _STRIP: dict[str, Section] = {
     "body": {"shape": "box", "size": ["4 mm", "10 mm", "30 mm"]},
     "material": {"young": "10 kPa", "poisson": 0.0},
-    "probe": {"action": "cut", "shape": "blade", "length": "2 mm", "width": "1 mm", "depth": "0.1 mm",
-              "incision": "15 mm", "ahead": "4 mm", "ends": "open"},
+    "probe": {
+        "action": "cut",
+        "shape": "blade",
+        "length": "2 mm",
+        "width": "1 mm",
+        "depth": "0.1 mm",
+        "incision": "15 mm",
+        "ahead": "4 mm",
+        "ends": "open",
+    },
     "mesh": {"epsilon": "full", "fine": "2.5 mm", "coarse": "2.5 mm", "rim": "0.5 mm", "growth": 0.7, "degree": 2},
-}  # fmt: skip
+}
 # How far (mm) the front of a slit goes up and down for the change of the energy; what is left then of the reference's
 # error, since what is released is not linear, and since three meshes are not one.
 _STEP, _LEFT = 0.1, 0.01
@@ -46,9 +54,13 @@ def slit_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
     for degree in (2,) if quick else (2, 3):
         value, bar = strip(comm, degree)
         yield Row(
-            f"crack in a strip, ν = 0, degree {degree}: energy release", "3D", _YOUNG * _MOVED**2 / _HALF,
-            "E δ² / h (J. R. Rice 1968)", value, bar,
-        )  # fmt: skip
+            f"crack in a strip, ν = 0, degree {degree}: energy release",
+            "3D",
+            _YOUNG * _MOVED**2 / _HALF,
+            "E δ² / h (J. R. Rice 1968)",
+            value,
+            bar,
+        )
     for nu in () if quick else (0.3, 0.5):
         yield _change_of_energy(comm, nu)
     if not quick:
@@ -86,9 +98,15 @@ def _change_of_energy(comm: MPI.Comm, nu: float) -> Row:
     before, here, after = records
     slope = (before.energy - after.energy) / (2e-3 * _STEP * 20e-3)
     return Row(
-        f"open slit, ν = {nu:g}: energy release", "3D", slope, "-dU/dA of two depths", here.energy_release,
-        here.energy_release_error, _LEFT, _message(records),
-    )  # fmt: skip
+        f"open slit, ν = {nu:g}: energy release",
+        "3D",
+        slope,
+        "-dU/dA of two depths",
+        here.energy_release,
+        here.energy_release_error,
+        _LEFT,
+        _message(records),
+    )
 
 
 def _pushed_on(comm: MPI.Comm, nu: float) -> Row:
@@ -97,9 +115,15 @@ def _pushed_on(comm: MPI.Comm, nu: float) -> Row:
     deeper, here, less_deep = records
     slope = (deeper.energy - less_deep.energy) / (2e-3 * _STEP)
     return Row(
-        f"open slit, faces slide, ν = {nu:g}: force", "3D", slope, "dU/ds of two depths of the blade", here.force,
-        here.force_error, _LEFT, _message(records),
-    )  # fmt: skip
+        f"open slit, faces slide, ν = {nu:g}: force",
+        "3D",
+        slope,
+        "dU/ds of two depths of the blade",
+        here.force,
+        here.force_error,
+        _LEFT,
+        _message(records),
+    )
 
 
 def _blade(comm: MPI.Comm, nu: float, contact: str, incision: float, ahead: float, accuracy: str) -> Record:
@@ -108,12 +132,19 @@ def _blade(comm: MPI.Comm, nu: float, contact: str, incision: float, ahead: floa
         "body": {"shape": "box", "size": ["20 mm", "20 mm", "12 mm"], "fixed": "bottom"},
         "material": {"young": "10 kPa", "poisson": nu},
         "probe": {
-            "action": "cut", "shape": "blade", "length": "6 mm", "width": "1 mm", "depth": "0.1 mm", "ends": "open",
-            "incision": f"{incision} mm", "ahead": f"{ahead} mm", "contact": contact,
+            "action": "cut",
+            "shape": "blade",
+            "length": "6 mm",
+            "width": "1 mm",
+            "depth": "0.1 mm",
+            "ends": "open",
+            "incision": f"{incision} mm",
+            "ahead": f"{ahead} mm",
+            "contact": contact,
         },
         "mesh": {"accuracy": accuracy},
         "solve": {"exact": False},
-    }  # fmt: skip
+    }
     (record,) = compute(make_plan(parse(scene)), comm).values()
     return record
 

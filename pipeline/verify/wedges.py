@@ -53,21 +53,31 @@ def strip(comm: MPI.Comm, thick: float, poisson: float) -> tuple[float, float, f
 def _case(thick: float, depth: float, poisson: float) -> Case:
     """Return a case whose wedge ends with its body, which a study file may not ask for."""
     width = 2e3 * _HALF * (2 + _BESIDE * thick)
-    case = parse({
-        "body": {
-            "shape": "box", "size": [f"{1e3 * _LENGTH} mm", f"{width} mm", f"{1e3 * thick * _HALF!r} mm"],
-            "fixed": "bottom",
-        },
-        "material": {"young": f"{_YOUNG} Pa", "poisson": poisson},
-        "probe": {
-            "shape": "wedge", "angle": f"{_ANGLE} deg", "length": f"{800 * _LENGTH} mm", "depth": f"{depth!r} m",
-            "contact": "unilateral",
-        },
-        "mesh": {
-            "epsilon": "full", "fine": f"{500 * thick * _HALF!r} mm", "coarse": "20 mm", "rim": "0.1 mm",
-            "growth": 0.3, "degree": 2,
-        },
-    }).case(())  # fmt: skip
+    case = parse(
+        {
+            "body": {
+                "shape": "box",
+                "size": [f"{1e3 * _LENGTH} mm", f"{width} mm", f"{1e3 * thick * _HALF!r} mm"],
+                "fixed": "bottom",
+            },
+            "material": {"young": f"{_YOUNG} Pa", "poisson": poisson},
+            "probe": {
+                "shape": "wedge",
+                "angle": f"{_ANGLE} deg",
+                "length": f"{800 * _LENGTH} mm",
+                "depth": f"{depth!r} m",
+                "contact": "unilateral",
+            },
+            "mesh": {
+                "epsilon": "full",
+                "fine": f"{500 * thick * _HALF!r} mm",
+                "coarse": "20 mm",
+                "rim": "0.1 mm",
+                "growth": 0.3,
+                "degree": 2,
+            },
+        }
+    ).case(())
     return replace(case, probe=case.probe.model_copy(update={"length": _LENGTH}))
 
 

@@ -108,16 +108,16 @@ def measure(repeats: int, *, quick: bool = False) -> Iterator[Point]:
             yield from _meridians(nu, repeats)
 
 
-def _point(
-    name: str, nu: float, level: int, mesh: dict[str, Any], without: tuple[str, ...], repeats: int
-) -> Point:  # fmt: skip
-    study = parse({
-        "body": known.CYLINDER_BODY,
-        "material": {"young": "10 kPa", "poisson": nu},
-        "probe": {"shape": "disc", "radius": "3 mm", "depth": "0.1 mm"},
-        "mesh": mesh,
-        "solve": {"exact": False},
-    })  # fmt: skip
+def _point(name: str, nu: float, level: int, mesh: dict[str, Any], without: tuple[str, ...], repeats: int) -> Point:
+    study = parse(
+        {
+            "body": known.CYLINDER_BODY,
+            "material": {"young": "10 kPa", "poisson": nu},
+            "probe": {"shape": "disc", "radius": "3 mm", "depth": "0.1 mm"},
+            "mesh": mesh,
+            "solve": {"exact": False},
+        }
+    )
     plan = make_plan(study, without=("axisymmetric", *without))
     runs: list[Record] = []
     for _ in range(repeats + 1):  # the first one warms up
@@ -128,9 +128,16 @@ def _point(
     median = {n: statistics.median(getattr(r, n) for r in runs[1:]) for n in ("time_total", "time_error")}
     error = record.force / _exact(nu) - 1
     return Point(
-        name, nu, level, error, record.force_error, median["time_total"], median["time_error"], record.dofs,
+        name,
+        nu,
+        level,
+        error,
+        record.force_error,
+        median["time_total"],
+        median["time_error"],
+        record.dofs,
         record.iterations,
-    )  # fmt: skip
+    )
 
 
 def _exact(nu: float) -> float:
@@ -156,10 +163,13 @@ def dataset(points: list[Point], repeats: int) -> xr.Dataset:
     shape = (len(methods), len(POISSON), len(levels))
     units = {"error": "1", "bar": "1", "seconds": "s", "estimate_seconds": "s", "dofs": "1", "iterations": "1"}
     names = {
-        "error": "relative error of F", "bar": "relative error bar on F", "seconds": "run time, median, warm",
-        "estimate_seconds": "run time of the error bar, not in seconds", "dofs": "unknowns of the whole body",
+        "error": "relative error of F",
+        "bar": "relative error bar on F",
+        "seconds": "run time, median, warm",
+        "estimate_seconds": "run time of the error bar, not in seconds",
+        "dofs": "unknowns of the whole body",
         "iterations": "iterations of the linear solver",
-    }  # fmt: skip
+    }
     variables = {}
     for name, unit in units.items():
         values = np.full(shape, np.nan)

@@ -101,9 +101,7 @@ class Box(Layered):
     def inside(self, points: FloatArray) -> FloatArray:
         """Return the distance (m) of points inside to the nearest face, negative outside."""
         x, y, z = points.T
-        return np.minimum.reduce(
-            [self.size[0] / 2 - np.abs(x), self.size[1] / 2 - np.abs(y), -z, z + self.size[2]]
-        )  # fmt: skip
+        return np.minimum.reduce([self.size[0] / 2 - np.abs(x), self.size[1] / 2 - np.abs(y), -z, z + self.size[2]])
 
     def gap(self, point: Vector) -> float:
         """Return the distance (m) to the edge of the face in whose plane the point lies, negative outside."""

@@ -45,9 +45,10 @@ class Ellipsoid(Drawn):
         Words("Three semi-axes, along x, y and z; the centre is the origin.", '["40 mm", "35 mm", "25 mm"]'),
     ]
     fixed: Annotated[
-        Below, BeforeValidator(_below),
+        Below,
+        BeforeValidator(_below),
         Words("Where the body is held: everywhere below a height.", '{below = "-6 mm"}', takes="{below = length}"),
-    ]  # fmt: skip
+    ]
 
     @property
     def extent(self) -> float:

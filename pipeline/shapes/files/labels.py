@@ -18,10 +18,13 @@ ENDINGS = (".nii", ".nii.gz", ".nrrd", ".nhdr")
 _UNITS = {"m": 1.0, "meter": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "micron": 1e-6}
 # Signs that take the axes of a NRRD file's space to right, anterior, superior.
 _SPACES = {
-    "right-anterior-superior": (1, 1, 1), "ras": (1, 1, 1),
-    "left-anterior-superior": (-1, 1, 1), "las": (-1, 1, 1),
-    "left-posterior-superior": (-1, -1, 1), "lps": (-1, -1, 1),
-}  # fmt: skip
+    "right-anterior-superior": (1, 1, 1),
+    "ras": (1, 1, 1),
+    "left-anterior-superior": (-1, 1, 1),
+    "las": (-1, 1, 1),
+    "left-posterior-superior": (-1, -1, 1),
+    "lps": (-1, -1, 1),
+}
 _MOST_VOXELS = 1_000_000_000
 # Of the values, and of what a packed file may become: what is larger is no label map that fits into memory.
 LARGEST_IMAGE = 4_000_000_000

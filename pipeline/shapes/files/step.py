@@ -86,8 +86,16 @@ def _point(content: str) -> tuple[float, float, float]:
     return x, y, z
 
 
-_LEADING = {"ADVANCED_FACE", "FACE_BOUND", "FACE_OUTER_BOUND", "EDGE_LOOP", "ORIENTED_EDGE", "EDGE_CURVE",
-            "VERTEX_LOOP", "VERTEX_POINT"}  # fmt: skip
+_LEADING = {
+    "ADVANCED_FACE",
+    "FACE_BOUND",
+    "FACE_OUTER_BOUND",
+    "EDGE_LOOP",
+    "ORIENTED_EDGE",
+    "EDGE_CURVE",
+    "VERTEX_LOOP",
+    "VERTEX_POINT",
+}
 _ON_THE_WAY = _LEADING | {"CARTESIAN_POINT"}
 
 

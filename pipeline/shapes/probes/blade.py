@@ -165,23 +165,27 @@ class Blade(Punch):
             problems.error("probe.incision", in_mm(self.incision), 'only a cut has an incision: set action = "cut"')
         if slit.tip <= 0:
             problems.error(
-                "probe.ahead", in_mm(slit.ahead),
+                "probe.ahead",
+                in_mm(slit.ahead),
                 f"leaves nothing of the blade in the slit, which is {in_mm(self.incision)} deep: must be below that "
                 "(left out, it is the blade's width)",
-            )  # fmt: skip
+            )
         elif slit.ahead < self.width:
             problems.warn(
-                "probe.ahead", in_mm(slit.ahead),
+                "probe.ahead",
+                in_mm(slit.ahead),
                 f"is less than the blade's width {in_mm(self.width)}: linear elasticity is then an extrapolation at "
                 "the slit's front",
-            )  # fmt: skip
+            )
         if self.contact == "bonded":
             self._check_travel(slit, problems)
         if self.contact == "frictionless":
             problems.warn(
-                "probe.depth", in_mm(self.depth), "does nothing where tissue slides along a blade that stands in a "
+                "probe.depth",
+                in_mm(self.depth),
+                "does nothing where tissue slides along a blade that stands in a "
                 "slit: F is what it takes to push it on from where it stands, `incision` - `ahead` deep",
-            )  # fmt: skip
+            )
 
     def _check_travel(self, slit: Slit, problems: Problems) -> None:
         """Report a blade that would run through the front of its slit: tissue there is not cut open by it."""
@@ -189,6 +193,8 @@ class Blade(Punch):
         for key, (travel, where) in travels.items():
             if travel >= slit.ahead:
                 problems.error(
-                    f"probe.{key}", in_mm(travel), f"runs the blade through the slit's front {where}, which is "
+                    f"probe.{key}",
+                    in_mm(travel),
+                    f"runs the blade through the slit's front {where}, which is "
                     f"{in_mm(slit.ahead)} ahead of it and is not cut open: must be below that",
-                )  # fmt: skip
+                )

@@ -51,13 +51,17 @@ class Cone(RoundIndenter):
         """Report a rounding that leaves no cone, and a cone that is pushed in as a whole."""
         if self.section.tangent >= self.radius:
             problems.error(
-                "probe.tip", in_mm(self.tip), f"leaves no cone: the rounding would reach {in_mm(self.section.tangent)} "
+                "probe.tip",
+                in_mm(self.tip),
+                f"leaves no cone: the rounding would reach {in_mm(self.section.tangent)} "
                 f"from the axis, and the shaft has radius {in_mm(self.radius)}; use a smaller tip, or a sphere",
-            )  # fmt: skip
+            )
         elif self.section.reach(depth := max(self.depth, self.depths[1])) >= self.radius:
             problems.error(
-                "probe.depth", in_mm(depth), f"pushes the cone in up to its shaft of radius {in_mm(self.radius)}: "
+                "probe.depth",
+                in_mm(depth),
+                f"pushes the cone in up to its shaft of radius {in_mm(self.radius)}: "
                 "use a smaller depth, or a larger radius",
-            )  # fmt: skip
+            )
         else:
             super().check(problems)

@@ -37,8 +37,10 @@ class Sphere(RoundIndenter):
         """Report a ball that would be pushed in past its equator."""
         if (depth := max(self.depth, self.depths[1])) >= self.radius:
             problems.error(
-                "probe.depth", in_mm(depth), f"must be less than the sphere's radius {in_mm(self.radius)}: past "
+                "probe.depth",
+                in_mm(depth),
+                f"must be less than the sphere's radius {in_mm(self.radius)}: past "
                 "its equator it does not press any more",
-            )  # fmt: skip
+            )
             return
         super().check(problems)

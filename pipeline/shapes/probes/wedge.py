@@ -41,9 +41,14 @@ class Wedge(Indenter):
         """The rectangle, as long as the edge, that holds all that it may touch."""
         width = 2 * CANDIDATES * self.section.reach(self.depths[1])
         return Blade.model_construct(
-            shape="blade", length=self.length, width=width, direction=self.direction, depth=self.depth, at=self.at,
+            shape="blade",
+            length=self.length,
+            width=width,
+            direction=self.direction,
+            depth=self.depth,
+            at=self.at,
             axis=self.axis,
-        )  # fmt: skip
+        )
 
     @property
     def half_length(self) -> float:
@@ -101,8 +106,9 @@ class Wedge(Indenter):
         """Report a rounding wider than the edge is long."""
         if self.section.tangent >= self.length / 2:
             problems.error(
-                "probe.tip", in_mm(self.tip), f"is too large for an edge of {in_mm(self.length)}: the rounding would "
-                "be wider than the edge is long",
-            )  # fmt: skip
+                "probe.tip",
+                in_mm(self.tip),
+                f"is too large for an edge of {in_mm(self.length)}: the rounding would be wider than the edge is long",
+            )
             return
         super().check(problems)

@@ -118,11 +118,15 @@ class Coverage:
         lines = [_LINE.format("", "held", "", "bar / |error|", "worst", "refused")]
         lines += [
             _LINE.format(
-                group.name, f"{group.held} of {len(group.served)}", f"{group.share:.1%}", f"{group.ratio:.2f}",
-                f"{group.worst:.2f}", len(group.trials) - len(group.served),
+                group.name,
+                f"{group.held} of {len(group.served)}",
+                f"{group.share:.1%}",
+                f"{group.ratio:.2f}",
+                f"{group.worst:.2f}",
+                len(group.trials) - len(group.served),
             )
             for group in self.groups
-        ]  # fmt: skip
+        ]
         asked = (
             f"asked for, of groups of {ENOUGH} and more: {HELD:.0%} held, median of bar / |error| at most {self.idle:g}"
         )

@@ -47,9 +47,14 @@ def _of_release(trial: Trial, case: Record, truth: Record) -> Trial:
     """Return the trial of the energy that a slit's front releases, of the scene of that of its force."""
     degree, element = trial.kind
     return replace(
-        trial, name=f"energy release: {trial.name}", force=case.energy_release, bar=case.energy_release_error,
-        truth=truth.energy_release, truth_bar=truth.energy_release_error, kind=(degree, f"{element}, released"),
-    )  # fmt: skip
+        trial,
+        name=f"energy release: {trial.name}",
+        force=case.energy_release,
+        bar=case.energy_release_error,
+        truth=truth.energy_release,
+        truth_bar=truth.energy_release_error,
+        kind=(degree, f"{element}, released"),
+    )
 
 
 def _trial(scene: Section, mesh: Section, case: Record, truth: Record) -> Trial:
@@ -57,10 +62,16 @@ def _trial(scene: Section, mesh: Section, case: Record, truth: Record) -> Trial:
     (declared,) = parse({**scene, "mesh": mesh}).cases()
     rim = declared.mesh.rim_size(declared.probe.half_width) / half_width_of(declared)
     return Trial(
-        _name(scene, mesh), case.force, case.force_error, truth.force, truth.force_error, message,
-        (declared.mesh.degree, declared.element), "naive" if rim > _NAIVE else "graded",
+        _name(scene, mesh),
+        case.force,
+        case.force_error,
+        truth.force,
+        truth.force_error,
+        message,
+        (declared.mesh.degree, declared.element),
+        "naive" if rim > _NAIVE else "graded",
         refused=not case.is_ok and not message,
-    )  # fmt: skip
+    )
 
 
 def _solve(comm: MPI.Comm, scene: Section, mesh: Section, without: tuple[str, ...] = ()) -> Record:

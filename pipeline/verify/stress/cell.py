@@ -63,9 +63,14 @@ def judge(cell: Cell, record: Record, reference: Record | None, seconds: float =
     Forces of ``reference`` are for a ``scale`` of 1.
     """
     found = Result(
-        cell.row, cell.value, "FAIL", iterations=record.iterations, dofs=record.dofs, seconds=seconds,
+        cell.row,
+        cell.value,
+        "FAIL",
+        iterations=record.iterations,
+        dofs=record.dofs,
+        seconds=seconds,
         message=record.message,
-    )  # fmt: skip
+    )
     if record.status != "ok":
         return _changed(found, status="refused" if cell.expect != "right" and record.message else "FAIL")
     if cell.expect == "refused":

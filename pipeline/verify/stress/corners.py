@@ -24,9 +24,11 @@ def _thin() -> Iterator[_Corner]:
     yield "layer of a, body 1000 a wide, epsilon 5 a, nu 0.4999", scene, "right"
     scene = study(0.5, cylinder(20, 1), disc(0.02), mesh(0.004, fine=1, epsilon=0.02, coarse=1))
     yield "epsilon = a = 0.001 R, layer R/20, nu 0.5", scene, "right"
-    yield "sheet 1000 x 1000 x 10, disc at its corner", study(
-        0.499, box(1000, 1000, 10), disc(2, at=497.9), mesh(0.4, fine=10, coarse=100, epsilon=20)
-    ), "right"  # fmt: skip
+    yield (
+        "sheet 1000 x 1000 x 10, disc at its corner",
+        study(0.499, box(1000, 1000, 10), disc(2, at=497.9), mesh(0.4, fine=10, coarse=100, epsilon=20)),
+        "right",
+    )
 
 
 def _slender() -> Iterator[_Corner]:

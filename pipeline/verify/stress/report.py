@@ -20,9 +20,16 @@ def line(result: Result) -> str:
     """Return one line of the table."""
     message = result.message if len(result.message) <= _LONGEST else result.message[: _LONGEST - 1] + "…"
     return _LINE.format(
-        result.status, result.row, result.value, _relative(result.error, "+"), _relative(result.bar), result.iterations,
-        result.dofs, f"{result.seconds:.1f}", message,
-    ).rstrip()  # fmt: skip
+        result.status,
+        result.row,
+        result.value,
+        _relative(result.error, "+"),
+        _relative(result.bar),
+        result.iterations,
+        result.dofs,
+        f"{result.seconds:.1f}",
+        message,
+    ).rstrip()
 
 
 def _relative(value: float, sign: str = "") -> str:

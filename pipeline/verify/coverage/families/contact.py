@@ -54,25 +54,38 @@ def _throw_layers(random: np.random.Generator) -> Section:
     height = log_uniform(random, 2.5, 12.0)
     layers: list[Section] = []
     for number in range(int(random.integers(1, 3))):
-        layers.append({
-            "name": f"layer{number}", "thickness": f"{log_uniform(random, 0.3, 1.2)} mm",
-            "young": f"{log_uniform(random, 2.0, 60.0)} kPa", "poisson": float(random.choice(_POISSON)),
-        })  # fmt: skip
+        layers.append(
+            {
+                "name": f"layer{number}",
+                "thickness": f"{log_uniform(random, 0.3, 1.2)} mm",
+                "young": f"{log_uniform(random, 2.0, 60.0)} kPa",
+                "poisson": float(random.choice(_POISSON)),
+            }
+        )
     return {
-        "shape": "cylinder", "radius": f"{log_uniform(random, 5.0, 15.0)} mm", "height": f"{height} mm",
-        "fixed": "bottom", "layers": layers,
-    }  # fmt: skip
+        "shape": "cylinder",
+        "radius": f"{log_uniform(random, 5.0, 15.0)} mm",
+        "height": f"{height} mm",
+        "fixed": "bottom",
+        "layers": layers,
+    }
 
 
 def _throw_tool(random: np.random.Generator) -> Section:
     if random.random() < 0.6:
         radius = log_uniform(random, 5.0, 30.0)
         return {
-            "shape": "sphere", "radius": f"{radius} mm", "depth": f"{1 / radius:.6g} mm", "contact": "unilateral",
-        }  # fmt: skip
+            "shape": "sphere",
+            "radius": f"{radius} mm",
+            "depth": f"{1 / radius:.6g} mm",
+            "contact": "unilateral",
+        }
     angle = float(np.round(random.uniform(76.0, 88.0), 1))
     depth = pi / 2 / tan(radians(angle))
     return {
-        "shape": "cone", "angle": f"{angle} deg", "radius": f"{_SHAFT} mm", "depth": f"{depth:.6g} mm",
+        "shape": "cone",
+        "angle": f"{angle} deg",
+        "radius": f"{_SHAFT} mm",
+        "depth": f"{depth:.6g} mm",
         "contact": "unilateral",
-    }  # fmt: skip
+    }

@@ -38,9 +38,12 @@ def throw_scene(random: np.random.Generator) -> Section:
     probe: Section = {"shape": "disc", "radius": "1 mm", "depth": "0.01 mm", "contact": contact}
     if kind == "blade":
         probe = {
-            "shape": "blade", "length": f"{2 * length(1.0, 8.0)} mm", "width": "2 mm", "depth": "0.01 mm",
+            "shape": "blade",
+            "length": f"{2 * length(1.0, 8.0)} mm",
+            "width": "2 mm",
+            "depth": "0.01 mm",
             "contact": contact,
-        }  # fmt: skip
+        }
     if kind == "off centre":
         probe["at"] = [f"{np.round(random.uniform(0.1, 0.7) * radius, 3)} mm", "0 mm"]
     return {
@@ -64,6 +67,11 @@ def throw_mesh(random: np.random.Generator, scene: Section) -> Section:
     if scene["body"]["shape"] == "cylinder" and "at" not in scene["probe"] and random.random() < 0.3:
         epsilon, outside = f"{random.uniform(2.0, 6.0):.3g} mm", str(random.choice(["free", "fixed"]))
     return {
-        "epsilon": epsilon, "outside": outside, "fine": f"{fine:.3g} mm", "coarse": f"{far:.3g} mm",
-        "rim": f"{min(rim, fine):.3g} mm", "growth": float(np.round(growth, 2)), "degree": degree,
-    }  # fmt: skip
+        "epsilon": epsilon,
+        "outside": outside,
+        "fine": f"{fine:.3g} mm",
+        "coarse": f"{far:.3g} mm",
+        "rim": f"{min(rim, fine):.3g} mm",
+        "growth": float(np.round(growth, 2)),
+        "degree": degree,
+    }

@@ -14,7 +14,10 @@ def throw(random: np.random.Generator) -> tuple[Section, Section]:
     scene = throw_scene(random)
     turned = random.uniform(0.0, np.pi) if random.random() < 0.5 else 0.0
     scene["probe"] = {
-        "shape": "ellipse", "axes": [f"{log_uniform(random, 1.0, 6.0)} mm", "1 mm"], "depth": "0.01 mm",
-        "direction": [float(np.cos(turned)), float(np.sin(turned)), 0.0], "contact": scene["probe"]["contact"],
-    }  # fmt: skip
+        "shape": "ellipse",
+        "axes": [f"{log_uniform(random, 1.0, 6.0)} mm", "1 mm"],
+        "depth": "0.01 mm",
+        "direction": [float(np.cos(turned)), float(np.sin(turned)), 0.0],
+        "contact": scene["probe"]["contact"],
+    }
     return scene, throw_mesh(random, scene)

@@ -39,13 +39,19 @@ def throw_scene(random: np.random.Generator) -> Section:
     contact = str(random.choice(["bonded", "frictionless"]))
     return {
         "body": {
-            "shape": "surface", "unit": "mm", "file": str(_written(surface)), "fixed": {"below": f"{held:.3f} mm"},
+            "shape": "surface",
+            "unit": "mm",
+            "file": str(_written(surface)),
+            "fixed": {"below": f"{held:.3f} mm"},
         },
         "material": {"young": "10 kPa", "poisson": float(random.choice(_POISSON))},
-        "probe": _tool(random) | {
-            "depth": "0.01 mm", "contact": contact, "at": [f"{x:.3f} mm" for x in random.choice(above)],
+        "probe": _tool(random)
+        | {
+            "depth": "0.01 mm",
+            "contact": contact,
+            "at": [f"{x:.3f} mm" for x in random.choice(above)],
         },
-    }  # fmt: skip
+    }
 
 
 def _tool(random: np.random.Generator) -> Section:

@@ -59,9 +59,11 @@ def _throw_inclusion(random: np.random.Generator, height: float) -> Section:
     depth = np.round(random.uniform(0.1, 0.9) * height, 3)
     place = np.round(random.uniform(-3.0, 3.0, 2), 3) if random.random() < 0.5 else (0.0, 0.0)
     return {
-        "name": "inclusion", "at": [f"{place[0]} mm", f"{place[1]} mm", f"{-depth} mm"], **shape,
+        "name": "inclusion",
+        "at": [f"{place[0]} mm", f"{place[1]} mm", f"{-depth} mm"],
+        **shape,
         **throw_tissue(random),
-    }  # fmt: skip
+    }
 
 
 def throw_tissue(random: np.random.Generator) -> Section:

@@ -18,21 +18,29 @@ def throw(random: np.random.Generator) -> tuple[Section, Section]:
     width, height = log_uniform(random, 8.0, 16.0), tip + 1 + log_uniform(random, 1.0, 6.0)
     is_open, bonded = random.random() < 0.3, random.random() < 0.5
     body = {
-        "shape": "box", "size": [f"{length + 2 + log_uniform(random, 3.0, 8.0):.3f} mm", f"{width} mm",
-                                 f"{height:.3f} mm"],
+        "shape": "box",
+        "size": [f"{length + 2 + log_uniform(random, 3.0, 8.0):.3f} mm", f"{width} mm", f"{height:.3f} mm"],
         "fixed": "bottom",
-    }  # fmt: skip
+    }
     probe: Section = {
-        "action": "cut", "shape": "blade", "length": f"{length} mm", "width": f"{log_uniform(random, 0.3, 1.0)} mm",
-        "incision": f"{tip + 1:.3f} mm", "ahead": "1 mm", "ends": "open" if is_open else "blade",
-        "depth": f"{log_uniform(random, 0.05, 0.4)} mm", "contact": "bonded" if bonded else "frictionless",
-    }  # fmt: skip
+        "action": "cut",
+        "shape": "blade",
+        "length": f"{length} mm",
+        "width": f"{log_uniform(random, 0.3, 1.0)} mm",
+        "incision": f"{tip + 1:.3f} mm",
+        "ahead": "1 mm",
+        "ends": "open" if is_open else "blade",
+        "depth": f"{log_uniform(random, 0.05, 0.4)} mm",
+        "contact": "bonded" if bonded else "frictionless",
+    }
     if random.random() < 0.15 and bonded:
         turned = random.uniform(0.0, np.pi)
         probe["direction"] = [float(np.cos(turned)), float(np.sin(turned)), 0.0]
     scene = {
-        "body": body, "material": {"young": "10 kPa", "poisson": float(random.choice(_POISSON))}, "probe": probe,
-    }  # fmt: skip
+        "body": body,
+        "material": {"young": "10 kPa", "poisson": float(random.choice(_POISSON))},
+        "probe": probe,
+    }
     return scene, _throw_mesh(random)
 
 

@@ -19,9 +19,11 @@ _FAR = 60.0
 def throw(random: np.random.Generator) -> tuple[Section, Section]:
     """Throw a scene and a mesh for it; lengths in units of the radius of contact on a half-space, 1 mm."""
     body = {
-        "shape": "cylinder", "radius": f"{log_uniform(random, 3.5, 20.0)} mm",
-        "height": f"{log_uniform(random, 0.5, 20.0)} mm", "fixed": str(random.choice(["bottom", "bottom+sides"])),
-    }  # fmt: skip
+        "shape": "cylinder",
+        "radius": f"{log_uniform(random, 3.5, 20.0)} mm",
+        "height": f"{log_uniform(random, 0.5, 20.0)} mm",
+        "fixed": str(random.choice(["bottom", "bottom+sides"])),
+    }
     scene = {
         "body": body,
         "material": {"young": "10 kPa", "poisson": float(random.choice(_POISSON))},
@@ -55,6 +57,11 @@ def throw_mesh(random: np.random.Generator) -> Section:
 def full_order(rim: float, growth: float, fine: float, coarse: float) -> Section:
     """Return the mesh of degree 2 of a whole body, of these sizes (mm)."""
     return {
-        "epsilon": "full", "outside": "coarse", "fine": f"{fine:.3g} mm", "coarse": f"{coarse:.3g} mm",
-        "rim": f"{rim:.3g} mm", "growth": float(np.round(growth, 2)), "degree": 2,
-    }  # fmt: skip
+        "epsilon": "full",
+        "outside": "coarse",
+        "fine": f"{fine:.3g} mm",
+        "coarse": f"{coarse:.3g} mm",
+        "rim": f"{rim:.3g} mm",
+        "growth": float(np.round(growth, 2)),
+        "degree": 2,
+    }

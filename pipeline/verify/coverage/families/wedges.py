@@ -26,9 +26,13 @@ def throw(random: np.random.Generator) -> tuple[Section, Section]:
     if random.random() < 0.3:
         tip = log_uniform(random, 0.3, 2.0)
     probe = {
-        "shape": "wedge", "angle": f"{angle} deg", "length": f"{length} mm", "tip": f"{tip} mm",
-        "depth": f"{1e3 * _depth(Rounded(radians(angle), tip * 1e-3), length * 1e-3):.6g} mm", "contact": "unilateral",
-    }  # fmt: skip
+        "shape": "wedge",
+        "angle": f"{angle} deg",
+        "length": f"{length} mm",
+        "tip": f"{tip} mm",
+        "depth": f"{1e3 * _depth(Rounded(radians(angle), tip * 1e-3), length * 1e-3):.6g} mm",
+        "contact": "unilateral",
+    }
     scene = {
         "body": body | {"fixed": "bottom"},
         "material": {"young": "10 kPa", "poisson": float(random.choice(_POISSON))},
