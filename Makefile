@@ -11,6 +11,8 @@ PEERS_ARGS ?=
 FUZZ ?= 5000
 LOOP_ARGS ?=
 SOAK_ARGS ?=
+STRESS_ARGS ?=
+COVERAGE_ARGS ?=
 FAULTS_ARGS ?=
 MUTANTS_ARGS ?=
 
@@ -31,7 +33,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's own mpirun: another one on PATH would not fit Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies docs test test-debian13 debian release slurm-test verify benchmark peers plain-loop realtime resolution stress pairs fuzz soak faults mutants lint format clean
+.PHONY: help setup study studies docs test test-debian13 debian release slurm-test verify benchmark peers plain-loop realtime resolution stress coverage pairs fuzz soak faults mutants lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -108,8 +110,11 @@ realtime: setup ## the real-time evaluator: a shared library, and its tests in C
 resolution: setup ## what a file's resolution, noise and voxels change of F (a quarter of an hour): results/resolution.png
 	$(MPI_ENV) $(PYTHON) -m benchmarks.resolution
 
-stress: setup ## numerical stability: a matrix of extremes (10 minutes)
-	$(EPSMESH) stress
+stress: setup ## numerical stability: a matrix of extremes (10 minutes; STRESS_ARGS="poisson layer": rows of these names)
+	$(PYTHON) -m pipeline.verify.stress $(STRESS_ARGS)
+
+coverage: setup ## do the error bars hold on 160 random scenes? COVERAGE_ARGS="--family tools --count 60 --seed 7": others
+	$(PYTHON) -m pipeline.verify.coverage $(COVERAGE_ARGS)
 
 fuzz: setup ## ten thousand study files, and damaged surfaces, datasets, stores and models (minutes)
 	EPSMESH_FUZZ=$(FUZZ) $(MPI_ENV) $(PYTHON) -m pytest tests/fuzz -q $(PYTEST_ARGS)

@@ -64,7 +64,7 @@ def test_what_measures_the_program_is_part_of_it(installed):
 
 
 def test_stress_runs(installed):
-    done = installed("-m", "pipeline", "stress", "gap to the body's edge / a", "--quick")
+    done = installed("-m", "pipeline.verify.stress", "gap to the body's edge / a", "--quick")
     assert done.returncode == 0, done.stdout + done.stderr
     assert "no wrong numbers" in done.stdout
 

@@ -34,7 +34,7 @@ app = typer.Typer(
 _COMMANDS: tuple[Callable[..., None], ...] = (
     new.new, study.validate, plan.plan, study.run, merge.merge, study.status, plan.explain, report.plot, report.report,
     guide.guide, compare.compare, view.view, export.export, evaluator.evaluator, touch.touch,
-    checks.verify, checks.stress, checks.benchmark, study.version,
+    checks.verify, checks.benchmark, study.version,
 )  # fmt: skip
 for _command in _COMMANDS:
     app.command()(_command)

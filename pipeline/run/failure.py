@@ -13,6 +13,7 @@ from mpi4py import MPI
 from pipeline.launcher import is_interrupt
 from pipeline.mesh.generate import MeshError
 from pipeline.run.problem import CaseFailure
+from pipeline.run.record import UNFORESEEN
 from pipeline.run.store import StoreError
 from pipeline.solve.linear import SolveError
 
@@ -22,6 +23,8 @@ T = TypeVar("T")
 PATIENCE = 60.0
 _PAUSE = 2e-3
 _EXPECTED = (CaseFailure, MeshError, SolveError)
+# Want of memory, above all, as libraries tell it.
+_OF_LIBRARIES = (MemoryError, RuntimeError, ArithmeticError, np.linalg.LinAlgError, OSError)
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,7 @@ def describe(error: Exception) -> str:
     """Return what to say of an error: where it was raised, too, if nobody had foreseen it."""
     if isinstance(error, _EXPECTED):
         return str(error)
-    frames = traceback.extract_tb(error.__traceback__)
-    where = f" ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else ""
-    return f"{type(error).__name__}: {error}{where}"
+    if isinstance(error, _OF_LIBRARIES):
+        return f"{type(error).__name__}: {error}"
+    (*_, last) = traceback.extract_tb(error.__traceback__)
+    return f"{UNFORESEEN}{type(error).__name__}: {error} ({Path(last.filename).name}, line {last.lineno})"

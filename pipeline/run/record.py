@@ -8,6 +8,9 @@ from pipeline.plan.cost import Observation, speed_up
 from pipeline.quantities import CLEAR
 from pipeline.study.sweep import Scale
 
+# How the message of a case begins that failed for a reason that the program does not know.
+UNFORESEEN = "an error of the program: "
+
 
 @dataclass(frozen=True)
 class Record:

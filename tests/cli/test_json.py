@@ -15,8 +15,6 @@ from pipeline.report.page.guideline import ACCURACY, guide_section
 from pipeline.run.record import Record
 from pipeline.run.store import Store
 from pipeline.shapes.probes.blade import Blade
-from pipeline.verify.stress import cells
-from pipeline.verify.stress.runner import rows_of
 from tests.commands import ROOT
 from tests.report.chosen import TEXT, dataset
 
@@ -65,8 +63,8 @@ def test_unknown_commands_and_missing_words_are_told(epsmesh):
     assert "pln" in error["message"]
     (error,) = failed(epsmesh("plan", "--json"))
     assert error["key"] == "FILE"
-    (error,) = failed(epsmesh("verify", "--count", "many", "--json"))
-    assert (error["key"], error["value"], bool(error["allowed"])) == ("--count", "many", True)
+    (error,) = failed(epsmesh("benchmark", "--repeats", "many", "--json"))
+    assert (error["key"], error["value"], bool(error["allowed"])) == ("--repeats", "many", True)
     (error,) = failed(epsmesh("plan", "a.toml", "--memory=-1", "--json"))
     assert (error["key"], error["value"], "0.1" in error["allowed"]) == ("--memory", "-1", True)
 
@@ -101,8 +99,6 @@ def test_a_bad_study_is_told_problem_by_problem(epsmesh, small, command):
         ("run SMALL --output known.nc --json", None),
         ("store list --store absent --json", None),
         ("store prune --store known.nc --json", "--store"),
-        ("stress Laplace --json", "ROW"),
-        ("verify --coverage --family none --json", "--family"),
         ("touch known.nc --json", None),
         ("export SMALL --accuracy 90% --json", "--accuracy"),
     ],
@@ -176,16 +172,6 @@ def test_report_and_guide_agree_on_every_number():
     # What takes longest in one scene is not what it usually takes: neither stands for the other.
     slow = dataset(seconds=lambda case: 1 + 9 * (case.material.poisson > 0.35) * isinstance(case.probe, Blade))
     assert all(row["time"] != row["usual"] for row in guide_section(slow).rows)
-
-
-def test_the_examples_of_stress_name_rows(epsmesh):
-    known = tuple(dict.fromkeys(cell.row for cell in cells()))
-    examples = re.findall(r"epsmesh stress (\w.*)", epsmesh("stress", "--help").stdout)
-    assert examples
-    for words in examples:
-        assert rows_of(words.split(), known) < set(known)
-    assert rows_of(["corners"], known) == {"corners"}
-    assert rows_of(None, known) == set(known)
 
 
 def test_the_how_to_of_a_refusal_is_a_page(epsmesh, small, here):

@@ -7,7 +7,7 @@ from math import inf, isnan, nan
 import pytest
 from mpi4py import MPI
 
-from pipeline.run.record import Record
+from pipeline.run.record import UNFORESEEN, Record
 from pipeline.verify.stress import Cell, Result, cells, judge, run, summary, table, to_json
 from pipeline.verify.stress import runner as stress_runner
 
@@ -69,6 +69,8 @@ def test_refusals_need_a_message_and_a_cell_that_expects_them():
     assert judge(replace(CELL, expect="either"), failed, None).status == "refused"
     assert judge(replace(CELL, expect="refused"), replace(failed, message=""), None).status == "FAIL"
     assert judge(replace(CELL, expect="refused"), GOOD, None).wrong
+    unforeseen = replace(failed, message=f"{UNFORESEEN}IndexError: tuple index out of range")
+    assert judge(replace(CELL, expect="either"), unforeseen, None).status == "FAIL"
 
 
 def test_invariances_have_no_bar_to_hide_behind():

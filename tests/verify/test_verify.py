@@ -1,5 +1,6 @@
 """Verification itself: the quick rows are right, and a wrong number is called out."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from pipeline.study.load import parse
 from pipeline.verify import known
 from pipeline.verify.boundary import rectangle_stiffness
 from pipeline.verify.coverage import FAMILIES, Coverage, Trial, trials
+from pipeline.verify.coverage import __main__ as coverage
 from pipeline.verify.layered import Solid, layered_disc, surface_compliance
 from pipeline.verify.row import Row
 
@@ -105,10 +107,20 @@ def test_error_is_the_larger_of_both_readings():
         assert Trial("", force, 0.5, truth, 0.0).error == pytest.approx(0.5)
 
 
-def test_unknown_family_is_named():
-    result = CliRunner().invoke(cli.app, ["verify", "--coverage", "--family", "square"])
-    assert result.exit_code == 2
-    assert "proportions" in result.output
+def test_unknown_family_is_named(capsys):
+    with pytest.raises(SystemExit) as ended:
+        coverage.main(["--family", "square"])
+    assert ended.value.code == 2
+    assert "proportions" in capsys.readouterr().err
+
+
+def test_coverage_is_told_in_words_and_as_data(capsys, monkeypatch):
+    monkeypatch.setattr(coverage, "trials", lambda *_: iter([Trial("a disc", 1.0, 0.1, 1.05, 0.0)]))
+    for words in ([], ["--json"]):
+        coverage.main(words)
+    told = capsys.readouterr().out
+    assert "a disc" in told
+    assert json.loads(told[told.index("\n{") :])["trials"][0]["name"] == "a disc"
 
 
 def test_command_fails_if_a_row_is_out(monkeypatch):

@@ -96,12 +96,6 @@ class _Matrix:
 
 
 def _compute(comm: MPI.Comm, scene: dict[str, Any], without: tuple[str, ...] = ()) -> Record:
-    """Return the record of a study of one case; what is raised alone on one rank is a failure too."""
-    plan = make_plan(parse(scene), without=without)
-    try:
-        (record,) = compute(plan, comm).values()
-    except Exception as error:
-        if comm.size > 1:
-            raise
-        return Record("", "failed", f"raised {type(error).__name__}: {error}")
+    """Return the record of a study of one case."""
+    (record,) = compute(make_plan(parse(scene), without=without), comm).values()
     return replace(record, message=" ".join(record.message.split()))
