@@ -12,6 +12,7 @@ from pipeline.cli import app
 from pipeline.plan.plan import make_plan
 from pipeline.quantities import attributes
 from pipeline.report.dataset import build
+from pipeline.study.capabilities import FEATURES, OBSTACLES, REFUSALS
 from pipeline.study.keys import SECTION_TEXTS, all_sections, heading, keys_of
 from pipeline.study.load import parse
 from pipeline.study.starter import starter
@@ -40,9 +41,11 @@ _VARIANTS: tuple[dict[str, dict[str, Any]], ...] = (
 
 
 def write_reference(folder: Path) -> None:
-    """Write ``study.md``, ``dataset.md`` and ``commands.md`` into ``folder``, where they differ from what is there."""
+    """Write the pages of the reference into ``folder``, where they differ from what is there."""
     folder.mkdir(exist_ok=True)
-    for name, text in {"study": study_page(), "dataset": dataset_page(), "commands": commands_page()}.items():
+    pages = {"study": study_page, "features": features_page, "dataset": dataset_page, "commands": commands_page}
+    for name, page in pages.items():
+        text = page()
         path = folder / f"{name}.md"
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")
@@ -73,6 +76,23 @@ def study_page() -> str:
             shown = default if key.words.default or not key.default else f"`{default}`"
             text = f"*{', '.join(key.shapes)}*: {key.words.text}" if key.shapes else key.words.text
             lines.append(_row(f"`{key.name}`", f"`{key.takes}`", shown, text))
+    return "\n".join(lines) + "\n"
+
+
+def features_page() -> str:
+    """Return the page of what does not go together in one study, and of what is computed the long way."""
+    lines = [
+        "# What goes together", "",
+        "Any two features of a study go together, but for these. A study that has both is refused, at the key and with "
+        "the reason that the table has.", "",
+        *_table(("feature", "with", "told at", "reason, and what to write instead")),
+    ]  # fmt: skip
+    lines += [_row(r.first, r.second, f"`{FEATURES[r.first].key}`", _escaped(r.reason)) for r in REFUSALS]
+    lines += ["", "Shorter ways of computing, and real-time models, are not for all of them:", ""]
+    lines += _table(("way", "not with", "reason"))
+    lines += [
+        _row(way, feature, _escaped(reason)) for way, found in OBSTACLES.items() for feature, reason in found.items()
+    ]
     return "\n".join(lines) + "\n"
 
 

@@ -14,24 +14,30 @@ from statistics import median
 from pipeline.plan import estimate
 from pipeline.plan.steps import MeshStep, Solve
 from pipeline.plan.symmetry import model_planes
+from pipeline.shapes.body import Layered
 from pipeline.study.sweep import Case
 
 # What ranks are worth on one solve: n of them are as good as n^0.8.
 _PARALLEL = 0.8
-# Seconds on one core of 2020s hardware: for each tetrahedron; and of the mixed element, as a multiple.
-_MESH, _MIXED = 2e-5, 1.3
-_SOLVE = {1: 5e-6, 2: 2e-5, 3: 5e-5, 4: 1.6e-4}
-_MERIDIAN, _MERIDIAN_BYTES = 0.5, 3.8e8
+# Seconds on one core of 2020s hardware for 10,000 tetrahedra, and the power of their number that they grow with: of
+# displacement elements by degree. Fitted to eight studies, judged on eight others (docs/performance.md).
+_MESH = (0.35, 0.66)
+_SOLVE = {1: (0.04, 0.75), 2: (0.165, 0.75), 3: (0.4, 0.8)}
+_BAR = {1: (0.03, 0.8), 2: (0.105, 0.8), 3: (0.3, 0.85)}
+# Of large strains: of steps, and of Newton's steps in them; their bar.
+_LARGE = {"solve": (9.7, 1.1), "bar": (0.48, 0.8)}
+# So many times as much: mixed elements, the search for what touches, several materials; meshes of curved bodies; the
+# proof of an accuracy.
+_MIXED, _SEARCH, _LAYERED, _CURVED, _PROOF = 1.4, 2.7, 1.8, 2.5, 1.6
+_MERIDIAN, _MERIDIAN_BYTES = 0.27, 3.8e8
 # And one whose contact is to be found: so many times that.
-_FOUND, _TRIALS = "meridian contact", 2.0
+_FOUND, _TRIALS = "meridian contact", 1.7
 # Share of the meshes that miss the accuracy they were chosen for: 5 of 60 scenes, 9 of 48 blades that slice.
 _MISSED, _MISSED_BY_SEVERAL = 0.08, 0.19
-# At large displacements: so many times a linear solve, of steps and of Newton's steps in them, and its bar.
-_LARGE = {"solve": 40.0, "bar": 2.0}
 # How fast iterations grow on the way to incompressible.
 _LOCKING = -0.35
-# What another movement of the probe adds, on the same set-up: a right-hand side.
-_MOVEMENT = 0.5
+# What another movement of the probe adds, in units of the first.
+_MOVEMENT = 1.0
 # Observations that weigh as much as the law above, for its factor and for its exponents.
 _WEIGHT = (0.5, 5.0, 5.0)
 
@@ -86,7 +92,8 @@ class CostModel:
         seconds = self.seconds("mesh", kind, cells, 0.0)
         for solve in step.solves:
             kind, _, poisson = features(solve)
-            seconds += sum(self.seconds(stage, kind, cells, poisson) for stage in ("solve", "bar"))
+            proof = 1.0 if solve.goal is None else _PROOF
+            seconds += proof * sum(self.seconds(stage, kind, cells, poisson) for stage in ("solve", "bar"))
             seconds += self._further(solve)
         memory = max(map(_memory, {_size(solve): solve for solve in step.solves}.values()))
         return StepEstimate("mesh", len(step.solves), len(step.operators), cells, seconds, memory, title)
@@ -116,18 +123,20 @@ def _memory(solve: Solve) -> float:
 
 
 def features(solve: Solve) -> tuple[str, float, float]:
-    """Return what a solve's cost depends on: kind of element with the number of movements if there are several,
-    tetrahedra (estimated) of the part modelled, ν.
+    """Return what a solve's cost depends on: its kind, the tetrahedra (estimated) of the part modelled, ν.
+
+    A kind is the element, its degree, the number of movements if there are several, whether contact is found,
+    whether there are several materials, and whether the body is curved.
     """
     case = solve.case
     if solve.axisymmetric:
         return _FOUND if case.probe.is_unilateral else "meridian", 1.0, 0.0
-    movements = "" if case.movements == 1 else f" {case.movements}"
-    return (
-        f"{case.material.law if case.material.is_large else case.element} {case.mesh.degree}{movements}",
-        estimate.cells(case) * 0.5 ** len(solve.mirrors),
-        _poisson(case),
-    )
+    words = [case.material.law if case.material.is_large else case.element, str(case.mesh.degree)]
+    words += [str(case.movements)] if case.movements > 1 else []
+    words += ["found"] if case.probe.is_unilateral else []
+    words += ["regions"] if case.body.regions else []
+    words += [] if isinstance(case.body, Layered) else ["curved"]
+    return " ".join(words), estimate.cells(case) * 0.5 ** len(solve.mirrors), _poisson(case)
 
 
 def speed_up(ranks: int) -> float:
@@ -175,10 +184,16 @@ def _poisson(case: Case) -> float:
 def _prior(stage: str, kind: str) -> _Numbers:
     if kind in ("meridian", _FOUND):
         return log(_MERIDIAN * (_TRIALS if kind == _FOUND else 1.0)), 0.0, 0.0
+    element, degree, *words = kind.split()
     if stage == "mesh":
-        return log(1e4 * _MESH), 1.0, 0.0
-    element, degree, *movements = kind.split()
-    more = 1 + _MOVEMENT * (int(movements[0]) - 1) if movements else 1.0
-    per_cell = more * _SOLVE[int(degree) + (stage == "bar")] * (_MIXED if element == "mixed" else 1.0)
-    per_cell *= _LARGE[stage] if element == "neo-hookean" else 1.0
-    return log(1e4 * per_cell), 1.0, 0.0 if element == "mixed" else _LOCKING
+        seconds, power = _MESH
+        return log(seconds * (_CURVED if "curved" in words else 1.0)), power, 0.0
+    if element == "neo-hookean":
+        seconds, power = _LARGE[stage]
+        return log(seconds), power, _LOCKING
+    seconds, power = (_SOLVE if stage == "solve" else _BAR)[int(degree)]
+    movements = next((int(word) for word in words if word.isdigit()), 1)
+    seconds *= (1 + _MOVEMENT * (movements - 1)) * (_MIXED if element == "mixed" else 1.0)
+    seconds *= _LAYERED if "regions" in words else 1.0
+    seconds *= _SEARCH if stage == "solve" and "found" in words else 1.0
+    return log(seconds), power, 0.0 if element == "mixed" else _LOCKING

@@ -2,6 +2,7 @@
 
 from math import inf, log, pi
 
+from pipeline.shapes.indenter import Indenter
 from pipeline.study.sweep import Case
 
 # Volume of gmsh's mean tetrahedron in units of the cube of the size asked for: measured, docs/performance.md.
@@ -47,6 +48,9 @@ def cells(case: Case) -> float:
     total = length * pi * (1 / rim - 1 / mesh.fine) ** 2 * rim / (2 * growth**2) if rim < mesh.fine else 0.0
     # Below an area in which contact may end: ∫ 1 / (rim + growth s)³ ds.
     total += area / (2 * growth * rim**2)
+    if isinstance(probe, Indenter):  # elements there are small down to the depth of the tool, and beside that
+        _, depth = probe.depths
+        total += area * depth / rim**3 + length * depth / (growth * rim**2)
     total += _of_bend(case) + _of_regions(case)
     epsilon = min(mesh.epsilon, (3 * body.volume / (2 * pi)) ** (1 / 3))
     if case.is_full or mesh.epsilon == inf:

@@ -14,6 +14,7 @@ from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.shapes.tissue import Tissue
+from pipeline.study.capabilities import features_of
 from pipeline.study.closure import FarRegion
 from pipeline.study.loads import Load
 from pipeline.study.place import CLEAR, is_clear, place_error
@@ -103,6 +104,11 @@ class Case:
     def frame(self) -> Frame:
         """Where the probe meets the body."""
         return self.probe.frame_on(self.body)
+
+    @property
+    def features(self) -> frozenset[str]:
+        """What it has of the features that :mod:`pipeline.study.capabilities` names."""
+        return features_of(self)
 
     @property
     def absence(self) -> str:

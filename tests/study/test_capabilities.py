@@ -1,0 +1,69 @@
+"""The table of features: a case knows those that it has, and what is refused or done the long way says why."""
+
+import itertools
+
+import pytest
+
+from pipeline.study.capabilities import FEATURES, OBSTACLES, REFUSALS, obstacle
+from pipeline.study.load import parse
+from pipeline.study.problems import StudyError
+from tests.cases import BLADE, raw, study
+
+SPHERE = {"shape": "sphere", "radius": "6 mm", "depth": "0.2 mm", "contact": "unilateral"}
+# A tilted tool touches beside its axis: that is the place's, and no feature's.
+_LATER = "would touch the body"
+HAVING = {
+    "found contact": {"probe": SPHERE},
+    "tool that is not flat": {"probe": SPHERE},
+    "six motions": {"probe": {"motion": "all"}},
+    "cut": {"probe": BLADE},
+    "slice": {"probe": BLADE | {"slice": "0.1 mm"}},
+    "slit": {"probe": BLADE | {"incision": "6 mm"}},
+    "large strains": {"material": {"law": "neo-hookean"}},
+    "loads": {"load": {"gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]}, "material": {"density": "1 g/cm^3"}},
+    "kept column": {"mesh": {"epsilon": "9 mm", "outside": "free"}},
+    "half ball": {"mesh": {"epsilon": "9 mm", "outside": "halfspace"}},
+    "own far field": {"mesh": {"epsilon": "9 mm", "outside": "green"}},
+    "inclined tool or surface": {"probe": {"axis": [0.1, 0, -1]}},
+    "degree 1": {"mesh": {"degree": 1}},
+}
+
+
+def test_a_plain_press_has_no_feature():
+    assert study().case(()).features == frozenset()
+
+
+@pytest.mark.parametrize("name", HAVING)
+def test_a_case_knows_its_features(name):
+    assert name in study(**HAVING[name]).case(()).features
+
+
+def test_every_row_names_features():
+    told = {name for refusal in REFUSALS for name in (refusal.first, refusal.second)}
+    hindering = {name for found in OBSTACLES.values() for name in found}
+    assert told | hindering == set(FEATURES)
+
+
+@pytest.mark.parametrize(("one", "other"), itertools.combinations(HAVING, 2))
+def test_two_features_are_refused_if_the_table_says_so(one, other):
+    """A study that has both of them is refused with the reason of their row, or there is none."""
+    content = raw(**HAVING[one])
+    for section, keys in HAVING[other].items():
+        before = HAVING[one].get(section, {})
+        if {"shape", "outside"} & keys.keys() & before.keys():
+            return  # two tools, or two outsides
+        start = {} if "shape" in keys else content.get(section, {})
+        content[section] = {**start, **keys, **before}
+    try:
+        case = parse(content).case(())
+    except StudyError as error:
+        assert any(reason in str(error) for reason in (*(r.reason for r in REFUSALS), _LATER)), error
+    else:
+        assert {one, other} <= case.features
+        assert not any({r.first, r.second} <= case.features for r in REFUSALS)
+
+
+def test_an_obstacle_is_told_with_its_reason():
+    case = study(**HAVING["loads"]).case(())
+    assert "three dimensions" in obstacle("meridian", case)
+    assert obstacle("F_exact", case) == ""
