@@ -149,7 +149,7 @@ def _mixed_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[A
     from pipeline.solve.saddle import SaddleSolver
     from pipeline.solve.solution import TOLERANCE
 
-    direct, space, c = method == "direct", problem.elements.space, 1 / (law.ratio - LAME.lame[0])
+    direct, space, c = method == "direct", problem.elements.space, 1 / (law.parameters[0].ratio - LAME.lame_lambda[0])
     start = time.process_time()
     saddle = problem.elements.saddle(LAME, stack, direct=direct)
     assemble = time.process_time() - start

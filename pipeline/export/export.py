@@ -138,7 +138,7 @@ def _flat(
     def counted(places: Places, poisson: float) -> FloatArray:
         solved.extend(places)
         tissues = scope.tissues_at(poisson)
-        law = MaterialLaw(*tissues) if tissues else None
+        law = MaterialLaw.of(*tissues) if tissues else None
         return np.array(ranks.together(places, lambda some: list(compliances(mesh, region, some, poisson, law))))
 
     table, missed = tabulate(region, scope.poissons, counted, _SHARE * accuracy)

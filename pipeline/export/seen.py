@@ -41,7 +41,7 @@ def seen_body(scope: Scope, model: Model, margin: float, ranks: Ranks = ALONE) -
 
     def law(poisson: float) -> MaterialLaw | None:
         tissues = scope.tissues_at(poisson)
-        return MaterialLaw(*tissues) if tissues else None
+        return MaterialLaw.of(*tissues) if tissues else None
 
     if isinstance(scope.body, Layered):
         region = Region.of(scope.body, margin)

@@ -6,7 +6,7 @@ from math import inf, isnan, nan
 
 from pipeline.plan.steps import Solve
 from pipeline.run.measure import turned_back
-from pipeline.run.problem import loads_of
+from pipeline.run.problem import law_of, loads_of
 from pipeline.run.record import Record
 from pipeline.shapes.frame import Vector
 from pipeline.solve.quasi_static import QuasiStaticProblem
@@ -81,5 +81,5 @@ def _record(solve: Solve, reduced: Reduced, source: Record, problem: QuasiStatic
         source, key=solve.key, origin="reduced", young=scale.stress, depth=scale.length, force=z,
         force_vector=turned_back(solve.case.frame.turn, (x, y, z)),
         force_error=bar, force_vector_error=_vector_bars(source, bar * abs(z)), energy=mu * reduced.response.energy,
-        max_strain=problem.largest_strain(basis.displacement(reduced)), balance=reduced.bound, iterations=0,
+        **problem.largest(law_of(solve.case), basis.displacement(reduced)), balance=reduced.bound, iterations=0,
     )  # fmt: skip

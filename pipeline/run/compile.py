@@ -6,10 +6,12 @@ from mpi4py import MPI
 
 from pipeline.plan.steps import Solve
 from pipeline.solve.axisymmetric import compile_axisymmetric
+from pipeline.solve.cell_values import compile_cell_values
 from pipeline.solve.compiled import compiling
 from pipeline.solve.forms import compile_elastic
+from pipeline.solve.hyperelastic import compile_hyperelastic
 from pipeline.solve.kernels import native
-from pipeline.solve.large.forms import compile_neo_hookean
+from pipeline.solve.material import LAWS
 from pipeline.solve.meridian_trials import TRIAL_DEGREE
 from pipeline.solve.mixed_forms import compile_mixed
 from pipeline.solve.regular import compile_regular
@@ -18,7 +20,6 @@ from pipeline.stages import stage
 
 # What the regular part of a Green's function takes, whatever the elements of the case.
 _REGULAR = "regular", 0, False, False
-_LARGE = "neo-hookean"
 # What this process has seen to.
 _compiled: set[tuple[str, int, bool, bool]] = set()
 
@@ -55,7 +56,7 @@ def _forms(solve: Solve) -> tuple[str, int, bool, bool]:
         kind = "elliptic" if half_plane and half_plane.is_curved else "axisymmetric"
         return kind, TRIAL_DEGREE if solve.case.probe.is_unilateral else 0, False, False
     if solve.case.material.is_large:
-        return _LARGE, mesh.degree, False, False
+        return solve.case.material.law, mesh.degree, False, False
     return solve.case.element, mesh.degree, bool(body.regions), solve.case.probe.slit is not None
 
 
@@ -69,7 +70,8 @@ def _compile(element: str, degree: int, *, of_regions: bool, of_slit: bool) -> N
     compile_elastic(degree, straight=degree == 1, of_regions=of_regions)
     if element == "mixed":
         compile_mixed(degree)
-    if element == _LARGE:
-        compile_neo_hookean(degree, straight=degree == 1)
+    compile_cell_values(degree, straight=degree == 1)
+    if element in LAWS:
+        compile_hyperelastic(element, degree, straight=degree == 1)
     if of_slit:
         compile_release(degree, mixed=element == "mixed", of_regions=of_regions)

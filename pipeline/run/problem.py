@@ -17,11 +17,9 @@ from pipeline.solve.axisymmetric import MeridianProblem
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.contact.active_set import ContactError
 from pipeline.solve.contact.problem import ContactProblem, Tool
-from pipeline.solve.large.newton import LargeError
-from pipeline.solve.large.problem import LargeProblem
 from pipeline.solve.linear import SolveError, is_direct
 from pipeline.solve.loads import Loads
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.material import MaterialLaw, Parameters
 from pipeline.solve.meridian_contact import MeridianContact
 from pipeline.solve.meridian_trials import RoundTool
 from pipeline.solve.quasi_static import QuasiStaticProblem
@@ -51,8 +49,6 @@ def problem_of(
         return ContactProblem(
             spaces, tool_of(case), case.element, degree=case.mesh.degree, reuse=reuse, condense=condense
         )
-    if case.material.is_large:
-        return LargeProblem(spaces, case.mesh.degree, conditions_of(case), reuse=reuse)
     return QuasiStaticProblem(spaces, case.mesh.degree, conditions_of(case), case.element, shared=shared, reuse=reuse)
 
 
@@ -165,8 +161,8 @@ def _movement_of(case: Case, meshed: Case) -> Loads:
 
 def law_of(case: Case) -> MaterialLaw:
     """Return what the regions of the body of ``case`` are made of."""
-    moduli = [tissue.lame for tissue in case.tissues]
-    return MaterialLaw(tuple(value for value, _ in moduli), tuple(value for _, value in moduli))
+    parameters = tuple(Parameters.of_moduli(tissue.young, tissue.poisson) for tissue in case.tissues)
+    return MaterialLaw(parameters, case.material.law)
 
 
 def solve_problem(case: Case, problem: Problem, *, estimate: bool, meshed: Case | None = None) -> Solution:
@@ -181,10 +177,10 @@ def solve_problem(case: Case, problem: Problem, *, estimate: bool, meshed: Case 
     method, tolerance = case.solve.method, case.solve.tolerance
     try:
         solution = problem.solve(law, loads, method=method, tolerance=tolerance, estimate=estimate)
-    except (ContactError, LargeError):
+    except ContactError:
         raise
     except SolveError:
-        if method != "auto" or not 0 < problem.dofs <= _MOST_DIRECT:
+        if method != "auto" or not law.is_linear or not 0 < problem.dofs <= _MOST_DIRECT:
             raise
         solution = problem.solve(law, loads, method="direct", tolerance=tolerance, estimate=estimate)
     if loads.far is not None:

@@ -24,5 +24,10 @@ class Tissue(Section):
     @property
     def lame(self) -> tuple[float, float]:
         """Lamé's λ and μ (Pa); λ is infinite for an incompressible material."""
-        mu = self.young / (2 * (1 + self.poisson))
-        return (2 * mu * self.poisson / (1 - 2 * self.poisson) if self.poisson < 0.5 else inf), mu
+        return lame(self.young, self.poisson)
+
+
+def lame(young: float, poisson: float) -> tuple[float, float]:
+    """Return Lamé's λ and μ (Pa) from Young's modulus (Pa) and Poisson's ratio; λ is infinite for ½."""
+    mu = young / (2 * (1 + poisson))
+    return (2 * mu * poisson / (1 - 2 * poisson) if poisson < 0.5 else inf), mu

@@ -31,7 +31,6 @@ from pipeline.solve.meridian_system import (
     factorised,
     forms_of,
     max_strain,
-    poisson_of,
 )
 from pipeline.solve.reaction import reaction
 from pipeline.solve.solution import Solution
@@ -64,9 +63,9 @@ class MeridianProblem(DirectProblem):
                 error bar stays above 1e-3.
         """
         only_along_axis(loads)
-        for nu in map(poisson_of, law.lame_lambda, law.lame_mu):
-            if not 0 <= nu <= 0.5:
-                raise SolveError(f"Poisson's ratio is {nu:g}, must be between 0 and 0.5")
+        for tissue in law.parameters:
+            if not 0 <= tissue.poisson <= 0.5:
+                raise SolveError(f"Poisson's ratio is {tissue.poisson:g}, must be between 0 and 0.5")
 
         def solve_on(grading: Grading) -> _Scaled:
             with stage("meshing"):
@@ -82,7 +81,7 @@ class MeridianProblem(DirectProblem):
         )  # fmt: skip
         return Solution(
             response=response,
-            max_strain=abs(amount) / a * best.max_strain,
+            largest={"max_strain": abs(amount) / a * best.max_strain},
             dofs=best.forms.dofs,
             cells=best.cells,
             iterations=best.iterations,

@@ -26,7 +26,7 @@ from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
-from pipeline.solve.conditions import Conditions
+from pipeline.solve.conditions import Conditions, ConstrainedSpace
 from pipeline.solve.dead_loads import Applied
 from pipeline.solve.earlier import Earlier
 from pipeline.solve.enrich import energy_decrements
@@ -57,13 +57,14 @@ class Column:
     """One load case and its solution: a unit of a motion, or dead loads on a probe that is held.
 
     The solution is ``unknown``, whose prescribed dofs are nought, and ``prescribed`` (m, local dofs with ghosts).
-    ``right`` is the right-hand side for the unknown.
+    ``right`` is the right-hand side for the unknown. ``amount`` is that of the motion (m, or rad), 1 for loads.
     """
 
     prescribed: FloatArray
     applied: Applied | None
     right: Fields
     unknown: Fields
+    amount: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +75,7 @@ class Products:
     ``energies`` (n) are twice the strain energies. Energies are global, of the part that is modelled.
     """
 
+    dofs: ConstrainedSpace
     moved: list[FloatArray]
     residuals: list[FloatArray]
     stationary: FloatArray
@@ -96,7 +98,20 @@ class Enriched:
 
 
 class Solver(Protocol):
-    """A solver of elements for one law."""
+    """A solver of elements for one law.
+
+    ``is_exact`` tells that nothing improves what it finds; ``stored`` is the energy (J) of the modelled part where that
+    is not half the work of the force.
+    """
+
+    is_exact: bool
+    stored: float | None
+
+    def lift(self, columns: Sequence[Column]) -> None:
+        """Put what columns prescribe and their loads on their right-hand sides; collective."""
+
+    def products(self, columns: Sequence[Column]) -> Products:
+        """Return residuals and energies of solutions; collective."""
 
     def solve(self, columns: Sequence[Column], tolerance: float) -> int:
         """Lower the energy norm of the error of each solution to a ``tolerance``; return the iterations; collective."""
@@ -183,19 +198,27 @@ class Elements(ABC):
         """
         dofs = self.displacements.dofs
         prescribed = [dofs.held(motion) for motion in loads.motions]
-        applied: list[Applied | None] = [None] * len(prescribed)
+        amounts = [*loads.amounts]
+        applied: list[Applied | None] = [None for _ in prescribed]
         if loads.dead is not None:
             prescribed.append(np.zeros(len(self.displacements.forms.displacement.x.array)))
+            amounts.append(1.0)
             applied.append(self.displacements.applied(loads.dead))
         return [
-            Column(values, load, stack.enter_context(self.fields()), stack.enter_context(self.fields()))
-            for values, load in zip(prescribed, applied, strict=True)
+            Column(
+                prescribed=values,
+                applied=load,
+                right=stack.enter_context(self.fields()),
+                unknown=stack.enter_context(self.fields()),
+                amount=amount,
+            )
+            for values, load, amount in zip(prescribed, applied, amounts, strict=True)
         ]
 
-    def show(self, columns: Sequence[Column], amounts: Sequence[float]) -> None:
-        """Make the sum of solutions, each times its amount, the fields of the forms; collective."""
+    def show(self, columns: Sequence[Column], amounts: Sequence[float] | None = None) -> None:
+        """Make the sum of solutions, each times its amount or another one, the fields of the forms; collective."""
         with self.fields() as total:
-            for column, amount in zip(columns, amounts, strict=True):
+            for column, amount in zip(columns, amounts or [column.amount for column in columns], strict=True):
                 for whole, part in zip(total, column.unknown, strict=True):
                     whole.axpy(amount, part)
                 total[0].array[:] += amount * column.prescribed[: self.displacements.dofs.owned]
@@ -280,7 +303,7 @@ class DisplacementElements(Elements):
                 residuals.append(residual.array.copy())
                 moved.append(total[0].array.copy())
         stationary = self._sums([[u @ r for r in residuals] for u in moved])
-        return Products(moved, residuals, stationary, np.diag(stationary))
+        return Products(self.displacements.dofs, moved, residuals, stationary, np.diag(stationary))
 
     def release(self, law: MaterialLaw, line: Front) -> Release:
         """Return what tells the energy that the present displacement of the forms releases at a ``line``."""
@@ -308,7 +331,7 @@ class DisplacementElements(Elements):
                 levels = self.levels(law, owner, direct=direct)
                 solver = LinearSolver(levels, direct=direct, tolerance=_ANY)
                 owner.callback(solver.close)
-            found = DisplacementSolver(self, law, levels, solver, cost)
+            found = DisplacementSolver(self, law, levels, solver, cost, is_exact=direct)
             if keep and solver.is_single:
                 self._kept, found.owner = found, owner.pop_all()
             else:
@@ -361,9 +384,20 @@ class DisplacementSolver:
     levels: list[Level]
     linear: LinearSolver
     cost: Times
+    is_exact: bool
+    stored: float | None = None
     owner: ExitStack = field(default_factory=ExitStack)
     _above: tuple[DisplacementElements, LinearSolver] | None = None
     _tolerance: float = 1.0
+
+    def lift(self, columns: Sequence[Column]) -> None:
+        """Put what columns prescribe and their loads on their right-hand sides; collective."""
+        for column in columns:
+            self.elements.lift(column, self.law)
+
+    def products(self, columns: Sequence[Column]) -> Products:
+        """Return residuals and energies of solutions; collective."""
+        return self.elements.products(self.law, columns)
 
     def solve(self, columns: Sequence[Column], tolerance: float) -> int:
         """Lower the energy norm of each error to a ``tolerance``; return the iterations; collective."""
@@ -493,6 +527,7 @@ class MixedElements(Elements):
         )
         stretched, coupled, compressed = np.moveaxis(products, -1, 0)
         return Products(
+            dofs=self.displacements.dofs,
             moved=[u for u, _ in moved],
             residuals=residuals,
             stationary=stretched + coupled + coupled.T - compressed,
@@ -512,9 +547,9 @@ class MixedElements(Elements):
         Raises:
             SolveError: if λ <= μ everywhere, or it cannot be set up.
         """
-        if not any(lame_lambda > mu for lame_lambda, mu in zip(law.lame_lambda, law.lame_mu, strict=True)):
+        if not any(region.ratio > 1 for region in law.parameters):
             raise SolveError("mixed elements are for Poisson's ratios above 0.25; use displacement elements")
-        return MixedSolver(self, law, self._solver(SplitLaw.of(law).elastic, direct=direct))
+        return MixedSolver(self, law, self._solver(SplitLaw.of(law).elastic, direct=direct), is_exact=direct)
 
     def finer(self) -> "MixedElements":
         """Return the elements of one degree more, made when first asked for; collective."""
@@ -526,8 +561,7 @@ class MixedElements(Elements):
         """Return the blocks for λ₀ and μ of the law ``elastic``, given back with the ``stack``; collective."""
         spaces = [self._spaces.get(d, self._conditions) for d in ([self.degree] if direct else self._degrees)]
         levels = [_level(space, elastic, stack, blocked=not direct, entries=direct) for space in spaces]
-        moduli = zip(elastic.lame_lambda, elastic.lame_mu, strict=True)
-        stiffness = self.space.by_region(tuple(lame_lambda + 2 * mu for lame_lambda, mu in moduli))
+        stiffness = self.space.by_region(tuple(part.lame_lambda + 2 * part.lame_mu for part in elastic.parameters))
         return Saddle(levels, *self.space.blocks(entries=direct), stiffness, self.degree - 1)
 
     @property
@@ -558,6 +592,17 @@ class MixedSolver:
     elements: MixedElements
     law: MaterialLaw
     saddle: SaddleSolver
+    is_exact: bool
+    stored: float | None = None
+
+    def lift(self, columns: Sequence[Column]) -> None:
+        """Put what columns prescribe and their loads on their right-hand sides; collective."""
+        for column in columns:
+            self.elements.lift(column, self.law)
+
+    def products(self, columns: Sequence[Column]) -> Products:
+        """Return residuals and energies of solutions; collective."""
+        return self.elements.products(self.law, columns)
 
     def solve(self, columns: Sequence[Column], tolerance: float) -> int:
         """Lower the energy norm of each error by a ``tolerance``; return the iterations; collective."""
@@ -574,7 +619,7 @@ class MixedSolver:
         coarse, split = self.elements, SplitLaw.of(self.law)
         finer = coarse.finer()
         below = coarse._solvers.get(False, (None, None))[0]
-        above = MixedSolver(finer, self.law, finer._solver(split.elastic, direct=False, below=below))
+        above = MixedSolver(finer, self.law, finer._solver(split.elastic, direct=False, below=below), is_exact=False)
         found = finer.columns(loads, stack)
         for column, fine in zip(columns, found, strict=True):
             coarse.show([column], [1.0])

@@ -22,7 +22,7 @@ from pipeline.solve.compiled import cellwise_space, form, vector_space
 from pipeline.solve.kernels import assembles, has_kernel
 from pipeline.solve.kernels.curved import quadrature_degree
 from pipeline.solve.kernels.stiffness import cell_kernel
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.material import MaterialLaw, strain
 
 # Marks of cells, and the bulge of an edge, in units of its length, that rounding may leave.
 _NEITHER, _STRAIGHT, _CURVED = 0, 1, 2
@@ -131,20 +131,6 @@ def _find_curved(mesh: Any) -> BoolArray | None:
     return np.asarray(bulge > _FLAT * np.abs(ends[:, :, 1] - ends[:, :, 0]).max(axis=(1, 2)))
 
 
-def strain(u: Any) -> Any:
-    """Small strain tensor ε(u)."""
-    return ufl.sym(ufl.grad(u))
-
-
-def mean_strain_form(space: Any, displacement: Any) -> tuple[Any, Any]:
-    """Return forms of the integral of the strain, and of the volume, of each cell; collective."""
-    tensors = cellwise_space(space.mesh, (3, 3))
-    test = ufl.TestFunction(tensors)
-    measure = dx(space)
-    one = ufl.as_tensor(np.ones((3, 3)).tolist())
-    return form(ufl.inner(strain(displacement), test) * measure), form(ufl.inner(one, test) * measure)
-
-
 def compile_elastic(degree: int, *, straight: bool, of_regions: bool) -> None:
     """Compile the forms of displacements of ``degree`` and of those below, and of one degree more for the error bar."""
     regions = np.zeros(1, dtype=np.int32) if of_regions else None
@@ -153,8 +139,6 @@ def compile_elastic(degree: int, *, straight: bool, of_regions: bool) -> None:
         space = vector_space(mesh, level)
         forms = ElasticForms(space, regions)
         _ = forms.stiffness, forms.action
-        if level == degree:
-            mean_strain_form(space, forms.displacement)
 
 
 def one_cell(*, straight: bool) -> MeshArrays:

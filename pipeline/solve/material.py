@@ -1,55 +1,94 @@
-"""What the body is made of."""
+"""What tissue is made of: parameters of each region, and laws, each of which is a strain energy in UFL.
 
-from dataclasses import dataclass
+A law gives the energy ψ (J/m³) of the undeformed body as a function of F = I + ∇u. To second order in ∇u each law is
+linear elasticity with the same λ and μ. To add one, write ψ as a function and enter it in :data:`LAWS`; the study file
+takes it once its name is in the list of ``pipeline/study/schema.py``.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from math import inf
+from typing import Any
+
+import ufl
+
+from pipeline.shapes.tissue import lame
 
 # λ₁ in units of μ, at least: λ₀ may then be −μ/4, and K₀ is definite as long as it is above −2μ/3.
 _LEAST_REST = 0.25
 
 
 @dataclass(frozen=True)
-class MaterialLaw:
-    """Isotropic linear elasticity: Lamé's λ and μ (Pa) of each region of the mesh, in the order of its numbers.
+class Parameters:
+    """What one region is made of, at small strains: Lamé's λ and μ (Pa); λ is infinite where it is incompressible.
 
-    λ is infinite where the material is incompressible.
+    ``given_poisson`` is Poisson's ratio as it was given, None where λ and μ were.
     """
 
-    lame_lambda: tuple[float, ...]
-    lame_mu: tuple[float, ...]
+    lame_lambda: float
+    lame_mu: float
+    given_poisson: float | None = field(default=None, compare=False)
 
     @staticmethod
-    def of(lame_lambda: float, lame_mu: float) -> "MaterialLaw":
-        """Return the law of a body of one material, from λ and μ (Pa)."""
-        return MaterialLaw((lame_lambda,), (lame_mu,))
-
-    @staticmethod
-    def of_moduli(young: float, poisson: float) -> "MaterialLaw":
-        """Return the law of a body of one material, from Young's modulus (Pa) and Poisson's ratio, 0 to ½."""
-        mu = young / (2 * (1 + poisson))
-        return MaterialLaw.of(2 * mu * poisson / (1 - 2 * poisson) if poisson < 0.5 else inf, mu)
-
-    @property
-    def is_uniform(self) -> bool:
-        """Whether there is one material, for all regions that the mesh may have."""
-        return len(self.lame_mu) == 1
-
-    @property
-    def lame(self) -> tuple[float, float]:
-        """λ and μ (Pa) of a body of one material."""
-        ((lame_lambda,), (lame_mu,)) = self.lame_lambda, self.lame_mu
-        return lame_lambda, lame_mu
+    def of_moduli(young: float, poisson: float) -> "Parameters":
+        """Return parameters from Young's modulus (Pa) and Poisson's ratio, 0 to ½."""
+        return Parameters(*lame(young, poisson), poisson)
 
     @property
     def poisson(self) -> float:
-        """Poisson's ratio of a body of one material."""
-        lame_lambda, lame_mu = self.lame
-        return 0.5 if lame_lambda == inf else lame_lambda / (2 * (lame_lambda + lame_mu))
+        """Poisson's ratio."""
+        if self.given_poisson is not None:
+            return self.given_poisson
+        return 0.5 if self.lame_lambda == inf else self.lame_lambda / (2 * (self.lame_lambda + self.lame_mu))
 
     @property
     def ratio(self) -> float:
-        """λ/μ of a body of one material: all that F/μ depends on."""
-        lame_lambda, lame_mu = self.lame
-        return lame_lambda / lame_mu
+        """λ/μ: all that F/μ depends on."""
+        return self.lame_lambda / self.lame_mu
+
+
+@dataclass(frozen=True)
+class MaterialLaw:
+    """A law, one of :data:`LAWS`, with the ``parameters`` of each region of the mesh, in the order of its numbers.
+
+    A law of one region holds for all regions that a mesh may have.
+    """
+
+    parameters: tuple[Parameters, ...]
+    name: str = "linear"
+
+    @staticmethod
+    def of(lame_lambda: float | Sequence[float], lame_mu: float | Sequence[float]) -> "MaterialLaw":
+        """Return linear elasticity from λ and μ (Pa): a number each, or one for each region."""
+        if isinstance(lame_lambda, Sequence) and isinstance(lame_mu, Sequence):
+            return MaterialLaw(tuple(map(Parameters, lame_lambda, lame_mu)))
+        return MaterialLaw((Parameters(lame_lambda, lame_mu),))  # type: ignore[arg-type]
+
+    @staticmethod
+    def of_moduli(young: float, poisson: float, name: str = "linear") -> "MaterialLaw":
+        """Return the law of a body of one material, from Young's modulus (Pa) and Poisson's ratio, 0 to ½."""
+        return MaterialLaw((Parameters.of_moduli(young, poisson),), name)
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether forces are proportional to displacements."""
+        return self.name == "linear"
+
+    @cached_property
+    def lame_lambda(self) -> tuple[float, ...]:
+        """Lamé's λ (Pa) of each region."""
+        return tuple(each.lame_lambda for each in self.parameters)
+
+    @cached_property
+    def lame_mu(self) -> tuple[float, ...]:
+        """Lamé's μ (Pa) of each region."""
+        return tuple(each.lame_mu for each in self.parameters)
+
+    @property
+    def is_uniform(self) -> bool:
+        """Whether there is one material."""
+        return len(self.parameters) == 1
 
 
 @dataclass(frozen=True)
@@ -65,12 +104,37 @@ class SplitLaw:
         """Split a law: λ₀ = μ, and less where λ is not much larger than μ, so that λ₁ stays positive."""
         unit = max(law.lame_mu)
         elastic, compliance = [], []
-        for lame_lambda, lame_mu in zip(law.lame_lambda, law.lame_mu, strict=True):
-            mu = lame_mu / unit
-            rest, kept = lame_lambda / unit - mu, mu
+        for region in law.parameters:
+            mu = region.lame_mu / unit
+            rest, kept = region.lame_lambda / unit - mu, mu
             if not law.is_uniform and rest < _LEAST_REST * mu:
                 rest = _LEAST_REST * mu
-                kept = lame_lambda / unit - rest
+                kept = region.lame_lambda / unit - rest
             elastic.append(kept)
             compliance.append(0.0 if rest == inf else 1 / rest)
-        return SplitLaw(unit, MaterialLaw(tuple(elastic), tuple(mu / unit for mu in law.lame_mu)), tuple(compliance))
+        return SplitLaw(unit, MaterialLaw.of(elastic, [mu / unit for mu in law.lame_mu]), tuple(compliance))
+
+
+def strain(u: Any) -> Any:
+    """Return the small strain tensor ε(u)."""
+    return ufl.sym(ufl.grad(u))
+
+
+def linear(gradient: Any, lame_lambda: Any, lame_mu: Any) -> Any:
+    """Linear elasticity: λ/2 (tr ε)² + μ ε : ε, ε the symmetric part of F − I."""
+    small = ufl.sym(gradient) - ufl.Identity(gradient.ufl_shape[0])
+    return lame_lambda / 2 * ufl.tr(small) ** 2 + lame_mu * ufl.inner(small, small)
+
+
+def neo_hookean(gradient: Any, lame_lambda: Any, lame_mu: Any) -> Any:
+    """A compressible neo-Hookean body: μ/2 (F : F − 3) − μ ln J + λ/2 (J − 1)², J = det F.
+
+    It is polyconvex (J. M. Ball, Arch. Rational Mech. Anal. 63, 1977), and infinite where tissue has no volume left.
+    """
+    volume = ufl.det(gradient)
+    stretched = lame_mu / 2 * (ufl.inner(gradient, gradient) - 3) - lame_mu * ufl.ln(volume)
+    return stretched + lame_lambda / 2 * (volume - 1) ** 2
+
+
+# ψ(F, λ, μ) by the name that a study file has.
+LAWS: dict[str, Callable[[Any, Any, Any], Any]] = {"linear": linear, "neo-hookean": neo_hookean}

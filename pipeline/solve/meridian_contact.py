@@ -83,7 +83,7 @@ class MeridianContact(DirectProblem):
         )
         return Solution(
             response=response,
-            max_strain=best.max_strain,
+            largest={"max_strain": best.max_strain},
             dofs=best.trial.forms.dofs,
             cells=best.cells,
             iterations=search.trials.count,

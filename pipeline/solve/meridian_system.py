@@ -22,8 +22,6 @@ from pipeline.stages import stage
 # on three scenes displacement elements differ from mixed ones by 5e-9 to 1e-8 at ν = 0.45 and by 2e-8 at 0.49, take
 # half the time (0.3 s, not 0.65), and have bars of 3e-6 at most, where 1e-5 is asked for.
 MIXED_FROM = 0.49
-# The ratio comes from Lamé's constants: rounding must not decide which element a Poisson's ratio of 0.49 has.
-_ROUNDING = 1e-9
 # Per cent of memory beyond MUMPS's estimate, which pivoting exceeds.
 _SPARE_MEMORY = 100
 
@@ -41,19 +39,14 @@ def forms_of(meshes: Meshes, degree: int, law: MaterialLaw) -> tuple[MeridianFor
     """Return the forms of all materials, in units of the μ of region 0, and whether their operator is definite."""
     parts, weights, definite = [], [], True
     for region, (mesh, facets) in meshes.items():
-        lame_lambda, lame_mu = law.lame_lambda[region], law.lame_mu[region]
-        mixed = poisson_of(lame_lambda, lame_mu) >= MIXED_FROM - _ROUNDING
+        tissue = law.parameters[region]
+        mixed = tissue.poisson >= MIXED_FROM
         part = MeridianForms(mesh, facets, degree, mixed)
-        part.set_ratio(lame_lambda / lame_mu)
+        part.set_ratio(tissue.ratio)
         parts.append(part)
-        weights.append(lame_mu / law.lame_mu[0])
+        weights.append(tissue.lame_mu / law.parameters[0].lame_mu)
         definite = definite and not mixed
     return parts[0] if len(parts) == 1 and weights == [1.0] else JoinedForms(parts, weights), definite
-
-
-def poisson_of(lame_lambda: float, lame_mu: float) -> float:
-    """Return Poisson's ratio."""
-    return MaterialLaw.of(lame_lambda, lame_mu).poisson
 
 
 @contextmanager

@@ -141,7 +141,7 @@ class Operators:
             self._part_seconds = (time.perf_counter() - start) / 2
         matrix = into if into is not None else self._assemble(MaterialLaw.of(0.0, 1.0), 1.0, mat_type, None)
         of_lambda, of_mu = self._parts[mat_type]
-        lame_lambda, lame_mu = law.lame
+        (lame_lambda,), (lame_mu,) = law.lame_lambda, law.lame_mu
         of_lambda.copy(matrix, structure=_SAME)
         matrix.scale(lame_lambda)
         matrix.axpy(lame_mu, of_mu, structure=_SAME)

@@ -23,12 +23,21 @@ from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.carried import Carried, carried_of, imbalance, shares
+from pipeline.solve.cell_values import CellValues
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.earlier import Earlier
-from pipeline.solve.elements import Column, DisplacementElements, DisplacementSolver, Elements, Solver, elements_of
+from pipeline.solve.elements import (
+    Column,
+    DisplacementElements,
+    DisplacementSolver,
+    Elements,
+    Products,
+    Solver,
+    elements_of,
+)
 from pipeline.solve.error import error_bar, stiffness_bars
-from pipeline.solve.forms import mean_strain_form
 from pipeline.solve.linear import LinearSolver, SolveError
+from pipeline.solve.load_steps import LoadSteps, Walk
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.material import MaterialLaw
 from pipeline.solve.reaction import Response, reaction, sums
@@ -36,7 +45,6 @@ from pipeline.solve.release import Front, Released
 from pipeline.solve.rim import plain_share
 from pipeline.solve.solution import MOST_ROUNDS, TOLERANCE, Solution, check_balance, rest
 from pipeline.solve.spaces import Spaces
-from pipeline.solve.strain import largest_strain, principal_strains
 from pipeline.solve.vectors import global_sum
 from pipeline.stages import recorded, stage
 
@@ -63,7 +71,7 @@ class QuasiStaticProblem:
         """Prepare elements of a ``degree``, of a kind, "displacement" or "mixed"; collective.
 
         ``shared`` assembles A_λ and A_μ apart, once, for many pairs of λ and μ. ``reuse`` begins each solve from the
-        solution of the one before. What the spaces hold is freed with them.
+        solution of the one before: depths of a law that is not linear share one walk.
 
         Raises:
             SolveError: if footprint and support share a point: no displacement satisfies both.
@@ -71,10 +79,11 @@ class QuasiStaticProblem:
         self.elements: Elements = elements_of(spaces, degree, conditions, element, shared=shared)
         self.corrections: dict[Motion, tuple[FloatArray, ...]] = {}
         self._earlier: Earlier | None = None  # of a tool and the far fields of its places
+        self._walk: Walk | None = None  # to the last depth in a body of a law that is not linear
         self._reuse = reuse and element == "displacement"
         self._body, self._conditions = spaces.body, conditions
-        displacements = self.elements.displacements
-        self._strain = mean_strain_form(displacements.dofs.space, displacements.forms.displacement)
+        self._values = CellValues(self._body, self.elements.displacements.forms.displacement)
+        self._law: MaterialLaw | None = None  # of the last solution
 
     def __enter__(self) -> Self:
         return self
@@ -109,40 +118,37 @@ class QuasiStaticProblem:
         elements, direct = self.elements, self.elements.is_direct(method)
         with recorded() as times, ExitStack() as stack:
             earlier = self._earlier_of(law, loads, direct=direct)
-            solver = elements.set_up(law, stack, direct=direct, keep=earlier is not None)
+            solver = self._set_up(law, loads, stack, direct=direct, keep=earlier is not None)
             with stage("assembly"):
                 columns = elements.columns(loads, stack)
-                for column in columns:
-                    elements.lift(column, law)
+                solver.lift(columns)
             with stage("solve"):
                 self._guess(columns, loads, earlier)
-                iterations, response, carried = self._iterate(
-                    solver, columns, law, loads, earlier, direct=direct, tolerance=tolerance
-                )
+                iterations, response, carried = self._iterate(solver, columns, law, loads, earlier, tolerance=tolerance)
                 if loads.far is not None:
                     loads = _close(columns, response)
-                    response = _balanced(self._response(elements, columns, law, loads)[0])
+                    response = _balanced(self._response(solver.products(columns), columns, law, loads)[0])
                 self.corrections = {
                     motion: tuple(part.array.copy() for part in column.unknown)
                     for motion, column in zip(loads.motions, columns, strict=False)
                 }
-                self._show(columns, loads)
             released, pushed = self._released(elements, columns, law, loads)
-            self._show(columns, loads)
+            elements.show(columns)
             solution = Solution(
                 response=response,
                 carried=carried,
-                max_strain=self._largest_strain(),
+                largest=self._values.largest(law, self._conditions.front),
                 dofs=elements.whole_dofs,
                 cells=self._body.cells,
                 iterations=iterations,
                 times=times,
                 released=released,
                 pushed=pushed,
+                stored=None if solver.stored is None else 2.0 ** len(self._body.mirrored) * solver.stored,
             )
             if estimate:
                 solution = self._estimated(solution, solver, columns, law, loads)
-                self._show(columns, loads)
+                elements.show(columns)
         return solution
 
     def _iterate(
@@ -153,7 +159,6 @@ class QuasiStaticProblem:
         loads: Loads,
         earlier: Earlier | None,
         *,
-        direct: bool,
         tolerance: float,
     ) -> tuple[int, Response, Carried | None]:
         """Solve for ``columns`` until forces balance; return the iterations, and what the solutions do.
@@ -166,9 +171,9 @@ class QuasiStaticProblem:
         todo = [column for number, column in enumerate(columns) if _motion(loads, number) not in known]
         iterations = solver.solve(todo, aim)
         for further in range(MOST_ROUNDS + 1):
-            response, carried = self._response(self.elements, columns, law, loads)
+            response, carried = self._response(solver.products(columns), columns, law, loads)
             share = rest(response.balance, tolerance)
-            if direct or share == 1.0 or further == MOST_ROUNDS:
+            if solver.is_exact or share == 1.0 or further == MOST_ROUNDS:
                 break
             iterations += solver.improve(columns, share)
         check_balance(response.balance)
@@ -196,21 +201,16 @@ class QuasiStaticProblem:
                 column.unknown[0].array[:] = earlier.guess(column.right[0].array) if known is None else known
 
     def _response(
-        self, elements: Elements, columns: Sequence[Column], law: MaterialLaw, loads: Loads, *, checked: bool = True
+        self, found: Products, columns: Sequence[Column], law: MaterialLaw, loads: Loads
     ) -> tuple[Response, Carried | None]:
-        """Return the response to the motions, and what dead loads do, of which the last column is; collective.
-
-        ``checked``: see :meth:`ElasticSpace.apply`.
-        """
-        found = elements.products(law, columns, checked=checked)
+        """Return the response to the motions, and what dead loads do, of which the last column is; collective."""
         count, mirrored = len(loads.motions), self._body.mirrored
         motions, loaded = columns[:count], columns[count:]
         residuals = [
             residual if column.applied is None else residual - column.applied.forces
             for residual, column in zip(found.residuals, columns, strict=True)
         ]
-        dofs = elements.displacements.dofs
-        total = sums(dofs, residuals, [column.prescribed for column in motions])
+        total = sums(found.dofs, residuals, [column.prescribed for column in motions])
         beyond = _energy_beyond(loads, law.lame_mu[0], mirrored)
         response = reaction(loads, found.stationary[:count, :count] + beyond, total.on_probe[:count], mirrored)
         balance = total.imbalance(found.energies[:count], loads, mirrored)
@@ -218,7 +218,7 @@ class QuasiStaticProblem:
             return replace(response, balance=balance), None
         (applied,) = (column.applied for column in loaded)
         assert applied is not None
-        works = global_sum(dofs.comm, np.array([u @ applied.forces for u in found.moved]))
+        works = global_sum(found.dofs.comm, np.array([u @ applied.forces for u in found.moved]))
         balance = max(balance, imbalance(total, found.energies, works, applied, loads, mirrored))
         carried = carried_of(found.stationary, works, total.on_probe[-1], mirrored, apart=loads.apart)
         return replace(response, balance=balance), carried
@@ -233,7 +233,8 @@ class QuasiStaticProblem:
             finer = solver.enrich(columns, loads, stack, keep=self._conditions.front is not None)
             form = _form(solution.response, solution.carried)
             if finer.decrements is None:
-                decrements = form - _form(*self._response(finer.elements, finer.columns, law, loads, checked=False))
+                products = finer.elements.products(law, finer.columns, checked=False)
+                decrements = form - _form(*self._response(products, finer.columns, law, loads))
             else:
                 decrements = whole * finer.decrements
             released, pushed = None, None
@@ -271,10 +272,6 @@ class QuasiStaticProblem:
 
         return of(self._conditions.front), of(self._conditions.tip)
 
-    def _show(self, columns: Sequence[Column], loads: Loads) -> None:
-        """Make the sum of the motions, and what loads do, the fields of the forms; collective."""
-        self.elements.show(columns, [*loads.amounts, *(1.0 for _ in columns[len(loads.motions) :])])
-
     @contextmanager
     def solver(self, law: MaterialLaw, method: str = "auto", *, linear: bool = True) -> Iterator[LinearSolver]:
         """Lend a solver for a material, of displacement elements; collective.
@@ -295,15 +292,30 @@ class QuasiStaticProblem:
 
     def fields(self) -> tuple[Any, FloatArray]:
         """Return the last solution's displacement (m) and the principal strains of each owned cell; collective."""
-        return self.elements.displacements.forms.displacement, principal_strains(self._strain, self._body)
+        assert self._law is not None
+        return self.elements.displacements.forms.displacement, self._values.principal_strains(self._law)
 
-    def largest_strain(self, displacement: PETSc.Vec) -> float:
-        """Return the largest principal strain of ``displacement``; collective."""
+    def largest(self, law: MaterialLaw, displacement: PETSc.Vec) -> dict[str, Any]:
+        """Return the largest values of ``displacement`` over the cells, by name; collective."""
         self.elements.displacements.set_displacement(displacement)
-        return self._largest_strain()
+        return self._values.largest(law, self._conditions.front)
 
-    def _largest_strain(self) -> float:
-        return largest_strain(self._strain, self._body, self._conditions.front)
+    def _set_up(self, law: MaterialLaw, loads: Loads, stack: ExitStack, *, direct: bool, keep: bool) -> Solver:
+        """Return a solver for a law, freed with the ``stack`` unless it is to ``keep``; collective.
+
+        Raises:
+            SolveError: if it cannot be set up, or the elements are not for the law.
+        """
+        self._law = law
+        if law.is_linear:
+            return self.elements.set_up(law, stack, direct=direct, keep=keep)
+        if not isinstance(self.elements, DisplacementElements):
+            raise SolveError(f"the law {law.name} is for displacement elements")
+        walk = self._walk
+        if walk is None or not walk.leads_to(law, loads):
+            walk = Walk(law, loads.motions[0], np.zeros(self.elements.displacements.dofs.owned))
+        self._walk = walk if self._reuse else None
+        return LoadSteps(self.elements, walk, stack, direct=direct)
 
 
 def _motion(loads: Loads, number: int) -> Motion | None:

@@ -190,8 +190,11 @@ def _solved(
 
 def _beyond(law: MaterialLaw, own: MaterialLaw) -> MaterialLaw:
     """Return by how much Lamé's constants of each region are more than a half-space's ``own``."""
-    lame_lambda, mu = own.lame
-    return MaterialLaw(tuple(x - lame_lambda for x in law.lame_lambda), tuple(x - mu for x in law.lame_mu))
+    (within,) = own.parameters
+    return MaterialLaw.of(
+        [region.lame_lambda - within.lame_lambda for region in law.parameters],
+        [region.lame_mu - within.lame_mu for region in law.parameters],
+    )
 
 
 def _field(force: PointForce, places: FloatArray) -> FloatArray:

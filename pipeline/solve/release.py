@@ -31,8 +31,9 @@ from mpi4py import MPI
 from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve.compiled import form, scalar_space, vector_space
-from pipeline.solve.forms import ElasticForms, dx, one_cell, strain
+from pipeline.solve.forms import ElasticForms, dx, one_cell
 from pipeline.solve.loads import Vector
+from pipeline.solve.material import strain
 
 # What a unit of advance of a slit's front releases (n, n), and of the blade's tip; None where there is none.
 Released = tuple[FloatArray | None, FloatArray | None]

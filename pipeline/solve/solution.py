@@ -49,48 +49,47 @@ def check_balance(balance: float) -> None:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Solution:
-    """What one solve gives; all values global and equal on every rank.
-
-    ``max_strain`` is the largest principal strain of a cell's mean strain, clear of singular edges
-    (:mod:`pipeline.solve.strain`); ``dofs`` are those of the whole body, ``cells`` those of the part that is modelled,
-    ``iterations`` the sum over the motions. ``decrements`` (n, n) is what one degree more takes away from the probe's
-    stiffness, and ``bars`` (n, n) the 95 % error bars on its entries, made with ``plain``, the share of edges at the
-    rim without quarter points, and for mixed elements with ``unseen`` (n), N in units of the energies on the diagonal
-    (see :mod:`pipeline.solve.error`). Of unilateral contact, ``contact_area`` (m²) and ``contact_radius`` (m) are those
-    found, ``contact_area_bar`` the relative 95 % bar on the area, ``sag`` (m) how far loads have moved the first touch,
-    ``load_energy`` (J) their strain energy without the probe, ``iterations`` the linear solves that it took, and
-    ``stored`` (J) is its strain energy, which is not half of F d. ``released`` (n, n) is the energy (J) that a metre of
-    advance of a slit's front releases, a form of the amounts of the motions (:mod:`pipeline.solve.release`),
-    ``released_finer`` what one degree more makes of it, and
-    ``release_bar`` the relative 95 % bar on what they release. ``pushed``, ``pushed_finer`` and ``push_bar`` are the
-    same of the tip of a blade along which tissue slides: what its advance takes, less than nothing is released, is the
-    force on it. ``carried`` is what loads do while the probe is held.
-    """
+    """What one solve gives; all values global and equal on every rank."""
 
     response: Response
-    max_strain: float
+    carried: Carried | None = None  # what loads do while the probe is held
+    # Largest values of all cells clear of singular edges, numbers by name (pipeline.solve.cell_values).
+    largest: dict[str, Any]
+    # Strain energy (J) where that is not half of F d.
+    stored: float | None = None
+
+    # Unknowns of the whole body, cells of the part that is modelled; of all motions, or the linear solves of contact.
     dofs: int
     cells: int
     iterations: int
     times: Times
+
+    # The error bar (pipeline.solve.error): what one degree more takes away from the stiffness (n, n), and 95 % bars on
+    # its entries; the share of edges at the rim without quarter points; N of mixed elements, in units of the energies
+    # on the diagonal (n).
     decrements: FloatArray | None = None
     bars: FloatArray | None = None
     plain: float = nan
+    unseen: FloatArray | None = None
     estimate_iterations: int = 0
+
+    # Of contact that is found: area (m²), its relative 95 % bar, and radius (m); how far loads have moved the first
+    # touch (m), and their strain energy without the probe (J).
     contact_area: float = nan
-    contact_radius: float = nan
     contact_area_bar: float = nan
+    contact_radius: float = nan
     sag: float = nan
     load_energy: float = nan
-    stored: float | None = None
+
+    # Of a slit (pipeline.solve.release): the energy (J/m) that an advance of its front releases, a form (n, n) of the
+    # amounts of the motions, what one degree more makes of it, and the relative 95 % bar on what they release.
     released: FloatArray | None = None
     released_finer: FloatArray | None = None
     release_bar: float = nan
-    unseen: FloatArray | None = None
+    # The same of the tip of a blade along which tissue slides: what its advance takes is the force on it.
     pushed: FloatArray | None = None
     pushed_finer: FloatArray | None = None
     push_bar: float = nan
-    carried: Carried | None = None
 
     @property
     def reaction(self) -> Vector:
@@ -112,6 +111,11 @@ class Solution:
     def balance(self) -> float:
         """Largest relative error of F·d = 2U and of F_probe + F_support = 0."""
         return self.response.balance
+
+    @property
+    def max_strain(self) -> float:
+        """Largest principal strain of a cell's mean strain, by magnitude, clear of singular edges."""
+        return float(self.largest["max_strain"])
 
     @property
     def stiffness(self) -> FloatArray:

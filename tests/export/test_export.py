@@ -252,7 +252,7 @@ def test_a_layer_is_a_load_on_the_regular_part_of_the_skin():
     assert scope.young == 40e3
     region = Region.of(scope.body, 0.5)
     mesh = coarse_mesh(scope.case, region)
-    ((c, h, *_),) = compliances(mesh, region, [(0.0, 0.0)], 0.45, MaterialLaw(*scope.tissues))
+    ((c, h, *_),) = compliances(mesh, region, [(0.0, 0.0)], 0.45, MaterialLaw.of(*scope.tissues))
     nothing = np.zeros(2)
     place = Place(c, h, 0.0, nothing, nothing, nothing, 1 / (1 - 0.45**2))
     for radius, most in ((1e-3, 3e-3), (2e-3, 6e-3)):

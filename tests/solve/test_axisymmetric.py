@@ -11,7 +11,7 @@ from pipeline.solve.compiled import compiling
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads, Motion
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.material import MaterialLaw, Parameters
 from pipeline.verify import known
 
 
@@ -28,8 +28,7 @@ def solve_axisymmetric(meridian, poisson, bonded, *, young=1.0, depth=1.0, **opt
 
 def solve_layers(meridian, moduli, bonded, *, depth=1.0, **options):
     """Solve for the moduli (E, ν) of each region."""
-    laws = [MaterialLaw.of_moduli(*each) for each in moduli]
-    law = MaterialLaw(*(tuple(each[n] for each in (law.lame for law in laws)) for n in (0, 1)))
+    law = MaterialLaw(tuple(Parameters.of_moduli(*each) for each in moduli))
     with MeridianProblem(meridian, Conditions(bonded), **options) as problem:
         return problem.solve(law, Loads.along((0.0, 0.0, -depth)))
 

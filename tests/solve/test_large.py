@@ -1,25 +1,27 @@
 """Large displacements: neo-Hookean bodies are linear ones at small depths, and obey closed forms at any."""
 
 import re
+from typing import get_args
 
 import numpy as np
 import pytest
 from dolfinx import fem
 from mpi4py import MPI
 
+from pipeline import compat
 from pipeline.plan.plan import make_plan
 from pipeline.run.meshing import mesh_case
 from pipeline.scene.model import FIXED
 from pipeline.solve.compiled import vector_space
 from pipeline.solve.forms import ElasticForms
+from pipeline.solve.hyperelastic import HyperelasticForms
 from pipeline.solve.kernels import multigrid
-from pipeline.solve.large.forms import NeoHookeanForms
-from pipeline.solve.large.newton import LargeError
-from pipeline.solve.large.problem import LargeProblem
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.load_steps import LoadSteps, check_path
+from pipeline.solve.material import LAWS, MaterialLaw
+from pipeline.solve.newton import LargeError
 from pipeline.study.problems import StudyError
+from pipeline.study.schema import Material
 from tests.cases import BLADE, force, solve, study
-from tests.solve.test_mixed import make_mesh
 
 LARGE = {"law": "neo-hookean"}
 SKIN = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.4}
@@ -31,7 +33,7 @@ def test_uniform_stretch(stretch):
     (planned,) = make_plan(study(material=LARGE)).solves
     body, _ = mesh_case(planned.case, planned.mirrors, MPI.COMM_SELF, None)
     law = MaterialLaw.of_moduli(10e3, 0.3)
-    lame_lambda, mu = law.lame
+    (lame_lambda,), (mu,) = law.lame_lambda, law.lame_mu
     # Of the sides: μ (b - 1/b) + λ (J - 1) b stretch = 0 with J = b² stretch, by Newton's method.
     b = 1.0
     for _ in range(50):
@@ -45,7 +47,7 @@ def test_uniform_stretch(stretch):
     linear = ElasticForms(space)
     linear.set_law(law)
     linear.displacement.interpolate(lambda x: np.array([(b - 1) * x[0], (b - 1) * x[1], (stretch - 1) * x[2]]))
-    forms = NeoHookeanForms(space, linear)
+    forms = HyperelasticForms(space, linear, "neo-hookean")
     quarter = 20e-3**3
     assert fem.assemble_scalar(forms.energy) == pytest.approx(quarter * density, rel=1e-9, abs=1e-12)
     nodal = np.array(fem.assemble_vector(forms.residual).array).reshape(-1, 3)
@@ -111,14 +113,14 @@ def test_depths_of_a_sweep_share_one_walk(monkeypatch):
     """Those that are reached have the forces of depths alone; those beyond the walk's end fail, and say where it is."""
     depths = {"depth": ["9 mm", "0.4 mm", "8 mm", "0.8 mm"]}
     ends: list[tuple[float, float]] = []
-    step = LargeProblem._step
+    step = LoadSteps._step
 
     def counted(self, *arguments):
         *_, walk, _, depth = arguments
         ends.append((walk.reached, depth))
         return step(self, *arguments)
 
-    monkeypatch.setattr(LargeProblem, "_step", counted)
+    monkeypatch.setattr(LoadSteps, "_step", counted)
     deep, first, far, second = solve(material=LARGE, probe=depths).values()
     shared = len(ends)
     assert [reached for reached, _ in ends] == sorted(reached for reached, _ in ends)
@@ -164,26 +166,46 @@ def test_what_it_is_not_for_is_refused(changes, key):
         study(**({"material": LARGE} | changes))
 
 
-def test_a_force_that_is_not_the_derivative_of_the_energy_is_refused(monkeypatch):
-    law, problem = MaterialLaw.of(1e4, 1e4), object.__new__(LargeProblem)
-    monkeypatch.setattr(problem, "_volume", lambda: 1e-5, raising=False)
+def test_a_force_that_is_not_the_derivative_of_the_energy_is_refused():
     depth = 1e-3 * np.arange(1, 5) / 4
-    problem._check(np.column_stack([depth, 50 * depth, 25 * depth**2]), law)
+    check_path(np.column_stack([depth, 50 * depth, 25 * depth**2]), 0.0)
     wrong = np.column_stack([depth, 50 * depth, 25.1 * depth**2])
     with pytest.raises(LargeError, match="not the derivative"):
-        problem._check(wrong, law)
-    problem._check(wrong * (1e-5, 1e-5, 1e-10), law)  # of so little energy rounding takes more away
+        check_path(wrong, 0.0)
+    check_path(wrong * (1e-5, 1e-5, 1e-10), 1e-16)  # of so little energy rounding takes more away
 
 
-def test_a_second_law_on_the_same_space_has_forms_of_its_own():
-    class Stiffer(NeoHookeanForms):
-        @property
-        def _energy(self):
-            return 3 * super()._energy
+def test_a_study_takes_every_law_and_no_other():
+    assert set(get_args(Material.model_fields["law"].annotation)) == set(LAWS)
 
-    space = vector_space(make_mesh(mesh={"degree": 1, "fine": "8 mm", "rim": "3 mm"}).mesh, 1)
-    linear = ElasticForms(space)
-    linear.displacement.interpolate(lambda x: 0.1 * x[::-1])
-    first, second = (fem.assemble_scalar(law(space, linear).energy) for law in (NeoHookeanForms, Stiffer))
-    assert second == pytest.approx(3 * first, rel=1e-12)
-    assert first > 0
+
+@pytest.mark.parametrize("law", LAWS)
+def test_laws_are_linear_at_small_strains(law):
+    """The tangent without displacement is the stiffness of linear elasticity."""
+    (planned,) = make_plan(study()).solves
+    body, _ = mesh_case(planned.case, planned.mirrors, MPI.COMM_SELF, None)
+    space = vector_space(body.mesh, 2)
+    elastic = ElasticForms(space)
+    elastic.set_law(MaterialLaw.of_moduli(10e3, 0.4))
+    stiffness, tangent = (
+        compat.assemble_matrix(form, [], 1.0, "aij")
+        for form in (elastic.stiffness, HyperelasticForms(space, elastic, law).tangent)
+    )
+    size = stiffness.norm()
+    tangent.axpy(-1.0, stiffness)
+    assert tangent.norm() < 1e-10 * size
+
+
+def test_laws_of_one_space_have_forms_of_their_own(monkeypatch):
+    """Forms of a second law are not taken for those of the first."""
+    monkeypatch.setitem(LAWS, "stiffer", lambda *of: 2 * LAWS["neo-hookean"](*of))
+    (planned,) = make_plan(study()).solves
+    body, _ = mesh_case(planned.case, planned.mirrors, MPI.COMM_SELF, None)
+    space = vector_space(body.mesh, 1)
+    elastic = ElasticForms(space)
+    elastic.set_law(MaterialLaw.of_moduli(10e3, 0.4))
+    elastic.displacement.interpolate(lambda x: 0.1 * x)
+    energies = [
+        fem.assemble_scalar(HyperelasticForms(space, elastic, law).energy) for law in ("neo-hookean", "stiffer")
+    ]
+    assert energies[1] == pytest.approx(2 * energies[0], rel=1e-12)

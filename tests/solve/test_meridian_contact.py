@@ -121,7 +121,7 @@ def test_a_disc_on_a_stiff_skin_lifts_off_in_a_ring():
     """
     skin, depth = Meridian(30.0, 20.0, 5.0, interfaces=(-1.0,)), 0.1
     stiff = MaterialLaw.of(0.3 / 1.3 / 0.4 * 30, 0.5 / 1.3 * 30)
-    law = MaterialLaw(LAW.lame_lambda + stiff.lame_lambda, LAW.lame_mu + stiff.lame_mu)
+    law = MaterialLaw.of(LAW.lame_lambda + stiff.lame_lambda, LAW.lame_mu + stiff.lame_mu)
     press = Loads.along((0.0, 0.0, -depth))
     found = MeridianContact(skin, flat(5.0), degree=4, accuracy=1e-3).solve(law, press)
     assert found.reaction[2] == pytest.approx(2.07474, rel=1e-4)

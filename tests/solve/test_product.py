@@ -24,7 +24,7 @@ LAYERS = {"body": {"layers": [{"name": "skin", "thickness": "2 mm", "young": "60
         (2, MaterialLaw.of(3.0, 1.0), {}),
         (3, MaterialLaw.of(3.0, 1.0), {}),
         (4, MaterialLaw.of(0.0, 1.0), {}),
-        (2, MaterialLaw((3.0, 50.0), (1.0, 20.0)), LAYERS),
+        (2, MaterialLaw.of((3.0, 50.0), (1.0, 20.0)), LAYERS),
     ],
 )
 def test_it_is_the_product_of_the_matrix(degree, material, changes):

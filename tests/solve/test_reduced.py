@@ -34,7 +34,7 @@ def test_energy_falls_towards_that_of_a_solve_with_each_solution():
         with ReducedBasis(problem, PRESS, t_of(0.0), "auto") as basis:
             for poisson in RATIOS:
                 problem.solve(law_of(poisson), PRESS)
-                (correction,) = problem.corrections.values()
+                ((correction,),) = problem.corrections.values()
                 basis.add(correction)
                 reduced = basis.evaluate(t_of(0.4))
                 found.append(reduced.response.energy / wanted - 1)
@@ -53,7 +53,7 @@ def test_many_evaluations_keep_no_memory():
         ReducedBasis(problem, PRESS, t_of(0.0), "auto") as basis,
     ):
         problem.solve(law_of(0.3), PRESS)
-        (correction,) = problem.corrections.values()
+        ((correction,),) = problem.corrections.values()
         basis.add(correction)
         basis.displacement(basis.evaluate(0.5))
         before = psutil.Process().memory_info().rss

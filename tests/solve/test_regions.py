@@ -39,7 +39,7 @@ def body() -> BodyMesh:
 def moduli(*pairs: tuple[float, float]) -> MaterialLaw:
     """Return the law of regions of these Young's moduli (Pa) and Poisson's ratios."""
     laws = [MaterialLaw.of_moduli(*pair) for pair in pairs]
-    return MaterialLaw(*(sum((getattr(law, name) for law in laws), ()) for name in ("lame_lambda", "lame_mu")))
+    return MaterialLaw(sum((law.parameters for law in laws), ()))
 
 
 def solve(body: BodyMesh, law: MaterialLaw, kind: Any = "displacement", degree: int = 2, **options) -> Solution:

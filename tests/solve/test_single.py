@@ -43,9 +43,9 @@ def test_a_smoother_that_took_its_largest_eigenvalue_for_too_small_looks_closer(
 @pytest.mark.parametrize("stiffer", [1e-20, 1e25])
 @pytest.mark.parametrize("deeper", [1e-15, 1e10])
 def test_no_unit_runs_out_of_numbers(stiffer, deeper):
-    (lame_lambda, mu), depth = law(0.3).lame, PRESS.amounts[0]
+    (tissue,), depth = law(0.3).parameters, PRESS.amounts[0]
     known = solved("displacement", 2, law(0.3))
-    material = MaterialLaw.of(stiffer * lame_lambda, stiffer * mu)
+    material = MaterialLaw.of(stiffer * tissue.lame_lambda, stiffer * tissue.lame_mu)
     found = solved("displacement", 2, material, Loads(PRESS.motions, (deeper * depth,)))
     assert found.reaction[2] == pytest.approx(stiffer * deeper * known.reaction[2], rel=1e-8)
 

@@ -91,7 +91,7 @@ def test_operators_are_those_that_dolfinx_assembles(degree, mirrors, changes, ke
     """On one rank and on several, whose cells add to rows of others; with the same kernel, and with forms alone."""
     mesh = make_mesh(MPI.COMM_WORLD, mirrors, **changes)
     space, other = (ElasticSpace(mesh, degree, Conditions(bonded=False)) for _ in range(2))
-    material = MaterialLaw((2.0, 5.0), (1.0, 0.7)) if mesh.regions is not None else MaterialLaw.of(2.0, 1.0)
+    material = MaterialLaw.of((2.0, 5.0), (1.0, 0.7)) if mesh.regions is not None else MaterialLaw.of(2.0, 1.0)
     lend = {"law": material, "blocked": degree > 1}
     with ExitStack() as stack:
         ours, _ = stack.enter_context(space.operators.lend(**lend))

@@ -1,10 +1,18 @@
 """The largest strain: read clear of the probe's edge, where it would grow with every smaller element."""
 
+import numpy as np
 import pytest
+from mpi4py import MPI
 
+from pipeline.run.meshing import mesh_case
+from pipeline.run.problem import conditions_of
 from pipeline.run.record import Record
+from pipeline.solve.cell_values import CellValues
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.spaces import Spaces
 from pipeline.study.problems import StudyError
 from tests.cases import solve, study
+from tests.solve.test_slit import case_of
 
 ROUND = {"shape": "cylinder", "radius": "20 mm", "height": "20 mm", "fixed": "bottom"}
 MESH = {"fine": "2 mm", "growth": 0.4}
@@ -27,6 +35,24 @@ def test_converges_as_the_edge_is_refined():
 def test_half_a_body_and_all_of_it_have_the_same():
     quarter, whole = (strain(mesh={"model": model}, solve={"tolerance": 1e-10}) for model in ("auto", "3d"))
     assert quarter == pytest.approx(whole, rel=1e-6)
+
+
+def test_strain_at_the_front_of_a_slit_is_left_out_of_its_own_body_only():
+    """Which cells are clear of singular edges is known of each front, on one mesh."""
+    case = case_of()
+    mesh, _ = mesh_case(case, ("x", "y"), MPI.COMM_SELF)
+    front, law = conditions_of(case).front, MaterialLaw.of_moduli(1.0, 0.3)
+    with Spaces(mesh) as spaces:
+        u = spaces.get(2, conditions_of(case)).forms.displacement
+
+        def stretched(x):
+            along, down = (x.T - np.array(front.point)) @ np.array(front.normal), x[2] + front.depth
+            return down * np.exp(-(along**2 + down**2) / 0.2e-3**2) * np.array([[0.0], [0.0], [1.0]])
+
+        u.interpolate(stretched)
+        values = CellValues(mesh, u)
+        with_front, without, again = (values.largest(law, line)["max_strain"] for line in (front, None, front))
+    assert with_front == again < 0.9 * without
 
 
 def test_records_of_before_say_nothing_of_it():

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
+from pipeline.solve.cell_values import CellValues
 from pipeline.solve.contact.active_set import ContactError, Found, Obstacle, find_set
 from pipeline.solve.contact.area import contact_area
 from pipeline.solve.contact.candidates import CONDITIONS, Candidates, Numbering, Surface
@@ -28,7 +29,6 @@ from pipeline.solve.contact.sweep import Kind, Sweep
 from pipeline.solve.contact.touch import Touch
 from pipeline.solve.dead_loads import Applied
 from pipeline.solve.error import error_bar, found_again_bar, found_bar
-from pipeline.solve.forms import mean_strain_form
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.material import MaterialLaw
@@ -36,7 +36,6 @@ from pipeline.solve.reaction import Response
 from pipeline.solve.rim import plain_share
 from pipeline.solve.solution import TOLERANCE, Solution, check_balance
 from pipeline.solve.spaces import Spaces
-from pipeline.solve.strain import largest_strain, principal_strains
 from pipeline.solve.vectors import global_sum
 from pipeline.stages import recharge, recorded, stage
 
@@ -93,7 +92,8 @@ class ContactProblem:
         self.found: Found | None = None
         self._reuse, self._condense = reuse or condense, condense
         self._sweep: Sweep | None = None
-        self._strain = mean_strain_form(self._fine.dofs.space, self._fine.forms.displacement)
+        self._values = CellValues(self._body, self._fine.forms.displacement)
+        self._law: MaterialLaw | None = None  # of the last solution
 
     def __enter__(self) -> "ContactProblem":
         return self
@@ -120,6 +120,7 @@ class ContactProblem:
             ContactError: if the contact does not settle, reaches the candidates' edge where the probe does not end, or
                 what is held of the body.
         """
+        self._law = law
         with recorded() as times, ExitStack() as stack:
             with stage("solve"):
                 sweep = self._sweep_of(law, method, stack)
@@ -146,7 +147,7 @@ class ContactProblem:
             whole = self._whole * area.value
             solution = Solution(
                 response=response,
-                max_strain=largest_strain(self._strain, self._body),
+                largest=self._values.largest(law),
                 dofs=self._fine.dofs.whole_dofs,
                 cells=self._body.cells,
                 iterations=first + found.sets,
@@ -170,7 +171,8 @@ class ContactProblem:
 
     def fields(self) -> tuple[Any, FloatArray]:
         """Return the last solution's displacement (m) and the principal strains of each owned cell; collective."""
-        return self._fine.forms.displacement, principal_strains(self._strain, self._body)
+        assert self._law is not None
+        return self._fine.forms.displacement, self._values.principal_strains(self._law)
 
     # ---- what acts besides the probe ------------------------------------------------------------------
 
@@ -383,5 +385,5 @@ class _Bar:
 
 
 def _softer(law: MaterialLaw) -> MaterialLaw:
-    pairs = zip(law.lame_lambda, law.lame_mu, strict=True)
-    return MaterialLaw(tuple(min(lame, _FIRST_RATIO * mu) for lame, mu in pairs), law.lame_mu)
+    softer = [min(region.lame_lambda, _FIRST_RATIO * region.lame_mu) for region in law.parameters]
+    return MaterialLaw.of(softer, law.lame_mu)

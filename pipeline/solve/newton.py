@@ -1,4 +1,4 @@
-"""Newton's method for the equilibrium of a neo-Hookean body whose prescribed displacements are in place.
+"""Newton's method for the equilibrium of a hyperelastic body whose prescribed displacements are in place.
 
 PETSc's SNES with a line search; the linear systems by conjugate gradients, preconditioned by the multigrid of linear
 elasticity, which is set up once: the tangent differs from it by what strain makes of the stiffness.
@@ -16,7 +16,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline import compat
-from pipeline.solve.large.forms import NeoHookeanForms
+from pipeline.solve.hyperelastic import HyperelasticForms
 from pipeline.solve.linear import LinearSolver, SolveError, explain
 from pipeline.solve.spaces import ElasticSpace
 from pipeline.solve.vectors import add_from_ghosts, fill, vector
@@ -40,9 +40,9 @@ class LargeError(SolveError):
 
 
 class Equilibrium:
-    """A neo-Hookean body in the spaces of linear elasticity, and Newton's method for it; ``close`` frees it."""
+    """A hyperelastic body in the spaces of linear elasticity, and Newton's method for it; ``close`` frees it."""
 
-    def __init__(self, space: ElasticSpace, forms: NeoHookeanForms, solver: LinearSolver):
+    def __init__(self, space: ElasticSpace, forms: HyperelasticForms, solver: LinearSolver):
         """Set up; collective. ``solver`` is that of linear elasticity."""
         self._space, self._forms, self._solver = space, forms, solver
         self._held = space.dofs.prescribed_owned
@@ -203,7 +203,7 @@ def assemble(form: Any, result: PETSc.Vec) -> None:
     add_from_ghosts(result)
 
 
-def tangent_product(forms: NeoHookeanForms, x: PETSc.Vec, result: PETSc.Vec) -> None:
+def tangent_product(forms: HyperelasticForms, x: PETSc.Vec, result: PETSc.Vec) -> None:
     """Write K x into ``result``, of all dofs, with the tangent K at the forms' displacement; collective."""
     fill(forms.direction, x)
     assemble(forms.product, result)

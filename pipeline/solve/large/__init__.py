@@ -1,1 +1,0 @@
-"""Large displacements: neo-Hookean bodies, by Newton's method over load steps."""

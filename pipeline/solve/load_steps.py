@@ -1,0 +1,270 @@
+"""Large displacements: a probe is pressed to its depth in steps, each solved by Newton's method.
+
+The force is the reaction. It must be the derivative of the stored energy by the depth, whose integral over the steps is
+compared with the energy itself.
+
+The error bar is made as that of linear elasticity, by one degree more. With the residual r of the solution u there,
+and r' that of v = ∂u/∂d under the tangent K,
+
+    F_p - F_{p+1} = r'·K⁻¹ r,    of second order in what degree p + 1 changes.
+
+(r'·K⁻¹ r' · r·K⁻¹ r)^½ is at least that, and takes its place: it does not vanish by chance. For K stands the operator
+of linear elasticity: at moderate depths the result is the same to a few per cent, and at larger ones elements of one
+degree more give way at the probe's edge, where the tangent is not definite.
+"""
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from math import inf
+
+import numpy as np
+from petsc4py import PETSc
+
+from pipeline.arrays import FloatArray
+from pipeline.solve.elements import Column, DisplacementElements, Enriched, Products
+from pipeline.solve.enrich import energy_decrements
+from pipeline.solve.hyperelastic import HyperelasticForms
+from pipeline.solve.linear import LinearSolver
+from pipeline.solve.loads import Loads, Motion
+from pipeline.solve.material import MaterialLaw
+from pipeline.solve.newton import Equilibrium, LargeError, assemble, tangent_product
+from pipeline.solve.solution import TOLERANCE
+from pipeline.solve.vectors import global_sum, vector
+from pipeline.stages import Times, recharge, recorded
+
+# The depth is reached in so many steps at least; smaller ones than this share of it are not tried.
+_FEWEST, _SMALLEST = 3, 1 / 50
+# A step that leaves less than this share of the way goes to its end.
+_SLIVER = 1e-6
+# Newton's steps that make a step of the depth one to lengthen the next of.
+_EASY = 4
+# Work and energy may differ by this share, and by what rounding makes of energies where strains are tiny. Where an
+# element at the edge folds between the points that it is integrated at, energy is lost that no work was done for.
+_WORK, _ROUNDING = 3e-4, 1e-13
+
+
+@dataclass
+class Walk:
+    """How far a ``motion`` of the probe has gone in a body of a ``law``.
+
+    ``path`` has depth (m), force (N) and energy (J) of each step, of the modelled part; ``displacement`` (owned dofs)
+    is that at the last one. ``times`` and ``iterations`` are what it took, and no depth begins with a step of more than
+    the last one, ``step`` (m).
+    """
+
+    law: MaterialLaw
+    motion: Motion
+    displacement: FloatArray
+    path: list[tuple[float, float, float]] = field(default_factory=lambda: [(0.0, 0.0, 0.0)])
+    step: float = inf
+    iterations: int = 0
+    times: list[Times] = field(default_factory=list)
+
+    @property
+    def reached(self) -> float:
+        """The depth (m) of the last step."""
+        return self.path[-1][0]
+
+    def leads_to(self, law: MaterialLaw, loads: Loads) -> bool:
+        """Tell whether it is on the way to what ``loads`` do."""
+        return (self.law, (self.motion,)) == (law, loads.motions) and self.reached <= loads.amounts[0]
+
+
+class LoadSteps:
+    """A solver of displacement elements for a law of large displacements, one material and one motion.
+
+    ``stored`` is the energy (J) that the modelled part stores at the end. What is made is freed with the stack.
+    """
+
+    is_exact = True
+
+    def __init__(self, elements: DisplacementElements, walk: Walk, stack: ExitStack, *, direct: bool):
+        """Set up for what a ``walk`` leads to; collective.
+
+        Raises:
+            SolveError: if the preconditioner cannot be set up.
+        """
+        self._elements, self._walk, self._law = elements, walk, walk.law
+        law = walk.law
+        self._space = elements.displacements
+        self._levels = elements.levels(law, stack, direct=direct)
+        solver = LinearSolver(self._levels, direct=direct, tolerance=TOLERANCE)
+        stack.callback(solver.close)
+        self._forms = HyperelasticForms(self._space.dofs.space, self._space.forms, law.name)
+        self._body = Equilibrium(self._space, self._forms, solver)
+        stack.callback(self._body.close)
+        self.stored: float | None = None
+
+    def lift(self, columns: Sequence[Column]) -> None:
+        """Do nothing: what is prescribed is moved step by step."""
+
+    def solve(self, columns: Sequence[Column], tolerance: float) -> int:
+        """Press to the depth of the one column; return the iterations; collective.
+
+        ``tolerance`` has no part in it: Newton's method ends where what it gains is rounding.
+
+        Raises:
+            LargeError: if Newton's method does not get there, or what it finds fails a check.
+        """
+        (column,) = columns
+        self._space.forms.set_law(self._law)
+        owned = self._space.dofs.owned
+        with vector(self._space.dofs.space) as displacement:
+            path = self._press(displacement, column)
+            column.unknown[0].array[:] = displacement.array / column.amount - column.prescribed[:owned]
+            column.unknown[0].array[self._space.dofs.prescribed_owned] = 0.0
+        check_path(path, _ROUNDING * self._law.lame_mu[0] * self._volume())
+        self.stored = float(path[-1, 2])
+        return self._walk.iterations
+
+    def improve(self, columns: Sequence[Column], share: float) -> int:
+        """Raise an error: Newton's method has done all that it can."""
+        raise LargeError("forces do not balance")
+
+    def products(self, columns: Sequence[Column]) -> Products:
+        """Return the residual and the work of the solution, both as a secant: for a unit of the motion."""
+        (column,), dofs = columns, self._space.dofs
+        with vector(dofs.space) as displacement, vector(dofs.space) as forces:
+            self._at(column, displacement)
+            self._body.forces(displacement, forces)
+            residual, moved = forces.array / column.amount, displacement.array / column.amount
+        held = dofs.prescribed_owned
+        work = global_sum(dofs.comm, np.array([residual[held] @ column.prescribed[held]]))
+        return Products(dofs, [moved], [residual], work[None], work)
+
+    def enrich(self, columns: Sequence[Column], loads: Loads, stack: ExitStack, *, keep: bool) -> Enriched:
+        """Solve on in one degree more, from the residuals of the solution and of its rate there; collective.
+
+        Raises:
+            LargeError: if elements of that degree give way.
+        """
+        (column,), space = columns, self._space
+        displacement, rate, unit = (stack.enter_context(vector(space.dofs.space)) for _ in range(3))
+        self._at(column, displacement)
+        unit.array[:] = column.prescribed[: space.dofs.owned]
+        self._body.move(displacement, unit, rate)
+        elements, solver = self._elements.finer(self._law, self._levels, stack)
+        finer = elements.displacements
+        forms = HyperelasticForms(finer.dofs.space, finer.forms, self._law.name)
+        finer.forms.set_law(self._law)
+        residuals = [stack.enter_context(vector(finer.dofs.space)) for _ in range(2)]
+        with vector(finer.dofs.space) as there:
+            space.set_displacement(rate)
+            finer.forms.displacement.interpolate(space.forms.displacement)
+            there.array[:] = finer.forms.displacement.x.array[: finer.dofs.owned]
+            space.set_displacement(displacement)
+            finer.forms.displacement.interpolate(space.forms.displacement)
+            assemble(forms.residual, residuals[0])
+            tangent_product(forms, there, residuals[1])
+        for residual in residuals:
+            residual.scale(-1.0)
+            residual.array[finer.dofs.prescribed_owned] = 0.0
+        if not all(np.isfinite(residual.norm()) for residual in residuals):
+            raise LargeError("elements of one degree more turn tissue inside out, so that no error bar can be made")
+        found, _, iterations = energy_decrements(solver, residuals)
+        taken = float(np.sqrt(found[0, 0] * found[1, 1])) / column.amount
+        if not taken < self.products(columns).stationary[0, 0]:
+            raise LargeError(
+                f"no error bar: elements of degree {finer.degree}, of which it is made, give way at the probe's "
+                "edge; use a smaller depth, a larger rim, or degree 2"
+            )
+        return Enriched(elements, [], iterations, decrements=np.array([[taken]]))
+
+    def _at(self, column: Column, displacement: PETSc.Vec) -> None:
+        """Write the solution at the depth of a column into ``displacement``."""
+        self._elements.total(column, (displacement,))
+        displacement.scale(column.amount)
+
+    def _press(self, displacement: PETSc.Vec, column: Column) -> FloatArray:
+        """Take ``displacement`` along the walk to the depth of a column.
+
+        Return the path: depth, force and energy of each step. Each step begins along the tangent; one that Newton's
+        method cannot end is halved.
+
+        Raises:
+            LargeError: if that gets too small; the walk has come as far as it says.
+        """
+        walk, depth, space = self._walk, column.amount, self._space.dofs.space
+        displacement.array[:] = walk.displacement
+        longest = depth / _FEWEST
+        step, before = min(walk.step, longest), self._body.iterations
+        for times in walk.times:
+            recharge(times)
+        with recorded() as times, ExitStack() as stack:
+            walk.times.append(times)
+            unit, rate, trial, forces = (stack.enter_context(vector(space)) for _ in range(4))
+            unit.array[:] = column.prescribed[: self._space.dofs.owned]
+            while (reached := walk.reached) < depth:
+                self._body.move(displacement, unit, rate)
+                step, steps = self._step(displacement, rate, trial, walk, step, depth)
+                displacement.array[:] = trial.array
+                energy = self._body.energy(displacement)
+                self._body.forces(displacement, forces)
+                there = depth if step >= depth - reached else reached + step
+                walk.path.append((there, forces.dot(unit), energy))
+                walk.displacement[:] = displacement.array
+                walk.iterations, before = walk.iterations + self._body.iterations - before, self._body.iterations
+                walk.step = step = min(step * (2 if steps <= _EASY else 1), longest)
+        return np.array(walk.path)
+
+    def _step(
+        self, displacement: PETSc.Vec, rate: PETSc.Vec, trial: PETSc.Vec, walk: Walk, step: float, depth: float
+    ) -> tuple[float, int]:
+        """Write the equilibrium a ``step`` (m) farther into ``trial``; return the step, and Newton's steps to it.
+
+        ``rate`` is the tangent at ``displacement``, for a metre; at ``depth`` (m) the ``walk`` ends.
+        """
+        reached = walk.reached
+        if step > (1 - _SLIVER) * (depth - reached):
+            step = depth - reached  # not one more for what rounding leaves
+        with vector(self._space.dofs.space) as forces:
+            while True:
+                trial.array[:] = displacement.array + step * rate.array
+                try:
+                    if not np.isfinite(self._body.energy(trial)):
+                        raise LargeError("tissue is turned inside out")
+                    self._body.forces(trial, forces)
+                    return step, self._body.settle(trial, self._norm_on_held(forces))
+                except LargeError as error:
+                    step /= 2
+                    if step < _SMALLEST * depth:
+                        raise LargeError(self._stopped(walk, depth, error)) from error
+
+    def _stopped(self, walk: Walk, depth: float, why: LargeError) -> str:
+        """Return what to say of a walk that ends before ``depth`` (m)."""
+        reached, force, _ = walk.path[-1]
+        whole = 2.0 ** len(self._elements.body.mirrored) * force
+        return (
+            f"reached {reached * 1e3:.3g} mm of {depth * 1e3:.3g} mm, where F is {whole:.4g} N; Newton's method "
+            f"stopped there ({why}): the tissue gives way, or elements at the probe's edge are squeezed to nothing; "
+            "use a smaller depth, or a larger rim"
+        )
+
+    def _norm_on_held(self, forces: PETSc.Vec) -> float:
+        dofs = self._space.dofs
+        on_held = forces.array[dofs.prescribed_owned]
+        return float(np.sqrt(dofs.comm.allreduce(float(on_held @ on_held))))
+
+    def _volume(self) -> float:
+        body = self._elements.body
+        return float(body.comm.allreduce(float(np.ptp(np.asarray(body.mesh.geometry.x), axis=0).prod())))
+
+
+def check_path(path: FloatArray, rounding: float) -> None:
+    """See that the force is the derivative of the energy by the depth; ``path`` has depth, force and energy in rows.
+
+    ``rounding`` is what that makes of energies (J).
+
+    Raises:
+        LargeError: if it is not.
+    """
+    depth, force, energy = path.T
+    depths = depth / depth[-1]
+    through = np.polynomial.Polynomial.fit(depths, force, min(len(path) - 1, 4)).integ(lbnd=0.0)
+    wrong = abs(float(through(1.0)) * depth[-1] / energy[-1] - 1)
+    if not wrong <= _WORK + rounding / energy[-1]:
+        raise LargeError(
+            f"the force is not the derivative of the energy by the depth: {wrong:.1e} apart, since an element at "
+            "the probe's edge folds; use a smaller depth, a larger rim, or degree 2"
+        )
