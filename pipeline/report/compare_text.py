@@ -4,9 +4,11 @@ from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
+import pandas as pd
+
 from pipeline.quantities import counted, readable
 from pipeline.report.compare import Comparison, Pair
-from pipeline.report.guide_words import percent, table
+from pipeline.report.guide_text import percent
 
 # Cases that a list names; the JSON has all of them.
 _MOST = 20
@@ -59,13 +61,17 @@ def to_dict(found: Comparison, names: tuple[str, str], doubts: dict[str, list[st
 
 
 def _apart(found: Comparison) -> list[str]:
-    rows = [["case", "quantity", "A", "B", "B - A", "bars", ""]]
+    rows = []
     for pair in found.apart[:_MOST]:
         factor, unit = readable(pair.quantity)
-        values = [f"{factor * value:.5g} {unit}" if isfinite(value) else "" for value in (pair.a, pair.b)]
-        rows.append([pair.case, pair.quantity, *values, percent(pair.difference), percent(pair.bars), pair.why])
+        a, b = (f"{factor * value:.5g} {unit}" if isfinite(value) else "" for value in (pair.a, pair.b))
+        words = {"case": pair.case, "quantity": pair.quantity, "A": a, "B": b, "B - A": percent(pair.difference)}
+        rows.append(words | {"bars": percent(pair.bars), "": pair.why})
     more = len(found.apart) - _MOST
-    return [*table(rows, 2), *([f"  … and {more} more: --json has all"] if more > 0 else [])]
+    return [
+        *pd.DataFrame(rows).to_string(index=False).splitlines(),
+        *([f"  … and {more} more: --json has all"] if more > 0 else []),
+    ]
 
 
 def _listed(lines: list[str]) -> list[str]:

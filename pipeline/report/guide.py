@@ -1,18 +1,17 @@
 """The guideline: which mesh settings keep F near F_exact over all scenes of a study, and at what cost.
 
 The error of a setting is the worst over the scenes of |F/F_exact - 1|, to which the error bars of F and of F_exact are
-added. Nothing is claimed of a case that was not computed: a setting that lacks one is not judged, and scenes that no
-setting can be judged on are left out of every claim, and named.
+added. A setting that lacks a case is not judged; scenes that no setting can be judged on are left out, and named.
 """
 
 import json
 from collections import Counter
 from math import inf, isfinite
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from pipeline.quantities import counted
 from pipeline.report import guide_text
 from pipeline.report.guideline import Guideline
 from pipeline.report.sinking import tools
@@ -44,22 +43,33 @@ def guide(dataset: xr.Dataset, accuracy: str | float | None = None, budget: str 
     seconds = quantity("budget", budget, "s") if budget is not None else inf
     table = arrange(dataset)
     if table.lost.all():
-        raise DatasetError(f"no case can be judged: {_listed(Counter(table.why.ravel()))}")
+        reasons = "; ".join(f"{count} {why}" for why, count in Counter(table.why.ravel()).most_common())
+        raise DatasetError(f"no case can be judged: {reasons}")
     verdicts = tuple(judge(table, row) for row in range(len(table.settings)))
     keeping = [v for v in verdicts if keeps(v, verdicts, wanted, "force") and v.seconds <= seconds]
     return Guide(
-        str(dataset.attrs.get("title", "")), wanted, seconds, int((~table.lost).sum()),
-        tuple((name, len(np.unique(labels))) for name, labels in table.axes.items()),
-        verdicts, choose(verdicts, wanted, seconds), choose(verdicts, wanted, seconds, "ratio"),
-        most_accurate(verdicts, seconds), most_accurate(verdicts, seconds, "ratio"),
-        choose(verdicts, wanted, seconds, "tools"), most_accurate(verdicts, seconds, "tools"),
-        min(keeping, key=lambda v: v.dofs, default=None) if isfinite(wanted) else None,
-        _counts(table.why[:, table.lost]), _counts(table.why[:, ~table.lost]),
-        tuple(scene for scene, lost in zip(table.scenes, table.lost, strict=True) if lost),
-        bool(np.isfinite(table.share).any()), _timing(dataset),
-        tools(case for case, one in zip(table.cases, table.sinking, strict=True) if case and not one.why_not),
-        _counts(np.array([one.why_not for one in table.sinking])), tuple(doubts(dataset)),
-    )  # fmt: skip
+        title=str(dataset.attrs.get("title", "")),
+        accuracy=wanted,
+        budget=seconds,
+        scenes=int((~table.lost).sum()),
+        axes=tuple((name, len(np.unique(labels))) for name, labels in table.axes.items()),
+        verdicts=verdicts,
+        answer=choose(verdicts, wanted, seconds),
+        corrected=choose(verdicts, wanted, seconds, "ratio"),
+        best=most_accurate(verdicts, seconds),
+        best_corrected=most_accurate(verdicts, seconds, "ratio"),
+        carried=choose(verdicts, wanted, seconds, "tools"),
+        best_carried=most_accurate(verdicts, seconds, "tools"),
+        lean=min(keeping, key=lambda v: v.dofs, default=None) if isfinite(wanted) else None,
+        left_out=_counts(table.why[:, table.lost]),
+        unjudged=_counts(table.why[:, ~table.lost]),
+        lost=tuple(scene for scene, lost in zip(table.scenes, table.lost, strict=True) if lost),
+        has_full=bool(np.isfinite(table.share).any()),
+        timing=_timing(dataset),
+        tools=tools(case for case, one in zip(table.cases, table.sinking, strict=True) if case and not one.why_not),
+        no_law=_counts(np.array([one.why_not for one in table.sinking])),
+        doubts=tuple(doubts(dataset)),
+    )
 
 
 def quantity(name: str, value: str | float, unit: str) -> float:
@@ -82,18 +92,12 @@ def _counts(why: np.ndarray) -> tuple[tuple[str, int], ...]:
     return tuple(Counter(str(text) for text in why.ravel() if text != "").most_common())
 
 
-def _listed(counts: Counter[Any]) -> str:
-    return "; ".join(f"{count} {text}" for text, count in counts.most_common())
-
-
-def _has_meridians(dataset: xr.Dataset) -> bool:
-    struck = json.loads(str(dataset.attrs.get("reductions", "[]")))
-    return any(one["name"] == "axisymmetric" for one in struck)
-
-
 def _timing(dataset: xr.Dataset) -> str:
     """Say what the times are worth: where they were taken, and whether every case ran afresh and alone."""
     ranks = str(dataset.attrs.get("ranks", 1))  # "1, 2" where groups of ranks differed
-    where = f"{ranks} rank{'s' * (ranks != '1')} of {dataset.attrs.get('host', 'an unnamed machine')}"
-    where += ", round scenes on their meridian, with elements of its own" if _has_meridians(dataset) else ""
+    where = f"{counted(int(ranks), 'rank') if ranks.isdigit() else f'{ranks} ranks'}"
+    where += f" of {dataset.attrs.get('host', 'an unnamed machine')}"
+    struck = json.loads(str(dataset.attrs.get("reductions", "[]")))
+    if any(one["name"] == "axisymmetric" for one in struck):
+        where += ", round scenes on their meridian, with elements of its own"
     return f"{where}, {'every case afresh and alone' if dataset.attrs.get('timing') else 'no timing study'}"

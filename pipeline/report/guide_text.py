@@ -1,103 +1,70 @@
-"""A guide in words, for people: mm, kPa, mN, ms."""
+"""A guide in words, and its settings as a table in the units that people read."""
 
-from math import isfinite
+from math import inf, isfinite
+from pathlib import Path
 
-from pipeline.quantities import symbol
-from pipeline.report.correction import Correction
-from pipeline.report.guide_laws import carried, comparison
-from pipeline.report.guide_settings import (
-    ERROR,
-    LEFT_OUT,
-    RATIO,
-    RESIDUAL,
-    TIME,
-    UNKNOWNS,
-    UNSEEN,
-    USUAL,
-    range_of,
-    settings,
-)  # fmt: skip
-from pipeline.report.guide_words import (
-    cells_of,
-    cost,
-    elements,
-    heads,
-    in_order,
-    newton,
-    number,
-    percent,
-    ratio,
-    table,
-    time,
-)  # fmt: skip
+import pandas as pd
+from jinja2 import Environment, StrictUndefined
+
+from pipeline.quantities import counted, symbol, write
 from pipeline.report.guideline import Guideline
-from pipeline.report.table import words
+from pipeline.report.laws import Law
+from pipeline.report.table import Labels, words
 from pipeline.report.verdict import Verdict
+
+_TEMPLATE = Path(__file__).parent / "templates" / "guide.txt.j2"
+_NOUGHT = 1e-9  # what rounding leaves of no error
 
 
 def text(guide: Guideline) -> str:
-    """Return the answer, the settings, the law of correction and what is left out, as lines."""
-    parts = [[guide.title], question(guide), answer(guide), _per_outside(guide), _settings(guide)]
-    parts += [_constancy(guide), comparison(guide), _left_out(guide)]
-    return "\n\n".join("\n".join(part) for part in parts if part and part[0])
+    """Return the answer, what it costs, the laws of correction and what is left out."""
+    environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    template = environment.from_string(_TEMPLATE.read_text(encoding="utf-8"))
+    table = of_each_outside(guide)
+    shown = table.to_string(index=False).splitlines() if len(table) > 1 else []
+    lost = "; ".join([*map(words, guide.lost[:4]), *(["…"] if len(guide.lost) > 4 else [])])
+    return template.render(
+        guide=guide,
+        question=question(guide),
+        setting=setting(guide),
+        details=details(guide),
+        others=others(guide),
+        table=shown,
+        lost=f"{counted(len(guide.lost), 'scene')} ({lost})",
+    ).rstrip()
 
 
-def question(guide: Guideline) -> list[str]:
+def question(guide: Guideline) -> str:
     """Return what was asked for, and of how many scenes."""
     axes = " × ".join(f"{length} {name}" for name, length in guide.axes)
     wanted = [f"F within {percent(guide.accuracy)} of F_exact, error bars included"] if isfinite(guide.accuracy) else []
     wanted += [f"at most {time(guide.budget)} a case"] if isfinite(guide.budget) else []
-    scenes = f"{guide.scenes} scene{'s' * (guide.scenes != 1)}{f' ({axes})' if axes and not guide.lost else ''}"
-    return [f"Asked for: {', '.join(wanted)}, over {scenes}."]
-
-
-def answer(guide: Guideline) -> list[str]:
-    """Return the chosen setting, what it costs and what limits it, and the one with the law of correction."""
-    return [setting(guide), *(f"  {name:<11}  {words}" for name, words in details(guide)), *others(guide)]
+    scenes = f"{counted(guide.scenes, 'scene')}{f' ({axes})' if axes and not guide.lost else ''}"
+    return f"Asked for: {', '.join(wanted)}, over {scenes}."
 
 
 def setting(guide: Guideline) -> str:
     """Return the chosen setting, or the best one where none does what was asked for."""
-    if guide.answer is None:
-        return f"No setting of this study does that{_nearest(guide)}"
-    smallest = "Smallest ε" if "epsilon" in guide.answer.labels else "Fewest unknowns"
-    what = smallest if isfinite(guide.accuracy) else "Most accurate"
-    return f"{what}: {words(guide.answer.labels)}"
-
-
-def others(guide: Guideline) -> list[str]:
-    """Return the setting with the fewest unknowns, and those with laws of correction."""
-    lines = []
-    chosen, lean = guide.answer, guide.lean
-    if chosen and lean and lean is not chosen and lean.dofs < chosen.dofs:
-        lines.append(f"Fewest unknowns: {words(lean.labels)} ({cost(lean)})")
-    corrected = guide.corrected or guide.best_corrected
-    if corrected:
-        law = corrected.correction
-        found = "" if guide.corrected else "no setting does that either; best reached: "
-        lines.append(
-            f"With the correction F_exact ≈ F / r: {found}{words(corrected.labels)}, r = {ratio(law.r)}; off by at "
-            f"most {percent(law.error)} on scenes that r was not taken from, {cost(corrected)}"
-        )
-    else:
-        few = "nothing can be said: it takes more than one scene"
-        lines.append(
-            f"With the correction F_exact ≈ F / r: {few if guide.scenes == 1 else 'no setting does that either'}"
-        )
-    return lines + carried(guide)
-
-
-def _nearest(guide: Guideline) -> str:
+    if guide.answer is not None:
+        smallest = "Smallest ε" if "epsilon" in guide.answer.labels else "Fewest unknowns"
+        return f"{smallest if isfinite(guide.accuracy) else 'Most accurate'}: {words(guide.answer.labels)}"
+    none = f"No setting of this study {_asked(guide)}"
     if guide.best:
-        return f"; best reached: {words(guide.best.labels)}"
-    if not any(v.is_judged for v in guide.verdicts):
-        return ": none was computed for every scene."
-    quickest = min((v for v in guide.verdicts if v.is_judged), key=lambda v: v.seconds)
-    return f"; the quickest takes {time(quickest.seconds)}: {words(quickest.labels)}"
+        return f"{none}; best reached: {words(guide.best.labels)}"
+    judged = [v for v in guide.verdicts if v.is_judged]
+    if not judged:
+        return f"{none}: none was computed for every scene."
+    quickest = min(judged, key=lambda v: v.seconds)
+    return f"{none}; the quickest takes {time(quickest.seconds)}: {words(quickest.labels)}"
+
+
+def _asked(guide: Guideline) -> str:
+    parts = [f"is within {percent(guide.accuracy)} in every scene"] if isfinite(guide.accuracy) else []
+    return " and ".join([*parts, *([f"takes at most {time(guide.budget)}"] if isfinite(guide.budget) else [])])
 
 
 def details(guide: Guideline) -> list[tuple[str, str]]:
-    """Return the elements of the chosen setting, what it costs, how sure it is and what limits it: names and words."""
+    """Return how sure the chosen setting is, what limits it, what it costs and its elements: names and words."""
     verdict = guide.answer or guide.best
     if verdict is None:
         return []
@@ -105,71 +72,139 @@ def details(guide: Guideline) -> list[tuple[str, str]]:
     spare = f" (margin {percent(margin)})" if isfinite(margin) and margin >= 0 else ""
     limit = f" at {words(verdict.limit)}" if verdict.limit else ""
     return [
-        ("elements", elements(verdict.mesh)),
+        ("worst error", f"{percent(verdict.error)}{spare}; {percent(verdict.deviation)} without error bars"),
+        ("worst case", f"F = {newton(verdict.force)}, F_exact = {newton(verdict.exact)}{limit}"),
         ("cost", f"{cost(verdict)}, on {guide.timing}"),
         *(("times", doubt) for doubt in guide.doubts),
-        ("worst error", f"{percent(verdict.error)}{spare}; {percent(verdict.deviation)} without error bars"),
-        ("limited", f"F = {newton(verdict.force)}, F_exact = {newton(verdict.exact)}{limit}"),
+        ("mesh", elements(verdict.mesh)),
     ]
 
 
-def _per_outside(guide: Guideline) -> list[str]:
-    """Return the answer for each value of outside, where there is more than one and an accuracy to keep."""
-    answers = guide.of_each_outside()
-    if len(answers) < 2 or not isfinite(guide.accuracy):
-        return []
-    rows = [["outside", "smallest ε", "worst error", "smallest ε with F / r", "r", "worst error"]]
-    for name, (plain, corrected) in answers.items():
-        row = [name, _short(plain), percent(plain.error) if plain else ""]
-        law = corrected.correction if corrected else Correction()
-        rows.append([*row, _short(corrected), *((ratio(law.r), percent(law.error)) if corrected else ("", ""))])
-    return table(rows)
-
-
-def _settings(guide: Guideline) -> list[str]:
-    """Return the table of all settings: error, cost, and the law of correction."""
-    columns = [*heads(guide), ERROR, USUAL, TIME, UNKNOWNS, RATIO, RESIDUAL, LEFT_OUT, UNSEEN]
-    # What is not judged ends with its reason.
-    rows = [columns, *([row[name] for name in columns if name in row] for row in settings(guide))]
-    legend = [
-        "Largest over the scenes (usual: median of the time); error with, the last three without error bars.",
-        "r: F_exact ≈ F / r; residual: on the scenes that r is taken from; left out: on each scene, r taken from the",
-        "others; unseen: on the scenes with one value of a parameter (one ν, one probe, …), r taken from the rest.",
-    ]
-    return [*table(rows, len(heads(guide))), *legend]
-
-
-def _constancy(guide: Guideline) -> list[str]:
-    """Return the table that tells how constant F/F_max is over the scenes, and what changes it."""
-    names = [name for name, length in guide.axes if length > 1]
-    if not names:
-        return []
-    names_of = heads(guide)
-    rows = [[*names_of, "least", "most", "most - least", "relative", *(f"by {symbol(name)}" for name in names)]]
-    for v in in_order(guide):
-        if v.is_judged and isfinite(v.spread.most):
-            over = dict(v.spread.over)
-            row = [number(v.spread.least), number(v.spread.most), number(v.spread.width), percent(v.spread.relative)]
-            rows.append([*cells_of(v), *row, *(number(over[name]) for name in names)])
-    what = f"How constant is {range_of(guide)} over the scenes?"
-    title = f"{what} By a parameter: the largest change it makes, all else held."
-    return [title, *table(rows, len(names_of))] if len(rows) > 1 else []
-
-
-def _left_out(guide: Guideline) -> list[str]:
+def others(guide: Guideline) -> list[str]:
+    """Return the setting with the fewest unknowns, and those with laws of correction."""
+    chosen, lean = guide.answer, guide.lean
     lines = []
-    if guide.lost:
-        few = "; ".join(words(scene) for scene in guide.lost[:4]) + ("; …" if len(guide.lost) > 4 else "")
-        lines.append(f"Left out, and nothing is claimed of them: {len(guide.lost)} scenes ({few}). Their cases:")
-        lines += [f"  {count} {reason}" for reason, count in guide.left_out]
-    if guide.unjudged:
-        lines.append("Cases that keep settings from being judged:")
-        lines += [f"  {count} {reason}" for reason, count in guide.unjudged]
-    return lines
+    if chosen and lean and lean is not chosen and lean.dofs < chosen.dofs:
+        lines.append(f"Fewest unknowns: {words(lean.labels)} ({cost(lean)})")
+    corrected = guide.corrected or guide.best_corrected
+    if corrected is None:
+        why = (
+            "nothing can be said: it takes more than one scene" if guide.scenes == 1 else "no setting does that either"
+        )
+        lines.append(f"With F_exact ≈ F / r: {why}")
+    else:
+        law = corrected.correction
+        best = "" if guide.corrected else "no setting does that either; best reached: "
+        off = f"off by at most {percent(law.error)} on scenes that r was not fitted to"
+        lines.append(f"With F_exact ≈ F / r: {best}{words(corrected.labels)}, r = {law.r:.4g}; {off}")
+    return [*lines, _for_other_tools(guide)]
+
+
+def _for_other_tools(guide: Guideline) -> str:
+    """Say which setting serves with the best law for other tools, and how sure that is."""
+    chosen = guide.carried or guide.best_carried
+    law = chosen.laws.best if chosen else None
+    if chosen is None or law is None:
+        why = "; ".join(f"{counted(count, 'scene')}: {reason}" for reason, count in guide.no_law)
+        return f"For other tools: nothing can be said: it takes a study of several tools{f' ({why})' if why else ''}"
+    best = "" if guide.carried else "no setting does that either; best reached: "
+    off = f"off by at most {percent(law.error)} for tools that it was not fitted to"
+    return (
+        f"For other tools on the same tissue: {best}{words(chosen.labels)}, {law.formula}, {constants(law)}; {off}"
+        f"\n  fitted to: {'; '.join(guide.tools)}"
+    )
+
+
+def of_each_outside(guide: Guideline) -> pd.DataFrame:
+    """Return the answer for each value of outside: the smallest ε as F is, and with F / r."""
+    rows = []
+    for name, (plain, corrected) in guide.of_each_outside().items() if isfinite(guide.accuracy) else ():
+        law = corrected.correction if corrected else None
+        rows.append(
+            {
+                "outside": name,
+                "smallest ε": _short(plain),
+                "worst error": percent(plain.error) if plain else "",
+                "smallest ε with F / r": _short(corrected),
+                "r": f"{law.r:.4g}" if law else "",
+                "worst error with F / r": percent(law.error) if law else "",
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def settings(guide: Guideline) -> pd.DataFrame:
+    """Return a row of words for each setting, ε running fastest: what is swept, error, cost, F/F_max, and r."""
+    share = "F/F_max" if guide.has_full else "F/F_exact"
+    rows = []
+    for v in sorted(guide.verdicts, key=_place):
+        row = {symbol(name): write(name, v.labels[name]) for name in sorted(v.labels, key="epsilon".__eq__)}
+        if v.labels.get("epsilon") == inf and "outside" in v.labels:
+            row[symbol("outside")] = "any"
+        if not v.is_judged:
+            rows.append(row | {"worst error": f"not judged: {v.missing} of {guide.scenes} scenes not computed"})
+            continue
+        law, spread = v.correction, v.spread
+        row |= {"worst error": percent(v.error), "unknowns": f"{v.dofs:,.0f}"}
+        row |= {"median time": time(v.usual), "longest time": time(v.seconds)}
+        row[share] = f"{spread.least:.3f} … {spread.most:.3f}" if isfinite(spread.most) else ""
+        rows.append(row | {"r": f"{law.r:.4g}" if isfinite(law.r) else "", "error of F/r": percent(law.error)})
+    return pd.DataFrame(rows).fillna("")
+
+
+def _place(verdict: Verdict) -> tuple[bool, str, float]:
+    """Return what settings are sorted by: full order last."""
+    labels = verdict.labels
+    epsilon = labels.get("epsilon", 0.0)
+    return epsilon == inf and "outside" in labels, str([v for k, v in labels.items() if k != "epsilon"]), epsilon
+
+
+def constants(law: Law) -> str:
+    """Write the range of a law's first constant over the tissues."""
+    name, unit = ("r", "") if law.name == "ratio" else ("c", " 1/m")
+    if f"{law.least:.3g}" == f"{law.most:.3g}":
+        return f"{name} = {law.most:.3g}{unit}"
+    return f"{name} = {law.least:.3g} … {law.most:.3g}{unit} by tissue"
+
+
+def elements(mesh: Labels) -> str:
+    """Return the sizes and kind of the elements in words."""
+    if "accuracy" in mesh:
+        return f"chosen by the program for an accuracy of {percent(mesh['accuracy'])}"
+    if "fine" not in mesh:
+        return words(mesh)
+    full = mesh.get("epsilon", inf) == inf
+    edge = "a tenth of its half width" if mesh["rim"] is None else write("rim", mesh["rim"])
+    parts = [f"{write('fine', mesh['fine'])} {'everywhere' if full else 'within ε'}"]
+    parts += [] if full else [f"{write('coarse', mesh['coarse'])} far away"]
+    parts += [f"{edge} at the probe's edge", f"growth {mesh['growth']:g}", f"degree {mesh['degree']}"]
+    return ", ".join([*parts, f"element {mesh['element']}"])
+
+
+def cost(verdict: Verdict) -> str:
+    """Return unknowns, elements and time, the largest over the scenes."""
+    size = f"up to {verdict.dofs:,.0f} unknowns, {verdict.cells:,.0f} elements"
+    return f"{size}, {time(verdict.seconds)} (median {time(verdict.usual)})"
+
+
+def percent(share: float) -> str:
+    """Write a share as people read it; nothing for what is not known."""
+    if not isfinite(share):
+        return ""
+    if abs(share) < _NOUGHT:
+        return "0 %"
+    return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"
+
+
+def time(seconds: float) -> str:
+    """Write seconds, in ms where they are few."""
+    return f"{seconds:.3g} s" if seconds >= 1 else f"{1e3 * seconds:.3g} ms"
+
+
+def newton(force: float) -> str:
+    """Write a force in mN."""
+    return f"{1e3 * force:.4g} mN"
 
 
 def _short(verdict: Verdict | None) -> str:
-    if verdict is None:
-        return "none"
-    labels = {k: v for k, v in verdict.labels.items() if k != "outside"}
-    return words(labels)
+    return words({k: v for k, v in verdict.labels.items() if k != "outside"}) if verdict else "none"

@@ -38,7 +38,7 @@ def test_json_is_for_scripts(results):
 def test_what_no_setting_reaches_ends_with_1(results):
     done = call(results / "known.nc", "--accuracy", "0.4%")
     assert done.exit_code == 1
-    assert "No setting of this study does that" in done.stdout
+    assert "No setting of this study is within 0.4 % in every scene" in done.stdout
 
 
 @pytest.mark.parametrize(

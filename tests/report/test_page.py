@@ -7,6 +7,7 @@ import sys
 from html.parser import HTMLParser
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from pipeline.pages import json_in_page
@@ -160,13 +161,8 @@ def test_what_was_struck_out_is_told_with_its_reason():
 
 
 def test_a_guide_stands_in_the_page_where_there_is_one(monkeypatch):
-    section = Section(
-        "Smallest ε: <10 mm",
-        "Asked for: <5 %",
-        (("cost", "<1 s"),),
-        (),
-        ({"ε": "10 mm", "error": "< 5 %"}, {"ε": "20 mm", "error": "1 %"}),
-    )
+    settings = pd.DataFrame([{"ε": "10 mm", "error": "< 5 %"}, {"ε": "20 mm", "error": "1 %"}])
+    section = Section("Asked for: <5 %", "Smallest ε: <10 mm", [("cost", "<1 s")], [], settings)
     monkeypatch.setattr(page, "guide_section", lambda _: section)
     text = render(small(), "small")
     answer, settings = '<section id="answer">.*Smallest ε: &lt;10 mm', '<section id="guide">.*<td>&lt; 5 %</td>'
@@ -179,10 +175,10 @@ def test_the_guide_of_the_page_is_that_of_the_epsmesh():
     assert guide_section(small()) is None  # F_exact is not known
     section, found = guide_section(chosen.dataset()), guide(chosen.dataset(), ACCURACY)
     assert section is not None
-    assert len(section.rows) == len(found.verdicts)
+    assert len(section.settings) == len(found.verdicts)
     assert section.setting in str(found)
     assert section.question in str(found)
-    assert {name for name, _ in section.details} >= {"how sure: worst error", "cost", "mesh"}
+    assert {name for name, _ in section.details} >= {"worst error", "cost", "mesh"}
     assert all(line in str(found) for line in (*(words for _, words in section.details), *section.others))
 
 

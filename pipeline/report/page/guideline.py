@@ -2,33 +2,26 @@
 
 from dataclasses import dataclass
 
+import pandas as pd
 import xarray as xr
 
+from pipeline.report import guide_text
 from pipeline.report.guide import guide
-from pipeline.report.guide_settings import ERROR, OFF, RATIO, TIME, UNKNOWNS, USUAL, range_of, settings
-from pipeline.report.guide_text import details, others, question, setting
-from pipeline.report.guide_words import heads
 from pipeline.report.table import DatasetError
 
 # The accuracy that the report asks for; `epsmesh guide` answers for any.
 ACCURACY = "5 %"
-# What the report calls the details of an answer, in its order.
-_NAMES = {"worst error": "how sure: worst error", "cost": "cost", "times": "times", "elements": "mesh",
-          "limited": "limited by"}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Section:
-    """The answer: the setting, what was asked for, names and words of what it is worth, the law of correction in lines.
+    """What was asked for, the chosen setting, names and words of its details, laws of correction, all settings."""
 
-    Below it stand all mesh settings, ``rows`` of heading to text.
-    """
-
-    setting: str
     question: str
-    details: tuple[tuple[str, str], ...]
-    others: tuple[str, ...]
-    rows: tuple[dict[str, str], ...]
+    setting: str
+    details: list[tuple[str, str]]
+    others: list[str]
+    settings: pd.DataFrame
 
 
 def guide_section(dataset: xr.Dataset) -> Section | None:
@@ -37,8 +30,10 @@ def guide_section(dataset: xr.Dataset) -> Section | None:
         found = guide(dataset, ACCURACY)
     except DatasetError:
         return None
-    columns = [*heads(found), ERROR, UNKNOWNS, USUAL, TIME, range_of(found), RATIO, OFF]
-    rows = [{name: row.get(name, "") for name in columns} for row in settings(found)]
-    named = [(name, [words for other, words in details(found) if other == name]) for name in _NAMES]
-    told = tuple((_NAMES[name], "; ".join(words)) for name, words in named if words)
-    return Section(setting(found), " ".join(question(found)), told, tuple(others(found)), tuple(rows))
+    return Section(
+        question=guide_text.question(found),
+        setting=guide_text.setting(found),
+        details=guide_text.details(found),
+        others=guide_text.others(found),
+        settings=guide_text.settings(found),
+    )
