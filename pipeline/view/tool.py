@@ -31,7 +31,7 @@ def tool_of(fields: Fields) -> Tool:
     case = fields.case
     length, outward = _LENGTH * case.probe.circumradius, np.array(case.frame.outward)
     if isinstance(case.probe, Indenter):
-        lines = tool_points(case.probe, length)
+        lines = _lines(case.probe, length)
         points = np.asarray(case.frame.world(lines.reshape(-1, 3)))
         return Tool(points, _between_lines(*lines.shape[:2]), np.tile(case.travel, (len(points), 1)))
     used, corners = np.unique(fields.facets[PROBE], return_inverse=True)
@@ -46,18 +46,22 @@ def tool_of(fields: Fields) -> Tool:
     )
 
 
-def tool_points(probe: Indenter, length: float) -> FloatArray:
-    """Return lines (k, n, 3) over its surface, in m and the probe's own coordinates: from the axis, or across it."""
+def _lines(probe: Indenter, length: float) -> FloatArray:
+    """Return lines (k, n, 3) over its surface, in m and the probe's own coordinates.
+
+    Those of a round tool go from its axis to its axis; those of a long one are sections, the first and last points.
+    """
     if probe.is_round:
         directions = (np.array([np.cos(a), np.sin(a)]) for a in np.linspace(0, 2 * np.pi, _LINES))
-        farthest = _ROUND * probe.circumradius
-        return np.array([_line(probe, np.zeros(2), farthest * direction, length) for direction in directions])
+        farthest, top = _ROUND * probe.circumradius, (0.0, 0.0, length)
+        return np.array([[*_line(probe, np.zeros(2), farthest * direction, length), top] for direction in directions])
     along, across = probe.outline().max(axis=0)
     sides = np.array([0.0, _ACROSS * across])
     starts = (np.array([x, 0.0]) for x in np.linspace(-along, along, _LINES))
-    return np.array(
-        [np.vstack([_line(probe, s, -sides, length)[::-1], _line(probe, s, sides, length)]) for s in starts]
-    )
+    halves = ((_line(probe, s, -sides, length), _line(probe, s, sides, length)) for s in starts)
+    sections = [[*left[::-1], *right, left[-1]] for left, right in halves]
+    ends = [[section[0]] * len(section) for section in (sections[0], sections[-1])]
+    return np.array([ends[0], *sections, ends[1]])
 
 
 def _line(probe: Indenter, start: FloatArray, along: FloatArray, length: float) -> FloatArray:
