@@ -1,12 +1,15 @@
 """Pages of HTML that hold all they need: what they are told stays text, and one script is all that may run."""
 
 import json
+import zlib
 from base64 import b64encode
 from collections.abc import Mapping
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
@@ -45,3 +48,19 @@ def json_in_page(told: Mapping[str, Any]) -> Markup:
     for sign in "<>&\u2028\u2029":
         text = text.replace(sign, f"\\u{ord(sign):04x}")
     return Markup(text)
+
+
+def layout(arrays: Mapping[str, npt.NDArray[Any]]) -> list[tuple[str, str, int]]:
+    """Return what a page needs to read :func:`packed` arrays: name, type and length of each."""
+    return [(name, a.dtype.str[1:], a.size) for name, a in arrays.items()]
+
+
+def packed(arrays: Mapping[str, npt.NDArray[Any]]) -> str:
+    """Return arrays, of each first every number's first byte, then every second one, as compressed text."""
+    planes = [np.ascontiguousarray(a).view("u1").reshape(-1, a.itemsize).T.tobytes() for a in arrays.values()]
+    return compressed(b"".join(planes))
+
+
+def compressed(content: bytes, level: int = 6) -> str:
+    """Return bytes, deflated, as base64."""
+    return b64encode(zlib.compress(content, level)).decode()

@@ -11,7 +11,6 @@ from pipeline.realtime.blade import RECTANGLE
 from pipeline.realtime.surface import Surface
 from pipeline.realtime.touch import SENTENCES
 from pipeline.view import palette
-from pipeline.view.numbers import layout, packed
 from pipeline.view.page import render_scene
 
 _TEMPLATES = Path(__file__).parent / "templates"
@@ -33,13 +32,12 @@ def write_touch_page(surface: Surface, path: Path, title: str) -> Path:
 
 def render(surface: Surface, title: str) -> str:
     """Return the page of a model as HTML; it loads nothing else."""
-    arrays = _arrays(surface)
     return render_scene(
         _TEMPLATES / "touch.html.j2",
         _SCRIPTS,
         [_TEMPLATES / "touch.css"],
-        told=_told(surface, arrays),
-        numbers=packed(arrays),
+        told=_told(surface),
+        arrays=_arrays(surface),
         title=title,
         facts=_facts(surface),
         sliders=_sliders(surface),
@@ -91,27 +89,36 @@ def _sliders(surface: Surface) -> list[dict[str, Any]]:
 def _arrays(surface: Surface) -> dict[str, Any]:
     table = surface.table
     return {
-        "points": table.points.T.astype("<f4"), "triangles": table.triangles.T.astype("<i4"),
-        "modes": table.modes.astype("<i2"), "amounts": table.amounts.astype("<f4"),
-    }  # fmt: skip
+        "points": table.points.T.astype("<f4"),
+        "triangles": table.triangles.T.astype("<i4"),
+        "modes": table.modes.astype("<i2"),
+        "amounts": table.amounts.astype("<f4"),
+    }
 
 
-def _told(surface: Surface, arrays: dict[str, Any]) -> dict[str, Any]:
+def _told(surface: Surface) -> dict[str, Any]:
     """Return what the script is told besides the arrays; the camera's lengths are in mm, along the face's axes."""
     model, table = surface.model, surface.table
     low, high = table.points.min(axis=0), table.points.max(axis=0)
     names = ("thickness", "young", "poisson", "largest", "sides", "bar", "off", "bend_error")
     numbers = {name: getattr(model, name) for name in names} | {
-        "origin": model.origin.tolist(), "axes": model.axes.tolist(), "c_ref": model.table.c_ref,
-        "reach": model.table.reach, "even": model.table.even,
-        "leans": model.table.leans, "is_round": model.table.is_round, "poisson_range": model.table.poisson,
-        "reciprocal": model.table.reciprocal.tolist(), "curvature": model.table.curvature.tolist(),
-        "tensors": model.table.tensors.tolist(), "height": model.face.height.tolist(),
-        "bend": model.face.bend.tolist(), "rectangle": RECTANGLE.tolist(),
-    }  # fmt: skip
+        "origin": model.origin.tolist(),
+        "axes": model.axes.tolist(),
+        "c_ref": model.table.c_ref,
+        "reach": model.table.reach,
+        "even": model.table.even,
+        "leans": model.table.leans,
+        "is_round": model.table.is_round,
+        "poisson_range": model.table.poisson,
+        "reciprocal": model.table.reciprocal.tolist(),
+        "curvature": model.table.curvature.tolist(),
+        "tensors": model.table.tensors.tolist(),
+        "height": model.face.height.tolist(),
+        "bend": model.face.bend.tolist(),
+        "rectangle": RECTANGLE.tolist(),
+    }
     return {
         "model": numbers,
-        "arrays": layout(arrays),
         "shape": table.amounts.shape,
         "eye": (np.array([-0.5, -0.75, 0.55]) / hypot(0.5, 0.75, 0.55)).tolist(),
         "centre": (_MM * (low + high) / 2).tolist(),

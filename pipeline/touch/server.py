@@ -42,10 +42,13 @@ class _Handler(BaseHTTPRequestHandler):
             return
         self.send_response(HTTPStatus.OK)
         headers = {
-            "Content-Type": "text/html; charset=utf-8", "Content-Length": str(len(self.server.body)),
-            "Cache-Control": "no-store", "X-Content-Type-Options": "nosniff", "X-Frame-Options": "DENY",
+            "Content-Type": "text/html; charset=utf-8",
+            "Content-Length": str(len(self.server.body)),
+            "Cache-Control": "no-store",
+            "X-Content-Type-Options": "nosniff",
+            "X-Frame-Options": "DENY",
             "Referrer-Policy": "no-referrer",
-        }  # fmt: skip
+        }
         for name, value in headers.items():
             self.send_header(name, value)
         self.end_headers()

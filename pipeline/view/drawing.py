@@ -94,10 +94,19 @@ class Drawing:
         plotter.enable_anti_aliasing("ssaa")
         colours = self._colouring
         plotter.add_mesh(
-            self._surface, scalars="value", cmap=colours.cmap, clim=colours.limits, log_scale=colours.logarithmic,
-            ambient=_AMBIENT, diffuse=1 - _AMBIENT, show_scalar_bar=False, show_edges=True, edge_color=INK,
-            edge_opacity=0.5 if close else 0.3, line_width=1.2,
-        )  # fmt: skip
+            self._surface,
+            scalars="value",
+            cmap=colours.cmap,
+            clim=colours.limits,
+            log_scale=colours.logarithmic,
+            ambient=_AMBIENT,
+            diffuse=1 - _AMBIENT,
+            show_scalar_bar=False,
+            show_edges=True,
+            edge_color=INK,
+            edge_opacity=0.5 if close else 0.3,
+            line_width=1.2,
+        )
         if self._held.n_points:
             held = self._held.translate(1e-3 * self._surface.length * self._view.eye)
             plotter.add_mesh(held, color=HELD, opacity=_HELD, lighting=False)

@@ -65,9 +65,13 @@ def _xdmf(mesh: meshio.Mesh) -> Xml.ElementTree:
 def _add_numbers(parent: Xml.Element, values: np.ndarray) -> None:
     whole = np.issubdtype(values.dtype, np.integer)
     item = Xml.SubElement(
-        parent, "DataItem", Dimensions=" ".join(map(str, values.shape)), Format="XML",
-        NumberType="Int" if whole else "Float", Precision=str(values.dtype.itemsize),
-    )  # fmt: skip
+        parent,
+        "DataItem",
+        Dimensions=" ".join(map(str, values.shape)),
+        Format="XML",
+        NumberType="Int" if whole else "Float",
+        Precision=str(values.dtype.itemsize),
+    )
     text = io.StringIO()
     np.savetxt(text, values, fmt="%d" if whole else "%.16g")
     item.text = text.getvalue()

@@ -5,9 +5,6 @@ Morton's curve and cells by their points, which leaves differences of few bits; 
 deflated: about 7 bytes a cell, where a list of cells and points takes 30.
 """
 
-import zlib
-from base64 import b64encode
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,79 +22,76 @@ _GROUPS = {PROBE: 1, FIXED: 2, CUT: 3}
 # Strains are shown over this range below the largest, which the singular edge of the probe has.
 _STRAINS = 1e-3
 # Below this (m) displacements are read in µm.
-_SMALL = 1e-4
+SMALL = 1e-4
 # The largest displacement, in its units.
 _HALF = 32767
 # Bits of a coordinate along Morton's curve.
 _BITS = 10
-_DEFLATE = 6
 # Bits of a point's number: three of them fit one integer.
 _POINT_BITS = 21
 # The corners of a tetrahedron's face, by the corner that it lies opposite to.
 FACES = np.array(((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)))
 
 
-@dataclass(frozen=True)
-class Numbers:
-    """Arrays as base64 ``text``, in order the (name, type, length) of each, and what they can colour.
-
-    ``shift`` is the length (mm) of a displacement's unit.
-    """
-
-    text: str
-    layout: list[tuple[str, str, int]]
-    colours: list[dict[str, Any]]
-    shift: float
-
-
-def mesh_numbers(fields: Fields) -> Numbers:
-    """Return the numbers of a case's page.
+def mesh_arrays(fields: Fields) -> dict[str, npt.NDArray[Any]]:
+    """Return the arrays of a case's page, by name.
 
     ``points`` (3, n) in mm from the contact; ``cells`` (4, m), each number the difference to the corner before it, the
     first one's to the cell before; ``faces`` of the boundary, 4 × cell + the corner that it lies opposite to, each the
-    difference to the one before, and their ``groups``; ``shift`` (3, n), displacements; ``regions``, ``sizes`` and
-    ``strains`` (m), the last two in 0 … 255 of the scale of their colours; ``tool_points``, ``tool_moved`` (k, 3), mm,
-    and ``tool_triangles``.
+    difference to the one before, and their ``groups``; ``shift`` (3, n), displacements in units of :func:`shift_unit`;
+    ``regions``, ``sizes`` and ``strains`` (m), the last two in 0 … 255 of the scale of their colours; ``tool_points``,
+    ``tool_moved`` (k, 3), mm, and ``tool_triangles``.
     """
-    used, number = _along_curve(fields.points, fields.cells[:, :4])
+    sizes, (used, number) = fields.sizes, _along_curve(fields.points, fields.cells[:, :4])
     corners = np.sort(number[fields.cells[:, :4]], axis=1)
     order = np.lexsort(corners.T[::-1])
     corners = corners[order]
+    regions = np.zeros(len(corners), dtype=np.int64) if fields.regions is None else fields.regions
+    tool = tool_of(fields)
     arrays: dict[str, npt.NDArray[Any]] = {
         "points": (_MM * (fields.points[used] - fields.contact)).T.astype("<f4"),
         "cells": np.vstack([np.diff(corners[:, 0], prepend=0), np.diff(corners, axis=1).T]).astype("<i4"),
         **_faces(corners, {name: number[triangles] for name, triangles in fields.facets.items()}),
+        "regions": regions[order].astype("u1"),
+        "sizes": _steps(sizes, float(sizes.min()))[order],
+        "tool_points": (_MM * (tool.points - fields.contact)).astype("<f4"),
+        "tool_moved": (_MM * tool.moved).astype("<f4"),
+        "tool_triangles": tool.triangles.astype("<i4"),
     }
-    regions = np.zeros(len(corners), dtype=np.int64) if fields.regions is None else fields.regions
-    arrays["regions"] = regions[order].astype("u1")
-    tool = tool_of(fields)
-    arrays["tool_points"] = (_MM * (tool.points - fields.contact)).astype("<f4")
-    arrays["tool_moved"] = (_MM * tool.moved).astype("<f4")
-    arrays["tool_triangles"] = tool.triangles.astype("<i4")
-    names = list(fields.region_names)
-    colours: list[dict[str, Any]] = [
-        {"name": "region", "array": "regions", "labels": names, "stops": region_colours(len(names))}
-    ]
-    sizes = _MM * fields.sizes
-    arrays["sizes"] = _steps(sizes, float(sizes.min()), float(sizes.max()))[order]
-    colours.append(_scale("element size", "mm", float(sizes.min()), float(sizes.max()), VIRIDIS, array="sizes"))
-    shift = 1.0
     if fields.displacement is not None and fields.strain is not None:
-        shift = float(np.abs(fields.displacement).max()) / _HALF
-        arrays["shift"] = np.round(fields.displacement[used] / shift).T.astype("<i2")
-        largest = float(fields.magnitude.max())
-        unit, factor = ("µm", 1e6) if largest < _SMALL else ("mm", _MM)
-        colours.insert(1, _scale("displacement", unit, 0.0, factor * largest, YLGNBU))
-        worst = float(fields.strain.max())
-        arrays["strains"] = _steps(fields.strain, _STRAINS * worst, worst)[order]
-        name = "largest principal strain"
-        colours.insert(2, _scale(name, "%", 100 * _STRAINS * worst, 100 * worst, YLORRD, array="strains"))
-    return Numbers(packed(arrays), layout(arrays), colours, _MM * shift)
+        arrays["shift"] = np.round(fields.displacement[used] / shift_unit(fields)).T.astype("<i2")
+        arrays["strains"] = _steps(fields.strain, _STRAINS * float(fields.strain.max()))[order]
+    return arrays
+
+
+def shift_unit(fields: Fields) -> float:
+    """Return the length (m) of a displacement's unit, 1 where there is none."""
+    return 1.0 if fields.displacement is None else float(np.abs(fields.displacement).max()) / _HALF
+
+
+def colours_of(fields: Fields) -> list[dict[str, Any]]:
+    """Return what can colour the body, each with its scale or its labels."""
+    names, sizes = list(fields.region_names), _MM * fields.sizes
+    regions = {"name": "region", "array": "regions", "labels": names, "stops": region_colours(len(names))}
+    size = _scale("element size", "mm", float(sizes.min()), float(sizes.max()), VIRIDIS, array="sizes")
+    if fields.displacement is None or fields.strain is None:
+        return [regions, size]
+    largest, worst = float(fields.magnitude.max()), 100 * float(fields.strain.max())
+    unit, factor = ("µm", 1e6) if largest < SMALL else ("mm", _MM)
+    strain = _scale("largest principal strain", "%", _STRAINS * worst, worst, YLORRD, array="strains")
+    return [regions, _scale("displacement", unit, 0.0, factor * largest, YLGNBU), strain, size]
 
 
 def _scale(name: str, unit: str, low: float, high: float, stops: tuple[str, ...], array: str = "") -> dict[str, Any]:
     """Describe a scale of colours: logarithmic, of an array of the cells, or linear, of the displacement."""
-    return {"name": name, "unit": unit, "limits": [low, high], "stops": list(stops), "array": array}
+    return {
+        "name": name,
+        "unit": unit,
+        "limits": [low, high],
+        "stops": list(stops),
+        "array": array,
+        "linear": not array,
+    }
 
 
 def _along_curve(points: FloatArray, corners: IntArray) -> tuple[IntArray, IntArray]:
@@ -143,24 +137,7 @@ def _keys(triples: IntArray) -> IntArray:
     return np.asarray((low << 2 * _POINT_BITS) | (middle << _POINT_BITS) | high)
 
 
-def _steps(values: FloatArray, low: float, high: float) -> npt.NDArray[np.uint8]:
-    """Return where positive values lie between ``low`` and ``high``, by their logarithms, in 0 … 255."""
-    span = np.log(high / low) or 1.0
-    share = np.log(np.maximum(values, low) / low) / span
-    return np.round(255 * np.clip(share, 0, 1)).astype("u1")
-
-
-def layout(arrays: dict[str, npt.NDArray[Any]]) -> list[tuple[str, str, int]]:
-    """Return what a page is told of its arrays: name, type and length of each."""
-    return [(name, a.dtype.str[1:], a.size) for name, a in arrays.items()]
-
-
-def packed(arrays: dict[str, npt.NDArray[Any]]) -> str:
-    """Return arrays, of each first every number's first byte, then every second one, as compressed text."""
-    planes = [np.ascontiguousarray(a).view("u1").reshape(-1, a.itemsize).T.tobytes() for a in arrays.values()]
-    return compressed(b"".join(planes))
-
-
-def compressed(content: bytes, level: int = _DEFLATE) -> str:
-    """Return bytes, deflated, as base64."""
-    return b64encode(zlib.compress(content, level)).decode()
+def _steps(values: FloatArray, low: float) -> npt.NDArray[np.uint8]:
+    """Return where positive values lie between ``low`` and the largest, by their logarithms, in 0 … 255."""
+    span = np.log(values.max() / low) or 1.0
+    return np.round(255 * np.log(np.maximum(values, low) / low) / span).astype("u1")

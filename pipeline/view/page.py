@@ -5,14 +5,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from pipeline.files import write_whole
-from pipeline.pages import hash_of, json_in_page, render_page
+from pipeline.pages import compressed, hash_of, joined, json_in_page, layout, packed, render_page
 from pipeline.quantities import write
 from pipeline.shapes.indenter import Indenter
 from pipeline.view import palette
 from pipeline.view.fields import Fields
-from pipeline.view.numbers import compressed, mesh_numbers
+from pipeline.view.numbers import colours_of, mesh_arrays, shift_unit
 from pipeline.view.viewpoint import Viewpoint
 
 SCENE = Path(__file__).parent / "templates"
@@ -27,18 +28,27 @@ def write_page(fields: Fields, path: Path, title: str) -> Path:
 
 def render(fields: Fields, title: str) -> str:
     """Return the page of a case as HTML; it loads nothing else."""
-    numbers = mesh_numbers(fields)
-    told = _told(fields) | {"arrays": numbers.layout, "colours": numbers.colours, "shift": numbers.shift}
-    scripts = [SCENE / "mesh.js", SCENE / "view.js"]
     return render_scene(
-        SCENE / "view.html.j2", scripts, [], told=told, numbers=numbers.text, title=title, facts=_facts(fields)
+        SCENE / "view.html.j2",
+        [SCENE / "mesh.js", SCENE / "view.js"],
+        [],
+        told=_told(fields),
+        arrays=mesh_arrays(fields),
+        title=title,
+        facts=_facts(fields),
     )
 
 
 def render_scene(
-    template: Path, scripts: list[Path], styles: list[Path], *, told: dict[str, Any], numbers: str, **content: Any
+    template: Path,
+    scripts: list[Path],
+    styles: list[Path],
+    *,
+    told: dict[str, Any],
+    arrays: dict[str, npt.NDArray[Any]],
+    **content: Any,
 ) -> str:
-    """Return a page in three dimensions: ``told`` and ``numbers`` are for its scripts, ``content`` for its template.
+    """Return a page in three dimensions: ``told`` and ``arrays`` are for its scripts, ``content`` for its template.
 
     The library is compressed; a script puts it into the page, where the policy allows it by its hash.
     """
@@ -46,19 +56,15 @@ def render_scene(
     ink = {"footprint": palette.FOOTPRINT, "held": palette.HELD, "probe": palette.TOOL, "outline": palette.OUTLINE}
     return render_page(
         template,
-        _joined(SCENE / "scene.js", *scripts),
+        joined(SCENE / "scene.js", *scripts),
         base=SCENE,
-        style=_joined(SCENE / "scene.css", *styles),
-        told=json_in_page(told | {"ink": ink}),
-        numbers=numbers,
+        style=joined(SCENE / "scene.css", *styles),
+        told=json_in_page(told | {"ink": ink, "arrays": layout(arrays)}),
+        numbers=packed(arrays),
         library=compressed(library.encode(), 9),
         library_hash=hash_of(library),
         **content,
     )
-
-
-def _joined(*files: Path) -> str:
-    return "\n".join(path.read_text(encoding="utf-8") for path in files)
 
 
 def _facts(fields: Fields) -> list[str]:
@@ -77,6 +83,8 @@ def _told(fields: Fields) -> dict[str, Any]:
     low, high = (_MM * (end(fields.points, axis=0) - fields.contact) for end in (np.min, np.max))
     is_solved = fields.displacement is not None
     return {
+        "colours": colours_of(fields),
+        "shift": _MM * shift_unit(fields),
         "front": view.front.tolist(),
         "side": view.side.tolist(),
         "outward": view.outward.tolist(),

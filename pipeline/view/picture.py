@@ -18,6 +18,7 @@ from pipeline.report.figures.style import DEFAULTS, save
 from pipeline.shapes.indenter import Indenter
 from pipeline.view.drawing import MM, Colouring, Drawing
 from pipeline.view.fields import Fields
+from pipeline.view.numbers import SMALL
 from pipeline.view.palette import FOOTPRINT, HELD, INK, TOOL, region_colours
 
 # Inches, at 200 dots each: 1200 × 720 pixels.
@@ -31,8 +32,6 @@ _STYLE = DEFAULTS | {"font.size": 8, "axes.linewidth": 0.6}
 _COLUMNS = 4
 # Letters of a title that fit the width.
 _LONGEST = 92
-# Below this (m) displacements are read in µm.
-_SMALL = 1e-4
 
 
 def draw_mesh(fields: Fields, path: Path, title: str) -> Path:
@@ -55,7 +54,7 @@ def draw_deformed(fields: Fields, path: Path, title: str) -> tuple[Path, float]:
     factor = fields.drawn_factor
     moved = fields.magnitude
     largest = float(moved.max())
-    unit, scale = ("µm", 1e6) if largest < _SMALL else ("mm", MM)
+    unit, scale = ("µm", 1e6) if largest < SMALL else ("mm", MM)
     colouring = Colouring(scale * moved, "YlGnBu", (0.0, scale * largest))
     words = "true to scale" if factor == 1 else f"displacement drawn {factor:,.0f} × as large"
     body = Drawing(fields, colouring, factor)
@@ -77,8 +76,14 @@ def _compose(
             axes.spines[:].set_visible(close)
             axes.spines[:].set_color("#777777")
         _add_names(figure, colouring) if colouring.names else _add_scale(figure, colouring, quantity)
-        figure.legend(handles=_lines(fields), loc="lower right", bbox_to_anchor=(0.99, 0.02), frameon=False, ncols=2,
-                      handlelength=1.5)  # fmt: skip
+        figure.legend(
+            handles=_lines(fields),
+            loc="lower right",
+            bbox_to_anchor=(0.99, 0.02),
+            frameon=False,
+            ncols=2,
+            handlelength=1.5,
+        )
         figure.text(0.012, 0.965, shorten(words[0], _LONGEST, placeholder=" …"), fontweight="bold", va="center")
         figure.text(0.012, 0.915, words[1], va="center")
         figure.text(0.99, 0.915, "close to the probe", ha="right", va="center")
@@ -87,8 +92,15 @@ def _compose(
 
 def _add_names(figure: Figure, colouring: Colouring) -> None:
     patches = [Patch(color=c, label=n) for c, n in zip(colouring.cmap, colouring.names, strict=True)]
-    figure.legend(handles=patches, loc="lower left", bbox_to_anchor=(0.01, 0.02), frameon=False, ncols=_COLUMNS,
-                  handlelength=1.2, columnspacing=1.2)  # fmt: skip
+    figure.legend(
+        handles=patches,
+        loc="lower left",
+        bbox_to_anchor=(0.01, 0.02),
+        frameon=False,
+        ncols=_COLUMNS,
+        handlelength=1.2,
+        columnspacing=1.2,
+    )
 
 
 def _add_scale(figure: Figure, colouring: Colouring, quantity: str) -> None:

@@ -60,13 +60,18 @@ def queries(model, count):
         at = model.origin + np.array([x, y, model.face.at(model.table, x, y).height]) @ model.axes
         turn, size = rng.uniform(0, 7), float(rng.uniform(0.5, 2))
         yield {
-            "tool": "disc" if tool == "bonded" else tool, **({"contact": tool} if tool == "bonded" else {}),
-            "at": at.tolist(), "depth": float(rng.uniform(-5e-5, 1e-3)), "angle": 1.1,
+            "tool": "disc" if tool == "bonded" else tool,
+            **({"contact": tool} if tool == "bonded" else {}),
+            "at": at.tolist(),
+            "depth": float(rng.uniform(-5e-5, 1e-3)),
+            "angle": 1.1,
             "radius": {"sphere": 6e-3, "cone": 5e-3}.get(tool, 2e-3) * size,
-            "length": 4e-3 * size, "width": 4e-3 * float(rng.uniform(0.015, 1)),
+            "length": 4e-3 * size,
+            "width": 4e-3 * float(rng.uniform(0.015, 1)),
             "along": [np.cos(turn), np.sin(turn), 0.1],
-            "young": float(rng.uniform(1e3, 1e5)), "poisson": float(rng.uniform(0.29, 0.5)),
-        }  # fmt: skip
+            "young": float(rng.uniform(1e3, 1e5)),
+            "poisson": float(rng.uniform(0.29, 0.5)),
+        }
 
 
 @in_browser
@@ -143,6 +148,7 @@ def test_the_dent_is_seen_and_outside_the_region_no_number_is(browser, tmp_path)
     rest, pressed = (imread(tmp_path / f"{name}.png")[80:, :700, :3] for name in ("rest", "pressed"))
     assert np.mean(rest.min(axis=-1) < 0.97) > 0.1
     assert np.mean(np.abs(rest - pressed).max(axis=-1) > 0.05) > 0.01
+    assert told(browser, "legend") == "00.51 mm"
     change(browser, x=33)
     assert "outside" in told(browser, "status")
     assert [told(browser, name) for name in ("force", "error", "stiffness", "contact")] == ["–", "", "–", "–"]

@@ -17,7 +17,7 @@ from pipeline.report.page import write_page as write_report
 from pipeline.scene.model import FIXED, PROBE
 from pipeline.shapes.frame import Frame
 from pipeline.view.compute import compute_fields, solve_to_view
-from pipeline.view.numbers import FACES, mesh_numbers
+from pipeline.view.numbers import FACES, mesh_arrays
 from pipeline.view.page import render, write_page
 from pipeline.view.tool import tool_of
 from pipeline.view.viewpoint import Viewpoint
@@ -121,7 +121,7 @@ def test_mesh_alone_has_no_force_and_no_displacement():
 def test_a_triangle_that_bounds_nothing_is_refused(fields):
     facets = fields.facets | {"more": fields.cells[[[0, 0, -1]], [[0, 1, 0]]]}
     with pytest.raises(ValueError, match="1 triangles"):
-        mesh_numbers(replace(fields, facets=facets))
+        mesh_arrays(replace(fields, facets=facets))
 
 
 def test_a_ball_has_its_shape_and_its_depth():

@@ -174,6 +174,7 @@ class Page {
     const triangles = isIn ? this.surface.press(query, touch, true) : null;
     const took = performance.now() - began;
     this.fillBody(triangles, query.depth * MM);
+    describe({ stops: this.told.stops, limits: [0, Math.max(query.depth * MM, 0)], unit: "mm", linear: true });
     stage.fill(stage.body, this.made.geometry());
     stage.uniforms.edges.value = field("edges").checked;
     this.arrow.visible = isIn;

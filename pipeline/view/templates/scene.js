@@ -270,15 +270,43 @@ class Stage {
   }
 }
 
+const add = (parent, kind, name = "", text = "") => {
+  const made = document.createElement(kind);
+  made.className = name;
+  made.textContent = text;
+  parent.append(made);
+  return made;
+};
+
+// Show what colours mean: names, or a scale with its unit, logarithmic or `linear`.
+function describe({ labels, stops, limits, unit, linear }) {
+  const legend = document.getElementById("legend");
+  legend.replaceChildren();
+  if (labels) {
+    const list = add(legend, "ul");
+    labels.forEach((label, i) => {
+      const line = add(list, "li");
+      add(line, "i").style.background = stops[i];
+      line.append(` ${label}`);
+    });
+    return;
+  }
+  add(legend, "div", "ramp").style.background = `linear-gradient(to right, ${stops})`;
+  const [low, high] = limits;
+  const middle = linear ? (low + high) / 2 : Math.sqrt(low * high);
+  const ticks = add(legend, "div", "ticks");
+  [low, middle, high].forEach((value, i) => add(ticks, "span", "", short(value, 2) + (i === 2 ? ` ${unit}` : "")));
+}
+
 let page = null;
 // Put the library into the page, then make `Page` of what the page holds; `prepare` reads its arrays.
 async function start(Page, prepare = unpack) {
+  if (innerWidth < 600) document.getElementById("panel").open = false;
   const library = document.createElement("script");
   library.textContent = new TextDecoder().decode(await inflate("library"));
   document.head.append(library);
   const told = JSON.parse(textOf("told"));
   const arrays = await prepare(told.arrays);
-  if (innerWidth < 600) document.getElementById("panel").open = false;
   if (document.createElement("canvas").getContext("webgl2")) page = new Page(told, arrays);
   else {
     const trouble = document.getElementById("trouble");

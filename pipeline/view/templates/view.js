@@ -1,13 +1,5 @@
 // The page of a case: what is shown, and its legend.
 
-const add = (parent, kind, name = "", text = "") => {
-  const made = document.createElement(kind);
-  made.className = name;
-  made.textContent = text;
-  parent.append(made);
-  return made;
-};
-
 class Page {
   constructor(told, { tool_points, tool_moved, tool_triangles, ...arrays }) {
     this.told = told;
@@ -67,7 +59,7 @@ class Page {
   recolour() {
     this.stage.colour(this.colour);
     this.stage.fill(this.stage.body, this.mesh.surface(this.colour).geometry());
-    this.describe();
+    describe(this.colour);
     this.recut();
   }
   // The slider's ends are those of the body; it begins at the contact, or, across the axis, a little within.
@@ -100,25 +92,6 @@ class Page {
     tool.visible = field("probe").checked;
     uniforms.epsilon.value = (field("ring").checked && this.told.epsilon) || 0;
     for (const name of ["edges", "marks"]) uniforms[name].value = field(name).checked;
-  }
-  describe() {
-    const legend = document.getElementById("legend");
-    const { labels, stops, limits, unit, array } = this.colour;
-    legend.replaceChildren();
-    if (labels) {
-      const list = add(legend, "ul");
-      labels.forEach((label, i) => {
-        const line = add(list, "li");
-        add(line, "i").style.background = stops[i];
-        line.append(` ${label}`);
-      });
-      return;
-    }
-    add(legend, "div", "ramp").style.background = `linear-gradient(to right, ${stops})`;
-    const [low, high] = limits;
-    const middle = array ? Math.sqrt(low * high) : (low + high) / 2;
-    const ticks = add(legend, "div", "ticks");
-    [low, middle, high].forEach((value, i) => add(ticks, "span", "", short(value, 2) + (i === 2 ? ` ${unit}` : "")));
   }
 }
 
