@@ -48,7 +48,7 @@ def scene_at_hand(dataset: xr.Dataset) -> str:
         case = find_case(study, _number_of_answer(dataset))
     except DatasetError:
         return ""
-    if case.absence:
+    if case.lost_contact:
         return ""
     load_solvers()
     from mpi4py import MPI

@@ -70,10 +70,14 @@ def fields_of(
     from pipeline.solve.linear import SolveError
     from pipeline.view.compute import compute_fields, solve_to_view
 
-    if case.absence:
+    if case.lost_contact:
         fail(
             Fault(
-                f"{case}: {case.absence}", key="CASE", value=str(case), allowed=case.absence, howto="docs/howto/path.md"
+                f"{case}: {case.lost_contact}",
+                key="CASE",
+                value=str(case),
+                allowed=case.lost_contact,
+                howto="docs/howto/path.md",
             )
         )
     note = error if comm.rank == 0 else _say_nothing

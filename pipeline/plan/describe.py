@@ -5,9 +5,9 @@ from collections.abc import Iterable
 from typing import Any
 
 from pipeline.plan.cost import speed_up
-from pipeline.plan.deeper import depth_key
 from pipeline.plan.estimate import on_ranks
 from pipeline.plan.plan import Plan
+from pipeline.plan.proportional_depths import depth_key
 from pipeline.plan.schedule import schedule
 from pipeline.plan.steps import MeshStep, Solve, mesh_steps
 from pipeline.study.sweep import Case
@@ -68,8 +68,8 @@ def story(plan: Plan, index: tuple[int, ...]) -> dict[str, Any]:
     """Return what is to be known of one case: its steps, with whom it shares them, and what a change would cost."""
     position = next(i for i, case in enumerate(plan.study.cases()) if case.index == index)
     case, key = plan.study.case(index), plan.keys[position]
-    if case.absence:
-        return {"case": str(case), "key": key, "steps": [f"none: {case.absence}"]}
+    if case.lost_contact:
+        return {"case": str(case), "key": key, "steps": [f"none: {case.lost_contact}"]}
     solve = next((s for s in plan.solves if s.key == key), None)
     same = [c for c, k in zip(plan.study.cases(), plan.keys, strict=True) if k == key and c.index != index]
     step = next((s for s in plan.meshes if solve in s.solves), None)

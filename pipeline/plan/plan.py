@@ -9,7 +9,7 @@ from pipeline.plan.reductions import REDUCTIONS, strike_stored
 from pipeline.plan.shard import Shard, take
 from pipeline.plan.steps import Solve
 from pipeline.plan.symmetry import is_round, model_planes
-from pipeline.plan.work import ABSENT, Plan, Struck
+from pipeline.plan.work import NO_RECORD, Plan, Struck
 from pipeline.study.capabilities import obstacle
 from pipeline.study.schema import Mesh, Solving
 from pipeline.study.sweep import Case, Study
@@ -28,10 +28,10 @@ _LOST = "Where the tool does not stand on the body, nothing is solved."
 
 def declare(study: Study) -> Plan:
     """Return the plan that solves every case of ``study`` for itself."""
-    found = [None if case.absence else _declared(case) for case in study.cases()]
-    keys = tuple(solve.key if solve else ABSENT for solve in found)
+    found = [None if case.lost_contact else _declared(case) for case in study.cases()]
+    keys = tuple(solve.key if solve else NO_RECORD for solve in found)
     plan = Plan(study, tuple(solve for solve in found if solve), keys)
-    return plan.struck_by("lost", keys.count(ABSENT), _LOST)
+    return plan.struck_by("lost", keys.count(NO_RECORD), _LOST)
 
 
 def _declared(case: Case) -> Solve:
@@ -88,22 +88,22 @@ def ask_for_exact(plan: Plan) -> Plan:
     unasked: dict[str, Solve] = {}
     keys, large = [], 0
     for case in plan.study.cases():
-        if case.absence:
-            keys.append(ABSENT)
+        if case.lost_contact:
+            keys.append(NO_RECORD)
             continue
         if obstacle("F_exact", case):
-            keys.append(ABSENT)
+            keys.append(NO_RECORD)
             large += 1
             continue
-        if (image := plan.images.get(case.index)) and image.of_scene:
+        if (image := plan.equivalent.get(case.index)) and image.of_scene:
             case = plan.study.case(image.of)  # noqa: PLW2901
-        if deeper := plan.deeper.get(case.index):
+        if deeper := plan.proportional.get(case.index):
             case = plan.study.case(deeper.of)  # noqa: PLW2901
         enough = max(accuracy, EXACT_OF_SLIT) if case.probe.slit else accuracy
         key = reference_key(case, enough)
         is_wanted = is_asked or case.mesh.accuracy is None
         wanted = found if is_wanted else unasked
-        keys.append(key if is_wanted else ABSENT)
+        keys.append(key if is_wanted else NO_RECORD)
         if key not in wanted:
             wanted[key] = _reference(key, case, enough)
     plan = replace(plan.struck_by("exact", large, _NO_EXACT), unasked=tuple(unasked.values()))

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 from pipeline.plan import estimate
 from pipeline.plan.basis import use_reduced_basis
-from pipeline.plan.deeper import Deeper, deeper_than, depth_key
+from pipeline.plan.equivalent_places import EquivalentPlace, Matrix, from_place, image_key, moved_key
 from pipeline.plan.far_fields import far_regions
-from pipeline.plan.images import Image, Matrix, from_place, image_key, moved_key
 from pipeline.plan.key import case_key, digest
+from pipeline.plan.proportional_depths import ProportionalDepth, depth_key, proportional_to_depth
 from pipeline.plan.steps import MOST_DOFS, MeshStep, OperatorStep, Solve, mesh_steps
 from pipeline.plan.symmetry import is_round, model_planes
 from pipeline.plan.work import Plan, Struck, reason_of
@@ -45,25 +45,25 @@ def strike_scaled(plan: Plan) -> Plan:
     reason = "" if all(solve.case.probe.proportional_to for solve in plan.solves) else _OF_STRESS_ALONE
     reason = _LARGE if any(solve.case.material.is_large for solve in plan.solves) else reason
     first: dict[str, Case] = {}
-    deeper: dict[tuple[int, ...], Deeper] = {}
+    deeper: dict[tuple[int, ...], ProportionalDepth] = {}
     for solve in plan.solves:
         text = depth_key(solve.case)
         if text and (other := first.setdefault(text, solve.case)).probe.depth != solve.case.probe.depth:
-            deeper |= dict.fromkeys(solve.serves, deeper_than(solve.case, other))
+            deeper |= dict.fromkeys(solve.serves, proportional_to_depth(solve.case, other))
 
     def key(case: Case) -> str:
         # Records are those of a depth: which one is solved for the others is the study's order.
         text = depth_key(case)
         return case_key(first[text] if text else case, folded=True, scaled=True)
 
-    return _rekeyed(replace(plan, deeper=deeper), "scaling", strike_scaled, key, reason)
+    return _rekeyed(replace(plan, proportional=deeper), "scaling", strike_scaled, key, reason)
 
 
 def strike_images(plan: Plan) -> Plan:
     """Places that are each other's image, mirrored or turned about the body's axis, are solved once."""
     first: dict[str, tuple[Solve, Matrix]] = {}
     key: dict[str, str] = {}
-    images: dict[tuple[int, ...], Image] = {}
+    images: dict[tuple[int, ...], EquivalentPlace] = {}
     for solve in plan.solves if _sweeps_places(plan) else ():
         found = image_key(solve.case, scaled="scaling" in plan.used)
         if found is None:
@@ -72,10 +72,10 @@ def strike_images(plan: Plan) -> Plan:
         other, there = first.setdefault(text, (solve, matrix))
         if other is not solve:
             key[solve.key] = other.key
-            image = Image(other.case.index, from_place(there, matrix))
+            image = EquivalentPlace(other.case.index, from_place(there, matrix))
             images |= dict.fromkeys(solve.serves, image)
     solves = tuple(replace(solve, key=key.get(solve.key, solve.key)) for solve in plan.solves)
-    plan = replace(plan, solves=solves, keys=tuple(key.get(k, k) for k in plan.keys), images=images)
+    plan = replace(plan, solves=solves, keys=tuple(key.get(k, k) for k in plan.keys), equivalent=images)
     return _merged(plan, "images", reason_of(strike_images))
 
 
@@ -83,15 +83,15 @@ def strike_moved(plan: Plan) -> Plan:
     """A column, or a half ball that a half-space closes, is the same anywhere on flat tissue: it is solved once."""
     first: dict[str, Solve] = {}
     key: dict[str, str] = {}
-    images = dict(plan.images)
+    images = dict(plan.equivalent)
     for solve in plan.solves if _sweeps_places(plan) else ():
         text = moved_key(solve.case, scaled="scaling" in plan.used)
         other = first.setdefault(text, solve) if text else solve
         if other is not solve:
             key[solve.key] = other.key
-            images = dict.fromkeys(solve.serves, Image(other.case.index, of_scene=False)) | images
+            images = dict.fromkeys(solve.serves, EquivalentPlace(other.case.index, of_scene=False)) | images
     solves = tuple(replace(solve, key=key.get(solve.key, solve.key)) for solve in plan.solves)
-    plan = replace(plan, solves=solves, keys=tuple(key.get(k, k) for k in plan.keys), images=images)
+    plan = replace(plan, solves=solves, keys=tuple(key.get(k, k) for k in plan.keys), equivalent=images)
     return _merged(plan, "moved", reason_of(strike_moved))
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pipeline.plan.cost import CostModel
 from pipeline.plan.steps import MeshStep
-from pipeline.plan.work import ABSENT, Plan
+from pipeline.plan.work import NO_RECORD, Plan
 from pipeline.study.sweep import Study
 
 _NAME = re.compile(r"\.(\d+)-of-(\d+)\.sqlite$")
@@ -110,7 +110,7 @@ def _waiting(plan: Plan) -> Iterable[list[str]]:
     chains: dict[tuple[int, ...], list[str]] = {}
     for case, key, exact in zip(plan.study.cases(), plan.keys, plan.reference_keys, strict=True):
         others = (*case.index[:position], *case.index[position + 1 :])
-        chains.setdefault(others, []).extend(k for k in (key, exact) if k != ABSENT)
+        chains.setdefault(others, []).extend(k for k in (key, exact) if k != NO_RECORD)
     return chains.values()
 
 

@@ -38,7 +38,7 @@ class Solve:
     reduced: bool = False
 
     @property
-    def ground(self) -> Case:
+    def meshed_case(self) -> Case:
         """The case on whose mesh it is solved: itself, but half balls of all places share the one at the centre."""
         if not self.case.is_closed:
             return self.case
@@ -128,14 +128,14 @@ def mesh_steps(solves: Collection[Solve], *, shared: bool = True) -> tuple[MeshS
         return tuple(MeshStep((OperatorStep((solve,)),)) for solve in solves)
     steps = []
     for group in _grouped(solves, _mesh_of):
-        operators = _grouped(group, lambda solve: operator_key(solve.ground))
+        operators = _grouped(group, lambda solve: operator_key(solve.meshed_case))
         steps.append(MeshStep(tuple(OperatorStep(found) for found in operators)))
     return tuple(steps)
 
 
 def _mesh_of(solve: Solve) -> Hashable:
     """Tell apart the meshes of solves: each meridian is one of its own."""
-    return (solve.key if solve.axisymmetric else mesh_key(solve.ground), solve.mirrors)
+    return (solve.key if solve.axisymmetric else mesh_key(solve.meshed_case), solve.mirrors)
 
 
 def _grouped(solves: Collection[Solve], key: Callable[[Solve], Hashable]) -> list[tuple[Solve, ...]]:

@@ -4,13 +4,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 from pipeline.plan.cost import CostModel
-from pipeline.plan.deeper import Deeper
-from pipeline.plan.images import Image
+from pipeline.plan.equivalent_places import EquivalentPlace
+from pipeline.plan.proportional_depths import ProportionalDepth
 from pipeline.plan.steps import MeshStep, Solve, mesh_steps
 from pipeline.study.sweep import Case, Scale, Study
 
-# The key, in place of a record's, of a case whose tool does not stand on the body.
-ABSENT = ""
+# The key of what has no record: a case whose tool has lost contact, an F_exact that is not computed.
+NO_RECORD = ""
 
 
 @dataclass(frozen=True)
@@ -24,16 +24,23 @@ class Struck:
 
 @dataclass(frozen=True)
 class Plan:
-    """What a study needs done.
+    """What a study needs done, after the reductions.
 
-    ``keys`` holds, for each case in order, the key of its record, ``reference_keys`` that of its scene's F_exact; both
-    are ``ABSENT`` where the tool has left the body.
-    ``used`` are the reductions that had their turn, whether they found work to strike out or not. ``stored`` are the
-    keys that were on record; ``shared`` says that solves share meshes and assembly, ``reuse`` that
-    they begin from their neighbours' solutions, ``condensed`` that many depths of found contact on a small body are
-    solved on its surface; ``cost`` estimates what steps take. Of a plan that is one shard's, ``part`` are the keys that
-    are its own. ``images`` says, by index, of which other case a case is the image, ``deeper`` of which it is so many
-    times as deep. ``unasked`` are the solves that F_exact would take where nobody has asked for it.
+    Attributes:
+        solves: what is to be solved.
+        keys: for each case in order, the key of its record; ``NO_RECORD`` where the tool has left the body.
+        reference_keys: likewise those of its scene's F_exact.
+        struck: what each reduction took out, and why.
+        used: the reductions that were tried, whether they found anything or not.
+        stored: the keys that were on record.
+        shared: whether solves share meshes and assembly.
+        reuse: whether solves begin from their neighbours' solutions.
+        condensed: whether many depths of found contact on a small body are solved on its condensed surface.
+        cost: estimates what steps take.
+        part: of a shard's plan, the keys that are its own.
+        unasked: the solves that F_exact would take where nobody has asked for it.
+        equivalent: by index of a case, the equivalent place that is solved instead.
+        proportional: by index of a case, the proportional depth that is solved instead.
     """
 
     study: Study
@@ -49,13 +56,13 @@ class Plan:
     cost: CostModel = field(default_factory=CostModel)
     part: frozenset[str] | None = None
     unasked: tuple[Solve, ...] = ()
-    images: Mapping[tuple[int, ...], Image] = field(default_factory=dict)
-    deeper: Mapping[tuple[int, ...], Deeper] = field(default_factory=dict)
+    equivalent: Mapping[tuple[int, ...], EquivalentPlace] = field(default_factory=dict)
+    proportional: Mapping[tuple[int, ...], ProportionalDepth] = field(default_factory=dict)
 
     def scale_of(self, case: Case) -> Scale:
         """Return the scale of a case of the study, to which the record of its key is taken."""
-        deeper = self.deeper.get(case.index)
-        return replace(case.scale, length=deeper.times * case.scale.length) if deeper else case.scale
+        depth = self.proportional.get(case.index)
+        return replace(case.scale, length=depth.times * case.scale.length) if depth else case.scale
 
     @property
     def meshes(self) -> tuple[MeshStep, ...]:

@@ -12,7 +12,7 @@ import xarray as xr
 
 from pipeline import __version__
 from pipeline.netcdf import write_netcdf
-from pipeline.plan.images import Image
+from pipeline.plan.equivalent_places import EquivalentPlace
 from pipeline.plan.key import digest
 from pipeline.plan.plan import Plan
 from pipeline.quantities import attributes, quantity_of
@@ -50,7 +50,7 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     """Arrange ``records`` (by key) as the dataset of the plan's study; ``run`` adds attributes of the run."""
     study = plan.study
     flat = [
-        _imaged(_scaled(records.get(key), plan.scale_of(case)), plan.images.get(case.index)) or absent(case)
+        _imaged(_scaled(records.get(key), plan.scale_of(case)), plan.equivalent.get(case.index)) or absent(case)
         for key, case in zip(plan.keys, study.cases(), strict=True)
     ]
     keys = plan.reference_keys or [""] * len(flat)
@@ -65,7 +65,7 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     if "stiffness" in variables:
         coordinates |= _motions()
     dataset = xr.Dataset(variables, coordinates, _attributes(plan, flat, run or {}))
-    if any(case.is_closed for case in study.cases() if not case.absence):
+    if any(case.is_closed for case in study.cases() if not case.lost_contact):
         dataset["force_error"].attrs["comment"] = _OF_CLOSURE
     if path := {axis.name for axis in study.axes if axis.off}:
         dataset = dataset.assign_coords({name: _along(dataset[name], path) for name in _PLACE})
@@ -229,7 +229,7 @@ def _scaled(record: Record | None, scale: Scale) -> Record | None:
     )  # fmt: skip
 
 
-def _imaged(record: Record | None, image: Image | None) -> Record | None:
+def _imaged(record: Record | None, image: EquivalentPlace | None) -> Record | None:
     """Return the record of the image of a case's place for the case itself."""
     if record is None or image is None or not record.is_ok:
         return record
@@ -248,7 +248,7 @@ def _loaded(record: Record | None, case: Case) -> Record | None:
 
 def _frame(case: Case) -> Frame | None:
     """Return where the probe touches; None where it has left the body, or what describes no surface cannot tell."""
-    if case.absence:
+    if case.lost_contact:
         return None
     try:
         return case.frame

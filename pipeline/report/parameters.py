@@ -27,7 +27,7 @@ def parameters_of(case: Case) -> Parameters:
     found = {key: value for name, part in parts.items() for key, value in _flat(name, part)}
     if _FILE in found:
         found[_FILE] = (*_rounded(case.body.heights), *_rounded((case.body.volume, case.body.extent)))
-    if case.absence:
+    if case.lost_contact:
         return found  # off the body there is no frame to tell what is kept
     if case.is_truncated or case.is_closed:
         found["kept.epsilon"] = found["mesh.epsilon"]

@@ -13,7 +13,7 @@ def absent(case: Case) -> Record | None:
 
     Where it would stand over an edge it touches something, and its force is not known. None if it stands on the body.
     """
-    if not (why := case.absence):
+    if not (why := case.lost_contact):
         return None
     if why != CLEAR:
         return Record("", SKIPPED, why)

@@ -215,7 +215,7 @@ class StepRunner:
         check_memory(self._free, needed, "solving")
         missing = self._lacks_room(bar, with_bar)
         estimate_it = bar is not Bar.NONE and not missing
-        solution = solve_problem(solve.case, problem, estimate=estimate_it, meshed=solve.ground)
+        solution = solve_problem(solve.case, problem, estimate=estimate_it, meshed=solve.meshed_case)
         record = record_of(solve, solution, ground.seconds)
         return replace(self._stamp(record, ground.memory), message=missing)
 
@@ -238,7 +238,7 @@ class StepRunner:
 
     def _mesh(self, solve: Solve) -> tuple[BodyMesh, float]:
         """Return the distributed mesh of a solve and the seconds that it took; collective. What is timed is made."""
-        case = solve.ground
+        case = solve.meshed_case
         self._progress.note(f"meshing: {solve.label}")
         check_memory(self._free, estimate.case_memory(case, share=0.5 ** len(solve.mirrors)), "this case")
         return mesh_case(case, solve.mirrors, self._comm, None if case.solve.timing else self._cache)

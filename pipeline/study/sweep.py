@@ -111,7 +111,7 @@ class Case:
         return features_of(self)
 
     @property
-    def absence(self) -> str:
+    def lost_contact(self) -> str:
         """Why a tool that may leave the body does not stand at this place of its path; "" if it does."""
         if not any(axis.off == "lost" for axis in self.axes):
             return ""

@@ -14,7 +14,7 @@ from pipeline.study.sweep import Case
 
 
 @dataclass(frozen=True)
-class Deeper:
+class ProportionalDepth:
     """The index of the case that is solved instead, and how many times its displacement is this one's."""
 
     of: tuple[int, ...]
@@ -30,9 +30,9 @@ def depth_key(case: Case) -> str | None:
     return case_key(some, folded=True, scaled=True)
 
 
-def deeper_than(case: Case, other: Case) -> Deeper:
+def proportional_to_depth(case: Case, other: Case) -> ProportionalDepth:
     """Return what the solution of ``other``, of the same :func:`depth_key`, tells of ``case``."""
-    return Deeper(other.index, 1.0 if _stands_and_slides(case) else case.probe.depth / other.probe.depth)
+    return ProportionalDepth(other.index, 1.0 if _stands_and_slides(case) else case.probe.depth / other.probe.depth)
 
 
 def _is_lifted_in_proportion(case: Case) -> bool:

@@ -30,7 +30,7 @@ _UNITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
-class Image:
+class EquivalentPlace:
     """The index of the case that is solved instead, and the matrix (3, 3), by rows, that takes its vectors here.
 
     ``of_scene`` says that the whole body is the other's image, too, and not only what the mesh keeps of it.

@@ -74,7 +74,7 @@ def test_what_is_not_in_proportion_is_solved_at_each_depth(kind):
         "ball": {"probe": LIFTS["probe"] | {"shape": "sphere"}},
     }
     plan = make_plan(parse(raw(**changes[kind])))
-    assert not plan.deeper
+    assert not plan.proportional
     assert len(plan.solves) == 2
 
 
