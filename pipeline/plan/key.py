@@ -55,9 +55,11 @@ def reference_key(case: Case, accuracy: float) -> str:
     ratios = "0.0" if _slides_across_a_mirror(case) else _ratios_text(probe)
     parts = [
         f"{PHYSICS_VERSION} exact {accuracy!r}", _body_text(case.body, case.scale.stress),
-        text_of(case.material, ("density", *case.material.PROPORTIONAL_TO)),
+        text_of(case.material, ("density", *(() if case.is_bent else case.material.PROPORTIONAL_TO))),
         text_of(probe, (*_UNPHYSICAL, *probe.proportional_to)), ratios,
     ]  # fmt: skip
+    if case.is_bent:
+        parts.append(_load_text(case.load, case.densities))
     return digest("\n".join(parts))
 
 
@@ -79,11 +81,16 @@ def operator_key(case: Case) -> str:
 
 
 def normalised(case: Case) -> Case:
-    """Return the case in the units of its scale, 1 Pa and 1 m, pressed only, no loads: its force is F / (E d)."""
+    """Return the case in the units of its scale, 1 Pa and 1 m, pressed only, no loads: its force is F / (E d).
+
+    Loads that bend the surface on which contact is found stay, and so does the material.
+    """
     travel = _ratios(case.probe)
     if _slides_across_a_mirror(case):
         travel = {key: float(number == 0) for number, key in enumerate(travel)}
     pressed = {**travel, **_pressed(case.probe)}
+    if case.is_bent:
+        return replace(case, probe=case.probe.model_copy(update=pressed))
     material = case.material.model_copy(update={"young": 1.0})
     body = _in_units_of(case.scale.stress, case.body)
     return replace(case, body=body, material=material, probe=case.probe.model_copy(update=pressed), load=Load())

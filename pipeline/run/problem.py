@@ -12,6 +12,7 @@ from pipeline.run.dead_loads import dead_loads_of
 from pipeline.run.far_field import far_field_of
 from pipeline.run.memory import FreeMemory
 from pipeline.run.room import MEMORY_SHARE
+from pipeline.shapes.contact import first_touch
 from pipeline.shapes.probes._round import RoundIndenter
 from pipeline.solve.axisymmetric import MeridianProblem
 from pipeline.solve.conditions import Conditions
@@ -97,7 +98,8 @@ def tool_of(case: Case) -> Tool:
         # All of a flat tool's footprint is below its face, whatever rounding has made of the nodes on the edge.
         return (0.0 if probe.has_singular_edge else probe.profile(local[:, :2])) - local[:, 2]
 
-    return Tool(height, lambda points: probe.ends_at(frame.local(points)[:, :2]))
+    *_, first = first_touch(case.body, probe, case.frame)
+    return Tool(height, lambda points: probe.ends_at(frame.local(points)[:, :2]), first)
 
 
 def _front_of(case: Case) -> Front | None:

@@ -3,7 +3,8 @@
 The footprint is what projects along the axis into the probe's outline. It must be one smooth piece of the surface.
 """
 
-from math import isfinite, radians, tan
+from functools import lru_cache
+from math import hypot, isfinite, radians, tan
 
 import numpy as np
 
@@ -22,8 +23,13 @@ _WITHIN = (0.0, 0.25, 0.5, 0.75, 0.9)
 # Neighbours differ in height by less than this, in units of what the steepest slope that is allowed makes of their
 # distance: more is a fold.
 _FOLD = 2.0
-# A tool may touch beside its axis first by this share of its depth: noise of a surface does no harm.
-_SOONER = 0.1
+# A tool that finds its contact touches first within this share of what it may touch.
+_WELL_WITHIN = 0.7
+# Smaller outlines within which the first touch is looked for; then, round the best point, in steps that get smaller.
+_RINGS = tuple(i / 12 for i in range(13))
+_AROUND = np.array([(i, j) for i in range(-2, 3) for j in range(-2, 3)], dtype=float)
+_CLOSER = 0.6
+_MANY = 256
 # A surface this near to a plane, in units of the footprint, is one.
 _FLAT = 1e-9
 
@@ -108,22 +114,45 @@ def check_contact(body: Body, probe: Probe, frame: Frame) -> None:
 
 
 def check_first_touch(body: Body, probe: Probe, frame: Frame) -> None:
-    """Check that a tool whose contact is unilateral touches a body on its axis, or hardly sooner elsewhere.
+    """Check that a tool whose contact is found touches a body first well within what it may touch.
 
     Raises:
         PlaceError: with where it would touch.
     """
-    rim = outline_points(probe)
-    points = np.concatenate([share * rim for share in _WITHIN] + [rim])
-    lifted, _ = body.lift(frame, points)
-    gap = probe.profile(points) - frame.local(lifted)[:, 2]
-    first = int(np.nanargmin(gap))
-    if gap[first] < -_SOONER * probe.depth:
+    x, y, _ = first_touch(body, probe, frame)
+    beside, most = hypot(max(0.0, abs(x) - probe.half_length), y), _WELL_WITHIN * probe.half_width
+    if not probe.has_singular_edge and beside > most:
         raise PlaceError(
-            f"the {probe.shape} would touch the body {in_mm(float(np.linalg.norm(points[first])))} beside its axis, "
-            f"{in_mm(-float(gap[first]))} before it does there, and its depth is counted from its axis: use another "
-            "place, another axis or a smaller probe"
+            f"the {probe.shape} would touch the body first {in_mm(beside)} beside its axis: at most {in_mm(most)} are "
+            "allowed, so that contact stays where it is looked for; use another place or axis, or press it in deeper"
         )
+
+
+@lru_cache(_MANY)
+def first_touch(body: Body, probe: Probe, frame: Frame) -> tuple[float, float, float]:
+    """Return where a tool first touches a body, beside its axis (m, along and across), and its gap (m) there.
+
+    Gaps are none where the axis meets the surface, and less where the tool touches before it gets there.
+    """
+    if is_level(body, frame):
+        return 0.0, 0.0, 0.0
+    rim = outline_points(probe)
+    points = np.concatenate([share * rim for share in _RINGS])
+    best, gap = _least_gap(body, probe, frame, points)
+    step = probe.half_width / len(_RINGS)
+    while not probe.has_singular_edge and step > _FLAT * probe.half_width:
+        best, gap = _least_gap(body, probe, frame, best + step * _AROUND)
+        step *= _CLOSER
+    # Rounding is no place beside the axis.
+    return (float(best[0]), float(best[1]), gap) if gap < -_FLAT * probe.half_width else (0.0, 0.0, 0.0)
+
+
+def _least_gap(body: Body, probe: Probe, frame: Frame, points: FloatArray) -> tuple[FloatArray, float]:
+    lifted, _ = body.lift(frame, points)
+    heights = 0.0 if probe.has_singular_edge else probe.profile(points)
+    gap = heights - frame.local(lifted)[:, 2]
+    first = int(np.nanargmin(gap))
+    return points[first], float(gap[first])
 
 
 def _angles(normals: FloatArray, direction: FloatArray) -> float:

@@ -49,8 +49,8 @@ _RELEASE = (0.45, 0.9)
 # meshes that are not.
 _FOUND, _FOUND_UNSEEN = 1.6, 1.4
 _FOUND_SPREAD, _FOUND_SPREAD_ELSEWHERE, _FOUND_SPREAD_COARSE = 0.4, 0.5, 0.8
-# And where contact is found again: |F_p - F_exact| in units of what one degree more changes.
-_FOUND_AGAIN = 2.0
+# And where contact is found again: |F_p - F_exact| in units of what one degree more changes, and of the area's bar.
+_FOUND_AGAIN, _FOUND_AT_EDGE = 2.0, 0.1
 # Graded to the edge: the coarsest that was measured, relative to the probe's half width, and the growth from there.
 _GRADED = (0.4, 0.7)
 
@@ -145,12 +145,12 @@ def found_bar(decrement: float, unseen: float = 0.0) -> float:
     return share / (1 - min(share, _MOST))
 
 
-def found_again_bar(share: float) -> tuple[float, float]:
+def found_again_bar(share: float, area_bar: float) -> tuple[float, float]:
     """Return a decrement and the 95 % bar on F_p, relative, from the ``share`` that one degree more takes away of F.
 
-    That is with contact found again: half of the bar corrects F_p to what one degree more makes of it.
+    That is with contact found again; as it may vanish by chance, the bar is never below a share of that on the area.
     """
-    bar = _FOUND_AGAIN * abs(share)
+    bar = max(_FOUND_AGAIN * abs(share), _FOUND_AT_EDGE * area_bar)
     return 2 * share / _FOUND, bar / (1 - min(bar, _MOST))
 
 

@@ -166,11 +166,6 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal("half ball", "layers", _ONE_MATERIAL),
     Refusal("half ball", "inclusion", _ONE_MATERIAL),
-    Refusal(
-        "half ball",
-        "found contact",
-        f"the far field is found together with the force, and not where contact is found, too: {_COARSE}",
-    ),
     Refusal("half ball", "slice", _PRESSES),
     Refusal("half ball", "slit", _PRESSES),
     Refusal("half ball", "six motions", _PRESSES),
@@ -190,12 +185,7 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         "degree 1",
         "found contact",
-        "is too low where contact is found: its edge falls between straight elements; use 2",
-    ),
-    Refusal(
-        "degree 3",
-        "found contact",
-        "is too high where contact is found: forces at nodes do not tell pressure from tension; use 2",
+        "is too low where contact is found: its edge falls between straight elements; use 2 or 3",
     ),
     Refusal("degree 1", "inclusion", "is too low for inclusions, which straight elements cut: use 2 or 3"),
     Refusal("degree 1", "curved or inclined surface", "is too low for a curved surface, or a tilted probe: use 2 or 3"),
@@ -223,12 +213,6 @@ REFUSALS: tuple[Refusal, ...] = (
         "it; leave one of the two out",
     ),
     # Loads.
-    Refusal(
-        "found contact",
-        "loads",
-        "where a tool touches depends on how loads have bent the surface, which is not computed: use "
-        '"bonded" or "frictionless", or leave [load] out',
-    ),
     Refusal("slit", "loads", "what loads do to a slit is not computed: leave the incision, or [load], out"),
     Refusal(
         "part of the body",

@@ -165,7 +165,14 @@ class Case:
     @property
     def scale(self) -> Scale:
         """The units in which its results do not depend on what they are proportional to."""
+        if self.is_bent:
+            return Scale(1.0, 1.0)
         return Scale(self.material.young, self.probe.scale if self.moves_in_proportion else 1.0)
+
+    @property
+    def is_bent(self) -> bool:
+        """Whether loads bend the surface on which contact is found: F is then proportional to nothing."""
+        return self.load.acts and self.probe.is_unilateral
 
     @property
     def is_plain(self) -> bool:

@@ -82,11 +82,13 @@ class Obstacle:
 
 @stage("contact sets")
 def find_set(
-    elements: Elements, obstacle: Obstacle, active: BoolArray, tolerances: Sequence[float], energy: float | None = None
-) -> Found:
+    elements: Elements, obstacle: Obstacle, active: BoolArray, tolerances: Sequence[float],
+    energy: float | None = None, *, roughly: bool = False,
+) -> Found:  # fmt: skip
     """Return the set that ``active`` (n) leads to, solved to the last of the ``tolerances``; collective.
 
-    Each of them is of the energy norm, relative to the root of an ``energy`` (J), known roughly.
+    Each of them is of the energy norm, relative to the root of an ``energy`` (J), known roughly. A set that is wanted
+    ``roughly`` may be one of several that come back.
 
     Raises:
         SolveError: if the linear solver fails.
@@ -107,7 +109,7 @@ def find_set(
                 break
             seen.add(active.tobytes())
             if count >= _MOST_SETS or following.tobytes() in seen:
-                if number < len(tolerances):
+                if roughly or number < len(tolerances):
                     break
                 raise ContactError(f"the contact area does not settle: {count} sets of nodes were tried")
             if not following.any():

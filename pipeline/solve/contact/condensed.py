@@ -53,7 +53,7 @@ class CondensedElements(DisplacementElements):
         self._place = np.empty_like(order)
         self._place[order] = np.arange(len(order))  # of each candidate among the sorted dofs
         with stage("set-up"):
-            self._compliance = self._condense()
+            self._near = self._compliance = self._condense()
 
     def _factor(self) -> LinearSolver:
         space = self.space.dofs
@@ -99,7 +99,7 @@ class CondensedElements(DisplacementElements):
 
     def condense_far(self, far: FarShare) -> None:
         """Take in what the far field adds to the compliance: φ φᵀ / k."""
-        self._compliance += np.outer(far.unit.moved, far.unit.moved) / far.stiffness
+        self._compliance = self._near + np.outer(far.unit.moved, far.unit.moved) / far.stiffness
 
     def improve(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
         """Find the reactions that move what is held to ``bounds`` (n, m), and the share of the far field."""

@@ -14,6 +14,7 @@ import numpy as np
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.solve.contact.active_set import State
 from pipeline.solve.contact.candidates import Candidates, Numbering
+from pipeline.solve.far_field import FarField
 from pipeline.solve.linear import SolveError
 from pipeline.solve.spaces import ElasticSpace
 from pipeline.solve.vectors import global_sum
@@ -40,8 +41,9 @@ class FreeResponse:
 
 @dataclass(eq=False)
 class FarShare:
-    """A ``unit`` of the far field, twice the energy of it on both sides of the cut (J), and how much there is."""
+    """A ``unit`` of the far ``field``, twice its energy on both sides of the cut (J), and how much of it there is."""
 
+    field: FarField
     unit: FreeResponse
     stiffness: float
     share: float = 0.0

@@ -82,7 +82,7 @@ def mixed_decrement(
         finer = MixedElements(spaces, elements.space.degree + 1, law, surface, "iterative", stack)
         finer.start_from(elements)
         finer.hold_facets(facets)
-        before = elements.energy()
+        before = finer.energy()
         iterations = finer.approach(np.zeros(len(finer.candidates)), _ESTIMATE_TOLERANCE, None)  # nothing held moves
         return before - finer.energy(), finer.first_energy, iterations
 

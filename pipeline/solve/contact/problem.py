@@ -18,7 +18,7 @@ import numpy as np
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.solve.cell_values import CellValues
 from pipeline.solve.contact.active_set import ContactError, Found, Obstacle, find_set
-from pipeline.solve.contact.area import contact_area
+from pipeline.solve.contact.area import Area, contact_area
 from pipeline.solve.contact.candidates import CONDITIONS, Candidates, Numbering, Surface
 from pipeline.solve.contact.condensed import CondensedElements, suits
 from pipeline.solve.contact.displacement import DisplacementElements
@@ -143,7 +143,7 @@ class ContactProblem:
             bar = self._estimate_of(sweep, obstacle, found, loaded) if estimate else None
             if loaded is not None:
                 elements.show(loaded)
-            area = contact_area(obstacle, found.active, found.state, self._modulus(law), self._body.mirrored)
+            area = self._area_of(found, law)
             whole = self._whole * area.value
             solution = Solution(
                 response=response,
@@ -180,15 +180,15 @@ class ContactProblem:
         """Return the far field on the cut face, None without; collective. What is known of it is kept."""
         if loads.far is None:
             return None
-        if elements.far is None:
-            motion = next(motion for motion in loads.motions if motion.far is not None)
-            held = self._fine.dofs.held(motion)
-            unit = elements.free_response(tolerance, elements.lift(held), held[: self._fine.dofs.owned])
-            far = FarShare(unit, unit.energy + loads.far.stiffness(law.lame_mu[0]) / self._whole)
-            if isinstance(elements, CondensedElements):
-                elements.condense_far(far)
-            return far
-        return elements.far
+        if elements.far is not None and elements.far.field == loads.far:
+            return elements.far
+        motion = next(motion for motion in loads.motions if motion.far is not None)
+        held = self._fine.dofs.held(motion)
+        unit = elements.free_response(tolerance, elements.lift(held), held[: self._fine.dofs.owned])
+        far = FarShare(loads.far, unit, unit.energy + loads.far.stiffness(law.lame_mu[0]) / self._whole)
+        if isinstance(elements, CondensedElements):
+            elements.condense_far(far)
+        return far
 
     def _loaded(self, elements: Kind, loads: Loads, tolerance: float) -> FreeResponse | None:
         """Return what loads do to the body without the probe; collective.
@@ -206,7 +206,7 @@ class ContactProblem:
     def _imbalance(self, elements: Kind, applied: Applied, loaded: FreeResponse) -> float:
         """Return the relative error of work and forces of loads, ``loaded`` being in the forms; collective."""
         space = self._fine.dofs
-        residual = elements.residual().reshape(-1, 3)
+        residual = (elements.residual() - applied.forces).reshape(-1, 3)
         sums = [*residual[space.fixed_owned].sum(axis=0), loaded.unknowns[0] @ applied.forces]
         *support, work = global_sum(space.comm, np.array(sums))
         rest = [s + f for axis, (s, f) in enumerate(zip(support, applied.resultant, strict=True))
@@ -250,7 +250,7 @@ class ContactProblem:
                 lower.start_from(elements)
                 active = elements.candidates.raised(found.active, lower.candidates)
             energy = None if found is None else found.state.energy
-            found = find_set(lower, obstacle, active, (_LOOSE,), energy)
+            found = find_set(lower, obstacle, active, (_LOOSE,), energy, roughly=True)
             lower.show()
             elements, sets = lower, sets + found.sets
         assert elements is not None
@@ -312,7 +312,7 @@ class ContactProblem:
         if covered < _COVERED * touching and not at_edge:
             finer = self._obstacle_of(self._surface.of(self._degree + 1), loaded)
             share, more = found_again(self._spaces, elements, law, self._surface, finer, found)
-            return *found_again_bar(share), more
+            return *found_again_bar(share, self._area_of(found, law).bar), more
         facets, element = candidates.held_facets(found.active), "mixed" if self._is_mixed else "displacement"
         if isinstance(elements, MixedElements):
             taken, unseen, more = mixed_decrement(self._spaces, elements, law, self._surface, facets)
@@ -336,6 +336,11 @@ class ContactProblem:
         """Tell whether all of a face touches and moves by the depth: the area of contact was no question."""
         assert self.obstacle is not None
         return bool(found.active.all() and np.ptp(self.obstacle.bounds) <= _SAME * self.obstacle.depth)
+
+    def _area_of(self, found: Found, law: MaterialLaw) -> Area:
+        """Return the area of contact of the part that is modelled."""
+        assert self.obstacle is not None
+        return contact_area(self.obstacle, found.active, found.state, self._modulus(law), self._body.mirrored)
 
     def _modulus(self, law: MaterialLaw) -> FloatArray:
         """Return E / (1 - ν²) (Pa) of the tissue below each candidate (n)."""
