@@ -220,9 +220,22 @@ def test_a_tool_may_come_as_near_to_a_held_column_as_it_does_not_go_below_the_su
             study(body=SMALL, probe=SPHERE, mesh=mesh | {"epsilon": "1.41 mm"})
 
 
-def test_other_degrees_are_refused():
-    with pytest.raises(StudyError, match="where contact is found"):
-        study(body=SMALL, probe=SPHERE, mesh=COARSE | {"degree": 3})
+def test_straight_elements_are_refused():
+    with pytest.raises(StudyError, match="too low where contact is found"):
+        study(body=SMALL, probe=SPHERE, mesh=COARSE | {"degree": 1})
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.49])
+@pytest.mark.parametrize("probe", [SPHERE, CONE | {"depth": "0.07 mm"}, DISC], ids=["sphere", "cone", "disc"])
+def test_degree_3_holds_the_force_of_the_meridian_and_is_nearer_to_it(probe, poisson):
+    scene = {"probe": probe, "material": {"poisson": poisson}}
+    (truth,) = solve(body=SMALL, mesh=COARSE, plan={"without": []}, **scene).values()
+    assert truth.origin == "axisymmetric"
+    lower, higher = (record(mesh={"degree": degree}, **scene) for degree in (2, 3))
+    errors = [abs(found.force / truth.force - 1) for found in (lower, higher)]
+    assert errors[1] < min(0.3 * errors[0], higher.force_error)
+    assert higher.force_error < lower.force_error
+    assert abs(higher.contact_area / truth.contact_area - 1) < higher.contact_area_error
 
 
 @pytest.mark.mpi

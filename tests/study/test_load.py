@@ -201,9 +201,6 @@ MISTAKES = {
         {"body": {"layers": [{"name": "skin", "thickness": "2 mm", "young": "9 kPa", "poisson": 0.3}]}, "mesh": CLOSED},
         ["mesh.outside", "one material"],
     ),
-    "half ball where contact is found": (
-        {"probe": {"contact": "unilateral"}, "mesh": CLOSED}, ["mesh.outside", "found together"],
-    ),
     "half ball below a blade that cuts": (
         {"probe": BLADE | {"slice": "0.1 mm"}, "mesh": CLOSED}, ["mesh.outside", "presses, and neither"],
     ),

@@ -45,7 +45,6 @@ MISTAKES = {
         {"load": {"traction": [{"on": "top", "pressure": ["1 kPa", "2 kPa"]}]}},
         ["load.traction[1].pressure", "needs a name"],
     ),
-    "found contact": (pulled() | {"probe": {"contact": "unilateral"}}, ["probe.contact", "not computed"]),
     "slit": (pulled() | {"probe": BLADE | {"incision": "6 mm"}}, ["probe.incision", "not computed"]),
     "column": (pulled() | {"mesh": {"outside": "free", "epsilon": "8 mm"}}, ["mesh.outside", '"coarse"']),
 }  # fmt: skip

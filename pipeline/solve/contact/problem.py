@@ -309,7 +309,7 @@ class ContactProblem:
         candidates, at_edge = self._candidates, bool((found.active & self._candidates.is_edge).any())
         touching = float(candidates.weights[found.active].sum())
         covered = float(candidates.areas[candidates.closed(found.active)].sum())
-        if covered < _COVERED * touching and not at_edge:
+        if covered < _COVERED * touching:
             finer = self._obstacle_of(self._surface.of(self._degree + 1), loaded)
             share, more = found_again(self._spaces, elements, law, self._surface, finer, found)
             return *found_again_bar(share, self._area_of(found, law).bar), more

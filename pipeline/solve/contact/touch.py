@@ -9,9 +9,11 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.solve.contact.candidates import Candidates
 from pipeline.solve.contact.elements import FreeResponse
+from pipeline.solve.contact.facet import FACET_CORNERS
 
-# Points on each facet where the first touch is looked for, along an edge.
-_ALONG = 12
+# Points on each facet where the first touch is looked for, along an edge; and then, so many times, nearer to the best
+# of each of the nearest facets.
+_ALONG, _ROUNDS, _CLOSER, _NEAREST = 8, 4, 0.25, 12
 
 
 @dataclass(frozen=True)
@@ -37,11 +39,24 @@ class Touch:
 
     def sag(self, candidates: Candidates, loaded: FreeResponse) -> float:
         """Return how much farther (m) the probe goes until it touches the surface that loads have bent."""
-        values = candidates.shape.values(_grid())
-        points = np.einsum("qk,mkx->mqx", values, candidates.points[candidates.facets]).reshape(-1, 3)
-        moved = np.einsum("qk,mk->mq", values, loaded.moved[candidates.facets]).ravel()
-        heights = self.height(points)
-        return float((heights - moved).min() - heights.min())
+        moved = loaded.moved[candidates.facets]
+        return self._first(candidates, moved) - self._first(candidates, np.zeros_like(moved))
+
+    def _first(self, candidates: Candidates, moved: FloatArray) -> float:
+        """Return the least gap (m) to the surface that is ``moved`` (m, k) at the nodes of its facets."""
+        x, facets, step = candidates.points[candidates.facets], np.arange(len(moved)), 1.0
+        middle = np.full((len(facets), FACET_CORNERS), 1 / FACET_CORNERS)
+        for _ in range(_ROUNDS):
+            places = middle[:, None] + step * (_grid()[None] - 1 / FACET_CORNERS)
+            places = np.maximum(places, 0.0) / np.maximum(places, 0.0).sum(axis=2, keepdims=True)
+            values = candidates.shape.values(places.reshape(-1, FACET_CORNERS)).reshape(*places.shape[:2], -1)
+            points = np.einsum("mqk,mkx->mqx", values, x[facets])
+            gaps = self.height(points.reshape(-1, 3)).reshape(points.shape[:2])
+            gaps = gaps - np.einsum("mqk,mk->mq", values, moved[facets])
+            nearest = np.argsort(gaps.min(axis=1))[:_NEAREST]
+            middle, facets = places[nearest, gaps[nearest].argmin(axis=1)], facets[nearest]
+            step *= _CLOSER
+        return float(gaps.min())
 
 
 def _interpolated(candidates: Candidates, values: FloatArray, other: Candidates) -> FloatArray:

@@ -1,0 +1,182 @@
+"""Found contact with loads, with a far field, and under tilted tools."""
+
+from math import pi, sqrt
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from tests.cases import solve
+
+BOX = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "bottom"}
+MESH = {"fine": "3 mm", "coarse": "6 mm", "rim": "0.4 mm", "growth": 0.6}
+SPHERE = {"shape": "sphere", "radius": "10 mm", "depth": "0.1 mm"}
+DISC = {"shape": "disc", "radius": "1 mm", "depth": "0.1 mm"}
+GRAVITY = {"gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]}
+TISSUE = {"poisson": 0.3, "density": "1060 kg/m^3"}
+CAP = {"around": ["7 mm", "0 mm", "0 mm"], "radius": "3 mm"}
+BALL = {"epsilon": "8 mm", "outside": "halfspace"}
+HERTZ = 4 / 3 * 10e3 / (1 - 0.3**2) * sqrt(10e-3) * 0.1e-3**1.5
+
+
+def record(comm=MPI.COMM_SELF, mesh=None, **changes):
+    (found,) = solve(comm, **({"body": BOX, "probe": SPHERE, "mesh": MESH | (mesh or {})} | changes)).values()
+    assert found.status == "ok", found.message
+    return found
+
+
+def pulled(pressure):
+    return {"traction": [{"on": CAP, "pressure": f"{pressure} kPa"}]}
+
+
+# ---- loads ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.49])
+@pytest.mark.parametrize("load", [GRAVITY, pulled(0.5)], ids=["gravity", "cap"])
+def test_disc_that_does_not_lift_off_is_the_prescribed_one_moved_from_its_first_touch(load, poisson):
+    """F = k (d + sag) + the force of the loads on a disc that is held: superposition."""
+    scene = {"load": load, "material": TISSUE | {"poisson": poisson}, "mesh": {"rim": "0.5 mm"}}
+    found = record(probe=DISC | {"contact": "unilateral"}, **scene)
+    held = record(probe=DISC | {"contact": "frictionless"}, **scene)
+    expected = held.force * (1 + found.sag / 0.1e-3) + held.load_force
+    assert found.force == pytest.approx(expected, rel=2e-6)
+    assert found.load_energy == pytest.approx(record(probe=SPHERE, **scene).load_energy, rel=0.02)
+
+
+def test_depth_counts_from_the_first_touch_of_the_surface_as_loads_leave_it():
+    """The body sinks by 0.2 μm or so; what changes F is how its surface bends below the tool, which is little."""
+    alone, loaded = record(material=TISSUE), record(material=TISSUE, load=GRAVITY)
+    assert loaded.sag == pytest.approx(1060 * 9.81 * 0.02**2 / 2 / 13.46e3, rel=0.3)  # a column's: ρ g H² / 2 M
+    assert loaded.force == pytest.approx(alone.force, rel=0.002)
+    assert loaded.load_force == 0.0
+    assert loaded.balance < 1e-6
+
+
+def test_what_loads_add_is_proportional_to_them_while_they_are_small():
+    mesh = {"degree": 3, "rim": "0.3 mm"}
+    nothing, small, twice, back = (record(load=pulled(p) if p else {}, mesh=mesh).force for p in (0, 0.5, 1.0, -0.5))
+    assert abs(small - nothing) > 1e-3 * nothing
+    assert twice - nothing == pytest.approx(2 * (small - nothing), rel=0.1)
+    assert back - nothing == pytest.approx(nothing - small, rel=0.4)
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+def test_loads_on_a_quarter_a_half_and_the_whole_agree(degree):
+    scene = {"load": GRAVITY, "material": TISSUE, "mesh": {"degree": degree, "rim": "0.6 mm"}}
+    quarter = record(**scene)
+    whole = record(**scene | {"mesh": scene["mesh"] | {"model": "3d"}})
+    assert quarter.force == pytest.approx(whole.force, rel=3e-8)
+    assert quarter.sag == pytest.approx(whole.sag, rel=1e-6)
+
+
+def test_force_is_not_scaled_where_loads_bend_the_surface():
+    """Not with the modulus: a softer body bends more. Twice as stiff under twice the load, F is twice as large."""
+    load = pulled(["1 kPa", "2 kPa"][0].split()[0])
+    soft = record(load=load, material={"young": "10 kPa"})
+    stiff = record(load=pulled(2), material={"young": "20 kPa"})
+    other = record(load=load, material={"young": "20 kPa"})
+    assert stiff.force == pytest.approx(2 * soft.force, rel=1e-7)
+    assert abs(other.force / (2 * soft.force) - 1) > 1e-3
+
+
+def test_depths_with_loads_on_one_mesh_are_those_of_each_alone():
+    depths = [f"{depth:.4g} mm" for depth in np.linspace(0.04, 0.12, 10)]
+    probe = SPHERE | {"depth": depths, "depth_range": [depths[0], depths[-1]]}
+    scene = {"body": BOX, "probe": probe, "mesh": MESH, "load": pulled(1.0)}
+    together, alone = (
+        solve(**scene, plan={"without": ["axisymmetric", *more]}) for more in ((), ("condensed", "reuse"))
+    )
+    for index, found in together.items():
+        assert found.force == pytest.approx(alone[index].force, rel=1e-8)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("changes", [{"load": GRAVITY, "material": TISSUE}, {"mesh": BALL}], ids=["loads", "far field"])
+def test_ranks_agree(changes):
+    together, alone = (record(comm, **changes) for comm in (MPI.COMM_WORLD, MPI.COMM_SELF))
+    together = MPI.COMM_WORLD.bcast(together)
+    assert together.force == pytest.approx(alone.force, rel=1e-7)
+    assert together.force_error == pytest.approx(alone.force_error, rel=0.05)
+
+
+# ---- a far field ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+def test_half_ball_that_a_half_space_closes_is_hertz(degree):
+    found = record(mesh=BALL | {"degree": degree})
+    assert found.force == pytest.approx(HERTZ, rel=found.force_error)
+    assert found.contact_area == pytest.approx(pi * 1e-6, rel=found.contact_area_error)
+    assert found.energy == pytest.approx(2 / 5 * found.force * 0.1e-3, rel=0.01)
+
+
+def test_half_ball_of_a_much_larger_body_is_that_body():
+    large = {"shape": "box", "size": ["200 mm", "200 mm", "100 mm"], "fixed": "bottom"}
+    whole = record(body=large, mesh={"epsilon": "8 mm", "coarse": "20 mm"})
+    part = record(body=large, mesh={"epsilon": "8 mm", "coarse": "20 mm", "outside": "green"})
+    assert part.force == pytest.approx(whole.force, rel=0.004)
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.48])
+def test_half_ball_with_the_body_s_own_far_field_is_the_body(poisson):
+    material = {"poisson": poisson}
+    meshes = ({"degree": 3}, BALL | {"outside": "green", "degree": 3})
+    whole, part = (record(mesh=mesh, material=material) for mesh in meshes)
+    assert part.force == pytest.approx(whole.force, rel=0.003)
+    assert part.force_error < 0.05
+
+
+def test_flat_tool_over_a_half_ball_is_the_prescribed_one():
+    found, held = (record(probe=DISC | {"contact": contact}, mesh=BALL) for contact in ("unilateral", "frictionless"))
+    assert found.force == pytest.approx(held.force, rel=1e-7)
+    assert found.energy == pytest.approx(held.energy, rel=1e-6)
+
+
+@pytest.mark.parametrize("poisson", [0.49, 0.5])
+def test_mixed_elements_take_a_far_field(poisson):
+    found = record(mesh=BALL, material={"poisson": poisson})
+    hertz = HERTZ * (1 - 0.3**2) / (1 - poisson**2)
+    assert found.force == pytest.approx(hertz, rel=found.force_error)
+    assert found.force_error < 0.05
+
+
+def test_condensed_surface_of_a_half_ball_gives_the_forces_of_each_depth_alone():
+    depths = [f"{depth:.4g} mm" for depth in np.linspace(0.04, 0.12, 10)]
+    probe = SPHERE | {"depth": depths, "depth_range": [depths[0], depths[-1]]}
+    scene = {"body": BOX, "probe": probe, "mesh": MESH | BALL}
+    together, alone = (
+        solve(**scene, plan={"without": ["axisymmetric", *more]}) for more in ((), ("condensed", "reuse"))
+    )
+    for index, found in together.items():
+        assert found.force == pytest.approx(alone[index].force, rel=1e-7)
+        assert found.energy == pytest.approx(alone[index].energy, rel=1e-6)
+
+
+# ---- tilted tools -----------------------------------------------------------------------------------------
+
+
+def test_tilted_disc_touches_first_at_its_edge_and_its_depth_counts_from_there():
+    """Tilted by 6°, its edge is 0.1 mm ahead of its middle; upright, all of it touches at once."""
+    disc = DISC | {"contact": "unilateral"}
+    tilted, upright = record(probe=disc | {"axis": [0.1, 0, -1]}), record(probe=disc)
+    assert 0.1 * upright.force < tilted.force < 0.6 * upright.force
+    shallower = record(probe=disc | {"axis": [0.1, 0, -1], "depth": "0.01 mm"})
+    assert 0 < shallower.force < 0.1 * tilted.force
+
+
+def test_tilted_ball_is_pressed_by_what_its_depth_is_across_the_surface():
+    """Of a ball that goes in along an axis at 6° to the normal: d cos 6° across; forces are along the axis alone."""
+    ball = {"shape": "sphere", "radius": "5 mm", "depth": "0.2 mm"}
+    tilted, upright = record(probe=ball | {"axis": [0.1, 0, -1]}), record(probe=ball)
+    assert tilted.force == pytest.approx(upright.force, rel=0.02 + tilted.force_error)
+    assert tilted.contact_radius == pytest.approx(upright.contact_radius, rel=0.05)
+
+
+def test_tool_that_would_touch_where_contact_is_not_looked_for_is_refused():
+    found = solve(body=BOX, mesh=MESH, probe={"shape": "sphere", "radius": "3 mm", "depth": "0.1 mm"})
+    assert all(one.status == "ok" for one in found.values())
+    with pytest.raises(Exception, match="beside its axis"):
+        solve(
+            body=BOX, mesh=MESH, probe={"shape": "sphere", "radius": "10 mm", "depth": "0.1 mm", "axis": [0.4, 0, -1]}
+        )
