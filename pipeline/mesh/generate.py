@@ -10,7 +10,7 @@ from typing import Any
 import gmsh
 import numpy as np
 
-from pipeline.arrays import FloatArray, IntArray
+from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.compat import gmsh_session
 from pipeline.mesh.follow import middle_nodes, rounded_sizes
 from pipeline.mesh.reason import reason
@@ -207,18 +207,24 @@ def _numbers(count: int, cells: IntArray) -> IntArray:
     return numbers
 
 
+def flat_cells(points: FloatArray, cells: IntArray) -> BoolArray:
+    """Tell which tetrahedra are flat: with one of them a mesh is unusable."""
+    corners = points[cells]
+    volume = np.linalg.det(corners[:, 1:] - corners[:, :1])
+    return np.asarray(~(np.abs(volume) > _FLAT * np.ptp(corners, axis=1).max(axis=1) ** 3))
+
+
 def orient(points: FloatArray, cells: IntArray) -> IntArray:
     """Return the cells with positive volume.
 
     Raises:
-        MeshError: if one is flat: the mesh is then unusable.
+        MeshError: if one is flat.
     """
-    corners = points[cells]
-    volume = np.linalg.det(corners[:, 1:] - corners[:, :1])
-    flat = ~(np.abs(volume) > _FLAT * np.ptp(corners, axis=1).max(axis=1) ** 3)
-    if flat.any():
+    if count := np.count_nonzero(flat_cells(points, cells)):
         raise MeshError(
-            f"gmsh left {np.count_nonzero(flat)} flat tetrahedra: use a smaller rim, above all where a layer is much "
+            f"gmsh left {count} flat tetrahedra: use a smaller rim, above all where a layer is much "
             "thinner than elements along the probe's edge are long"
         )
-    return np.where((volume < 0)[:, None], cells[:, [0, 1, 3, 2]], cells)
+    corners = points[cells]
+    turned = np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0
+    return np.where(turned[:, None], cells[:, [0, 1, 3, 2]], cells)

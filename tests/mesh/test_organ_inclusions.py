@@ -87,7 +87,7 @@ def test_a_surface_that_meets_the_bodys_is_never_filled(body, monkeypatch):
             (points + np.array([0.0, 0.0, 20e-3]), facets) for points, facets in inclusion_surfaces(inclusions, field)
         ]
 
-    monkeypatch.setattr(make, "_ATTEMPTS", make._ATTEMPTS[:1])
+    monkeypatch.setattr(make, "_FINER", (1,))
     monkeypatch.setattr(make, "inclusion_surfaces", shifted)
     with pytest.raises(MeshError, match=r"."):
         mesh_arrays(case, ())

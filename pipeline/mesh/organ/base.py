@@ -3,30 +3,36 @@
 It depends on the body alone, so that every place, tool and mesh on it shares it.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
+import igl
 import numpy as np
+from scipy.spatial import cKDTree
 
-from pipeline.arrays import FloatArray, IntArray
+from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.generate import GeometryError
 from pipeline.mesh.organ.even import merged
 from pipeline.mesh.organ.field import PER_RADIUS
 from pipeline.mesh.organ.level import cut, level_line, on_segments
-from pipeline.mesh.organ.narrow import NOWHERE, Narrow, narrow_places
 from pipeline.mesh.organ.remesh import release, remesh
 from pipeline.mesh.organ.sharp import sharp_edges
 from pipeline.mesh.organ.sheet import FIXED, FREE, Sheet
+from pipeline.mesh.organ.untangle import TangledError
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.surface import Surface
 from pipeline.stages import stage
 
 # Raise by hand when the same file gives another surface.
-_VERSION = 4
+_VERSION = 5
 # How far, in units of the largest elements, the surface between two meshings may be from the file's: points are put
 # back onto the file's after each.
 DEVIATION = 0.02
+# How far round a tangle the file's own facets stay, in units of the facets there.
+_REACH = 1.5
+# Points stay where they are to rounding, in units of the body.
+_SAME = 1e-7
 # Facets that turn by more (cosine) as their points are put back have turned over; so often neighbours are looked at.
 _TURNED, _ROUNDS = 0.2, 10
 
@@ -35,16 +41,29 @@ _TURNED, _ROUNDS = 0.2, 10
 class Base:
     """The coarse ``sheet``, and the ``level`` line (n, 2, 3), in m, at which what is held of the true surface ends.
 
-    Elements are smaller where it is ``narrow``.
+    ``as_is`` (k, 3) are the centres of facets that are the file's own.
     """
 
     sheet: Sheet
     level: FloatArray
-    narrow: Narrow = NOWHERE
+    as_is: FloatArray
+
+    def is_own(self, sheet: Sheet) -> BoolArray:
+        """Tell which facets of a ``sheet`` made of this one are still the file's own."""
+        if not len(self.as_is):
+            return np.zeros(len(sheet.facets), dtype=bool)
+        distance, _ = cKDTree(self.as_is).query(sheet.centres)
+        return np.asarray(distance < _SAME * np.ptp(sheet.points, axis=0).max())
+
+    def own_points(self, sheet: Sheet) -> IntArray:
+        """Return the corners of these facets."""
+        return np.unique(sheet.facets[self.is_own(sheet)])
 
 
 # Points, and numbers of points.
 Arrays = dict[str, Any]
+# Where attempts at a mesh failed, the first one first.
+Tangles = Sequence[TangledError]
 
 
 class Kept(Protocol):
@@ -54,53 +73,77 @@ class Kept(Protocol):
         """Return what is kept under ``key``, or what ``make`` returns, which is then kept."""
 
 
-def far_surface(body: Scanned, kept: Kept | None = None, finer: float = 1, adapted: bool = False) -> Base:
+def far_surface(body: Scanned, kept: Kept | None = None, finer: float = 1, tangles: Tangles = ()) -> Base:
     """Return the surface of ``body`` away from any contact, out of what is ``kept`` if it is there.
 
-    Its elements are ``finer`` by this factor than the body's bend asks for, and if ``adapted``, no larger than thin
-    parts and narrow gaps are wide.
+    Its elements are ``finer`` by this factor than the body's bend asks for. Round the ``tangles`` that other meshes of
+    it had, they are the facets of the file.
 
     Raises:
         GeometryError: if nothing, or all, of it is held.
         MeshError: if the remesher fails.
     """
     (below,), (skin,), triangles = body.support.edges(), body.surfaces()["skin"], body.triangles
-    largest, how = body.bend / PER_RADIUS / finer, " adapted" if adapted else ""
+    largest = body.bend / PER_RADIUS / finer
 
     def make() -> Arrays:
-        made = base(triangles.points, triangles.facets, skin, below, largest, adapted)
-        sheet, narrow = made.sheet, {"narrow": made.narrow.points, "sizes": made.narrow.sizes} if adapted else {}
-        return {"points": sheet.points, "facets": sheet.facets, "group": sheet.group, "sharp": sheet.sharp,
-                "level": made.level, **narrow}  # fmt: skip
+        made = base(triangles.points, triangles.facets, skin, below, largest, tangles)
+        sheet = made.sheet
+        return {
+            "points": sheet.points,
+            "facets": sheet.facets,
+            "group": sheet.group,
+            "sharp": sheet.sharp,
+            "level": made.level,
+            "as_is": made.as_is,
+        }
 
-    if kept is None:
+    if kept is None or tangles:
         found = make()
     else:
-        found = kept.arrays(f"surface {_VERSION} {triangles.hash} {below!r} {largest!r} {release()}{how}", make)
-    sheet = Sheet(found["points"], found["facets"], found["group"], found["sharp"])
-    return Base(sheet, found["level"], Narrow(found["narrow"], found["sizes"]) if adapted else NOWHERE)
+        found = kept.arrays(f"surface {_VERSION} {triangles.hash} {below!r} {largest!r} {release()}", make)
+    return Base(
+        sheet=Sheet(found["points"], found["facets"], found["group"], found["sharp"]),
+        level=found["level"],
+        as_is=found["as_is"],
+    )
 
 
 @stage("far surface")
-def base(points: FloatArray, facets: IntArray, skin: Surface, below: float, largest: float,
-         adapted: bool = False) -> Base:  # fmt: skip
+def base(
+    points: FloatArray, facets: IntArray, skin: Surface, below: float, largest: float, tangles: Tangles = ()
+) -> Base:
     """Return the surface in elements of at most ``largest`` (m), held below the height ``below`` (m).
 
-    They are smaller where it is narrow, if ``adapted``.
+    Round ``tangles`` the facets stay as they are.
 
     Raises:
         GeometryError: if nothing, or all, is held.
         MeshError: if the remesher fails.
     """
-    even = merged(points, facets)
-    sheet, narrow = cut(*even, below), narrow_places(*even, largest) if adapted else NOWHERE
+    sheet = cut(*merged(points, facets), below)
     if len(np.unique(sheet.group)) < 2:
         low, high = points[:, 2].min(), points[:, 2].max()
         raise GeometryError(f"a level of {below:g} m does not cut a surface between {low:g} and {high:g} m")
     level = level_line(points, facets, below)
     sheet = Sheet(sheet.points, sheet.facets, sheet.group, sharp_edges(sheet, largest))
-    coarse = remesh(sheet, np.minimum(largest, narrow.at(sheet.points)), DEVIATION * largest)
-    return Base(put_back(coarse, skin, level), level, narrow)
+    as_is = _round(sheet, tangles)
+    coarse = remesh(sheet, np.full(len(sheet.points), largest), DEVIATION * largest, as_is=as_is)
+    unsettled = Base(coarse, level, sheet.centres[as_is])
+    own = unsettled.own_points(coarse)
+    return replace(unsettled, sheet=put_back(coarse, skin, level, own, coarse.points[own]))
+
+
+def _round(sheet: Sheet, tangles: Tangles) -> BoolArray:
+    """Tell which facets of the file's surface are within reach of tangles, farther at each attempt."""
+    near, centres = np.zeros(len(sheet.facets), dtype=bool), cKDTree(sheet.centres)
+    for number, tangle in enumerate(tangles, start=1):
+        _, nearest, _ = igl.point_mesh_squared_distance(tangle.places, sheet.points, sheet.facets)
+        own = np.ptp(sheet.points[sheet.facets[nearest]], axis=1).max(axis=1)
+        reach = _REACH * number * np.maximum(own, tangle.reach)
+        near[nearest] = True
+        near[np.concatenate(centres.query_ball_point(tangle.places, reach)).astype(int)] = True
+    return near
 
 
 def put_back(

@@ -10,7 +10,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.arrays import FloatArray
-from pipeline.mesh.organ.narrow import NOWHERE, Narrow
 from pipeline.mesh.regions import InclusionSizes
 from pipeline.mesh.size import Sizes
 from pipeline.shapes.frame import Frame
@@ -23,14 +22,12 @@ PER_RADIUS = 2
 class Field:
     """``sizes`` round a ``frame``, and those that ``inclusions`` ask for.
 
-    ``edge`` (n, 3), in m, are points close to each other along the footprint's edge. Elements of the surface are
-    smaller where it is ``narrow``, and those within next to them.
+    ``edge`` (n, 3), in m, are points close to each other along the footprint's edge.
     """
 
     sizes: Sizes
     frame: Frame
     edge: FloatArray
-    narrow: Narrow = NOWHERE
     inclusions: tuple[InclusionSizes, ...] = ()
 
     @cached_property
@@ -53,7 +50,7 @@ class Field:
             size = np.minimum(size, sizes.fine + sizes.growth * np.maximum(beyond, 0.0))
         for inclusion in self.inclusions:
             size = np.minimum(size, inclusion.at(points))
-        return np.minimum(size, self.narrow.at(points))
+        return size
 
     def terms(self, distance: str, scale: float) -> list[str]:
         """Write what the size is the least of, in units of ``scale`` m, from text of the distance to the edge."""

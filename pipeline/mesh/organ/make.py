@@ -8,14 +8,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.arrays import FloatArray, IntArray
-from pipeline.mesh.generate import GeometryError, MeshArrays, MeshError, orient
+from pipeline.mesh.generate import GeometryError, MeshArrays, MeshError, flat_cells, orient
 from pipeline.mesh.organ.base import DEVIATION, Base, Kept, far_surface, put_back
 from pipeline.mesh.organ.contact import Contact, set_in
 from pipeline.mesh.organ.field import Field
-from pipeline.mesh.organ.folds import unfolded
 from pipeline.mesh.organ.inclusions import inclusion_surfaces
 from pipeline.mesh.organ.remesh import remesh
 from pipeline.mesh.organ.sheet import PROBE, Sheet, edges_of, group_names
+from pipeline.mesh.organ.untangle import TangledError, untangled
 from pipeline.mesh.organ.volume import fill
 from pipeline.mesh.regions import inclusion_sizes
 from pipeline.mesh.size import Sizes
@@ -24,10 +24,10 @@ from pipeline.shapes.scanned import Scanned
 
 # The surface is meshed twice: only the second time its points are dense where sizes change fast.
 _PASSES = 2
-# Where elements far from the contact are so large that the surface meets itself across a thin part or a gap, they are
-# to be no larger than these are wide. If that is not enough, facets folded upon each other at sharp rims are opened;
-# at last elements are this many times smaller everywhere.
-_ATTEMPTS = ((1, False, False), (1, True, False), (1, True, True), (2, False, True), (4, False, True), (8, False, True))
+# Where the surface crosses itself, the file's own facets are kept there: attempts, each with those of all before.
+_ATTEMPTS = 5
+# Where anything else fails, elements are this many times smaller everywhere.
+_FINER = (1, 2, 4)
 # The remesher turns lengths into units of its own and back, which moves points by rounding.
 _SAME = 1e-6
 # A share of the body's volume: chords of elements leave half a per cent of an organ out, which their curved edges bring
@@ -45,28 +45,32 @@ def mesh_scanned(scene: Scene, body: Scanned, sizes: Sizes, kept: Kept | None = 
         MeshError: if a mesh generator fails with smaller elements, too.
     """
 
-    def mesh(finer: int, adapted: bool, opened: bool) -> MeshArrays:
+    tangles: list[TangledError] = []
+    for finer in _FINER:
         smaller = replace(sizes, column=sizes.column / finer)
-        return mesh_organ(scene, smaller, far_surface(body, kept, finer, adapted), opened)
-
-    for attempt in _ATTEMPTS[:-1]:
         try:
-            return mesh(*attempt)
+            for _ in range(_ATTEMPTS):
+                try:
+                    return mesh_organ(scene, smaller, far_surface(body, kept, finer, tangles))
+                except TangledError as error:
+                    tangles.append(error)
         except GeometryError:
             raise
-        except MeshError:
-            continue
-    return mesh(*_ATTEMPTS[-1])
+        except MeshError as error:
+            failure: MeshError = error
+        else:
+            raise tangles[-1]
+    raise failure
 
 
-def mesh_organ(scene: Scene, sizes: Sizes, far: Base, opened: bool = False) -> MeshArrays:
+def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
     """Mesh a ``scene`` whose body is bounded by triangles, from its surface ``far`` from the contact.
 
-    If ``opened``, folds of the surface are, at the cost of points that are then beside it.
     The same input gives the same arrays, bit for bit.
 
     Raises:
         GeometryError: if the footprint does not fit there, or the scene has what such a body cannot.
+        TangledError: if the surface crosses itself, or leaves no room for tetrahedra.
         MeshError: if a mesh generator fails.
     """
     start = perf_counter()
@@ -76,12 +80,13 @@ def mesh_organ(scene: Scene, sizes: Sizes, far: Base, opened: bool = False) -> M
         return scene.body.lift(scene.frame, points)[0]
 
     contact = set_in(far.sheet, scene.frame, scene.footprint, sizes, lift)
-    field = Field(sizes, scene.frame, contact.edge, far.narrow, inclusion_sizes(scene.body, sizes.growth))
+    field = Field(sizes, scene.frame, contact.edge, inclusion_sizes(scene.body, sizes.growth))
     sheet = _to_sizes(contact, field, _Truth(scene, far, lift))
-    if opened:
-        sheet = unfolded(sheet)
+    sheet = untangled(sheet, np.unique(sheet.facets[sheet.group == PROBE]))
     _check_whole(sheet, scene.body.volume)
     points, cells, regions = fill(sheet.points, sheet.facets, field, inclusion_surfaces(scene.body.inclusion, field))
+    if (flat := flat_cells(points, cells)).any():
+        raise TangledError.at(points[cells[flat]], "gmsh left a flat tetrahedron")
     facets = {name: sheet.facets[sheet.group == number] for number, name in group_names().items()}
     rim = np.unique(sheet.border(PROBE))
     return MeshArrays(points, orient(points, cells), facets, rim, perf_counter() - start, regions)
@@ -125,8 +130,9 @@ class _Truth:
         inner = np.setdiff1d(np.unique(sheet.facets[sheet.group == PROBE]), rim)
         lifted = self.lift(self.scene.frame.local(points[inner])[:, :2])
         seen = np.isfinite(lifted).all(axis=1)
-        known = np.concatenate([rim, inner[seen]])
-        places = np.vstack([true_rim, lifted[seen]])
+        own = np.setdiff1d(self.far.own_points(sheet), np.concatenate([rim, inner]))
+        known = np.concatenate([rim, inner[seen], own])
+        places = np.vstack([true_rim, lifted[seen], points[own]])
         (skin,) = self.scene.body.surfaces()["skin"]
         return put_back(Sheet(points, sheet.facets, sheet.group, sheet.sharp), skin, self.far.level, known, places)
 
@@ -137,7 +143,9 @@ def _to_sizes(contact: Contact, field: Field, truth: _Truth) -> Sheet:
     true_rim, extent = sheet.points[rim], float(np.ptp(sheet.points, axis=0).max())
     for _ in range(_PASSES):
         kept = np.column_stack([rim, np.roll(rim, -1)])
-        sheet = remesh(sheet, field.at(sheet.points), DEVIATION * min(field.largest, extent), kept)
+        size = field.at(sheet.points)
+        as_is = truth.far.is_own(sheet) & (size[sheet.facets].min(axis=1) > field.largest / 2)
+        sheet = remesh(sheet, size, DEVIATION * min(field.largest, extent), kept, as_is)
         found = np.unique(sheet.border(PROBE))
         distance, nearest = cKDTree(sheet.points[found]).query(true_rim)
         rim = found[nearest]

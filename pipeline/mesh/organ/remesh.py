@@ -12,13 +12,14 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from pipeline.arrays import FloatArray, IntArray
+from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.generate import MeshError
 from pipeline.mesh.organ.even import closed
 from pipeline.mesh.organ.sheet import Sheet, edges_of
 from pipeline.stages import stage
 
 _PACKAGE, _PROGRAM = "mmgpy", "bin/mmgs_O3"
+_NO_EDGES = np.empty((0, 2), dtype=np.int64)
 # Where nothing was asked for, the remesher neither finds ridges by itself nor smooths the sizes: both are given.
 _OPTIONS = ("-v", "-1", "-nr", "-hgrad", "-1")
 _LONGEST = 600  # seconds
@@ -48,18 +49,20 @@ def release() -> str:
 
 
 @stage("surface")
-def remesh(sheet: Sheet, size: FloatArray, deviation: float, kept: IntArray | None = None) -> Sheet:
+def remesh(
+    sheet: Sheet, size: FloatArray, deviation: float, kept: IntArray | None = None, as_is: BoolArray | None = None
+) -> Sheet:
     """Return the surface with elements of the ``size`` (n) asked for at its points, all in m.
 
     It stays within ``deviation`` (m) of what it was. Edges between groups stay, and so do the ``kept`` ones (k, 2),
-    with their points.
+    with their points, and the facets that are to be left ``as_is`` (m).
 
     Raises:
         MeshError: with what the remesher said, if it fails.
     """
     with TemporaryDirectory(prefix="surface-") as folder:
         source, result = Path(folder, "in.mesh"), Path(folder, "out.mesh")
-        source.write_text(_mesh_text(sheet, np.empty((0, 2), np.int64) if kept is None else kept))
+        source.write_text(_mesh_text(sheet, _NO_EDGES if kept is None else kept, as_is))
         source.with_suffix(".sol").write_text(_size_text(size))
         least, most = float(size.min()) / _ROOM, float(size.max()) * _ROOM
         limits = ("-hmin", repr(least), "-hmax", repr(most), "-hausd", repr(float(deviation)))
@@ -75,7 +78,7 @@ def remesh(sheet: Sheet, size: FloatArray, deviation: float, kept: IntArray | No
         return closed(_read(result.read_text()))
 
 
-def _mesh_text(sheet: Sheet, kept: IntArray) -> str:
+def _mesh_text(sheet: Sheet, kept: IntArray, as_is: BoolArray | None) -> str:
     edges, sides = edges_of(sheet.facets)
     groups = sheet.group[sides]
     border = edges[groups[:, 0] != groups[:, 1]]
@@ -90,6 +93,7 @@ def _mesh_text(sheet: Sheet, kept: IntArray) -> str:
         "MeshVersionFormatted 2\nDimension 3\n",
         _section("Vertices", np.column_stack([sheet.points, np.zeros(base)]), "%.17g %.17g %.17g %d"),
         _section("Triangles", np.column_stack([sheet.facets + 1, sheet.group]), "%d %d %d %d"),
+        "" if as_is is None else _section("RequiredTriangles", 1 + np.flatnonzero(as_is)[:, None], "%d"),
         _section("Edges", np.column_stack([lines + 1, np.ones(len(lines), np.int64)]), "%d %d %d"),
         _section("Ridges", ridges[:, None], "%d"),
         _section("RequiredEdges", required[:, None], "%d"),

@@ -39,6 +39,12 @@ class Sheet:
         return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
 
     @property
+    def centres(self) -> FloatArray:
+        """Centres (m, 3) of the facets."""
+        middles: FloatArray = self.points[self.facets].mean(axis=1)
+        return middles
+
+    @property
     def volume(self) -> float:
         """Volume (m³) within."""
         return enclosed(self.points, self.facets)

@@ -9,6 +9,7 @@ from pipeline.arrays import FloatArray, IntArray
 from pipeline.compat import gmsh_session
 from pipeline.mesh.generate import MeshError, model_options
 from pipeline.mesh.organ.field import Field, set_field
+from pipeline.mesh.organ.untangle import TangledError
 from pipeline.mesh.reason import reason
 from pipeline.shapes.triangles import enclosed
 from pipeline.stages import stage
@@ -47,11 +48,10 @@ def fill(
         volumes = _add_volumes([(corners / scale, triangles) for corners, triangles in surfaces])
         set_field(field, scale, model.geo)
         gmsh.option.setNumber("Mesh.OptimizeThreshold", _OPTIMISED)
-        gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", bool(field.narrow))
         try:
             model.mesh.generate(3)
         except Exception as error:  # gmsh raises bare Exception
-            raise MeshError(f"gmsh: {reason(error)}") from error
+            raise _named(f"gmsh: {reason(error)}", scale) from error
         found, coordinates, _ = model.mesh.getNodes()
         parts = [model.mesh.getElementsByType(_TETRAHEDRON, volume)[1] for volume in volumes]
         if not all(map(len, parts)):
@@ -80,6 +80,15 @@ def _add_volumes(surfaces: Sequence[Surface]) -> list[int]:
     volumes = [model.geo.addVolume(loops), *(model.geo.addVolume([loop]) for loop in loops[1:])]
     model.geo.synchronize()
     return volumes
+
+
+def _named(words: str, scale: float) -> MeshError:
+    """Return gmsh's failure, with the places (m) of the nodes that it blames, if any."""
+    nodes = gmsh.model.mesh.getLastNodeError()
+    if not len(nodes):
+        return MeshError(words)
+    places = scale * np.array([gmsh.model.mesh.getNode(node)[0] for node in nodes])
+    return TangledError(places, np.zeros(len(places)), words)
 
 
 def _check_filled(points: FloatArray, cells: IntArray, numbers: IntArray, inner: Sequence[Surface]) -> None:
