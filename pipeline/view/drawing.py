@@ -64,25 +64,16 @@ class Drawing:
         self._outline = [MM * line for line in fields.outline]
         grid = self._opened(self._grid())
         # A clipped body's faces turn either way: the angle between two of them would not tell an edge.
-        surface = grid.extract_surface(algorithm="dataset_surface").compute_normals(
-            point_normals=False, split_vertices=False, auto_orient_normals=True
-        )
+        surface = _surface(grid).compute_normals(point_normals=False, split_vertices=False, auto_orient_normals=True)
         patch = self._patch(PROBE)
         # The faces of a slit may lie in the cut itself.
-        behind = patch if fields.case.probe.slit else self._opened(patch)
-        footprint = behind.extract_surface(algorithm="dataset_surface")
-        held = self._opened(self._patch(FIXED)).extract_surface(algorithm="dataset_surface")
-        edge = footprint.extract_feature_edges(
-            boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False
-        )
-        sharp = surface.extract_feature_edges(
-            _SHARP, boundary_edges=False, feature_edges=True, manifold_edges=False, non_manifold_edges=False
-        )
-        parts = surface, sharp, edge, self._at_epsilon(surface), patch, held
-        self._surface, self._sharp, self._edge, self._ring, patch, self._held = (_moved(part, factor) for part in parts)
+        footprint = _surface(patch if fields.case.probe.slit else self._opened(patch))
+        held = _surface(self._opened(self._patch(FIXED)))
+        edge, sharp = _edges(footprint, boundary_edges=True), _edges(surface, feature_edges=True, feature_angle=_SHARP)
+        parts = surface, sharp, edge, self._at_epsilon(surface), held
+        self._surface, self._sharp, self._edge, self._ring, self._held = (_moved(part, factor) for part in parts)
         tool = tool_of(fields)
-        corners = np.hstack([np.full((len(tool.triangles), 1), 3), tool.triangles])
-        self._tool = pv.PolyData(MM * (tool.points + factor * tool.moved), corners)
+        self._tool = pv.PolyData.from_regular_faces(MM * (tool.points + factor * tool.moved), tool.triangles)
 
     def render(self, size: tuple[int, int], *, close: bool) -> npt.NDArray[np.uint8]:
         """Return a picture of ``size`` pixels (width, height), of the whole or ``close`` to the probe."""
@@ -124,22 +115,17 @@ class Drawing:
 
     def _grid(self) -> Any:
         fields, values = self._fields, self._colouring.values
-        corners = fields.cells[:, :4]
-        cells = np.hstack([np.full((len(corners), 1), 4), corners])
-        grid = pv.UnstructuredGrid(cells, np.full(len(cells), pv.CellType.TETRA), MM * fields.points)
+        grid = pv.UnstructuredGrid({pv.CellType.TETRA: fields.cells[:, :4]}, MM * fields.points)
         (grid.point_data if len(values) == len(fields.points) else grid.cell_data)["value"] = values
-        self._add_shift(grid)
-        return grid
+        return self._with_shift(grid)
 
     def _patch(self, group: str) -> Any:
-        facets = self._fields.facets[group]
-        patch = pv.PolyData(MM * self._fields.points, np.hstack([np.full((len(facets), 1), 3), facets]))
-        self._add_shift(patch)
-        return patch
+        return self._with_shift(pv.PolyData.from_regular_faces(MM * self._fields.points, self._fields.facets[group]))
 
-    def _add_shift(self, part: Any) -> None:
+    def _with_shift(self, part: Any) -> Any:
         if self._fields.displacement is not None:
             part.point_data["shift"] = MM * self._fields.displacement
+        return part
 
     def _opened(self, part: Any) -> Any:
         """Take away what is in front of the cut: whole elements where they end in it."""
@@ -157,8 +143,7 @@ class Drawing:
         near |= np.abs(distance.min(axis=1) - epsilon) < np.ptp(distance, axis=1)
         if not np.isfinite(epsilon) or not near.any():
             return pv.PolyData()
-        patch = surface.extract_cells(np.flatnonzero(near)).extract_surface(algorithm="dataset_surface")
-        patch = patch.subdivide(_HALVINGS, "linear")
+        patch = _surface(surface.extract_cells(np.flatnonzero(near))).subdivide(_HALVINGS, "linear")
         return patch.contour([epsilon], scalars=np.linalg.norm(patch.points - self._contact, axis=1))
 
     def _add_lines(self, plotter: Any, lines: Any, colour: str, width: float) -> None:
@@ -187,6 +172,15 @@ class Drawing:
         plotter.enable_parallel_projection()
         plotter.camera.parallel_scale = half
         plotter.camera.clipping_range = (0.01, 10 * self._surface.length)
+
+
+def _surface(part: Any) -> Any:
+    return part.extract_surface(algorithm="dataset_surface")
+
+
+def _edges(part: Any, **wanted: Any) -> Any:
+    none = dict.fromkeys(("boundary_edges", "feature_edges", "manifold_edges", "non_manifold_edges"), False)
+    return part.extract_feature_edges(**none | wanted)
 
 
 def _moved(part: Any, factor: float) -> Any:

@@ -41,7 +41,7 @@ class Page {
     const centre = vector(low).add(vector(high)).multiplyScalar(0.5);
     const corners = Array.from({ length: 8 }, (_, k) => vector(low.map((end, i) => ((k >> i) & 1 ? high[i] : end))));
     this.stage.follow(() => {
-      const reach = (along) => 1.1 * Math.max(...corners.map((corner) => Math.abs(corner.clone().sub(centre).dot(along))));
+      const reach = (along) => 1.2 * Math.max(...corners.map((corner) => Math.abs(corner.clone().sub(centre).dot(along))));
       const [right, up] = this.stage.basis();
       return [centre, reach(up), reach(right)];
     });
