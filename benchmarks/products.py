@@ -46,7 +46,7 @@ def measure(size: tuple[float, float], degrees: list[int]) -> list[dict[str, Any
 
     from pipeline.run.meshing import mesh_case
     from pipeline.solve.conditions import Conditions
-    from pipeline.solve.material import MaterialLaw
+    from pipeline.solve.physics import MaterialLaw
     from pipeline.solve.spaces import Spaces
 
     law = MaterialLaw.of_moduli(YOUNG, 0.3)

@@ -56,7 +56,7 @@ def measure(element: str, degree: int, poisson: float, size: tuple[float, float]
     from pipeline.run.memory import PeakMemory
     from pipeline.run.meshing import mesh_case
     from pipeline.solve.conditions import Conditions
-    from pipeline.solve.material import MaterialLaw
+    from pipeline.solve.physics import MaterialLaw
     from pipeline.solve.quasi_static import QuasiStaticProblem
     from pipeline.solve.spaces import Spaces
 

@@ -78,6 +78,12 @@ _SCENE = (
     Quantity("body_shape", "", "shape of the body"),
     Quantity("probe_shape", "", "shape of the probe"),
 )
+# Largest values of all cells of a solution (pipeline/solve/cell_values.py), each a field of a record.
+_LARGEST = (
+    Quantity("max_strain", "1", "largest principal strain of a cell's mean strain, a tenth of the probe's half width "
+             "or farther from its edge and from those of what is held",
+             "largest strain", in_per_cent=True),
+)  # fmt: skip
 _RESULTS = (
     Quantity("force", "N", "reaction force along the probe's axis, positive against its advance", "F",
              "reaction force F"),
@@ -136,9 +142,7 @@ _RESULTS = (
              "unloaded surface, at which it bears no force", "sag", "sag of the surface under the probe"),
     Quantity("linear_ratio", "1", "force over that of linear elasticity in the same study", "F/F_linear",
              "F / $F_{linear}$"),
-    Quantity("max_strain", "1", "largest principal strain of a cell's mean strain, a tenth of the probe's half width "
-             "or farther from its edge and from those of what is held",
-             "largest strain", in_per_cent=True),
+    *_LARGEST,
     Quantity("balance", "1", "relative error of F d = 2 U and of the balance of forces", "imbalance"),
     Quantity("time_mesh", "s", "time to generate and distribute the mesh", "mesh"),
     Quantity("time_assemble", "s", "time to assemble operator and load", "assembly"),
@@ -190,6 +194,7 @@ def _table(*quantities: Quantity) -> dict[str, Quantity]:
 QUANTITIES = _table(*_MESH, *_SCENE, *_RESULTS)
 # Names of the dataset's own variables and coordinates: no swept input may have them as its dimension.
 RESERVED = frozenset(quantity.name for quantity in _RESULTS)
+LARGEST = tuple(quantity.name for quantity in _LARGEST)
 MESH_DIMENSIONS = tuple(quantity.name for quantity in _MESH)
 
 # Factor and unit of what people do not read in SI.

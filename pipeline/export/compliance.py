@@ -18,7 +18,7 @@ from pipeline.mesh.of_case import mesh_arrays
 from pipeline.shapes.probes.blade import Blade
 from pipeline.shapes.probes.disc import Disc
 from pipeline.solve.far_field import PointForce
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.regular import regular_parts
 from pipeline.solve.side_force import SideForce
 from pipeline.stages import stage

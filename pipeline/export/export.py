@@ -22,7 +22,7 @@ from pipeline.export.tabulate import Places, tabulate
 from pipeline.realtime.model import Model
 from pipeline.realtime.surface import SurfaceTable
 from pipeline.shapes.body import Layered
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 
 # What is left out beside the sides, of the smaller of half the width and the thickness; how large contact may be, in
 # units of the way to the nearest side or the bottom.

@@ -18,7 +18,7 @@ from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.far_field import PointForce
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.regular import OnBoundary, regular_on_boundary
 from pipeline.stages import stage
 

@@ -17,7 +17,7 @@ from pipeline.mesh.of_case import mesh_arrays
 from pipeline.realtime.model import Model
 from pipeline.shapes.body import Layered
 from pipeline.solve.far_field import PointForce
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.placed_force import PlacedForce
 from pipeline.study.schema import Mesh
 

@@ -188,7 +188,7 @@ def _prior(stage: str, kind: str) -> _Numbers:
     if stage == "mesh":
         seconds, power = _MESH
         return log(seconds * (_CURVED if "curved" in words else 1.0)), power, 0.0
-    if element == "neo-hookean":
+    if element not in ("displacement", "mixed"):  # the name of a law of large displacements
         seconds, power = _LARGE[stage]
         return log(seconds), power, _LOCKING
     seconds, power = (_SOLVE if stage == "solve" else _BAR)[int(degree)]

@@ -15,7 +15,7 @@ from pipeline.netcdf import write_netcdf
 from pipeline.plan.equivalent_places import EquivalentPlace
 from pipeline.plan.key import digest
 from pipeline.plan.plan import Plan
-from pipeline.quantities import attributes, quantity_of
+from pipeline.quantities import LARGEST, attributes, quantity_of
 from pipeline.run.absent import absent
 from pipeline.run.record import Record
 from pipeline.shapes.frame import Frame, PlaceError
@@ -24,7 +24,7 @@ from pipeline.study.sweep import Axis, Case, Scale, Study
 
 # The variables that are taken as they are from the records of the cases, and from those of F_exact.
 _FLOATS = (
-    "force", "force_error", "energy", "max_strain", "balance", "time_mesh", "time_assemble", "time_setup", "time_solve",
+    "force", "force_error", "energy", *LARGEST, "balance", "time_mesh", "time_assemble", "time_setup", "time_solve",
     "time_error", "time_total", "time_spread", "machine_load", "memory",
 )  # fmt: skip
 # What a record calls otherwise than the dataset.
@@ -221,11 +221,13 @@ def _scaled(record: Record | None, scale: Scale) -> Record | None:
     """
     if record is None or record.is_ok:
         return record.scaled(scale) if record else None
+    unknown: dict[str, Any] = dict.fromkeys(LARGEST, nan)
     return replace(
         record, force=nan, force_vector=(nan, nan, nan), force_vector_error=(nan, nan, nan), stiffness=(),
-        stiffness_error=(), energy=nan, energy_release=nan, max_strain=nan, balance=nan, contact_area=nan,
+        stiffness_error=(), energy=nan, energy_release=nan, balance=nan, contact_area=nan,
         contact_radius=nan, contact_area_error=nan, contact_radius_error=nan, load_force=nan,
         load_force_error=nan, load_energy=nan, sag=nan, load_force_vector=(nan, nan, nan),
+        **unknown,
     )  # fmt: skip
 
 

@@ -8,12 +8,10 @@ from pipeline.plan.steps import Solve
 from pipeline.solve.axisymmetric import compile_axisymmetric
 from pipeline.solve.cell_values import compile_cell_values
 from pipeline.solve.compiled import compiling
-from pipeline.solve.forms import compile_elastic
-from pipeline.solve.hyperelastic import compile_hyperelastic
+from pipeline.solve.forms import compile_forms
 from pipeline.solve.kernels import native
-from pipeline.solve.material import LAWS
 from pipeline.solve.meridian_trials import TRIAL_DEGREE
-from pipeline.solve.mixed_forms import compile_mixed
+from pipeline.solve.physics import LAWS
 from pipeline.solve.regular import compile_regular
 from pipeline.solve.release import compile_release
 from pipeline.stages import stage
@@ -67,11 +65,8 @@ def _compile(element: str, degree: int, *, of_regions: bool, of_slit: bool) -> N
     if element == _REGULAR[0]:
         compile_regular()
         return
-    compile_elastic(degree, straight=degree == 1, of_regions=of_regions)
-    if element == "mixed":
-        compile_mixed(degree)
+    law = element if element in LAWS else "linear"
+    compile_forms(degree, element, law, straight=degree == 1, of_regions=of_regions)
     compile_cell_values(degree, straight=degree == 1)
-    if element in LAWS:
-        compile_hyperelastic(element, degree, straight=degree == 1)
     if of_slit:
         compile_release(degree, mixed=element == "mixed", of_regions=of_regions)

@@ -22,7 +22,6 @@ from pipeline.scene.model import FIXED, PROBE
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads
-from pipeline.solve.material import MaterialLaw
 from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
 from pipeline.solve.meridian_refine import DirectProblem, best_answer, error_bar, meshes_of, only_along_axis, refined
 from pipeline.solve.meridian_system import (
@@ -32,6 +31,7 @@ from pipeline.solve.meridian_system import (
     forms_of,
     max_strain,
 )
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.reaction import reaction
 from pipeline.solve.solution import Solution
 from pipeline.stages import recorded, stage

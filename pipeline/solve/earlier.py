@@ -9,7 +9,7 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray
 from pipeline.solve.linear import LinearSolver
 from pipeline.solve.loads import Motion
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.vectors import global_sum
 
 # So many solutions are kept, and no more than fit into so many bytes of a process.

@@ -33,8 +33,8 @@ from pipeline.solve.enrich import energy_decrements
 from pipeline.solve.kernels.multigrid import takes_product
 from pipeline.solve.linear import Level, LinearSolver, SolveError, is_direct
 from pipeline.solve.loads import Loads, Motion
-from pipeline.solve.material import MaterialLaw, SplitLaw
 from pipeline.solve.mixed_space import MixedSpace
+from pipeline.solve.physics import MaterialLaw, SplitLaw
 from pipeline.solve.release import Front, Release
 from pipeline.solve.saddle import Saddle, SaddleSolver
 from pipeline.solve.spaces import ElasticSpace, Spaces

@@ -1,7 +1,7 @@
-"""Forms of linear elasticity, compiled once and kept in a cache of the project's own.
+"""Forms of all elements, compiled once and kept in a cache of the project's own; what they mean is in ``physics``.
 
-K = λ A_λ + μ A_μ with A_λ(u, v) = ∫ div u div v, A_μ(u, v) = ∫ 2 ε(u) : ε(v). λ and μ are constants of the
-compiled form, or functions that are constant on each cell, so that no value of them is ever compiled in.
+λ and μ are constants of the compiled form, or functions that are constant on each cell, so that no value of them is
+ever compiled in. Each form is made when it is first asked for, which is collective.
 """
 
 from functools import cached_property
@@ -18,20 +18,22 @@ from pipeline.arrays import BoolArray, Int32Array
 from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import distribute
 from pipeline.mesh.generate import MeshArrays
-from pipeline.solve.compiled import cellwise_space, form, vector_space
+from pipeline.solve.compiled import cellwise_space, form, scalar_space, vector_space
 from pipeline.solve.kernels import assembles, has_kernel
 from pipeline.solve.kernels.curved import quadrature_degree
 from pipeline.solve.kernels.stiffness import cell_kernel
-from pipeline.solve.material import MaterialLaw, strain
+from pipeline.solve.physics import LAWS, MaterialLaw, strain
 
 # Marks of cells, and the bulge of an edge, in units of its length, that rounding may leave.
 _NEITHER, _STRAIGHT, _CURVED = 0, 1, 2
 _FLAT = 1e-9
 _curved: WeakKeyDictionary[Any, BoolArray | None] = WeakKeyDictionary()
+# Integrands of large displacements are no polynomials: quadrature of so many degrees more than of linear elasticity.
+_MORE = 2
 
 
 class ElasticForms:
-    """Forms of elasticity on one space, each made when first asked for (collective).
+    """Forms of linear elasticity, K = λ ∫ div u div v + μ ∫ 2 ε(u) : ε(v), on one space.
 
     ``lame`` are λ and μ in them: constants, or, on a mesh of several ``regions`` (of the local cells, ghosts too),
     functions that are constant on each cell. ``displacement`` is the function that ``action``, K u, acts on.
@@ -92,6 +94,100 @@ class ElasticForms:
         return form(energy * measure, kernels)
 
 
+class MixedForms:
+    """What couples displacement and pressure of mixed elements: B(q, u) = ∫ q div u and M(p, q) = ∫ p q.
+
+    ``dilation`` and ``pull`` are of the ``displacement`` that was passed and of the function ``pressure``.
+    """
+
+    def __init__(self, displacement: Any, pressures: Any):
+        self._displacement, self._pressures = displacement, pressures
+        self.pressure = fem.Function(pressures)
+
+    @cached_property
+    def mass(self) -> Any:
+        """M."""
+        return self._mass(curved_only=False)
+
+    @cached_property
+    def curved_mass(self) -> Any:
+        """The part of M from cells with curved edges."""
+        return self._mass(curved_only=True)
+
+    @cached_property
+    def coupling(self) -> Any:
+        """B."""
+        return self._coupling(curved_only=False)
+
+    @cached_property
+    def curved_coupling(self) -> Any:
+        """The part of B from cells with curved edges."""
+        return self._coupling(curved_only=True)
+
+    @cached_property
+    def dilation(self) -> Any:
+        """B u, a vector on pressures."""
+        return self._form(ufl.TestFunction(self._pressures) * ufl.div(self._displacement))
+
+    @cached_property
+    def pull(self) -> Any:
+        """Bᵀ p, a vector on displacements."""
+        return self._form(self.pressure * ufl.div(ufl.TestFunction(self._displacement.function_space)))
+
+    def _mass(self, *, curved_only: bool) -> Any:
+        p, q = ufl.TrialFunction(self._pressures), ufl.TestFunction(self._pressures)
+        return self._form(p * q, curved_only=curved_only)
+
+    def _coupling(self, *, curved_only: bool) -> Any:
+        u, q = ufl.TrialFunction(self._displacement.function_space), ufl.TestFunction(self._pressures)
+        return self._form(q * ufl.div(u), curved_only=curved_only)
+
+    def _form(self, integrand: Any, *, curved_only: bool = False) -> Any:
+        return form(integrand * dx(self._displacement.function_space, curved_only=curved_only))
+
+
+class HyperelasticForms:
+    """Derivatives of the energy of a law, on the space of some ``elastic`` forms, with their λ, μ and displacement u.
+
+    ``direction`` is the function w that ``product`` acts on.
+    """
+
+    def __init__(self, space: Any, elastic: ElasticForms, law: str):
+        self._space, self._law = space, law
+        self._displacement, self._lame = elastic.displacement, elastic.lame
+        self.direction = fem.Function(space)
+
+    @property
+    def _energy(self) -> Any:
+        gradient = ufl.Identity(3) + ufl.grad(self._displacement)
+        return LAWS[self._law](gradient, *self._lame) * dx(self._space, more=_MORE)
+
+    @property
+    def _residual(self) -> Any:
+        return ufl.derivative(self._energy, self._displacement, ufl.TestFunction(self._space))
+
+    @cached_property
+    def energy(self) -> Any:
+        """Stored energy; not a number where J < 0 anywhere."""
+        return form(self._energy)
+
+    @cached_property
+    def residual(self) -> Any:
+        """Nodal forces."""
+        return form(self._residual)
+
+    @cached_property
+    def tangent(self) -> Any:
+        """Derivative K of the nodal forces."""
+        trial = ufl.TrialFunction(self._space)
+        return form(ufl.derivative(self._residual, self._displacement, trial))
+
+    @cached_property
+    def product(self) -> Any:
+        """K w."""
+        return form(ufl.derivative(self._residual, self._displacement, self.direction))
+
+
 def dx(space: Any, *, curved_only: bool = False, more: int = 0) -> Any:
     """Return the measure for forms of elasticity on ``space``, with its quadrature; of straight cells, too, or not.
 
@@ -131,14 +227,24 @@ def _find_curved(mesh: Any) -> BoolArray | None:
     return np.asarray(bulge > _FLAT * np.abs(ends[:, :, 1] - ends[:, :, 0]).max(axis=(1, 2)))
 
 
-def compile_elastic(degree: int, *, straight: bool, of_regions: bool) -> None:
-    """Compile the forms of displacements of ``degree`` and of those below, and of one degree more for the error bar."""
+def compile_forms(
+    degree: int, element: str = "displacement", law: str = "linear", *, straight: bool = False, of_regions: bool = False
+) -> None:
+    """Compile the forms of elements of ``degree`` and of those below, and of one degree more for the error bar."""
     regions = np.zeros(1, dtype=np.int32) if of_regions else None
     mesh = distribute(MPI.COMM_SELF, one_cell(straight=straight)).mesh
     for level in range(1, degree + 2):
         space = vector_space(mesh, level)
-        forms = ElasticForms(space, regions)
-        _ = forms.stiffness, forms.action
+        elastic = ElasticForms(space, regions)
+        _ = elastic.stiffness, elastic.action
+        if element == "mixed" and level >= degree:
+            mixed = MixedForms(elastic.displacement, scalar_space(mesh, level - 1))
+            _ = mixed.mass, mixed.coupling, mixed.dilation, mixed.pull
+        if law != "linear" and level >= degree:
+            large = HyperelasticForms(space, elastic, law)
+            _ = large.residual, large.product
+            if level == degree:
+                _ = large.energy, large.tangent
 
 
 def one_cell(*, straight: bool) -> MeshArrays:

@@ -24,11 +24,11 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray
 from pipeline.solve.elements import Column, DisplacementElements, Enriched, Products
 from pipeline.solve.enrich import energy_decrements
-from pipeline.solve.hyperelastic import HyperelasticForms
+from pipeline.solve.forms import HyperelasticForms
 from pipeline.solve.linear import LinearSolver
 from pipeline.solve.loads import Loads, Motion
-from pipeline.solve.material import MaterialLaw
 from pipeline.solve.newton import Equilibrium, LargeError, assemble, tangent_product
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.solution import TOLERANCE
 from pipeline.solve.vectors import global_sum, vector
 from pipeline.stages import Times, recharge, recorded

@@ -14,8 +14,8 @@ from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Meridian, MeridianArrays
 from pipeline.quantities import CLEAR
 from pipeline.solve.linear import SolveError
-from pipeline.solve.material import MaterialLaw
 from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
+from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
 
 # Later than in three dimensions (Mesh.MIXED_FROM, 0.45), since elements of degree 5 lock later than those of degree 2:

@@ -16,10 +16,10 @@ from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import AXIS, Grading, MeridianArrays
 from pipeline.scene.model import FIXED, PROBE
 from pipeline.solve.linear import SolveError
-from pipeline.solve.material import MaterialLaw
 from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
 from pipeline.solve.meridian_refine import meshes_of, refined
 from pipeline.solve.meridian_system import HalfPlane, Meshes, factorised, forms_of
+from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
 
 # Trials are on this mesh, by elements of this degree: the depth of a radius comes out to some 1e-5.

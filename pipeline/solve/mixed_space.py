@@ -15,12 +15,11 @@ from pipeline import compat
 from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.conditions import whole_points
-from pipeline.solve.forms import curved_cells, has_curved_cells
+from pipeline.solve.forms import MixedForms, curved_cells, has_curved_cells
 from pipeline.solve.kernels import assembles
 from pipeline.solve.kernels import coupling as straight
 from pipeline.solve.kernels.pressure import CellPressures, Coupling, Mass
-from pipeline.solve.material import MaterialLaw
-from pipeline.solve.mixed_forms import MixedForms
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.region_space import region_wise_space
 from pipeline.solve.saddle import Pair
 from pipeline.solve.spaces import ElasticSpace

@@ -16,7 +16,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline import compat
-from pipeline.solve.hyperelastic import HyperelasticForms
+from pipeline.solve.forms import HyperelasticForms
 from pipeline.solve.linear import LinearSolver, SolveError, explain
 from pipeline.solve.spaces import ElasticSpace
 from pipeline.solve.vectors import add_from_ghosts, fill, vector

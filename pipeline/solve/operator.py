@@ -14,7 +14,7 @@ from pipeline.solve.forms import ElasticForms, curved_cells, has_curved_cells
 from pipeline.solve.kernels import assembles, product
 from pipeline.solve.kernels.product import CellOperator, CellStiffness
 from pipeline.solve.kernels.stiffness import StraightStiffness
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
 
 _SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN

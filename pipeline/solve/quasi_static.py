@@ -39,7 +39,7 @@ from pipeline.solve.error import error_bar, stiffness_bars
 from pipeline.solve.linear import LinearSolver, SolveError
 from pipeline.solve.load_steps import LoadSteps, Walk
 from pipeline.solve.loads import Loads, Motion
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.reaction import Response, reaction, sums
 from pipeline.solve.release import Front, Released
 from pipeline.solve.rim import plain_share

@@ -19,7 +19,7 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray
 from pipeline.solve.enrich import smallest_eigenvalue
 from pipeline.solve.loads import Loads
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.reaction import Response, reaction
 from pipeline.solve.vectors import global_sum, vector

@@ -28,11 +28,11 @@ from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve.compiled import form, vector_space
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.far_field import Place, PointForce
-from pipeline.solve.forms import compile_elastic, one_cell
+from pipeline.solve.forms import compile_forms, one_cell
 from pipeline.solve.linear import Level, LinearSolver, SolveError
 from pipeline.solve.loads import Motion
-from pipeline.solve.material import MaterialLaw
 from pipeline.solve.operator import Operators
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.placed_force import PlacedForce, PlacedPull
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.vectors import vector
@@ -263,7 +263,7 @@ class _Pull:
 
 def compile_regular() -> None:
     """Compile the forms that the regular part takes."""
-    compile_elastic(DEGREE, straight=False, of_regions=False)
+    compile_forms(DEGREE)
     space = vector_space(distribute(MPI.COMM_SELF, one_cell(straight=False)).mesh, DEGREE)
     _Pull(space, np.asarray(space.tabulate_dof_coordinates()))
 

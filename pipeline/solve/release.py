@@ -33,7 +33,7 @@ from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve.compiled import form, scalar_space, vector_space
 from pipeline.solve.forms import ElasticForms, dx, one_cell
 from pipeline.solve.loads import Vector
-from pipeline.solve.material import strain
+from pipeline.solve.physics import strain
 
 # What a unit of advance of a slit's front releases (n, n), and of the blade's tip; None where there is none.
 Released = tuple[FloatArray | None, FloatArray | None]

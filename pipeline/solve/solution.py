@@ -11,7 +11,7 @@ from pipeline.solve.carried import Carried, load_bars
 from pipeline.solve.error import extrapolate, extrapolate_found, extrapolate_release, release_bar
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads, Vector
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.reaction import Response
 from pipeline.stages import Times
 

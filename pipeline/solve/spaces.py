@@ -8,8 +8,8 @@ from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.conditions import Conditions, ConstrainedSpace
 from pipeline.solve.dead_loads import Applied, DeadLoads, apply_loads
 from pipeline.solve.forms import ElasticForms
-from pipeline.solve.material import MaterialLaw
 from pipeline.solve.operator import Operators
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.vectors import add_from_ghosts, fill
 from pipeline.stages import stage
 

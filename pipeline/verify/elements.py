@@ -19,9 +19,8 @@ from pipeline.mesh.distribute import distribute
 from pipeline.mesh.of_case import mesh_arrays
 from pipeline.plan.plan import make_plan
 from pipeline.solve.compiled import form, scalar_space, vector_space
-from pipeline.solve.forms import ElasticForms
-from pipeline.solve.material import MaterialLaw
-from pipeline.solve.mixed_forms import MixedForms
+from pipeline.solve.forms import ElasticForms, MixedForms
+from pipeline.solve.physics import MaterialLaw
 from pipeline.study.load import parse
 from pipeline.verify.row import Row
 

@@ -17,7 +17,7 @@ from pipeline.run.record import Record
 from pipeline.scene.model import FIXED, FREE, PROBE, SLIT
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.loads import Loads
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.study.load import parse

@@ -26,7 +26,7 @@ from pipeline.run.record import Record
 from pipeline.solve.axisymmetric import MeridianProblem
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.loads import Loads
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.study.load import parse
 from pipeline.verify import known
 from pipeline.verify.machine import machine

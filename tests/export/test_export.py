@@ -18,7 +18,7 @@ from pipeline.export.tabulate import tabulate
 from pipeline.realtime import Model
 from pipeline.realtime.contact import tangent
 from pipeline.realtime.place import Place
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.study.load import parse
 from pipeline.verify.compare import solve
 

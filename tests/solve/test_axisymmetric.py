@@ -11,7 +11,7 @@ from pipeline.solve.compiled import compiling
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads, Motion
-from pipeline.solve.material import MaterialLaw, Parameters
+from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.verify import known
 
 

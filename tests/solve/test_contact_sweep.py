@@ -14,7 +14,7 @@ from pipeline.report.dataset import build
 from pipeline.run.execute import compute
 from pipeline.solve.contact.condensed import CondensedElements
 from pipeline.solve.contact.sweep import Sweep
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.study.problems import StudyError
 from tests.cases import study
 

@@ -13,7 +13,7 @@ from pipeline.run.meshing import mesh_case
 from pipeline.solve.carried import load_bars
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.dead_loads import apply_loads
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.vectors import global_sum, vector
 from tests.cases import solve, study

@@ -8,7 +8,7 @@ from pipeline.plan.plan import make_plan
 from pipeline.run import far_field
 from pipeline.run.execute import compute
 from pipeline.solve.earlier import Earlier
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from tests.cases import study
 
 LAW = MaterialLaw.of_moduli(1.0, 0.3)

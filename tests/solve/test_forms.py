@@ -15,7 +15,7 @@ from pipeline.mesh.size import Sizes
 from pipeline.scene.model import Scene
 from pipeline.solve.compiled import form, vector_space
 from pipeline.solve.forms import ElasticForms, strain
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from tests.cases import study
 
 LAME = (2.0, 1.0)

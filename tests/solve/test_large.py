@@ -13,12 +13,11 @@ from pipeline.plan.plan import make_plan
 from pipeline.run.meshing import mesh_case
 from pipeline.scene.model import FIXED
 from pipeline.solve.compiled import vector_space
-from pipeline.solve.forms import ElasticForms
-from pipeline.solve.hyperelastic import HyperelasticForms
+from pipeline.solve.forms import ElasticForms, HyperelasticForms
 from pipeline.solve.kernels import multigrid
 from pipeline.solve.load_steps import LoadSteps, check_path
-from pipeline.solve.material import LAWS, MaterialLaw
 from pipeline.solve.newton import LargeError
+from pipeline.solve.physics import LAWS, MaterialLaw
 from pipeline.study.problems import StudyError
 from pipeline.study.schema import Material
 from tests.cases import BLADE, force, solve, study

@@ -19,9 +19,9 @@ from pipeline.solve.compiled import compiling
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads
-from pipeline.solve.material import MaterialLaw
 from pipeline.solve.meridian_contact import DEGREE, MeridianContact
 from pipeline.solve.meridian_trials import TRIAL_DEGREE, RoundTool
+from pipeline.solve.physics import MaterialLaw
 from tests.cases import study
 
 LAW = MaterialLaw.of(0.3 / 1.3 / 0.4, 0.5 / 1.3)  # E = 1, ν = 0.3

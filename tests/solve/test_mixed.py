@@ -15,8 +15,8 @@ from pipeline.solve.conditions import Conditions
 from pipeline.solve.error import error_bar
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads
-from pipeline.solve.material import MaterialLaw
 from pipeline.solve.mixed_space import MixedSpace
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Solution
 from pipeline.solve.spaces import Spaces

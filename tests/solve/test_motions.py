@@ -14,7 +14,7 @@ from pipeline.report.dataset import build
 from pipeline.run.execute import compute
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.loads import Loads, Motion
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.reaction import Sums
 from pipeline.solve.spaces import Spaces

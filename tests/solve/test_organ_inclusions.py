@@ -9,7 +9,7 @@ from pipeline.mesh.distribute import BodyMesh
 from pipeline.run.meshing import mesh_case
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.loads import Loads
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from tests.cases import study

@@ -7,9 +7,9 @@ from petsc4py import PETSc
 
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.kernels.blocks import UpperBlocks
-from pipeline.solve.material import MaterialLaw
 from pipeline.solve.mixed_space import MixedSpace
 from pipeline.solve.operator import Operators
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from tests.solve.test_mixed import PRESS, law, make_mesh

@@ -6,7 +6,7 @@ import pytest
 from mpi4py import MPI
 
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.reduced_basis import ReducedBasis
 from pipeline.solve.spaces import Spaces

@@ -12,7 +12,7 @@ from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.loads import Loads
-from pipeline.solve.material import MaterialLaw, SplitLaw
+from pipeline.solve.physics import MaterialLaw, SplitLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Solution
 from pipeline.solve.spaces import Spaces

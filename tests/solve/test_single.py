@@ -8,7 +8,7 @@ from pipeline.solve.conditions import Conditions
 from pipeline.solve.kernels import multigrid
 from pipeline.solve.linear import Level, LinearSolver, SolveError
 from pipeline.solve.loads import Loads
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from tests.solve.test_mixed import PRESS, law, make_mesh

@@ -14,7 +14,7 @@ from pipeline.solve import forms, operator
 from pipeline.solve.compiled import vector_space
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.kernels.pattern import pattern
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.vectors import vector

@@ -8,7 +8,7 @@ from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import conditions_of
 from pipeline.run.record import Record
 from pipeline.solve.cell_values import CellValues
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import Spaces
 from pipeline.study.problems import StudyError
 from tests.cases import solve, study

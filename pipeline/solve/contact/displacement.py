@@ -10,7 +10,7 @@ from pipeline.solve.contact.candidates import CONDITIONS, Candidates, Numbering,
 from pipeline.solve.contact.elements import ContactElements, Unknowns
 from pipeline.solve.contact.levels import Hierarchy
 from pipeline.solve.linear import Level, LinearSolver, is_direct
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.vectors import vector
 from pipeline.stages import stage

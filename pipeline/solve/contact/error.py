@@ -21,7 +21,7 @@ from pipeline.solve.contact.mixed import MixedElements
 from pipeline.solve.enrich import energy_decrements
 from pipeline.solve.kernels.multigrid import suits, takes_product
 from pipeline.solve.linear import LinearSolver
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import Spaces
 from pipeline.solve.vectors import vector
 from pipeline.stages import stage

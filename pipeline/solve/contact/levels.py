@@ -11,7 +11,7 @@ from pipeline.solve.contact.candidates import CONDITIONS, Numbering, Surface
 from pipeline.solve.kernels.multigrid import suits
 from pipeline.solve.kernels.product import is_product
 from pipeline.solve.linear import Level
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import ElasticSpace, Spaces
 
 _SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN

@@ -15,8 +15,8 @@ from pipeline.solve.contact.elements import ContactElements, Unknowns
 from pipeline.solve.contact.levels import Hierarchy, normal_dofs
 from pipeline.solve.elements import DIRECT_LIMIT
 from pipeline.solve.linear import Level
-from pipeline.solve.material import MaterialLaw, SplitLaw
 from pipeline.solve.mixed_space import MixedSpace
+from pipeline.solve.physics import MaterialLaw, SplitLaw
 from pipeline.solve.saddle import Pair, Saddle, SaddleSolver
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.stages import stage

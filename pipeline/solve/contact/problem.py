@@ -31,7 +31,7 @@ from pipeline.solve.dead_loads import Applied
 from pipeline.solve.error import error_bar, found_again_bar, found_bar
 from pipeline.solve.linear import SolveError
 from pipeline.solve.loads import Loads
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.reaction import Response
 from pipeline.solve.rim import plain_share
 from pipeline.solve.solution import TOLERANCE, Solution, check_balance

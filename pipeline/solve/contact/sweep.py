@@ -10,7 +10,7 @@ from pipeline.solve.contact.active_set import Found, Obstacle, find_set
 from pipeline.solve.contact.condensed import CondensedElements
 from pipeline.solve.contact.displacement import DisplacementElements
 from pipeline.solve.contact.mixed import MixedElements
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import Times
 
 Kind = DisplacementElements | MixedElements | CondensedElements

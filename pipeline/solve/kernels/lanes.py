@@ -3,7 +3,7 @@
 import numpy as np
 
 from pipeline.arrays import FloatArray, Int32Array
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 
 # Cells that are taken side by side, as product.c has it.
 LANES = 16

@@ -21,8 +21,8 @@ from pipeline.solve.kernels.curved import CurvedCells
 from pipeline.solve.kernels.lanes import LANES, Lanes
 from pipeline.solve.kernels.native import Single, call
 from pipeline.solve.kernels.pattern import corners, owned_cells, reference, straight_cells
-from pipeline.solve.material import MaterialLaw
 from pipeline.solve.parcels import ghosts_of
+from pipeline.solve.physics import MaterialLaw
 
 DEGREES = (2, 3, 4)
 # What takes points to coefficients is sparse but for rounding.

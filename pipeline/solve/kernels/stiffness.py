@@ -12,7 +12,7 @@ from pipeline.solve.kernels.arrays import entries_of_parts, set_local_numbers, s
 from pipeline.solve.kernels.native import address, call, point_at
 from pipeline.solve.kernels.pattern import corners, owned_cells, reference, straight_cells
 from pipeline.solve.kernels.rows import Part, rows
-from pipeline.solve.material import MaterialLaw
+from pipeline.solve.physics import MaterialLaw
 
 
 class StraightStiffness:
