@@ -46,7 +46,7 @@ def measure(fine: str, degree: int) -> dict[str, Any]:
     comm = MPI.COMM_WORLD
     study = LARGE | {"mesh": LARGE["mesh"] | {"fine": fine, "degree": degree}}
     case = parse(study).case(())
-    body, _ = mesh_case(case, (), comm)
+    body = mesh_case(case, (), comm)
     law, loads = MaterialLaw.of_moduli(10e3, 0.3), Loads.along((0.0, 0.0, -0.2e-3))
     with Spaces(body) as spaces, _watched() as sent, QuasiStaticProblem(spaces, degree, Conditions()) as problem:
         solution = problem.solve(law, loads, method="iterative", estimate=True)

@@ -73,7 +73,7 @@ def prescribed(body: BodyMesh, case: Case, *, estimate: bool) -> Solution:
 def in_linear_solves(poisson: float, rim: str = "0.12 mm", repeats: int = _REPEATS) -> dict[str, Any]:
     """Return what found contact takes in units of a prescribed one, without and with the error bar."""
     (case,) = parse(_study(poisson, rim, "0.1 mm")).cases()
-    body, _ = mesh_case(case, model_planes(case), MPI.COMM_SELF)
+    body = mesh_case(case, model_planes(case), MPI.COMM_SELF)
     ways: dict[str, Callable[[], Solution]] = {
         f"{name}, {what}": partial(solve, body, case, estimate=estimate)
         for name, solve in (("found", found), ("prescribed", prescribed))

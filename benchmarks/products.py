@@ -51,7 +51,7 @@ def measure(size: tuple[float, float], degrees: list[int]) -> list[dict[str, Any
 
     law = MaterialLaw.of_moduli(YOUNG, 0.3)
     with threadpool_limits(limits=1):
-        mesh, _ = mesh_case(_case(2, size), ("x", "y"), MPI.COMM_SELF)
+        mesh = mesh_case(_case(2, size), ("x", "y"), MPI.COMM_SELF)
         rows = []
         for degree in degrees:
             with Spaces(mesh) as spaces:

@@ -61,7 +61,7 @@ def measure(element: str, degree: int, poisson: float, size: tuple[float, float]
     from pipeline.solve.spaces import Spaces
 
     with threadpool_limits(limits=1), ExitStack() as stack:
-        mesh, _ = mesh_case(_case(degree, size), ("x", "y"), MPI.COMM_SELF)
+        mesh = mesh_case(_case(degree, size), ("x", "y"), MPI.COMM_SELF)
         base = PeakMemory(MPI.COMM_SELF)
         held = base.peak()
         problem = stack.enter_context(

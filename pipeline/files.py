@@ -4,7 +4,6 @@ import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from math import inf
 from pathlib import Path
 
 # Bytes that a disk must have left for a file: less than a dataset and its figure take.
@@ -95,7 +94,7 @@ def is_utf8(name: str) -> bool:
 def why_not_writable(path: Path, room: int = LEAST_ROOM) -> str:
     """Say why no file of ``room`` bytes can be written at ``path``, "" if one can.
 
-    That is tried beside it with the first of them; the folders that it takes are made, and nothing else is left.
+    That is tried beside it; the folders that it takes are made, and nothing else is left.
     """
     if path.is_dir():
         return f"{path}: is a folder, and a file of that name is to be written"
@@ -109,25 +108,11 @@ def why_not_writable(path: Path, room: int = LEAST_ROOM) -> str:
                 return f"{path}: cannot be written: {folder} is a file, not a folder"
             break
     try:
-        with _beside(path) as temporary:
-            tried = temporary.write_bytes(bytes(min(room, LEAST_ROOM)))
-            _to_disk(temporary)
-            left = tried + room_on_disk(path.parent)
+        with _beside(path) as temporary, temporary.open("wb") as file:
+            os.posix_fallocate(file.fileno(), 0, room)
     except OSError as error:
         return f"{path}: cannot be written: {error.strerror or error}"
-    if left < room:
-        return f"{path}: cannot be written: {left / 1e6:.2g} MB are left on the disk, and it may take {room / 1e6:.2g}"
     return ""
-
-
-def room_on_disk(folder: Path) -> float:
-    """Return the bytes that are left for files in ``folder``, infinite where its file system has no size of its own.
-
-    Raises:
-        OSError: if it cannot be asked.
-    """
-    disk = os.statvfs(folder)
-    return disk.f_bavail * disk.f_frsize if disk.f_blocks else inf
 
 
 @contextmanager

@@ -265,7 +265,7 @@ def _known_beside(path: Path | None, keys: Collection[str]) -> dict[str, Record]
         rows = read_rows(path) if path and path.exists() else []
         records = (Record.from_json(text) for key, text, _ in rows if key in keys)
         return {record.key: record for record in records if record.is_ok}
-    except (StoreError, ValueError, TypeError, KeyError):
+    except (StoreError, ValueError):
         return {}
 
 

@@ -32,10 +32,25 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 _COMMANDS: tuple[Callable[..., None], ...] = (
-    new.new, study.validate, plan.plan, study.run, merge.merge, study.status, plan.explain, report.plot, report.report,
-    guide.guide, compare.compare, view.view, export.export, evaluator.evaluator, touch.touch,
-    checks.verify, checks.benchmark, study.version,
-)  # fmt: skip
+    new.new,
+    study.validate,
+    plan.plan,
+    study.run,
+    merge.merge,
+    study.status,
+    plan.explain,
+    report.plot,
+    report.report,
+    guide.guide,
+    compare.compare,
+    view.view,
+    export.export,
+    evaluator.evaluator,
+    touch.touch,
+    checks.verify,
+    checks.benchmark,
+    study.version,
+)
 for _command in _COMMANDS:
     app.command()(_command)
 app.add_typer(store.app, name="store")

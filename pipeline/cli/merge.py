@@ -74,11 +74,14 @@ def merge(
     again = _completing(plan, missing, paths, [word for name in without or () for word in ("--without", name)])
     if as_json:
         found: dict[str, Any] = {
-            "file": str(file), **counts,
+            "file": str(file),
+            **counts,
             "shards": [{"file": str(s.path), "records": s.records, "taken": s.taken} for s in sources],
-            "problems": problems, "failures": [{"case": case, "message": message} for case, message in failed],
-            "again": again, "files": [str(path) for path in files],
-        }  # fmt: skip
+            "problems": problems,
+            "failures": [{"case": case, "message": message} for case, message in failed],
+            "again": again,
+            "files": [str(path) for path in files],
+        }
         print_json(found)
     else:
         for source in sources:

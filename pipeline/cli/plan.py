@@ -143,9 +143,14 @@ def explain(
     found = story(made, chosen.index)
     record = records.get(found["key"])
     if record:
-        found["record"] = {"status": record.status, "origin": record.origin, "force": record.force,
-                           "force_error": record.force_error, "seconds": record.time_total,
-                           **record.provenance}  # fmt: skip
+        found["record"] = {
+            "status": record.status,
+            "origin": record.origin,
+            "force": record.force,
+            "force_error": record.force_error,
+            "seconds": record.time_total,
+            **record.provenance,
+        }
     if as_json:
         print_json(found)
         return

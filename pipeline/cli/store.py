@@ -34,11 +34,14 @@ def list_records(store: StoreFile = DEFAULT_STORE, as_json: Json = False) -> Non
     with _read(store) as opened:
         rows = list(opened.records())
     content: dict[str, Any] = {
-        "file": str(store), "records": len(rows), "bytes": store.stat().st_size,
-        "status": dict(Counter(r.status for r in rows)), "origin": dict(Counter(r.origin for r in rows)),
+        "file": str(store),
+        "records": len(rows),
+        "bytes": store.stat().st_size,
+        "status": dict(Counter(r.status for r in rows)),
+        "origin": dict(Counter(r.origin for r in rows)),
         "versions": dict(Counter(_versions(r.provenance) for r in rows)),
         "seconds": sum(r.time_total for r in rows if r.is_ok),
-    }  # fmt: skip
+    }
     if as_json:
         print_json(content)
         return
@@ -75,8 +78,14 @@ def prune(
     try:
         found = _found(store, older_than, failed=failed)
     except DamagedStoreError as wrong:
-        found = {"file": str(store), "records": None, "remove": None, "bytes": store.stat().st_size, "reasons": {},
-                 "damaged": str(wrong)}  # fmt: skip
+        found = {
+            "file": str(store),
+            "records": None,
+            "remove": None,
+            "bytes": store.stat().st_size,
+            "reasons": {},
+            "damaged": str(wrong),
+        }
     except StoreError as wrong:
         fail(Fault(str(wrong), file=str(store)))
     moved = _prune(store, older_than, failed=failed) if yes else ""
@@ -105,9 +114,13 @@ def _found(store: Path, older_than: float | None, *, failed: bool) -> dict[str, 
     with open_to_read(store) as opened:
         doomed, count = opened.doomed(older_than=older_than, failed=failed), len(opened.rows())
     return {
-        "file": str(store), "records": count, "remove": len(doomed), "bytes": sum(one.size for one in doomed),
-        "reasons": dict(Counter(one.why for one in doomed)), "damaged": "",
-    }  # fmt: skip
+        "file": str(store),
+        "records": count,
+        "remove": len(doomed),
+        "bytes": sum(one.size for one in doomed),
+        "reasons": dict(Counter(one.why for one in doomed)),
+        "damaged": "",
+    }
 
 
 def _prune(store: Path, older_than: float | None, *, failed: bool) -> str:

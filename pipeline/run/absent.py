@@ -19,7 +19,17 @@ def absent(case: Case) -> Record | None:
         return Record("", SKIPPED, why)
     none = (0.0, 0.0, 0.0)
     return Record(
-        "", LOST, why, force=0.0, force_error=0.0, force_vector=none, force_vector_error=none, energy=0.0,
-        max_strain=0.0, contact_area=0.0, contact_radius=0.0, contact_area_error=0.0,
+        "",
+        LOST,
+        why,
+        force=0.0,
+        force_error=0.0,
+        force_vector=none,
+        force_vector_error=none,
+        energy=0.0,
+        max_strain=0.0,
+        contact_area=0.0,
+        contact_radius=0.0,
+        contact_area_error=0.0,
         contact_radius_error=0.0,
-    )  # fmt: skip
+    )

@@ -78,8 +78,17 @@ def _record(solve: Solve, reduced: Reduced, source: Record, problem: QuasiStatic
     x, y, z = (mu * component for component in reduced.response.force)
     bar = source.force_error + reduced.bound
     return replace(
-        source, key=solve.key, origin="reduced", young=scale.stress, depth=scale.length, force=z,
+        source,
+        key=solve.key,
+        origin="reduced",
+        young=scale.stress,
+        depth=scale.length,
+        force=z,
         force_vector=turned_back(solve.case.frame.turn, (x, y, z)),
-        force_error=bar, force_vector_error=_vector_bars(source, bar * abs(z)), energy=mu * reduced.response.energy,
-        **problem.largest(law_of(solve.case), basis.displacement(reduced)), balance=reduced.bound, iterations=0,
-    )  # fmt: skip
+        force_error=bar,
+        force_vector_error=_vector_bars(source, bar * abs(z)),
+        energy=mu * reduced.response.energy,
+        **problem.largest(law_of(solve.case), basis.displacement(reduced)),
+        balance=reduced.bound,
+        iterations=0,
+    )

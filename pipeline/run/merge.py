@@ -59,6 +59,6 @@ def _state(row: Row) -> int:
     """Return 1 for a record with a force, 0 for a failure, -1 for what cannot be read."""
     try:
         record = Record.from_json(row[1])
-    except (ValueError, TypeError, KeyError, AttributeError):
+    except ValueError:
         return -1
     return int(record.is_ok) if record.key == row[0] else -1

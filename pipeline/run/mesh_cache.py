@@ -4,13 +4,14 @@ import os
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pipeline.compat import versions
-from pipeline.files import atomic, room_on_disk
+from pipeline.files import atomic
 from pipeline.mesh.generate import MeshArrays
 from pipeline.npz import read_npz
 from pipeline.plan.key import digest, mesh_key
@@ -40,9 +41,13 @@ class MeshCache:
             content = read_npz(path)
             facets = {name.removeprefix("facets_"): content[name] for name in content if name.startswith("facets_")}
             mesh = MeshArrays(
-                content["points"], content["cells"], facets, content["rim"], float(content["seconds"]),
+                content["points"],
+                content["cells"],
+                facets,
+                content["rim"],
+                float(content["seconds"]),
                 content.get("regions"),
-            )  # fmt: skip
+            )
             _touch(path)
         except FileNotFoundError:
             return None
@@ -77,12 +82,12 @@ class MeshCache:
 
     def _keep(self, path: Path, arrays: dict[str, Any]) -> None:
         """Write arrays to a file, if it can be written."""
+        packed = BytesIO()  # of a disk that fills meanwhile zipfile would complain on standard error
+        np.savez(packed, **arrays)
         with suppress(OSError):
             with atomic(path) as temporary:
-                # Of a disk that fills meanwhile zipfile complains once more, on standard error, when it is freed.
-                if room_on_disk(path.parent) > sum(np.asarray(array).nbytes for array in arrays.values()):
-                    np.savez(temporary, **arrays)
-                    _touch(temporary)
+                temporary.write_bytes(packed.getbuffer())
+                _touch(temporary)
             self._shrink()
 
     def _shrink(self) -> None:

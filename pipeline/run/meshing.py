@@ -11,32 +11,27 @@ from pipeline.mesh.generate import MeshArrays, MeshError
 from pipeline.mesh.of_case import mesh_arrays, upright
 from pipeline.run.failure import describe
 from pipeline.run.mesh_cache import MeshCache
+from pipeline.stages import Times, recharge, stage
 from pipeline.study.sweep import Case
 
 T = TypeVar("T")
 
 
-def mesh_case(
-    case: Case, mirrors: tuple[str, ...], comm: MPI.Comm, cache: MeshCache | None = None
-) -> tuple[BodyMesh, float]:
-    """Return the mesh of a case, of the part that ``mirrors`` leave of it, and the seconds it takes; collective.
+@stage("meshing")
+def mesh_case(case: Case, mirrors: tuple[str, ...], comm: MPI.Comm, cache: MeshCache | None = None) -> BodyMesh:
+    """Return the mesh of a case, of the part that ``mirrors`` leave of it; collective.
 
     It is turned so that the probe presses along -z: that is how it is solved.
-
-    A mesh from the ``cache`` counts with the seconds that it took to make.
 
     Raises:
         MeshError: on every rank.
     """
     arrays = on_first_rank(comm, lambda: cached_arrays(case, mirrors, cache))
-    start = MPI.Wtime()
-    mesh = distribute(comm, arrays and upright(case, arrays))
-    making = comm.bcast(arrays.seconds if arrays is not None else 0.0)
-    return mesh, making + comm.allreduce(MPI.Wtime() - start, op=MPI.MAX)
+    return distribute(comm, arrays and upright(case, arrays))
 
 
 def cached_arrays(case: Case, mirrors: tuple[str, ...], cache: MeshCache | None) -> MeshArrays:
-    """Return the mesh of a case from the cache, or made and put there."""
+    """Return the mesh of a case from the cache, charged with the time that it took, or made and put there."""
     if cache is None:
         return mesh_arrays(case, mirrors)
     path = cache.path(case, mirrors)
@@ -44,6 +39,8 @@ def cached_arrays(case: Case, mirrors: tuple[str, ...], cache: MeshCache | None)
     if found is None:
         found = mesh_arrays(case, mirrors, cache)
         cache.put(path, found)
+    else:
+        recharge(Times(mesh=found.seconds))
     return found
 
 

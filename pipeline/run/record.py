@@ -2,10 +2,12 @@
 
 import json
 from dataclasses import asdict, dataclass, field, replace
+from functools import cache
 from math import isfinite, nan
 
+from pydantic import TypeAdapter
+
 from pipeline.plan.cost import Observation, speed_up
-from pipeline.quantities import CLEAR
 from pipeline.study.sweep import Scale
 
 # How the message of a case begins that failed for a reason that the program does not know.
@@ -21,7 +23,7 @@ class Record:
     95 % error bar on that, on which ``time_error`` seconds were spent. ``force_vector_error`` (N) are the bars on the
     vector's components, where they are known; ``stiffness`` is that of all six rigid motions, if it was asked for, and
     ``stiffness_error`` has the bars on its entries. ``contact_area`` (m²) and ``contact_radius`` (m) are those of
-    unilateral contact. ``max_strain`` is read ``strain_clearance`` half widths of the probe from its edge or farther.
+    unilateral contact. ``max_strain`` is read clear of the probe's edge.
     ``energy_release`` (J/m²) is the mean along a slit's front, its relative 95 % bar ``energy_release_error``.
     Loads add ``load_force`` (N), of the bar ``load_force_error`` (N), to the force while the probe is held, in all
     ``load_force_vector`` (N); ``load_energy`` (J) is their strain energy, ``sag`` (m) how far they take a probe that is
@@ -46,7 +48,6 @@ class Record:
     energy_release: float = nan
     energy_release_error: float = nan
     max_strain: float = nan
-    strain_clearance: float = CLEAR
     contact_area: float = nan
     contact_radius: float = nan
     contact_area_error: float = nan
@@ -113,11 +114,19 @@ class Record:
             for rows in (self.stiffness, self.stiffness_error)
         )
         return replace(
-            self, origin="scaled", young=young, depth=depth, force=stiffer * deeper * self.force,
-            force_vector=(x, y, z), force_vector_error=(bx, by, bz), stiffness=stiffness, stiffness_error=bars,
-            energy=stiffer * deeper**2 * self.energy, energy_release=stiffer * deeper**2 * self.energy_release,
+            self,
+            origin="scaled",
+            young=young,
+            depth=depth,
+            force=stiffer * deeper * self.force,
+            force_vector=(x, y, z),
+            force_vector_error=(bx, by, bz),
+            stiffness=stiffness,
+            stiffness_error=bars,
+            energy=stiffer * deeper**2 * self.energy,
+            energy_release=stiffer * deeper**2 * self.energy_release,
             max_strain=deeper * self.max_strain,
-        )  # fmt: skip
+        )
 
     def to_json(self) -> str:
         """Write as JSON text."""
@@ -125,19 +134,14 @@ class Record:
 
     @staticmethod
     def from_json(text: str) -> "Record":
-        """Read what :meth:`to_json` wrote, now or in an earlier version.
+        """Read what :meth:`to_json` wrote.
 
         Raises:
-            ValueError, TypeError, KeyError: if it is no record.
+            ValueError: if it is no record.
         """
-        content = dict(json.loads(text))
-        x, y, z = content["force_vector"]
-        bx, by, bz = content.get("force_vector_error", (nan, nan, nan))
-        content |= {"force_vector": (x, y, z), "force_vector_error": (bx, by, bz)}
-        x, y, z = content.get("load_force_vector", (nan, nan, nan))
-        content["load_force_vector"] = (x, y, z)
-        for name in ("stiffness", "stiffness_error"):
-            content[name] = tuple(tuple(row) for row in content.get(name, ()))
-        if "strain_clearance" not in content and content.get("origin") != "axisymmetric":
-            content["max_strain"] = nan  # it was that at the probe's edge, where it hangs on the elements' size
-        return Record(**content)
+        return _adapter().validate_json(text)
+
+
+@cache
+def _adapter() -> TypeAdapter[Record]:
+    return TypeAdapter(Record)

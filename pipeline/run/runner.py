@@ -43,6 +43,7 @@ from pipeline.run.sweeping import in_order
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import FieldProblem
 from pipeline.solve.spaces import Spaces
+from pipeline.stages import Times, recorded
 
 T = TypeVar("T")
 Keep = Callable[[Record], None]
@@ -57,11 +58,11 @@ class Bar(Enum):
 
 
 @dataclass(frozen=True)
-class Ground:
-    """What the solves of a step stand on: spaces of the mesh, the seconds it took, the memory since it was begun."""
+class Meshed:
+    """A mesh that solves share: its spaces, the times of its making, and the memory since that was begun."""
 
     spaces: Spaces
-    seconds: float
+    times: Times
     memory: PeakMemory
 
     @property
@@ -125,22 +126,22 @@ class StepRunner:
     def _on_mesh(self, step: MeshStep, memory: PeakMemory) -> None:
         """Mesh once, and solve every operator on it."""
         self._begin(*step.solves)
-        meshed = self._caught(lambda: self._mesh(step.solves[0]))
-        if isinstance(meshed, Failure):
-            self._fail(step.solves, meshed)
+        with recorded() as times:
+            mesh = self._caught(lambda: self._mesh(step.solves[0]))
+        if isinstance(mesh, Failure):
+            self._fail(step.solves, mesh)
             return
-        mesh, seconds = meshed
         with Spaces(mesh) as spaces:
             for operator in step.operators:
-                self._operate(operator, Ground(spaces, seconds, memory))
+                self._operate(operator, Meshed(spaces, times, memory))
 
-    def _operate(self, step: OperatorStep, ground: Ground) -> None:
+    def _operate(self, step: OperatorStep, meshed: Meshed) -> None:
         """Solve every material of an operator, or a few of them and the rest from these."""
         self._begin(*step.solves)
-        shared = self._assembles_parts(step, ground.mesh)
-        condense, reuse = self._condenses(step, ground.mesh), self._plan.reuse
+        shared = self._assembles_parts(step, meshed.mesh)
+        condense, reuse = self._condenses(step, meshed.mesh), self._plan.reuse
         problem = self._caught(
-            lambda: problem_of(ground.spaces, step.case, shared=shared, reuse=reuse, condense=condense)
+            lambda: problem_of(meshed.spaces, step.case, shared=shared, reuse=reuse, condense=condense)
         )
         if isinstance(problem, Failure):
             self._fail(step.solves, problem)
@@ -149,10 +150,10 @@ class StepRunner:
             self._share_far_fields()
         with problem:
             if step.solves[0].reduced and isinstance(problem, QuasiStaticProblem):
-                self._reduce(step, problem, ground)
+                self._reduce(step, problem, meshed)
             for solve in in_order(step, condensed=condense) if reuse or condense else step.solves:
                 if solve.key not in self._records:
-                    self._record(solve, partial(self._solve, solve, problem, ground, _bar_of(solve)))
+                    self._record(solve, partial(self._solve, solve, problem, meshed, _bar_of(solve)))
 
     def _share_far_fields(self) -> None:
         """Find the far fields of all places of the plan at once; if that fails, each finds its own. Collective."""
@@ -161,11 +162,11 @@ class StepRunner:
             self._has_far_fields = True
             self._caught(lambda: share_far_fields(solve.case for solve in plan.solves))
 
-    def _reduce(self, step: OperatorStep, problem: QuasiStaticProblem, ground: Ground) -> None:
+    def _reduce(self, step: OperatorStep, problem: QuasiStaticProblem, meshed: Meshed) -> None:
         """Solve a few and finish the rest from their basis; without a basis those are left to be solved, too."""
 
         def compute(solve: Solve) -> Record | None:
-            self._record(solve, partial(self._solve, solve, problem, ground, _bar_of(solve)))
+            self._record(solve, partial(self._solve, solve, problem, meshed, _bar_of(solve)))
             record = self._records[solve.key]
             return record if record.is_ok else None
 
@@ -203,21 +204,22 @@ class StepRunner:
 
     def _afresh(self, solve: Solve, memory: PeakMemory, bar: Bar) -> Record:
         """Compute one case, mesh and all; collective."""
-        mesh, seconds = self._mesh(solve)
+        with recorded() as times:
+            mesh = self._mesh(solve)
         with Spaces(mesh) as spaces, problem_of(spaces, solve.case, shared=False) as problem:
-            record = self._solve(solve, problem, Ground(spaces, seconds, memory), bar)
+            record = self._solve(solve, problem, Meshed(spaces, times, memory), bar)
         del mesh, spaces, problem
         give_back(self._comm)
         return record
 
-    def _solve(self, solve: Solve, problem: FieldProblem, ground: Ground, bar: Bar) -> Record:
+    def _solve(self, solve: Solve, problem: FieldProblem, meshed: Meshed, bar: Bar) -> Record:
         needed, with_bar = memory_of(solve.case, problem.dofs)
         check_memory(self._free, needed, "solving")
         missing = self._lacks_room(bar, with_bar)
         estimate_it = bar is not Bar.NONE and not missing
         solution = solve_problem(solve.case, problem, estimate=estimate_it, meshed=solve.meshed_case)
-        record = record_of(solve, solution, ground.seconds)
-        return replace(self._stamp(record, ground.memory), message=missing)
+        record = record_of(solve, solution, meshed.times.mesh)
+        return replace(self._stamp(record, meshed.memory), message=missing)
 
     def _lacks_room(self, bar: Bar, needed: float) -> str:
         """Return what to say if there is no memory for an error bar that may be left out; collective.
@@ -236,8 +238,8 @@ class StepRunner:
         record = on_first_rank(self._comm, lambda: record_of(solve, solve_problem(solve.case, problem, estimate=True)))
         return self._stamp(self._comm.bcast(record), memory)
 
-    def _mesh(self, solve: Solve) -> tuple[BodyMesh, float]:
-        """Return the distributed mesh of a solve and the seconds that it took; collective. What is timed is made."""
+    def _mesh(self, solve: Solve) -> BodyMesh:
+        """Return the distributed mesh of a solve; collective. What is timed is made."""
         case = solve.meshed_case
         self._progress.note(f"meshing: {solve.label}")
         check_memory(self._free, estimate.case_memory(case, share=0.5 ** len(solve.mirrors)), "this case")

@@ -269,7 +269,7 @@ def _readable(text: str) -> Record | None:
     """Return the record that ``text`` is, None if it is none."""
     try:
         return Record.from_json(text)
-    except (ValueError, TypeError, KeyError, RecursionError):
+    except ValueError:
         return None
 
 

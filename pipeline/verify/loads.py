@@ -60,7 +60,7 @@ def _work_without_probe(comm: MPI.Comm, load: Section) -> float:
     body = box(x, y, z)
     study = parse({"body": body, "material": tissue(0.0) | _HEAVY, "probe": probe, "mesh": straight, "load": load})
     case = study.case(())
-    found, _ = mesh_case(case, (), comm)
+    found = mesh_case(case, (), comm)
     dead = dead_loads_of(case)
     assert dead is not None
     with Spaces(found) as spaces, QuasiStaticProblem(spaces, 2, Conditions(unilateral=True)) as problem:

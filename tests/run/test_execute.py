@@ -21,6 +21,7 @@ from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.progress import Silent
 from pipeline.solve.linear import SolveError
 from pipeline.solve.solution import BALANCE_LIMIT
+from pipeline.stages import Times, recharge
 from tests.cases import BLADE, solve, study
 
 WORLD = MPI.COMM_WORLD
@@ -275,20 +276,20 @@ def test_many_cases_do_not_grow_memory():
 
 @pytest.mark.skipif(WORLD.size > 1, reason="serial")
 def test_timed_cases_are_medians_of_repeats_each_made_afresh(monkeypatch, tmp_path):
-    """Meshes said to take 5, 1 and 3 s; the fourth one is that of the error bar, which is no part of the case."""
-    told = iter([5.0, 1.0, 3.0, 100.0])
+    """Meshes said to take 5, 1 and 3 Ms; the fourth one is that of the error bar, which is no part of the case."""
+    told = iter([5e6, 1e6, 3e6, 1e8])
 
     def mesh_case(*arguments):
-        mesh, _ = meshing.mesh_case(*arguments)
-        return mesh, next(told)
+        recharge(Times(mesh=next(told)))
+        return meshing.mesh_case(*arguments)
 
     monkeypatch.setattr("pipeline.run.runner.mesh_case", mesh_case)
     plan = make_plan(study(solve={"timing": True, "repeats": 3, "exact": False}))
     found = []
     assert execute(plan, MPI.COMM_SELF, found.append, Silent(), cache=MeshCache(tmp_path)) == 0
     (record,) = found
-    assert record.time_mesh == 3.0
-    assert record.time_error > 100.0
+    assert record.time_mesh == pytest.approx(3e6, rel=1e-4)
+    assert record.time_error > 1e8
     assert 0 < record.force_error < 0.5
     assert next(told, None) is None
     assert not list(tmp_path.iterdir())

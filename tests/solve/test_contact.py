@@ -43,7 +43,7 @@ def record(comm=MPI.COMM_SELF, mesh=None, **changes):
 def pressed(tool=None, **changes):
     """Lend the problem of a scene, with another tool, perhaps, on its candidates; and its material and loads."""
     (case,) = study(**{"body": SMALL, "probe": SPHERE, "mesh": COARSE} | changes).cases()
-    body, _ = mesh_case(case, ("y",) if tool else ("x", "y"), MPI.COMM_SELF)
+    body = mesh_case(case, ("y",) if tool else ("x", "y"), MPI.COMM_SELF)
     with Spaces(body) as spaces:
         yield ContactProblem(spaces, tool or tool_of(case), case.element), law_of(case), loads_of(case)
 

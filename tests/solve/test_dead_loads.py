@@ -30,7 +30,7 @@ SIDES = {"on": "sides", "pressure": "100 Pa"}
 @pytest.fixture(scope="module")
 def body() -> BodyMesh:
     """Return a quarter of the box in straight cells, on which polynomials are exact."""
-    mesh, _ = mesh_case(study(mesh={"degree": 1}).case(()), ("x", "y"), MPI.COMM_SELF)
+    mesh = mesh_case(study(mesh={"degree": 1}).case(()), ("x", "y"), MPI.COMM_SELF)
     return mesh
 
 
@@ -78,7 +78,7 @@ def test_resultants_are_those_of_the_loads(body):
 def test_each_layer_has_its_own_weight():
     skin = {"name": "skin", "thickness": "5 mm", "young": "10 kPa", "poisson": 0.3, "density": "2120 kg/m^3"}
     case = study(body={"layers": [skin]}, material=HEAVY, load=GRAVITY, mesh={"degree": 1}).case(())
-    layered, _ = mesh_case(case, ("x", "y"), MPI.COMM_SELF)
+    layered = mesh_case(case, ("x", "y"), MPI.COMM_SELF)
     with Spaces(layered) as spaces:
         applied = apply_loads(dead_loads_of(case), layered, spaces.get(1, Conditions()).dofs.space)
     assert applied.resultant == pytest.approx([0, 0, -WEIGHT * (2 * 5e-3 + 15e-3) * 20e-3**2], abs=1e-12)
@@ -105,7 +105,7 @@ def test_loads_add_up_and_leave_the_force_of_the_depth(pulled):
 def test_what_ranks_add_for_each_other_counts():
     """Shape functions add up to 1: so do the forces of all dofs to the resultant, wherever they are owned."""
     load = {**GRAVITY, "traction": [PULL]}
-    body, _ = mesh_case(study(mesh={"degree": 1}).case(()), ("x", "y"), MPI.COMM_WORLD)
+    body = mesh_case(study(mesh={"degree": 1}).case(()), ("x", "y"), MPI.COMM_WORLD)
     with Spaces(body) as spaces:
         space = spaces.get(2, Conditions()).dofs.space
         applied = apply_loads(dead_loads_of(study(material=HEAVY, load=load).case(())), body, space)

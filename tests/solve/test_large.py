@@ -30,7 +30,7 @@ SKIN = {"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.4}
 def test_uniform_stretch(stretch):
     """Pulled along z with free sides: what is stored, and the force on each face, are the closed form's."""
     (planned,) = make_plan(study(material=LARGE)).solves
-    body, _ = mesh_case(planned.case, planned.mirrors, MPI.COMM_SELF, None)
+    body = mesh_case(planned.case, planned.mirrors, MPI.COMM_SELF, None)
     law = MaterialLaw.of_moduli(10e3, 0.3)
     (lame_lambda,), (mu,) = law.lame_lambda, law.lame_mu
     # Of the sides: μ (b - 1/b) + λ (J - 1) b stretch = 0 with J = b² stretch, by Newton's method.

@@ -38,7 +38,7 @@ def law(poisson: float, young: float = YOUNG) -> MaterialLaw:
 
 
 def make_mesh(comm: MPI.Comm = MPI.COMM_SELF, mirrors: tuple[str, ...] = QUARTER, **changes: Any) -> BodyMesh:
-    body, _ = mesh_case(study(**changes).case(()), mirrors, comm)
+    body = mesh_case(study(**changes).case(()), mirrors, comm)
     return body
 
 

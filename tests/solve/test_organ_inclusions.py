@@ -25,7 +25,7 @@ NATIVE = {"shape": "ellipsoid", "axes": ["60 mm", "45 mm", "30 mm"], "fixed": {"
 
 
 def meshed(body) -> BodyMesh:
-    return mesh_case(study(body=body | {"inclusion": [TUMOUR]}, probe=PROBE, mesh=MESH).case(()), (), MPI.COMM_SELF)[0]
+    return mesh_case(study(body=body | {"inclusion": [TUMOUR]}, probe=PROBE, mesh=MESH).case(()), (), MPI.COMM_SELF)
 
 
 def force(mesh: BodyMesh, law: MaterialLaw, method: str = "iterative") -> float:

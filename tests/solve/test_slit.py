@@ -29,7 +29,7 @@ def case_of(mesh=COARSE, body=BODY, **probe):
 
 
 def run(case, mirrors=QUARTER, kind="displacement", poisson=0.3, comm=MPI.COMM_SELF, **options):
-    mesh, _ = mesh_case(case, mirrors, comm)
+    mesh = mesh_case(case, mirrors, comm)
     with Spaces(mesh) as spaces, QuasiStaticProblem(spaces, case.mesh.degree, conditions_of(case), kind) as problem:
         return problem.solve(law(poisson), loads_of(case), **options)
 
@@ -70,7 +70,7 @@ def test_change_of_energy():
 def test_strain_is_read_clear_of_the_front():
     """Of the cells about it, and of no other."""
     case = case_of()
-    mesh, _ = mesh_case(case, QUARTER, MPI.COMM_SELF)
+    mesh = mesh_case(case, QUARTER, MPI.COMM_SELF)
     front = conditions_of(case).front
     whole, clear = clear_cells(mesh), clear_cells(mesh, front)
     corners = compat.geometry_dofs(mesh.mesh)[: mesh.owned_cells, :4]
