@@ -7,7 +7,7 @@ import typer
 
 from pipeline import __version__
 from pipeline.cli.console import load_solvers, print_json, warning
-from pipeline.cli.faults import BAD_INPUT, DONE, SOME_FAILED, Fault, fail, of_file, of_option, of_unwritten
+from pipeline.cli.faults import BAD_INPUT, DONE, SOME_FAILED, Fault, fail, of_file, of_option, of_unwritten, refusing
 from pipeline.cli.words import DEFAULT_OUTPUT, File, Json, check_machine, check_output, load_all
 from pipeline.files import LEAST_ROOM
 
@@ -64,10 +64,8 @@ def export(
     path = output or DEFAULT_OUTPUT / f"{study.name}.epsm.nc"
     check_output(path, room=_WITH_SURFACE if surface else LEAST_ROOM)
     check_machine()
-    try:
+    with refusing(ExportError, file=file, howto=_HOWTO):
         scope = scope_of(study)
-    except ExportError as problem:
-        fail(Fault(str(problem), file=str(file), howto=_HOWTO))
     load_solvers()
     from threadpoolctl import threadpool_limits
 

@@ -1,7 +1,8 @@
 """How a command ends that cannot go on: told to people on standard error, and to scripts as JSON where they asked."""
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -74,6 +75,15 @@ def fail(*faults: Fault | str, status: int = BAD_INPUT) -> NoReturn:
     if is_json_wanted():
         print_json(as_data(found, status))
     raise typer.Exit(status)
+
+
+@contextmanager
+def refusing(*errors: type[Exception], file: str | Path, howto: str | None = None) -> Iterator[None]:
+    """Exit for bad input where one of ``errors`` is raised: its message is what is wrong with ``file``."""
+    try:
+        yield
+    except errors as wrong:
+        fail(Fault(str(wrong), file=str(file), howto=howto))
 
 
 def tell(faults: Iterable[Fault]) -> None:

@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 
-from pipeline.cli.console import print_json, warning
-from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail
-from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output
+from pipeline.cli.console import print_json
+from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_file
+from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output, read_dataset
 
 # What it asks and answers.
 _HOWTO = "docs/guideline.md"
@@ -32,7 +32,6 @@ def guide(
         fail(Fault("give --accuracy, such as 5%, or --budget, such as 10ms, or both", key="--accuracy", howto=_HOWTO))
     from pipeline.report.guide import guide as make_guide
     from pipeline.report.guide import quantity
-    from pipeline.report.read import read
     from pipeline.report.table import DatasetError
 
     for name, value, unit in (("--accuracy", accuracy, ""), ("--budget", budget, "s")):
@@ -41,12 +40,11 @@ def guide(
                 quantity(name, value, unit)
         except ValueError as wrong:
             fail(Fault(str(wrong), key=name, value=value, allowed=str(wrong).rpartition(": ")[2], howto=_HOWTO))
+    _, dataset = read_dataset(file, output)
     try:
-        found = make_guide(read(file, output, warning), accuracy, budget)
+        found = make_guide(dataset, accuracy, budget)
     except DatasetError as wrong:
-        fail(
-            Fault(str(wrong) if str(wrong).startswith(str(file)) else f"{file}: {wrong}", file=str(file), howto=_HOWTO)
-        )
+        fail(of_file(file, str(wrong), _HOWTO))
     if as_json:
         print_json(found.to_dict())
     else:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipeline.cli.console import error, print_json
-from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_file
+from pipeline.cli.faults import DONE, SOME_FAILED, fail, of_file, refusing
 from pipeline.cli.words import (
     CLUSTER,
     DEFAULT_OUTPUT,
@@ -117,15 +117,13 @@ def _merged(paths: list[Path], path: Path, plan: "Plan") -> "tuple[tuple[Source,
 
     if path.resolve() in [source.resolve() for source in paths]:
         fail(of_file(path, "this store is what the others are merged into; it cannot be one of them"))
-    try:
+    with refusing(StoreError, file=path):
         store = Store(path)
         if store.notice:
             error(store.notice)
         sources = merging.merge(paths, store)
         records = store.get({*plan.keys, *plan.reference_keys})
         store.close()
-    except StoreError as problem:
-        fail(Fault(str(problem), file=str(path)))
     return sources, records | skipped(plan, records)
 
 

@@ -1,16 +1,13 @@
 """The commands that show a dataset: figures, report."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from pipeline.cli.console import print_json, warning
+from pipeline.cli.console import print_json
 from pipeline.cli.faults import Fault, fail, of_option
-from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output, check_machine, check_output
-
-if TYPE_CHECKING:
-    import xarray as xr
+from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output, check_machine, check_output, read_dataset
 
 # Bytes that a page may take: figures, parts of the first one and some thousand cases; a scene besides.
 _PAGE, _PAGE_WITH_SCENE = 2_000_000, 5_000_000
@@ -44,7 +41,7 @@ def plot(
 
     Example: epsmesh plot studies/figure3.toml --kind error --kind force
     """
-    path, dataset = _read(file, output)
+    path, dataset = read_dataset(file, output)
     from pipeline.report.figures import KINDS, choose, draw, files, lacks
 
     for name in kind or ():
@@ -87,7 +84,7 @@ def report(
 
     Example: epsmesh report results/figure3.nc --scene none
     """
-    path, dataset = _read(file, output)
+    path, dataset = read_dataset(file, output)
     wanted = (scene or "").strip()
     check_output(path.with_suffix(".html"), room=_PAGE if wanted in ("", _NONE) else _PAGE_WITH_SCENE)
     if wanted not in ("", _NONE):
@@ -101,14 +98,3 @@ def report(
         print_json({"file": str(path), "page": str(page)})
     else:
         print(page)
-
-
-def _read(file: Path, output: Path) -> "tuple[Path, xr.Dataset]":
-    """Return the dataset that ``file`` names, in memory, and where it is; exit if there is none."""
-    from pipeline.report.read import dataset_path, read
-    from pipeline.report.table import DatasetError
-
-    try:
-        return dataset_path(file, output), read(file, output, warning)
-    except DatasetError as wrong:
-        fail(Fault(str(wrong), file=str(file)))

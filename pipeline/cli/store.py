@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipeline.cli.console import print_json, warning
-from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_file
+from pipeline.cli.faults import DONE, SOME_FAILED, fail, of_file, refusing
 from pipeline.cli.words import DEFAULT_OUTPUT, Json, check_store
 from pipeline.files import STORE_NAME
 from pipeline.quantities import counted
@@ -71,23 +71,12 @@ def prune(
 
     Example: epsmesh store prune --days 90 --failed --yes
     """
-    from pipeline.run.store import DamagedStoreError, StoreError
+    from pipeline.run.store import StoreError
 
     _check(store)
     older_than = None if days is None else 86400 * days
-    try:
+    with refusing(StoreError, file=store):
         found = _found(store, older_than, failed=failed)
-    except DamagedStoreError as wrong:
-        found = {
-            "file": str(store),
-            "records": None,
-            "remove": None,
-            "bytes": store.stat().st_size,
-            "reasons": {},
-            "damaged": str(wrong),
-        }
-    except StoreError as wrong:
-        fail(Fault(str(wrong), file=str(store)))
     moved = _prune(store, older_than, failed=failed) if yes else ""
     if as_json:
         print_json(found | {"done": yes, "notice": moved})
@@ -110,31 +99,34 @@ def _said(found: dict[str, Any], *, done: bool) -> str:
 def _found(store: Path, older_than: float | None, *, failed: bool) -> dict[str, Any]:
     """Return what is to be removed, as data; the store is left as it is."""
     from pipeline.run.reading import open_to_read
+    from pipeline.run.store import DamagedStoreError
 
-    with open_to_read(store) as opened:
-        doomed, count = opened.doomed(older_than=older_than, failed=failed), len(opened.rows())
-    return {
+    unknown: dict[str, Any] = {
         "file": str(store),
-        "records": count,
-        "remove": len(doomed),
-        "bytes": sum(one.size for one in doomed),
-        "reasons": dict(Counter(one.why for one in doomed)),
-        "damaged": "",
+        "records": None,
+        "remove": None,
+        "bytes": store.stat().st_size,
+        "reasons": {},
     }
+    try:
+        with open_to_read(store) as opened:
+            doomed, count = opened.doomed(older_than=older_than, failed=failed), len(opened.rows())
+    except DamagedStoreError as wrong:
+        return unknown | {"damaged": str(wrong)}
+    size, reasons = sum(one.size for one in doomed), dict(Counter(one.why for one in doomed))
+    return unknown | {"records": count, "remove": len(doomed), "bytes": size, "reasons": reasons, "damaged": ""}
 
 
 def _prune(store: Path, older_than: float | None, *, failed: bool) -> str:
     """Remove it; return what became of a store that is damaged as a whole."""
     from pipeline.run.store import Store, StoreError
 
-    try:
+    with refusing(StoreError, file=store):
         opened = Store(store)
         if opened.notice:
             warning(opened.notice)
         opened.prune(older_than=older_than, failed=failed)
         opened.close()
-    except StoreError as wrong:
-        fail(Fault(str(wrong), file=str(store)))
     return opened.notice
 
 
@@ -164,11 +156,8 @@ def _read(path: Path) -> Iterator["Records"]:
     from pipeline.run.store import StoreError
 
     _check(path)
-    try:
-        with open_to_read(path) as opened:
-            yield opened
-    except StoreError as wrong:
-        fail(Fault(str(wrong), file=str(path)))
+    with refusing(StoreError, file=path), open_to_read(path) as opened:
+        yield opened
 
 
 def _check(path: Path) -> None:

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipeline.cli.console import warning
-from pipeline.cli.faults import Fault, fail, of_file, of_option, of_study
+from pipeline.cli.faults import Fault, fail, of_file, of_option, of_study, refusing
 from pipeline.files import LEAST_ROOM, STORE_NAME, cache_folder, why_not_writable
 from pipeline.study.vocabulary import REDUCTIONS
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from pipeline.plan.cost import CostModel
     from pipeline.plan.plan import Plan
     from pipeline.plan.shard import Shard
@@ -95,10 +97,17 @@ def stored_records(path: Path, plan: "Plan") -> "tuple[dict[str, Record], CostMo
     from pipeline.run.store import StoreError
 
     check_store(path)
-    try:
+    with refusing(StoreError, file=path):
         return known_of(path, plan)
-    except StoreError as problem:
-        fail(Fault(str(problem), file=str(path)))
+
+
+def read_dataset(file: Path, output: Path) -> "tuple[Path, xr.Dataset]":
+    """Return the dataset that ``file`` names, in memory, and where it is; exit if there is none."""
+    from pipeline.report.read import dataset_path, read
+    from pipeline.report.table import DatasetError
+
+    with refusing(DatasetError, file=file):
+        return dataset_path(file, output), read(file, output, warning)
 
 
 def check_store(path: Path) -> None:

@@ -1,7 +1,7 @@
 """What is kept of a case: its force, its checks, what it cost, and where it was computed."""
 
 import json
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache
 from math import isfinite, nan
 
@@ -139,7 +139,10 @@ class Record:
         Raises:
             ValueError: if it is no record.
         """
-        return _adapter().validate_json(text)
+        record = _adapter().validate_json(text)
+        if missing := {one.name for one in fields(Record)} - json.loads(text).keys():
+            raise ValueError(f"it lacks {', '.join(sorted(missing))}")
+        return record
 
 
 @cache
