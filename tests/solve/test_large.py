@@ -182,7 +182,7 @@ def test_a_study_takes_every_law_and_no_other():
 def test_laws_are_linear_at_small_strains(law):
     """The tangent without displacement is the stiffness of linear elasticity."""
     (planned,) = make_plan(study()).solves
-    body, _ = mesh_case(planned.case, planned.mirrors, MPI.COMM_SELF, None)
+    body = mesh_case(planned.case, planned.mirrors, MPI.COMM_SELF, None)
     space = vector_space(body.mesh, 2)
     elastic = ElasticForms(space)
     elastic.set_law(MaterialLaw.of_moduli(10e3, 0.4))
@@ -199,7 +199,7 @@ def test_laws_of_one_space_have_forms_of_their_own(monkeypatch):
     """Forms of a second law are not taken for those of the first."""
     monkeypatch.setitem(LAWS, "stiffer", lambda *of: 2 * LAWS["neo-hookean"](*of))
     (planned,) = make_plan(study()).solves
-    body, _ = mesh_case(planned.case, planned.mirrors, MPI.COMM_SELF, None)
+    body = mesh_case(planned.case, planned.mirrors, MPI.COMM_SELF, None)
     space = vector_space(body.mesh, 1)
     elastic = ElasticForms(space)
     elastic.set_law(MaterialLaw.of_moduli(10e3, 0.4))
