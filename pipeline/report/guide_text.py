@@ -108,11 +108,9 @@ def _for_other_tools(guide: Guideline) -> str:
         why = "; ".join(f"{counted(count, 'scene')}: {reason}" for reason, count in guide.no_law)
         return f"For other tools: nothing can be said: it takes a study of several tools{f' ({why})' if why else ''}"
     best = "" if guide.carried else "no setting does that either; best reached: "
+    found = f"{best}{words(chosen.labels)}, {law.formula}, {constants(law)}"
     off = f"off by at most {percent(law.error)} for tools that it was not fitted to"
-    return (
-        f"For other tools on the same tissue: {best}{words(chosen.labels)}, {law.formula}, {constants(law)}; {off}"
-        f"\n  fitted to: {'; '.join(guide.tools)}"
-    )
+    return f"For other tools on the same tissue: {found}; {off}. Fitted to: {'; '.join(guide.tools)}"
 
 
 def of_each_outside(guide: Guideline) -> pd.DataFrame:

@@ -1,6 +1,7 @@
 """The report of a study: one HTML page that holds all it needs, made from the dataset alone."""
 
 import re
+from importlib.resources import files
 from pathlib import Path
 from shlex import quote as shell
 from typing import Any
@@ -9,7 +10,7 @@ from urllib.parse import quote
 import xarray as xr
 
 from pipeline.files import write_whole
-from pipeline.pages import joined, render_page
+from pipeline.pages import hash_of, joined, render_page
 from pipeline.report.figures import choose, describe, figure
 from pipeline.report.page.cases import FIRST_ROWS, case_table
 from pipeline.report.page.facts import facts, failures, provenance, reproduce, without_exact
@@ -19,7 +20,11 @@ from pipeline.report.page.skipped import origins, skipped, struck
 
 # What the answer says of times, and the headlines need not say again.
 _TOLD = "speed-ups"
-_TEMPLATES = Path(__file__).parent / "templates"
+# What the curves show first.
+_MAIN = ("force_ratio", "accuracy", "force")
+_TEMPLATES, _VENDOR = Path(__file__).parent / "templates", Path(__file__).parent / "vendor"
+_BUNDLE = Path(str(files("itables"))) / "html" / "dt_bundle.js"
+_EXPORT = re.compile(r"export\s*\{[^}]*?([\w$]+) as default[^}]*\};?")
 _SCRIPT = re.compile(r"'sha256-[A-Za-z0-9+/=]+'")
 
 
@@ -39,18 +44,40 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
     study = str(dataset.attrs.get("study", ""))
     guide = guide_section(dataset)
     table = case_table(dataset)
+    plotly = joined(_VENDOR / "plotly-basic.min.js")
+    names = [column.name for column in table.columns]
     return render_page(
-        _TEMPLATES / "page.html.j2", joined(_TEMPLATES / "page.js"),
-        title=dataset.attrs.get("title", name), name=name, style=joined(_TEMPLATES / "page.css"),
-        scene=scene, scene_scripts=_SCRIPT.findall(scene)[:2],
+        _TEMPLATES / "page.html.j2",
+        f"{_data_tables()}\n{joined(_TEMPLATES / 'page.js')}",
+        plotly=plotly,
+        plotly_hash=hash_of(plotly),
+        title=dataset.attrs.get("title", name),
+        name=name,
+        style=joined(_BUNDLE.with_suffix(".css"), _TEMPLATES / "page.css"),
+        scene=scene,
+        scene_scripts=_SCRIPT.findall(scene)[:2],
         facts=[fact for fact in facts(dataset) if not (guide and fact[0] == _TOLD)],
-        failures=failures(dataset), without_exact=without_exact(dataset),
-        figures=_figures(dataset), guide=guide, table=table, first_rows=FIRST_ROWS,
-        struck=struck(dataset), origins=origins(dataset), skipped=skipped(dataset),
-        study=study, study_link=f"data:text/plain;charset=utf-8,{quote(study)}",
-        provenance=provenance(dataset), commands=reproduce(dataset, name),
+        failures=failures(dataset),
+        without_exact=without_exact(dataset),
+        figures=_figures(dataset),
+        guide=guide,
+        table=table,
+        main=next((name for name in _MAIN if name in names), "force"),
+        first_rows=FIRST_ROWS,
+        struck=struck(dataset),
+        origins=origins(dataset),
+        skipped=skipped(dataset),
+        study=study,
+        study_link=f"data:text/plain;charset=utf-8,{quote(study)}",
+        provenance=provenance(dataset),
+        commands=reproduce(dataset, name),
         turn=f"epsmesh report {shell(f'results/{name}.nc')} --scene answer",
-    )  # fmt: skip
+    )
+
+
+def _data_tables() -> str:
+    """Return the script of DataTables, from itables, as a part of a module: it exports nothing."""
+    return _EXPORT.sub(r"const DataTable=\1;", joined(_BUNDLE))
 
 
 def _figures(dataset: xr.Dataset) -> list[dict[str, Any]]:

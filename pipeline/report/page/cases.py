@@ -11,8 +11,8 @@ from pipeline.pages import json_in_page
 from pipeline.quantities import QUANTITIES
 from pipeline.report.words import is_numeric, number, scale, symbol
 
-# Rows in the page before anybody asks for more; the script's number, too.
-FIRST_ROWS = 200
+# Rows of a page of the table.
+FIRST_ROWS = 50
 _STATES = ("failed", "pending", "skipped", "lost", "ok")  # the order of the rows
 # The columns of numbers; some are shown only when asked for.
 _QUANTITIES = (
@@ -28,7 +28,8 @@ _DIGITS = 4
 class Column:
     """A column: ``values`` are numbers (None: none) or, where there are ``words``, the index of a word.
 
-    ``keys`` sort the words of a swept number; ``hint`` is the long name; ``is_first`` columns are shown at first.
+    ``keys`` sort the words of a swept number; ``hint`` is the long name; ``is_first`` columns are shown at first, an
+    ``is_axis`` column is swept.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Column:
     keys: list[float] | None = None
     is_filter: bool = False
     is_first: bool = True
+    is_axis: bool = False
 
     def text(self, row: int) -> str:
         """Return what stands in a row."""
@@ -93,7 +95,7 @@ def _axis(dataset: xr.Dataset, dim: str, position: int, dims: list[str]) -> Colu
     keys = [min(float(value), 1e300) for value in values] if is_numeric(coordinate) else None
     hint = str(coordinate.attrs.get("long_name", dim))
     words = [number(coordinate, value) for value in values]
-    return Column(dim, symbol(coordinate), codes.tolist(), hint, words, keys, is_filter=True)
+    return Column(dim, symbol(coordinate), codes.tolist(), hint, words, keys, is_filter=True, is_axis=True)
 
 
 def _quantity(array: xr.DataArray, name: str) -> Column:

@@ -1,167 +1,160 @@
+// The table of cases, by DataTables, and the curves, by plotly. What the table shows is in the address, after #, so that
+// a link shows the same: #sort=force&order=down&status=ok&epsilon=10 mm&text=…&columns=all&rows=200
+const { columns, order, rows: step } = JSON.parse(document.getElementById("data").textContent);
+const byName = new Map(columns.map((column) => [column.name, column]));
+const form = document.getElementById("filters");
+const escaped = (text) => text.replace(/[&<>"']/g, (sign) => `&#${sign.charCodeAt(0)};`);
 
-"use strict";
-// The table of cases. What it shows stands in the address, after #, so that a link shows the same:
-// #sort=force&order=down&status=ok&epsilon=10 mm&text=…&columns=all&rows=400
-(() => {
-  const table = document.getElementById("table");
-  const form = document.querySelector(".filters");
-  const further = document.getElementById("further");
-  const all = document.getElementById("all");
-  const { columns, order, rows: step } = JSON.parse(document.getElementById("data").textContent);
-  const byName = new Map(columns.map((column) => [column.name, column]));
-  const heads = new Map([...table.tHead.rows[0].cells].map((head) => [head.dataset.name, head]));
-  const nothing = () => ({ sort: "", order: "up", filters: {}, text: "", full: false, rows: step });
-  const most = 3000; // rows that a phone can still lay out
-  let state = nothing();
+function textOf(column, row) {
+  const value = column.values[row];
+  return column.words ? column.words[value] : value === null ? "" : String(value);
+}
 
-  const textOf = (column, row) => {
-    const value = column.values[row];
-    return column.words ? column.words[value] : value === null ? "" : String(value);
+function keyOf(column, row) {
+  const value = column.values[row];
+  if (!column.words || value === null) return value;
+  return column.keys ? column.keys[value] : column.words[value] || null;
+}
+
+// Cases without a value come last, whichever way the others are sorted.
+function by(sign) {
+  return (a, b) => {
+    if (a === b) return 0;
+    if (a === null || b === null) return a === null ? 1 : -1;
+    return sign * (typeof a === "string" ? a.localeCompare(b, "en") : a - b);
   };
+}
+Object.assign(DataTable.ext.type.order, { "case-asc": by(1), "case-desc": by(-1) });
+document.querySelector("#table tbody").replaceChildren();
+const table = new DataTable("#table", {
+  data: order.map((row) => ({ row })),
+  columns: columns.map((column) => ({
+    name: column.name,
+    type: "case",
+    visible: column.is_first,
+    className: `${column.words ? "word" : "number"} ${column.name}`,
+    data: ({ row }, kind) => {
+      if (kind === "sort" || kind === "type") return keyOf(column, row);
+      return kind === "display" ? escaped(textOf(column, row)) : textOf(column, row);
+    },
+  })),
+  createdRow: (line, { row }) => line.classList.add(textOf(byName.get("status"), row)),
+  order: [],
+  autoWidth: false,
+  deferRender: true,
+  pageLength: step,
+  lengthMenu: [step, 5 * step, 20 * step],
+  layout: { topStart: null, topEnd: null, bottomStart: "info", bottomEnd: ["pageLength", "paging"] },
+  language: { info: "Cases _START_ to _END_ of _TOTAL_", infoEmpty: "No case", infoFiltered: "matching, of _MAX_" },
+});
 
-  function read() {
-    const given = new URLSearchParams(location.hash.slice(1));
-    const found = nothing();
-    found.sort = byName.has(given.get("sort")) ? given.get("sort") : "";
-    found.order = given.get("order") === "down" ? "down" : "up";
-    found.text = given.get("text") || "";
-    found.full = given.get("columns") === "all";
-    found.rows = Math.min(most, Math.max(step, Number.parseInt(given.get("rows"), 10) || 0));
-    for (const column of columns) {
-      const word = given.get(column.name);
-      if (column.is_filter && column.words.includes(word)) found.filters[column.name] = word;
-    }
-    return found;
+function apply() {
+  for (const { name, value, checked } of form.elements) {
+    if (name === "text") table.search(value);
+    else if (name === "columns") columns.forEach((c, i) => table.column(i).visible(c.is_first || checked, false));
+    else if (name) table.column(`${name}:name`).search(value ? (text) => text === value : "");
   }
+  table.draw();
+}
 
-  function write() {
-    const told = new URLSearchParams(state.filters);
-    if (state.sort) told.set("sort", state.sort);
-    if (state.sort && state.order === "down") told.set("order", "down");
-    if (state.text) told.set("text", state.text);
-    if (state.full) told.set("columns", "all");
-    if (state.rows > step) told.set("rows", state.rows);
-    history.replaceState(null, "", `#${told.size || [...told].length ? told : "cases"}`);
+function write() {
+  const told = new URLSearchParams();
+  for (const { name, value, checked } of form.elements) {
+    if (name === "columns" ? checked : name && value) told.set(name, name === "columns" ? "all" : value);
   }
+  const [sorted] = table.order();
+  if (sorted && sorted[1]) told.set("sort", columns[sorted[0]].name);
+  if (sorted && sorted[1] === "desc") told.set("order", "down");
+  if (table.page.len() !== step) told.set("rows", table.page.len());
+  history.replaceState(null, "", `#${[...told].length ? told : "cases"}`);
+}
 
-  function chosen() {
-    const filters = Object.entries(state.filters).map(([name, word]) => {
-      const column = byName.get(name);
-      return [column.values, column.words.indexOf(word)];
-    });
-    const words = state.text.toLowerCase().split(/\s+/).filter(Boolean);
-    const found = order.filter(
-      (row) =>
-        filters.every(([values, code]) => values[row] === code) &&
-        (!words.length || matches(words, columns.map((column) => textOf(column, row)).join("\n").toLowerCase())),
-    );
-    return state.sort ? sorted(found, byName.get(state.sort)) : found;
+function follow() {
+  if (!location.hash.includes("=")) return;
+  const given = new URLSearchParams(location.hash.slice(1));
+  for (const field of form.elements) {
+    if (field.name === "columns") field.checked = given.get("columns") === "all";
+    else if (field.name) field.value = given.get(field.name) || "";
+    if (field.selectedIndex === -1) field.value = "";
   }
+  const sort = columns.findIndex((column) => column.name === given.get("sort"));
+  table.order(sort < 0 ? [] : [[sort, given.get("order") === "down" ? "desc" : "asc"]]);
+  const rows = Number.parseInt(given.get("rows"), 10);
+  table.page.len(rows > 0 ? rows : step);
+  apply();
+  document.getElementById("cases").scrollIntoView();
+}
 
-  const matches = (words, text) => words.every((word) => text.includes(word));
+form.addEventListener("input", apply);
+form.addEventListener("reset", () => setTimeout(() => (table.order([]), apply())));
+form.addEventListener("submit", (event) => event.preventDefault());
+form.hidden = false;
+follow();
+table.on("draw", write);
+window.addEventListener("hashchange", follow);
 
-  // Cases without a value come last, whichever way the others are sorted.
-  function sorted(found, column) {
-    const sign = state.order === "down" ? -1 : 1;
-    const key = (row) => {
-      const value = column.values[row];
-      if (!column.words || value === null) return value;
-      return column.keys ? column.keys[value] : column.words[value] || null;
-    };
-    const compare = (a, b) => (a === b ? 0 : typeof a === "string" ? a.localeCompare(b, "en") : a - b);
-    const known = found.filter((row) => key(row) !== null);
-    const unknown = found.filter((row) => key(row) === null);
-    return [...known.sort((a, b) => sign * compare(key(a), key(b))), ...unknown];
+// The curves: one for each combination of what is swept, but for what is drawn across.
+const axes = document.querySelector(".axes");
+const swept = columns.filter((column) => column.is_axis && column.words.length > 1);
+const measured = columns.filter((column) => !column.words && column.name !== "case");
+const alone = (column) => ({ column, label: (row) => `${column.heading} = ${textOf(column, row)}` });
+const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+function curves(x, y) {
+  const along = x.is_axis ? x : byName.get("epsilon") || swept[0];
+  const others = swept.filter((column) => column !== along).map(alone);
+  const groups = new Map();
+  for (const row of [...order].sort((a, b) => a - b)) {
+    const name = others.map(({ label }) => label(row)).join(", ");
+    if (!groups.has(name)) groups.set(name, []);
+    groups.get(name).push(row);
   }
+  const bars = ["force", "accuracy"].includes(y.name) && byName.get("force_error");
+  return [...groups].map(([name, rows]) => ({
+    name: escaped(name),
+    x: rows.map((row) => (x.words ? place(x, x.values[row]) : x.values[row])),
+    y: rows.map((row) => y.values[row]),
+    text: rows.map((row) => escaped(`case ${row}: ${columns.filter((c) => c.is_axis).map((c) => alone(c).label(row)).join(", ")}`)),
+    error_y: bars ? { array: rows.map((row) => (y.values[row] * bars.values[row]) / 100), thickness: 1 } : undefined,
+    hovertemplate: "%{text}<br>%{y}<extra></extra>",
+    mode: x.keys || !x.words ? "lines+markers" : "markers",
+  }));
+}
 
-  function draw() {
-    const found = chosen();
-    const shown = found.slice(0, state.rows);
-    const status = byName.get("status");
-    const body = document.createElement("tbody");
-    for (const row of shown) {
-      const line = body.insertRow();
-      line.className = status.words[status.values[row]];
-      for (const column of columns) {
-        const cell = line.insertCell();
-        cell.className = `${column.words ? "word" : "number"}${column.is_first ? "" : " more"} ${column.name}`;
-        cell.textContent = textOf(column, row);
-      }
-    }
-    table.tBodies[0].replaceWith(body);
-    table.classList.toggle("full", state.full);
-    for (const [name, head] of heads) {
-      const way = state.order === "down" ? "descending" : "ascending";
-      head.setAttribute("aria-sort", name === state.sort ? way : "none");
-    }
-    const how = state.sort ? `sorted by ${byName.get(state.sort).heading}` : "failed ones first";
-    const many = found.length === order.length ? `${order.length} cases` : `${found.length} matching of ${order.length} cases`;
-    const message = shown.length < found.length ? `Shown: the first ${shown.length} of ${many}` : `Shown: ${many}`;
-    document.getElementById("shown").textContent = `${message}, ${how}.`;
-    const limit = Math.min(most, found.length);
-    further.parentElement.hidden = shown.length === limit;
-    further.textContent = `show ${Math.min(step, limit - shown.length)} more`;
-    all.textContent = limit < found.length ? `show the first ${limit}` : `show all ${limit}`;
-    all.onclick = () => change({ rows: limit });
-  }
+// Numbers are to scale, in the unit that is read, the full order a step past the largest; words are in a row.
+function place(column, index) {
+  if (!column.keys) return index;
+  const finite = column.words.filter((_, i) => column.keys[i] < 1e300).map(Number.parseFloat);
+  return column.keys[index] < 1e300 ? Number.parseFloat(column.words[index]) : 1.2 * Math.max(...finite, 0) || 1;
+}
 
-  // The form says what is chosen, whoever chose it.
-  function fill() {
-    for (const field of form.elements) {
-      if (field.name === "text") field.value = state.text;
-      else if (field.name === "columns") field.checked = state.full;
-      else if (field.name) field.value = state.filters[field.name] || "";
-    }
-  }
+function plot() {
+  const [x, y] = ["x", "y"].map((name) => byName.get(axes.elements[name].value));
+  const ticks = x.words && { tickvals: x.words.map((_, i) => place(x, i)), ticktext: x.words.map(escaped) };
+  const lines = { gridcolor: style("--grid"), zeroline: false };
+  const type = axes.elements.log.checked ? "log" : "linear";
+  Plotly.react(
+    "plot",
+    curves(x, y),
+    {
+      paper_bgcolor: "transparent",
+      plot_bgcolor: "transparent",
+      font: { color: style("--ink"), size: 14 },
+      colorway: [1, 2, 3, 4, 5, 6, 7].map((number) => style(`--curve-${number}`)),
+      hovermode: "closest",
+      showlegend: true,
+      legend: innerWidth < 700 ? { orientation: "h", y: -0.3 } : {},
+      margin: { t: 20, r: 20 },
+      xaxis: { ...lines, ...ticks, title: { text: escaped(x.hint || x.heading) } },
+      yaxis: { ...lines, type, title: { text: escaped(y.heading) } },
+    },
+    { responsive: true, displaylogo: false },
+  );
+}
 
-  function change(what) {
-    state = { ...state, ...what };
-    write();
-    draw();
-  }
-
-  function sortBy(name) {
-    if (state.sort !== name) change({ sort: name, order: "up" });
-    else if (state.order === "up") change({ order: "down" });
-    else change({ sort: "", order: "up" });
-  }
-
-  for (const [name, head] of heads) {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.textContent = head.textContent;
-    button.addEventListener("click", () => sortBy(name));
-    head.replaceChildren(button);
-  }
-  form.addEventListener("input", (event) => {
-    const { name, value, checked } = event.target;
-    if (name === "text") change({ text: value, rows: step });
-    else if (name === "columns") change({ full: checked });
-    else {
-      const filters = { ...state.filters };
-      if (value) filters[name] = value;
-      else delete filters[name];
-      change({ filters, rows: step });
-    }
-  });
-  form.addEventListener("reset", (event) => {
-    event.preventDefault();
-    change({ ...nothing(), full: state.full });
-    fill();
-  });
-  form.addEventListener("submit", (event) => event.preventDefault());
-  further.addEventListener("click", () => change({ rows: Math.min(most, state.rows + step) }));
-
-  function follow() {
-    if (!location.hash.includes("=")) return;
-    state = read();
-    fill();
-    draw();
-    document.getElementById("cases").scrollIntoView();
-  }
-  window.addEventListener("hashchange", follow);
-  form.hidden = false;
-  fill();
-  draw();
-  follow();
-})();
+if (swept.length && measured.length) {
+  axes.addEventListener("input", plot);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", plot);
+  axes.closest("section").hidden = false;
+  plot();
+}
