@@ -1,5 +1,6 @@
 """The reference pages, written from the code when the documentation is built: study keys, dataset, commands."""
 
+import json
 import re
 import tomllib
 from collections.abc import Iterator
@@ -13,6 +14,7 @@ from pipeline.plan.plan import make_plan
 from pipeline.quantities import attributes
 from pipeline.report.dataset import build
 from pipeline.study.capabilities import FEATURES, OBSTACLES, REFUSALS
+from pipeline.study.json_schema import study_schema
 from pipeline.study.keys import SECTION_TEXTS, all_sections, heading, keys_of
 from pipeline.study.load import parse
 from pipeline.study.starter import starter
@@ -44,9 +46,10 @@ def write_reference(folder: Path) -> None:
     """Write the pages of the reference into ``folder``, where they differ from what is there."""
     folder.mkdir(exist_ok=True)
     pages = {"study": study_page, "features": features_page, "dataset": dataset_page, "commands": commands_page}
-    for name, page in pages.items():
-        text = page()
-        path = folder / f"{name}.md"
+    texts = {f"{name}.md": page() for name, page in pages.items()}
+    texts["study.schema.json"] = json.dumps(study_schema(), indent=1, ensure_ascii=False) + "\n"
+    for name, text in texts.items():
+        path = folder / name
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")
 
@@ -60,7 +63,8 @@ def study_page() -> str:
         "(`[[body]]`, `[[material]]`, `[[probe]]`, `[[mesh]]`), labelled by the tables' `name`. Quantities are text, "
         'one number and one unit (`"10 mm"`, `"12 kPa"`, `"1 %"`, `"60 deg"`): metre and pascal with their '
         "prefixes, `bar`, `%`, `deg` and `rad`; of loads kg/m^3 and m/s^2. A decimal comma, a ±, or a sum is an error. "
-        "`title` stands before the sections.",
+        "`title` stands before the sections. Editors that know JSON schemas complete and check keys by "
+        "{download}`study.schema.json`.",
     ]
     for section in all_sections():
         lines += [

@@ -139,7 +139,6 @@ FEATURES: dict[str, Feature] = {
         "mesh.outside", ("mesh",), lambda s: s.mesh.outside != "coarse" and isfinite(s.mesh.epsilon), _outside
     ),
     "degree 1": Feature("mesh.degree", ("mesh",), lambda s: s.mesh.degree == 1, _degree),
-    "degree 3": Feature("mesh.degree", ("mesh",), lambda s: s.mesh.degree == 3, _degree),
     "mixed elements": Feature("mesh.element", ("mesh",), lambda s: s.mesh.element == "mixed", lambda s: s.mesh.element),
     "accuracy": Feature("mesh.accuracy", ("mesh",), lambda s: s.mesh.accuracy is not None, lambda s: s.mesh.accuracy),
     "loads": Feature("load", ("load",), lambda s: s.load.acts),

@@ -4,15 +4,14 @@ All of it is read from the models: what a key takes, its default, and the words 
 """
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import isinf
-from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
 from pipeline.shapes.section import Section, Words, words_of
+from pipeline.study.json_schema import takes_of
 from pipeline.study.schema import NESTED, SECTIONS, TABLES
 
 
@@ -46,17 +45,6 @@ SECTION_TEXTS = {
     "plan": "What may be left out of the work. Optional; lists are no sweeps here.",
     "figure": "What the study's main figure shows: forces do not depend on it. Optional; lists are no sweeps here.",
 }
-_QUANTITIES = {
-    "m": ("length", "lengths"),
-    "Pa": ("pressure", "pressures"),
-    "1": ("per cent", "per cent"),
-    "rad": ("angle", "angles"),
-    "kg/m^3": ("density", "densities"),
-    "m/s^2": ("acceleration", "accelerations"),
-    "": ("number", "numbers"),
-}
-_PLAIN = {bool: "true | false", int: "whole number", str: "text"}
-_SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 
 
 def keys_of(section: str) -> tuple[Key, ...]:
@@ -75,7 +63,9 @@ def keys_of(section: str) -> tuple[Key, ...]:
         kinds = [_takes(models[shape], name) for shape in shapes]
         takes = " | ".join(dict.fromkeys(part for kind in kinds for part in kind.split(" | ")))
         words = words_of(models[shapes[0]], name)
-        keys.append(Key(name, own, takes, words.default or _default(models[shapes[0]].model_fields[name]), words))
+        keys.append(
+            Key(name, own, takes, words.default or _default(models[shapes[0]].model_fields[name], takes), words)
+        )
     return tuple(keys)
 
 
@@ -114,67 +104,14 @@ def _takes(model: type[Section], name: str) -> str:
         return own
     if name == "on":
         return 'face | "free" | {around = 3 lengths, radius = length}'
-    field = model.model_fields[name]
-    return _kind(field.annotation, _unit(field.annotation, [field])) + _bounds(field)
+    return takes_of(model, name)
 
 
-def _kind(annotation: Any, unit: str) -> str:
-    """Name the values of a type; ``unit`` is what its numbers are in."""
-    kind, parts = get_origin(annotation) or annotation, get_args(annotation)
-    if kind is Annotated:
-        return _kind(parts[0], _unit(parts[0], parts[1:]) or unit)
-    if kind is Literal:
-        return " | ".join(json.dumps(part, ensure_ascii=False) for part in parts)
-    if kind in (Union, UnionType):
-        return " | ".join(_kind(part, unit) for part in parts if part is not NoneType)
-    if kind is tuple and ... in parts:
-        return f"list of {_kind(parts[0], unit).replace(' | ', ', ')}"
-    if kind is tuple:
-        return f"{len(parts)} {_QUANTITIES[unit][1]}"
-    return _QUANTITIES[unit][0] if kind is float else _PLAIN.get(kind, "table")
-
-
-def _unit(annotation: Any, notes: Iterable[Any]) -> str:
-    """Return the SI unit that is noted on a type, or on what it is made of, "" if none is."""
-    extras = (getattr(note, "json_schema_extra", None) for note in _metadata(annotation, notes))
-    return next((str(extra["unit"]) for extra in extras if isinstance(extra, dict) and "unit" in extra), "")
-
-
-def _bounds(field: FieldInfo) -> str:
-    """Write the bounds of a field, or of the items of its list, in SI units."""
-    found: dict[str, float] = {}
-    unit = ""
-    for item in _metadata(field.annotation, field.metadata):
-        extra = getattr(item, "json_schema_extra", None)
-        unit = extra.get("unit", unit) if isinstance(extra, dict) else unit
-        found |= {name: limit for name in _SIGNS if (limit := getattr(item, name, None)) is not None}
-    if unit == "1":
-        return "".join(f", {_SIGNS[name]} {100 * limit:g} %" for name, limit in found.items()).lstrip(",")
-    return ",".join(f" {_SIGNS[name]} {limit:g}" for name, limit in found.items())
-
-
-def _metadata(annotation: Any, own: Iterable[Any]) -> Iterator[Any]:
-    """Yield what is noted on a type, on the types that it is made of, and within the notes."""
-    for item in own:
-        yield item
-        yield from getattr(item, "metadata", ())
-    for part in getattr(annotation, "__args__", ())[:1]:
-        yield from _metadata(part, getattr(part, "__metadata__", ()))
-
-
-def _default(field: FieldInfo) -> str:
+def _default(field: FieldInfo, takes: str) -> str:
     """Write a field's default as it would stand in a study file; nothing if the key is required."""
     value = field.default
     if field.is_required() or value is None or (isinstance(value, float) and isinf(value)):
         return ""
-    extra = field.json_schema_extra
-    unit = extra.get("unit") if isinstance(extra, dict) else None
-    if unit == "m" or _has_unit(field):
+    if takes.startswith(("length", "list of length")):
         return json.dumps([f"{1e3 * v:g} mm" for v in value] if isinstance(value, Iterable) else f"{1e3 * value:g} mm")
     return json.dumps(list(value) if isinstance(value, tuple) else value)
-
-
-def _has_unit(field: FieldInfo) -> bool:
-    """Tell whether the items of a list are lengths."""
-    items = getattr(field.annotation, "__args__", ())
-    return any(getattr(m, "json_schema_extra", None) for item in items for m in getattr(item, "__metadata__", ()))

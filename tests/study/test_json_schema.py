@@ -1,0 +1,52 @@
+"""The JSON schema of a study file takes every study that there is, and refuses what no study is."""
+
+import copy
+import tomllib
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from pipeline.study.json_schema import study_schema
+from pipeline.study.keys import all_sections, keys_of
+from pipeline.study.starter import starter
+
+STUDIES = [*Path("studies").glob("*.toml"), *Path("docs/scenes").glob("*.toml")]
+
+
+@pytest.fixture(scope="module")
+def validator():
+    jsonschema.Draft202012Validator.check_schema(study_schema())
+    return jsonschema.Draft202012Validator(study_schema())
+
+
+@pytest.mark.parametrize("path", STUDIES, ids=str)
+def test_every_study_fits_the_schema(validator, path):
+    validator.validate(tomllib.loads(path.read_text(encoding="utf-8")))
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "value"),
+    [
+        ("probe", "radius", 2),
+        ("probe", "shape", "disk"),
+        ("probe", "friction", 0.3),
+        ("material", "poisson", 0.7),
+        ("material", "poison", 0.3),
+        ("mesh", "outside", "nowhere"),
+        ("solve", "tolerance", 1e-3),
+        ("solve", "repeats", [1, 2]),
+    ],
+)
+def test_a_mistake_does_not_fit(validator, section, key, value):
+    study = tomllib.loads(starter("study"))
+    validator.validate(study)
+    wrong = copy.deepcopy(study)
+    wrong.setdefault(section, {})[key] = value
+    assert not validator.is_valid(wrong)
+
+
+def test_every_key_of_the_reference_is_in_the_schema():
+    definitions = study_schema()["$defs"].values()
+    known = {key for definition in definitions for key in definition.get("properties", {})}
+    assert {key.name for section in all_sections() for key in keys_of(section)} <= known
