@@ -17,6 +17,7 @@ from pipeline.mesh.of_case import upright
 from pipeline.mesh.reflect import reflect, reflect_vectors
 from pipeline.plan import estimate
 from pipeline.plan.plan import declare, first_attempts
+from pipeline.plan.reductions import use_axisymmetry
 from pipeline.plan.steps import Solve
 from pipeline.plan.symmetry import mirror_planes, model_planes
 from pipeline.run.attempts import Attempts
@@ -25,7 +26,15 @@ from pipeline.run.measure import record_of
 from pipeline.run.memory import FreeMemory
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.meshing import cached_arrays, on_first_rank
-from pipeline.run.problem import CaseFailure, check_memory, lacks_memory, memory_of, problem_of, solve_problem
+from pipeline.run.problem import (
+    CaseFailure,
+    check_memory,
+    lacks_memory,
+    memory_of,
+    meridian_problem,
+    problem_of,
+    solve_problem,
+)
 from pipeline.run.record import Record
 from pipeline.solve.compiled import vector_space
 from pipeline.solve.linear import SolveError
@@ -38,8 +47,14 @@ Note = Callable[[str], None]
 
 
 def solve_to_view(study: Study, case: Case) -> Solve:
-    """Return how ``case`` is computed to be looked at: in three dimensions, on what symmetry leaves of the body."""
-    solves = first_attempts(declare(study)).solves
+    """Return how ``case`` is computed to be looked at: in three dimensions, on what symmetry leaves of the body.
+
+    It is ``axisymmetric`` if a run solves it on its meridian: the force comes from there, too.
+    """
+    plan = declare(study)
+    if not study.solve.timing and not {"axisymmetric", "all"} & {*study.planning.without}:
+        plan = use_axisymmetry(plan)
+    solves = first_attempts(plan).solves
     solve = next(solve for solve in solves if case.index in solve.serves)
     return replace(solve, mirrors=model_planes(case)) if case.mesh.model == "auto" else solve
 
@@ -63,6 +78,7 @@ def compute_fields(
         CaseFailure, MeshError, SolveError: on every rank, with what to tell the user.
     """
     # A rank is one thread, as in a run.
+    run, solve = solve, replace(solve, axisymmetric=False)
     with threadpool_limits(limits=1, user_api="blas"):
         if mesh_only:
             arrays = _arrays(solve, comm, cache, note)
@@ -78,7 +94,17 @@ def compute_fields(
                 break  # no finer mesh: a run concludes with the best force so far, too
             if record.force_error < best.force_error:
                 best, fields = record, found
-        return fields
+        return _with_force_of_meridian(run, fields, comm) if run.axisymmetric else fields
+
+
+def _with_force_of_meridian(run: Solve, fields: Fields | None, comm: MPI.Comm) -> Fields | None:
+    """Return the fields with the force that a run finds on the meridian; collective."""
+    prepare(comm, [run])
+    problem = meridian_problem(run.case)
+    record = on_first_rank(comm, lambda: record_of(run, solve_problem(run.case, problem, estimate=True)))
+    if fields is None or record is None:
+        return None
+    return replace(fields, force=record.force, force_error=record.force_error, on_meridian=True)
 
 
 def _attempt(

@@ -24,7 +24,7 @@ class Fields:
     cell by magnitude, are None where only the mesh was asked for. The mesh is conforming to the mirror ``planes``
     ("x": x = 0); ``dofs`` counts the whole body's unknowns. ``regions`` (m,) numbers the material of each cell, by its
     position in ``region_names``; None where there is one only. ``force`` (N) is the probe's, with its relative error
-    bar ``force_error``; not a number where they were not asked for.
+    bar ``force_error``; not a number where they were not asked for. ``on_meridian`` tells that it was found there.
     """
 
     case: Case
@@ -39,6 +39,7 @@ class Fields:
     region_names: tuple[str, ...] = ("tissue",)
     force: float = nan
     force_error: float = nan
+    on_meridian: bool = False
 
     @property
     def contact(self) -> FloatArray:

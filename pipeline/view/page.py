@@ -73,7 +73,8 @@ def _facts(fields: Fields) -> list[str]:
     facts = [case] if fields.case.axes else []
     if not isnan(fields.force):
         bar = "" if isnan(fields.force_error) else f" ± {100 * fields.force_error:.2g} %"
-        facts.append(f"F = {write('force', float(f'{fields.force:.4g}'))}{bar}")
+        where = ", on the meridian" if fields.on_meridian else ""
+        facts.append(f"F = {write('force', float(f'{fields.force:.4g}'))}{bar}{where}")
     return [*facts, f"{count}, {fields.dofs:,} unknowns" if fields.dofs else count]
 
 

@@ -131,6 +131,19 @@ def test_mesh_and_force_of_an_accuracy_are_the_run_s(accuracy):
     assert (found.force, found.force_error) == pytest.approx((record.force, record.force_error), rel=1e-9)
 
 
+@pytest.mark.parametrize("mesh", [{"accuracy": "1 %"}, {"epsilon": "8 mm", "outside": "free"}])
+def test_force_of_a_round_scene_is_the_meridian_s(mesh):
+    body = {"shape": "cylinder", "radius": "20 mm", "height": "20 mm"}
+    none = dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree")) if "accuracy" in mesh else {}
+    changes = {"body": body, "plan": {"without": []}, "mesh": none | mesh}
+    (record,) = solve(**changes).values()
+    found = fields(**changes)
+    assert record.origin == "axisymmetric"
+    assert found.on_meridian
+    assert (found.force, found.force_error) == pytest.approx((record.force, record.force_error), rel=1e-9)
+    assert found.displacement.shape == found.points.shape
+
+
 @pytest.mark.mpi
 def test_what_does_not_fit_into_memory_is_refused():
     with pytest.raises(CaseFailure, match="GB are available"):
