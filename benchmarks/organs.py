@@ -28,7 +28,7 @@ from pipeline.plan.plan import make_plan
 from pipeline.run.compile import prepare
 from pipeline.run.execute import execute
 from pipeline.run.mesh_cache import MeshCache
-from pipeline.run.progress import Silent
+from pipeline.run.progress import Progress
 from pipeline.run.record import Record
 from pipeline.shapes.files.stl import parse as read_stl
 from pipeline.shapes.files.stl import written
@@ -80,7 +80,7 @@ WHOLE = {"what": "", "seconds": ".1f"}
 _TIMES = 3
 
 
-class Meshes(Silent):
+class Meshes(Progress):
     """Counts the meshes that were begun: a runner tells of each, of the operator on it, and of each solve."""
 
     begun = 0

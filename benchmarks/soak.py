@@ -23,7 +23,7 @@ from mpi4py import MPI
 
 from pipeline.plan.plan import make_plan
 from pipeline.run.execute import execute
-from pipeline.run.progress import Silent
+from pipeline.run.progress import Progress
 from pipeline.run.record import Record
 from pipeline.run.store import Store
 from pipeline.study.load import parse
@@ -111,7 +111,7 @@ def main(cases: int) -> int:
     plan = make_plan(parse(study(cases)))
     with TemporaryDirectory() as folder:
         log = Log(Store(Path(folder) / "cases.sqlite"), max(cases // _MARKS, 1)) if comm.rank == 0 else None
-        failed = execute(plan, comm, log.keep if log else lambda _: None, Silent())
+        failed = execute(plan, comm, log.keep if log else lambda _: None, Progress())
         rest = comm.gather(psutil.Process().memory_info().rss)
         if log is None:
             return 0

@@ -19,7 +19,7 @@ from pipeline.plan.shard import Shard
 from pipeline.report.publish import publish
 from pipeline.run.begun import ENDING, Begun, fail_begun
 from pipeline.run.outcome import count_states, failures
-from pipeline.run.progress import Silent, Terminal
+from pipeline.run.progress import Progress, Terminal
 from pipeline.run.reading import read_rows
 from pipeline.run.record import Record
 from pipeline.run.store import Store, StoreError
@@ -212,7 +212,7 @@ def _execute(plan: Plan, opened: Opened, comm: MPI.Comm, progress: Terminal | No
             raise KeyboardInterrupt
 
     with progress or nullcontext(), opened.begun as begun:
-        execute(plan, comm, keep, progress or Silent(), known=opened.records, cache=cache, begun=begun)
+        execute(plan, comm, keep, progress or Progress(), known=opened.records, cache=cache, begun=begun)
 
 
 @contextmanager

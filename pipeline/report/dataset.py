@@ -16,7 +16,7 @@ from pipeline.plan.equivalent_places import EquivalentPlace
 from pipeline.plan.key import digest
 from pipeline.plan.plan import Plan
 from pipeline.quantities import LARGEST, attributes, quantity_of
-from pipeline.run.absent import absent
+from pipeline.run.outcome import without_contact
 from pipeline.run.record import Record
 from pipeline.shapes.frame import Frame, PlaceError
 from pipeline.shapes.from_file import FromFile
@@ -50,12 +50,13 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     """Arrange ``records`` (by key) as the dataset of the plan's study; ``run`` adds attributes of the run."""
     study = plan.study
     flat = [
-        _imaged(_scaled(records.get(key), plan.scale_of(case)), plan.equivalent.get(case.index)) or absent(case)
+        _imaged(_scaled(records.get(key), plan.scale_of(case)), plan.equivalent.get(case.index))
+        or without_contact(case)
         for key, case in zip(plan.keys, study.cases(), strict=True)
     ]
     keys = plan.reference_keys or [""] * len(flat)
     exact = [
-        _scaled(records.get(key), plan.scale_of(case)) or absent(case)
+        _scaled(records.get(key), plan.scale_of(case)) or without_contact(case)
         for key, case in zip(keys, study.cases(), strict=True)
     ]
     variables = _of_records(study, flat, exact)

@@ -13,7 +13,7 @@ from pipeline.run.compile import prepare
 from pipeline.run.groups import run_phase
 from pipeline.run.memory import FreeMemory, keep_imports
 from pipeline.run.mesh_cache import MeshCache
-from pipeline.run.progress import Progress, Silent
+from pipeline.run.progress import Progress
 from pipeline.run.provenance import provenance
 from pipeline.run.record import Record
 from pipeline.run.runner import StepRunner
@@ -61,7 +61,7 @@ def execute(
 def compute(plan: Plan, comm: MPI.Comm) -> dict[str, Record]:
     """Carry out ``plan`` without a store and return its records by key, on every rank; collective."""
     records: dict[str, Record] = {}
-    execute(plan, comm, lambda record: records.__setitem__(record.key, record), Silent())
+    execute(plan, comm, lambda record: records.__setitem__(record.key, record), Progress())
     return comm.bcast(records)
 
 

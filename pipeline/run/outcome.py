@@ -1,16 +1,46 @@
-"""What came of a study: how many of its cases are in which state, and what failed."""
+"""What came of a study: how many of its cases are in which state, what failed, and where contact is lost."""
 
 from collections.abc import Iterator, Mapping
 
 from pipeline.plan.plan import Plan
-from pipeline.run.absent import LOST, absent
 from pipeline.run.record import Record
+from pipeline.run.stop import SKIPPED
+from pipeline.study.place import CLEAR
 from pipeline.study.sweep import Case
+
+LOST = "lost"
+
+
+def without_contact(case: Case) -> Record | None:
+    """Return the record of a case without contact: no force where the tool is clear of the body.
+
+    Where it would stand over an edge it touches something, and its force is not known. None if it stands on the body.
+    """
+    if not (why := case.lost_contact):
+        return None
+    if why != CLEAR:
+        return Record("", SKIPPED, why)
+    none = (0.0, 0.0, 0.0)
+    return Record(
+        "",
+        LOST,
+        why,
+        force=0.0,
+        force_error=0.0,
+        force_vector=none,
+        force_vector_error=none,
+        energy=0.0,
+        max_strain=0.0,
+        contact_area=0.0,
+        contact_radius=0.0,
+        contact_area_error=0.0,
+        contact_radius_error=0.0,
+    )
 
 
 def count_states(plan: Plan, records: Mapping[str, Record]) -> dict[str, int]:
     """Return the number of a plan's cases in each state; of a shard's plan, of its own cases."""
-    states = [_status(records.get(key) or absent(case)) for key, case in _cases(plan)]
+    states = [_status(records.get(key) or without_contact(case)) for key, case in _cases(plan)]
     counts = {state: states.count(state) for state in ("ok", "skipped", "failed", "pending")}
     return counts | ({LOST: states.count(LOST)} if LOST in states else {})
 

@@ -3,7 +3,7 @@
 import sys
 import time
 from types import TracebackType
-from typing import Any, Protocol
+from typing import Any
 
 from pipeline.printable import printable
 from pipeline.run.remaining import Remaining, format_seconds
@@ -15,8 +15,8 @@ _REFRESH = 2
 _MESHING = "meshing: "
 
 
-class Progress(Protocol):
-    """What a run tells whoever started it."""
+class Progress:
+    """What a run tells whoever started it: nothing, to ranks other than the first, and to scripts."""
 
     def done(self, label: str, failed: str = "") -> None:
         """Report that one more case is finished, or has ``failed`` with a message."""
@@ -25,17 +25,7 @@ class Progress(Protocol):
         """Say what is being worked on."""
 
 
-class Silent:
-    """Reports nothing: for ranks other than the first, and for scripts."""
-
-    def done(self, label: str, failed: str = "") -> None:
-        """Report nothing."""
-
-    def note(self, text: str) -> None:
-        """Report nothing."""
-
-
-class Terminal:
+class Terminal(Progress):
     """Progress for people, as a context manager: rich's bar on a terminal, else plain lines.
 
     ``remaining`` tells the time left, of the whole and of the step under way; ``verbose`` gives every case its line.

@@ -10,7 +10,7 @@ from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build
 from pipeline.run.attempts import Attempts
 from pipeline.run.execute import compute, execute
-from pipeline.run.progress import Silent
+from pipeline.run.progress import Progress
 from pipeline.run.record import Record
 from pipeline.study.load import parse
 from tests.cases import raw, study
@@ -120,7 +120,7 @@ def test_exact_force_is_the_best_that_was_found():
     assert (found.status, found.force, found.force_error) == ("ok", 3.0, 0.002)
 
 
-class Notes(Silent):
+class Notes(Progress):
     """Remembers what was worked on."""
 
     def __init__(self):

@@ -18,7 +18,7 @@ from pipeline.run import meshing, problem
 from pipeline.run.basis import ReducedBasis
 from pipeline.run.execute import compute, execute
 from pipeline.run.mesh_cache import MeshCache
-from pipeline.run.progress import Silent
+from pipeline.run.progress import Progress
 from pipeline.solve.linear import SolveError
 from pipeline.solve.solution import BALANCE_LIMIT
 from pipeline.stages import Times, recharge
@@ -267,7 +267,7 @@ def test_many_cases_do_not_grow_memory():
         resident.append(psutil.Process().memory_info().rss)
         messages.append(record.message)
 
-    failed = execute(plan, MPI.COMM_SELF, keep, Silent())
+    failed = execute(plan, MPI.COMM_SELF, keep, Progress())
     assert not any(messages), messages
     assert failed == 0
     assert len(resident) == 120
@@ -286,7 +286,7 @@ def test_timed_cases_are_medians_of_repeats_each_made_afresh(monkeypatch, tmp_pa
     monkeypatch.setattr("pipeline.run.runner.mesh_case", mesh_case)
     plan = make_plan(study(solve={"timing": True, "repeats": 3, "exact": False}))
     found = []
-    assert execute(plan, MPI.COMM_SELF, found.append, Silent(), cache=MeshCache(tmp_path)) == 0
+    assert execute(plan, MPI.COMM_SELF, found.append, Progress(), cache=MeshCache(tmp_path)) == 0
     (record,) = found
     assert record.time_mesh == pytest.approx(3e6, rel=1e-4)
     assert record.time_error > 1e8

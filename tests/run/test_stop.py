@@ -9,7 +9,7 @@ from mpi4py import MPI
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build
 from pipeline.run.execute import compute, execute
-from pipeline.run.progress import Silent
+from pipeline.run.progress import Progress
 from pipeline.run.record import Record
 from pipeline.run.stop import skipped
 from tests.cases import study
@@ -57,7 +57,7 @@ def test_stop_is_decided_alike_from_stored_records():
     stored = {key: record for key, record in records.items() if record.is_ok}
     again = make_plan(study(**STOPPED), stored)
     found = {}
-    execute(again, MPI.COMM_SELF, lambda record: found.__setitem__(record.key, record), Silent(), known=stored)
+    execute(again, MPI.COMM_SELF, lambda record: found.__setitem__(record.key, record), Progress(), known=stored)
     assert {record.status for record in found.values()} == {"skipped"}
     assert set(found) == set(records) - set(stored)
 
