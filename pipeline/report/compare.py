@@ -124,11 +124,15 @@ def compare(a: xr.Dataset, b: xr.Dataset) -> Comparison:
         reasons = "; ".join(dict.fromkeys(why for _, why in not_compared))
         raise DatasetError(f"none of the {len(common)} cases that they have in common can be compared: {reasons}")
     return Comparison(
-        tuple(found), len(common),
-        tuple(case.words for values, case in left.items() if values not in right),
-        tuple(case.words for values, case in right.items() if values not in left),
-        len(ours) - len(left), len(theirs) - len(right), tuple(not_compared), tuple(settings),
-    )  # fmt: skip
+        pairs=tuple(found),
+        cases=len(common),
+        only_a=tuple(case.words for values, case in left.items() if values not in right),
+        only_b=tuple(case.words for values, case in right.items() if values not in left),
+        again_a=len(ours) - len(left),
+        again_b=len(theirs) - len(right),
+        not_compared=tuple(not_compared),
+        settings=tuple(settings),
+    )
 
 
 @dataclass(frozen=True)

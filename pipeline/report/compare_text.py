@@ -52,12 +52,21 @@ def to_dict(found: Comparison, names: tuple[str, str], doubts: dict[str, list[st
     rows = [asdict(pair) | {"difference": pair.difference, "bars": pair.bars} for pair in found.pairs]
     times = dict(zip(("median", "least", "most"), found.times, strict=True)) if found.times else None
     return {
-        "a": names[0], "b": names[1], "agree": found.agrees, "verdict": verdict(found), "cases": found.cases,
-        "only_a": list(found.only_a), "only_b": list(found.only_b), "again_a": found.again_a, "again_b": found.again_b,
+        "a": names[0],
+        "b": names[1],
+        "agree": found.agrees,
+        "verdict": verdict(found),
+        "cases": found.cases,
+        "only_a": list(found.only_a),
+        "only_b": list(found.only_b),
+        "again_a": found.again_a,
+        "again_b": found.again_b,
         "not_compared": [{"case": case, "why": why} for case, why in found.not_compared],
         "settings": [{"key": key, "a": one, "b": other} for key, one, other in found.settings],
-        "times": times, "doubts": doubts, "values": rows,
-    }  # fmt: skip
+        "times": times,
+        "doubts": doubts,
+        "values": rows,
+    }
 
 
 def _apart(found: Comparison) -> list[str]:

@@ -54,8 +54,9 @@ def compliance(dataset: xr.Dataset, against: Against = "exact") -> xr.Dataset:
     coordinates = {str(name): values for name, values in dataset.coords.items() if set(values.dims) <= set(force.dims)}
     return xr.Dataset(
         {name: values.transpose(*force.dims).assign_attrs(attributes(name)) for name, values in variables.items()},
-        coordinates, {"against": against},
-    )  # fmt: skip
+        coordinates,
+        {"against": against},
+    )
 
 
 def tool_dimension(dataset: xr.Dataset) -> str:

@@ -24,9 +24,21 @@ from pipeline.study.sweep import Axis, Case, Scale, Study
 
 # The variables that are taken as they are from the records of the cases, and from those of F_exact.
 _FLOATS = (
-    "force", "force_error", "energy", *LARGEST, "balance", "time_mesh", "time_assemble", "time_setup", "time_solve",
-    "time_error", "time_total", "time_spread", "machine_load", "memory",
-)  # fmt: skip
+    "force",
+    "force_error",
+    "energy",
+    *LARGEST,
+    "balance",
+    "time_mesh",
+    "time_assemble",
+    "time_setup",
+    "time_solve",
+    "time_error",
+    "time_total",
+    "time_spread",
+    "machine_load",
+    "memory",
+)
 # What a record calls otherwise than the dataset.
 _IN_RECORD = {"machine_load": "load"}
 # Those of contact that is found, if any of the study's is.
@@ -193,9 +205,11 @@ def _add_ratios(dataset: xr.Dataset) -> xr.Dataset:
         full_force, full_seconds = force, seconds
     order = force.dims
     ratios = {
-        "accuracy": force / dataset["force_exact"], "force_max": full_force, "force_ratio": force / full_force,
+        "accuracy": force / dataset["force_exact"],
+        "force_max": full_force,
+        "force_ratio": force / full_force,
         "speedup": full_seconds / seconds,
-    }  # fmt: skip
+    }
     if "energy_release" in dataset:
         ratios["energy_release_ratio"] = _over_full_order(dataset["energy_release"], dataset)
     if "load_force" in dataset:
@@ -224,12 +238,26 @@ def _scaled(record: Record | None, scale: Scale) -> Record | None:
         return record.scaled(scale) if record else None
     unknown: dict[str, Any] = dict.fromkeys(LARGEST, nan)
     return replace(
-        record, force=nan, force_vector=(nan, nan, nan), force_vector_error=(nan, nan, nan), stiffness=(),
-        stiffness_error=(), energy=nan, energy_release=nan, balance=nan, contact_area=nan,
-        contact_radius=nan, contact_area_error=nan, contact_radius_error=nan, load_force=nan,
-        load_force_error=nan, load_energy=nan, sag=nan, load_force_vector=(nan, nan, nan),
+        record,
+        force=nan,
+        force_vector=(nan, nan, nan),
+        force_vector_error=(nan, nan, nan),
+        stiffness=(),
+        stiffness_error=(),
+        energy=nan,
+        energy_release=nan,
+        balance=nan,
+        contact_area=nan,
+        contact_radius=nan,
+        contact_area_error=nan,
+        contact_radius_error=nan,
+        load_force=nan,
+        load_force_error=nan,
+        load_energy=nan,
+        sag=nan,
+        load_force_vector=(nan, nan, nan),
         **unknown,
-    )  # fmt: skip
+    )
 
 
 def _imaged(record: Record | None, image: EquivalentPlace | None) -> Record | None:

@@ -19,9 +19,10 @@ from pipeline.report.compliance import beyond
 
 LAWS = ("ratio", "compliance", "second order")
 FORMULAS = {
-    "ratio": "F_exact ≈ F / r", "compliance": "1/F_exact ≈ 1/F - c/(E d)",
+    "ratio": "F_exact ≈ F / r",
+    "compliance": "1/F_exact ≈ 1/F - c/(E d)",
     "second order": "1/F_exact ≈ 1/F - (c + g m²)/(E d)",
-}  # fmt: skip
+}
 # A law with more constants must be better than a simpler one by this factor.
 _WORTH = 0.8
 # Of a determinant, over that of columns at right angles: below it the tools left do not tell two constants apart.

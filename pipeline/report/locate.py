@@ -86,9 +86,13 @@ def locate(dataset: xr.Dataset, body: str, healthy: str) -> Located:
     moved = (areas * bar.values[beyond] / total)[:, None] * (places - point)
     axis = shares @ with_it["axis"].values[beyond]
     return Located(
-        _vector(point), _vector(axis / np.linalg.norm(axis)), _vector(np.sqrt((moved**2).sum(axis=0))),
-        excess, bar, _touches_edge(beyond),
-    )  # fmt: skip
+        point=_vector(point),
+        axis=_vector(axis / np.linalg.norm(axis)),
+        error=_vector(np.sqrt((moved**2).sum(axis=0))),
+        excess=excess,
+        bar=bar,
+        reaches_edge=_touches_edge(beyond),
+    )
 
 
 def _dimensions(dataset: xr.Dataset) -> tuple[str, ...]:

@@ -14,9 +14,20 @@ from pipeline.report.table import DatasetError
 
 # What every dataset of a study has, and figures and report are made from.
 _NEEDED = (
-    "force", "force_error", "force_ratio", "force_exact", "force_exact_error", "force_exact_message", "accuracy",
-    "status", "message", "origin", "time_total", "reductions", "study",
-)  # fmt: skip
+    "force",
+    "force_error",
+    "force_ratio",
+    "force_exact",
+    "force_exact_error",
+    "force_exact_message",
+    "accuracy",
+    "status",
+    "message",
+    "origin",
+    "time_total",
+    "reductions",
+    "study",
+)
 
 
 def dataset_path(file: str | Path, output: str | Path = "results") -> Path:

@@ -99,13 +99,26 @@ def arrange(dataset: xr.Dataset) -> Table:
         {axis.name for axis in study.axes if axis.section == "probe" and axis.name in columns} if study else set()
     )
     return Table(
-        tuple(settings[i] for i in keep), tuple(scenes), dict(zip(columns, counts, strict=True)), force, exact,
-        force / exact, force / exact * (force_bar + exact_bar), force_bar, exact_bar, matrix("force_ratio") + blank,
-        matrix("time_total") + blank, matrix("dofs") + blank, matrix("cells") + blank, why,
-        tuple(_mesh(dataset, study, settings[i]) for i in keep),
-        cases, tuple(Sinking.of(case) for case in cases), tuple(sorted(of_probe - LOADS - PLACES)),
-        tuple(sorted(of_probe & LOADS)),
-    )  # fmt: skip
+        settings=tuple(settings[i] for i in keep),
+        scenes=tuple(scenes),
+        axes=dict(zip(columns, counts, strict=True)),
+        force=force,
+        exact=exact,
+        ratio=force / exact,
+        bar=force / exact * (force_bar + exact_bar),
+        force_bar=force_bar,
+        exact_bar=exact_bar,
+        share=matrix("force_ratio") + blank,
+        seconds=matrix("time_total") + blank,
+        dofs=matrix("dofs") + blank,
+        cells=matrix("cells") + blank,
+        why=why,
+        meshes=tuple(_mesh(dataset, study, settings[i]) for i in keep),
+        cases=cases,
+        sinking=tuple(Sinking.of(case) for case in cases),
+        tools=tuple(sorted(of_probe - LOADS - PLACES)),
+        loads=tuple(sorted(of_probe & LOADS)),
+    )
 
 
 def study_of(dataset: xr.Dataset) -> Study | None:
@@ -208,5 +221,13 @@ def _mesh(dataset: xr.Dataset, study: Study | None, labels: Labels) -> Labels:
     if mesh.accuracy is not None:
         return {"accuracy": mesh.accuracy, "outside": mesh.outside}
     outside = {"outside": mesh.outside} if not isinf(mesh.epsilon) else {}
-    return {"epsilon": mesh.epsilon, **outside, "fine": mesh.fine, "coarse": mesh.coarse, "rim": mesh.rim,
-            "growth": mesh.growth, "degree": mesh.degree, "element": mesh.element}  # fmt: skip
+    return {
+        "epsilon": mesh.epsilon,
+        **outside,
+        "fine": mesh.fine,
+        "coarse": mesh.coarse,
+        "rim": mesh.rim,
+        "growth": mesh.growth,
+        "degree": mesh.degree,
+        "element": mesh.element,
+    }

@@ -87,13 +87,23 @@ def judge(table: Table, row: int) -> Verdict:
     axes = {name: positions[use] for name, positions in table.axes.items()}
     share = table.share if np.isfinite(table.share).any() else table.ratio
     return Verdict(
-        labels, mesh, missing, float(deviation.max()), float(deviation[worst] + bar[worst]), table.scenes[scene],
-        float(table.force[row, scene]), float(table.exact[row, scene]), float(table.seconds[row, use].max()),
-        float(np.median(table.seconds[row, use])),
-        float(table.dofs[row, use].max()), float(table.cells[row, use].max()), spread(share[row, use], axes),
-        correction.fit(ratio, bar, axes), _laws(table, row, use),
-        _laws(table, row, use, of_full=True),
-    )  # fmt: skip
+        labels,
+        mesh,
+        missing,
+        deviation=float(deviation.max()),
+        error=float(deviation[worst] + bar[worst]),
+        limit=table.scenes[scene],
+        force=float(table.force[row, scene]),
+        exact=float(table.exact[row, scene]),
+        seconds=float(table.seconds[row, use].max()),
+        usual=float(np.median(table.seconds[row, use])),
+        dofs=float(table.dofs[row, use].max()),
+        cells=float(table.cells[row, use].max()),
+        spread=spread(share[row, use], axes),
+        correction=correction.fit(ratio, bar, axes),
+        laws=_laws(table, row, use),
+        laws_of_full=_laws(table, row, use, of_full=True),
+    )
 
 
 def _laws(table: Table, row: int, use: np.ndarray, *, of_full: bool = False) -> Laws:

@@ -148,6 +148,8 @@ def test_every_scene_has_a_curve_that_can_be_hidden(browser, path):
     browser.open(path)
     names = browser.ask(NAMES)
     assert len(names) == 40 and "ν = 0.3, outside = free" in names
+    buttons = browser.ask("[...document.querySelectorAll('.modebar-btn')].map(one => one.dataset.title)")
+    assert "Zoom" in buttons and not any("Share" in button or "loud" in button for button in buttons)
     table = json.loads(browser.ask("document.getElementById('data').textContent"))
     columns = {found["name"]: found for found in table["columns"]}
     drawn = browser.ask("document.getElementById('plot').data.map(trace => [trace.name, trace.y])")

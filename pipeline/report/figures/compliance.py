@@ -52,8 +52,14 @@ def _with_positions(dataset: xr.Dataset) -> tuple[xr.Dataset, str]:
     is_round = bool(np.isfinite(inverse.where(np.isfinite(whole), 0.0)).all())
     full = whole.where(np.isinf(dataset["epsilon"])).max("epsilon").broadcast_like(whole)
     contact = np.array([one.contact for one in known.ravel()], dtype=object).reshape(known.shape)
-    data = dataset.assign({_WHOLE: whole, "position": inverse if is_round else full, "of_full_order": full,
-                           "touch": (dataset["force"].dims, contact)})  # fmt: skip
+    data = dataset.assign(
+        {
+            _WHOLE: whole,
+            "position": inverse if is_round else full,
+            "of_full_order": full,
+            "touch": (dataset["force"].dims, contact),
+        }
+    )
     return data, "1 / radius a, 1/mm" if is_round else "$E d/F_{max}$, 1/mm"
 
 

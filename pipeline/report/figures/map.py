@@ -49,8 +49,9 @@ def draw_map(ax: Axes, part: xr.Dataset, values: np.ndarray, **look: Any) -> Any
     x, y = (factor * part[name].values for name in PLACES)
     drawn = ax.pcolormesh(x, y, np.ma.masked_invalid(values), shading="nearest", **{"cmap": _COLOURS} | look)
     for state, marker, colour, label in (
-        (["lost"], "o", LINE, "contact lost"), (["failed", "skipped", "pending"], "x", FAILED, "no force"),
-    ):  # fmt: skip
+        (["lost"], "o", LINE, "contact lost"),
+        (["failed", "skipped", "pending"], "x", FAILED, "no force"),
+    ):
         rows, columns = np.nonzero(np.isin(part["status"].values.astype(str), state))
         if rows.size:
             style = {"marker": marker, "color": colour, "linestyle": "none", "fillstyle": "none", "markersize": 4}

@@ -16,10 +16,26 @@ FIRST_ROWS = 50
 _STATES = ("failed", "pending", "skipped", "lost", "ok")  # the order of the rows
 # The columns of numbers; some are shown only when asked for.
 _QUANTITIES = (
-    "force", "force_error", "force_ratio", "accuracy", "force_exact_error", "speedup", "time_total", "dofs", "cells",
-    "iterations", "time_mesh", "time_assemble", "time_setup", "time_solve", "time_error", "memory", "max_strain",
-    "energy", "balance",
-)  # fmt: skip
+    "force",
+    "force_error",
+    "force_ratio",
+    "accuracy",
+    "force_exact_error",
+    "speedup",
+    "time_total",
+    "dofs",
+    "cells",
+    "iterations",
+    "time_mesh",
+    "time_assemble",
+    "time_setup",
+    "time_solve",
+    "time_error",
+    "memory",
+    "max_strain",
+    "energy",
+    "balance",
+)
 _SHOWN = {"force", "force_error", "force_ratio", "accuracy", "speedup", "time_total"}
 _DIGITS = 4
 
@@ -78,8 +94,13 @@ def case_table(dataset: xr.Dataset) -> Table:
     axes = [_axis(dataset, dim, position, dims) for position, dim in enumerate(dims)]
     quantities = [_quantity(dataset[name].transpose(*dims), name) for name in _QUANTITIES if name in dataset]
     status = _texts("status", states, QUANTITIES["status"].meaning, is_filter=True)
-    origin = _texts("origin", dataset["origin"].transpose(*dims).values.ravel(), QUANTITIES["origin"].meaning,
-                    is_filter=True, is_first=False)  # fmt: skip
+    origin = _texts(
+        "origin",
+        dataset["origin"].transpose(*dims).values.ravel(),
+        QUANTITIES["origin"].meaning,
+        is_filter=True,
+        is_first=False,
+    )
     message = _texts("message", dataset["message"].transpose(*dims).values.ravel(), "why there is no force")
     known = [column for column in quantities if any(value is not None for value in column.values)]
     told = [column for column in (origin, message) if any(column.words or ())]

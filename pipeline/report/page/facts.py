@@ -16,8 +16,13 @@ from pipeline.report.words import choices
 _COMMIT = re.compile(r"[0-9a-f]{7,64}\+?")
 # Cases that a message names; the table shows all of them.
 _MOST_NAMED = 5
-_STATES = {"ok": "with a force", "failed": "failed", "skipped": "skipped", "lost": "without contact",
-           "pending": "not yet run"}  # fmt: skip
+_STATES = {
+    "ok": "with a force",
+    "failed": "failed",
+    "skipped": "skipped",
+    "lost": "without contact",
+    "pending": "not yet run",
+}
 
 
 def facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
@@ -28,9 +33,11 @@ def facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
     if np.isfinite(force).any():
         low, high = np.nanmin(force), np.nanmax(force)
         found.append(("force", f"{low:.3g} mN" if high - low < 5e-4 * high else f"{low:.3g} to {high:.3g} mN"))
-    for name, text, scale, unit in (("force_error", "largest error bar", 100, " %"),
-                                    ("balance", "worst imbalance", 1, ""),
-                                    ("speedup", "largest speed-up", 1, " ×")):  # fmt: skip
+    for name, text, scale, unit in (
+        ("force_error", "largest error bar", 100, " %"),
+        ("balance", "worst imbalance", 1, ""),
+        ("speedup", "largest speed-up", 1, " ×"),
+    ):
         values = dataset[name].values * scale if name in dataset else np.array([np.nan])
         if np.isfinite(values).any() and not (name == "speedup" and np.nanmax(values) == 1):
             found.append((text, f"{np.nanmax(values):.2g}{unit}"))
@@ -62,8 +69,14 @@ def provenance(dataset: xr.Dataset) -> list[tuple[str, str]]:
     versions = [(name.removeprefix("version_"), v) for name, v in attributes.items() if name.startswith("version_")]
     for name in ("start", "end"):
         attributes[name] = attributes.get(name, "").replace("T", " ")
-    known = (("git_commit", "git commit"), ("host", "host"), ("ranks", "ranks"), ("start", "start"), ("end", "end"),
-             ("study_hash", "study hash"))  # fmt: skip
+    known = (
+        ("git_commit", "git commit"),
+        ("host", "host"),
+        ("ranks", "ranks"),
+        ("start", "start"),
+        ("end", "end"),
+        ("study_hash", "study hash"),
+    )
     return versions + [(text, attributes[name]) for name, text in known if attributes.get(name)]
 
 
@@ -78,8 +91,12 @@ def reproduce(dataset: xr.Dataset, name: str) -> list[str]:
         changed = "  # and changes that were not committed" if commit.endswith("+") else ""
         lines.append(f"git checkout {commit.rstrip('+')}{changed}")
     launcher = f"mpirun -n {ranks} " if ranks.isdigit() and int(ranks) > 1 else ""
-    return [*lines, "make setup", f"{launcher}.venv/bin/epsmesh run {file} --fresh",
-            f".venv/bin/epsmesh report {quote(f'results/{name}.nc')}"]  # fmt: skip
+    return [
+        *lines,
+        "make setup",
+        f"{launcher}.venv/bin/epsmesh run {file} --fresh",
+        f".venv/bin/epsmesh report {quote(f'results/{name}.nc')}",
+    ]
 
 
 def _by_message(dataset: xr.Dataset, status: str, variable: str) -> list[dict[str, Any]]:
@@ -91,10 +108,14 @@ def _by_message(dataset: xr.Dataset, status: str, variable: str) -> list[dict[st
             found[str(messages[index])].append(index)
     groups = sorted(found.items(), key=lambda item: -len(item[1]))
     return [
-        {"message": message or "no message", "count": len(cases), "more": max(0, len(cases) - _MOST_NAMED),
-         "cases": [_name(dataset, dims, index) for index in cases[:_MOST_NAMED]]}
+        {
+            "message": message or "no message",
+            "count": len(cases),
+            "more": max(0, len(cases) - _MOST_NAMED),
+            "cases": [_name(dataset, dims, index) for index in cases[:_MOST_NAMED]],
+        }
         for message, cases in groups
-    ]  # fmt: skip
+    ]
 
 
 def _name(dataset: xr.Dataset, dims: list[str], index: tuple[int, ...]) -> str:

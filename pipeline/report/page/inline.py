@@ -11,9 +11,13 @@ from pipeline.report.figures.style import CLAIM, COLOURS, FAILED, GRID, LINE, PA
 
 # The page's variable for each colour: what is dark on paper must be light on a dark screen.
 _THEME = {colour: f"var(--curve-{i})" for i, colour in enumerate(COLOURS, start=1)} | {
-    CLAIM: "var(--claim)", FAILED: "var(--bad)", QUIET: "var(--quiet)", GRID: "var(--grid)", LINE: "currentColor",
+    CLAIM: "var(--claim)",
+    FAILED: "var(--bad)",
+    QUIET: "var(--quiet)",
+    GRID: "var(--grid)",
+    LINE: "currentColor",
     PAPER: "var(--paper)",
-}  # fmt: skip
+}
 _COLOUR = re.compile("|".join(_THEME))
 
 

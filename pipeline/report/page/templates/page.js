@@ -148,7 +148,12 @@ function plot() {
       xaxis: { ...lines, ...ticks, title: { text: escaped(x.hint || x.heading) } },
       yaxis: { ...lines, type, title: { text: escaped(y.heading) } },
     },
-    { responsive: true, displaylogo: false },
+    {
+      responsive: true,
+      displaylogo: false,
+      plotlyServerURL: "", // nothing of a page leaves it
+      modeBarButtonsToRemove: ["sendChartToCloud", "select2d", "lasso2d"],
+    },
   );
 }
 
