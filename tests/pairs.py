@@ -48,7 +48,7 @@ class Feature:
 
 @dataclass(frozen=True)
 class Result:
-    """What became of a study: taken, refused or failed, in how many seconds, and what was said."""
+    """What became of a study, in how many processor seconds; what was said; the key of its first case."""
 
     name: str
     outcome: str  # taken | refused | failed | traceback
@@ -56,6 +56,7 @@ class Result:
     force: float = math.nan
     error: float = math.nan
     seconds: float = 0.0
+    key: str = ""
 
 
 def _update(section: str, **keys: Any) -> Callable[[Study], None]:
@@ -216,6 +217,8 @@ def write_bodies(folder: Path) -> None:
 
 def run(features: tuple[Feature, ...], folder: Path, *, solved: bool = True) -> Result:
     """Run one study in ``folder``, which has the files of :func:`write_bodies`; only read it unless ``solved``."""
+    from pipeline.plan.plan import declare, make_plan
+    from pipeline.study.capabilities import obstacle
     from pipeline.study.load import load_mapping
     from pipeline.study.problems import StudyError
 
@@ -227,11 +230,13 @@ def run(features: tuple[Feature, ...], folder: Path, *, solved: bool = True) -> 
         return done("refused", " | ".join(str(problem) for problem in error.problems))
     except Exception:
         return done("traceback", traceback.format_exc(limit=-3))
+    if study.solve.exact and (reason := obstacle("F_exact", next(study.cases()))):
+        return done("refused", reason)
+    (key, *_) = declare(study).keys
     if not solved:
-        return done("taken")
+        return done("taken", key=key)
     from mpi4py import MPI
 
-    from pipeline.plan.plan import make_plan
     from pipeline.run.execute import compute
 
     try:

@@ -20,9 +20,10 @@ def use_reduced_basis(plan: Plan) -> Plan:
     tolerance = plan.study.planning.tolerance
     many = {
         solve.key: digest(f"{solve.key} reduced {tolerance!r}")
-        for operator, obstacle in zip(operators, obstacles, strict=True) if not obstacle
+        for operator, obstacle in zip(operators, obstacles, strict=True)
+        if not obstacle
         for solve in operator.solves
-    }  # fmt: skip
+    }
     if operators and not many:
         reason = f"No reduced basis: {obstacles[0]}, and each is solved."
         return replace(plan, struck=(*plan.struck, Struck("reduced", 0, reason)))

@@ -84,8 +84,9 @@ def _of_regions(case: Case) -> float:
     """Return what layers and inclusions ask for, in cubes of the size."""
     body, growth = case.body, case.mesh.growth
     # Both sides of an inclusion's surface: ∫ 1 / (0.4 least + growth s)³ ds.
-    total = sum(_area(one.surface.axes) / (growth * (_ON_INCLUSION * min(one.surface.axes)) ** 2)
-                for one in body.inclusion)  # fmt: skip
+    total = sum(
+        _area(one.surface.axes) / (growth * (_ON_INCLUSION * min(one.surface.axes)) ** 2) for one in body.inclusion
+    )
     top = body.heights[1]
     high = top
     for low in body.interfaces:
@@ -110,9 +111,16 @@ def dofs(count: float, degree: int) -> float:
 
 
 def solving_memory(
-    dofs: float, degree: int, *, direct: bool, mixed: bool = False, matrices: bool = False, large: bool = False,
-    parts: bool = False, roughly: bool = False,
-) -> float:  # fmt: skip
+    dofs: float,
+    degree: int,
+    *,
+    direct: bool,
+    mixed: bool = False,
+    matrices: bool = False,
+    large: bool = False,
+    parts: bool = False,
+    roughly: bool = False,
+) -> float:
     """Estimate the bytes that a solve takes, all ranks together.
 
     ``matrices`` says that nothing multiplies cell by cell here, as for ``large`` displacements, but for their error

@@ -54,10 +54,12 @@ def reference_key(case: Case, accuracy: float) -> str:
     probe = case.probe.model_copy(update=_pressed(case.probe))
     ratios = "0.0" if _slides_across_a_mirror(case) else _ratios_text(probe)
     parts = [
-        f"{PHYSICS_VERSION} exact {accuracy!r}", _body_text(case.body, case.scale.stress),
+        f"{PHYSICS_VERSION} exact {accuracy!r}",
+        _body_text(case.body, case.scale.stress),
         text_of(case.material, ("density", *(() if case.is_bent else case.material.PROPORTIONAL_TO))),
-        text_of(probe, (*_UNPHYSICAL, *probe.proportional_to)), ratios,
-    ]  # fmt: skip
+        text_of(probe, (*_UNPHYSICAL, *probe.proportional_to)),
+        ratios,
+    ]
     if case.is_bent:
         parts.append(_load_text(case.load, case.densities))
     return digest("\n".join(parts))
@@ -113,8 +115,9 @@ def _in_units_of(stress: float, body: Body) -> Body:
     """Return the body with its regions' Young's moduli in units of ``stress`` (Pa)."""
     changes = {
         key: tuple(piece.model_copy(update={"young": canonical(piece.young / stress)}) for piece in getattr(body, key))
-        for key in _PIECES if getattr(body, key, ())
-    }  # fmt: skip
+        for key in _PIECES
+        if getattr(body, key, ())
+    }
     return body.model_copy(update=changes) if changes else body
 
 

@@ -276,7 +276,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "six motions": f"probe.motion: {_PRESSED_ONLY}",
         "cut": f"probe.action: {_PRESSED_ONLY}",
     },
-}  # fmt: skip
+}
 
 
 def features_of(scene: Scene) -> frozenset[str]:

@@ -149,16 +149,18 @@ def _check_thickness(body: Body, probe: Probe, problems: Problems) -> bool:
     thickness = body.thickness(probe.frame_on(body))
     if probe.depth >= thickness:
         problems.error(
-            "probe.depth", in_mm(probe.depth),
+            "probe.depth",
+            in_mm(probe.depth),
             f"must be below the {in_mm(thickness)} that the body reaches below the probe, along its axis",
-        )  # fmt: skip
+        )
         return False
     if _LINEAR * thickness < probe.depth <= _LINEAR * probe.half_width:
         problems.warn(
-            "probe.depth", in_mm(probe.depth),
+            "probe.depth",
+            in_mm(probe.depth),
             f"is {probe.depth / thickness:.0%} of the {in_mm(thickness)} of tissue below the probe: above "
             f"{_LINEAR:.0%} linear elasticity is an extrapolation",
-        )  # fmt: skip
+        )
     return True
 
 
@@ -183,8 +185,9 @@ def _check_place(body: Body, probe: Probe, way: Axis | None, problems: Problems)
     return error is None
 
 
-def _check_way(way: Axis | None, probes: Sequence[Probe], placed: Sequence[tuple[Body, Probe]],
-               problems: Problems) -> None:  # fmt: skip
+def _check_way(
+    way: Axis | None, probes: Sequence[Probe], placed: Sequence[tuple[Body, Probe]], problems: Problems
+) -> None:
     """Refuse a path that never meets a body, and the loss of a contact that cannot be lost."""
     if way is None or way.off != "lost" or problems.errors:
         return

@@ -53,9 +53,10 @@ def _makes_sense(load: Load, problems: Problems) -> bool:
     for number, traction in enumerate(load.traction, start=1):
         if (traction.pressure is None) == (traction.traction is None):
             problems.error(
-                f"load.traction[{number}]", None, "needs a pressure (against the outward normal) or a traction (a "
-                "vector), and not both",
-            )  # fmt: skip
+                f"load.traction[{number}]",
+                None,
+                "needs a pressure (against the outward normal) or a traction (a vector), and not both",
+            )
             sane = False
     return sane
 
@@ -81,9 +82,11 @@ def _check_place(body: Body, traction: Traction, key: str, problems: Problems) -
             return False
         if off > _FARTHEST_OFF * on.radius:
             problems.error(
-                key, found, f"lies {in_mm(off)} off the body's surface: at most half the cap's radius, "
+                key,
+                found,
+                f"lies {in_mm(off)} off the body's surface: at most half the cap's radius, "
                 f"{in_mm(_FARTHEST_OFF * on.radius)}, is taken for a place on it",
-            )  # fmt: skip
+            )
             return False
         return True
     if on != FREE and isinstance(body, FromFile) and body.HAS_NAMES:
@@ -108,6 +111,8 @@ def _check_beside(body: Body, probe: Probe, cap: Cap, key: str, problems: Proble
         return
     if gap < 0:
         problems.error(
-            key, [in_mm(c) for c in cap.around], f"the cap reaches within {in_mm(-gap)} of what the probe may cover, "
+            key,
+            [in_mm(c) for c in cap.around],
+            f"the cap reaches within {in_mm(-gap)} of what the probe may cover, "
             f"up to {in_mm(probe.circumradius)} from its axis: move it away, or make it smaller",
-        )  # fmt: skip
+        )

@@ -64,30 +64,33 @@ def check_column(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> No
     column = mesh.column(body.reach(frame))
     if mesh.outside == "free" and isinstance(probe, Indenter) and column <= (1 + ON_EDGE) * probe.half_length:
         problems.error(
-            "mesh.epsilon", in_mm(mesh.epsilon),
+            "mesh.epsilon",
+            in_mm(mesh.epsilon),
             f"keeps a column that contact along the {probe.shape} runs out of: must be above half its length, "
             f'{in_mm(probe.half_length)}, or use outside = "coarse"',
-        )  # fmt: skip
+        )
 
 
 def check_gap(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
     """Between the probe and a held face there must be room for an element, or F is that of the element."""
     if _meets_held_column(body, probe, mesh):
         problems.error(
-            "mesh.epsilon", in_mm(mesh.epsilon),
+            "mesh.epsilon",
+            in_mm(mesh.epsilon),
             f"keeps a column that is held at its side, and that the {probe.shape} reaches, {in_mm(probe.pressed)} from "
             f'its axis: must be above that, or use outside = "coarse" or "free"',
-        )  # fmt: skip
+        )
         return
     if mesh.accuracy is not None and "rim" not in mesh.model_fields_set:
         return
     for key, gap in held_gaps(body, probe, mesh).items():
         if gap < mesh.rim_size(probe.half_width):
             problems.error(
-                key, in_mm(mesh.epsilon) if key == "mesh.epsilon" else None,
+                key,
+                in_mm(mesh.epsilon) if key == "mesh.epsilon" else None,
                 f"leaves {in_mm(gap)} between the probe's edge and a held face, less than an element there: "
                 f"use a rim below {in_mm(gap)}",
-            )  # fmt: skip
+            )
 
 
 def _meets_held_column(body: Body, probe: Probe, mesh: Mesh) -> bool:
@@ -143,9 +146,11 @@ def check_locking(poissons: dict[str, float], mesh: Mesh, problems: Problems) ->
     for key, poisson in poissons.items():
         if poisson > most:
             problems.error(
-                key, poisson, f"displacement elements of degree {mesh.degree} lock: must be at most {most}; "
+                key,
+                poisson,
+                f"displacement elements of degree {mesh.degree} lock: must be at most {most}; "
                 'with degree 2 or 3 and element = "auto", mixed elements take values up to 0.5',
-            )  # fmt: skip
+            )
         elif poisson > visible or poisson == most:
             problems.warn(
                 key, poisson, f"displacement elements of degree {mesh.degree} lock at this value: F comes out too high"

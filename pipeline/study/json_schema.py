@@ -25,9 +25,15 @@ _QUANTITIES = {
 }
 _PLAIN = {"boolean": "true | false", "integer": "whole number", "string": "text"}
 _SIGNS = {
-    "gt": ">", "exclusiveMinimum": ">", "ge": ">=", "minimum": ">=",
-    "lt": "<", "exclusiveMaximum": "<", "le": "<=", "maximum": "<=",
-}  # fmt: skip
+    "gt": ">",
+    "exclusiveMinimum": ">",
+    "ge": ">=",
+    "minimum": ">=",
+    "lt": "<",
+    "exclusiveMaximum": "<",
+    "le": "<=",
+    "maximum": "<=",
+}
 
 
 def study_schema() -> Schema:

@@ -110,9 +110,11 @@ class Problems:
             groups.setdefault((problem.key, _NUMBER.sub("#", problem.allowed), problem.tables), []).append(problem)
         for first, *others in groups.values():
             values = [shortened(_toml(other.found)) for other in others if other.found != first.found]
-            listed = ", ".join(dict.fromkeys(values)) if len(values) <= _MOST_VALUES else (
-                f"{len(values)} more values up to {values[-1]}"
-            )  # fmt: skip
+            listed = (
+                ", ".join(dict.fromkeys(values))
+                if len(values) <= _MOST_VALUES
+                else (f"{len(values)} more values up to {values[-1]}")
+            )
             yield f"{first}; so for {printable(listed)}" if listed else str(first)
 
     def named(self, problems: Iterable[Problem]) -> list[Problem]:

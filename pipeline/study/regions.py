@@ -21,9 +21,23 @@ GAP = 0.1
 _POINTS = 2000
 # Names of tissues that lie on one another: two of them in a sweep were probably meant as layers.
 _LIE_ON_ONE_ANOTHER = {
-    "skin", "epidermis", "dermis", "subcutis", "hypodermis", "fat", "adipose", "fascia", "muscle", "bone", "capsule",
-    "mucosa", "serosa", "cortex", "medulla", "parenchyma",
-}  # fmt: skip
+    "skin",
+    "epidermis",
+    "dermis",
+    "subcutis",
+    "hypodermis",
+    "fat",
+    "adipose",
+    "fascia",
+    "muscle",
+    "bone",
+    "capsule",
+    "mucosa",
+    "serosa",
+    "cortex",
+    "medulla",
+    "parenchyma",
+}
 # Layers that are thicker than the body by this share of it: the rest is rounding.
 _SAME = 1e-9
 # Thinner than this share of the body's height, a layer's two ends are one to whoever meshes it.
@@ -83,16 +97,18 @@ def _check_layers(body: Layered, problems: Problems) -> None:
             return
         if layer.thickness < _THINNEST * height:
             problems.error(
-                key, in_mm(layer.thickness), f"must be at least {in_mm(_THINNEST * height)}, a millionth of the body's "
-                f"height {in_mm(height)}",
-            )  # fmt: skip
+                key,
+                in_mm(layer.thickness),
+                f"must be at least {in_mm(_THINNEST * height)}, a millionth of the body's height {in_mm(height)}",
+            )
             return
         total += layer.thickness
         if total > height * (1 + _SAME):
             problems.error(
-                key, in_mm(layer.thickness), f"layers down to this one take {in_mm(total)}: must be at most the "
-                f"body's height {in_mm(height)}",
-            )  # fmt: skip
+                key,
+                in_mm(layer.thickness),
+                f"layers down to this one take {in_mm(total)}: must be at most the body's height {in_mm(height)}",
+            )
             return
 
 
@@ -103,24 +119,30 @@ def _check_inclusions(body: Body, problems: Problems) -> None:
         gap, found = GAP * min(surface.axes), [in_mm(x) for x in inclusion.at]
         if (room := body.room(surface)) < gap:
             problems.error(
-                key, found, f"{inclusion.name} must lie inside the {body.shape}, {in_mm(gap)} (a tenth of its smallest "
+                key,
+                found,
+                f"{inclusion.name} must lie inside the {body.shape}, {in_mm(gap)} (a tenth of its smallest "
                 f"semi-axis) or more from its surface; "
                 + (f"it is {in_mm(room)} from it" if room > 0 else f"it reaches {in_mm(-room)} out of it"),
-            )  # fmt: skip
+            )
         low, high = surface.centre[2] - surface.axes[2], surface.centre[2] + surface.axes[2]
         for height in body.interfaces:
             if (room := max(low - height, height - high)) < gap:
                 problems.error(
-                    key, found, f"{inclusion.name} must keep {in_mm(gap)} (a tenth of its smallest semi-axis) from "
+                    key,
+                    found,
+                    f"{inclusion.name} must keep {in_mm(gap)} (a tenth of its smallest semi-axis) from "
                     f"where a layer ends, at z = {in_mm(height)}; it is {_distance(room)}",
-                )  # fmt: skip
+                )
     for (i, one), (j, other) in itertools.combinations(enumerate(body.inclusion, start=1), 2):
         gap = GAP * min(*one.surface.axes, *other.surface.axes)
         if (room := _apart(one, other)) < gap:
             problems.error(
-                f"body.inclusion[{j}].at", [in_mm(x) for x in other.at], f"{other.name} must keep {in_mm(gap)} (a "
+                f"body.inclusion[{j}].at",
+                [in_mm(x) for x in other.at],
+                f"{other.name} must keep {in_mm(gap)} (a "
                 f"tenth of the smallest semi-axis) from {one.name}, inclusion[{i}]; it is {_distance(room)}",
-            )  # fmt: skip
+            )
 
 
 def _apart(one: Inclusion, other: Inclusion) -> float:
@@ -158,10 +180,11 @@ def _check_sweep(bodies: Sequence[Body], axes: tuple[Axis, ...], problems: Probl
         tissues = [name for name in names if set(re.split(r"\W+|_", name.lower())) & _LIE_ON_ONE_ANOTHER]
         if len(tissues) > 1 and not any(body.regions for body in bodies):
             problems.warn(
-                "[[material]]", None,
+                "[[material]]",
+                None,
                 f"is a sweep: the whole body is made of {', then of '.join(names)}; layers of one body are "
                 f"[[body.layers]]: {page_of('body.layers')}",
-            )  # fmt: skip
+            )
         elif any(isinstance(body, Layered) and body.layers for body in bodies):
             problems.warn(
                 "[[material]]",

@@ -49,35 +49,40 @@ def check_slit_in(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> N
         return
     if column <= slit.on_surface:
         problems.error(
-            "mesh.epsilon", in_mm(mesh.epsilon),
+            "mesh.epsilon",
+            in_mm(mesh.epsilon),
             f"keeps a column that the slit reaches out of: must be above {in_mm(slit.on_surface)}, or use "
             'outside = "coarse"',
-        )  # fmt: skip
+        )
 
 
 def _check_sliding(body: Body, slit: Slit, frame: Frame, problems: Problems) -> None:
     """Report a blade that tissue slides along where its faces, or what its tip moves in, do not allow for it."""
     if max(map(abs, frame.along)) < 1 - _ALIGNED:
         problems.error(
-            "probe.direction", list(frame.along), "tissue slides along a blade in a slit that lies along x or y only: "
+            "probe.direction",
+            list(frame.along),
+            "tissue slides along a blade in a slit that lies along x or y only: "
             "turn the body, or use contact = 'bonded'",
-        )  # fmt: skip
+        )
     least = _LEAST_ROOM * slit.ahead
     if slit.tip > 0 and (room := slit.room_at_tip(body)) < least:
         problems.error(
-            "probe.incision", in_mm(slit.depth),
+            "probe.incision",
+            in_mm(slit.depth),
             f"puts the blade's tip {in_mm(room)} from the surface or where a layer ends: tissue that slides along it "
             f"needs {in_mm(least)}, a quarter of how far the slit runs ahead",
-        )  # fmt: skip
+        )
 
 
 def _check_depth(body: Body, slit: Slit, problems: Problems) -> None:
     low, high = body.heights
     if slit.depth >= high - low:
         problems.error(
-            "probe.incision", in_mm(slit.depth),
+            "probe.incision",
+            in_mm(slit.depth),
             f"goes through the whole body: must be below its height {in_mm(high - low)}",
-        )  # fmt: skip
+        )
 
 
 def _check_support(body: Body, slit: Slit, problems: Problems) -> None:
@@ -85,9 +90,10 @@ def _check_support(body: Body, slit: Slit, problems: Problems) -> None:
     for level in support.edges():
         if slit.depth >= high - level:
             problems.error(
-                "probe.incision", in_mm(slit.depth),
+                "probe.incision",
+                in_mm(slit.depth),
                 f"goes through what is held of the body: must be below {in_mm(high - level)}",
-            )  # fmt: skip
+            )
     if slit.is_open and support.gap(0.0) == 0.0:
         problems.error("probe.ends", "open", 'the slit would go through the sides, which are held: use ends = "blade"')
 
@@ -96,10 +102,11 @@ def _check_room(body: Body, slit: Slit, problems: Problems) -> None:
     least = _LEAST_ROOM * slit.ahead
     if (room := slit.room(body)) < least:
         problems.error(
-            "probe.incision", in_mm(slit.depth),
+            "probe.incision",
+            in_mm(slit.depth),
             f"puts the slit's front {in_mm(room)} from where a layer ends, or from the bottom or what is held: at "
             f"least {in_mm(least)}, a quarter of how far it runs ahead of the blade, must be left",
-        )  # fmt: skip
+        )
 
 
 def _check_inclusions(body: Body, slit: Slit, frame: Frame, problems: Problems) -> None:
@@ -108,10 +115,11 @@ def _check_inclusions(body: Body, slit: Slit, frame: Frame, problems: Problems) 
     for number, inclusion in enumerate(body.inclusion, start=1):
         if (room := _distance(slit, half, frame, inclusion.surface)) < slit.ahead:
             problems.error(
-                f"body.inclusion[{number}].at", [in_mm(x) for x in inclusion.at],
+                f"body.inclusion[{number}].at",
+                [in_mm(x) for x in inclusion.at],
                 f"{inclusion.name} must keep {in_mm(slit.ahead)} (how far the slit runs ahead of the blade) from the "
                 f"slit; it is {f'{in_mm(room)} from it' if room > 0 else 'cut by it'}",
-            )  # fmt: skip
+            )
 
 
 def _distance(slit: Slit, half: float, frame: Frame, surface: Surface) -> float:

@@ -49,8 +49,11 @@ def _walked(raw: Any, problems: Problems) -> tuple[Any, Way | None]:
         if not isinstance(table, dict):
             return table
         # The sweep's place among the others is the path's.
-        return {("at" if k == "path" else k): (way.texts if k == "path" and way else v) for k, v in table.items()
-                if k != "at" and (k != "path" or way)}  # fmt: skip
+        return {
+            ("at" if k == "path" else k): (way.texts if k == "path" and way else v)
+            for k, v in table.items()
+            if k != "at" and (k != "path" or way)
+        }
 
     return ([walked(table) for table in raw] if isinstance(raw, list) else walked(raw)), way
 
@@ -118,9 +121,10 @@ def _read_array(name: str, tables: list[Any], problems: Problems) -> tuple[list[
         for place, value in sweeps(model, table):
             if place not in shared:
                 problems.error(
-                    f"{where}.{written(place)}", value, "a list inside an array of tables: write one table for each "
-                    "value, or the same list in all tables",
-                )  # fmt: skip
+                    f"{where}.{written(place)}",
+                    value,
+                    "a list inside an array of tables: write one table for each value, or the same list in all tables",
+                )
         try:
             combinations = itertools.product(*shared.values())
             filled = [placed(table, zip(shared, values, strict=True)) for values in combinations]

@@ -1,9 +1,20 @@
 """Names that options of the command line share with the keys of a study file."""
 
 REDUCTIONS = (
-    "duplicates", "full", "scaling", "images", "moved", "axisymmetric", "symmetry", "sharing", "reuse", "reduced",
-    "condensed", "stored", "all",
-)  # fmt: skip
+    "duplicates",
+    "full",
+    "scaling",
+    "images",
+    "moved",
+    "axisymmetric",
+    "symmetry",
+    "sharing",
+    "reuse",
+    "reduced",
+    "condensed",
+    "stored",
+    "all",
+)
 
 # Keys of features that are not computed: named as such, not taken for slips of the pen.
 NOT_COMPUTED = {
