@@ -27,7 +27,7 @@ from benchmarks.ranks import LARGE
 from pipeline import stages
 from pipeline.run.meshing import mesh_case
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.linear import LinearSolver
+from pipeline.solve.krylov import LinearSolver
 from pipeline.solve.loads import Loads
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
@@ -80,25 +80,25 @@ def _counted() -> np.ndarray:
 @contextmanager
 def _watched() -> Iterator[dict[str, float]]:
     """Count what is sent in iterations of conjugate gradients; make stages count the processor's time outside MPI."""
-    sent, iterate = dict.fromkeys((*_MPI, "iterations"), 0.0), LinearSolver._iterate
+    sent, iterate = dict.fromkeys((*_MPI, "iterations"), 0.0), LinearSolver.solve
 
-    def counted(solver: LinearSolver, *vectors: Any) -> int:
+    def counted(solver: LinearSolver, *arguments: Any, **options: Any) -> int:
         before = _counted()
-        iterations = iterate(solver, *vectors)
+        iterations = iterate(solver, *arguments, **options)
         for name, more in zip(_MPI, _counted() - before, strict=False):
             sent[name] += more
         sent["iterations"] += iterations
         return iterations
 
     clock = stages.time
-    LinearSolver._iterate = counted  # type: ignore[method-assign]
+    LinearSolver.solve = counted  # type: ignore[method-assign]
     stages.time = SimpleNamespace(perf_counter=lambda: float(_counted()[3]))  # type: ignore[assignment]
     stages.seconds.clear()
     stages._since[0] = float(_counted()[3])
     try:
         yield sent
     finally:
-        LinearSolver._iterate, stages.time = iterate, clock  # type: ignore[method-assign]
+        LinearSolver.solve, stages.time = iterate, clock  # type: ignore[method-assign]
 
 
 def _run(ranks: int, library: Path, fine: str, degree: int) -> dict[str, Any]:

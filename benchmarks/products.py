@@ -1,4 +1,4 @@
-"""A product with the operator, by who makes it: PETSc's matrix, upper blocks, cells: ``python -m benchmarks.products``.
+"""A product with the operator, by who makes it: PETSc's matrix, cells: ``python -m benchmarks.products``.
 
 A disc on a box, a quarter of it, graded to the probe's edge, degrees 2 to 4. Milliseconds are those of the processor,
 medians; ways take turns, so that each has its share of what else the machine does. What it takes before the first
@@ -29,8 +29,6 @@ COLUMNS = {
     "assemble": ".2f",
     "lay_out": ".2f",
     "petsc": ".2f",
-    "upper_double": ".2f",
-    "upper_single": ".2f",
     "cells_double": ".2f",
     "cells_single": ".2f",
     "ratio": ".1f",
@@ -60,32 +58,27 @@ def measure(size: tuple[float, float], degrees: list[int]) -> list[dict[str, Any
 
 
 def _row(space: Any, law: Any) -> dict[str, Any]:
-    from pipeline.solve.kernels.blocks import SymmetricProduct, UpperBlocks
-    from pipeline.solve.kernels.product import library
+    from pipeline.solve.kernels.native import library
 
     library()
     with ExitStack() as stack:
         start = time.process_time()
-        operator, _ = stack.enter_context(space.operators.lend_product(law))
+        operator = stack.enter_context(space.operators.lend_product(law))
         laid_out = time.process_time()
-        matrix, _ = stack.enter_context(space.operators.lend(law, blocked=True))
+        matrix = stack.enter_context(space.operators.lend(law))
         assembled = time.process_time()
         x, y = matrix.createVecs()
         x.array[:] = np.random.default_rng(0).standard_normal(x.getSize())
         x.array[space.dofs.prescribed] = 0.0
-        upper, doubled, cells = UpperBlocks(matrix), SymmetricProduct(matrix), operator.getPythonContext()
+        cells = operator.getPythonContext()
         single = x.array.astype(np.float32), np.empty(x.getSize(), dtype=np.float32)
         found = _medians(
             {
                 "petsc": lambda: matrix.mult(x, y),
-                "upper_double": lambda: doubled.mult(matrix, x, y),
-                "upper_single": lambda: upper.multiply(*single),
                 "cells_double": lambda: operator.mult(x, y),
                 "cells_single": lambda: cells.multiply(*single),
             }
         )
-        # Both triangles in double, and one in single precision, with their columns; or all that cells are laid out in.
-        blocks = matrix.getInfo()["nz_used"] / 9
         return {
             "degree": space.degree,
             "dofs": space.dofs.dofs,
@@ -93,7 +86,7 @@ def _row(space: Any, law: Any) -> dict[str, Any]:
             "lay_out": laid_out - start,
             **found,
             "ratio": found["petsc"] / found["cells_single"],
-            "matrix_bytes": blocks * (76 + 40 / 2) / space.dofs.dofs,
+            "matrix_bytes": 12 * matrix.getInfo()["nz_used"] / space.dofs.dofs,
             "cells_bytes": cells.nbytes / space.dofs.dofs,
         }
 

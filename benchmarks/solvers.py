@@ -115,19 +115,20 @@ def _case(degree: int, size: tuple[float, float]) -> Any:
 
 
 def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[Any, Callable[[], Any]]:
-    """Return the blocked operator, and what assembles, sets up and solves once."""
-    from pipeline.solve.linear import LinearSolver
+    """Return the operator, and what assembles, sets up and solves once."""
+    from pipeline.solve.krylov import LinearSolver
     from pipeline.solve.solution import TOLERANCE
     from pipeline.solve.vectors import vector
 
     space = problem.elements.displacements
-    unit, _ = stack.enter_context(space.operators.lend(law, blocked=space.degree > 1))
+    lend = space.operators.lend_product if space.degree > 1 else space.operators.lend
+    unit = stack.enter_context(lend(law))
     held = space.dofs.held(PRESS)
 
     def once() -> tuple[float, float, float, int]:
         start = time.process_time()
         with (
-            problem.solver(law, method, linear=False) as lent,
+            problem.solver(law, method) as lent,
             vector(space.dofs.space) as rhs,
             vector(space.dofs.space) as unknown,
         ):
@@ -154,7 +155,7 @@ def _mixed_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[A
     saddle = problem.elements.saddle(LAME, stack, direct=direct)
     assemble = time.process_time() - start
     # Neither a product without entries nor the matrix of a direct solve is what others multiply with.
-    unit, _ = stack.enter_context(space.displacements.operators.lend(LAME, blocked=True))
+    unit = stack.enter_context(space.displacements.operators.lend_product(LAME))
     held = space.displacements.dofs.held(PRESS)
 
     def once() -> tuple[float, float, float, int]:

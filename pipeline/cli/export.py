@@ -74,7 +74,7 @@ def export(
     from pipeline.export.export import write
     from pipeline.export.ranks import Ranks
     from pipeline.mesh.generate import MeshError
-    from pipeline.solve.linear import SolveError
+    from pipeline.solve.krylov import SolveError
 
     comm = workflow.world()
     ranks = Ranks(comm)

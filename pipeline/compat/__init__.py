@@ -9,7 +9,7 @@ from petsc4py import PETSc
 
 from pipeline.compat.code import EVERYWHERE, Code, compile_code, function_space, make_form, renumbered_space
 from pipeline.compat.elements import cell_dofs, degree, element, mixed_element, reference_element
-from pipeline.compat.matrices import add_matrix, assemble_matrix, dirichletbc
+from pipeline.compat.matrices import add_from_ghosts, add_matrix, assemble_matrix, dirichletbc, ghosted_vector
 from pipeline.compat.meshes import (
     cell_tags,
     create_mesh,
@@ -21,11 +21,31 @@ from pipeline.compat.meshes import (
 )
 
 __all__ = [
-    "EVERYWHERE", "Code", "add_matrix", "assemble_matrix", "cell_dofs", "cell_tags", "compile_code", "create_mesh",
-    "degree", "dirichletbc", "element", "function_space", "geometry_dofs", "gmsh_session", "inside_face",
-    "make_form", "mixed_element", "original_cells", "reference_element", "renumbered_space", "triangle_nodes",
+    "EVERYWHERE",
+    "Code",
+    "add_from_ghosts",
+    "add_matrix",
+    "assemble_matrix",
+    "cell_dofs",
+    "cell_tags",
+    "compile_code",
+    "create_mesh",
+    "degree",
+    "dirichletbc",
+    "element",
+    "function_space",
+    "geometry_dofs",
+    "ghosted_vector",
+    "gmsh_session",
+    "inside_face",
+    "make_form",
+    "mixed_element",
+    "original_cells",
+    "reference_element",
+    "renumbered_space",
+    "triangle_nodes",
     "versions",
-]  # fmt: skip
+]
 
 
 def versions() -> dict[str, str]:

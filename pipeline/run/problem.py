@@ -18,7 +18,7 @@ from pipeline.solve.axisymmetric import MeridianProblem
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.contact.active_set import ContactError
 from pipeline.solve.contact.problem import ContactProblem, Tool
-from pipeline.solve.linear import SolveError, is_direct
+from pipeline.solve.krylov import SolveError, is_direct
 from pipeline.solve.loads import Loads
 from pipeline.solve.meridian_contact import MeridianContact
 from pipeline.solve.meridian_trials import RoundTool
@@ -39,9 +39,7 @@ class CaseFailure(Exception):
     """A case cannot be computed, for a reason that all ranks have agreed on."""
 
 
-def problem_of(
-    spaces: Spaces, case: Case, *, shared: bool, reuse: bool = False, condense: bool = False
-) -> FieldProblem:
+def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: bool = False) -> FieldProblem:
     """Return what solves ``case`` in the spaces of its mesh, by the elements that suit it; collective.
 
     ``condense`` says that many depths are to come.
@@ -50,7 +48,7 @@ def problem_of(
         return ContactProblem(
             spaces, tool_of(case), case.element, degree=case.mesh.degree, reuse=reuse, condense=condense
         )
-    return QuasiStaticProblem(spaces, case.mesh.degree, conditions_of(case), case.element, shared=shared, reuse=reuse)
+    return QuasiStaticProblem(spaces, case.mesh.degree, conditions_of(case), case.element, reuse=reuse)
 
 
 def memory_of(case: Case, dofs: int) -> tuple[float, float]:

@@ -138,11 +138,8 @@ class StepRunner:
     def _operate(self, step: OperatorStep, meshed: Meshed) -> None:
         """Solve every material of an operator, or a few of them and the rest from these."""
         self._begin(*step.solves)
-        shared = self._assembles_parts(step, meshed.mesh)
         condense, reuse = self._condenses(step, meshed.mesh), self._plan.reuse
-        problem = self._caught(
-            lambda: problem_of(meshed.spaces, step.case, shared=shared, reuse=reuse, condense=condense)
-        )
+        problem = self._caught(lambda: problem_of(meshed.spaces, step.case, reuse=reuse, condense=condense))
         if isinstance(problem, Failure):
             self._fail(step.solves, problem)
             return
@@ -206,7 +203,7 @@ class StepRunner:
         """Compute one case, mesh and all; collective."""
         with recorded() as times:
             mesh = self._mesh(solve)
-        with Spaces(mesh) as spaces, problem_of(spaces, solve.case, shared=False) as problem:
+        with Spaces(mesh) as spaces, problem_of(spaces, solve.case) as problem:
             record = self._solve(solve, problem, Meshed(spaces, times, memory), bar)
         del mesh, spaces, problem
         give_back(self._comm)
@@ -244,16 +241,6 @@ class StepRunner:
         self._progress.note(f"meshing: {solve.label}")
         check_memory(self._free, estimate.case_memory(case, share=0.5 ** len(solve.mirrors)), "this case")
         return mesh_case(case, solve.mirrors, self._comm, None if case.solve.timing else self._cache)
-
-    def _assembles_parts(self, step: OperatorStep, mesh: BodyMesh) -> bool:
-        """Tell whether A_λ and A_μ are assembled apart, once for every material; collective.
-
-        That costs as much as assembling their sum twice, and memory for three; on one rank assembly is so fast that
-        it is never worth it.
-        """
-        degree = step.case.mesh.degree
-        needed = estimate.enriched_memory(estimate.dofs(mesh.cells, degree), degree, matrices=True, parts=True)
-        return self._comm.size > 1 and len(step.solves) > 2 and not lacks_memory(self._free, needed, "")
 
     def _condenses(self, step: OperatorStep, mesh: BodyMesh) -> bool:
         """Tell whether the surface is condensed for many depths: of a small body, on one rank; collective."""

@@ -20,7 +20,7 @@ from pipeline.mesh.meridian import (
 )
 from pipeline.scene.model import FIXED, PROBE
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.linear import SolveError
+from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
 from pipeline.solve.meridian_refine import DirectProblem, best_answer, error_bar, meshes_of, only_along_axis, refined

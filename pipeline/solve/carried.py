@@ -19,7 +19,7 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.solve.dead_loads import Applied
 from pipeline.solve.error import extrapolate
-from pipeline.solve.linear import SolveError
+from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads, Vector
 from pipeline.solve.reaction import Sums, whole_force
 

@@ -28,10 +28,9 @@ from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.conditions import Conditions, ConstrainedSpace
 from pipeline.solve.dead_loads import Applied
-from pipeline.solve.earlier import Earlier
-from pipeline.solve.enrich import energy_decrements
-from pipeline.solve.kernels.multigrid import takes_product
-from pipeline.solve.linear import Level, LinearSolver, SolveError, is_direct
+from pipeline.solve.hierarchical_estimate import energy_decrements
+from pipeline.solve.initial_guess import Earlier
+from pipeline.solve.krylov import Level, LinearSolver, SolveError, is_direct
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.mixed_space import MixedSpace
 from pipeline.solve.physics import MaterialLaw, SplitLaw
@@ -234,19 +233,15 @@ class Elements(ABC):
         return global_sum(self.displacements.dofs.comm, np.array(products))
 
 
-def elements_of(
-    spaces: Spaces, degree: int, conditions: Conditions, element: str = "displacement", *, shared: bool = False
-) -> Elements:
+def elements_of(spaces: Spaces, degree: int, conditions: Conditions, element: str = "displacement") -> Elements:
     """Return elements of a kind, "displacement" or "mixed", and a ``degree``; collective.
-
-    ``shared`` assembles A_λ and A_μ apart, once, for many pairs of λ and μ.
 
     Raises:
         SolveError: if footprint and support share a point: no displacement satisfies both.
     """
     if element == "mixed":
         return MixedElements(spaces, degree, conditions)
-    return DisplacementElements(spaces, degree, conditions, shared=shared)
+    return DisplacementElements(spaces, degree, conditions)
 
 
 class DisplacementElements(Elements):
@@ -254,10 +249,9 @@ class DisplacementElements(Elements):
 
     element, stricter = "displacement", 1.0
 
-    def __init__(self, spaces: Spaces, degree: int, conditions: Conditions, *, shared: bool = False):
+    def __init__(self, spaces: Spaces, degree: int, conditions: Conditions):
         """Prepare; collective."""
         super().__init__(spaces, degree, conditions)
-        self._shared = shared
         self._kept: DisplacementSolver | None = None
 
     @property
@@ -332,20 +326,17 @@ class DisplacementElements(Elements):
                 solver = LinearSolver(levels, direct=direct, tolerance=_ANY)
                 owner.callback(solver.close)
             found = DisplacementSolver(self, law, levels, solver, cost, is_exact=direct)
-            if keep and solver.is_single:
+            if keep and solver.cycle is not None:
                 self._kept, found.owner = found, owner.pop_all()
             else:
                 stack.push(owner.pop_all())
                 found.owner = stack
         return found
 
-    def levels(self, law: MaterialLaw, stack: ExitStack, *, direct: bool, entries: bool = False) -> list[Level]:
-        """Return the levels of multigrid, or the one of a direct solve, given back with the ``stack``; collective.
-
-        All of them have ``entries``, or maybe the lowest alone.
-        """
+    def levels(self, law: MaterialLaw, stack: ExitStack, *, direct: bool) -> list[Level]:
+        """Return the levels of multigrid, or the one of a direct solve, given back with the ``stack``; collective."""
         spaces = [self.displacements] if direct else [*self._coarser(), self.displacements]
-        return [self._level(space, law, stack, blocked=not direct, entries=entries) for space in spaces]
+        return [_level(space, law, stack, direct=direct) for space in spaces]
 
     def finer(
         self, law: MaterialLaw, levels: list[Level], stack: ExitStack, below: LinearSolver | None = None
@@ -355,11 +346,9 @@ class DisplacementElements(Elements):
         ``below`` is the solver of ``levels``, if it is still there.
         """
         finer = DisplacementElements(self._spaces, self.degree + 1, self._conditions)
-        if len(levels) == 1:
-            coarser = [self._level(space, law, stack, blocked=True, entries=True) for space in self._coarser()]
-            levels = [*coarser, *levels]
-        entries = not takes_product([level.matrix for level in levels])
-        level = self._level(finer.displacements, law, stack, blocked=True, entries=entries)
+        if len(levels) == 1 and self.degree > 1:
+            levels = self.levels(law, stack, direct=False)
+        level = _level(finer.displacements, law, stack)
         solver = LinearSolver([*levels, level], direct=False, tolerance=_ANY, below=below)
         stack.callback(solver.close)
         return finer, solver
@@ -367,9 +356,6 @@ class DisplacementElements(Elements):
     def _coarser(self) -> list[ElasticSpace]:
         """Return the spaces of lower degree."""
         return [self._spaces.get(degree, self._conditions) for degree in range(1, self.degree)]
-
-    def _level(self, space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, blocked: bool, entries: bool) -> Level:
-        return _level(space, law, stack, blocked=blocked, entries=entries, shared=self._shared)
 
 
 @dataclass(eq=False)
@@ -415,7 +401,7 @@ class DisplacementSolver:
     def enrich(self, columns: Sequence[Column], loads: Loads, stack: ExitStack, *, keep: bool) -> Enriched:
         """Solve on in one degree more, from the residuals there; collective."""
         coarse = self.elements
-        if not self.linear.is_single and coarse.degree > 1:
+        if self.linear.cycle is None and coarse.degree > 1:
             self.linear.close()  # what the next degree takes is the most memory of all
         self._above = self._above or coarse.finer(self.law, self.levels, self.owner, self.linear)
         finer, solver = self._above
@@ -433,7 +419,7 @@ class DisplacementSolver:
             if loads.dead is not None and column.applied is not None:
                 space.put(residual, space.applied(loads.dead))
             residuals.append(residual)
-        decrements, corrections, iterations = energy_decrements(solver, residuals, keep=keep)
+        decrements, corrections, iterations = energy_decrements(solver, residuals, keep_solutions=keep)
         kept = []
         for solution, correction in zip(solutions, corrections, strict=False):
             (values,) = fields = stack.enter_context(finer.fields())
@@ -560,7 +546,7 @@ class MixedElements(Elements):
     def saddle(self, elastic: MaterialLaw, stack: ExitStack, *, direct: bool) -> Saddle:
         """Return the blocks for λ₀ and μ of the law ``elastic``, given back with the ``stack``; collective."""
         spaces = [self._spaces.get(d, self._conditions) for d in ([self.degree] if direct else self._degrees)]
-        levels = [_level(space, elastic, stack, blocked=not direct, entries=direct) for space in spaces]
+        levels = [_level(space, elastic, stack, direct=direct) for space in spaces]
         stiffness = self.space.by_region(tuple(part.lame_lambda + 2 * part.lame_mu for part in elastic.parameters))
         return Saddle(levels, *self.space.blocks(entries=direct), stiffness, self.degree - 1)
 
@@ -630,16 +616,10 @@ class MixedSolver:
         return Enriched(finer, found, iterations, unseen=split.unit * np.array(above.saddle.first_energies))
 
 
-def _level(
-    space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, blocked: bool, entries: bool, shared: bool = False
-) -> Level:
-    """Return a level of multigrid, whose operator is given back with the ``stack``; collective."""
-    blocked, operators = blocked and space.degree > 1, space.operators
-    if blocked and not entries:
-        lent = operators.lend_for_cycles(law, shared=shared)
-    else:
-        lent = operators.lend(law, blocked=blocked, shared=shared)
-    matrix, _ = stack.enter_context(lent)
+def _level(space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, direct: bool = False) -> Level:
+    """Return a level of multigrid, or of a direct solve; its operator is given back with the ``stack``; collective."""
+    operators = space.operators
+    matrix = stack.enter_context(operators.lend(law) if direct or space.degree == 1 else operators.lend_product(law))
     return Level(space.dofs.space, matrix, space.dofs.prescribed, not law.is_uniform)
 
 

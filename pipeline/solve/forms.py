@@ -19,9 +19,8 @@ from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import distribute
 from pipeline.mesh.generate import MeshArrays
 from pipeline.solve.compiled import cellwise_space, form, scalar_space, vector_space
-from pipeline.solve.kernels import assembles, has_kernel
+from pipeline.solve.kernels.assembly import cell_kernel
 from pipeline.solve.kernels.curved import quadrature_degree
-from pipeline.solve.kernels.stiffness import cell_kernel
 from pipeline.solve.physics import LAWS, MaterialLaw, strain
 
 # Marks of cells, and the bulge of an edge, in units of its length, that rounding may leave.
@@ -82,11 +81,8 @@ class ElasticForms:
 
     def _kernels(self) -> dict[int, int]:
         """Return a kernel for the straight cells, which takes a twelfth of the time of the generated one."""
-        degree, mesh = compat.degree(self._space), self._space.mesh
-        if assembles(self._space) or not has_kernel(degree):
-            return {}
-        kernel = cell_kernel(degree, of_regions=self._regions is not None)
-        return {compat.EVERYWHERE if curved_cells(mesh) is None else _STRAIGHT: kernel}
+        kernel = cell_kernel(compat.degree(self._space), of_regions=self._regions is not None)
+        return {compat.EVERYWHERE if curved_cells(self._space.mesh) is None else _STRAIGHT: kernel}
 
     def _form(self, u: Any, measure: Any, kernels: dict[int, int] | None = None) -> Any:
         v, (lame_lambda, lame_mu) = ufl.TestFunction(self._space), self.lame
@@ -107,22 +103,14 @@ class MixedForms:
     @cached_property
     def mass(self) -> Any:
         """M."""
-        return self._mass(curved_only=False)
-
-    @cached_property
-    def curved_mass(self) -> Any:
-        """The part of M from cells with curved edges."""
-        return self._mass(curved_only=True)
+        p, q = ufl.TrialFunction(self._pressures), ufl.TestFunction(self._pressures)
+        return self._form(p * q)
 
     @cached_property
     def coupling(self) -> Any:
         """B."""
-        return self._coupling(curved_only=False)
-
-    @cached_property
-    def curved_coupling(self) -> Any:
-        """The part of B from cells with curved edges."""
-        return self._coupling(curved_only=True)
+        u, q = ufl.TrialFunction(self._displacement.function_space), ufl.TestFunction(self._pressures)
+        return self._form(q * ufl.div(u))
 
     @cached_property
     def dilation(self) -> Any:
@@ -134,16 +122,8 @@ class MixedForms:
         """Bᵀ p, a vector on displacements."""
         return self._form(self.pressure * ufl.div(ufl.TestFunction(self._displacement.function_space)))
 
-    def _mass(self, *, curved_only: bool) -> Any:
-        p, q = ufl.TrialFunction(self._pressures), ufl.TestFunction(self._pressures)
-        return self._form(p * q, curved_only=curved_only)
-
-    def _coupling(self, *, curved_only: bool) -> Any:
-        u, q = ufl.TrialFunction(self._displacement.function_space), ufl.TestFunction(self._pressures)
-        return self._form(q * ufl.div(u), curved_only=curved_only)
-
-    def _form(self, integrand: Any, *, curved_only: bool = False) -> Any:
-        return form(integrand * dx(self._displacement.function_space, curved_only=curved_only))
+    def _form(self, integrand: Any) -> Any:
+        return form(integrand * dx(self._displacement.function_space))
 
 
 class HyperelasticForms:

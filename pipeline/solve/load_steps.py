@@ -23,9 +23,9 @@ from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.elements import Column, DisplacementElements, Enriched, Products
-from pipeline.solve.enrich import energy_decrements
 from pipeline.solve.forms import HyperelasticForms
-from pipeline.solve.linear import LinearSolver
+from pipeline.solve.hierarchical_estimate import energy_decrements
+from pipeline.solve.krylov import LinearSolver
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.newton import Equilibrium, LargeError, assemble, tangent_product
 from pipeline.solve.physics import MaterialLaw

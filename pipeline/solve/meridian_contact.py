@@ -23,7 +23,7 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Grading
-from pipeline.solve.linear import SolveError
+from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.meridian_refine import DirectProblem, best_answer, error_bar, only_along_axis
 from pipeline.solve.meridian_signs import LiftsOff, check_signs

@@ -25,7 +25,7 @@ from pipeline import compat
 from pipeline.arrays import FloatArray, Int32Array, IntArray
 from pipeline.mesh.meridian import JOINT, mesh_order
 from pipeline.solve.compiled import cellwise_space, form, taylor_hood_space, vector_space
-from pipeline.solve.linear import SolveError
+from pipeline.solve.krylov import SolveError
 
 # Of the larger coordinate: what rounding may put between one place and itself.
 _SAME_PLACE = 1e-11
@@ -85,7 +85,7 @@ class MeridianForms:
 
     def stiffness(self) -> sp.csr_matrix:
         """Assemble the operator (μ a, per radian), with nothing prescribed."""
-        matrix = compat.assemble_matrix(self._stiffness, [], 1.0, "aij")
+        matrix = compat.assemble_matrix(self._stiffness, [], 1.0)
         rows, columns, values = matrix.getValuesCSR()
         matrix.destroy()
         return sp.csr_matrix((values, columns, rows), shape=(self.dofs, self.dofs))

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.arrays import FloatArray, Int32Array, IntArray
 from pipeline.mesh.meridian import Grading, MeridianArrays, meridian_mesh, split_regions
 from pipeline.scene.model import FIXED, PROBE
-from pipeline.solve.linear import SolveError
+from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
 from pipeline.solve.meridian_system import Meshes, Unbalanced

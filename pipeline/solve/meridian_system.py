@@ -13,7 +13,7 @@ from pipeline.arrays import FloatArray, Int32Array
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Meridian, MeridianArrays
 from pipeline.quantities import CLEAR
-from pipeline.solve.linear import SolveError
+from pipeline.solve.krylov import SolveError
 from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage

@@ -15,7 +15,7 @@ from pipeline.arrays import BoolArray, FloatArray
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import AXIS, Grading, MeridianArrays
 from pipeline.scene.model import FIXED, PROBE
-from pipeline.solve.linear import SolveError
+from pipeline.solve.krylov import SolveError
 from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
 from pipeline.solve.meridian_refine import meshes_of, refined
 from pipeline.solve.meridian_system import HalfPlane, Meshes, factorised, forms_of

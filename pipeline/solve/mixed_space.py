@@ -15,10 +15,9 @@ from pipeline import compat
 from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.conditions import whole_points
-from pipeline.solve.forms import MixedForms, curved_cells, has_curved_cells
-from pipeline.solve.kernels import assembles
-from pipeline.solve.kernels import coupling as straight
+from pipeline.solve.forms import MixedForms
 from pipeline.solve.kernels.pressure import CellPressures, Coupling, Mass
+from pipeline.solve.krylov import keep
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.region_space import region_wise_space
 from pipeline.solve.saddle import Pair
@@ -32,7 +31,7 @@ class MixedSpace:
 
     Pressures are counted in units of ``unit`` × μ, ``unit`` (1/m) being about one over the element size: the blocks
     of the saddle point are then of like magnitude in any unit of length. What couples them is multiplied cell by cell
-    where C is compiled (:meth:`blocks`), and assembled where entries are asked for.
+    (:meth:`blocks`), and assembled where entries are asked for.
     """
 
     def __init__(self, body: BodyMesh, displacements: ElasticSpace):
@@ -43,13 +42,13 @@ class MixedSpace:
         self._has_regions = body.regions is not None
         self.forms = MixedForms(displacements.forms.displacement, self.pressures)
         index_map = self.pressures.dofmap.index_map
-        self._owned, self._size = index_map.size_local, index_map.size_global
+        self._owned = index_map.size_local
         self.dofs = displacements.dofs.dofs + index_map.size_global
         self.whole_dofs = displacements.dofs.whole_dofs + whole_points(self.pressures, body)
         self._body, self._stack = body, ExitStack()
         with stage("assembly"):
-            self._products = self._lay_out()
-            self.unit = self._unit()
+            self._products = CellPressures(self.pressures, displacements.operators.cells)
+            self.unit = self._products.unit
 
     def close(self) -> None:
         """Free the matrices that pressures take part in."""
@@ -57,7 +56,7 @@ class MixedSpace:
 
     def blocks(self, *, entries: bool) -> tuple[PETSc.Mat, PETSc.Mat]:
         """Return B and M, which are the space's: with ``entries``, or maybe as products; collective."""
-        if entries or self._products is None:
+        if entries:
             return self.coupling, self.mass
         return self._shells
 
@@ -104,7 +103,7 @@ class MixedSpace:
         ``checked``: see :meth:`ElasticSpace.apply`.
         """
         self.displacements.apply(elastic, law, checked=checked)
-        if not checked and self._products is not None:
+        if not checked:
             pressure = self.forms.pressure.x.array[: self._owned] / self.unit
             pull.array[:] += self._products.pull(pressure, whole=True)
         else:
@@ -122,48 +121,18 @@ class MixedSpace:
         unknown[0].array[dofs.prescribed_owned] = 0.0
         unknown[1].array[:] = pressure.x.array[: self._owned] / self.unit
 
-    def _lay_out(self) -> CellPressures | None:
-        """Return what multiplies with M and B cell by cell, None where nothing does; collective."""
-        operators = self.displacements.operators
-        return CellPressures(self.pressures, operators.cells) if operators.multiplies else None
-
-    def _unit(self) -> float:
-        if self._products is not None:
-            return self._products.unit
-        diagonal = self._bare[0].getDiagonal()
-        unit = float((diagonal.sum() / self._size) ** (-1 / 3))
-        diagonal.destroy()
-        return unit
-
     @cached_property
     def _shells(self) -> tuple[PETSc.Mat, PETSc.Mat]:
-        assert self._products is not None
         matrices = Coupling(self._products).matrix(), Mass(self._products).matrix()
         for matrix in matrices:
             self._stack.callback(matrix.destroy)
         return matrices
 
     @cached_property
-    def _bare(self) -> tuple[PETSc.Mat, PETSc.Mat]:
-        """M and B in units of length and without conditions; collective."""
-        if not assembles(self.displacements.dofs.space):
-            mass, coupling = _assemble(self.forms.mass), _assemble(self.forms.coupling)
-        else:
-            curved = curved_cells(self._body.mesh)
-            mass = straight.mass(self.pressures, curved)
-            coupling = straight.coupling(self.pressures, self.displacements.dofs.space, curved)
-            if has_curved_cells(self._body.mesh):
-                compat.add_matrix(mass, self.forms.curved_mass, [], 1.0)
-                compat.add_matrix(coupling, self.forms.curved_coupling, [], 1.0)
-        self._stack.callback(mass.destroy)
-        self._stack.callback(coupling.destroy)
-        return mass, coupling
-
-    @cached_property
     @stage("assembly")
     def _assembled(self) -> tuple[PETSc.Mat, PETSc.Mat]:
         """M and B; collective."""
-        mass, coupling = self._bare
+        mass, coupling = (keep(self._stack, _assemble(form)) for form in (self.forms.mass, self.forms.coupling))
         free = coupling.createVecRight()
         free.set(1.0)
         free.array[self.displacements.dofs.prescribed_owned] = 0.0
@@ -174,7 +143,7 @@ class MixedSpace:
         return mass, coupling
 
     def _dilate(self, result: PETSc.Vec, *, checked: bool) -> None:
-        if not checked and self._products is not None:
+        if not checked:
             displacement = self.displacements.forms.displacement.x.array[: self.displacements.dofs.owned]
             result.array[:] += self._products.dilation(displacement, whole=True)
             return
@@ -184,4 +153,4 @@ class MixedSpace:
 
 
 def _assemble(form: object) -> PETSc.Mat:
-    return compat.assemble_matrix(form, [], 1.0, "aij")
+    return compat.assemble_matrix(form, [], 1.0)

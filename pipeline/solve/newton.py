@@ -17,7 +17,7 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.solve.forms import HyperelasticForms
-from pipeline.solve.linear import LinearSolver, SolveError, explain
+from pipeline.solve.krylov import LinearSolver, SolveError, explain
 from pipeline.solve.spaces import ElasticSpace
 from pipeline.solve.vectors import add_from_ghosts, fill, vector
 from pipeline.stages import stage
@@ -125,7 +125,7 @@ class Equilibrium:
 
     def _assemble(self, displacement: PETSc.Vec) -> None:
         self._space.set_displacement(displacement)
-        compat.assemble_matrix(self._forms.tangent, [], 1.0, "aij", self.tangent)
+        compat.assemble_matrix(self._forms.tangent, [], 1.0, self.tangent)
 
     def _shorten(self, here: PETSc.Vec, step: PETSc.Vec) -> bool:
         """Halve a ``step`` (which is subtracted) until no tissue is inside out behind it, and less energy is stored.

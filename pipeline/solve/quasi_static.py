@@ -25,7 +25,6 @@ from pipeline.arrays import FloatArray
 from pipeline.solve.carried import Carried, carried_of, imbalance, shares
 from pipeline.solve.cell_values import CellValues
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.earlier import Earlier
 from pipeline.solve.elements import (
     Column,
     DisplacementElements,
@@ -36,7 +35,8 @@ from pipeline.solve.elements import (
     elements_of,
 )
 from pipeline.solve.error import error_bar, stiffness_bars
-from pipeline.solve.linear import LinearSolver, SolveError
+from pipeline.solve.initial_guess import Earlier
+from pipeline.solve.krylov import LinearSolver, SolveError
 from pipeline.solve.load_steps import LoadSteps, Walk
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.physics import MaterialLaw
@@ -65,18 +65,16 @@ class QuasiStaticProblem:
         conditions: Conditions,
         element: str = "displacement",
         *,
-        shared: bool = False,
         reuse: bool = False,
     ):
         """Prepare elements of a ``degree``, of a kind, "displacement" or "mixed"; collective.
 
-        ``shared`` assembles A_λ and A_μ apart, once, for many pairs of λ and μ. ``reuse`` begins each solve from the
-        solution of the one before: depths of a law that is not linear share one walk.
+        ``reuse`` begins each solve from the solution of the one before: depths of a nonlinear law share one walk.
 
         Raises:
             SolveError: if footprint and support share a point: no displacement satisfies both.
         """
-        self.elements: Elements = elements_of(spaces, degree, conditions, element, shared=shared)
+        self.elements: Elements = elements_of(spaces, degree, conditions, element)
         self.corrections: dict[Motion, tuple[FloatArray, ...]] = {}
         self._earlier: Earlier | None = None  # of a tool and the far fields of its places
         self._walk: Walk | None = None  # to the last depth in a body of a law that is not linear
@@ -273,10 +271,8 @@ class QuasiStaticProblem:
         return of(self._conditions.front), of(self._conditions.tip)
 
     @contextmanager
-    def solver(self, law: MaterialLaw, method: str = "auto", *, linear: bool = True) -> Iterator[LinearSolver]:
+    def solver(self, law: MaterialLaw, method: str = "auto") -> Iterator[LinearSolver]:
         """Lend a solver for a material, of displacement elements; collective.
-
-        ``linear``: its preconditioner is, to the last digit.
 
         Raises:
             SolveError: if it cannot be set up.
@@ -285,8 +281,8 @@ class QuasiStaticProblem:
         assert isinstance(elements, DisplacementElements)
         direct = elements.is_direct(method)
         with ExitStack() as stack:
-            levels = elements.levels(law, stack, direct=direct, entries=linear)
-            solver = LinearSolver(levels, direct=direct, tolerance=0.5, linear=linear)
+            levels = elements.levels(law, stack, direct=direct)
+            solver = LinearSolver(levels, direct=direct, tolerance=0.5)
             stack.callback(solver.close)
             yield solver
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.conditions import ConstrainedSpace
-from pipeline.solve.linear import SolveError
+from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads, Vector
 from pipeline.solve.vectors import global_sum
 

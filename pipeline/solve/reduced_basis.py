@@ -5,8 +5,8 @@ solution among their combinations has the smallest energy of them all, so that F
 
     F_rb·d - F_h·d = r K(t)⁻¹ r <= r K(t₀)⁻¹ r <= r P r / λ_min(P K(t₀))        for t >= t₀,
 
-r being its residual, P the preconditioner for the smallest t. As r is a combination of a few vectors, so is the
-bound, and costs nothing for another t (A. K. Noor and J. M. Peters, AIAA J. 18, 455, 1980; G. Rozza, D. B. P. Huynh and
+r being its residual, P the preconditioner for the smallest t. As r is a combination of a few vectors, the bound costs
+one application of P for another t (A. K. Noor and J. M. Peters, AIAA J. 18, 455, 1980; G. Rozza, D. B. P. Huynh and
 A. T. Patera, Arch. Comput. Methods Eng. 15, 229, 2008, for the bound).
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.enrich import smallest_eigenvalue
+from pipeline.solve.krylov import LinearSolver, keep
 from pipeline.solve.loads import Loads
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
@@ -26,6 +26,7 @@ from pipeline.solve.vectors import global_sum, vector
 
 # λ_min is estimated from above, by Lanczos: its share that is relied on.
 _TRUST = 0.5
+_LANCZOS, _SETTLED = 30, 1e-12
 _LAMBDA, _MU = MaterialLaw.of(1.0, 0.0), MaterialLaw.of(0.0, 1.0)
 
 
@@ -48,21 +49,19 @@ class ReducedBasis:
         self._loads, self._mirrored = loads, self._space.dofs.body.mirrored
         self._stack = ExitStack()
         self._solver = self._stack.enter_context(problem.solver(MaterialLaw.of(smallest, 1.0), method))
-        # What the residual is made of, and what each of it becomes under P: first the loads, then two for each w.
+        # What the residual is made of: first the loads, then two for each w.
         self._parts: list[PETSc.Vec] = []
-        self._under_p: list[PETSc.Vec] = []
         self._solutions: list[PETSc.Vec] = []
         self._reactions: list[FloatArray] = []
-        self._gram = np.zeros((0, 0))
         self._products = np.zeros((0, 2))  # w_i · parts_j
         self._result = self._vector()
         held = self._vector()
         held.array[:] = self._space.dofs.held(motion)[: self._space.dofs.owned]
         self._held = held
         self._held_energy = [self._add(held, law, sign=-1.0) for law in (_LAMBDA, _MU)]
-        load = self._vector()
-        load.array[:] = self._parts[0].array + self._parts[1].array
-        self._least = _TRUST * smallest_eigenvalue(self._solver, load)
+        self._residual, self._under_p = self._vector(), self._vector()
+        self._residual.array[:] = self._parts[0].array + self._parts[1].array
+        self._least = _TRUST * _smallest_eigenvalue(self._solver, self._residual)
 
     def __enter__(self) -> "ReducedBasis":
         return self
@@ -95,7 +94,7 @@ class ReducedBasis:
         self._products = products
 
     def evaluate(self, t: float) -> Reduced:
-        """Return force, energy and bound for t = λ/μ; no work to speak of.
+        """Return force, energy and bound for t = λ/μ, for the work of one application of P; collective.
 
         With loads b_q = -A_q·held and the solutions' w_i·A_q·w_j from the products of parts and solutions.
         """
@@ -104,7 +103,10 @@ class ReducedBasis:
         loads, columns = self._products[:, :2], self._products[:, 2:].reshape(count, count, 2)
         weights = np.linalg.solve(columns @ theta, loads @ theta)
         mixture = np.concatenate([theta, -np.outer(weights, theta).reshape(-1)])
-        residual = float(mixture @ self._gram @ mixture)
+        self._residual.set(0.0)
+        self._residual.maxpy(mixture, self._parts)
+        self._solver.precondition(self._residual, self._under_p)
+        residual = float(self._residual.dot(self._under_p))
         twice_energy = float(np.dot(self._held_energy, theta) - weights @ (loads @ theta))
         reactions = np.array(self._reactions)  # for each part, of the unmodified operator
         on_probe = reactions.T @ np.concatenate([theta, np.outer(weights, theta).reshape(-1)])
@@ -125,7 +127,7 @@ class ReducedBasis:
 
     def _add(self, values: PETSc.Vec, law: MaterialLaw, *, sign: float) -> float:
         """Take sign · A·``values`` among the parts of the residual; return ``values``·A·``values``; collective."""
-        space, part, under_p = self._space, self._vector(), self._vector()
+        space, part = self._space, self._vector()
         space.set_displacement(values)
         space.apply(part, law)
         energy = float(part.dot(values))
@@ -133,15 +135,25 @@ class ReducedBasis:
         self._reactions.append(global_sum(space.dofs.comm, on_probe))
         part.scale(sign)
         part.array[space.dofs.prescribed_owned] = 0.0
-        self._solver.precondition(part, under_p)
         self._parts.append(part)
-        self._under_p.append(under_p)
-        row = np.array([other.dot(part) for other in self._under_p])
-        grown = np.zeros((len(row), len(row)))
-        grown[:-1, :-1] = self._gram
-        grown[-1, :], grown[:, -1] = row, row
-        self._gram = grown
         return energy
 
     def _vector(self) -> PETSc.Vec:
         return self._stack.enter_context(vector(self._space.dofs.space))
+
+
+def _smallest_eigenvalue(solver: LinearSolver, load: PETSc.Vec) -> float:
+    """Return the smallest eigenvalue of preconditioner times operator, from above, by Lanczos' method; collective."""
+    if solver.ksp.getType() == "preonly":
+        return 1.0
+    with ExitStack() as stack:
+        ksp = keep(stack, PETSc.KSP().create(solver.matrix.comm))
+        ksp.setOperators(solver.matrix)
+        ksp.setType("cg")
+        ksp.setPC(solver.ksp.pc)
+        ksp.setNormType(PETSc.KSP.NormType.NATURAL)
+        ksp.setComputeEigenvalues(True)
+        ksp.setTolerances(rtol=_SETTLED, max_it=_LANCZOS)
+        solution = keep(stack, load.duplicate())
+        ksp.solve(load, solution)
+        return float(np.min(np.real(ksp.computeEigenvalues())))

@@ -29,7 +29,7 @@ from pipeline.solve.compiled import form, vector_space
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.far_field import Place, PointForce
 from pipeline.solve.forms import compile_forms, one_cell
-from pipeline.solve.linear import Level, LinearSolver, SolveError
+from pipeline.solve.krylov import Level, LinearSolver, SolveError
 from pipeline.solve.loads import Motion
 from pipeline.solve.operator import Operators
 from pipeline.solve.physics import MaterialLaw
@@ -167,7 +167,7 @@ def _solved(
     pull: Any = PlacedPull(space.dofs.space) if is_placed else _Pull(space.dofs.space, places)
     free = np.ones(len(places) * 3)
     free[space.dofs.prescribed] = 0.0
-    with space.operators.lend(law, blocked=False) as (matrix, _), _products(space, len(forces)) as product:
+    with space.operators.lend(law) as matrix, _products(space, len(forces)) as product:
         level = Level(space.dofs.space, matrix, space.dofs.prescribed)
         solver = LinearSolver([level], direct=True, tolerance=0.5)
         try:
@@ -221,11 +221,10 @@ def _products(space: ElasticSpace, forces: int) -> Iterator[Callable[[FloatArray
             return
         whole = stack.enter_context(vector(space.dofs.space))
         operators, made = Operators(_Free(space.dofs.body, space.dofs.space), space.forms), {}
-        stack.callback(operators.close)
 
         def by_matrix(values: FloatArray, law: MaterialLaw) -> FloatArray:
             if law not in made:
-                made[law], _ = stack.enter_context(operators.lend(law, blocked=False))
+                made[law] = stack.enter_context(operators.lend(law))
             whole.array[:] = values
             made[law].mult(whole, result)
             return np.array(result.array)

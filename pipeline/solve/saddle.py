@@ -9,16 +9,14 @@ and a multiple of the pressure's mass M for the Schur complement (D. Silvester a
 mesh changes the iterations much.
 """
 
-import itertools
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any
 
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.linear import Level, LinearSolver, SolveError, explain, reason_name
+from pipeline.solve.krylov import Level, LinearSolver, check_converged, explained, factorised, iterative, keep
 from pipeline.stages import stage
 
 Pair = tuple[PETSc.Vec, PETSc.Vec]
@@ -34,8 +32,6 @@ _SCHUR = 1.2
 _MASS = {1: (3, 0.2), 2: (5, 0.1), 3: (10, 0.04), 4: (14, 0.02)}
 # Percentage by which MUMPS enlarges its work space: an indefinite matrix fills in more than the analysis foresees.
 _PIVOTING = 100
-
-_prefixes = itertools.count()
 
 
 @dataclass(frozen=True)
@@ -93,27 +89,19 @@ class SaddleSolver:
             SolveError: if PETSc reports anything but convergence.
         """
         iterations, self.first_energies = 0, []
-        with ExitStack() as stack:
-            try:
-                matrix = self._matrix(c, stack)
-                b, x = (_keep(stack, vector) for vector in matrix.createVecs())
-                block = None if self._direct else self._preconditioner(c, stack)
-                aim = tolerance, target
-                solver = self._factors(matrix, stack) if block is None else _iteration(matrix, block, aim, stack)
-                for load, unknown in zip(rhs, unknowns, strict=True):
-                    split = load[0].getLocalSize()
-                    for whole, (first, second) in ((b, load), (x, unknown)):
-                        whole.array[:split], whole.array[split:] = first.array, second.array
-                    solver.solve(b, x)
-                    reason, iterations = solver.getConvergedReason(), iterations + int(solver.its)
-                    if reason <= 0:
-                        raise SolveError(
-                            f"the linear solver did not converge: {reason_name(reason)} after {solver.its} iterations"
-                        )
-                    unknown[0].array[:], unknown[1].array[:] = x.array[:split], x.array[split:]
-                    self.first_energies.append(0.0 if block is None else block.first_energy)
-            except PETSc.Error as error:
-                raise SolveError(explain(error)) from error
+        with ExitStack() as stack, explained():
+            matrix = self._matrix(c, stack)
+            b, x = (keep(stack, vector) for vector in matrix.createVecs())
+            block = None if self._direct else self._preconditioner(c, stack)
+            solver = self._factors(matrix, stack) if block is None else _gcr(matrix, block, (tolerance, target), stack)
+            for load, unknown in zip(rhs, unknowns, strict=True):
+                split = load[0].getLocalSize()
+                for whole, (first, second) in ((b, load), (x, unknown)):
+                    whole.array[:split], whole.array[split:] = first.array, second.array
+                solver.solve(b, x)
+                iterations += check_converged(solver)
+                unknown[0].array[:], unknown[1].array[:] = x.array[:split], x.array[split:]
+                self.first_energies.append(0.0 if block is None else block.first_energy)
         return iterations
 
     @property
@@ -123,27 +111,20 @@ class SaddleSolver:
 
     def _matrix(self, c: Weight, stack: ExitStack) -> PETSc.Mat:
         saddle = self._saddle
-        mass = _keep(stack, _weighed(saddle.mass, -c))
+        mass = keep(stack, _weighed(saddle.mass, -c))
         transpose = PETSc.Mat()
         if self._direct:
             saddle.coupling.transpose(transpose)
         else:
             transpose.createTranspose(saddle.coupling)
-        blocks = [[saddle.levels[-1].matrix, _keep(stack, transpose)], [saddle.coupling, mass]]
-        return _keep(stack, PETSc.Mat().createNest(blocks, comm=saddle.mass.comm))
+        blocks = [[saddle.levels[-1].matrix, keep(stack, transpose)], [saddle.coupling, mass]]
+        return keep(stack, PETSc.Mat().createNest(blocks, comm=saddle.mass.comm))
 
     @stage("set-up")
     def _factors(self, nest: PETSc.Mat, stack: ExitStack) -> PETSc.KSP:
-        matrix = _keep(stack, nest.convert("aij", PETSc.Mat()))
+        matrix = keep(stack, nest.convert("aij", PETSc.Mat()))
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        ksp = _krylov(matrix, stack)
-        ksp.setType("preonly")
-        ksp.pc.setType("cholesky")
-        ksp.pc.setFactorSolverType("mumps")
-        with _options(ksp, {"mat_mumps_icntl_14": _PIVOTING}):
-            ksp.setFromOptions()
-            ksp.setUp()
-        return ksp
+        return factorised(matrix, stack, {"mat_mumps_icntl_14": _PIVOTING})
 
     def _preconditioner(self, c: Weight, stack: ExitStack) -> "_BlockTriangular":
         saddle = self._saddle
@@ -152,15 +133,16 @@ class SaddleSolver:
         return block
 
     def _mass_solver(self, stack: ExitStack) -> PETSc.KSP:
-        ksp = _krylov(self._saddle.mass, stack)
         steps, ratio = _MASS[self._saddle.degree]
-        values = {
-            "ksp_type": "chebyshev", "ksp_max_it": steps, "ksp_norm_type": "none", "pc_type": "jacobi",
-            "ksp_chebyshev_esteig": f"0,{ratio},0,1.1", "ksp_chebyshev_esteig_steps": 10,
-        }  # fmt: skip
-        with _options(ksp, values):
-            ksp.setFromOptions()
-            ksp.setUp()
+        options = {
+            "ksp_max_it": steps,
+            "ksp_norm_type": "none",
+            "pc_type": "jacobi",
+            "ksp_chebyshev_esteig": f"0,{ratio},0,1.1",
+            "ksp_chebyshev_esteig_steps": 10,
+        }
+        ksp = iterative(self._saddle.mass, "chebyshev", stack, options=options)
+        ksp.setInitialGuessNonzero(False)
         return ksp
 
 
@@ -221,19 +203,11 @@ class _EnergyTest:
         return int(reasons.DIVERGED_MAX_IT) if iteration >= _MOST_ITERATIONS else 0
 
 
-def _iteration(
-    matrix: PETSc.Mat, block: _BlockTriangular, aim: tuple[float, float | None], stack: ExitStack
-) -> PETSc.KSP:
-    ksp = _krylov(matrix, stack)
-    ksp.setType("gcr")
-    with _options(ksp, {"ksp_gcr_restart": _RESTART_ROUGH if aim[0] >= _ROUGH else _RESTART}):
-        ksp.setFromOptions()
-    ksp.setInitialGuessNonzero(True)
-    ksp.pc.setType("python")
-    ksp.pc.setPythonContext(block)
+def _gcr(matrix: PETSc.Mat, block: _BlockTriangular, aim: tuple[float, float | None], stack: ExitStack) -> PETSc.KSP:
+    restart = _RESTART_ROUGH if aim[0] >= _ROUGH else _RESTART
+    ksp = iterative(matrix, "gcr", stack, block, {"ksp_gcr_restart": restart})
     ksp.setTolerances(max_it=_MOST_ITERATIONS)
     ksp.setConvergenceTest(_EnergyTest(block, *aim))
-    ksp.setUp()
     return ksp
 
 
@@ -250,28 +224,3 @@ def _weighed(mass: PETSc.Mat, weight: Weight) -> PETSc.Mat:
     mass.diagonalScale(weights, None)
     weights.destroy()
     return mass
-
-
-def _krylov(matrix: PETSc.Mat, stack: ExitStack) -> PETSc.KSP:
-    ksp = _keep(stack, PETSc.KSP().create(matrix.comm))
-    ksp.setOptionsPrefix(f"epsmesh_mixed{next(_prefixes)}_")
-    ksp.setOperators(matrix)
-    return ksp
-
-
-@contextmanager
-def _options(ksp: PETSc.KSP, values: dict[str, Any]) -> Iterator[None]:
-    """Hold ``values`` among PETSc's options, under the solver's own prefix."""
-    options, prefix = PETSc.Options(), ksp.getOptionsPrefix()
-    for name, value in values.items():
-        options[prefix + name] = value
-    try:
-        yield
-    finally:
-        for name in values:
-            options.delValue(prefix + name)
-
-
-def _keep(stack: ExitStack, item: Any) -> Any:
-    stack.callback(item.destroy)
-    return item

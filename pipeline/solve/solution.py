@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.solve.carried import Carried, load_bars
 from pipeline.solve.error import extrapolate, extrapolate_found, extrapolate_release, release_bar
-from pipeline.solve.linear import SolveError
+from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads, Vector
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.reaction import Response

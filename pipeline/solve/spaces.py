@@ -105,4 +105,4 @@ class Spaces:
     def close(self) -> None:
         """Free the operators that all spaces keep."""
         while self._made:
-            self._made.popitem()[1].operators.close()
+            self._made.popitem()

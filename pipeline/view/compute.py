@@ -37,7 +37,7 @@ from pipeline.run.problem import (
 )
 from pipeline.run.record import Record
 from pipeline.solve.compiled import vector_space
-from pipeline.solve.linear import SolveError
+from pipeline.solve.krylov import SolveError
 from pipeline.solve.solution import FieldProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.study.sweep import Case, Study
@@ -115,7 +115,7 @@ def _attempt(
     arrays = _arrays(solve, comm, cache, note)
     prepare(comm, [solve])
     mesh = distribute(comm, arrays and upright(case, arrays))
-    with Spaces(mesh) as spaces, problem_of(spaces, case, shared=False) as problem:
+    with Spaces(mesh) as spaces, problem_of(spaces, case) as problem:
         needed, with_bar = memory_of(case, problem.dofs)
         check_memory(FreeMemory(comm), needed, "solving")
         room = bar and not lacks_memory(FreeMemory(comm), with_bar, "")

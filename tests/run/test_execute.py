@@ -19,7 +19,7 @@ from pipeline.run.basis import ReducedBasis
 from pipeline.run.execute import compute, execute
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.progress import Progress
-from pipeline.solve.linear import SolveError
+from pipeline.solve.krylov import SolveError
 from pipeline.solve.solution import BALANCE_LIMIT
 from pipeline.stages import Times, recharge
 from tests.cases import BLADE, solve, study
@@ -240,7 +240,7 @@ def test_what_is_raised_beside_any_case_fails_those_of_the_step(monkeypatch):
     def broken(*_, **__):
         raise ZeroDivisionError("division by zero")
 
-    monkeypatch.setattr("pipeline.run.runner.StepRunner._assembles_parts", broken)
+    monkeypatch.setattr("pipeline.run.runner.StepRunner._condenses", broken)
     records = solve(WORLD, material={"poisson": [0.3, 0.4]})
     assert [record.status for record in records.values()] == ["failed", "failed"]
     assert all("ZeroDivisionError: division by zero" in record.message for record in records.values())

@@ -9,7 +9,7 @@ from pipeline.mesh.meridian import Grading, Meridian, generate_meridian
 from pipeline.solve.axisymmetric import MeridianProblem, compile_axisymmetric
 from pipeline.solve.compiled import compiling
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.linear import SolveError
+from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.verify import known

@@ -10,7 +10,7 @@ from pipeline.mesh.meridian import Grading
 from pipeline.solve.axisymmetric import MeridianProblem, compile_axisymmetric
 from pipeline.solve.compiled import compiling
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.linear import SolveError
+from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.physics import MaterialLaw
 from pipeline.verify import known

@@ -8,13 +8,10 @@ import cffi
 import pytest
 import ufl
 from dolfinx import fem
-from mpi4py import MPI
 
 from pipeline import compat
 from pipeline.solve.compiled import compiling, form, form_cache, scalar_space, vector_space
-from pipeline.solve.kernels import arrays
-from pipeline.solve.kernels.stiffness import cell_kernel
-from tests.cases import force
+from pipeline.solve.kernels.assembly import cell_kernel
 from tests.solve.test_mixed import make_mesh
 
 _EVERY_MODULE = """
@@ -75,7 +72,7 @@ def test_a_plain_form_has_the_generated_kernel(degree):
     key = "jit_options" if "jit_options" in inspect.signature(fem.form).parameters else "jit_params"
     plain = fem.form(expression, **{key: jit})
     assert first_kernel(plain) != address
-    matrices = [compat.assemble_matrix(f, [], 1.0, "aij") for f in (own, plain, form(expression))]
+    matrices = [compat.assemble_matrix(f, [], 1.0) for f in (own, plain, form(expression))]
     size = matrices[0].norm()
     for other in matrices[1:]:
         other.axpy(-1.0, matrices[0])
@@ -91,7 +88,7 @@ def test_a_kernel_of_ones_own_is_used():
     other = (lame[0] + lame[1]) * ufl.inner(u, v) * ufl.dx
     kernels = {compat.EVERYWHERE: cell_kernel(2, of_regions=False)}
     mass, replaced, wanted = (
-        compat.assemble_matrix(f, [], 1.0, "aij")
+        compat.assemble_matrix(f, [], 1.0)
         for f in (
             form(other),
             form(other, kernels=kernels),
@@ -110,24 +107,5 @@ def test_code_is_looked_up_once(monkeypatch):
     made = [form(u * v * ufl.dx)]
     monkeypatch.setattr("dolfinx.jit.ffcx_jit", None)
     made.append(form(u * v * ufl.dx))
-    norms = [compat.assemble_matrix(f, [], 1.0, "aij").norm() for f in made]
+    norms = [compat.assemble_matrix(f, [], 1.0).norm() for f in made]
     assert norms[0] == norms[1]
-
-
-@pytest.mark.mpi
-@pytest.mark.parametrize("changes", [{}, {"mesh": {"degree": 1}}, {"material": {"poisson": 0.49}}])
-def test_without_the_arrays_of_petsc_dolfinx_assembles(changes, monkeypatch):
-    wanted = force(MPI.COMM_WORLD, **changes)
-    monkeypatch.setattr(arrays, "available", lambda: False)
-    assert force(MPI.COMM_WORLD, **changes) == pytest.approx(wanted, rel=1e-9)
-
-
-def test_the_arrays_of_petsc_are_tried_before_they_are_relied_on(monkeypatch):
-    assert arrays.available()
-    for broken in (object, lambda: (_ for _ in ()).throw(OSError)):
-        monkeypatch.setattr(arrays, "_petsc", broken)
-        arrays.available.cache_clear()
-        assert not arrays.available()
-    monkeypatch.undo()
-    arrays.available.cache_clear()
-    assert arrays.available()

@@ -68,7 +68,7 @@ def manufactured_error(degree: int, size: float) -> tuple[float, int]:
     held = fem.Function(space)
     held.interpolate(lambda p: np.array(exact(p, np.sin, np.cos)))
     condition = fem.dirichletbc(held, boundary_dofs(space))
-    matrix = compat.assemble_matrix(forms.stiffness, [condition], 1.0, "aij")
+    matrix = compat.assemble_matrix(forms.stiffness, [condition], 1.0)
     b = np.asarray(fem.assemble_vector(load).array).copy()
     forms.displacement.x.array[:] = 0.0
     dofs = (3 * boundary_dofs(space)[:, None] + np.arange(3)).reshape(-1)

@@ -89,7 +89,7 @@ def test_a_preconditioner_that_is_not_definite_is_mended(monkeypatch):
     known = force(**changes)
     monkeypatch.setattr(multigrid, "_LANCZOS", 1)
     assert force(**changes) == pytest.approx(known, rel=1e-8)
-    monkeypatch.setattr(multigrid.SingleCycle, "look_closer", lambda self: None)
+    monkeypatch.setattr(multigrid.Cycle, "look_closer", lambda self: None)
     (record,) = solve(**changes).values()
     assert record.status == "failed"
 

@@ -17,7 +17,7 @@ from pipeline.solve import meridian_signs
 from pipeline.solve.axisymmetric import MeridianProblem, compile_axisymmetric
 from pipeline.solve.compiled import compiling
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.linear import SolveError
+from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.meridian_contact import DEGREE, MeridianContact
 from pipeline.solve.meridian_trials import TRIAL_DEGREE, RoundTool

@@ -30,7 +30,7 @@ def case_of(**changes):
 def record_on(arrays, case):
     """Return the record of a case, solved on a mesh of its body."""
     mesh = distribute(MPI.COMM_SELF, upright(case, arrays))
-    with Spaces(mesh) as spaces, problem_of(spaces, case, shared=False) as problem:
+    with Spaces(mesh) as spaces, problem_of(spaces, case) as problem:
         solution = solve_problem(case, problem, estimate=True)
     return record_of(Solve("key", case), solution)
 

@@ -16,7 +16,7 @@ from pipeline.solve.contact.candidates import Candidates, Surface
 from pipeline.solve.contact.displacement import DisplacementElements
 from pipeline.solve.contact.elements import FarShare, Unknowns
 from pipeline.solve.contact.levels import Hierarchy
-from pipeline.solve.linear import Level, LinearSolver, SolveError
+from pipeline.solve.krylov import Level, LinearSolver, SolveError
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.vectors import vector

@@ -9,7 +9,7 @@ from pipeline.solve.contact.active_set import State
 from pipeline.solve.contact.candidates import CONDITIONS, Candidates, Numbering, Surface
 from pipeline.solve.contact.elements import ContactElements, Unknowns
 from pipeline.solve.contact.levels import Hierarchy
-from pipeline.solve.linear import Level, LinearSolver, is_direct
+from pipeline.solve.krylov import Level, LinearSolver, is_direct
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.vectors import vector
@@ -48,7 +48,7 @@ class DisplacementElements(ContactElements):
         """
         self._active, self._held = active, self.numbering.normal_dofs(active, owned=True)
         levels = self.hierarchy.hold(active)
-        if self._solver is not None and self._solver.is_single:
+        if self._solver is not None and self._solver.cycle is not None:
             self._solver.hold(levels)
         else:
             self.close()

@@ -15,7 +15,7 @@ from pipeline.arrays import BoolArray, FloatArray
 from pipeline.solve.contact.active_set import State
 from pipeline.solve.contact.candidates import Candidates, Numbering
 from pipeline.solve.far_field import FarField
-from pipeline.solve.linear import SolveError
+from pipeline.solve.krylov import SolveError
 from pipeline.solve.spaces import ElasticSpace
 from pipeline.solve.vectors import global_sum
 

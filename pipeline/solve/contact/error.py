@@ -16,11 +16,10 @@ from pipeline.arrays import Int32Array
 from pipeline.solve.contact.active_set import Found, Obstacle, find_set
 from pipeline.solve.contact.candidates import CONDITIONS, Surface
 from pipeline.solve.contact.displacement import DisplacementElements
-from pipeline.solve.contact.levels import hold, mask, normal_dofs
+from pipeline.solve.contact.levels import mask, normal_dofs
 from pipeline.solve.contact.mixed import MixedElements
-from pipeline.solve.enrich import energy_decrements
-from pipeline.solve.kernels.multigrid import suits, takes_product
-from pipeline.solve.linear import LinearSolver
+from pipeline.solve.hierarchical_estimate import energy_decrements
+from pipeline.solve.krylov import LinearSolver
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import Spaces
 from pipeline.solve.vectors import vector
@@ -47,13 +46,8 @@ def displacement_decrement(
     finer = spaces.get(elements.space.degree + 1, CONDITIONS)
     with ExitStack() as stack, vector(finer.dofs.space) as residual:
         levels = elements.held_levels(facets, stack)
-        below = [level.matrix for level in levels]
-        operators = finer.operators
-        lent = operators.lend_for_cycles(law) if takes_product(below) else operators.lend(law, blocked=True)
-        matrix, _ = stack.enter_context(lent)
-        # Where cycles in single precision serve, they hold what is to be held: see :class:`Hierarchy`.
-        level = mask if suits([*below, matrix]) else hold
-        levels.append(level(finer, matrix, law, normal_dofs(finer, facets)))
+        matrix = stack.enter_context(finer.operators.lend_product(law))
+        levels.append(mask(finer, matrix, law, normal_dofs(finer, facets)))
         solver = LinearSolver(levels, direct=False, tolerance=0.5)
         stack.callback(solver.close)
         finer.forms.displacement.interpolate(elements.space.forms.displacement)

@@ -8,9 +8,8 @@ from petsc4py import PETSc
 
 from pipeline.arrays import BoolArray, Int32Array
 from pipeline.solve.contact.candidates import CONDITIONS, Numbering, Surface
-from pipeline.solve.kernels.multigrid import suits
 from pipeline.solve.kernels.product import is_product
-from pipeline.solve.linear import Level
+from pipeline.solve.krylov import Level
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import ElasticSpace, Spaces
 
@@ -20,8 +19,8 @@ _SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
 class Hierarchy:
     """The operators of degrees 1 … p, or of p alone for a direct solve; on lower levels the set is what most say.
 
-    Where cycles in single precision serve, what is held changes their smoothers alone: but for degree 1, operators
-    are never changed. ``masks`` says that their user can do with that.
+    Unless the solve is direct, what is held changes the cycle's smoothers alone: but for degree 1, operators are never
+    changed. ``masks`` says that their user can do with that.
     """
 
     def __init__(
@@ -31,15 +30,12 @@ class Hierarchy:
         """Assemble; collective. What is made is given back with the ``stack``."""
         degrees = [degree] if direct else range(1, degree + 1)
         found = [spaces.get(d, CONDITIONS) for d in degrees]
-        lent = [
-            s.operators.lend_for_cycles(law) if s.degree > 1 and not direct else s.operators.lend(law, blocked=False)
-            for s in found
-        ]
+        lent = [s.operators.lend_product(law) if s.degree > 1 and not direct else s.operators.lend(law) for s in found]
         matrices = [stack.enter_context(matrix) for matrix in lent]
-        is_masked = masks and not direct and suits([matrix for matrix, _ in matrices])
+        is_masked = masks and not direct
         self._operators = [
             HeldOperator(space, matrix, law, stack, masked=is_masked and space.degree > 1)
-            for space, (matrix, _) in zip(found, matrices, strict=True)
+            for space, matrix in zip(found, matrices, strict=True)
         ]
         self._candidates = [surface.of(d) for d in degrees]
         self._numberings = [Numbering(s.dofs.space, c.numbers) for s, c in zip(found, self._candidates, strict=True)]

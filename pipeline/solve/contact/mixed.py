@@ -14,7 +14,7 @@ from pipeline.solve.contact.candidates import CONDITIONS, Candidates, Surface
 from pipeline.solve.contact.elements import ContactElements, Unknowns
 from pipeline.solve.contact.levels import Hierarchy, normal_dofs
 from pipeline.solve.elements import DIRECT_LIMIT
-from pipeline.solve.linear import Level
+from pipeline.solve.krylov import Level
 from pipeline.solve.mixed_space import MixedSpace
 from pipeline.solve.physics import MaterialLaw, SplitLaw
 from pipeline.solve.saddle import Pair, Saddle, SaddleSolver

@@ -29,7 +29,7 @@ from pipeline.solve.contact.sweep import Kind, Sweep
 from pipeline.solve.contact.touch import Touch
 from pipeline.solve.dead_loads import Applied
 from pipeline.solve.error import error_bar, found_again_bar, found_bar
-from pipeline.solve.linear import SolveError
+from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.reaction import Response

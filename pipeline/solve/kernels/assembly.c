@@ -19,14 +19,14 @@
 
 enum { MOST_PAIRS = 630 }; /* the 35 points of degree 4 */
 
-/* Fill `places`, (cells, height, width): the number of the entry that each pair of points of a cell has in a matrix.
+/* Fill `places`, (cells, width, width): the number of the entry that each pair of points of a cell has in a matrix.
  *
- * A cell has `height` points that are rows, and `width` that are columns, `dofs`. Row r has the entries offsets[r] to
- * before offsets[r + 1], whose columns are in `columns`; likewise visits are those of the rows of all cells, counted
- * through, that are the row r. `entry` is room for a number a column.
+ * A cell has `width` points, `dofs`. Row r has the entries offsets[r] to before offsets[r + 1], whose columns are in
+ * `columns`; likewise visits are those of the points of all cells, counted through, that are the row r. `entry` is room
+ * for a number a column.
  */
-void find_entries(int rows, int height, int width, const int* dofs, const int* offsets, const int* columns,
-                  const int* first_visit, const int* visits, int* entry, int* places)
+void find_entries(int rows, int width, const int* dofs, const int* offsets, const int* columns, const int* first_visit,
+                  const int* visits, int* entry, int* places)
 {
   for (int row = 0; row < rows; ++row)
   {
@@ -34,7 +34,7 @@ void find_entries(int rows, int height, int width, const int* dofs, const int* o
       entry[columns[k]] = k;
     for (int v = first_visit[row]; v < first_visit[row + 1]; ++v)
     {
-      const int* cell = dofs + visits[v] / height * (size_t)width;
+      const int* cell = dofs + visits[v] / width * (size_t)width;
       for (int j = 0; j < width; ++j)
         places[visits[v] * (size_t)width + j] = entry[cell[j]];
     }
@@ -96,32 +96,25 @@ static void hold(int points, const int* dofs, const double* free, double B[restr
           B[3 * s + r][p] *= free[3 * (size_t)dofs[i] + r] * free[3 * (size_t)dofs[j] + s];
 }
 
-/* The block of an entry: entries are counted through, first those in `blocks`, then those in `rest`. */
-static inline double* block(int entry, int inside, double* blocks, double* rest)
-{
-  return entry < inside ? blocks + 9 * (size_t)entry : rest + 9 * (size_t)(entry - inside);
-}
-
 /* Add the blocks of all pairs, and their transposes, where they belong. */
-static void scatter(int points, const int* places, const double B[restrict 9][MOST_PAIRS], int inside, double* blocks,
-                    double* rest)
+static void scatter(int points, const int* places, const double B[restrict 9][MOST_PAIRS], double* blocks)
 {
   for (int i = 0, p = 0; i < points; ++i)
     for (int j = i; j < points; ++j, ++p)
     {
-      double* here = block(places[i * points + j], inside, blocks, rest);
+      double* here = blocks + 9 * (size_t)places[i * points + j];
       for (int q = 0; q < 9; ++q)
         here[q] += B[q][p];
       if (i == j)
         continue;
-      double* there = block(places[j * points + i], inside, blocks, rest);
+      double* there = blocks + 9 * (size_t)places[j * points + i];
       for (int s = 0; s < 3; ++s)
         for (int r = 0; r < 3; ++r)
           there[3 * r + s] += B[3 * s + r][p];
     }
 }
 
-/* Add the stiffness of some cells to the blocks of a matrix: to `inside` of them, `blocks`, and to the `rest`.
+/* Add the stiffness of some cells to the `blocks` of a matrix.
  *
  * corners (cells, 4, 3); dofs (cells, points); places (cells, points, points) from find_entries; S (3, 3, pairs);
  * free (dofs, 3): 1, or 0 where a displacement is prescribed; `which` are the `count` cells to add; region (cells)
@@ -129,7 +122,7 @@ static void scatter(int points, const int* places, const double B[restrict 9][MO
  */
 void add_stiffness(int count, const int* which, int points, const double* corners, const int* dofs, const int* places,
                    const double* S, const double* free, const int* region, const double* lambda, const double* mu,
-                   int inside, double* blocks, double* rest)
+                   double* blocks)
 {
   const int pairs = points * (points + 1) / 2, places_each = points * points;
   for (int k = 0; k < count; ++k)
@@ -137,7 +130,7 @@ void add_stiffness(int count, const int* which, int points, const double* corner
     if (k + 1 < count) /* memory is far: ask for the next cell's blocks, two cache lines each, while at this one's */
       for (int q = 0; q < places_each; ++q)
       {
-        const double* next = block(places[which[k + 1] * (size_t)places_each + q], inside, blocks, rest);
+        const double* next = blocks + 9 * (size_t)places[which[k + 1] * (size_t)places_each + q];
         __builtin_prefetch(next, 1);
         __builtin_prefetch(next + 8, 1);
       }
@@ -146,7 +139,7 @@ void add_stiffness(int count, const int* which, int points, const double* corner
     mapping((const double(*)[3])(corners + 12 * cell), K);
     stiffness(pairs, S, K, lambda[region[cell]], mu[region[cell]], B);
     hold(points, dofs + points * cell, free, B);
-    scatter(points, places + places_each * cell, B, inside, blocks, rest);
+    scatter(points, places + places_each * cell, B, blocks);
   }
 }
 
@@ -187,25 +180,3 @@ KERNEL(regions_1, 4, tensors_1, w)
 KERNEL(regions_2, 10, tensors_2, w)
 KERNEL(regions_3, 20, tensors_3, w)
 KERNEL(regions_4, 35, tensors_4, w)
-
-/* Add products of factors of each cell with tensors of the reference cell, sum_t factors(t, s) R_t(i, j).
- *
- * An entry of the pattern is `size` numbers side by side, s; factors (cells, terms, size); R (terms, height, width);
- * places (cells, height, width) from find_entries; values (entries, size).
- */
-void add_products(int count, const int* which, int pairs, int terms, int size, const double* factors, const double* R,
-                  const int* places, double* values)
-{
-  for (int k = 0; k < count; ++k)
-  {
-    const size_t cell = which[k];
-    for (int p = 0; p < pairs; ++p)
-      for (int s = 0; s < size; ++s)
-      {
-        double sum = 0.0;
-        for (int t = 0; t < terms; ++t)
-          sum += factors[(cell * terms + t) * size + s] * R[t * pairs + p];
-        values[places[cell * pairs + p] * (size_t)size + s] += sum;
-      }
-  }
-}

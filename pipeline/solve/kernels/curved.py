@@ -10,9 +10,8 @@ import numpy as np
 
 from pipeline import compat
 from pipeline.arrays import FloatArray, Int32Array
-from pipeline.solve.kernels.lanes import LANES, Lanes
+from pipeline.solve.kernels.cells import LANES, Lanes, reference
 from pipeline.solve.kernels.native import call
-from pipeline.solve.kernels.pattern import reference
 
 
 def quadrature_degree(degree: int) -> int:

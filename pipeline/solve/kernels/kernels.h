@@ -1,13 +1,11 @@
 /* What Python calls: cffi reads this file, too. */
 
 /* assembly.c: matrices of straight cells */
-void find_entries(int rows, int height, int width, const int* dofs, const int* offsets, const int* columns,
-                  const int* first_visit, const int* visits, int* entry, int* places);
+void find_entries(int rows, int width, const int* dofs, const int* offsets, const int* columns, const int* first_visit,
+                  const int* visits, int* entry, int* places);
 void add_stiffness(int count, const int* which, int points, const double* corners, const int* dofs, const int* places,
                    const double* S, const double* free, const int* region, const double* lambda, const double* mu,
-                   int inside, double* blocks, double* rest);
-void add_products(int count, const int* which, int pairs, int terms, int size, const double* factors, const double* R,
-                  const int* places, double* values);
+                   double* blocks);
 extern const double *tensors_1, *tensors_2, *tensors_3, *tensors_4;
 void kernel_1(double* A, const double* w, const double* c, const double* x, const int* l, const uint8_t* p);
 void kernel_2(double* A, const double* w, const double* c, const double* x, const int* l, const uint8_t* p);
@@ -61,17 +59,7 @@ void add_curved_pull(int points, int count, int quadrature, int batches, const i
                      const double* values, const double* x, double* y);
 
 /* multigrid.c: a cycle in single precision */
-void take_upper(int rows, const int* offsets, const int* columns, const double* blocks, const int* upper_offsets,
-                int* upper_columns, float* upper);
-int invert_diagonal(int rows, const int* offsets, const float* values, float* inverse);
-void multiply(int rows, const int* first, const int* offsets, const int* columns, const float* blocks, const float* x,
-              float* y);
-void multiply_double(int rows, const int* first, const int* offsets, const int* columns, const double* blocks,
-                     const double* x, double* y);
-void multiply_beyond(int rows, const int* which, const int* offsets, const int* columns, const float* blocks,
-                     const float* z, float* y);
-void multiply_beyond_double(int rows, const int* which, const int* offsets, const int* columns, const double* blocks,
-                            const double* z, double* y);
+int invert_diagonal(int rows, const float* blocks, float* inverse);
 void advance(int rows, const float* inverse, float a, float b, const float* r, float* d, float* x);
 void subtract(int count, const float* q, float* r);
 double dot(int count, const float* x, const float* y);

@@ -1,5 +1,4 @@
-/* A multigrid cycle's loops in single precision. Matrices are symmetric, of 3 x 3 blocks by rows; of each row, the
- * diagonal block and those right of it, in that order. Vectors hold three numbers a point. */
+/* A multigrid cycle's loops in single precision. Vectors hold three numbers a point. */
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -7,33 +6,13 @@
 
 #include "kernels.h"
 
-/* The upper blocks of a matrix of all blocks, by columns, whose columns ascend. */
-void take_upper(int rows, const int* offsets, const int* columns, const double* blocks, const int* upper_offsets,
-                int* upper_columns, float* upper)
-{
-  for (int i = 0; i < rows; ++i)
-  {
-    int to = upper_offsets[i];
-    for (int k = offsets[i]; k < offsets[i + 1]; ++k)
-      if (columns[k] >= i)
-      {
-        const double* block = blocks + 9 * (size_t)k;
-        float* target = upper + 9 * (size_t)to;
-        for (int r = 0; r < 3; ++r)
-          for (int c = 0; c < 3; ++c)
-            target[3 * r + c] = (float)block[3 * c + r];
-        upper_columns[to++] = columns[k];
-      }
-  }
-}
-
 /* The inverses of the diagonal blocks; the number of those that have none. */
-int invert_diagonal(int rows, const int* offsets, const float* values, float* inverse)
+int invert_diagonal(int rows, const float* blocks, float* inverse)
 {
   int singular = 0;
   for (int i = 0; i < rows; ++i)
   {
-    const float* b = values + 9 * (size_t)offsets[i];
+    const float* b = blocks + 9 * (size_t)i;
     const double a = b[0], c = b[1], d = b[2], e = b[4], f = b[5], g = b[8];
     const double A = e * g - f * f, B = d * f - c * g, C = c * f - d * e;
     const double determinant = a * A + c * B + d * C;
@@ -50,65 +29,6 @@ int invert_diagonal(int rows, const int* offsets, const float* values, float* in
   }
   return singular;
 }
-
-/* y = A x, of which the blocks from the diagonal on are read: those of row i from first[i] to before offsets[i + 1]. */
-#define DEFINE_MULTIPLY(NAME, TYPE, AT)                                                                                \
-void NAME(int rows, const int* restrict first, const int* restrict offsets, const int* restrict columns,               \
-          const TYPE* restrict blocks, const TYPE* restrict x, TYPE* restrict y)                                       \
-{                                                                                                                      \
-  memset(y, 0, 3 * (size_t)rows * sizeof(TYPE));                                                                       \
-  for (int i = 0; i < rows; ++i)                                                                                       \
-  {                                                                                                                    \
-    const TYPE x0 = x[3 * i], x1 = x[3 * i + 1], x2 = x[3 * i + 2];                                                    \
-    const TYPE* b = blocks + 9 * (size_t)first[i];                                                                     \
-    TYPE s0 = b[AT(0, 0)] * x0 + b[AT(0, 1)] * x1 + b[AT(0, 2)] * x2;                                                  \
-    TYPE s1 = b[AT(1, 0)] * x0 + b[AT(1, 1)] * x1 + b[AT(1, 2)] * x2;                                                  \
-    TYPE s2 = b[AT(2, 0)] * x0 + b[AT(2, 1)] * x1 + b[AT(2, 2)] * x2;                                                  \
-    b += 9;                                                                                                            \
-    for (int k = first[i] + 1; k < offsets[i + 1]; ++k, b += 9)                                                        \
-    {                                                                                                                  \
-      const int j = 3 * columns[k];                                                                                    \
-      const TYPE z0 = x[j], z1 = x[j + 1], z2 = x[j + 2];                                                              \
-      s0 += b[AT(0, 0)] * z0 + b[AT(0, 1)] * z1 + b[AT(0, 2)] * z2;                                                    \
-      s1 += b[AT(1, 0)] * z0 + b[AT(1, 1)] * z1 + b[AT(1, 2)] * z2;                                                    \
-      s2 += b[AT(2, 0)] * z0 + b[AT(2, 1)] * z1 + b[AT(2, 2)] * z2;                                                    \
-      y[j] += b[AT(0, 0)] * x0 + b[AT(1, 0)] * x1 + b[AT(2, 0)] * x2;                                                  \
-      y[j + 1] += b[AT(0, 1)] * x0 + b[AT(1, 1)] * x1 + b[AT(2, 1)] * x2;                                              \
-      y[j + 2] += b[AT(0, 2)] * x0 + b[AT(1, 2)] * x1 + b[AT(2, 2)] * x2;                                              \
-    }                                                                                                                  \
-    y[3 * i] += s0;                                                                                                    \
-    y[3 * i + 1] += s1;                                                                                                \
-    y[3 * i + 2] += s2;                                                                                                \
-  }                                                                                                                    \
-}
-
-/* Where the entry of row r and column c is in a block: in one of ours, and in one of PETSc's. */
-#define BY_ROWS(r, c) (3 * (r) + (c))
-#define BY_COLUMNS(r, c) (3 * (c) + (r))
-
-DEFINE_MULTIPLY(multiply, float, BY_ROWS)
-DEFINE_MULTIPLY(multiply_double, double, BY_COLUMNS)
-
-/* y += B z for the few rows that have blocks whose columns are other ranks': those of row which[i] are offsets[i] to
- * before offsets[i + 1], as PETSc has them. */
-#define DEFINE_MULTIPLY_BEYOND(NAME, TYPE)                                                                             \
-void NAME(int rows, const int* restrict which, const int* restrict offsets, const int* restrict columns,               \
-          const TYPE* restrict blocks, const TYPE* restrict z, TYPE* restrict y)                                       \
-{                                                                                                                      \
-  for (int i = 0; i < rows; ++i)                                                                                       \
-  {                                                                                                                    \
-    TYPE s[3] = {0, 0, 0};                                                                                             \
-    for (int k = offsets[i]; k < offsets[i + 1]; ++k)                                                                  \
-      for (int c = 0; c < 3; ++c)                                                                                      \
-        for (int r = 0; r < 3; ++r)                                                                                    \
-          s[r] += blocks[9 * (size_t)k + BY_COLUMNS(r, c)] * z[3 * columns[k] + c];                                    \
-    for (int r = 0; r < 3; ++r)                                                                                        \
-      y[3 * which[i] + r] += s[r];                                                                                     \
-  }                                                                                                                    \
-}
-
-DEFINE_MULTIPLY_BEYOND(multiply_beyond, float)
-DEFINE_MULTIPLY_BEYOND(multiply_beyond_double, double)
 
 /* d = a d + b D^-1 r, and x += d: a step of Chebyshev's iteration. */
 void advance(int rows, const float* restrict inverse, float a, float b, const float* restrict r, float* restrict d,

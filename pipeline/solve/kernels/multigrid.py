@@ -1,8 +1,7 @@
 """A multigrid cycle over degrees p, …, 2 in single precision, above a solver of degree 1 in double.
 
-The smoother is Chebyshev's iteration with the blocks of the diagonal, the same as PETSc's. What an iteration takes is
-the time to read its matrices: in single precision, and of a symmetric matrix the upper blocks alone, they are a
-quarter as long. The residual is brought to magnitude 1 first, so that nothing runs out of the exponents of a float.
+The smoother is Chebyshev's iteration with the blocks of the diagonal, the same as PETSc's; operators multiply cell by
+cell. The residual is brought to magnitude 1 first, so that nothing runs out of the exponents of a float.
 
 On several ranks each smooths the rows that it owns; what it needs of others' points is sent in single precision, too.
 """
@@ -15,41 +14,25 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline.arrays import Int32Array
-from pipeline.solve.kernels.arrays import available
-from pipeline.solve.kernels.beyond import summed
-from pipeline.solve.kernels.blocks import SymmetricOperator
+from pipeline.solve.kernels.ghosts import summed
 from pipeline.solve.kernels.interpolation import Interpolation
 from pipeline.solve.kernels.native import Single, call
-from pipeline.solve.kernels.product import is_product
+from pipeline.solve.kernels.product import CellOperator
 
 # Chebyshev's iteration: steps, the share of the spectrum that is left to the coarser level, and by how much the
 # largest eigenvalue that so many of Lanczos' steps find is raised. Measured: docs/solvers.md.
 _STEPS, _LEFT, _RAISED, _LANCZOS = 2, 0.1, 1.15, 5
-# Where the material jumps, as PETSc's own: see :mod:`pipeline.solve.linear`.
+# Where the material jumps, the mode of the largest one sits in the stiffest region, of which noise has little.
 _LANCZOS_JUMPS = 12
 # Beyond 1.1 times what it is taken for, an eigenvalue makes the cycle indefinite. A few slender elements have one of
 # which noise has little; so many steps find it.
 _LANCZOS_CLOSER = 40
 
-_BLOCKED = ("seqbaij", "mpibaij")
-
-
-def suits(matrices: list[PETSc.Mat]) -> bool:
-    """Tell whether a cycle over operators of degrees 1, 2, … can be made."""
-    return len(matrices) > 1 and takes_product(matrices)
-
-
-def takes_product(matrices: list[PETSc.Mat]) -> bool:
-    """Tell whether a cycle could be made over these operators and one of the next degree, maybe without entries."""
-    if not all(matrix.getType() in _BLOCKED or is_product(matrix) for matrix in matrices[1:]):
-        return False
-    return available()
-
 
 class SmoothedLevel:
     """An operator in single precision and its smoother."""
 
-    def __init__(self, operator: SymmetricOperator, *, jumps: bool = False):
+    def __init__(self, operator: CellOperator, *, jumps: bool = False):
         """Set up; ``jumps``: the material does. Collective.
 
         Raises:
@@ -58,7 +41,7 @@ class SmoothedLevel:
         self._operator, self._comm, rows = operator, operator.comm, operator.rows
         self._rows, self._blocks = rows, operator.diagonal()
         self._inverse = np.empty((rows, 9), dtype=np.float32)
-        singular = call("invert_diagonal", rows, np.arange(rows, dtype=np.int32), self._blocks, self._inverse)
+        singular = call("invert_diagonal", rows, self._blocks, self._inverse)
         if summed(self._comm, singular):
             raise ArithmeticError("the operator is not positive definite")
         self.size, self._held = 3 * rows, np.empty(0, dtype=np.int32)
@@ -148,12 +131,12 @@ class SmoothedLevel:
         return summed(self._comm, call("dot", self.size, x, y))
 
 
-class SingleCycle:
+class Cycle:
     """The preconditioner: a context for PETSc's type "python"."""
 
     def __init__(self, levels: list[SmoothedLevel], interpolations: list[Interpolation], coarse: PETSc.PC):
         """``levels`` go up from degree 2, ``interpolations`` lead to each; ``coarse`` is the solver of degree 1."""
-        self._levels, self._interpolations, self._coarse = levels, interpolations, coarse
+        self._levels, self._interpolations, self.coarse = levels, interpolations, coarse
         bottom, _ = coarse.getOperators()
         self._comm = bottom.comm.tompi4py()
         sizes = [bottom.getLocalSize()[0], *(level.size for level in levels)]
@@ -168,11 +151,11 @@ class SingleCycle:
             replace(between, coarse_free=below, fine_free=above)
             for between, (below, above) in zip(self._interpolations, masks, strict=True)
         ]
-        self._coarse = coarse
+        self.coarse = coarse
 
-    def above(self, levels: list[SmoothedLevel], interpolations: list[Interpolation]) -> "SingleCycle":
+    def above(self, levels: list[SmoothedLevel], interpolations: list[Interpolation]) -> "Cycle":
         """Return the cycle with more levels on top, which shares those that are there."""
-        return SingleCycle([*self._levels, *levels], [*self._interpolations, *interpolations], self._coarse)
+        return Cycle([*self._levels, *levels], [*self._interpolations, *interpolations], self.coarse)
 
     def look_closer(self) -> None:
         """Let each level's smoother find its largest eigenvalue by many more steps."""
@@ -213,5 +196,5 @@ class SingleCycle:
     def _solve_coarsest(self, x: Single, r: Single) -> None:
         solution, rhs = self._bottom
         call("to_double", len(r), 1.0, r, rhs.array_w)
-        self._coarse.apply(rhs, solution)
+        self.coarse.apply(rhs, solution)
         x[:] = solution.array_r

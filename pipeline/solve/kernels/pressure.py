@@ -12,10 +12,10 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.arrays import FloatArray, Int32Array
+from pipeline.solve.kernels.cells import corners, owned_cells, reference
+from pipeline.solve.kernels.ghosts import Ghosts
 from pipeline.solve.kernels.native import call
-from pipeline.solve.kernels.pattern import corners, owned_cells, reference
 from pipeline.solve.kernels.product import CellStiffness, bernstein
-from pipeline.solve.parcels import Shared, ghosts_of
 
 
 class CellPressures:
@@ -26,11 +26,9 @@ class CellPressures:
 
     def __init__(self, pressures: Any, cells: CellStiffness):
         """Lay out; collective. ``unit`` is about one over the size of an element."""
-        index_map, dofs = pressures.dofmap.index_map, owned_cells(pressures)
+        self.ghosts, dofs = Ghosts(pressures), owned_cells(pressures)
         self.comm, self.cells, self.degree = cells.comm, cells, compat.degree(pressures)
         self._prescribed = cells.prescribed
-        self.points, self.local = index_map.size_local, index_map.size_local + index_map.num_ghosts
-        self.shared = ghosts_of(pressures)
         self._dofs = cells.lanes.spread(dofs[cells.lanes.which])
         self._roots = cells.lanes.spread(_roots(corners(pressures.mesh)[cells.lanes.which])[:, None])
         weights, values, _ = reference(self.degree, 2 * self.degree)
@@ -51,8 +49,8 @@ class CellPressures:
         if (curved := self.cells.curved) is not None:
             squares = curved.signs["float64"][:, None] * self._values**2
             parts.append((self._bent, squares.T @ curved.roots**2))
-        found = sum(np.bincount(dofs.reshape(-1), values.reshape(-1), self.local) for dofs, values in parts)
-        return _folded(np.asarray(found), self.points, self.shared, 1)
+        found = sum(np.bincount(dofs.reshape(-1), values.reshape(-1), self.ghosts.local) for dofs, values in parts)
+        return self.ghosts.folded(np.asarray(found), 1).copy()
 
     def holding(self, dofs: Int32Array) -> "CellPressures":
         """Return them with owned displacements ``dofs`` (unrolled) prescribed, too; they share everything else."""
@@ -65,29 +63,29 @@ class CellPressures:
         given = x.copy()
         if not whole:
             given[self._prescribed] = 0.0
-        found = np.zeros(self.local)
-        self._couple("dilation", _extended(given, self.cells.shared, 3), found)
-        return self.unit * _folded(found, self.points, self.shared, 1)
+        found = np.zeros(self.ghosts.local)
+        self._couple("dilation", self.cells.ghosts.extended(given, 3), found)
+        return self.unit * self.ghosts.folded(found, 1)
 
     def pull(self, x: FloatArray, *, whole: bool = False) -> FloatArray:
         """Return Bᵀ x for owned pressures; unless ``whole``, nought where displacements are prescribed."""
-        found = np.zeros(3 * self.cells.local)
-        self._couple("pull", _extended(x, self.shared, 1), found)
-        result = self.unit * _folded(found, self.cells.points, self.cells.shared, 3)
+        found = np.zeros(3 * self.cells.ghosts.local)
+        self._couple("pull", self.ghosts.extended(x, 1), found)
+        result = self.unit * self.cells.ghosts.folded(found, 3)
         if not whole:
             result[self._prescribed] = 0.0
         return result
 
     def weigh(self, x: FloatArray) -> FloatArray:
         """Return M x for owned pressures."""
-        given, found, curved = _extended(x, self.shared, 1), np.zeros(self.local), self.cells.curved
+        given, found, curved = self.ghosts.extended(x, 1), np.zeros(self.ghosts.local), self.cells.curved
         count, batches = len(self._mass), self.cells.lanes.batches
         call("add_mass", count, batches, self._dofs, self._roots, self._mass, given, found)
         if curved is not None:
             _, quadrature, batches = curved.sizes
             call("add_curved_mass", count, quadrature, batches, self._bent, curved.roots, curved.signs["float64"],
                       self._values, given, found)  # fmt: skip
-        return self.unit**2 * _folded(found, self.points, self.shared, 1)
+        return self.unit**2 * self.ghosts.folded(found, 1)
 
     def _couple(self, which: str, x: FloatArray, y: FloatArray) -> None:
         """Add B x or Bᵀ x, of local points, to ``y``."""
@@ -108,20 +106,6 @@ class CellPressures:
             )  # fmt: skip
 
 
-def _extended(x: FloatArray, shared: Shared | None, size: int) -> FloatArray:
-    """Return the values of the local points, given those of the owned ones; collective."""
-    return x if shared is None else shared.extend(x, size)
-
-
-def _folded(found: FloatArray, owned: int, shared: Shared | None, size: int) -> FloatArray:
-    """Return the sums at the owned points, given what this rank has for the local ones; collective."""
-    if shared is None:
-        return found
-    result = np.zeros(size * owned)
-    shared.fold(found, result, size)
-    return result
-
-
 class Coupling:
     """B: a context for PETSc."""
 
@@ -135,7 +119,7 @@ class Coupling:
     def matrix(self) -> PETSc.Mat:
         """Return it as a matrix of PETSc; the caller destroys it."""
         of = self._pressures
-        return _matrix(self, of.points, 3 * of.cells.points, of.comm)
+        return _matrix(self, of.ghosts.owned, 3 * of.cells.ghosts.owned, of.comm)
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write B x into ``y``; PETSc calls this."""
@@ -159,7 +143,7 @@ class Mass:
     def matrix(self) -> PETSc.Mat:
         """Return it as a matrix of PETSc; the caller destroys it."""
         of = self._pressures
-        return _matrix(self, of.points, of.points, of.comm)
+        return _matrix(self, of.ghosts.owned, of.ghosts.owned, of.comm)
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write M x into ``y``; PETSc calls this."""

@@ -17,11 +17,10 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
+from pipeline.solve.kernels.cells import LANES, Lanes, corners, owned_cells, reference, straight_cells
 from pipeline.solve.kernels.curved import CurvedCells
-from pipeline.solve.kernels.lanes import LANES, Lanes
+from pipeline.solve.kernels.ghosts import Ghosts
 from pipeline.solve.kernels.native import Single, call
-from pipeline.solve.kernels.pattern import corners, owned_cells, reference, straight_cells
-from pipeline.solve.parcels import ghosts_of
 from pipeline.solve.physics import MaterialLaw
 
 DEGREES = (2, 3, 4)
@@ -74,15 +73,13 @@ class CellStiffness:
     """The cells of this rank, laid out for products: the straight ones, and the others.
 
     ``curved`` tells for each local cell whether it is, None if none is; ``prescribed`` are the local dofs (unrolled)
-    whose rows and columns the operator does not have; ``regions`` number what cells are made of. Of its ``local``
-    points a rank owns the first ``points``; others own those that are ``shared``, None on one process.
+    whose rows and columns the operator does not have; ``regions`` number what cells are made of.
     """
 
     def __init__(self, space: Any, curved: BoolArray | None, prescribed: Int32Array, regions: Int32Array | None = None):
         """Collective."""
-        index_map, self.comm, self.degree = space.dofmap.index_map, space.mesh.comm, compat.degree(space)
-        self.points, self.local = index_map.size_local, index_map.size_local + index_map.num_ghosts
-        self.prescribed, self.shared = prescribed[prescribed < 3 * self.points], ghosts_of(space)
+        self.comm, self.degree, self.ghosts = space.mesh.comm, compat.degree(space), Ghosts(space)
+        self.prescribed = prescribed[prescribed < 3 * self.ghosts.owned]
         dofs, self._regions = owned_cells(space), regions
         self.lanes = Lanes(straight_cells(curved, len(dofs)), dofs)
         maps = np.zeros((self.lanes.batches, 9, LANES))
@@ -116,7 +113,7 @@ class CellStiffness:
 
     def diagonal(self, lame: list[FloatArray]) -> Single:
         """Return the blocks on the diagonal, shape (local, 9), that the cells of this rank make."""
-        blocks = np.zeros((self.local, 9), dtype=np.float32)
+        blocks = np.zeros((self.ghosts.local, 9), dtype=np.float32)
         weights, _, gradients = reference(self.degree, 2 * self.degree - 2)
         tensors = np.einsum("q,aqi,bqi->abi", weights, gradients, gradients)
         call("add_diagonal", len(self.lanes.which), self.lanes.dofs.shape[1], self.lanes.dofs,
@@ -135,7 +132,7 @@ class CellOperator:
     """
 
     def __init__(self, cells: CellStiffness, law: MaterialLaw):
-        self._cells, self.rows, self.prescribed, self.comm = cells, cells.points, cells.prescribed, cells.comm
+        self._cells, self.rows, self.prescribed, self.comm = cells, cells.ghosts.owned, cells.prescribed, cells.comm
         self._lame: dict[str, list[np.ndarray]] = {"float64": cells.lame(law)}
         self._lame["float32"] = [each.astype(np.float32) for each in self._lame["float64"]]
 
@@ -154,8 +151,7 @@ class CellOperator:
 
     def multiply(self, x: Single, y: Single) -> None:
         """Write A x into ``y``; what is prescribed must be nought in ``x``, and is anything in ``y``."""
-        y[:] = 0
-        self._add(x, y)
+        self._write(x, y)
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write A x into ``y``; PETSc calls this."""
@@ -164,14 +160,13 @@ class CellOperator:
         if values.any():
             given = given.copy()
             given[self.prescribed] = 0.0
-        result[:] = 0.0
-        self._add(given, result)
+        self._write(given, result)
         result[self.prescribed] = values
 
     def whole(self, x: FloatArray) -> FloatArray:
         """Return A x for the displacement of the owned points, without any conditions."""
-        result = np.zeros(3 * self.rows)
-        self._add(x, result)
+        result = np.empty(3 * self.rows)
+        self._write(x, result)
         return result
 
     @property
@@ -182,19 +177,23 @@ class CellOperator:
     def diagonal(self) -> Single:
         """Return the blocks on the diagonal, shape (points, 9), as if nothing was prescribed."""
         blocks = self._cells.diagonal(self._lame["float64"])
-        if self._cells.shared is not None:
-            self._cells.shared.add(blocks[self.rows :], blocks[: self.rows])
-        return blocks[: self.rows]
+        return self._cells.ghosts.folded(blocks.reshape(-1), 9).reshape(-1, 9)
 
-    def _add(self, x: np.ndarray, y: np.ndarray) -> None:
+    def _write(self, x: np.ndarray, y: np.ndarray) -> None:
         cells, lame = self._cells, self._lame[x.dtype.name]
-        if cells.shared is None:
+        if self.comm.size == 1:
+            y[:] = 0.0
             cells.add_product(lame, x, y)
             return
-        given = cells.shared.extend(x)
-        found = np.zeros_like(given)
-        cells.add_product(lame, given, found)
-        cells.shared.fold(found, y)
+        found = np.zeros(3 * cells.ghosts.local, dtype=x.dtype)
+        cells.add_product(lame, cells.ghosts.extended(x, 3), found)
+        y[:] = cells.ghosts.folded(found, 3)
+
+
+def operator_of(matrix: PETSc.Mat) -> CellOperator:
+    """Return the operator of cells that a matrix without entries stands for."""
+    operator: CellOperator = matrix.getPythonContext()
+    return operator
 
 
 def is_product(matrix: PETSc.Mat) -> bool:

@@ -1,7 +1,6 @@
 """What is solved with operators made of tensors of the reference cell is what dolfinx's forms give."""
 
 from contextlib import ExitStack
-from functools import partial
 
 import numpy as np
 import pytest
@@ -10,10 +9,10 @@ from mpi4py import MPI
 from pipeline import compat
 from pipeline.mesh.distribute import distribute
 from pipeline.mesh.generate import MeshArrays
-from pipeline.solve import forms, operator
 from pipeline.solve.compiled import vector_space
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.kernels.pattern import pattern
+from pipeline.solve.forms import ElasticForms
+from pipeline.solve.kernels.assembly import StraightStiffness
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import ElasticSpace, Spaces
@@ -23,39 +22,15 @@ from tests.solve.test_regions import SKIN
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("shared", [False, True])
-def test_what_is_lent_stays_as_it_is(shared):
-    """An operator is its borrower's: those made after it are others, until it is given back."""
+def test_what_is_lent_stays_as_it_is():
+    """An operator is its borrower's: those made after it are others."""
     space = ElasticSpace(make_mesh(MPI.COMM_WORLD), 2, Conditions())
-    lend = partial(space.operators.lend, blocked=True, shared=shared)
-    with lend(MaterialLaw.of(2.0, 1.0)) as (first, _):
+    with space.operators.lend(MaterialLaw.of(2.0, 1.0)) as first:
         before = first.norm()
-        with lend(MaterialLaw.of(5.0, 1.0)) as (second, _):
-            assert second.handle != first.handle
+        with space.operators.lend(MaterialLaw.of(5.0, 1.0)) as second:
             assert second.norm() != before
+            second.scale(2.0)
         assert first.norm() == before
-        space.operators.close()
-        assert first.norm() == before
-
-
-@pytest.mark.mpi
-def test_operators_of_two_parts_are_those_assembled_whole():
-    """One material after the other, in the same matrix."""
-    mesh = make_mesh(MPI.COMM_WORLD)
-    space, other = (ElasticSpace(mesh, 2, Conditions()) for _ in range(2))
-    free = np.setdiff1d(np.arange(space.dofs.owned), space.dofs.prescribed)
-    for material in (MaterialLaw.of(2.0, 1.0), MaterialLaw.of(5.0, 3.0)):
-        with (
-            space.operators.lend(material, blocked=True, shared=True) as (parts, _),
-            other.operators.lend(material, blocked=True) as (whole, _),
-            vector(space.dofs.space) as x, vector(space.dofs.space) as y, vector(space.dofs.space) as z,
-        ):  # fmt: skip
-            x.array[free] = np.sin(np.arange(len(free)))
-            parts.mult(x, y)
-            whole.mult(x, z)
-            assert np.abs(y.array - z.array).max() < 1e-12 * np.abs(z.array).max()
-    for made in (space, other):
-        made.operators.close()
 
 
 def test_a_point_of_very_many_cells():
@@ -68,11 +43,13 @@ def test_a_point_of_very_many_cells():
     cells = np.stack([np.zeros(count), np.ones(count), 2 + around, 2 + (around + 1) % count], axis=1).astype(np.int64)
     body = distribute(MPI.COMM_SELF, MeshArrays(points, cells, {"fixed": cells[:1, 1:]}, np.array([0]), 0.0))
     space = vector_space(body.mesh, 2)
-    found = pattern(space, space)
-    dofs = compat.cell_dofs(space)
-    assert np.array_equal(found.columns[found.places], np.broadcast_to(dofs[:, None, :], found.places.shape))
-    rows = np.searchsorted(found.offsets, found.places, side="right") - 1
-    assert np.array_equal(rows, np.broadcast_to(dofs[:, :, None], found.places.shape))
+    material, made = MaterialLaw.of(2.0, 1.0), ElasticForms(space)
+    made.set_law(material)
+    ours = StraightStiffness(space, None, np.empty(0, dtype=np.int32)).matrix(material, 1.0)
+    theirs = compat.assemble_matrix(made.stiffness, [], 1.0)
+    size = theirs.norm()
+    theirs.axpy(-1.0, ours)
+    assert theirs.norm() < 1e-13 * size
 
 
 @pytest.mark.mpi
@@ -92,30 +69,27 @@ def test_operators_are_those_that_dolfinx_assembles(degree, mirrors, changes, ke
     mesh = make_mesh(MPI.COMM_WORLD, mirrors, **changes)
     space, other = (ElasticSpace(mesh, degree, Conditions(bonded=False)) for _ in range(2))
     material = MaterialLaw.of((2.0, 5.0), (1.0, 0.7)) if mesh.regions is not None else MaterialLaw.of(2.0, 1.0)
-    lend = {"law": material, "blocked": degree > 1}
+    if not kernel:
+        monkeypatch.setattr(ElasticForms, "_kernels", lambda forms: {})
+    other.forms.set_law(material)
     with ExitStack() as stack:
-        ours, _ = stack.enter_context(space.operators.lend(**lend))
-        if degree > 1:
-            product, _ = stack.enter_context(space.operators.lend_product(material))
-        monkeypatch.setattr(operator, "assembles", lambda space: False)
-        monkeypatch.setattr(forms, "assembles", lambda space: False)
-        if not kernel:
-            monkeypatch.setattr(forms, "has_kernel", lambda degree: False)
-        theirs, _ = stack.enter_context(other.operators.lend(**lend))
+        theirs = compat.assemble_matrix(other.forms.stiffness, other.dofs.dirichlet, material.lame_mu[0])
+        monkeypatch.undo()
+        stack.callback(theirs.destroy)
+        ours = stack.enter_context(space.operators.lend(material))
         x, y, z = (stack.enter_context(vector(space.dofs.space)) for _ in range(3))
         x.array[:] = np.sin(np.arange(*x.getOwnershipRange()))
         ours.mult(x, y)
         theirs.mult(x, z)
         assert (y - z).norm() < 1e-12 * z.norm()
-        assert ours.getType() == theirs.getType()
+        assert ours.getType() == theirs.getType() and ours.getBlockSize() == theirs.getBlockSize() == 3
         if degree > 1:  # nor is that of the cells, without entries, another product
+            product = stack.enter_context(space.operators.lend_product(material))
             x.array[space.dofs.prescribed_owned] = 0.0
             product.mult(x, y)
             theirs.mult(x, z)
             y.array[space.dofs.prescribed_owned] = z.array[space.dofs.prescribed_owned]
             assert (y - z).norm() < 1e-12 * z.norm()
-    for made in (space, other):
-        made.operators.close()
 
 
 @pytest.mark.mpi

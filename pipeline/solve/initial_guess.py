@@ -7,7 +7,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.linear import LinearSolver
+from pipeline.solve.krylov import LinearSolver
 from pipeline.solve.loads import Motion
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.vectors import global_sum

@@ -7,7 +7,7 @@ from mpi4py import MPI
 from pipeline.plan.plan import make_plan
 from pipeline.run import far_field
 from pipeline.run.execute import compute
-from pipeline.solve.earlier import Earlier
+from pipeline.solve.initial_guess import Earlier
 from pipeline.solve.physics import MaterialLaw
 from tests.cases import study
 

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from petsc4py import PETSc
 
+from pipeline.solve import krylov
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.linear import Level, LinearSolver, SolveError
+from pipeline.solve.hierarchical_estimate import energy_decrements
+from pipeline.solve.krylov import Level, LinearSolver, SolveError, keep
 from pipeline.solve.loads import Loads
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import BALANCE_LIMIT, check_balance
@@ -51,15 +53,15 @@ def test_times_are_those_that_passed():
     assert times.total + times.error <= time.perf_counter() - begin
 
 
-@pytest.mark.parametrize(("direct", "levels", "serves"), [(False, 1, True), (True, 1, False), (False, 2, False)])
-def test_what_is_set_up_for_degree_1_serves_above_it_unless_it_is_a_factorisation(direct, levels, serves):
+@pytest.mark.parametrize(("direct", "levels", "serves"), [(False, 1, True), (True, 1, False), (False, 2, True)])
+def test_what_is_set_up_serves_above_it_unless_it_is_a_factorisation(direct, levels, serves):
     solver = object.__new__(LinearSolver)
-    solver._is_single, solver._is_direct = False, direct
-    solver._levels = [Level(None, None, np.empty(0)) for _ in range(levels)]
+    solver._is_direct = direct
+    solver.levels = [Level(None, None, np.empty(0)) for _ in range(levels)]
     above = Level(None, None, np.empty(0))
-    assert solver.carries([*solver._levels, above]) == serves
-    assert not solver.carries([above, *solver._levels])
-    assert not solver.carries([*solver._levels, Level(None, None, np.empty(0), held=np.zeros(1))])
+    assert solver.carries([*solver.levels, above]) == serves
+    assert not solver.carries([above, *solver.levels])
+    assert not solver.carries([*solver.levels, Level(None, None, np.empty(0), held=np.zeros(1))])
 
 
 def test_what_does_not_converge_is_a_failure():
@@ -107,12 +109,11 @@ def test_a_tolerance_after_a_target_is_kept():
 def test_a_set_up_that_fails_leaves_nothing(monkeypatch):
     made = []
 
-    def own(self, item):
-        self._owned.append(item)
+    def kept(stack, item):
         made.append(item)
-        return item
+        return keep(stack, item)
 
-    def multigrid(*_):
+    def cycle(*_):
         raise MemoryError
 
     with (
@@ -120,8 +121,8 @@ def test_a_set_up_that_fails_leaves_nothing(monkeypatch):
         QuasiStaticProblem(spaces, 2, Conditions()) as problem,
         problem.solver(law(0.3), "iterative") as solver,
     ):
-        monkeypatch.setattr(LinearSolver, "_own", own)
-        monkeypatch.setattr(LinearSolver, "_multigrid", multigrid)
+        monkeypatch.setattr(krylov, "keep", kept)
+        monkeypatch.setattr(krylov, "Cycle", cycle)
         with pytest.raises(MemoryError):
             LinearSolver(solver.levels, direct=False, tolerance=1e-6)
     assert made
@@ -133,3 +134,26 @@ def test_forces_that_do_not_balance_are_refused_and_so_is_no_number(balance):
     check_balance(BALANCE_LIMIT)
     with pytest.raises(SolveError, match="do not balance"):
         check_balance(balance)
+
+
+def test_decrements_are_energies_from_below():
+    """r·A⁻¹·r by a few iterations against a factorisation, for two right-hand sides and between them."""
+    with (
+        Spaces(make_mesh()) as spaces,
+        QuasiStaticProblem(spaces, 2, Conditions()) as problem,
+        problem.solver(law(0.45), "iterative") as solver,
+        problem.solver(law(0.45), "direct") as exact,
+    ):
+        rights, solutions = ([solver.matrix.createVecRight() for _ in range(2)] for _ in range(2))
+        for number, (right, solution) in enumerate(zip(rights, solutions, strict=True)):
+            right.array[:] = np.sin((1 + number) * np.arange(right.getSize()))
+            right.array[solver.levels[-1].prescribed] = 0.0
+            exact.solve(right, solution)
+        wanted = np.array([[b.dot(x) for x in solutions] for b in rights])
+        found, corrections, iterations = energy_decrements(solver, rights)
+        (alone,), *_ = energy_decrements(solver, rights[:1])
+    share = np.diag(found) / np.diag(wanted)
+    assert (share < 1 + 1e-9).all() and (share > 0.9).all()
+    assert found[0, 1] == found[1, 0] == pytest.approx(wanted[0, 1], abs=0.1 * np.diag(wanted).max())
+    assert alone[0] == pytest.approx(found[0, 0], rel=1e-9)
+    assert len(corrections) == 2 and 6 <= iterations < 60

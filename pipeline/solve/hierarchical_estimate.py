@@ -1,0 +1,114 @@
+"""How far the force of a displacement element is from the truth: solve on in the space of one degree more.
+
+For conforming displacement elements F_p·d - F·d is the energy of the error: F_p is too high, never too low. The part of
+it that degree p + 1 can see,
+
+    s = F_p - F_{p+1},    s·d = a(u_p - u_{p+1}, u_p - u_{p+1}),
+
+is summed by conjugate gradients that start from u_p: each iteration adds α (r, z) to the energy found, so that a few
+of them give s to a few per cent, always from below.
+"""
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from math import isfinite
+
+import numpy as np
+from petsc4py import PETSc
+
+from pipeline.arrays import FloatArray
+from pipeline.solve.krylov import INDEFINITE, LinearSolver, SolveError, check_converged, explained, iterative, keep
+from pipeline.solve.vectors import global_sum
+
+# Iterations end when one adds less than this share of the sum; the first few may be short by chance.
+_SMALL = 0.02
+_FEWEST, _MOST = 3, 60
+# What is left to gain below this share of the sum is rounding.
+_ROUNDING = 1e-6
+_REASONS = PETSc.KSP.ConvergedReason
+
+
+def energy_decrements(
+    solver: LinearSolver, residuals: Sequence[PETSc.Vec], *, keep_solutions: bool = False
+) -> tuple[FloatArray, list[FloatArray], int]:
+    """Return r_i·A⁻¹·r_j (J) of n ``residuals``, (n, n), each A⁻¹·r_i (owned dofs), and the iterations; collective.
+
+    On the diagonal it is from below; the error of any entry is at most the root of the two on the diagonal. There are
+    no solutions but for several residuals, or where they are to be kept.
+
+    Raises:
+        SolveError: if the increments do not get small.
+    """
+    with ExitStack() as stack, explained():
+        checked = _Checked(solver)
+        ksp = iterative(solver.matrix, "cg", stack, checked)
+        ksp.setNormType(PETSc.KSP.NormType.NONE)  # the preconditioner is not applied once more for a norm
+        ksp.setTolerances(max_it=_MOST)
+        solutions = [keep(stack, residual.duplicate()) for residual in residuals]
+        found = [_sum(ksp, checked, *pair) for pair in zip(residuals, solutions, strict=True)]
+        iterations = sum(count for _, count in found)
+        corrections = [solution.array.copy() for solution in solutions]
+        if len(found) == 1:
+            return np.array([[found[0][0]]]), corrections if keep_solutions else [], iterations
+        # x_i·r_j + x_j·r_i - x_i·A·x_j, whose error is that of both solutions.
+        product = keep(stack, residuals[0].duplicate())
+        local = np.empty((len(found), len(found)))
+        for j, (solution, residual) in enumerate(zip(solutions, residuals, strict=True)):
+            solver.multiply(solution, product)
+            for i, x in enumerate(corrections):
+                local[i, j] = x @ residual.array + corrections[j] @ residuals[i].array - x @ product.array
+    total = global_sum(residuals[0].comm.tompi4py(), local)
+    return (total + total.T) / 2, corrections, iterations
+
+
+def _sum(ksp: PETSc.KSP, checked: "_Checked", residual: PETSc.Vec, solution: PETSc.Vec) -> tuple[float, int]:
+    """Return ``residual``·A⁻¹·``residual`` and the iterations; write the solution."""
+    test = _Increments(checked)
+    ksp.setConvergenceTest(test)
+    solution.set(0.0)
+    ksp.solve(residual, solution)
+    if ksp.getConvergedReason() == INDEFINITE and not checked.is_rounding(test.total):
+        if not checked.solver.look_closer():
+            raise SolveError("the error estimate has no positive preconditioner")
+        solution.set(0.0)
+        ksp.solve(residual, solution)
+    if ksp.getConvergedReason() == _REASONS.DIVERGED_MAX_IT:
+        raise SolveError(f"the error estimate did not settle in {_MOST} iterations")
+    if ksp.getConvergedReason() != INDEFINITE:
+        check_converged(ksp)
+    return test.total, int(ksp.its)
+
+
+class _Checked:
+    """The preconditioner P of a solver, and the ``energy`` r·P·r of the last residual, negative if P is indefinite."""
+
+    def __init__(self, solver: LinearSolver):
+        self.solver, self.energy = solver, 0.0
+
+    def apply(self, _: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
+        """Apply it; PETSc calls this."""
+        self.solver.precondition(residual, result)
+        self.energy = float(residual.dot(result))
+
+    def is_rounding(self, total: float) -> bool:
+        """Tell whether what there was left to gain is nothing but rounding."""
+        return abs(self.energy) <= _ROUNDING * total
+
+
+class _Increments:
+    """Stops conjugate gradients from zero when x·r, their sum of increments, grows by a small share."""
+
+    def __init__(self, checked: _Checked):
+        self._checked, self.total = checked, 0.0
+
+    def __call__(self, ksp: PETSc.KSP, iteration: int, _: float) -> int:
+        if iteration == 0:
+            self.total = 0.0
+            return 0
+        before, self.total = self.total, float(ksp.getRhs().dot(ksp.getSolution()))
+        if not isfinite(self.total):
+            return int(_REASONS.DIVERGED_NANORINF)
+        if self._checked.energy < 0.0:
+            return int(INDEFINITE)
+        enough = iteration >= _FEWEST and self.total - before <= _SMALL * self.total
+        return int(_REASONS.CONVERGED_RTOL) if enough else 0

@@ -1,0 +1,315 @@
+"""Linear solvers: one factory of PETSc's KSP, what its errors mean, and the solver for elasticity.
+
+A KSP is Cholesky's or LDLᵀ factorisation by MUMPS, or an iteration. Conjugate gradients for elasticity have a multigrid
+cycle that goes down in degree (p, p - 1, …, 1), :mod:`pipeline.solve.kernels.multigrid`, and from degree 1 by hypre's
+BoomerAMG. Every KSP and PC has its own options prefix.
+"""
+
+import itertools
+import operator
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from pipeline import compat
+from pipeline.arrays import FloatArray
+from pipeline.solve.kernels.interpolation import free, interpolation
+from pipeline.solve.kernels.multigrid import Cycle, SmoothedLevel
+from pipeline.solve.kernels.product import operator_of
+from pipeline.stages import stage
+
+# Dofs up to which Cholesky is faster than conjugate gradients, measured: docs/solvers.md.
+DIRECT_LIMIT = {1: 5_000, 2: 1_500, 3: 1_500}
+_MOST_ITERATIONS = 500
+
+# Symmetric: Gauss–Seidel down, backwards up. Three entries to a row of the interpolation keep the coarse levels sparse.
+_BOOMERAMG = {
+    "coarsen_type": "HMIS",
+    "interp_type": "ext+i",
+    "strong_threshold": 0.5,
+    "P_max": 3,
+    "no_CF": "",
+    "relax_type_down": "SOR/Jacobi",
+    "relax_type_up": "backward-SOR/Jacobi",
+}
+# On several ranks a sweep takes what other ranks hold as it was. Where the material jumps that amplifies, and leaves no
+# definite preconditioner; with the sums of those entries' sizes on the diagonal it cannot (A. H. Baker, R. D. Falgout,
+# T. V. Kolev and U. M. Yang, SIAM J. Sci. Comput. 33, 2864, 2011).
+_BOOMERAMG_OF_RANKS = {"relax_type_down": "l1-Gauss-Seidel", "relax_type_up": "backward-l1-Gauss-Seidel"}
+
+_prefixes = itertools.count()
+_NONE = np.empty(0, dtype=np.int32)
+INDEFINITE = PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC
+
+
+class SolveError(Exception):
+    """A solve that did not give a solution to rely on."""
+
+
+@contextmanager
+def explained() -> Iterator[None]:
+    """Raise what PETSc and the multigrid cycle raise as errors for the reader of a record.
+
+    Raises:
+        SolveError: in their place.
+    """
+    try:
+        yield
+    except PETSc.Error as error:
+        raise SolveError(explain(error)) from error
+    except ArithmeticError as error:
+        raise SolveError(str(error)) from error
+
+
+def explain(error: PETSc.Error) -> str:
+    """Return what an error of PETSc means, for the reader of a record."""
+    return {
+        55: "out of memory",
+        76: "the factorisation failed (out of memory, or the operator is singular)",
+    }.get(error.ierr, f"PETSc error {error.ierr}")
+
+
+def check_converged(ksp: PETSc.KSP) -> int:
+    """Return the iterations of the last solve.
+
+    Raises:
+        SolveError: if it did not converge.
+    """
+    reason = ksp.getConvergedReason()
+    if reason <= 0:
+        names = {v: k for k, v in vars(PETSc.KSP.ConvergedReason).items() if isinstance(v, int)}
+        name = names.get(reason, str(reason)).lower()
+        raise SolveError(f"the linear solver did not converge: {name} after {ksp.its} iterations")
+    return int(ksp.its)
+
+
+def set_up(solver: PETSc.KSP | PETSc.PC, options: Mapping[str, Any]) -> None:
+    """Set up a KSP or PC with ``options`` of PETSc, which have an own prefix and are removed again; collective."""
+    held, prefix = PETSc.Options(), f"epsmesh{next(_prefixes)}_"
+    try:
+        if options:
+            solver.setOptionsPrefix(prefix)
+            for name, value in options.items():
+                held[prefix + name] = value
+            solver.setFromOptions()
+        solver.setUp()
+    finally:
+        for name in options:
+            held.delValue(prefix + name)
+
+
+def factorised(matrix: PETSc.Mat, stack: ExitStack, options: Mapping[str, Any] | None = None) -> PETSc.KSP:
+    """Return the solver by a symmetric factorisation of a ``matrix``, freed with the ``stack``; collective."""
+    ksp = keep(stack, PETSc.KSP().create(matrix.comm))
+    ksp.setOperators(matrix)
+    ksp.setType("preonly")
+    ksp.pc.setType("cholesky")
+    ksp.pc.setFactorSolverType("mumps")
+    set_up(ksp, options or {})
+    return ksp
+
+
+def iterative(
+    matrix: PETSc.Mat, kind: str, stack: ExitStack, preconditioner: Any = None, options: Mapping[str, Any] | None = None
+) -> PETSc.KSP:
+    """Return an iteration of a ``kind`` of PETSc's, freed with the ``stack``; it improves what it is given; collective.
+
+    The ``preconditioner`` is a PC, or a context in Python; without one, the ``options`` name it.
+    """
+    ksp = keep(stack, PETSc.KSP().create(matrix.comm))
+    ksp.setOperators(matrix)
+    ksp.setType(kind)
+    ksp.setInitialGuessNonzero(True)
+    if isinstance(preconditioner, PETSc.PC):
+        ksp.setPC(preconditioner)
+    elif preconditioner is not None:
+        ksp.pc.setType("python")
+        ksp.pc.setPythonContext(preconditioner)
+    set_up(ksp, options or {})
+    return ksp
+
+
+def algebraic(matrix: PETSc.Mat, stack: ExitStack) -> PETSc.PC:
+    """Return hypre's multigrid for a ``matrix`` of degree 1, freed with the ``stack``; collective."""
+    pc = keep(stack, PETSc.PC().create(matrix.comm))
+    pc.setOperators(matrix)
+    pc.setType("hypre")
+    pc.setHYPREType("boomeramg")
+    chosen = _BOOMERAMG | (_BOOMERAMG_OF_RANKS if matrix.comm.size > 1 else {})
+    set_up(pc, {f"pc_hypre_boomeramg_{name}": value for name, value in chosen.items()})
+    return pc
+
+
+def keep(stack: ExitStack, item: Any) -> Any:
+    """Let ``stack`` destroy an ``item`` of PETSc, and return it."""
+    stack.callback(item.destroy)
+    return item
+
+
+@dataclass(frozen=True)
+class Level:
+    """One level of a hierarchy: its space, its operator and the local dofs (unrolled) that are prescribed.
+
+    ``jumps`` says that the material does, from one region to the next. ``held`` are those of the prescribed dofs that
+    the operator knows nothing of: the multigrid cycle takes them into account.
+    """
+
+    space: Any
+    matrix: PETSc.Mat
+    prescribed: np.ndarray
+    jumps: bool = False
+    held: np.ndarray | None = None
+
+    @property
+    def degree(self) -> int:
+        """Polynomial degree of the space."""
+        return compat.degree(self.space)
+
+
+def is_direct(method: str, dofs: int, degree: int) -> bool:
+    """Decide between Cholesky and conjugate gradients for a system of ``dofs`` unknowns."""
+    return method == "direct" or (method == "auto" and dofs <= DIRECT_LIMIT[degree])
+
+
+class LinearSolver:
+    """A KSP for one operator, with everything that it needs; ``close`` frees it.
+
+    ``levels`` are what it was made of, ``cycle`` is the multigrid cycle, None for a direct solver and for degree 1.
+    """
+
+    @stage("set-up")
+    def __init__(self, levels: list[Level], *, direct: bool, tolerance: float, below: "LinearSolver | None" = None):
+        """Set up; collective. Operators above degree 1 are products, but for that of a ``direct`` solver.
+
+        ``below`` is a solver of all levels but the last, if there is one: what it has set up serves on where it can,
+        and it must then live as long.
+
+        Raises:
+            SolveError: if that fails.
+        """
+        self.levels = levels
+        self.cycle: Cycle | None = None
+        self._is_direct, self._looked_closer = direct, False
+        with ExitStack() as stack, explained():
+            self._stack = stack
+            if direct:
+                self.ksp = factorised(self.matrix, stack)
+            else:
+                self.ksp = iterative(self.matrix, "cg", stack, self._preconditioner(below))
+                self.ksp.setNormType(PETSc.KSP.NormType.NATURAL)
+                self.ksp.setTolerances(rtol=tolerance, atol=0.0, max_it=_MOST_ITERATIONS)
+            self._stack = stack.pop_all()
+
+    def _preconditioner(self, below: "LinearSolver | None") -> "PETSc.PC | Cycle":
+        levels = self.levels
+        if len(levels) == 1:
+            return algebraic(self.matrix, self._stack)
+        below = below if below is not None and below.carries(levels) else None
+        known = 1 if below is None else len(levels) - 1
+        smoothed = [SmoothedLevel(operator_of(level.matrix), jumps=level.jumps) for level in levels[known:]]
+        between = list(map(interpolation, levels[known - 1 :], levels[known:]))
+        if below is None:
+            self.cycle = Cycle(smoothed, between, algebraic(levels[0].matrix, self._stack))
+        elif below.cycle is None:
+            self.cycle = Cycle(smoothed, between, below.ksp.pc)
+        else:
+            self.cycle = below.cycle.above(smoothed, between)
+        if any(level.held is not None for level in levels):
+            self._hold(self.cycle.coarse)
+        return self.cycle
+
+    @stage("iterations")
+    def solve(
+        self, rhs: PETSc.Vec, solution: PETSc.Vec, tolerance: float | None = None, target: float | None = None
+    ) -> int:
+        """Improve ``solution`` and return the iterations; collective. A direct solve does not look at what it holds.
+
+        ``tolerance`` is another one than the solver was made with; a ``target`` is for the energy norm of the error
+        itself, not relative to anything.
+
+        Raises:
+            SolveError: if PETSc reports anything but convergence.
+        """
+        if tolerance is not None:
+            self.ksp.setTolerances(rtol=tolerance, atol=0.0)
+        if target is not None:
+            self.ksp.setTolerances(rtol=0.0, atol=target)
+        with explained():
+            self.ksp.solve(rhs, solution)
+            before = 0
+            if self.ksp.getConvergedReason() == INDEFINITE and self.look_closer():
+                before = int(self.ksp.its)
+                self.ksp.solve(rhs, solution)
+        return before + check_converged(self.ksp)
+
+    @stage("iterations")
+    def solve_many(self, loads: FloatArray) -> FloatArray:
+        """Return the solutions (m, n) for the columns of ``loads`` (m, n), of a direct solver on one process.
+
+        Raises:
+            SolveError: if the factorisation fails.
+        """
+        with ExitStack() as stack, explained():
+            right = keep(stack, PETSc.Mat().createDense(loads.shape, array=loads, comm=PETSc.COMM_SELF))
+            left = keep(stack, PETSc.Mat().createDense(loads.shape, comm=PETSc.COMM_SELF))
+            left.setUp()
+            self.ksp.pc.getFactorMatrix().matSolve(right, left)
+            return np.array(left.getDenseArray())
+
+    def look_closer(self) -> bool:
+        """Make an indefinite preconditioner definite, if that was not tried: what smoothers took for their largest
+        eigenvalue was too small. Only a cycle can.
+        """
+        if self.cycle is None or self._looked_closer:
+            return False
+        self._looked_closer = True
+        self.cycle.look_closer()
+        return True
+
+    def carries(self, levels: list[Level]) -> bool:
+        """Tell whether what is set up serves a cycle of ``levels``, one more than its own."""
+        same = len(levels) == len(self.levels) + 1 and all(map(operator.is_, levels, self.levels))
+        return same and not self._is_direct and all(level.held is None for level in levels)
+
+    @stage("set-up")
+    def hold(self, levels: list[Level]) -> None:
+        """Hold other dofs from now on: those of ``levels``, whose operators are the same but for degree 1; collective.
+
+        Raises:
+            SolveError: if PETSc fails.
+        """
+        self.levels = levels
+        with explained():
+            self._hold(algebraic(levels[0].matrix, self._stack))
+
+    def _hold(self, coarse: PETSc.PC) -> None:
+        assert self.cycle is not None
+        held = [_NONE if level.held is None else level.held for level in self.levels[1:]]
+        masks = [(free(lower), free(upper)) for lower, upper in itertools.pairwise(self.levels)]
+        self.cycle.hold(held, masks, coarse)
+
+    @property
+    def matrix(self) -> PETSc.Mat:
+        """The operator."""
+        return self.levels[-1].matrix
+
+    def multiply(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write the operator's product with ``x`` into ``y``; collective."""
+        self.matrix.mult(x, y)
+
+    def precondition(self, residual: PETSc.Vec, result: PETSc.Vec) -> None:
+        """Apply the preconditioner alone; collective. ``residual`` must be nought where dofs are prescribed.
+
+        Raises:
+            SolveError: if PETSc fails.
+        """
+        with explained():
+            self.ksp.pc.apply(residual, result)
+
+    def close(self) -> None:
+        """Free everything that was made."""
+        self._stack.close()
