@@ -16,7 +16,7 @@ from mpi4py import MPI
 from pipeline.plan.cost import CostModel
 from pipeline.plan.plan import Plan, make_plan
 from pipeline.plan.shard import Shard
-from pipeline.report.publish import publish
+from pipeline.report.publish import ResultsError, publish
 from pipeline.run.begun import ENDING, Begun, fail_begun
 from pipeline.run.outcome import count_states, failures
 from pipeline.run.progress import Progress, Terminal
@@ -30,17 +30,6 @@ from pipeline.study.sweep import Study
 _GRACE = 15
 # Within so many seconds a second signal is the first one again: sent to a group of processes, and passed on by one.
 _ECHO = 0.5
-
-
-class ResultsError(Exception):
-    """Dataset or figure cannot be made; what was computed is in the case store.
-
-    ``is_unwritable`` tells that it is for want of a disk, and not because of what was computed.
-    """
-
-    def __init__(self, message: str, *, is_unwritable: bool):
-        super().__init__(message)
-        self.is_unwritable = is_unwritable
 
 
 @dataclass
@@ -134,27 +123,21 @@ def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Term
     except KeyboardInterrupt:
         interrupted = True
     files: tuple[Path, ...] = ()
-    wrong, is_unwritable = "", False
+    wrong: ResultsError | None = None
     if opened.store is not None:
         opened.store.close()
         if plan.part is None:
             try:
                 with stage("results"):
                     files = publish(plan, opened.records, {"start": start, "end": _now()}, output)
-            except (OSError, RuntimeError) as error:  # of a full disk HDF5 tells the latter
-                is_unwritable, wrong = True, _unmade(plan, output, "written", str(error))
-            except Exception as error:
-                wrong = _unmade(plan, output, "built", f"{type(error).__name__}: {error}")
+            except ResultsError as error:
+                wrong = error
     counts = count_states(plan, opened.records)
     if not interrupted:
-        counts, wrong, is_unwritable = comm.bcast((counts, wrong, is_unwritable))
+        counts, wrong = comm.bcast((counts, wrong))
     if wrong:
-        raise ResultsError(wrong, is_unwritable=is_unwritable)
+        raise wrong
     return Outcome(counts, failures(plan, opened.records), files, interrupted)
-
-
-def _unmade(plan: Plan, output: Path, what: str, why: str) -> str:
-    return f"{output}: the results of {plan.study.file} cannot be {what}: {why}; all forces are on record"
 
 
 def leave_broken_pipes() -> None:

@@ -14,6 +14,7 @@ from pipeline.launcher import is_first_rank
 from pipeline.printable import printable
 
 if TYPE_CHECKING:
+    from pipeline.report.publish import ResultsError
     from pipeline.study.problems import StudyError
 
 DONE, SOME_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -75,6 +76,11 @@ def fail(*faults: Fault | str, status: int = BAD_INPUT) -> NoReturn:
     if is_json_wanted():
         print_json(as_data(found, status))
     raise typer.Exit(status)
+
+
+def of_results(wrong: "ResultsError", file: str) -> tuple[Fault, int]:
+    """Return what keeps the results of a study ``file`` from being made, and the exit status that it has."""
+    return Fault(str(wrong), file=file), BAD_INPUT if wrong.is_unwritable else SOME_FAILED
 
 
 @contextmanager

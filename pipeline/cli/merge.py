@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipeline.cli.console import error, print_json
-from pipeline.cli.faults import DONE, SOME_FAILED, fail, of_file, refusing
+from pipeline.cli.faults import DONE, SOME_FAILED, fail, of_file, of_results, refusing
 from pipeline.cli.words import (
     CLUSTER,
     DEFAULT_OUTPUT,
@@ -65,11 +65,15 @@ def merge(
     for problem in problems:
         error(problem)
 
-    from pipeline.report.publish import publish
+    from pipeline.report.publish import ResultsError, publish
     from pipeline.run.outcome import count_states, failures
 
     counts, failed = count_states(plan, records), failures(plan, records)
-    files = publish(plan, records, _dates(records), output)
+    try:
+        files = publish(plan, records, _dates(records), output)
+    except ResultsError as wrong:
+        fault, status = of_results(wrong, study.file)
+        fail(fault, status=status)
     missing = frozenset(solve.key for solve in plan.solves if solve.key not in records)
     again = _completing(plan, missing, paths, [word for name in without or () for word in ("--without", name)])
     if as_json:

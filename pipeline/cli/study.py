@@ -9,7 +9,18 @@ import typer
 
 from pipeline import __version__
 from pipeline.cli.console import print_json
-from pipeline.cli.faults import BAD_INPUT, DONE, INTERRUPTED, SOME_FAILED, Fault, as_data, fail, of_study, tell
+from pipeline.cli.faults import (
+    BAD_INPUT,
+    DONE,
+    INTERRUPTED,
+    SOME_FAILED,
+    Fault,
+    as_data,
+    fail,
+    of_results,
+    of_study,
+    tell,
+)
 from pipeline.cli.words import (
     DEFAULT_MESHES,
     DEFAULT_OUTPUT,
@@ -141,7 +152,8 @@ def run(
         except StoreError as wrong:
             fail(Fault(str(wrong), file=study.file))
         except workflow.ResultsError as wrong:
-            fail(Fault(str(wrong), file=study.file), status=BAD_INPUT if wrong.is_unwritable else SOME_FAILED)
+            fault, status = of_results(wrong, study.file)
+            fail(fault, status=status)
         if speaks:
             seconds = time.monotonic() - start
             conclude(plan, opened, outcome, seconds, part, quiet=quiet or as_json)

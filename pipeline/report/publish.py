@@ -3,16 +3,40 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from pipeline.launcher import is_interrupt
 from pipeline.plan.plan import Plan
 from pipeline.report.dataset import build, write
 from pipeline.run.record import Record
 
 
-def publish(plan: Plan, records: Mapping[str, Record], attributes: Mapping[str, str], output: Path) -> tuple[Path, ...]:
-    """Write ``<study>.nc`` and its figure into ``output`` and return the files; ``attributes`` tell of the run."""
-    from pipeline.report.figures import draw  # noqa: PLC0415 (matplotlib is slow to load, and wanted last)
+class ResultsError(Exception):
+    """Dataset or figure cannot be made; what was computed is in the case store.
 
+    ``is_unwritable`` tells that it is for want of a disk, and not because of what was computed.
+    """
+
+    def __init__(self, message: str, *, is_unwritable: bool = False):
+        super().__init__(message)
+        self.is_unwritable = is_unwritable
+
+
+def publish(plan: Plan, records: Mapping[str, Record], attributes: Mapping[str, str], output: Path) -> tuple[Path, ...]:
+    """Write ``<study>.nc`` and its figure into ``output`` and return the files; ``attributes`` tell of the run.
+
+    Raises:
+        ResultsError: whatever keeps them from being made.
+    """
+    what = f"{output}: the results of {plan.study.file} cannot be"
     path = output / f"{plan.study.name}.nc"
-    dataset = build(plan, records, attributes)
-    write(dataset, path)
-    return (path, *draw(dataset, path.with_suffix("")))
+    try:
+        from pipeline.report.figures import draw  # noqa: PLC0415 (matplotlib is slow to load, and wanted last)
+
+        dataset = build(plan, records, attributes)
+        write(dataset, path)
+        return (path, *draw(dataset, path.with_suffix("")))
+    except (OSError, RuntimeError) as error:  # of a full disk HDF5 tells the latter
+        raise ResultsError(f"{what} written: {error}; all forces are on record", is_unwritable=True) from error
+    except Exception as error:
+        if is_interrupt(error):
+            raise
+        raise ResultsError(f"{what} built: {type(error).__name__}: {error}; all forces are on record") from error

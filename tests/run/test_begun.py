@@ -148,7 +148,7 @@ def test_results_that_cannot_be_built_are_told_in_words(epsmesh, small, monkeypa
     def broken(*_):
         raise ValueError("dimension `load` against variable `load`")
 
-    monkeypatch.setattr("pipeline.workflow.publish", broken)
+    monkeypatch.setattr("pipeline.report.publish.build", broken)
     done = epsmesh("run", small, "--output", tmp_path / "out", "--json")
     assert done.exit_code == 1
     told = json.loads(done.stdout)
