@@ -275,6 +275,7 @@ def test_a_frame_that_gets_its_size_after_the_script_ran_is_drawn(browser, page,
     browser.ask(f"void Object.assign(document.querySelector('iframe').style, {style})")
     browser.ask("new Promise(done => setTimeout(done, 500))")
     inside = "document.querySelector('iframe').contentDocument.querySelector"
+    assert browser.ask(f"{inside}('#panel').open")
     assert re.fullmatch(r"[125]0* mm", browser.ask(f"{inside}('#bar').textContent"))
     browser.screenshot(tmp_path / "seen.png", whole=False)
     assert drawn(imread(tmp_path / "seen.png")[100:400, 100:500, :3]) > 0.3
@@ -319,7 +320,12 @@ def test_cut_moves_and_colours_change(browser, seen):
 def test_fits_a_phone_and_the_dark(browser, page, width):
     browser.look_like(width, 700, dark=True)
     browser.open(page)
+    browser.ask("new Promise(done => { const look = () => page ? done() : setTimeout(look, 10); look() })")
     assert browser.ask("document.documentElement.scrollWidth") <= width
     assert browser.ask("getComputedStyle(document.body).backgroundColor") == "rgb(20, 23, 27)"
     assert browser.ask("document.getElementById('panel').open") == (width > 600)
+    ends = (
+        "[page.told.low, page.told.high].flatMap(end => vector(end).project(page.stage.camera).toArray().slice(0, 2))"
+    )
+    assert np.abs(browser.ask(ends)).max() < 1
     assert browser.messages == []

@@ -192,11 +192,14 @@ class Stage {
   resize() {
     const { canvas: { clientWidth: width, clientHeight: height }, camera, controls, radius } = this;
     if (!width || !height) return;
+    const details = document.getElementById("panel");
+    if (!this.isSized && width < 600) details.open = false;
+    this.isSized = true;
     this.renderer.setPixelRatio(devicePixelRatio);
     this.renderer.setSize(width, height, false);
     Object.assign(camera, { top: radius, bottom: -radius, right: (radius * width) / height, left: (-radius * width) / height });
     Object.assign(camera, { near: 0, far: 100 * radius });
-    const panel = width < 600 ? 0 : document.getElementById("panel").offsetWidth;
+    const panel = width < 600 ? 0 : details.offsetWidth;
     camera.setViewOffset(width, height, panel / 2, 0, width, height);
     if (this.find) {
       const [target, half, wide] = this.find();
@@ -212,6 +215,7 @@ class Stage {
   // The camera's directions: to the right, up, to the eye.
   basis() {
     const directions = [0, 1, 2].map(() => new THREE.Vector3());
+    this.camera.updateMatrixWorld(); // which is a picture old
     this.camera.matrixWorld.extractBasis(...directions);
     return directions;
   }
@@ -301,7 +305,6 @@ function describe({ labels, stops, limits, unit, linear }) {
 let page = null;
 // Put the library into the page, then make `Page` of what the page holds; `prepare` reads its arrays.
 async function start(Page, prepare = unpack) {
-  if (innerWidth < 600) document.getElementById("panel").open = false;
   const library = document.createElement("script");
   library.textContent = new TextDecoder().decode(await inflate("library"));
   document.head.append(library);
