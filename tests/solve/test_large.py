@@ -150,7 +150,7 @@ def test_depths_of_a_sweep_share_one_walk(monkeypatch):
         ({"mesh": {"epsilon": "8 mm", "outside": "halfspace"}}, "mesh.outside"),
         ({"probe": {"contact": "frictionless"}}, "probe.contact"),
         ({"probe": {"contact": "unilateral"}}, "probe.contact"),
-        ({"probe": {"shape": "sphere", "radius": "5 mm", "depth": "0.1 mm"}}, "probe.shape"),
+        ({"probe": {"shape": "sphere", "radius": "5 mm", "depth": "0.1 mm"}}, "probe.contact"),
         ({"probe": {"motion": "all"}}, "probe.motion"),
         ({"probe": BLADE | {"slice": "0.1 mm"}}, "probe.slice"),
         ({"probe": BLADE | {"incision": "2 mm"}}, "probe.incision"),
