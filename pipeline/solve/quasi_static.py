@@ -41,7 +41,7 @@ from pipeline.solve.load_steps import LoadSteps, Walk
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.reaction import Response, reaction, sums
-from pipeline.solve.release import Front, Released
+from pipeline.solve.release import Advance, Front
 from pipeline.solve.rim import plain_share
 from pipeline.solve.solution import MOST_ROUNDS, TOLERANCE, Solution, check_balance, rest
 from pipeline.solve.spaces import Spaces
@@ -130,7 +130,7 @@ class QuasiStaticProblem:
                     motion: tuple(part.array.copy() for part in column.unknown)
                     for motion, column in zip(loads.motions, columns, strict=False)
                 }
-            released, pushed = self._released(elements, columns, law, loads)
+            front, tip = self._released(elements, columns, law, loads)
             elements.show(columns)
             solution = Solution(
                 response=response,
@@ -140,8 +140,8 @@ class QuasiStaticProblem:
                 cells=self._body.cells,
                 iterations=iterations,
                 times=times,
-                released=released,
-                pushed=pushed,
+                front=front,
+                tip=tip,
                 stored=None if solver.stored is None else 2.0 ** len(self._body.mirrored) * solver.stored,
             )
             if estimate:
@@ -235,9 +235,7 @@ class QuasiStaticProblem:
                 decrements = form - _form(*self._response(products, finer.columns, law, loads))
             else:
                 decrements = whole * finer.decrements
-            released, pushed = None, None
-            if finer.columns:
-                released, pushed = self._released(finer.elements, finer.columns, law, loads)
+            released = self._released(finer.elements, finer.columns, law, loads) if finer.columns else (None, None)
         plain = plain_share(self._body)
         unseen = None if finer.unseen is None else shares(np.diag(whole * finer.unseen), form)
         relative = [
@@ -247,26 +245,34 @@ class QuasiStaticProblem:
             )
         ]
         bars = stiffness_bars(form, np.array(relative))
+        solution = solution.with_bars(decrements, bars, elements.element, apart=loads.apart)
+        amounts = solution.response.amounts
+        front, tip = (
+            advance and above and advance.with_bar(above.form, amounts, elements.degree, solution.bar)
+            for advance, above in zip((solution.front, solution.tip), released, strict=True)
+        )
         return replace(
-            solution.with_bars(decrements, bars, elements.element, apart=loads.apart),
+            solution,
             plain=plain,
             unseen=None if unseen is None else unseen[: len(loads.motions)],
-            released_finer=released,
-            pushed_finer=pushed,
+            front=front,
+            tip=tip,
             estimate_iterations=finer.iterations,
-        ).with_release_bar(elements.degree)
+        )
 
     @stage("energy release")
-    def _released(self, elements: Elements, columns: Sequence[Column], law: MaterialLaw, loads: Loads) -> Released:
+    def _released(
+        self, elements: Elements, columns: Sequence[Column], law: MaterialLaw, loads: Loads
+    ) -> tuple[Advance | None, Advance | None]:
         """Return what a slit's front and the blade's tip in the whole body release (J/m), by pairs of motions."""
         motions = columns[: len(loads.motions)]
 
-        def of(line: Front | None) -> FloatArray | None:
+        def of(line: Front | None) -> Advance | None:
             if line is None:
                 return None
             release = elements.release(law, line)
             found = release.matrix(len(motions), lambda amounts: elements.show(motions, list(amounts)))
-            return 2.0 ** len(self._body.mirrored) * found
+            return Advance(2.0 ** len(self._body.mirrored) * found)
 
         return of(self._conditions.front), of(self._conditions.tip)
 

@@ -20,7 +20,7 @@ It is quadratic in u: of a sum of motions, R_ij tells what each pair of them rel
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, nan
 from typing import Any
 
 import numpy as np
@@ -31,12 +31,11 @@ from mpi4py import MPI
 from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve.compiled import form, scalar_space, vector_space
+from pipeline.solve.error import extrapolate_release, release_bar
 from pipeline.solve.forms import ElasticForms, dx, one_cell
 from pipeline.solve.loads import Vector
 from pipeline.solve.physics import strain
 
-# What a unit of advance of a slit's front releases (n, n), and of the blade's tip; None where there is none.
-Released = tuple[FloatArray | None, FloatArray | None]
 # v is 1 up to the first of these shares of its radius, and nothing from the second on.
 _INNER, _OUTER = 0.4, 1.0
 
@@ -68,6 +67,35 @@ class Front:
         if isfinite(self.reach):
             away = np.maximum(away, np.abs(offset @ np.array(self.along)) - self.reach)
         return np.asarray(np.clip((_OUTER - away / self.radius) / (_OUTER - _INNER), 0.0, 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Advance:
+    """The energy (J/m) that an advance of a line releases: a ``form`` (n, n) of the amounts of n motions.
+
+    ``finer`` is what one degree more makes of it, ``bar`` the relative 95 % bar on what is released.
+    """
+
+    form: FloatArray
+    finer: FloatArray | None = None
+    bar: float = nan
+
+    def released(self, amounts: FloatArray) -> float:
+        """Return what is released (J/m)."""
+        return float(amounts @ self.form @ amounts)
+
+    def with_bar(self, finer: FloatArray, amounts: FloatArray, degree: int, bar: float) -> "Advance":
+        """Return it with what one degree more makes of it; ``bar`` is the relative one on the energy."""
+        found = release_bar(self.released(amounts), float(amounts @ finer @ amounts), degree, bar)
+        return Advance(self.form, finer, found)
+
+    def extrapolated(self, amounts: FloatArray, degree: int, bar: float) -> "Advance":
+        """Return what the sequence of degrees tends to, itself without a finer one; ``bar`` is that on the energy."""
+        if self.finer is None:
+            return self
+        finer = float(amounts @ self.finer @ amounts)
+        found = release_bar(self.released(amounts), finer, degree, bar, extrapolated=True)
+        return Advance(extrapolate_release(self.form, self.finer, degree), self.finer, found)
 
 
 class Release:

@@ -8,11 +8,12 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.carried import Carried, load_bars
-from pipeline.solve.error import extrapolate, extrapolate_found, extrapolate_release, release_bar
+from pipeline.solve.error import extrapolate, extrapolate_found
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads, Vector
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.reaction import Response
+from pipeline.solve.release import Advance
 from pipeline.stages import Times
 
 # F·d = 2U and F_probe + F_support = 0 hold for the exact solution of the discrete system, and are linear in the
@@ -81,26 +82,20 @@ class Solution:
     sag: float = nan
     load_energy: float = nan
 
-    # Of a slit (pipeline.solve.release): the energy (J/m) that an advance of its front releases, a form (n, n) of the
-    # amounts of the motions, what one degree more makes of it, and the relative 95 % bar on what they release.
-    released: FloatArray | None = None
-    released_finer: FloatArray | None = None
-    release_bar: float = nan
-    # The same of the tip of a blade along which tissue slides: what its advance takes is the force on it.
-    pushed: FloatArray | None = None
-    pushed_finer: FloatArray | None = None
-    push_bar: float = nan
+    # Energy released (pipeline.solve.release) by a slit's front, and by the tip of a blade along which tissue slides.
+    front: Advance | None = None
+    tip: Advance | None = None
 
     @property
     def reaction(self) -> Vector:
         """Force of the tissue on the probe (N)."""
         x, y, z = self.response.force
-        return x, y, z if self.pushed is None else self.push
+        return x, y, z if self.tip is None else self.push
 
     @property
     def push(self) -> float:
         """Force (N) at the tip of a blade along which tissue slides; not a number if there is none."""
-        return -_form(self.pushed, self.response.amounts)
+        return nan if self.tip is None else -self.tip.released(self.response.amounts)
 
     @property
     def energy(self) -> float:
@@ -149,7 +144,7 @@ class Solution:
                     spanned += np.square(motion.direction)
                     bars += bar * np.abs(motion.direction)
         x, y, z = map(float, np.where(spanned > 1 - 1e-9, bars, nan))
-        return x, y, z if self.pushed is None else abs(self.push) * self.push_bar
+        return x, y, z if self.tip is None else abs(self.push) * self.tip.bar
 
     def with_bars(self, decrements: FloatArray, bars: FloatArray, element: str, *, apart: bool) -> "Solution":
         """Return the solution with what one degree more takes away, and bars; loads have a row more than motions.
@@ -169,25 +164,19 @@ class Solution:
     @property
     def release(self) -> float:
         """Energy (J) that a metre of advance of the slit's front releases; not a number if there is no slit."""
-        return _form(self.released, self.response.amounts)
+        return nan if self.front is None else self.front.released(self.response.amounts)
 
-    def with_release_bar(self, degree: int) -> "Solution":
-        """Return the solution with the bar on what a slit's front releases, for elements of ``degree``."""
-        if self.released is None:
-            return self
-        finer = _form(self.released_finer, self.response.amounts)
-        pushed = -_form(self.pushed_finer, self.response.amounts)
-        return replace(
-            self, release_bar=release_bar(self.release, finer, degree, self.bar),
-            push_bar=release_bar(self.push, pushed, degree, self.bar),
-        )  # fmt: skip
+    @property
+    def release_bar(self) -> float:
+        """Relative 95 % bar on that energy."""
+        return nan if self.front is None else self.front.bar
 
     @property
     def is_shut(self) -> bool:
         """Whether to open a slit further would release less: its faces are pressed together at the front."""
-        if self.released is None:
+        if self.front is None:
             return False
-        gained = self.released @ self.response.amounts
+        gained = self.front.form @ self.response.amounts
         return any(g < 0 for g, motion in zip(gained, self.response.loads.motions, strict=True) if any(motion.opening))
 
     def extrapolated(self, degree: int, element: str, *, graded: bool = True, elsewhere: bool = False) -> "Solution":
@@ -210,24 +199,12 @@ class Solution:
         if self.carried is not None:
             loaded = self.carried.extrapolated(degree, element, plain=self.plain, graded=graded)
             best = replace(best, carried=loaded)
-        if self.released is None or self.released_finer is None:
-            return best
-        finer = _form(self.released_finer, self.response.amounts)
-        best = replace(
-            best, released=extrapolate_release(self.released, self.released_finer, degree),
-            release_bar=release_bar(self.release, finer, degree, best.bar, extrapolated=True),
-        )  # fmt: skip
-        if self.pushed is None or self.pushed_finer is None:
-            return best
-        pushed = -_form(self.pushed_finer, self.response.amounts)
+        amounts = self.response.amounts
         return replace(
-            best, pushed=extrapolate_release(self.pushed, self.pushed_finer, degree),
-            push_bar=release_bar(self.push, pushed, degree, best.bar, extrapolated=True),
-        )  # fmt: skip
-
-
-def _form(matrix: FloatArray | None, amounts: FloatArray) -> float:
-    return nan if matrix is None else float(amounts @ matrix @ amounts)
+            best,
+            front=self.front and self.front.extrapolated(amounts, degree, best.bar),
+            tip=self.tip and self.tip.extrapolated(amounts, degree, best.bar),
+        )
 
 
 class Problem(Protocol):

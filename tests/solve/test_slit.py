@@ -38,7 +38,7 @@ def finer(solution):
     """Return energy (J) and release (J/m) as elements of one degree more have them."""
     amounts = solution.response.amounts
     energy = solution.energy - float(amounts @ solution.decrements @ amounts) / 2
-    return energy, float(amounts @ solution.released_finer @ amounts)
+    return energy, float(amounts @ solution.front.finer @ amounts)
 
 
 @cache
@@ -103,9 +103,9 @@ def test_flanks_that_slide():
     ]
     (deeper, here, less_deep), amounts = found, found[1].response.amounts
     slope = (finer(deeper)[0] - finer(less_deep)[0]) / (2 * step)
-    assert -float(amounts @ here.pushed_finer @ amounts) == pytest.approx(slope, rel=0.03)
-    assert here.reaction[2] == pytest.approx(slope, rel=here.push_bar)
-    assert 0.02 < here.push_bar < 0.1
+    assert -float(amounts @ here.tip.finer @ amounts) == pytest.approx(slope, rel=0.03)
+    assert here.reaction[2] == pytest.approx(slope, rel=here.tip.bar)
+    assert 0.02 < here.tip.bar < 0.1
     best = here.extrapolated(2, "displacement", elsewhere=True)
     assert best.reaction[2] == pytest.approx(slope, rel=0.03)
     assert here.balance < 1e-6
