@@ -1,7 +1,7 @@
 """What is read off a solution cell by cell, from the mean of ∇u over each: principal strains, and largest values.
 
 To report another one, write it as a function of :class:`Cells`, enter it in :data:`LARGEST`, and give it a field in
-``pipeline/run/record.py`` and a line in ``pipeline/quantities.py``.
+``pipeline/run/record.py`` and a line in ``pipeline/quantities.toml``.
 """
 
 from collections.abc import Callable
