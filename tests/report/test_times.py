@@ -21,7 +21,7 @@ def timed():
 
 def test_times_of_an_idle_machine_need_no_words(timed):
     assert doubts(timed) == []
-    assert doubts(timed.drop_vars(["load", "time_spread"])) == []  # of an earlier version
+    assert doubts(timed.drop_vars(["machine_load", "time_spread"])) == []  # of an earlier version
 
 
 def test_a_loaded_machine_is_told_of(timed):
@@ -32,10 +32,10 @@ def test_a_loaded_machine_is_told_of(timed):
     assert doubts(timed)[0].startswith("all times were taken on a loaded machine")
     assert f"times        {doubts(timed)[0]}" in str(guide(timed, accuracy="50 %"))
     assert ("speed-ups", doubts(timed)[0]) in facts(timed)
-    for kind in ("speedup", "epsilon", "accuracy"):
+    for kind in ("ratio", "error"):
         words = " ".join(text.get_text() for text in figure(timed, kind).texts)
         assert "loaded machine" in words.replace("\n", " ")
-    assert not any("loaded" in text.get_text() for text in figure(timed, "ratio").texts)
+    assert not any("loaded" in text.get_text() for text in figure(timed, "force").texts)
 
 
 def test_repeats_that_are_far_apart_are_told_of(timed):
@@ -48,15 +48,15 @@ def test_how_far_repeats_are_apart_is_drawn(timed):
     timed["time_spread"][:] = 0.2
     timed["time_spread"].loc[{"epsilon": np.inf}] = 0.1
     speed = timed["speedup"].sel(epsilon=4e-3, outside="free").item()
-    drawn = figure(timed, "speedup")
+    drawn = figure(timed, "ratio")
     bars = [line.get_segments() for ax in drawn.axes for line in ax.collections]
     spans = np.array([segment[:, 1] for segments in bars for segment in segments])
-    assert len(spans) == timed.sizes["epsilon"] - 1  # what is outside makes no difference to these times
+    assert len(spans) == 2 * (timed.sizes["epsilon"] - 1)
     assert np.isclose(spans, [speed / (1.1 * 1.05), speed * 1.1 * 1.05]).all(axis=1).any()
-    for kind in ("speedup", "accuracy"):
+    for kind in ("ratio", "error"):
         assert any("how far repeats are apart" in text.get_text() for text in figure(timed, kind).texts)
     once = timed.drop_vars("time_spread")
-    assert not [line for ax in figure(once, "speedup").axes for line in ax.collections]
+    assert not [line for ax in figure(once, "ratio").axes for line in ax.collections]
 
 
 def test_fewer_unknowns_that_were_slower_are_named(timed):

@@ -9,11 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.quantities import MESH_DIMENSIONS
-from pipeline.report.figures.curves import lines, positions, write_ticks
+from pipeline.report.figures.curves import BARS, lines, positions, write_ticks
 from pipeline.report.figures.facets import Facets, arrange, main_dimension, title_of, with_error
 from pipeline.report.figures.style import LEGEND, QUIET, WIDTH, finish, log_scale, look, new_figure
 from pipeline.report.pareto import front
-from pipeline.report.times import warned
+from pipeline.report.times import spreads, warned
 from pipeline.report.words import at_most, choices, heading, is_numeric
 
 _HEIGHT, _BESIDE = 2.3, 1.6  # inches: of a row, and of what is above and below the panels
@@ -23,6 +23,8 @@ _COSTS = ("dofs", "time_total")
 def error(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     """The error of F against what is swept of the mesh, the number of unknowns, and the run time of a case."""
     reference, data = with_error(dataset)
+    spread = spreads(dataset, "time_total")
+    data = data if spread is None else data.assign(spread=spread)
     facets = _facets(data)
     figure = new_figure(WIDTH + LEGEND, _HEIGHT * len(facets.rows) + _BESIDE)
     axes = figure.subplots(len(facets.rows), 1 + len(_COSTS), squeeze=False, sharex="col", sharey=True)
@@ -47,7 +49,8 @@ def error(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     bar = at_most(data["force_exact_error"])
     grey = f"grey: below the error bar of F_exact{bar}" if reference == "exact" else "no F_exact: errors against F_max"
     steps = "lines against cost: cases that no other beats in both, without errors 1.5 times as large on a finer mesh"
-    finish(figure, title, "; ".join(filter(None, (grey, steps, facets.note))), warned(warning, dataset))
+    repeats = "" if spread is None else "bars: how far repeats are apart"
+    finish(figure, title, "; ".join(filter(None, (grey, steps, repeats, facets.note))), warned(warning, dataset))
     return figure
 
 
@@ -74,6 +77,10 @@ def _draw_curve(row: np.ndarray, facets: Facets, line: xr.Dataset, position: int
         cost = np.where(cost > 0, cost, np.nan)
         best = front(cost, np.where(np.atleast_1d(flat["is_by_chance"].values), np.nan, known))
         ax.plot(cost, known, **style | {"linestyle": "none"})
+        if name == "time_total" and "spread" in flat:
+            share = np.atleast_1d(flat["spread"].values)[best]
+            bars = cost[best] * np.stack([1 - 1 / share, share - 1])
+            ax.errorbar(cost[best], known[best], xerr=bars, fmt="none", ecolor=style["color"], **BARS)
         joins = facets.x in MESH_DIMENSIONS
         ax.plot(cost[best], known[best], color=style["color"], drawstyle="steps-post", alpha=1.0 if joins else 0.0)
 

@@ -53,17 +53,18 @@ def arrange(
     x: str | None,
     flat: Collection[str] = (),
     most: tuple[int, int, int] = MOST,
+    first: Collection[str] = ("poisson", "law"),
 ) -> Facets:
     """Choose facets of ``quantities`` against the dimension ``x``; panels draw the dimensions ``flat`` themselves.
 
-    Curves are Poisson's ratios, or the first other numbers; columns the kinds of outside, or other words; rows the
+    Curves are a dimension of ``first``, or the first numbers; columns the kinds of outside, or other words; rows the
     next. ``most`` limits their numbers. Dimensions that change nothing, or have no place, have one value.
     """
     free = [str(dim) for dim in dataset["force"].dims if dim != x and dim not in flat]
     live = [d for d in free if dataset.sizes[d] > 1 and any(_depends(dataset[name], d) for name in quantities)]
     at = {dim: _representative(dataset, dim, x) for dim in free if dim not in live}
     ranks: tuple[Callable[[str], Any], ...] = (
-        lambda dim: (dim not in ("poisson", "law"), not is_numeric(dataset[dim]), dim == "outside"),
+        lambda dim: (dim not in first, not is_numeric(dataset[dim]), dim == "outside"),
         lambda dim: (dim != "outside", is_numeric(dataset[dim])),
         lambda dim: is_numeric(dataset[dim]),
     )

@@ -57,7 +57,8 @@ def _varies(dataset: xr.Dataset, name: str) -> bool:
 
 def _draw_column(axes: np.ndarray, dataset: xr.Dataset, dim: str, quantities: list[str]) -> tuple[str, ...]:
     """Draw every quantity against one dimension; return what is left out, in words."""
-    facets = arrange(dataset, quantities, dim, most=(_MOST_CURVES, 1, 1))
+    first = ("law", "probe") if "contact_area" in quantities else ("law", "poisson")
+    facets = arrange(dataset, quantities, dim, most=(_MOST_CURVES, 1, 1), first=first)
     data = dataset.sel(facets.at)
     for row, (ax, name) in enumerate(zip(axes, quantities, strict=True)):
         draw(Panel(ax, data, name, 0, row), facets, _LOAD_BAR if name == "load_force" else _RELATIVE.get(name, ""))
