@@ -11,9 +11,8 @@ import xarray as xr
 
 from pipeline.quantities import MESH_DIMENSIONS, symbol, write
 from pipeline.report.sinking import LOADS, PLACES, Sinking
-from pipeline.study.load import parse
+from pipeline.study.load import load_text
 from pipeline.study.problems import StudyError
-from pipeline.study.read import toml_of
 from pipeline.study.sweep import Case, Study
 
 Labels = dict[str, Any]
@@ -136,7 +135,7 @@ def study_of(dataset: xr.Dataset) -> Study | None:
 @lru_cache(8)  # figures, report and guide of a dataset ask for it again and again
 def _study(text: str, file: str) -> Study | None:
     try:
-        return parse(toml_of(text, file), file=file, text=text)
+        return load_text(text, file)
     except StudyError:
         return None
 

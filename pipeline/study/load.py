@@ -39,21 +39,19 @@ def load_mapping(study: Mapping[str, Any], name: str, folder: str | Path = ".") 
     try:
         text = to_toml(study, str(path))
         text.encode()  # a dataset holds it as UTF-8
-        raw = toml_of(text, str(path))
+        return load_text(text, str(path))
     except (RecursionError, UnicodeEncodeError) as error:
         why = "is nested too deeply" if isinstance(error, RecursionError) else "has text that is not Unicode"
         raise StudyError(str(path), [Problem("study", None, why)]) from None
-    return parse(raw, file=str(path), text=text)
 
 
-def load_text(text: str, name: str, folder: str | Path = ".") -> Study:
-    """Read the text of a study, such as a dataset carries, as the file ``name``.toml in ``folder`` would be read.
+def load_text(text: str, file: str) -> Study:
+    """Read the text of a study, such as a dataset carries, as it stood in ``file``, beside which bodies' files lie.
 
     Raises:
         StudyError: with every problem of it.
     """
-    path = str(Path(folder) / f"{name}.toml")
-    return parse(toml_of(text, path), file=path, text=text)
+    return parse(toml_of(text, file), file=file, text=text)
 
 
 def parse(raw: dict[str, Any], *, file: str = "study", text: str = "") -> Study:

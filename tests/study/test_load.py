@@ -353,10 +353,10 @@ def test_the_text_of_a_study_is_read_as_if_it_lay_in_its_folder(tmp_path):
     organs.write_stl(tmp_path / "box.stl", *organs.box(40e-3, 40e-3, 20e-3))
     body = {"shape": "surface", "file": "box.stl", "unit": "mm", "fixed": {"below": "-16 mm"}}
     text = to_toml(raw(body=body), "study.toml")
-    (case,) = load_text(text, "study", tmp_path).cases()
+    (case,) = load_text(text, f"{tmp_path}/study.toml").cases()
     assert case.body.volume == pytest.approx(32e-6)
     with pytest.raises(StudyError, match=r"box\.stl"):
-        load_text(text, "study", tmp_path / "elsewhere")
+        load_text(text, f"{tmp_path}/elsewhere/study.toml")
 
 
 def test_several_materials_beside_layers_are_told_to_be_a_sweep():
