@@ -29,7 +29,6 @@ from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.conditions import Conditions, ConstrainedSpace
 from pipeline.solve.dead_loads import Applied
 from pipeline.solve.hierarchical_estimate import energy_decrements
-from pipeline.solve.initial_guess import Earlier
 from pipeline.solve.krylov import Level, LinearSolver, SolveError, is_direct
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.mixed_space import MixedSpace
@@ -314,7 +313,8 @@ class DisplacementElements(Elements):
     def set_up(self, law: MaterialLaw, stack: ExitStack, *, direct: bool, keep: bool) -> "DisplacementSolver":
         """Return a solver, freed with the ``stack`` unless it is to ``keep``; collective.
 
-        What does not cycle in single precision is not kept: it takes much memory beside the next degree.
+        What is kept begins each solve from the best sum of earlier solutions. A factorisation is not kept: it takes
+        much memory beside the next degree.
         """
         if self._kept is not None and self._kept.law == law and keep and not direct:
             recharge(self._kept.cost)
@@ -326,7 +326,8 @@ class DisplacementElements(Elements):
                 solver = LinearSolver(levels, direct=direct, tolerance=_ANY)
                 owner.callback(solver.close)
             found = DisplacementSolver(self, law, levels, solver, cost, is_exact=direct)
-            if keep and solver.cycle is not None:
+            if keep and not direct:
+                solver.recycle()
                 self._kept, found.owner = found, owner.pop_all()
             else:
                 stack.push(owner.pop_all())
@@ -362,7 +363,8 @@ class DisplacementElements(Elements):
 class DisplacementSolver:
     """A solver of displacement elements for a ``law``, its ``levels``, and the one above it, once it was made.
 
-    ``owner`` frees it, and ``cost`` is what it took to make.
+    ``owner`` frees it, and ``cost`` is what it took to make. ``known`` are solutions for a unit of motions that may
+    come again, less what is prescribed.
     """
 
     elements: DisplacementElements
@@ -373,6 +375,7 @@ class DisplacementSolver:
     is_exact: bool
     stored: float | None = None
     owner: ExitStack = field(default_factory=ExitStack)
+    known: dict[Motion, FloatArray] = field(default_factory=dict)
     _above: tuple[DisplacementElements, LinearSolver] | None = None
     _tolerance: float = 1.0
 
@@ -393,10 +396,6 @@ class DisplacementSolver:
     def improve(self, columns: Sequence[Column], share: float) -> int:
         """Lower it to that ``share`` of what the last solve left; return the iterations; collective."""
         return self.solve(columns, share * self._tolerance)
-
-    def remember(self, earlier: Earlier, motions: Sequence[Motion], columns: Sequence[Column]) -> None:
-        """Let ``earlier`` keep solutions for other places; their right-hand sides are overwritten; collective."""
-        earlier.remember(motions, self.linear, *([c[0] for c in cs] for cs in _transposed(columns)))
 
     def enrich(self, columns: Sequence[Column], loads: Loads, stack: ExitStack, *, keep: bool) -> Enriched:
         """Solve on in one degree more, from the residuals there; collective."""

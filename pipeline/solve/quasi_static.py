@@ -13,7 +13,7 @@ The force is the reaction (:mod:`pipeline.solve.reaction`). Stress integrated un
 cent on the same solution.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from typing import Any, Self
@@ -35,7 +35,6 @@ from pipeline.solve.elements import (
     elements_of,
 )
 from pipeline.solve.error import error_bar, stiffness_bars
-from pipeline.solve.initial_guess import Earlier
 from pipeline.solve.krylov import LinearSolver, SolveError
 from pipeline.solve.load_steps import LoadSteps, Walk
 from pipeline.solve.loads import Loads, Motion
@@ -76,7 +75,6 @@ class QuasiStaticProblem:
         """
         self.elements: Elements = elements_of(spaces, degree, conditions, element)
         self.corrections: dict[Motion, tuple[FloatArray, ...]] = {}
-        self._earlier: Earlier | None = None  # of a tool and the far fields of its places
         self._walk: Walk | None = None  # to the last depth in a body of a law that is not linear
         self._reuse = reuse and element == "displacement"
         self._body, self._conditions = spaces.body, conditions
@@ -88,7 +86,6 @@ class QuasiStaticProblem:
 
     def __exit__(self, *_: object) -> None:
         self.corrections.clear()
-        self._earlier = None
         self.elements.close()
 
     @property
@@ -115,14 +112,18 @@ class QuasiStaticProblem:
         """
         elements, direct = self.elements, self.elements.is_direct(method)
         with recorded() as times, ExitStack() as stack:
-            earlier = self._earlier_of(law, loads, direct=direct)
-            solver = self._set_up(law, loads, stack, direct=direct, keep=earlier is not None)
+            # A tool at many places: the same operator, another far field each time.
+            keep = self._reuse and loads.far is not None and not direct
+            solver = self._set_up(law, loads, stack, direct=direct, keep=keep)
             with stage("assembly"):
                 columns = elements.columns(loads, stack)
                 solver.lift(columns)
             with stage("solve"):
-                self._guess(columns, loads, earlier)
-                iterations, response, carried = self._iterate(solver, columns, law, loads, earlier, tolerance=tolerance)
+                known = solver.known if keep and isinstance(solver, DisplacementSolver) else {}
+                self._guess(columns, loads, known)
+                iterations, response, carried = self._iterate(solver, columns, law, loads, known, tolerance=tolerance)
+                if keep and isinstance(solver, DisplacementSolver):
+                    solver.known = {loads.motions[0]: columns[0].unknown[0].array.copy()}
                 if loads.far is not None:
                     loads = _close(columns, response)
                     response = _balanced(self._response(solver.products(columns), columns, law, loads)[0])
@@ -155,7 +156,7 @@ class QuasiStaticProblem:
         columns: list[Column],
         law: MaterialLaw,
         loads: Loads,
-        earlier: Earlier | None,
+        known: Mapping[Motion, FloatArray],
         *,
         tolerance: float,
     ) -> tuple[int, Response, Carried | None]:
@@ -165,7 +166,6 @@ class QuasiStaticProblem:
             SolveError: if they do not.
         """
         aim = tolerance * min(self.elements.stricter, TWO_SIDED if loads.far is not None else 1.0)
-        known = {} if earlier is None else earlier.known
         todo = [column for number, column in enumerate(columns) if _motion(loads, number) not in known]
         iterations = solver.solve(todo, aim)
         for further in range(MOST_ROUNDS + 1):
@@ -175,28 +175,16 @@ class QuasiStaticProblem:
                 break
             iterations += solver.improve(columns, share)
         check_balance(response.balance)
-        if earlier is not None and isinstance(solver, DisplacementSolver):
-            solver.remember(earlier, loads.motions, columns)
         return iterations, response, carried
 
-    def _earlier_of(self, law: MaterialLaw, loads: Loads, *, direct: bool) -> Earlier | None:
-        """Return what was solved with a law, for far fields of many places: of one law at a time it is kept."""
-        if not self._reuse or loads.far is None or direct:
-            return None
-        if self._earlier is None or self._earlier.law != law:
-            dofs = self.elements.displacements.dofs
-            self._earlier = Earlier(dofs.comm, dofs.owned, law)
-        return self._earlier
-
-    def _guess(self, columns: Sequence[Column], loads: Loads, earlier: Earlier | None) -> None:
-        """Begin with the last solution for each motion, or with what ``earlier`` ones tell of it."""
+    def _guess(self, columns: Sequence[Column], loads: Loads, known: Mapping[Motion, FloatArray]) -> None:
+        """Begin with the last solution for each motion, or with one that is ``known``."""
         for motion, column in zip(loads.motions, columns, strict=False):
             if self._reuse and motion in self.corrections:
                 for part, values in zip(column.unknown, self.corrections[motion], strict=True):
                     part.array[:] = values
-            elif earlier is not None:
-                known = earlier.known.get(motion)
-                column.unknown[0].array[:] = earlier.guess(column.right[0].array) if known is None else known
+            elif motion in known:
+                column.unknown[0].array[:] = known[motion]
 
     def _response(
         self, found: Products, columns: Sequence[Column], law: MaterialLaw, loads: Loads

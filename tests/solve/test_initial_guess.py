@@ -7,45 +7,32 @@ from mpi4py import MPI
 from pipeline.plan.plan import make_plan
 from pipeline.run import far_field
 from pipeline.run.execute import compute
-from pipeline.solve.initial_guess import Earlier
-from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.conditions import Conditions
+from pipeline.solve.quasi_static import QuasiStaticProblem
+from pipeline.solve.spaces import Spaces
 from tests.cases import study
-
-LAW = MaterialLaw.of_moduli(1.0, 0.3)
-
-
-def _operator(size=60):
-    """Return a symmetric positive definite matrix of condition 1e8."""
-    random = np.random.default_rng(3)
-    turn, _ = np.linalg.qr(random.standard_normal((size, size)))
-    return turn @ np.diag(np.geomspace(1, 1e8, size)) @ turn.T, random
+from tests.solve.test_mixed import law, make_mesh
 
 
-def test_the_guess_is_the_nearest_sum_in_energy():
-    matrix, random = _operator()
-    earlier = Earlier(MPI.COMM_SELF, len(matrix), LAW)
-    solutions = random.standard_normal((5, len(matrix)))
-    solutions[1:4] = solutions[0] + 1e-3 * solutions[1:4]  # neighbours
-    load = matrix @ random.standard_normal(len(matrix))
-    assert not earlier.guess(load).any()
-    for solution in solutions:
-        earlier.add(matrix @ solution, solution)
-    basis = np.linalg.cholesky(matrix).T
-    nearest, *_ = np.linalg.lstsq(basis @ solutions.T, np.linalg.solve(basis.T, load), rcond=None)
-    assert earlier.guess(load) == pytest.approx(nearest @ solutions, rel=1e-6)
-    within = solutions.T @ [1.0, 2.0, 0.0, -1.0, 3.0]
-    assert earlier.guess(matrix @ within) == pytest.approx(within, rel=1e-7)
-
-
-def test_what_is_no_news_is_not_kept_and_the_latest_is():
-    matrix, random = _operator()
-    earlier = Earlier(MPI.COMM_SELF, 100_000_000 // (16 * 3), LAW)
-    found = random.standard_normal((5, len(matrix)))
-    for solution in (found[0], 2 * found[0], *found):
-        earlier.add(matrix @ solution, solution)
-    kept = np.array(earlier._solutions)
-    assert len(kept) == 3 and kept @ matrix @ kept.T == pytest.approx(np.eye(3), abs=1e-6)
-    assert abs(kept[-1] @ matrix @ found[4]) > abs(kept[1] @ matrix @ found[4])
+def test_a_solve_begins_from_the_best_sum_of_earlier_ones():
+    """A sum of loads that were solved for takes no more iterations than to see that nothing is left."""
+    with (
+        Spaces(make_mesh()) as spaces,
+        QuasiStaticProblem(spaces, 2, Conditions()) as problem,
+        problem.solver(law(0.3), "iterative") as solver,
+    ):
+        solver.recycle()
+        random, right, unknown = np.random.default_rng(3), *solver.matrix.createVecs()
+        loads = random.standard_normal((4, right.getSize()))
+        loads[:, solver.levels[-1].prescribed] = 0.0
+        counts, solutions = [], []
+        for load in [*loads, np.array([1.0, 2.0, 0.0, -1.0]) @ loads]:
+            right.array[:] = load
+            counts.append(solver.solve(right, unknown, 1e-8))
+            solutions.append(unknown.array.copy())
+    assert min(counts[:4]) > 10 and counts[4] <= 3
+    expected = np.array([1.0, 2.0, 0.0, -1.0]) @ solutions[:4]
+    assert np.abs(solutions[4] - expected).max() < 1e-6 * np.abs(expected).max()
 
 
 def test_places_of_a_path_begin_from_the_others():

@@ -187,7 +187,7 @@ def test_laws_are_linear_at_small_strains(law):
     elastic = ElasticForms(space)
     elastic.set_law(MaterialLaw.of_moduli(10e3, 0.4))
     stiffness, tangent = (
-        compat.assemble_matrix(form, [], 1.0, "aij")
+        compat.assemble_matrix(form, [], 1.0)
         for form in (elastic.stiffness, HyperelasticForms(space, elastic, law).tangent)
     )
     size = stiffness.norm()
