@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from math import ceil, inf
 
 import gmsh
+import numpy as np
 
-from pipeline.shapes.frame import Frame
+from pipeline.arrays import FloatArray
+from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.probe import Probe
 
 # Arcs of an eighth of a turn fold cells, which give up their quarter points: F is then 3 to 40 times as far off.
@@ -15,8 +17,8 @@ _FEWEST_SEGMENTS = 12
 _FEWEST_REGULAR = 8
 # A quarter of a disc has a whole number of edges.
 _SEGMENT_MULTIPLE = 4
-# A column is a dozen edges round at least.
-_EDGES_PER_RADIUS = 2
+# A column is a dozen edges round at least, and a body a few elements thick wherever it is round.
+EDGES_PER_RADIUS = 2
 # The distance to a rim that is not plane is that to points on it, so many for each of the elements along it.
 _POINTS_PER_EDGE = 6
 
@@ -35,6 +37,33 @@ class Sizes:
     rim: float
     growth: float
     column: float = inf
+
+    @property
+    def largest(self) -> float:
+        """The size (m) that no element exceeds by design, infinite if there is none."""
+        return min(self.column / EDGES_PER_RADIUS, self.fine if self.epsilon == inf else self.coarse)
+
+    def at(self, points: FloatArray, contact: Vector, to_rim: FloatArray) -> FloatArray:
+        """Return the size (m) at points (n, 3), whose distances (m) to the probe's edge are ``to_rim`` (n)."""
+        size = np.minimum(self.rim + self.growth * to_rim, self.largest)
+        if self.epsilon < inf:
+            beyond = np.linalg.norm(points - np.array(contact), axis=1) - self.epsilon
+            size = np.minimum(size, self.fine + self.growth * np.maximum(beyond, 0.0))
+        return size
+
+    def terms(self, contact: Vector, to_rim: str, unit: float) -> list[str]:
+        """Write what the size is the least of, as text for gmsh, with ``unit`` units in a metre.
+
+        ``to_rim`` is the text of the distance to the probe's edge.
+        """
+        terms = [f"{unit * self.rim:.12g}+{self.growth:.12g}*{to_rim}"]
+        if self.largest < inf:
+            terms.append(f"{unit * self.largest:.12g}")
+        if self.epsilon < inf:
+            squares = "+".join(f"({name}-({unit * c:.12g}))^2" for name, c in zip("xyz", contact, strict=True))
+            outside = f"Max(Sqrt({squares})-{unit * self.epsilon:.12g},0)"
+            terms.append(f"{unit * self.fine:.12g}+{self.growth:.12g}*{outside}")
+        return terms
 
     def rim_segments(self, probe: Probe) -> int:
         """Return the number of edges along a curved rim, 0 where it is straight."""
@@ -63,18 +92,12 @@ def set_size_field(
         to_rim = f"F{distance}"
     else:
         to_rim = probe.rim_distance(*frame.expressions(unit), unit)
-    terms = [f"{unit * sizes.rim:.12g}+{sizes.growth:.12g}*{to_rim}"]
-    if sizes.epsilon == inf:
-        terms.append(f"{unit * sizes.fine:.12g}")
-    else:
-        squares = "+".join(f"({name}-({unit * c:.12g}))^2" for name, c in zip("xyz", frame.point, strict=True))
-        outside = f"Max(Sqrt({squares})-{unit * sizes.epsilon:.12g},0)"
-        terms.append(f"{unit * sizes.fine:.12g}+{sizes.growth:.12g}*{outside}")
-        terms.append(f"{unit * sizes.coarse:.12g}")
-    if sizes.column < inf:
-        terms.append(f"{unit * sizes.column / _EDGES_PER_RADIUS:.12g}")
-    terms += more
-    tags = []
+    return set_background([*sizes.terms(frame.point, to_rim, unit), *more])
+
+
+def set_background(terms: Iterable[str]) -> int:
+    """Make the least of ``terms``, texts for gmsh, the background field of its current model; return its number."""
+    field, tags = gmsh.model.mesh.field, []
     for term in terms:
         tags.append(field.add("MathEval"))
         field.setString(tags[-1], "F", term)

@@ -14,12 +14,13 @@ from scipy.spatial import cKDTree
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.generate import GeometryError
 from pipeline.mesh.organ.even import merged
-from pipeline.mesh.organ.field import PER_RADIUS
 from pipeline.mesh.organ.level import cut, level_line, on_segments
 from pipeline.mesh.organ.remesh import release, remesh
 from pipeline.mesh.organ.sharp import sharp_edges
 from pipeline.mesh.organ.sheet import FIXED, FREE, Sheet
 from pipeline.mesh.organ.untangle import TangledError
+from pipeline.mesh.size import EDGES_PER_RADIUS
+from pipeline.shapes.frame import Vector
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.surface import Surface
 from pipeline.stages import stage
@@ -29,6 +30,8 @@ _VERSION = 5
 # How far, in units of the largest elements, the surface between two meshings may be from the file's: points are put
 # back onto the file's after each.
 DEVIATION = 0.02
+# Elements near a contact in units of its radius, one over, and how fast they grow from twice that on.
+_PER_CONTACT, _GROWTH = 3, 0.3
 # How far round a tangle the file's own facets stay, in units of the facets there.
 _REACH = 1.5
 # Points stay where they are to rounding, in units of the body.
@@ -60,6 +63,19 @@ class Base:
         return np.unique(sheet.facets[self.is_own(sheet)])
 
 
+@dataclass(frozen=True)
+class Near:
+    """A contact at a ``point``, within whose ``radius`` elements are several; both in m."""
+
+    point: Vector
+    radius: float
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return the size (m) of elements at points (n, 3)."""
+        distance = np.linalg.norm(points - np.array(self.point), axis=1)
+        return np.asarray(self.radius / _PER_CONTACT + _GROWTH * np.maximum(distance - 2 * self.radius, 0.0))
+
+
 # Points, and numbers of points.
 Arrays = dict[str, Any]
 # Where attempts at a mesh failed, the first one first.
@@ -73,21 +89,23 @@ class Kept(Protocol):
         """Return what is kept under ``key``, or what ``make`` returns, which is then kept."""
 
 
-def far_surface(body: Scanned, kept: Kept | None = None, finer: float = 1, tangles: Tangles = ()) -> Base:
+def far_surface(
+    body: Scanned, kept: Kept | None = None, finer: float = 1, tangles: Tangles = (), contact: Near | None = None
+) -> Base:
     """Return the surface of ``body`` away from any contact, out of what is ``kept`` if it is there.
 
     Its elements are ``finer`` by this factor than the body's bend asks for. Round the ``tangles`` that other meshes of
-    it had, they are the facets of the file.
+    it had, they are the facets of the file. Near a ``contact`` they are small, if it is given.
 
     Raises:
         GeometryError: if nothing, or all, of it is held.
         MeshError: if the remesher fails.
     """
     (below,), (skin,), triangles = body.support.edges(), body.surfaces()["skin"], body.triangles
-    largest = body.bend / PER_RADIUS / finer
+    largest = body.bend / EDGES_PER_RADIUS / finer
 
     def make() -> Arrays:
-        made = base(triangles.points, triangles.facets, skin, below, largest, tangles)
+        made = base(triangles.points, triangles.facets, skin, below, largest, tangles, contact)
         sheet = made.sheet
         return {
             "points": sheet.points,
@@ -98,7 +116,7 @@ def far_surface(body: Scanned, kept: Kept | None = None, finer: float = 1, tangl
             "as_is": made.as_is,
         }
 
-    if kept is None or tangles:
+    if kept is None or tangles or contact:
         found = make()
     else:
         found = kept.arrays(f"surface {_VERSION} {triangles.hash} {below!r} {largest!r} {release()}", make)
@@ -111,11 +129,17 @@ def far_surface(body: Scanned, kept: Kept | None = None, finer: float = 1, tangl
 
 @stage("far surface")
 def base(
-    points: FloatArray, facets: IntArray, skin: Surface, below: float, largest: float, tangles: Tangles = ()
+    points: FloatArray,
+    facets: IntArray,
+    skin: Surface,
+    below: float,
+    largest: float,
+    tangles: Tangles = (),
+    contact: Near | None = None,
 ) -> Base:
     """Return the surface in elements of at most ``largest`` (m), held below the height ``below`` (m).
 
-    Round ``tangles`` the facets stay as they are.
+    Round ``tangles`` the facets stay as they are. Near a ``contact`` elements are small.
 
     Raises:
         GeometryError: if nothing, or all, is held.
@@ -128,10 +152,16 @@ def base(
     level = level_line(points, facets, below)
     sheet = Sheet(sheet.points, sheet.facets, sheet.group, sharp_edges(sheet, largest))
     as_is = _round(sheet, tangles)
-    coarse = remesh(sheet, np.full(len(sheet.points), largest), DEVIATION * largest, as_is=as_is)
-    unsettled = Base(coarse, level, sheet.centres[as_is])
-    own = unsettled.own_points(coarse)
-    return replace(unsettled, sheet=put_back(coarse, skin, level, own, coarse.points[own]))
+    made = Base(sheet, level, sheet.centres[as_is])
+    # With a contact twice: only the second time points are dense enough for sizes that change fast.
+    for _ in range(1 if contact is None else 2):
+        size = np.full(len(sheet.points), largest)
+        if contact is not None:
+            size = np.minimum(size, contact.at(sheet.points))
+        sheet = remesh(sheet, size, DEVIATION * largest, as_is=made.is_own(sheet))
+        own = made.own_points(sheet)
+        sheet = put_back(sheet, skin, level, own, sheet.points[own])
+    return replace(made, sheet=sheet)
 
 
 def _round(sheet: Sheet, tangles: Tangles) -> BoolArray:

@@ -30,6 +30,10 @@ _FOLLOW = 8
 _FOLDED = "the surface is folded round the contact: the probe's own plane cannot hold it"
 
 
+class FoldedError(GeometryError):
+    """Facets round the contact are too large for the probe's plane: they reach over folds."""
+
+
 @dataclass(frozen=True, eq=False)
 class Contact:
     """The ``sheet`` with the footprint in it; ``rim`` (k) are the points along its edge, in order.
@@ -80,6 +84,7 @@ def set_in(sheet: Sheet, frame: Frame, probe: Probe, sizes: Sizes, lift: Lift) -
 
     Raises:
         GeometryError: if a part of the footprint has no tissue below it.
+        FoldedError: if facets round it reach over a fold.
     """
     rim = rim_points(probe, sizes)
     edge = edge_points(probe, rim)
@@ -92,7 +97,7 @@ def set_in(sheet: Sheet, frame: Frame, probe: Probe, sizes: Sizes, lift: Lift) -
         raise GeometryError("the footprint lies on, or next to, what is held of the body")
     loops = _loops(sheet.facets[patch])
     if _cross(local[:, :2], loops, rim):
-        raise GeometryError(f"{_FOLDED}; for a rough surface, `smooth` takes lengths that are taken off")
+        raise FoldedError(f"{_FOLDED}; for a rough surface, `smooth` takes lengths that are taken off")
     plane = _mesh_plane(local[:, :2], loops, rim, probe, sizes)
     return _joined(sheet, patch, plane, lift, lifted, followed)
 
@@ -115,7 +120,7 @@ def _patch(sheet: Sheet, local: FloatArray, radius: float) -> IntArray:
         if np.isin(more, chosen).all():
             break
         chosen = np.union1d(chosen, more)
-    raise GeometryError(_FOLDED)
+    raise FoldedError(_FOLDED)
 
 
 def _cross(local: FloatArray, loops: list[list[int]], rim: FloatArray) -> bool:

@@ -9,8 +9,8 @@ from scipy.spatial import cKDTree
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.generate import GeometryError, MeshArrays, MeshError, flat_cells, orient
-from pipeline.mesh.organ.base import DEVIATION, Base, Kept, far_surface, put_back
-from pipeline.mesh.organ.contact import Contact, set_in
+from pipeline.mesh.organ.base import DEVIATION, Base, Kept, Near, far_surface, put_back
+from pipeline.mesh.organ.contact import Contact, FoldedError, set_in
 from pipeline.mesh.organ.field import Field
 from pipeline.mesh.organ.inclusions import inclusion_surfaces
 from pipeline.mesh.organ.remesh import remesh
@@ -28,6 +28,8 @@ _PASSES = 2
 _ATTEMPTS = 5
 # Where anything else fails, elements are this many times smaller everywhere.
 _FINER = (1, 2, 4)
+# The file's own facets are not kept where they are larger than elements by this factor.
+_TOO_LARGE = 2
 # The remesher turns lengths into units of its own and back, which moves points by rounding.
 _SAME = 1e-6
 # A share of the body's volume: chords of elements leave half a per cent of an organ out, which their curved edges bring
@@ -46,20 +48,26 @@ def mesh_scanned(scene: Scene, body: Scanned, sizes: Sizes, kept: Kept | None = 
     """
 
     tangles: list[TangledError] = []
+    contact: Near | None = None
     for finer in _FINER:
         smaller = replace(sizes, column=sizes.column / finer)
-        try:
-            for _ in range(_ATTEMPTS):
-                try:
-                    return mesh_organ(scene, smaller, far_surface(body, kept, finer, tangles))
-                except TangledError as error:
-                    tangles.append(error)
-        except GeometryError:
-            raise
-        except MeshError as error:
-            failure: MeshError = error
+        for _ in range(_ATTEMPTS):
+            try:
+                return mesh_organ(scene, smaller, far_surface(body, kept, finer, tangles, contact))
+            except TangledError as error:
+                failure: MeshError = error
+                tangles.append(error)
+            except FoldedError:
+                if contact is not None:
+                    raise
+                contact = Near(scene.frame.point, scene.footprint.circumradius)
+            except GeometryError:
+                raise
+            except MeshError as error:
+                failure = error
+                break
         else:
-            raise tangles[-1]
+            break
     raise failure
 
 
@@ -144,8 +152,8 @@ def _to_sizes(contact: Contact, field: Field, truth: _Truth) -> Sheet:
     for _ in range(_PASSES):
         kept = np.column_stack([rim, np.roll(rim, -1)])
         size = field.at(sheet.points)
-        as_is = truth.far.is_own(sheet) & (size[sheet.facets].min(axis=1) > field.largest / 2)
-        sheet = remesh(sheet, size, DEVIATION * min(field.largest, extent), kept, as_is)
+        as_is = truth.far.is_own(sheet) & (sheet.extents < _TOO_LARGE * size[sheet.facets].min(axis=1))
+        sheet = remesh(sheet, size, DEVIATION * min(field.sizes.largest, extent), kept, as_is)
         found = np.unique(sheet.border(PROBE))
         distance, nearest = cKDTree(sheet.points[found]).query(true_rim)
         rim = found[nearest]

@@ -45,6 +45,12 @@ class Sheet:
         return middles
 
     @property
+    def extents(self) -> FloatArray:
+        """Largest extents (m) of the facets along x, y and z, in m."""
+        sizes: FloatArray = np.ptp(self.points[self.facets], axis=1).max(axis=1)
+        return sizes
+
+    @property
     def volume(self) -> float:
         """Volume (m³) within."""
         return enclosed(self.points, self.facets)

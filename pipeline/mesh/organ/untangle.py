@@ -63,6 +63,8 @@ def untangled(sheet: Sheet, stay: IntArray) -> Sheet:
         if number == _WIDER:
             fixed[:] = False
             fixed[stay] = True
+            # Where it began: what is not mended moves on.
+            begun = sheet.points[sheet.facets[bad]]
         moved = np.zeros(count)
         moved[sheet.facets[bad]] = 1.0
         for _ in range(number // _WIDER):
@@ -72,4 +74,4 @@ def untangled(sheet: Sheet, stay: IntArray) -> Sheet:
         points[chosen] = (beside @ sheet.points / share[:, None])[chosen]
         points[level, 2] = sheet.points[level, 2]
         sheet = Sheet(points, sheet.facets, sheet.group, sheet.sharp)
-    raise TangledError.at(sheet.points[sheet.facets[bad_facets(sheet)]])
+    raise TangledError.at(begun)

@@ -8,7 +8,7 @@ import numpy as np
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.compat import gmsh_session
 from pipeline.mesh.generate import MeshError, model_options
-from pipeline.mesh.organ.field import Field, set_field
+from pipeline.mesh.organ.field import Field
 from pipeline.mesh.organ.untangle import TangledError
 from pipeline.mesh.reason import reason
 from pipeline.shapes.triangles import enclosed
@@ -46,7 +46,7 @@ def fill(
         model_options()
         model = gmsh.model
         volumes = _add_volumes([(corners / scale, triangles) for corners, triangles in surfaces])
-        set_field(field, scale, model.geo)
+        field.set(scale, model.geo)
         gmsh.option.setNumber("Mesh.OptimizeThreshold", _OPTIMISED)
         try:
             model.mesh.generate(3)
