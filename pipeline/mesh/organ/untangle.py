@@ -12,6 +12,8 @@ from pipeline.shapes.files.crossings import crossings
 
 # Neighbours with less between them are folded: a tetrahedron in there would be flat.
 _FOLDED = radians(10.0)
+# A fold of the file itself may be as sharp as this.
+_SHARPEST = radians(1.0)
 # Points of bad facets are moved so often; after so many rounds, those next to them are moved, too.
 _ROUNDS, _WIDER = 12, 4
 
@@ -30,13 +32,13 @@ class TangledError(MeshError):
         return TangledError(corners.mean(axis=1), np.ptp(corners, axis=1).max(axis=1), *what)
 
 
-def bad_facets(sheet: Sheet) -> BoolArray:
-    """Tell which facets cross others, or are folded upon a neighbour."""
+def bad_facets(sheet: Sheet, folded: float = _FOLDED) -> BoolArray:
+    """Tell which facets cross others, or have less than the angle ``folded`` between them and a neighbour."""
     bad = np.zeros(len(sheet.facets), dtype=bool)
     bad[crossings(sheet.points, sheet.facets)] = True
     _, sides = edges_of(sheet.facets)
     normals = sheet.normals
-    bad[sides[(normals[sides[:, 0]] * normals[sides[:, 1]]).sum(axis=1) < -cos(_FOLDED)]] = True
+    bad[sides[(normals[sides[:, 0]] * normals[sides[:, 1]]).sum(axis=1) < -cos(folded)]] = True
     return bad
 
 
@@ -56,15 +58,20 @@ def untangled(sheet: Sheet, stay: IntArray) -> Sheet:
     ends = np.vstack([edges, edges[:, ::-1]])
     beside = coo_array((np.ones(len(ends)), tuple(ends.T)), shape=(count, count)).tocsr()
     share = beside.sum(axis=1)
+    fillable: Sheet | None = None
     for number in range(_ROUNDS):
         bad = bad_facets(sheet)
         if not bad.any():
             return sheet
+        if fillable is None and not bad_facets(sheet, _SHARPEST).any():
+            fillable = sheet
+        if number == 0:
+            first = sheet.points[sheet.facets[bad]]
         if number == _WIDER:
             fixed[:] = False
             fixed[stay] = True
-            # Where it began: what is not mended moves on.
-            begun = sheet.points[sheet.facets[bad]]
+            # What is not mended moves on from here.
+            stubborn = sheet.points[sheet.facets[bad]]
         moved = np.zeros(count)
         moved[sheet.facets[bad]] = 1.0
         for _ in range(number // _WIDER):
@@ -74,4 +81,6 @@ def untangled(sheet: Sheet, stay: IntArray) -> Sheet:
         points[chosen] = (beside @ sheet.points / share[:, None])[chosen]
         points[level, 2] = sheet.points[level, 2]
         sheet = Sheet(points, sheet.facets, sheet.group, sheet.sharp)
-    raise TangledError.at(begun)
+    if fillable is not None:
+        return fillable
+    raise TangledError.at(np.vstack([stubborn, first]))
