@@ -13,8 +13,7 @@ from scipy.linalg import cho_factor, cho_solve
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
 from pipeline.solve.contact.active_set import State
 from pipeline.solve.contact.candidates import Candidates, Surface
-from pipeline.solve.contact.displacement import DisplacementElements
-from pipeline.solve.contact.elements import FarShare, Unknowns
+from pipeline.solve.contact.elements import ContactDisplacement, FarShare, Unknowns
 from pipeline.solve.contact.levels import Hierarchy
 from pipeline.solve.krylov import Level, LinearSolver, SolveError
 from pipeline.solve.physics import MaterialLaw
@@ -34,8 +33,10 @@ def suits(space: ElasticSpace, candidates: Candidates, method: str) -> bool:
     return method != "iterative" and space.dofs.comm.size == 1 and small
 
 
-class CondensedElements(DisplacementElements):
+class CondensedElements(ContactDisplacement):
     """Displacements on one process, with the compliance of the candidates. Freed with the stack."""
+
+    is_exact = True
 
     def __init__(self, spaces: Spaces, degree: int, law: MaterialLaw, surface: Surface, stack: ExitStack):
         """Assemble, factorise and condense.
@@ -97,9 +98,11 @@ class CondensedElements(DisplacementElements):
         moved = self._compliance @ self._reactions
         return State(moved, self._reactions, float(moved @ self._reactions))
 
-    def condense_far(self, far: FarShare) -> None:
-        """Take in what the far field adds to the compliance: φ φᵀ / k."""
-        self._compliance = self._near + np.outer(far.unit.moved, far.unit.moved) / far.stiffness
+    def couple(self, far: FarShare | None) -> None:
+        """Let a far field act on the cut face from now on: it adds φ φᵀ / k to the compliance."""
+        super().couple(far)
+        if far is not None:
+            self._compliance = self._near + np.outer(far.unit.moved, far.unit.moved) / far.stiffness
 
     def improve(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
         """Find the reactions that move what is held to ``bounds`` (n, m), and the share of the far field."""
@@ -116,7 +119,7 @@ class CondensedElements(DisplacementElements):
         """Return the displacement (m) of the whole body, owned dofs, for the reactions found."""
         with vector(self.space.dofs.space) as loads:
             self.numbering.put(loads.array, self._reactions, self._active)
-            self._free.solve(loads, self.displacement)
+            self._free.solve(loads, self.fields[0])
         return super().unknowns()
 
     def relax(self, tolerance: float, load: Unknowns) -> Unknowns:
@@ -131,7 +134,5 @@ class CondensedElements(DisplacementElements):
     def held_levels(self, facets: Int32Array, stack: ExitStack) -> list[Level]:
         """Return the levels of multigrid, which are kept for the next depth, with the local ``facets`` held."""
         if self._multigrid is None:
-            self._multigrid = Hierarchy(
-                self._spaces, self.space.degree, self._law, self._surface, self._stack, direct=False
-            )
+            self._multigrid = self.hierarchy_of(self._stack, direct=False)
         return self._multigrid.hold_facets(facets)

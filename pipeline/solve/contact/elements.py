@@ -1,37 +1,48 @@
 """Elements whose nodes may be held where the probe touches them, and what the body does while nothing touches it.
 
-Loads f, and a unit φ of the far field on a cut face, act on the body without a tool: K w = f, K φ = 0 inside. By
-linearity the displacement is v + s φ + w, v that of the reactions r alone. As v vanishes on the cut face, a(v, φ) = 0:
-the share s of the far field follows from the reactions, k s = φ·r, with k twice the energy of a unit on both sides of
-the cut.
+They are those of :mod:`pipeline.solve.elements`, with operators in which other nodes are held each time. Loads f, and a
+unit φ of the far field on a cut face, act on the body without a tool: K w = f, K φ = 0 inside. By linearity the
+displacement is v + s φ + w, v that of the reactions r alone. As v vanishes on the cut face, a(v, φ) = 0: the share s of
+the far field follows from the reactions, k s = φ·r, with k twice the energy of a unit on both sides of the cut.
 """
 
 from abc import ABC, abstractmethod
+from contextlib import ExitStack
 from dataclasses import dataclass
 
 import numpy as np
+from petsc4py import PETSc
 
-from pipeline.arrays import BoolArray, FloatArray
+from pipeline.arrays import BoolArray, FloatArray, Int32Array
 from pipeline.solve.contact.active_set import State
-from pipeline.solve.contact.candidates import Candidates, Numbering
+from pipeline.solve.contact.candidates import CONDITIONS, Candidates, Numbering, Surface
+from pipeline.solve.contact.levels import Hierarchy, normal_dofs
+from pipeline.solve.dead_loads import Applied
+from pipeline.solve.elements import Column, Fields, MixedElements, elements_of
 from pipeline.solve.far_field import FarField
-from pipeline.solve.krylov import SolveError
-from pipeline.solve.spaces import ElasticSpace
+from pipeline.solve.krylov import Level, LinearSolver, SolveError
+from pipeline.solve.physics import MaterialLaw, SplitLaw
+from pipeline.solve.saddle import Saddle, SaddleSolver
+from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.vectors import global_sum
+from pipeline.stages import stage
 
+# What is solved for, owned dofs: displacement (m), and of mixed elements pressure (in the law's unit).
 Unknowns = tuple[FloatArray, ...]
 
 # The share of the far field is found where it changes by less than this, in units of the solver's tolerance.
 _SETTLED = 10.0
 _MOST_ROUNDS = 20
+# The solver is made for any tolerance: each solve has its own.
+_ANY = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class FreeResponse:
     """What the body does while nothing touches it.
 
-    ``unknowns`` are those of the elements, owned dofs; ``moved`` (n, m) the displacement of the candidates along z;
-    ``energy`` (J) twice the strain energy of the part that is modelled.
+    ``unknowns`` are those of the elements; ``moved`` (n, m) is the displacement of the candidates along z; ``energy``
+    (J) twice the strain energy of the part that is modelled.
     """
 
     unknowns: Unknowns
@@ -61,63 +72,88 @@ class FarShare:
 
 
 class ContactElements(ABC):
-    """Elements of one degree with one operator for every set; they keep the solution found last.
+    """Elements of one ``degree`` with one operator for every set; they keep the solution found last.
 
-    ``load`` is a right-hand side besides the probe, ``far`` the far field on the cut face, None without.
+    What they make is freed with the stack. ``load`` is a right-hand side besides the probe, ``far`` the far field on
+    the cut face, None without. ``unit`` (Pa) is that of the law's moduli: energies and forces are in J and N.
     """
 
-    space: ElasticSpace
-    candidates: Candidates
-    numbering: Numbering
+    # As the study has it.
+    element: str
+    # Whether every solve is, to rounding.
+    is_exact = False
+    unit = 1.0
 
-    def __init__(self) -> None:
+    def __init__(self, spaces: Spaces, degree: int, law: MaterialLaw, surface: Surface, method: str, stack: ExitStack):
+        """Assemble; collective."""
+        self._spaces, self._law, self._surface = spaces, law, surface
+        self.plug = elements_of(spaces, degree, CONDITIONS, self.element)
+        stack.callback(self.plug.close)
+        self.space: ElasticSpace = self.plug.displacements
+        self.candidates: Candidates = surface.of(degree)
+        self._direct = self.plug.is_direct(method)
+        self.hierarchy = self.hierarchy_of(stack, direct=self._direct)
+        self.numbering: Numbering = self.hierarchy.numbering
+        self.fields: Fields = stack.enter_context(self.plug.fields())
         self.load: Unknowns | None = None
         self.far: FarShare | None = None
-        self._active: BoolArray = np.empty(0, dtype=bool)
+        self._active: BoolArray = np.zeros(len(self.candidates), dtype=bool)
+        self._held: Int32Array = np.empty(0, dtype=np.int32)
+        self._solving = ExitStack()
+        stack.callback(self.close)
+
+    # ---- what displacement and mixed elements have each of their own ----------------------------------
 
     @abstractmethod
+    def hierarchy_of(self, stack: ExitStack, *, direct: bool) -> Hierarchy:
+        """Return the operators in which nodes may be held, given back with the ``stack``; collective."""
+
+    @abstractmethod
+    def use(self, levels: list[Level]) -> None:
+        """Solve with these ``levels`` from now on; collective."""
+
+    @abstractmethod
+    def correct(self, rest: Fields, correction: Fields, tolerance: float, target: float | None) -> int:
+        """Solve for a ``correction`` to an error of ``target``, or ``tolerance``, relative; return the iterations."""
+
+    @abstractmethod
+    def product(self, result: Fields) -> None:
+        """Write the operator, without a contact set, times the fields into ``result``; collective."""
+
+    @abstractmethod
+    def residual(self) -> FloatArray:
+        """Return K u (N) with the unmodified operator, owned dofs, for the forms' fields; collective."""
+
+    def couple(self, far: FarShare | None) -> None:
+        """Let a far field act on the cut face from now on, or none."""
+        self.far = far
+
+    # ---- sets -----------------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Free the solver."""
+        self._solving.close()
+
+    @stage("set-up")
     def hold(self, active: BoolArray) -> None:
         """Hold the ``active`` candidates (n) from now on; collective.
 
         Raises:
             SolveError: if the solver cannot be set up.
         """
+        self._active, self._held = active, self.numbering.normal_dofs(active, owned=True)
+        self.use(self.hierarchy.hold(active))
 
-    @abstractmethod
-    def approach(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
-        """Move what is held to ``bounds`` (n, m), and then the rest, far field aside: see ``improve``."""
+    @stage("set-up")
+    def hold_facets(self, facets: Int32Array) -> None:
+        """Hold all of the local ``facets`` where they are, in the place of any set; collective.
 
-    @abstractmethod
-    def near_state(self) -> State:
-        """Return what the candidates do, far field aside; collective."""
-
-    @abstractmethod
-    def unknowns(self) -> Unknowns:
-        """Return a copy of what is solved for, owned dofs: displacement (m), and pressure (in the law's unit)."""
-
-    @abstractmethod
-    def start_at(self, unknowns: Unknowns) -> None:
-        """Take over what is solved for, owned dofs."""
-
-    @abstractmethod
-    def put_fields(self, unknowns: Unknowns) -> None:
-        """Make ``unknowns`` the fields of the space's forms; collective."""
-
-    @abstractmethod
-    def residual(self) -> FloatArray:
-        """Return K u (N) with the unmodified operator, owned dofs, for the forms' fields; collective."""
-
-    @abstractmethod
-    def lift(self, held: FloatArray) -> Unknowns:
-        """Return the right-hand side of prescribed displacements ``held`` (m, with ghosts); collective."""
-
-    @abstractmethod
-    def pulled(self, forces: FloatArray) -> Unknowns:
-        """Return the right-hand side of ``forces`` (N), owned dofs."""
-
-    @abstractmethod
-    def start_from(self, coarse: "ContactElements") -> None:
-        """Take over the fields of the forms of elements of a lower degree; collective."""
+        Raises:
+            SolveError: if the solver cannot be set up.
+        """
+        dofs = normal_dofs(self.space, facets)
+        self._active, self._held = np.zeros(len(self.candidates), dtype=bool), dofs[dofs < self.space.dofs.owned]
+        self.use(self.hierarchy.hold_facets(facets))
 
     def improve(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
         """Move what is held to ``bounds`` (n, m), and then the rest; return the iterations. Collective.
@@ -142,6 +178,30 @@ class ContactElements(ABC):
             before, wanted_before = share, wanted
         raise SolveError(f"the share of the far field is not found in {_MOST_ROUNDS} rounds")
 
+    def approach(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
+        """Move what is held to ``bounds`` (n, m), and then the rest, far field aside: see ``improve``."""
+        self.numbering.put(self.fields[0].array, bounds, self._active)
+        with self.plug.fields() as rest, self.plug.fields() as correction:
+            self.product(rest)
+            for number, part in enumerate(rest):
+                part.scale(-1.0)
+                if self.load is not None:
+                    part.array[:] += self.load[number]
+            rest[0].array[self.space.dofs.prescribed_owned] = 0.0
+            rest[0].array[self._held] = 0.0
+            target = None if energy is None else tolerance * (energy / self.unit) ** 0.5
+            iterations = self.correct(rest, correction, tolerance, target)
+            for whole, part in zip(self.fields, correction, strict=True):
+                whole.axpy(1.0, part)
+        return iterations
+
+    def near_state(self) -> State:
+        """Return what the candidates do, far field aside; collective."""
+        with self.plug.fields() as forces:
+            self.product(forces)
+            moved, reactions = (self.numbering.gather(part.array) for part in (self.fields[0], forces[0]))
+            return State(moved, self.unit * reactions, self._work(forces))
+
     def state(self) -> State:
         """Return what the candidates do; collective."""
         state = self.near_state()
@@ -149,6 +209,46 @@ class ContactElements(ABC):
             return state
         moved = state.moved + far.share * far.unit.moved
         return State(moved, state.reactions, state.energy + far.share**2 * far.stiffness)
+
+    def energy(self) -> float:
+        """Return twice the energy (J) of the part that is modelled, stationary at the solution, less a constant.
+
+        The constant is that of what is prescribed, if that is not nothing; collective.
+        """
+        with self.plug.fields() as forces:
+            self.product(forces)
+            if self.load is not None:
+                for part, values in zip(forces, self.load, strict=True):
+                    part.array[:] -= 2 * values
+            return self._work(forces)
+
+    def _work(self, forces: Fields) -> float:
+        return self.unit * float(sum(field.dot(part) for field, part in zip(self.fields, forces, strict=True)))
+
+    # ---- the fields -----------------------------------------------------------------------------------
+
+    def unknowns(self) -> Unknowns:
+        """Return a copy of what is solved for."""
+        return tuple(np.array(field.array) for field in self.fields)
+
+    def start_at(self, unknowns: Unknowns) -> None:
+        """Take over what is solved for."""
+        for field, values in zip(self.fields, unknowns, strict=True):
+            field.array[:] = values
+
+    def start_from(self, coarse: "ContactElements") -> None:
+        """Take over the fields of the forms of elements of a lower degree; collective.
+
+        Of displacement elements there is no pressure. What is prescribed becomes a part of the right-hand side.
+        """
+        displacement, owned = self.space.forms.displacement, self.space.dofs.owned
+        displacement.interpolate(coarse.space.forms.displacement)
+        self.fields[0].array[:] = displacement.x.array[:owned]
+        self.fields[0].array[self.space.dofs.prescribed_owned] = 0.0
+        if coarse.far is not None:
+            held = np.zeros_like(displacement.x.array)
+            held[self.space.dofs.prescribed] = displacement.x.array[self.space.dofs.prescribed]
+            self.load = self.right_side(held)
 
     def show(self, loaded: FreeResponse | None = None) -> None:
         """Make the solution, and what loads do besides, the fields of the space's forms; collective."""
@@ -159,30 +259,35 @@ class ContactElements(ABC):
             parts.append((1.0, loaded.unknowns))
         columns = zip(*(values for _, values in parts), strict=True)
         factors = [factor for factor, _ in parts]
-        self.put_fields(tuple(np.tensordot(factors, column, 1) for column in columns))
+        self._put_fields(tuple(np.tensordot(factors, column, 1) for column in columns))
 
-    def free_response(self, tolerance: float, load: Unknowns, held: FloatArray | None = None) -> FreeResponse:
-        """Return what a ``load`` on the unknowns' equations does, with displacements ``held`` (m); collective.
+    def _put_fields(self, unknowns: Unknowns) -> None:
+        with self.plug.fields() as fields:
+            for field, values in zip(fields, unknowns, strict=True):
+                field.array[:] = values
+            self.plug.set_fields(fields)
+
+    # ---- without a probe ------------------------------------------------------------------------------
+
+    def right_side(self, prescribed: FloatArray, applied: Applied | None = None) -> Unknowns:
+        """Return the right-hand side of ``prescribed`` displacements (m, with ghosts), or of loads; collective."""
+        with self.plug.fields() as right, self.plug.fields() as unknown:
+            column = Column(prescribed=prescribed, applied=applied, right=right, unknown=unknown)
+            self.plug.lift(column, self._law)
+            return tuple(np.array(part.array) for part in right)
+
+    def free_response(self, tolerance: float, prescribed: FloatArray, applied: Applied | None = None) -> FreeResponse:
+        """Return what ``prescribed`` displacements (m, local with ghosts) or loads do without a probe; collective.
 
         Raises:
             SolveError: if the solver does not converge.
         """
-        found = self.relax(tolerance, load)
-        if held is not None:
-            found = (found[0] + held, *found[1:])
-        self.put_fields(found)
-        work = global_sum(self.space.dofs.comm, np.array([found[0] @ self.residual()]))
-        return FreeResponse(found, self.numbering.gather(found[0]), float(work[0]))
-
-    def hold_prescribed(self) -> None:
-        """Move what the forms' displacement prescribes from the unknowns to the right-hand side; collective."""
-        dofs, values = self.space.dofs, self.space.forms.displacement.x.array.copy()
-        held = np.zeros_like(values)
-        held[dofs.prescribed] = values[dofs.prescribed]
-        displacement, *others = self.unknowns()
-        displacement[dofs.prescribed_owned] = 0.0
-        self.start_at((displacement, *others))
-        self.load = self.lift(held)
+        displacement, *others = self.relax(tolerance, self.right_side(prescribed, applied))
+        displacement = displacement + prescribed[: self.space.dofs.owned]
+        found = (displacement, *others)
+        self._put_fields(found)
+        work = global_sum(self.space.dofs.comm, np.array([displacement @ self.residual()]))
+        return FreeResponse(found, self.numbering.gather(displacement), float(work[0]))
 
     def relax(self, tolerance: float, load: Unknowns) -> Unknowns:
         """Return the solution for a ``load`` with nothing held by the probe; collective.
@@ -198,3 +303,131 @@ class ContactElements(ABC):
         found, self.load = self.unknowns(), None
         self.start_at(nothing)
         return found
+
+
+class ContactDisplacement(ContactElements):
+    """Displacements of degree 1 or more."""
+
+    element = "displacement"
+    _solver: LinearSolver | None = None
+
+    def hierarchy_of(self, stack: ExitStack, *, direct: bool) -> Hierarchy:
+        """Return the operators in which nodes may be held, given back with the ``stack``; collective."""
+        return Hierarchy(self._spaces, self.plug.degree, self._law, self._surface, stack, direct=direct)
+
+    def close(self) -> None:
+        """Free the solver."""
+        super().close()
+        self._solver = None
+
+    def use(self, levels: list[Level]) -> None:
+        """Solve with these ``levels`` from now on; collective."""
+        if self._solver is not None and self._solver.cycle is not None:
+            self._solver.hold(levels)
+            return
+        self.close()
+        self._solver = LinearSolver(levels, direct=self._direct, tolerance=_ANY)
+        self._solving.callback(self._solver.close)
+
+    def correct(self, rest: Fields, correction: Fields, tolerance: float, target: float | None) -> int:
+        """Solve for a ``correction`` to an error of ``target``, or ``tolerance``, relative; return the iterations."""
+        assert self._solver is not None
+        return self._solver.solve(rest[0], correction[0], tolerance, target)
+
+    def product(self, result: Fields) -> None:
+        """Write K u into ``result``; collective."""
+        self.hierarchy.finest.mult(self.fields[0], result[0])
+
+    def residual(self) -> FloatArray:
+        """Return K u (N) with the unmodified operator, owned dofs, for the forms' displacement; collective."""
+        with self.plug.fields() as (forces,):
+            self.space.apply(forces, self._law)
+            return np.array(forces.array)
+
+    def held_levels(self, facets: Int32Array, stack: ExitStack) -> list[Level]:
+        """Return the levels of multigrid with the local ``facets`` held, in the place of any set; collective."""
+        self.close()
+        hierarchy = self.hierarchy_of(stack, direct=False) if self._direct else self.hierarchy
+        return hierarchy.hold_facets(facets)
+
+
+class ContactMixed(ContactElements):
+    """Displacements of degree 2 or more and pressures of one less: reactions are those of K₀ u + Bᵀ p."""
+
+    element = "mixed"
+
+    def __init__(self, spaces: Spaces, degree: int, law: MaterialLaw, surface: Surface, method: str, stack: ExitStack):
+        """Assemble; collective."""
+        self._split = SplitLaw.of(law)
+        self.unit = self._split.unit
+        super().__init__(spaces, degree, law, surface, method, stack)
+        assert isinstance(self.plug, MixedElements)
+        self.mixed = self.plug.space
+        self._compliance = self.mixed.by_region(self._split.compliance)
+        self._coupling, self._mass = self.mixed.blocks(entries=self._direct)
+        # The energy norm squared of the last correction (J): what is taken away from the energy may vanish by chance.
+        self.first_energy = 0.0
+
+    def hierarchy_of(self, stack: ExitStack, *, direct: bool) -> Hierarchy:
+        """Return the operators K₀ in which nodes may be held, given back with the ``stack``; collective.
+
+        The residual of held displacements must vanish: it is part of the norm that is made small.
+        """
+        law, degree = self._split.elastic, self.plug.degree
+        return Hierarchy(self._spaces, degree, law, self._surface, stack, direct=direct, masks=False)
+
+    def use(self, levels: list[Level]) -> None:
+        """Solve with these ``levels`` from now on; collective."""
+        self.close()
+        coupling = self._holding()
+        moduli = tuple(region.lame_lambda + 2 * region.lame_mu for region in self._split.elastic.parameters)
+        saddle = Saddle(levels, coupling, self._mass, self.mixed.by_region(moduli), self.plug.degree - 1)
+        self._solver = self._solving.enter_context(SaddleSolver(saddle, direct=self._direct))
+
+    def _holding(self) -> PETSc.Mat:
+        """Return B with columns of zeros for what is held, freed with the solver."""
+        if self._coupling.getType() == "python":
+            coupling = self._coupling.getPythonContext().holding(self._held).matrix()
+            self._solving.callback(coupling.destroy)
+            return coupling
+        coupling = self._coupling.copy()
+        self._solving.callback(coupling.destroy)
+        free = coupling.createVecRight()
+        free.set(1.0)
+        free.array[self._held] = 0.0
+        coupling.diagonalScale(None, free)
+        free.destroy()
+        return coupling
+
+    def correct(self, rest: Fields, correction: Fields, tolerance: float, target: float | None) -> int:
+        """Solve for a ``correction`` to an error of ``target``, or ``tolerance``, relative; return the iterations."""
+        pairs = [(rest[0], rest[1])], [(correction[0], correction[1])]
+        iterations = self._solver.solve(self._compliance, *pairs, tolerance, target)
+        self.first_energy = self.unit * self._solver.first_energies[0]
+        return iterations
+
+    def product(self, result: Fields) -> None:
+        """Write K₀ u + Bᵀ p and B u − c M p into ``result``; collective."""
+        displacement, pressure = self.fields
+        with self.plug.fields() as (pull, dilation):
+            self.hierarchy.finest.mult(displacement, result[0])
+            self._coupling.multTranspose(pressure, pull)
+            result[0].axpy(1.0, pull)
+            self._coupling.mult(displacement, dilation)
+            self._mass.mult(pressure, result[1])
+            result[1].array[:] *= -self._compliance
+            result[1].axpy(1.0, dilation)
+
+    def residual(self) -> FloatArray:
+        """Return K₀ u + Bᵀ p (N) with the unmodified operator, owned dofs, for the forms' fields; collective."""
+        with self.mixed.pair() as (residual, dilation), self.mixed.pair() as (pull, _):
+            self.mixed.apply(residual, pull, dilation, self._split.elastic)
+            return np.asarray(self.unit * (residual.array + pull.array))
+
+    def start_from(self, coarse: ContactElements) -> None:
+        """Take over the fields of the forms of elements of a lower degree; collective."""
+        if isinstance(coarse, ContactMixed):
+            nothing = np.zeros_like(self.space.forms.displacement.x.array)
+            displacement, pressure = self.fields
+            self.mixed.start_from(coarse.mixed, (displacement, pressure), nothing)
+        super().start_from(coarse)

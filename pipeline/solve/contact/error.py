@@ -15,9 +15,8 @@ import numpy as np
 from pipeline.arrays import Int32Array
 from pipeline.solve.contact.active_set import Found, Obstacle, find_set
 from pipeline.solve.contact.candidates import CONDITIONS, Surface
-from pipeline.solve.contact.displacement import DisplacementElements
+from pipeline.solve.contact.elements import ContactDisplacement, ContactElements, ContactMixed
 from pipeline.solve.contact.levels import mask, normal_dofs
-from pipeline.solve.contact.mixed import MixedElements
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.krylov import LinearSolver
 from pipeline.solve.physics import MaterialLaw
@@ -32,17 +31,27 @@ _AGAIN = (1e-3, 1e-5)
 
 
 @stage("error bar")
-def displacement_decrement(
-    spaces: Spaces, elements: DisplacementElements, law: MaterialLaw, facets: Int32Array
-) -> tuple[float, int]:
+def decrement(
+    spaces: Spaces, elements: ContactElements, law: MaterialLaw, surface: Surface, facets: Int32Array
+) -> tuple[float, float, int]:
     """Return what one degree more takes away of twice the energy (J) of the modelled part, and the iterations.
 
-    Collective. The local ``facets`` are held; the displacement is that of the forms of ``elements``, whose operators
-    serve on.
+    In between is N (J) of mixed elements, none of others. Collective. The local ``facets`` are held; the fields are
+    those of the forms of ``elements``.
 
     Raises:
-        SolveError: if the increments do not get small.
+        SolveError: if the solver does not converge.
     """
+    if isinstance(elements, ContactMixed):
+        return _mixed_decrement(spaces, elements, law, surface, facets)
+    assert isinstance(elements, ContactDisplacement)
+    taken, iterations = _displacement_decrement(spaces, elements, law, facets)
+    return taken, 0.0, iterations
+
+
+def _displacement_decrement(
+    spaces: Spaces, elements: ContactDisplacement, law: MaterialLaw, facets: Int32Array
+) -> tuple[float, int]:
     finer = spaces.get(elements.space.degree + 1, CONDITIONS)
     with ExitStack() as stack, vector(finer.dofs.space) as residual:
         levels = elements.held_levels(facets, stack)
@@ -59,21 +68,12 @@ def displacement_decrement(
     return float(decrements[0, 0]), iterations
 
 
-@stage("error bar")
-def mixed_decrement(
-    spaces: Spaces, elements: MixedElements, law: MaterialLaw, surface: Surface, facets: Int32Array
+def _mixed_decrement(
+    spaces: Spaces, elements: ContactMixed, law: MaterialLaw, surface: Surface, facets: Int32Array
 ) -> tuple[float, float, int]:
-    """Return what one degree more takes away of twice the energy (J), maybe less than nothing, and the iterations.
-
-    In between is the energy norm squared of the first correction (J): what is taken away may vanish by chance.
-    Collective. The local ``facets`` are held; the fields are those of the forms of ``elements``.
-
-    Raises:
-        SolveError: if the solver does not converge.
-    """
     elements.close()
     with ExitStack() as stack:
-        finer = MixedElements(spaces, elements.space.degree + 1, law, surface, "iterative", stack)
+        finer = ContactMixed(spaces, elements.space.degree + 1, law, surface, "iterative", stack)
         finer.start_from(elements)
         finer.hold_facets(facets)
         before = finer.energy()
@@ -83,7 +83,7 @@ def mixed_decrement(
 
 @stage("error bar")
 def found_again(
-    spaces: Spaces, elements: DisplacementElements | MixedElements, law: MaterialLaw, surface: Surface, tool: Obstacle,
+    spaces: Spaces, elements: ContactElements, law: MaterialLaw, surface: Surface, tool: Obstacle,
     found: Found,
 ) -> tuple[float, int]:  # fmt: skip
     """Return the share of the force that one degree more takes away, contact found again, and the sets; collective.
@@ -95,7 +95,7 @@ def found_again(
         ContactError: if the contact does not settle.
     """
     elements.close()
-    kind = MixedElements if isinstance(elements, MixedElements) else DisplacementElements
+    kind = ContactMixed if isinstance(elements, ContactMixed) else ContactDisplacement
     with ExitStack() as stack:
         finer = kind(spaces, elements.space.degree + 1, law, surface, "iterative", stack)
         finer.start_from(elements)

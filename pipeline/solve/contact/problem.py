@@ -21,11 +21,9 @@ from pipeline.solve.contact.active_set import ContactError, Found, Obstacle, fin
 from pipeline.solve.contact.area import Area, contact_area
 from pipeline.solve.contact.candidates import CONDITIONS, Candidates, Numbering, Surface
 from pipeline.solve.contact.condensed import CondensedElements, suits
-from pipeline.solve.contact.displacement import DisplacementElements
-from pipeline.solve.contact.elements import FarShare, FreeResponse
-from pipeline.solve.contact.error import displacement_decrement, found_again, mixed_decrement
-from pipeline.solve.contact.mixed import MixedElements
-from pipeline.solve.contact.sweep import Kind, Sweep
+from pipeline.solve.contact.elements import ContactDisplacement, ContactElements, ContactMixed, FarShare, FreeResponse
+from pipeline.solve.contact.error import decrement, found_again
+from pipeline.solve.contact.sweep import Sweep
 from pipeline.solve.contact.touch import Touch
 from pipeline.solve.dead_loads import Applied
 from pipeline.solve.error import error_bar, found_again_bar, found_bar
@@ -125,7 +123,7 @@ class ContactProblem:
             with stage("solve"):
                 sweep = self._sweep_of(law, method, stack)
                 elements, strict = sweep.elements, _STRICTER * tolerance
-                elements.far = self._far_share(elements, law, loads, strict)
+                self._couple(elements, law, loads, strict)
                 loaded = self._loaded(elements, loads, strict)
                 depth = loads.amounts[0]
                 heights = self._touch.heights(self._candidates, loaded)
@@ -176,21 +174,17 @@ class ContactProblem:
 
     # ---- what acts besides the probe ------------------------------------------------------------------
 
-    def _far_share(self, elements: Kind, law: MaterialLaw, loads: Loads, tolerance: float) -> FarShare | None:
-        """Return the far field on the cut face, None without; collective. What is known of it is kept."""
+    def _couple(self, elements: ContactElements, law: MaterialLaw, loads: Loads, tolerance: float) -> None:
+        """Let the far field of ``loads``, if there is one, act on the cut face; collective."""
         if loads.far is None:
-            return None
-        if elements.far is not None and elements.far.field == loads.far:
-            return elements.far
-        motion = next(motion for motion in loads.motions if motion.far is not None)
-        held = self._fine.dofs.held(motion)
-        unit = elements.free_response(tolerance, elements.lift(held), held[: self._fine.dofs.owned])
-        far = FarShare(loads.far, unit, unit.energy + loads.far.stiffness(law.lame_mu[0]) / self._whole)
-        if isinstance(elements, CondensedElements):
-            elements.condense_far(far)
-        return far
+            elements.couple(None)
+        elif elements.far is None or elements.far.field != loads.far:
+            motion = next(motion for motion in loads.motions if motion.far is not None)
+            unit = elements.free_response(tolerance, self._fine.dofs.held(motion))
+            beyond = loads.far.stiffness(law.lame_mu[0]) / self._whole
+            elements.couple(FarShare(loads.far, unit, unit.energy + beyond))
 
-    def _loaded(self, elements: Kind, loads: Loads, tolerance: float) -> FreeResponse | None:
+    def _loaded(self, elements: ContactElements, loads: Loads, tolerance: float) -> FreeResponse | None:
         """Return what loads do to the body without the probe; collective.
 
         Raises:
@@ -199,11 +193,12 @@ class ContactProblem:
         if loads.dead is None:
             return None
         applied = self._fine.applied(loads.dead)
-        loaded = elements.free_response(tolerance, elements.pulled(applied.forces))
+        nothing = np.zeros_like(self._fine.forms.displacement.x.array)
+        loaded = elements.free_response(tolerance, nothing, applied)
         check_balance(self._imbalance(elements, applied, loaded))
         return loaded
 
-    def _imbalance(self, elements: Kind, applied: Applied, loaded: FreeResponse) -> float:
+    def _imbalance(self, elements: ContactElements, applied: Applied, loaded: FreeResponse) -> float:
         """Return the relative error of work and forces of loads, ``loaded`` being in the forms; collective."""
         space = self._fine.dofs
         residual = (elements.residual() - applied.forces).reshape(-1, 3)
@@ -223,7 +218,7 @@ class ContactProblem:
             if found is not None:
                 return 0, found
         except SolveError:  # afresh, then
-            if isinstance(sweep.elements, CondensedElements):
+            if sweep.elements.is_exact:
                 raise
         with ExitStack() as stack:
             first, elements, before = self._first_set(sweep, loaded, stack)
@@ -233,13 +228,13 @@ class ContactProblem:
 
     def _first_set(
         self, sweep: Sweep, loaded: FreeResponse | None, stack: ExitStack
-    ) -> tuple[int, DisplacementElements | MixedElements, Found]:
+    ) -> tuple[int, ContactElements, Found]:
         """Return sets solved, the elements of one degree less, and what was found on them; collective."""
         sets, found = 0, None
-        elements: DisplacementElements | MixedElements | None = None
+        elements: ContactElements | None = None
         for degree in range(1, self._degree):
-            kind = MixedElements if self._is_mixed and degree > 1 else DisplacementElements
-            law = sweep.law if kind is MixedElements else _softer(sweep.law)
+            kind = ContactMixed if self._is_mixed and degree > 1 else ContactDisplacement
+            law = sweep.law if kind is ContactMixed else _softer(sweep.law)
             lower = kind(self._spaces, degree, law, self._surface, sweep.method, stack)
             obstacle = self._obstacle_of(lower.candidates, loaded)
             if elements is None or found is None:
@@ -273,11 +268,11 @@ class ContactProblem:
             return self._sweep
         self._forget()
         with ExitStack() as inner, recorded() as cost:
-            elements: Kind
+            elements: ContactElements
             if self._condense and not self._is_mixed and suits(self._fine, self._candidates, method):
                 elements = CondensedElements(self._spaces, self._degree, law, self._surface, inner)
             else:
-                kind = MixedElements if self._is_mixed else DisplacementElements
+                kind = ContactMixed if self._is_mixed else ContactDisplacement
                 elements = kind(self._spaces, self._degree, law, self._surface, method, inner)
             sweep = Sweep(law, method, elements, inner.pop_all(), cost)
         if self._reuse:
@@ -303,7 +298,7 @@ class ContactProblem:
         return _Bar(taken, share, more)
 
     def _estimated(
-        self, elements: Kind, law: MaterialLaw, found: Found, loaded: FreeResponse | None
+        self, elements: ContactElements, law: MaterialLaw, found: Found, loaded: FreeResponse | None
     ) -> tuple[float, float, int]:
         """Return the share of the energy that one degree more takes away, that of the bar, and the iterations."""
         candidates, at_edge = self._candidates, bool((found.active & self._candidates.is_edge).any())
@@ -313,15 +308,11 @@ class ContactProblem:
             finer = self._obstacle_of(self._surface.of(self._degree + 1), loaded)
             share, more = found_again(self._spaces, elements, law, self._surface, finer, found)
             return *found_again_bar(share, self._area_of(found, law).bar), more
-        facets, element = candidates.held_facets(found.active), "mixed" if self._is_mixed else "displacement"
-        if isinstance(elements, MixedElements):
-            taken, unseen, more = mixed_decrement(self._spaces, elements, law, self._surface, facets)
-        else:
-            taken, more = displacement_decrement(self._spaces, elements, law, facets)
-            unseen = 0.0
+        facets = candidates.held_facets(found.active)
+        taken, unseen, more = decrement(self._spaces, elements, law, self._surface, facets)
         share, unseen = taken / found.state.energy, unseen / found.state.energy
         if at_edge:  # the probe ends there, and the pressure is singular
-            bar = error_bar(share, self._degree, element, plain=plain_share(self._body), unseen=unseen)
+            bar = error_bar(share, self._degree, elements.element, plain=plain_share(self._body), unseen=unseen)
             return share, bar, more
         return share, found_bar(share, unseen), more
 
@@ -365,7 +356,7 @@ class ContactProblem:
                 "press the probe in less far, or set it up straighter"
             )
 
-    def _response(self, elements: Kind, found: Found, loads: Loads) -> Response:
+    def _response(self, elements: ContactElements, found: Found, loads: Loads) -> Response:
         """Return the force for the depth, as if it were proportional to it; its balance is that of all checks."""
         space, state = self._fine.dofs, found.state
         force = float(-state.reactions[found.active].sum())

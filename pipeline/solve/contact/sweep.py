@@ -5,15 +5,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pipeline.arrays import BoolArray, FloatArray
+from pipeline.arrays import BoolArray
 from pipeline.solve.contact.active_set import Found, Obstacle, find_set
-from pipeline.solve.contact.condensed import CondensedElements
-from pipeline.solve.contact.displacement import DisplacementElements
-from pipeline.solve.contact.mixed import MixedElements
+from pipeline.solve.contact.elements import ContactElements, Unknowns
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import Times
-
-Kind = DisplacementElements | MixedElements | CondensedElements
 
 # Between two depths of which the larger is at most so many times the smaller one, error bars are those of these two.
 NEAR = 2.0
@@ -30,7 +26,7 @@ class Guess:
     """Where to begin: a set (n), what the elements solve for (owned dofs), twice the energy (J) about."""
 
     active: BoolArray
-    unknowns: tuple[FloatArray, ...]
+    unknowns: Unknowns
     energy: float
 
 
@@ -38,7 +34,7 @@ class Guess:
 class _Known:
     depth: float
     found: Found
-    unknowns: tuple[FloatArray, ...]
+    unknowns: Unknowns
 
 
 @dataclass(eq=False)
@@ -50,7 +46,7 @@ class Sweep:
 
     law: MaterialLaw
     method: str
-    elements: Kind
+    elements: ContactElements
     stack: ExitStack
     cost: Times = field(default_factory=Times)
     _known: list[_Known] = field(default_factory=list)
@@ -70,7 +66,7 @@ class Sweep:
             ContactError: if the contact does not settle.
         """
         guess = self.guess(obstacle)
-        if isinstance(self.elements, CondensedElements):  # every solve is exact
+        if self.elements.is_exact:
             active = obstacle.bounds < 0 if guess is None else guess.active
             return find_set(self.elements, obstacle, active, tolerances[-1:])
         if guess is None:
@@ -116,7 +112,7 @@ class Sweep:
     def bar(self, depth: float) -> tuple[float, float] | None:
         """Return both shares between two near depths for which they are known, on a condensed surface alone."""
         below, above = [d for d in self._bars if d <= depth], [d for d in self._bars if d >= depth]
-        if not (isinstance(self.elements, CondensedElements) and below and above):
+        if not (self.elements.is_exact and below and above):
             return None
         ends = max(below), min(above)
         if ends[1] > NEAR * ends[0]:
