@@ -1,7 +1,7 @@
 """From solutions to records: the force along the probe's axis, its error bar, and what it cost."""
 
 from dataclasses import replace
-from math import isnan, nan
+from math import hypot, isnan, nan
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from pipeline.plan.recipe import half_width_of
 from pipeline.plan.steps import Solve
 from pipeline.run.record import Record
 from pipeline.shapes.body import Layered
+from pipeline.shapes.contact import first_touch
 from pipeline.shapes.frame import Vector
 from pipeline.shapes.indenter import Indenter
 from pipeline.solve.error import is_graded
@@ -19,6 +20,8 @@ from pipeline.solve.solution import Solution
 from pipeline.study.sweep import Case
 
 _ROUNDING = 1e-9
+# Contact is no longer where the mesh is graded to if it begins farther from the axis, in units of its half width.
+_BESIDE = 0.1
 BARS = ("force_error", "force_vector_error", "stiffness_error", "energy_release_error", "load_force_error")
 TIMES = ("time_mesh", "time_assemble", "time_setup", "time_solve")
 
@@ -113,6 +116,10 @@ def is_graded_to_contact(case: Case) -> bool:
     rim = case.mesh.rim_size(case.probe.half_width) / half_width_of(case)
     # The coarsest recipe is that of the limit itself, in the same units: no rounding may put it beyond.
     rim *= 1 - _ROUNDING if isinstance(case.probe, Indenter) else 1.0
+    if case.probe.is_unilateral:  # small elements are round the axis: contact is to be there
+        *beside, _ = first_touch(case.body, case.probe, case.frame)
+        if hypot(*beside) > _BESIDE * half_width_of(case):
+            return False
     return is_graded(rim, case.mesh.growth)
 
 

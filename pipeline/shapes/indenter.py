@@ -59,7 +59,12 @@ class Indenter(Probe):
 
     action: Literal["pierce"] = "pierce"
     depth: Annotated[
-        Length, Words("How far the tool is pushed in, from where its lowest point touches.", '"0.5 mm"', is_used=True)
+        Length,
+        Words(
+            "How far the tool is pushed in along its axis, from where it first touches the surface as loads leave it.",
+            '"0.5 mm"',
+            is_used=True,
+        ),
     ]
     depth_range: Annotated[
         tuple[Length, Length] | None,
