@@ -13,10 +13,8 @@ from scipy.spatial import cKDTree
 
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.generate import GeometryError
-from pipeline.mesh.organ.even import merged
-from pipeline.mesh.organ.level import cut, level_line, on_segments
+from pipeline.mesh.organ.prepare import cut, level_line, merged, on_segments, sharp_edges
 from pipeline.mesh.organ.remesh import release, remesh
-from pipeline.mesh.organ.sharp import sharp_edges
 from pipeline.mesh.organ.sheet import FIXED, FREE, Sheet
 from pipeline.mesh.organ.untangle import TangledError
 from pipeline.mesh.size import EDGES_PER_RADIUS

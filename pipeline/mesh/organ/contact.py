@@ -9,10 +9,9 @@ from dataclasses import dataclass
 import gmsh
 import numpy as np
 
-from pipeline.arrays import FloatArray, IntArray
+from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.compat import gmsh_session
 from pipeline.mesh.generate import GeometryError, MeshError, model_options
-from pipeline.mesh.organ.lines import cross
 from pipeline.mesh.organ.sheet import FIXED, PROBE, Sheet, compact, edges_of
 from pipeline.mesh.reason import reason
 from pipeline.mesh.size import Sizes, set_size_field
@@ -96,7 +95,7 @@ def set_in(sheet: Sheet, frame: Frame, probe: Probe, sizes: Sizes, lift: Lift) -
     if (sheet.group[patch] == FIXED).any():
         raise GeometryError("the footprint lies on, or next to, what is held of the body")
     loops = _loops(sheet.facets[patch])
-    if _cross(local[:, :2], loops, rim):
+    if _lines_cross(local[:, :2], loops, rim):
         raise FoldedError(f"{_FOLDED}; for a rough surface, `smooth` takes lengths that are taken off")
     plane = _mesh_plane(local[:, :2], loops, rim, probe, sizes)
     return _joined(sheet, patch, plane, lift, lifted, followed)
@@ -123,7 +122,7 @@ def _patch(sheet: Sheet, local: FloatArray, radius: float) -> IntArray:
     raise FoldedError(_FOLDED)
 
 
-def _cross(local: FloatArray, loops: list[list[int]], rim: FloatArray) -> bool:
+def _lines_cross(local: FloatArray, loops: list[list[int]], rim: FloatArray) -> bool:
     """Tell whether lines that bound the patch, and the rim, cross in the plane: gmsh would end the process."""
     closed = [local[loop] for loop in loops] + [rim]
     return cross(np.vstack(closed), np.vstack([np.roll(line, -1, axis=0) for line in closed]))
@@ -263,3 +262,23 @@ def _outside(sheet: Sheet, patch: IntArray) -> IntArray:
     gone = edges[within] @ np.array([base, 1])
     sharp = np.sort(sheet.sharp, axis=1)
     return sharp[~np.isin(sharp @ np.array([base, 1]), gone)]
+
+
+def cross(start: FloatArray, end: FloatArray) -> bool:
+    """Tell whether any two of the segments from ``start`` (n, 2) to ``end`` (n, 2) that share no end meet."""
+    sides = _sign(start[:, None], end[:, None], start[None]) * _sign(start[:, None], end[:, None], end[None])
+    # Pieces of one straight line are on no side of each other: they meet if they overlap along it.
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    apart = ((low[:, None] > high[None]) | (high[:, None] < low[None])).any(axis=-1)
+    joined = _same(start, start) | _same(start, end) | _same(end, start) | _same(end, end)
+    return bool(((sides <= 0) & (sides.T <= 0) & ~joined & ~apart).any())
+
+
+def _sign(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
+    """Tell on which side of the lines from ``a`` to ``b`` the points ``c`` are."""
+    ab, ac = b - a, c - a
+    return np.asarray(np.sign(ab[..., 0] * ac[..., 1] - ab[..., 1] * ac[..., 0]))
+
+
+def _same(one: FloatArray, other: FloatArray) -> BoolArray:
+    return np.asarray((one[:, None] == other[None]).all(axis=-1))

@@ -14,7 +14,6 @@ import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.generate import MeshError
-from pipeline.mesh.organ.even import closed
 from pipeline.mesh.organ.sheet import Sheet, edges_of
 from pipeline.stages import stage
 
@@ -75,7 +74,7 @@ def remesh(
         if done.returncode or not result.exists():
             said = " ".join((done.stderr + done.stdout).split())[-300:]
             raise MeshError(f"the remesher of surfaces failed ({done.returncode}): {said}")
-        return closed(_read(result.read_text()))
+        return _closed(_read(result.read_text()))
 
 
 def _mesh_text(sheet: Sheet, kept: IntArray, as_is: BoolArray | None) -> str:
@@ -139,3 +138,30 @@ def _read(text: str) -> Sheet:
     triangles, edges = found["Triangles"].astype(np.int64), found["Edges"].astype(np.int64)
     ridges = found["Ridges"].astype(np.int64).ravel() - 1
     return Sheet(found["Vertices"][:, :3], triangles[:, :3] - 1, triangles[:, 3], edges[ridges, :2] - 1)
+
+
+def _closed(sheet: Sheet) -> Sheet:
+    """Return the sheet with the holes closed that a remesher leaves where it drops a facet."""
+    pairs = np.concatenate([sheet.facets[:, [0, 1]], sheet.facets[:, [1, 2]], sheet.facets[:, [2, 0]]])
+    base = len(sheet.points)
+    keys, back = pairs @ np.array([base, 1]), pairs @ np.array([1, base])
+    alone = ~np.isin(keys, back)
+    if not alone.any():
+        return sheet
+    # Round a hole one goes against its facets.
+    following = {end: start for start, end in pairs[alone].tolist()}
+    owner = dict(zip(pairs[alone][:, 1].tolist(), np.tile(sheet.group, 3)[alone].tolist(), strict=True))
+    facets, groups = [], []
+    while following:
+        first = min(following)
+        loop, point = [first], following.pop(first)
+        while point != first and point in following:
+            loop.append(point)
+            point = following.pop(point)
+        facets += [(first, loop[k], loop[k + 1]) for k in range(1, len(loop) - 1)]
+        groups += [owner[first]] * (len(loop) - 2)
+    if not facets:
+        return sheet
+    return Sheet(
+        sheet.points, np.vstack([sheet.facets, facets]), np.concatenate([sheet.group, groups]), sheet.sharp
+    )  # fmt: skip

@@ -1,15 +1,48 @@
-"""Surfaces cut at the height below which a body is held."""
+"""A file's surface made ready for the remesher: without specks, cut where it is held, its sharp edges known."""
 
 from collections.abc import Callable
 
+import igl
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from pipeline.arrays import FloatArray, IntArray
+from pipeline.mesh.generate import MeshError
 from pipeline.mesh.organ.sheet import FIXED, FREE, Sheet, compact, edges_of
 
+# Points nearer than this to each other, for the edges of the surface, are one: remeshers drop such specks.
+_SAME = 0.05
 # A point this near to the level along an edge, in units of the edge, is moved onto it.
 _NEAR = 0.02
+# Facets that meet at a larger angle (cosine) make a sharp edge, if those at some distance from it do so, too.
+_SHARP = 0.7
+
+
+def merged(points: FloatArray, facets: IntArray) -> tuple[FloatArray, IntArray]:
+    """Return a closed surface with points that are next to each other made one, itself where that would open it."""
+    edges, _ = edges_of(facets)
+    length = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
+    near = edges[length < _SAME * np.median(length)]
+    count = len(points)
+    groups, label = connected_components(coo_array((np.ones(len(near)), tuple(near.T)), shape=(count, count)), False)
+    if groups == count:
+        return points, facets
+    share = np.bincount(label, minlength=groups)
+    middles = np.column_stack([np.bincount(label, points[:, k], minlength=groups) / share for k in range(3)])
+    corners = label[facets].astype(np.int64)
+    corners = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
+    # Two facets with the same corners, once a speck between them is gone, lie upon each other.
+    _, first, number = np.unique(np.sort(corners, axis=1), axis=0, return_inverse=True, return_counts=True)
+    corners = corners[number[first.ravel()] == 1]
+    try:
+        edges_of(corners)
+    except MeshError:
+        return points, facets
+    used = np.zeros(groups, dtype=bool)
+    used[corners] = True
+    return middles[used], (np.cumsum(used) - 1)[corners]
 
 
 def cut(points: FloatArray, facets: IntArray, below: float) -> Sheet:
@@ -115,3 +148,39 @@ def on_segments(points: FloatArray, segments: FloatArray) -> FloatArray:
         found = start[near] + t[:, None] * along[near]
         result[number] = found[np.argmin(((found - point) ** 2).sum(axis=1))]
     return result
+
+
+def sharp_edges(sheet: Sheet, largest: float) -> IntArray:
+    """Return the edges (k, 2) at which the surface is sharp: not only facet by facet, as noise and voxels are."""
+    edges, sides = edges_of(sheet.facets)
+    normals = sheet.normals
+    sharp = (normals[sides[:, 0]] * normals[sides[:, 1]]).sum(axis=1) < _SHARP
+    edges, sides = edges[sharp], sides[sharp]
+    if not len(edges):
+        return edges
+    middle = sheet.points[edges].mean(axis=1)
+    centre = sheet.points[sheet.facets].mean(axis=1)
+    mean = []
+    for side in sides.T:
+        # Into the facet, as far as half an element reaches: the facets about there say which way the surface faces.
+        along = sheet.points[edges[:, 1]] - sheet.points[edges[:, 0]]
+        inward = centre[side] - middle
+        inward -= along * ((inward * along).sum(axis=1) / (along**2).sum(axis=1))[:, None]
+        inward /= np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), np.finfo(float).tiny)
+        total = np.zeros_like(inward)
+        for share in (0.1, 0.2, 0.3, 0.4, 0.5, 0.6):
+            place = np.ascontiguousarray(middle + share * largest * inward)
+            _, facet, _ = igl.point_mesh_squared_distance(place, sheet.points, sheet.facets)
+            total += normals[facet]
+        mean.append(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), np.finfo(float).tiny))
+    return _long_lines(sheet, edges[(mean[0] * mean[1]).sum(axis=1) < _SHARP], largest)
+
+
+def _long_lines(sheet: Sheet, edges: IntArray, largest: float) -> IntArray:
+    """Return those of the edges that make lines as long as an element: a speck is no edge of a body."""
+    count = len(sheet.points)
+    joined = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
+    _, line = connected_components(joined, directed=False)
+    length = np.linalg.norm(sheet.points[edges[:, 1]] - sheet.points[edges[:, 0]], axis=1)
+    of_line = line[edges[:, 0]]
+    return edges[np.bincount(of_line, length, minlength=1)[of_line] > largest] if len(edges) else edges
