@@ -6,7 +6,6 @@ at a quarter of its length, a quadratic element contains r^½ (R. S. Barsoum, In
 
 from dataclasses import replace
 from functools import cache
-from itertools import combinations
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from pipeline.scene.model import FIXED, MIRROR, PROBE, Scene
 from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.surface import Surface
+from pipeline.shapes.triangles import half_edges
 from pipeline.stages import stage
 
 # Edges of the reference tetrahedron in the order of basix's quadratic nodes 4 to 9.
@@ -175,7 +175,7 @@ def _interface_edges(mesh: MeshArrays, regions: IntArray) -> IntArray:
     sorted_corners, owner = corners[order], np.repeat(regions, 4)[order]
     twins = np.all(sorted_corners[1:] == sorted_corners[:-1], axis=1) & (owner[1:] != owner[:-1])
     triangles = sorted_corners[1:][twins]
-    return np.unique(np.concatenate([_key(mesh, triangles[:, pair]) for pair in combinations(range(3), 2)]))
+    return np.unique(_key(mesh, np.sort(half_edges(triangles), axis=1)))
 
 
 def _key(mesh: MeshArrays, edges: IntArray) -> IntArray:
@@ -185,8 +185,7 @@ def _key(mesh: MeshArrays, edges: IntArray) -> IntArray:
 def _facet_edges(mesh: MeshArrays, names: object) -> IntArray:
     """Keys of the edges of the boundary triangles in the named groups."""
     facets = np.concatenate([mesh.facets[name] for name in names])  # type: ignore[attr-defined]
-    pairs = np.concatenate([np.sort(facets[:, pair], axis=1) for pair in combinations(range(3), 2)])
-    return np.unique(_key(mesh, pairs))
+    return np.unique(_key(mesh, np.sort(half_edges(facets), axis=1)))
 
 
 def _quarter_points(mesh: MeshArrays, edges: IntArray, middle: FloatArray) -> FloatArray:

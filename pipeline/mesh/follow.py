@@ -4,7 +4,6 @@ Both ask the geometry kernel while its model is open.
 """
 
 from collections.abc import Iterator
-from itertools import combinations
 from math import ceil
 
 import gmsh
@@ -13,6 +12,7 @@ import numpy as np
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.scene.model import Scene
 from pipeline.shapes.bodies.cad import FromCad
+from pipeline.shapes.triangles import half_edges
 
 # Elements along a rounded edge, in units of its radius, but at least this share of the body, are so large.
 _PER_RADIUS, _LEAST = 0.5, 1 / 100
@@ -75,8 +75,7 @@ def middle_nodes(position: IntArray, scale: float) -> tuple[IntArray, FloatArray
         curves |= {abs(tag) for _, tag in gmsh.model.getBoundary([(dim, face)], oriented=False)}
         if gmsh.model.getType(dim, face) != _STRAIGHT[dim]:
             corners = np.concatenate(gmsh.model.mesh.getElements(dim, face)[2]).reshape(-1, 3)
-            pairs = np.concatenate([corners[:, pair] for pair in combinations(range(3), 2)])
-            _put(middle, dim, face, pairs, at)
+            _put(middle, dim, face, half_edges(corners), at)
     for curve in sorted(curves):
         pairs = np.concatenate(gmsh.model.mesh.getElements(1, curve)[2] or [np.empty(0, dtype=int)]).reshape(-1, 2)
         if gmsh.model.getType(1, curve) == _STRAIGHT[1]:

@@ -4,13 +4,13 @@ Where the slit lies in a plane of symmetry there is nothing to double: reflectio
 """
 
 from dataclasses import replace
-from itertools import combinations
 
 import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.generate import MeshArrays, MeshError
 from pipeline.scene.model import PROBE, SLIT, Scene
+from pipeline.shapes.triangles import half_edges
 
 
 def open_slit(mesh: MeshArrays, scene: Scene) -> MeshArrays:
@@ -48,7 +48,7 @@ def _front(mesh: MeshArrays, faces: IntArray) -> IntArray:
 
 def _edges(triangles: IntArray, count: int) -> IntArray:
     """Return keys of the edges of triangles."""
-    pairs = np.concatenate([np.sort(triangles[:, pair], axis=1) for pair in combinations(range(3), 2)])
+    pairs = np.sort(half_edges(triangles), axis=1)
     return pairs[:, 0] * count + pairs[:, 1]
 
 

@@ -18,6 +18,7 @@ from pipeline.mesh.size import Sizes, set_size_field
 from pipeline.shapes.frame import Frame
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.rays import facing
+from pipeline.shapes.triangles import half_edges
 
 Lift = Callable[[FloatArray], FloatArray]
 # What is meshed anew reaches this far past the footprint, in units of its radius, if facets are small.
@@ -143,7 +144,7 @@ def _distance_to_origin(corners: FloatArray) -> FloatArray:
 
 def _outer_edges(facets: IntArray) -> IntArray:
     """Edges (k, 2) of facets, in their sense, that no other of them has."""
-    pairs = np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]])
+    pairs = half_edges(facets)
     there = set(map(tuple, pairs.tolist()))
     return np.array([pair for pair in pairs.tolist() if (pair[1], pair[0]) not in there], dtype=np.int64)
 

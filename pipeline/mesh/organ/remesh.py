@@ -15,6 +15,7 @@ import numpy as np
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.generate import MeshError
 from pipeline.mesh.organ.sheet import Sheet, edges_of
+from pipeline.shapes.triangles import half_edges
 from pipeline.stages import stage
 
 _PACKAGE, _PROGRAM = "mmgpy", "bin/mmgs_O3"
@@ -142,7 +143,7 @@ def _read(text: str) -> Sheet:
 
 def _closed(sheet: Sheet) -> Sheet:
     """Return the sheet with the holes closed that a remesher leaves where it drops a facet."""
-    pairs = np.concatenate([sheet.facets[:, [0, 1]], sheet.facets[:, [1, 2]], sheet.facets[:, [2, 0]]])
+    pairs = half_edges(sheet.facets)
     base = len(sheet.points)
     keys, back = pairs @ np.array([base, 1]), pairs @ np.array([1, base])
     alone = ~np.isin(keys, back)
@@ -150,7 +151,7 @@ def _closed(sheet: Sheet) -> Sheet:
         return sheet
     # Round a hole one goes against its facets.
     following = {end: start for start, end in pairs[alone].tolist()}
-    owner = dict(zip(pairs[alone][:, 1].tolist(), np.tile(sheet.group, 3)[alone].tolist(), strict=True))
+    owner = dict(zip(pairs[alone][:, 1].tolist(), np.repeat(sheet.group, 3)[alone].tolist(), strict=True))
     facets, groups = [], []
     while following:
         first = min(following)

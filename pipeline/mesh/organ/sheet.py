@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.generate import MeshError
 from pipeline.scene import model
-from pipeline.shapes.triangles import enclosed
+from pipeline.shapes.triangles import closed_edges, enclosed, half_edges
 
 # Numbers of the groups, which the remesher keeps apart.
 FREE, FIXED, PROBE = 1, 2, 3
@@ -70,15 +70,10 @@ def edges_of(facets: IntArray) -> tuple[IntArray, IntArray]:
     Raises:
         MeshError: if it is not closed.
     """
-    pairs = np.sort(np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]]), axis=1)
-    owner = np.tile(np.arange(len(facets)), 3)
-    order = np.lexsort((pairs[:, 1], pairs[:, 0]))
-    if len(pairs) % 2:
+    _, times = np.unique(np.sort(half_edges(facets), axis=1) @ np.array([facets.max() + 1, 1]), return_counts=True)
+    if (times != 2).any():
         raise MeshError("the surface, meshed anew, is not closed")
-    edges = pairs[order].reshape(-1, 2, 2)
-    if not np.array_equal(edges[:, 0], edges[:, 1]):
-        raise MeshError("the surface, meshed anew, is not closed")
-    return edges[:, 0], owner[order].reshape(-1, 2)
+    return closed_edges(facets)
 
 
 def compact(sheet: Sheet) -> tuple[Sheet, IntArray]:
