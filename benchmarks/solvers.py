@@ -3,7 +3,7 @@
 A disc on a box, a quarter of it, graded to the probe's edge. Set-up and solve are in units of one application of the
 finest operator (a product with its blocked matrix), measured around them: so the figures mean the same on another
 machine, and on a busy one, as times are those of the processor. Each row is a process of its own, since a process's
-peak memory is that of its largest solve. From this come ``DIRECT_LIMIT`` in ``pipeline/solve/linear.py`` and
+peak memory is that of its largest solve. From this come ``DIRECT_LIMIT`` in ``pipeline/solve/krylov.py`` and
 ``pipeline/solve/mixed.py``, and the bytes per dof in ``pipeline/plan/estimate.py``.
 """
 
