@@ -7,9 +7,9 @@ from pipeline.study.sweep import Case
 
 # Volume of gmsh's mean tetrahedron in units of the cube of the size asked for: measured, docs/performance.md.
 _TETRAHEDRON = 0.21
-# Bytes for each dof at the peak of a solve, degree by degree: multigrid, whose operators are products or, where nothing
-# multiplies cell by cell, matrices, and what conjugate residuals keep, little where a tenth is enough; the factor of a
-# system of 50,000 dofs; and what two more matrices take. Measured: docs/solvers.md.
+# Bytes for each dof at the peak of a solve, degree by degree: multigrid, whose operators are products or, for large
+# displacements, matrices, and what conjugate residuals keep, little where a tenth is enough; the factor of a
+# system of 50,000 dofs. Measured: docs/solvers.md.
 _BYTES_PER_DOF = {
     "displacement": {1: 3000, 2: 700, 3: 420, 4: 420},
     "mixed": {2: 1450, 3: 1200, 4: 1200},
@@ -19,7 +19,6 @@ _BYTES_PER_DOF = {
     "mixed, matrices": {2: 3800, 3: 4000, 4: 5600},
     "direct": {1: 9000, 2: 9000, 3: 10_000},
 }
-_BYTES_OF_PARTS = {1: 1000, 2: 1500, 3: 2200, 4: 3300}
 # And what a reduced basis keeps besides: a hierarchy for its bound, and five vectors of each of some eight solutions.
 _BYTES_OF_BASIS = {1: 1000, 2: 1100, 3: 1800, 4: 2500}
 _BASE = 200e6
@@ -116,34 +115,27 @@ def solving_memory(
     *,
     direct: bool,
     mixed: bool = False,
-    matrices: bool = False,
     large: bool = False,
-    parts: bool = False,
     roughly: bool = False,
 ) -> float:
     """Estimate the bytes that a solve takes, all ranks together.
 
-    ``matrices`` says that nothing multiplies cell by cell here, as for ``large`` displacements, but for their error
-    bar where C compiles; ``parts`` keeps A_λ and A_μ for the next ν. To solve ``roughly``, as an error bar does, is to
+    ``large`` displacements have matrices, but not in their error bar. To solve ``roughly``, as an error bar does, is to
     a tenth.
     """
-    kind = "direct" if direct else ("mixed" if mixed else "displacement") + ", matrices" * (matrices or large)
-    kind = "large" if large and roughly and not matrices else kind
+    kind = "direct" if direct else "large" if large and roughly else "mixed" if mixed else "displacement"
+    kind += ", matrices" * (large and not direct and not roughly)
     kind += ", roughly" * (roughly and kind in ("mixed", "large"))
-    per_dof = _BYTES_PER_DOF[kind][degree] + parts * _BYTES_OF_PARTS[degree]
+    per_dof = _BYTES_PER_DOF[kind][degree]
     # Fill of a factorisation in 3D grows like dofs^(4/3); the figure above is for 50,000.
     growth = (dofs / 50_000) ** (1 / 3) if direct else 1.0
     return _BASE + per_dof * growth * dofs
 
 
-def enriched_memory(
-    dofs: float, degree: int, *, mixed: bool = False, matrices: bool = False, large: bool = False, parts: bool = False
-) -> float:
+def enriched_memory(dofs: float, degree: int, *, mixed: bool = False, large: bool = False) -> float:
     """Estimate the bytes that an error bar takes: a solve of one degree more than that of ``dofs`` unknowns."""
     growth = _DOFS_PER_CELL[degree + 1] / _DOFS_PER_CELL[degree]
-    return solving_memory(
-        growth * dofs, degree + 1, direct=False, mixed=mixed, matrices=matrices, large=large, parts=parts, roughly=True
-    )
+    return solving_memory(growth * dofs, degree + 1, direct=False, mixed=mixed, large=large, roughly=True)
 
 
 def peak_memory(case: Case, share: float = 1.0, of_bar: float | None = None, *, reduced: bool = False) -> float:
