@@ -47,7 +47,7 @@ _RELEASE = (0.45, 0.9)
 # Found contact: |F_2 - F_exact| in units of what degree 3 takes away, and of N; and what is left, in bars, once F_2 is
 # corrected by half of it: on meshes graded to where contact is expected to end, of plain bodies and of others, and on
 # meshes that are not.
-_FOUND, _FOUND_UNSEEN = 1.6, 1.4
+_FOUND, _FOUND_UNSEEN, _FOUND_OF_AREA = 1.6, 1.4, 1.5
 _FOUND_SPREAD, _FOUND_SPREAD_ELSEWHERE, _FOUND_SPREAD_COARSE = 0.4, 0.5, 0.8
 # And where contact is found again: |F_p - F_exact| in units of what one degree more changes, and of the area's bar.
 _FOUND_AGAIN, _FOUND_AT_EDGE = 2.0, 0.1
@@ -135,13 +135,14 @@ def extrapolate_release(released: FloatArray, finer: FloatArray, degree: int) ->
     return released - (1 + _RELEASE[0] * _theta(degree)) * (released - finer)
 
 
-def found_bar(decrement: float, unseen: float = 0.0) -> float:
-    """Return the 95 % bar on F_2, relative, where contact is found, and pressure falls to nought at its edge.
+def found_bar(decrement: float, unseen: float = 0.0, area_bar: float = 0.0) -> float:
+    """Return the 95 % bar on F_p, relative, where contact is found, and pressure falls to nought at its edge.
 
-    ``decrement`` is the share of the energy that degree 3 takes away while that area is held, ``unseen`` N / (2 U) of
-    a mixed element.
+    ``decrement`` is the share of the energy that one degree more takes away while that area is held, ``unseen``
+    N / (2 U) of a mixed element. F is stationary in the area: the square of ``area_bar`` is what the decrement, which
+    may be small by chance, does not know of.
     """
-    share = max(_FOUND * abs(decrement), _FOUND_UNSEEN * unseen)
+    share = max(_FOUND * abs(decrement), _FOUND_UNSEEN * unseen, _FOUND_OF_AREA * area_bar**2)
     return share / (1 - min(share, _MOST))
 
 

@@ -129,6 +129,19 @@ def test_contact_on_few_nodes_has_an_error_bar_that_tells_how_coarse_its_element
     assert abs(found.force / exact - 1) < found.force_error < 0.15
 
 
+def test_small_depths_on_the_mesh_of_a_range_have_bars_and_areas_that_are_worth_something():
+    """A ball on a column of little more than its radius, on elements as large as its contact."""
+    depths = [0.05e-3, 0.1e-3, 0.2e-3, 0.4e-3]
+    ball = {"shape": "sphere", "radius": "4 mm", "depth_range": ["0.02 mm", "0.4 mm"]}
+    body = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "bottom"}
+    column = {"epsilon": "4.5 mm", "outside": "free", "fine": "1 mm", "coarse": "6 mm", "rim": "0.6 mm", "growth": 0.8}
+    found = swept(column, [1e3 * depth for depth in depths], ball, body)
+    assert all(record.status == "ok" for record in found)
+    assert max(record.force_error for record in found) < 0.15
+    for depth, record in zip(depths, found, strict=True):  # a column is softer than a body: contact is smaller
+        assert 0.8 < record.contact_radius / sqrt(4e-3 * depth) < 1.0
+
+
 def test_flat_probe_that_does_not_lift_off_is_the_frictionless_one():
     assert record(probe=DISC).force == pytest.approx(record(probe=DISC | {"contact": "frictionless"}).force, rel=1e-8)
 

@@ -314,7 +314,7 @@ class ContactProblem:
         if at_edge:  # the probe ends there, and the pressure is singular
             bar = error_bar(share, self._degree, elements.element, plain=plain_share(self._body), unseen=unseen)
             return share, bar, more
-        return share, found_bar(share, unseen), more
+        return share, found_bar(share, unseen, self._area_of(found, law).bar), more
 
     # ---- the force ------------------------------------------------------------------------------------
 
