@@ -146,7 +146,7 @@ def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple
 
 def _mixed_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[Any, Callable[[], Any]]:
     """The same for mixed elements; a set-up that serves all ratios counts for one."""
-    from pipeline.solve.elements import LAME
+    from pipeline.solve.mixed import LAME
     from pipeline.solve.saddle import SaddleSolver
     from pipeline.solve.solution import TOLERANCE
 

@@ -22,7 +22,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.elements import Column, DisplacementElements, Enriched, Products
+from pipeline.solve.displacement import DisplacementElements
+from pipeline.solve.fields import Column, Enriched, Products
 from pipeline.solve.forms import HyperelasticForms
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.krylov import LinearSolver

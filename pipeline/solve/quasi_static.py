@@ -25,16 +25,10 @@ from pipeline.arrays import FloatArray
 from pipeline.solve.carried import Carried, carried_of, imbalance, shares
 from pipeline.solve.cell_values import CellValues
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.elements import (
-    Column,
-    DisplacementElements,
-    DisplacementSolver,
-    Elements,
-    Products,
-    Solver,
-    elements_of,
-)
+from pipeline.solve.displacement import DisplacementElements, DisplacementSolver
+from pipeline.solve.elements import elements_of
 from pipeline.solve.error import error_bar, stiffness_bars
+from pipeline.solve.fields import Column, Elements, Products, Solver
 from pipeline.solve.krylov import LinearSolver, SolveError
 from pipeline.solve.load_steps import LoadSteps, Walk
 from pipeline.solve.loads import Loads, Motion

@@ -18,9 +18,11 @@ from pipeline.solve.contact.active_set import State
 from pipeline.solve.contact.candidates import CONDITIONS, Candidates, Numbering, Surface
 from pipeline.solve.contact.levels import Hierarchy, normal_dofs
 from pipeline.solve.dead_loads import Applied
-from pipeline.solve.elements import Column, Fields, MixedElements, elements_of
+from pipeline.solve.elements import elements_of
 from pipeline.solve.far_field import FarField
+from pipeline.solve.fields import Column, Fields
 from pipeline.solve.krylov import Level, LinearSolver, SolveError
+from pipeline.solve.mixed import MixedElements
 from pipeline.solve.physics import MaterialLaw, SplitLaw
 from pipeline.solve.saddle import Saddle, SaddleSolver
 from pipeline.solve.spaces import ElasticSpace, Spaces
