@@ -89,7 +89,7 @@ _THICKNESS, _THINNEST = 10.0, 0.15
 _MIXED_EVEN, _MIXED = {2: 1.0, 3: 1.05}, {2: 1.2, 3: 1.05}
 # Those of several movements over those of one, of mixed elements.
 _SEVERAL = 1.15
-# And those of bodies of several materials, with a curved surface, or of plates, by element (pipeline/solve/error.py).
+# And those of bodies of several materials, with a curved surface, or of plates, by element (solve/estimate.py).
 _ELSEWHERE = {"displacement": 1.6, "mixed": 2.6}
 # Bars of displacement elements grow like (1 - 2 ν)^-0.35 on the way to locking; measured from ν = 0.3 to 0.49.
 _LOCKING = 0.35

@@ -15,7 +15,7 @@ from pipeline.shapes.body import Layered
 from pipeline.shapes.contact import first_touch
 from pipeline.shapes.frame import Vector
 from pipeline.shapes.indenter import Indenter
-from pipeline.solve.error import is_graded
+from pipeline.solve.estimate import is_graded
 from pipeline.solve.solution import Solution
 from pipeline.study.sweep import Case
 
@@ -78,7 +78,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
 
 def _of_loads(solution: Solution, turn: FloatArray | None) -> dict[str, Any]:
     """Return what a record holds of loads, nothing where there are none."""
-    loaded, loads = solution.carried, solution.response.loads
+    loaded, loads = solution.load_response, solution.response.loads
     if not isnan(solution.sag):  # of found contact: loads bend the surface, and the depth counts from the first touch
         none = (0.0, 0.0, 0.0)
         touching = {"load_force": 0.0, "load_force_error": 0.0, "load_force_vector": none}

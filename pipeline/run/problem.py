@@ -18,13 +18,13 @@ from pipeline.solve.axisymmetric import MeridianProblem
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.contact.active_set import ContactError
 from pipeline.solve.contact.problem import ContactProblem, Tool
+from pipeline.solve.crack import Front
 from pipeline.solve.krylov import SolveError, is_direct
 from pipeline.solve.loads import Loads
 from pipeline.solve.meridian_contact import MeridianContact
 from pipeline.solve.meridian_trials import RoundTool
 from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.release import Front
 from pipeline.solve.solution import FieldProblem, Problem, Solution
 from pipeline.solve.spaces import Spaces
 from pipeline.study.sweep import Case

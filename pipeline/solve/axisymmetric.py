@@ -32,7 +32,7 @@ from pipeline.solve.meridian_system import (
     max_strain,
 )
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.reaction import reaction
+from pipeline.solve.response import reaction
 from pipeline.solve.solution import Solution
 from pipeline.stages import recorded, stage
 

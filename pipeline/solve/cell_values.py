@@ -18,9 +18,9 @@ from mpi4py import MPI
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve.compiled import cellwise_space, form, vector_space
+from pipeline.solve.crack import Front
 from pipeline.solve.forms import dx, one_cell
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.release import Front
 from pipeline.solve.rim import clear_cells
 from pipeline.stages import stage
 

@@ -13,9 +13,9 @@ from pipeline.arrays import FloatArray, Int32Array
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.scene.model import FIXED, MIRROR, PROBE
 from pipeline.solve.compiled import vector_space
+from pipeline.solve.crack import Front
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Motion
-from pipeline.solve.release import Front
 from pipeline.stages import stage
 
 

@@ -30,7 +30,7 @@ from pipeline.solve.meridian_signs import LiftsOff, check_signs
 from pipeline.solve.meridian_system import HalfPlane, max_strain
 from pipeline.solve.meridian_trials import STEP, Rings, RoundTool, Trial, Trials
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.reaction import reaction
+from pipeline.solve.response import reaction
 from pipeline.solve.solution import Solution
 from pipeline.stages import recorded, stage
 

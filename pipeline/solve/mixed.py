@@ -17,12 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.solve.conditions import Conditions
+from pipeline.solve.crack import Front, Release
 from pipeline.solve.fields import Column, Elements, Enriched, Fields, Products, level_of, transposed
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.mixed_space import MixedSpace
 from pipeline.solve.physics import MaterialLaw, SplitLaw
-from pipeline.solve.release import Front, Release
 from pipeline.solve.saddle import Saddle, SaddleSolver
 from pipeline.solve.spaces import Spaces
 from pipeline.stages import Times, recharge, recorded, stage

@@ -3,13 +3,14 @@
     Find u with K u = 0 inside, u = the probe's motion on its footprint (bonded) or its normal part only
     (frictionless), u = 0 on the support.
 
-Where loads f act, w with K w = f and w = 0 on footprint and support is one column more (:mod:`pipeline.solve.carried`).
+Where loads f act, w with K w = f and w = 0 on footprint and support is one column more
+(:mod:`pipeline.solve.load_response`).
 Where the cut face moves with a far field (:mod:`pipeline.solve.far_field`), a unit of that field is one, too. With K
 the stiffness of a unit of the tool's movement (0) and a unit of the far field (1), that of what is beyond the cut added
 to K₁₁, the energy is stationary where the share s of the field is -K₁₀ / K₁₁. The work of the tool is then that of both
 sides of the cut together, F d = 2 (U within + U beyond).
 
-The force is the reaction (:mod:`pipeline.solve.reaction`). Stress integrated under the probe is wrong by tens of per
+The force is the reaction (:mod:`pipeline.solve.response`). Stress integrated under the probe is wrong by tens of per
 cent on the same solution.
 """
 
@@ -22,19 +23,19 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.carried import Carried, carried_of, imbalance, shares
 from pipeline.solve.cell_values import CellValues
 from pipeline.solve.conditions import Conditions
+from pipeline.solve.crack import Advance, Front
 from pipeline.solve.displacement import DisplacementElements, DisplacementSolver
 from pipeline.solve.elements import elements_of
-from pipeline.solve.error import error_bar, stiffness_bars
+from pipeline.solve.estimate import error_bar, stiffness_bars
 from pipeline.solve.fields import Column, Elements, Products, Solver
 from pipeline.solve.krylov import LinearSolver, SolveError
+from pipeline.solve.load_response import LoadResponse, imbalance, load_response_of, shares
 from pipeline.solve.load_steps import LoadSteps, Walk
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.reaction import Response, reaction, sums
-from pipeline.solve.release import Advance, Front
+from pipeline.solve.response import Response, reaction, sums
 from pipeline.solve.rim import plain_share
 from pipeline.solve.solution import MOST_ROUNDS, TOLERANCE, Solution, check_balance, rest
 from pipeline.solve.spaces import Spaces
@@ -115,7 +116,9 @@ class QuasiStaticProblem:
             with stage("solve"):
                 known = solver.known if keep and isinstance(solver, DisplacementSolver) else {}
                 self._guess(columns, loads, known)
-                iterations, response, carried = self._iterate(solver, columns, law, loads, known, tolerance=tolerance)
+                iterations, response, load_response = self._iterate(
+                    solver, columns, law, loads, known, tolerance=tolerance
+                )
                 if keep and isinstance(solver, DisplacementSolver):
                     solver.known = {loads.motions[0]: columns[0].unknown[0].array.copy()}
                 if loads.far is not None:
@@ -129,7 +132,7 @@ class QuasiStaticProblem:
             elements.show(columns)
             solution = Solution(
                 response=response,
-                carried=carried,
+                load_response=load_response,
                 largest=self._values.largest(law, self._conditions.front),
                 dofs=elements.whole_dofs,
                 cells=self._body.cells,
@@ -153,7 +156,7 @@ class QuasiStaticProblem:
         known: Mapping[Motion, FloatArray],
         *,
         tolerance: float,
-    ) -> tuple[int, Response, Carried | None]:
+    ) -> tuple[int, Response, LoadResponse | None]:
         """Solve for ``columns`` until forces balance; return the iterations, and what the solutions do.
 
         Raises:
@@ -163,13 +166,13 @@ class QuasiStaticProblem:
         todo = [column for number, column in enumerate(columns) if _motion(loads, number) not in known]
         iterations = solver.solve(todo, aim)
         for further in range(MOST_ROUNDS + 1):
-            response, carried = self._response(solver.products(columns), columns, law, loads)
+            response, load_response = self._response(solver.products(columns), columns, law, loads)
             share = rest(response.balance, tolerance)
             if solver.is_exact or share == 1.0 or further == MOST_ROUNDS:
                 break
             iterations += solver.improve(columns, share)
         check_balance(response.balance)
-        return iterations, response, carried
+        return iterations, response, load_response
 
     def _guess(self, columns: Sequence[Column], loads: Loads, known: Mapping[Motion, FloatArray]) -> None:
         """Begin with the last solution for each motion, or with one that is ``known``."""
@@ -182,7 +185,7 @@ class QuasiStaticProblem:
 
     def _response(
         self, found: Products, columns: Sequence[Column], law: MaterialLaw, loads: Loads
-    ) -> tuple[Response, Carried | None]:
+    ) -> tuple[Response, LoadResponse | None]:
         """Return the response to the motions, and what dead loads do, of which the last column is; collective."""
         count, mirrored = len(loads.motions), self._body.mirrored
         motions, loaded = columns[:count], columns[count:]
@@ -200,8 +203,8 @@ class QuasiStaticProblem:
         assert applied is not None
         works = global_sum(found.dofs.comm, np.array([u @ applied.forces for u in found.moved]))
         balance = max(balance, imbalance(total, found.energies, works, applied, loads, mirrored))
-        carried = carried_of(found.stationary, works, total.on_probe[-1], mirrored, apart=loads.apart)
-        return replace(response, balance=balance), carried
+        load_response = load_response_of(found.stationary, works, total.on_probe[-1], mirrored, apart=loads.apart)
+        return replace(response, balance=balance), load_response
 
     @stage("error bar")
     def _estimated(
@@ -211,7 +214,7 @@ class QuasiStaticProblem:
         elements, whole = self.elements, 2.0 ** len(self._body.mirrored)
         with ExitStack() as stack:
             finer = solver.enrich(columns, loads, stack, keep=self._conditions.front is not None)
-            form = _form(solution.response, solution.carried)
+            form = _form(solution.response, solution.load_response)
             if finer.decrements is None:
                 products = finer.elements.products(law, finer.columns, checked=False)
                 decrements = form - _form(*self._response(products, finer.columns, law, loads))
@@ -322,9 +325,9 @@ def _close(columns: list[Column], response: Response) -> Loads:
     return response.loads.closed(share)
 
 
-def _form(response: Response, carried: Carried | None) -> FloatArray:
+def _form(response: Response, load_response: LoadResponse | None) -> FloatArray:
     """Return the stiffness, with a row more for loads."""
-    return response.stiffness if carried is None else carried.form
+    return response.stiffness if load_response is None else load_response.form
 
 
 def _energy_beyond(loads: Loads, mu: float, mirrored: Sequence[int]) -> FloatArray | float:

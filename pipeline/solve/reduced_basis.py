@@ -21,7 +21,7 @@ from pipeline.solve.krylov import LinearSolver, keep
 from pipeline.solve.loads import Loads
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.reaction import Response, reaction
+from pipeline.solve.response import Response, reaction
 from pipeline.solve.vectors import global_sum, vector
 
 # λ_min is estimated from above, by Lanczos: its share that is relied on.

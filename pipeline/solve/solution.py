@@ -7,13 +7,13 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.carried import Carried, load_bars
-from pipeline.solve.error import extrapolate, extrapolate_found
+from pipeline.solve.crack import Advance
+from pipeline.solve.estimate import extrapolate, extrapolate_found
 from pipeline.solve.krylov import SolveError
+from pipeline.solve.load_response import LoadResponse, load_bars
 from pipeline.solve.loads import Loads, Vector
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.reaction import Response
-from pipeline.solve.release import Advance
+from pipeline.solve.response import Response
 from pipeline.stages import Times
 
 # F·d = 2U and F_probe + F_support = 0 hold for the exact solution of the discrete system, and are linear in the
@@ -53,7 +53,7 @@ class Solution:
     """What one solve gives; all values global and equal on every rank."""
 
     response: Response
-    carried: Carried | None = None  # what loads do while the probe is held
+    load_response: LoadResponse | None = None  # what loads do while the probe is held
     # Largest values of all cells clear of singular edges, numbers by name (pipeline.solve.cell_values).
     largest: dict[str, Any]
     # Strain energy (J) where that is not half of F d.
@@ -65,7 +65,7 @@ class Solution:
     iterations: int
     times: Times
 
-    # The error bar (pipeline.solve.error): what one degree more takes away from the stiffness (n, n), and 95 % bars on
+    # The error bar (pipeline.solve.estimate): what one degree more takes away from the stiffness (n, n), 95 % bars on
     # its entries; the share of edges at the rim without quarter points; N of mixed elements, in units of the energies
     # on the diagonal (n).
     decrements: FloatArray | None = None
@@ -82,7 +82,7 @@ class Solution:
     sag: float = nan
     load_energy: float = nan
 
-    # Energy released (pipeline.solve.release) by a slit's front, and by the tip of a blade along which tissue slides.
+    # Energy released (pipeline.solve.crack) by a slit's front, and by the tip of a blade along which tissue slides.
     front: Advance | None = None
     tip: Advance | None = None
 
@@ -156,10 +156,10 @@ class Solution:
         if apart:
             for matrix in (decrements, bars):
                 matrix[:count, :count] = np.diag(np.diag(matrix)[:count])
-        loaded = self.carried and replace(
-            self.carried, decrements=decrements, bars=load_bars(bars, decrements, element)
+        loaded = self.load_response and replace(
+            self.load_response, decrements=decrements, bars=load_bars(bars, decrements, element)
         )  # fmt: skip
-        return replace(self, decrements=decrements[:count, :count], bars=bars[:count, :count], carried=loaded)
+        return replace(self, decrements=decrements[:count, :count], bars=bars[:count, :count], load_response=loaded)
 
     @property
     def release(self) -> float:
@@ -196,9 +196,9 @@ class Solution:
             elsewhere=elsewhere, unseen=self.unseen,
         )  # fmt: skip
         best = replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
-        if self.carried is not None:
-            loaded = self.carried.extrapolated(degree, element, plain=self.plain, graded=graded)
-            best = replace(best, carried=loaded)
+        if self.load_response is not None:
+            loaded = self.load_response.extrapolated(degree, element, plain=self.plain, graded=graded)
+            best = replace(best, load_response=loaded)
         amounts = self.response.amounts
         return replace(
             best,

@@ -10,9 +10,9 @@ from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.run.dead_loads import dead_loads_of
 from pipeline.run.meshing import mesh_case
-from pipeline.solve.carried import load_bars
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.dead_loads import apply_loads
+from pipeline.solve.load_response import load_bars
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.vectors import global_sum, vector

@@ -12,7 +12,7 @@ from petsc4py import PETSc
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.run.meshing import mesh_arrays, mesh_case
 from pipeline.solve.conditions import Conditions
-from pipeline.solve.error import error_bar
+from pipeline.solve.estimate import error_bar
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.mixed_space import MixedSpace

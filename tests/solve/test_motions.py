@@ -16,7 +16,7 @@ from pipeline.solve.conditions import Conditions
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.reaction import Sums
+from pipeline.solve.response import Sums
 from pipeline.solve.spaces import Spaces
 from pipeline.study.problems import StudyError
 from pipeline.study.sweep import Scale

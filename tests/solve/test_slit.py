@@ -9,8 +9,8 @@ from mpi4py import MPI
 from pipeline import compat
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import conditions_of, loads_of
+from pipeline.solve.crack import Release
 from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.release import Release
 from pipeline.solve.rim import clear_cells
 from pipeline.solve.spaces import Spaces
 from pipeline.verify.slits import strip

@@ -26,11 +26,11 @@ from pipeline.solve.contact.error import decrement, found_again
 from pipeline.solve.contact.sweep import Sweep
 from pipeline.solve.contact.touch import Touch
 from pipeline.solve.dead_loads import Applied
-from pipeline.solve.error import error_bar, found_again_bar, found_bar
+from pipeline.solve.estimate import error_bar, found_again_bar, found_bar
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.reaction import Response
+from pipeline.solve.response import Response
 from pipeline.solve.rim import plain_share
 from pipeline.solve.solution import TOLERANCE, Solution, check_balance
 from pipeline.solve.spaces import Spaces

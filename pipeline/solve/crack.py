@@ -31,7 +31,7 @@ from mpi4py import MPI
 from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve.compiled import form, scalar_space, vector_space
-from pipeline.solve.error import extrapolate_release, release_bar
+from pipeline.solve.estimate import extrapolate_release, release_bar
 from pipeline.solve.forms import ElasticForms, dx, one_cell
 from pipeline.solve.loads import Vector
 from pipeline.solve.physics import strain

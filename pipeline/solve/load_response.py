@@ -4,7 +4,7 @@ With u = Σ a_i u_i + w, u_i the solutions for units of the motions and w that o
 twice the potential energy is a'K a + 2 a'g - a(w, w), where K_ij = a(u_i, u_j) and g_i = -f·u_i (E. Betti): the force
 that the probe needs along motion i to stand still. Written as a(u_i, w) - f·u_i, g is stationary in both solutions; one
 degree more changes the whole form by minus the products of its corrections, as it does K: the errors and their bars are
-those of :mod:`pipeline.solve.error`, for a matrix of one row more.
+those of :mod:`pipeline.solve.estimate`, for a matrix of one row more.
 
 By Cauchy and Schwarz the bar on g_i is the root of those on K_ii and a(w, w), as if the errors of u_i and w were at the
 same places. How far they are is told by their corrections: |S_ij| / (S_ii S_jj)^½, the cosine of the angle between them
@@ -18,10 +18,10 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.dead_loads import Applied
-from pipeline.solve.error import extrapolate
+from pipeline.solve.estimate import extrapolate
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads, Vector
-from pipeline.solve.reaction import Sums, whole_force
+from pipeline.solve.response import Sums, whole_force
 
 # A bar on what loads do to the probe, in units of the root of both bars: so many cosines, and what remains without.
 # Measured: docs/accuracy.md.
@@ -31,7 +31,7 @@ _NO_WORK = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Carried:
+class LoadResponse:
     """The form of twice the potential energy (J) for n motions and, last, the loads; of the whole body, global.
 
     ``form`` (n + 1, n + 1) holds K, g and -a(w, w). ``forces`` (3) is the force of the tissue on the probe (N) from
@@ -72,11 +72,11 @@ class Carried:
                 return float(self.form[number, number])
         return float("nan")
 
-    def times(self, unit: float) -> "Carried":
+    def times(self, unit: float) -> "LoadResponse":
         """Return it in newtons, given that for moduli in a ``unit`` (Pa)."""
         return replace(self, form=unit * self.form, forces=unit * self.forces)
 
-    def extrapolated(self, degree: int, element: str, *, plain: float, graded: bool) -> "Carried":
+    def extrapolated(self, degree: int, element: str, *, plain: float, graded: bool) -> "LoadResponse":
         """Return what the sequence of degrees tends to, itself without bars."""
         if self.decrements is None or self.bars is None:
             return self
@@ -86,9 +86,9 @@ class Carried:
         return replace(self, form=form, bars=bars)
 
 
-def carried_of(
+def load_response_of(
     energies: FloatArray, works: FloatArray, on_probe: FloatArray, mirrored: Sequence[int], *, apart: bool
-) -> Carried:
+) -> LoadResponse:
     """Return what the loads do, from what belongs to the modelled part.
 
     ``energies`` (n + 1, n + 1) are the a(u_i, u_j) of all solutions, or what takes their place in a mixed method,
@@ -104,7 +104,7 @@ def carried_of(
         form[:-1, :-1] = np.diag(np.diag(form[:-1, :-1]))
     form[:, -1] -= works
     form[-1, :] -= works
-    return Carried(2.0 ** len(mirrored) * form, -whole_force(on_probe, mirrored))
+    return LoadResponse(2.0 ** len(mirrored) * form, -whole_force(on_probe, mirrored))
 
 
 def shares(decrements: FloatArray, form: FloatArray) -> FloatArray:
