@@ -76,9 +76,11 @@ class MeridianProblem(DirectProblem):
             best = best_answer(solve_on, self._accuracy)
         a, mu, (amount,) = self._meridian.unit, law.lame_mu[0], loads.amounts
         response = reaction(
-            loads, np.array([[mu * a * best.stationary]]), np.array([[0.0, 0.0, mu * a * best.on_probe]]),
+            loads,
+            np.array([[mu * a * best.stationary]]),
+            np.array([[0.0, 0.0, mu * a * best.on_probe]]),
             balance=best.balance,
-        )  # fmt: skip
+        )
         return Solution(
             response=response,
             largest={"max_strain": abs(amount) / a * best.max_strain},

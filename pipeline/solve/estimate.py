@@ -31,9 +31,11 @@ _MOST = 0.9
 # F is at F_{p+1} - (centre ± spread) θ s on meshes graded to the edge, by element and degree; of several movements of
 # mixed elements; on other meshes, and without quarter points.
 _LIMITS = {
-    ("displacement", 2): (0.4, 0.25), ("displacement", 3): (0.4, 0.25),
-    ("mixed", 2): (0.38, 0.3), ("mixed", 3): (0.58, 0.34),
-}  # fmt: skip
+    ("displacement", 2): (0.4, 0.25),
+    ("displacement", 3): (0.4, 0.25),
+    ("mixed", 2): (0.38, 0.3),
+    ("mixed", 3): (0.58, 0.34),
+}
 _LIMITS_SEVERAL = (0.5, 0.35)
 # Or, of mixed elements, at ± so many θ (N - |s|) from there, if that is more: s is then what two errors leave of each
 # other, and N knows of both.
@@ -83,9 +85,17 @@ def stiffness_bars(stiffness: FloatArray, relative: FloatArray, *, apart: bool =
 
 
 def extrapolate(
-    stiffness: FloatArray, decrements: FloatArray, bars: FloatArray, degree: int, element: str, *,
-    plain: float = 0.0, graded: bool = True, elsewhere: bool = False, unseen: FloatArray | None = None,
-) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    stiffness: FloatArray,
+    decrements: FloatArray,
+    bars: FloatArray,
+    degree: int,
+    element: str,
+    *,
+    plain: float = 0.0,
+    graded: bool = True,
+    elsewhere: bool = False,
+    unseen: FloatArray | None = None,
+) -> tuple[FloatArray, FloatArray]:
     """Return the stiffness (n, n) that the degrees tend to, and the bars on its entries.
 
     ``decrements`` is K_p - K_{p+1}, ``bars`` those on K_p: of each, the same share of F_p is left, or more where

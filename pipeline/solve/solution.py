@@ -158,7 +158,7 @@ class Solution:
                 matrix[:count, :count] = np.diag(np.diag(matrix)[:count])
         loaded = self.load_response and replace(
             self.load_response, decrements=decrements, bars=load_bars(bars, decrements, element)
-        )  # fmt: skip
+        )
         return replace(self, decrements=decrements[:count, :count], bars=bars[:count, :count], load_response=loaded)
 
     @property
@@ -192,9 +192,16 @@ class Solution:
             )
             return replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
         stiffness, bars = extrapolate(
-            self.stiffness, self.decrements, self.bars, degree, element, plain=self.plain, graded=graded,
-            elsewhere=elsewhere, unseen=self.unseen,
-        )  # fmt: skip
+            self.stiffness,
+            self.decrements,
+            self.bars,
+            degree,
+            element,
+            plain=self.plain,
+            graded=graded,
+            elsewhere=elsewhere,
+            unseen=self.unseen,
+        )
         best = replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
         if self.load_response is not None:
             loaded = self.load_response.extrapolated(degree, element, plain=self.plain, graded=graded)
@@ -219,9 +226,14 @@ class Problem(Protocol):
     def __exit__(self, *_: object) -> None: ...
 
     def solve(
-        self, law: MaterialLaw, loads: Loads, *, method: str = "auto", tolerance: float = TOLERANCE,
+        self,
+        law: MaterialLaw,
+        loads: Loads,
+        *,
+        method: str = "auto",
+        tolerance: float = TOLERANCE,
         estimate: bool = False,
-    ) -> Solution:  # fmt: skip
+    ) -> Solution:
         """Solve; ``estimate`` adds error bars. Collective.
 
         Raises:
