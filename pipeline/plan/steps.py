@@ -78,10 +78,9 @@ class OperatorStep:
 
     @property
     def sweeps(self) -> tuple[tuple[Solve, ...], ...]:
-        """The solves by material, those of each in the order of their depths."""
+        """The solves by material, loads and place, those of each in the order of their depths."""
         return tuple(
-            tuple(sorted(group, key=lambda solve: solve.case.probe.depth))
-            for group in _grouped(self.solves, lambda solve: tuple(tissue.lame for tissue in solve.case.tissues))
+            tuple(sorted(group, key=lambda solve: solve.case.probe.depth)) for group in _grouped(self.solves, _scene_of)
         )
 
     @property
@@ -136,6 +135,12 @@ def mesh_steps(solves: Collection[Solve], *, shared: bool = True) -> tuple[MeshS
 def _mesh_of(solve: Solve) -> Hashable:
     """Tell apart the meshes of solves: each meridian is one of its own."""
     return (solve.key if solve.axisymmetric else mesh_key(solve.meshed_case), solve.mirrors)
+
+
+def _scene_of(solve: Solve) -> Hashable:
+    """Tell apart what differs by more than the depth."""
+    case = solve.case
+    return tuple(tissue.lame for tissue in case.tissues), case.load, case.densities, case.probe.at
 
 
 def _grouped(solves: Collection[Solve], key: Callable[[Solve], Hashable]) -> list[tuple[Solve, ...]]:

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterable
+from functools import cache
 
 from mpi4py import MPI
 
@@ -10,7 +11,7 @@ from pipeline.mesh.of_case import mesh_arrays
 from pipeline.plan.far_fields import far_mesh
 from pipeline.plan.symmetry import mirror_planes
 from pipeline.shapes.body import Body
-from pipeline.solve.far_field import FarField, Place, PointForce
+from pipeline.solve.far_field import Place, PointForce
 from pipeline.solve.regular import BodyField, Smooth, regular_parts
 from pipeline.stages import stage
 from pipeline.study.closure import FarRegion, room
@@ -22,7 +23,7 @@ _Key = tuple[Body, Place, float, FarRegion | None]
 _known: dict[_Key, tuple[Smooth, float]] = {}
 
 
-def far_field_of(case: Case) -> FarField:
+def far_field_of(case: Case) -> PointForce | BodyField:
     """Return the far field of a closed case; every rank finds it for itself.
 
     Raises:
@@ -34,7 +35,7 @@ def far_field_of(case: Case) -> FarField:
         return near
     if _key(case) not in _known:
         _find(_mesh_of(case), [case])
-    return BodyField(near, *_known[_key(case)])
+    return _field(near, *_known[_key(case)])
 
 
 def share_far_fields(cases: Iterable[Case]) -> None:
@@ -73,6 +74,10 @@ def _find(mesh: BodyMesh, cases: list[Case]) -> None:
     seconds = (time.perf_counter() - start) / len(found)
     for case, smooth in zip(cases, found, strict=True):
         _known[_key(case)] = smooth, seconds
+
+
+# One of each: what is computed for a far field is kept by it.
+_field = cache(BodyField)
 
 
 def _key(case: Case) -> _Key:

@@ -22,7 +22,15 @@ from pipeline.study.sweep import Case
 _ROUNDING = 1e-9
 # Contact is no longer where the mesh is graded to if it begins farther from the axis, in units of its half width.
 _BESIDE = 0.1
-BARS = ("force_error", "force_vector_error", "stiffness_error", "energy_release_error", "load_force_error")
+BARS = (
+    "force_error",
+    "force_vector_error",
+    "stiffness_error",
+    "energy_release_error",
+    "load_force_error",
+    "contact_area_error",
+    "contact_radius_error",
+)
 TIMES = ("time_mesh", "time_assemble", "time_setup", "time_solve")
 
 

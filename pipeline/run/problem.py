@@ -1,6 +1,7 @@
 """What solves a case on its mesh, if the memory is there for it."""
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -19,18 +20,21 @@ from pipeline.solve.conditions import Conditions
 from pipeline.solve.contact.active_set import ContactError
 from pipeline.solve.contact.problem import ContactProblem, Tool
 from pipeline.solve.crack import Front
+from pipeline.solve.far_field import FarField, Place, PointForce
 from pipeline.solve.krylov import SolveError, is_direct
 from pipeline.solve.loads import Loads
 from pipeline.solve.meridian_contact import MeridianContact
 from pipeline.solve.meridian_trials import RoundTool
 from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.solve.quasi_static import QuasiStaticProblem
+from pipeline.solve.regular import BodyField
 from pipeline.solve.solution import FieldProblem, Problem, Solution
 from pipeline.solve.spaces import Spaces
 from pipeline.study.sweep import Case
 
 # Unknowns up to which a direct solve is a way out where iterations do not converge.
 _MOST_DIRECT = 100_000
+_FAR_FIELDS = 1_000  # that are remembered, of some kilobytes each
 # What is virtually moved round a slit's front is this near to it, in units of the distance to anything else.
 _CLEAR = 0.7
 
@@ -40,9 +44,9 @@ class CaseFailure(Exception):
 
 
 def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: bool = False) -> FieldProblem:
-    """Return what solves ``case`` in the spaces of its mesh, by the elements that suit it; collective.
+    """Return what solves cases in the spaces of the mesh of ``case``, by the elements that suit it; collective.
 
-    ``condense`` says that many depths are to come.
+    ``case`` is the one that the mesh was made for: the tool is there. ``condense`` says that many depths are to come.
     """
     if case.probe.is_unilateral:
         return ContactProblem(
@@ -154,9 +158,15 @@ def _movement_of(case: Case, meshed: Case) -> Loads:
         pressed = Loads.along(travel) if case.probe.contact == "bonded" else Loads((), ())
         return pressed.opened(case.frame.upright.across, slit.width / 2)
     if case.is_closed:
-        return Loads.along(travel).with_far(far_field_of(case).moved(meshed.frame.point))
+        return Loads.along(travel).with_far(_moved(far_field_of(case), meshed.frame.point))
     # Across a plane of symmetry a probe slides without force along its axis, and presses without force along itself.
     return Loads.along(travel, apart=mirror_planes(case) != movement_planes(case))
+
+
+@lru_cache(_FAR_FIELDS)
+def _moved(far: PointForce | BodyField, centre: Place) -> FarField:
+    """Return the same for the same: what is computed for a far field is kept by it."""
+    return far.moved(centre)
 
 
 def law_of(case: Case) -> MaterialLaw:

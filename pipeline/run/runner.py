@@ -138,15 +138,16 @@ class StepRunner:
     def _operate(self, step: OperatorStep, meshed: Meshed) -> None:
         """Solve every material of an operator, or a few of them and the rest from these."""
         self._begin(*step.solves)
+        first = step.solves[0]
         condense, reuse = self._condenses(step, meshed.mesh), self._plan.reuse
-        problem = self._caught(lambda: problem_of(meshed.spaces, step.case, reuse=reuse, condense=condense))
+        problem = self._caught(lambda: problem_of(meshed.spaces, first.meshed_case, reuse=reuse, condense=condense))
         if isinstance(problem, Failure):
             self._fail(step.solves, problem)
             return
         if step.case.has_own_far_field:
             self._share_far_fields()
         with problem:
-            if step.solves[0].reduced and isinstance(problem, QuasiStaticProblem):
+            if first.reduced and isinstance(problem, QuasiStaticProblem):
                 self._reduce(step, problem, meshed)
             for solve in in_order(step, condensed=condense) if reuse or condense else step.solves:
                 if solve.key not in self._records:
@@ -203,7 +204,7 @@ class StepRunner:
         """Compute one case, mesh and all; collective."""
         with recorded() as times:
             mesh = self._mesh(solve)
-        with Spaces(mesh) as spaces, problem_of(spaces, solve.case) as problem:
+        with Spaces(mesh) as spaces, problem_of(spaces, solve.meshed_case) as problem:
             record = self._solve(solve, problem, Meshed(spaces, times, memory), bar)
         del mesh, spaces, problem
         give_back(self._comm)

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from pipeline import __version__
 from pipeline.cli import app
 from pipeline.cli.console import print_json
-from pipeline.report.figures.choose import KINDS
+from pipeline.report.figures import KINDS
 from tests.commands import ENVIRONMENT, ROOT
 from tests.conftest import SMALL
 

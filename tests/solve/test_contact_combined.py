@@ -91,6 +91,17 @@ def test_depths_with_loads_on_one_mesh_are_those_of_each_alone():
         assert found.force == pytest.approx(alone[index].force, rel=1e-8)
 
 
+def test_depths_without_loads_have_their_own_bars_beside_loads():
+    depths = [f"{depth:.4g} mm" for depth in np.linspace(0.04, 0.12, 10)]
+    probe = SPHERE | {"depth": depths, "depth_range": [depths[0], depths[-1]]}
+    scene = {"body": BOX, "probe": probe, "mesh": MESH}
+    loads = [{"name": "pulled", **pulled(20.0)}, {"name": "none"}]
+    beside, alone = solve(**scene, load=loads), solve(**scene)
+    for (number,), found in alone.items():
+        other = next(beside[index] for index in ((number, 1), (1, number)) if index in beside)
+        assert other.force_error == pytest.approx(found.force_error, rel=1e-4)
+
+
 @pytest.mark.mpi
 @pytest.mark.parametrize("changes", [{"load": GRAVITY, "material": TISSUE}, {"mesh": BALL}], ids=["loads", "far field"])
 def test_ranks_agree(changes):
@@ -116,6 +127,26 @@ def test_half_ball_of_a_much_larger_body_is_that_body():
     whole = record(body=large, mesh={"epsilon": "8 mm", "coarse": "20 mm"})
     part = record(body=large, mesh={"epsilon": "8 mm", "coarse": "20 mm", "outside": "green"})
     assert part.force == pytest.approx(whole.force, rel=0.004)
+
+
+def test_half_ball_that_a_half_space_closes_is_the_same_at_every_place():
+    """All places share one mesh, on which the tool is where the mesh is made for it."""
+    centre, beside = (record(probe=SPHERE | {"at": [at, "0 mm"]}, mesh=BALL) for at in ("0 mm", "3 mm"))
+    assert beside.force == pytest.approx(centre.force, rel=1e-8)
+    timed = record(probe=SPHERE | {"at": ["3 mm", "0 mm"]}, mesh=BALL, solve={"timing": True})
+    assert timed.force == pytest.approx(centre.force, rel=1e-8)
+    assert timed.contact_radius_error == pytest.approx(centre.contact_radius_error, rel=1e-3)
+
+
+def test_places_on_a_half_ball_have_the_forces_and_bars_of_each_alone():
+    ball = BALL | {"outside": "green"}
+    together = solve(body=BOX, mesh=MESH | ball, probe=SPHERE | {"at": [["2 mm", "0 mm"], ["9 mm", "0 mm"]]})
+    first, second = (found.force for found in together.values())
+    assert abs(second / first - 1) > 1e-3
+    for found, at in zip(together.values(), ("2 mm", "9 mm"), strict=True):
+        alone = record(probe=SPHERE | {"at": [at, "0 mm"]}, mesh=ball)
+        assert found.force == pytest.approx(alone.force, rel=2e-3)  # far fields of several places share a mesh
+        assert found.force_error == pytest.approx(alone.force_error, rel=0.02)
 
 
 @pytest.mark.parametrize("poisson", [0.3, 0.48])

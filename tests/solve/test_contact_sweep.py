@@ -14,6 +14,7 @@ from pipeline.report.dataset import build
 from pipeline.run.execute import compute
 from pipeline.solve.contact.condensed import CondensedElements
 from pipeline.solve.contact.sweep import Sweep
+from pipeline.solve.far_field import PointForce
 from pipeline.solve.physics import MaterialLaw
 from pipeline.study.problems import StudyError
 from tests.cases import study
@@ -152,3 +153,4 @@ def test_bars_between_two_depths_are_those_of_the_worse_one():
         assert sweep.bar(depth) == pytest.approx((1.25 * 2e-3, 1.25 * 2e-2))
     assert sweep.bar(2e-4) is None  # too far from one of them
     assert sweep.bar(5e-4) is None
+    assert sweep.bar(1e-4, PointForce(0.3, (0.0, 0.0, 0.0), 1e-2)) is None  # of another scene

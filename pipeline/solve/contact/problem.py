@@ -289,12 +289,14 @@ class ContactProblem:
     # ---- error bar ------------------------------------------------------------------------------------
 
     def _estimate_of(self, sweep: Sweep, obstacle: Obstacle, found: Found, loaded: FreeResponse | None) -> "_Bar":
-        """Return the error bar on the force; collective."""
-        known = sweep.bar(obstacle.depth) if loaded is None else None
-        if known is not None:
+        """Return the error bar on the force; collective. Where loads act each depth has its own."""
+        if loaded is not None:
+            return _Bar(*self._estimated(sweep.elements, sweep.law, found, loaded))
+        far = None if sweep.elements.far is None else sweep.elements.far.field
+        if (known := sweep.bar(obstacle.depth, far)) is not None:
             return _Bar(*known, 0)
         taken, share, more = self._estimated(sweep.elements, sweep.law, found, loaded)
-        sweep.keep_bar(obstacle.depth, taken, share)
+        sweep.keep_bar(obstacle.depth, taken, share, far)
         return _Bar(taken, share, more)
 
     def _estimated(

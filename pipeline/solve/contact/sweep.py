@@ -8,6 +8,7 @@ import numpy as np
 from pipeline.arrays import BoolArray
 from pipeline.solve.contact.active_set import Found, Obstacle, find_set
 from pipeline.solve.contact.elements import ContactElements, Unknowns
+from pipeline.solve.far_field import FarField
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import Times
 
@@ -50,7 +51,7 @@ class Sweep:
     stack: ExitStack
     cost: Times = field(default_factory=Times)
     _known: list[_Known] = field(default_factory=list)
-    _bars: dict[float, tuple[float, float]] = field(default_factory=dict)
+    _bars: dict[FarField | None, dict[float, tuple[float, float]]] = field(default_factory=dict)
 
     def close(self) -> None:
         """Free the elements."""
@@ -105,18 +106,22 @@ class Sweep:
         others = [known for known in self._known if known.depth != depth]
         self._known = [*others, _Known(depth, found, self.elements.unknowns())][-_REMEMBERED:]
 
-    def keep_bar(self, depth: float, taken: float, share: float) -> None:
-        """Remember the share of the energy that one degree more takes away at a ``depth`` (m), and the force's bar."""
-        self._bars[depth] = taken, share
+    def keep_bar(self, depth: float, taken: float, share: float, far: FarField | None = None) -> None:
+        """Remember the share of the energy that one degree more takes away at a ``depth`` (m), and the force's bar.
 
-    def bar(self, depth: float) -> tuple[float, float] | None:
+        ``far`` is the far field on the cut face, None without one: another one has other bars.
+        """
+        self._bars.setdefault(far, {})[depth] = taken, share
+
+    def bar(self, depth: float, far: FarField | None = None) -> tuple[float, float] | None:
         """Return both shares between two near depths for which they are known, on a condensed surface alone."""
-        below, above = [d for d in self._bars if d <= depth], [d for d in self._bars if d >= depth]
+        bars = self._bars.get(far, {})
+        below, above = [d for d in bars if d <= depth], [d for d in bars if d >= depth]
         if not (self.elements.is_exact and below and above):
             return None
         ends = max(below), min(above)
         if ends[1] > NEAR * ends[0]:
             return None
-        taken, share = max((self._bars[end] for end in ends), key=lambda pair: pair[1])
+        taken, share = max((bars[end] for end in ends), key=lambda pair: pair[1])
         factor = _SAFE if ends[0] < ends[1] else 1.0
         return factor * taken, factor * share
