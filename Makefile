@@ -33,7 +33,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's own mpirun: another one on PATH would not fit Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies docs test test-debian13 debian release slurm-test verify benchmark peers plain-loop realtime resolution stress coverage pairs fuzz soak faults mutants lint format clean
+.PHONY: help setup study studies docs test test-all test-debian13 debian release slurm-test verify benchmark peers plain-loop realtime resolution stress coverage pairs fuzz soak faults mutants lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -59,6 +59,11 @@ docs: setup ## build the documentation; a warning is an error
 test: ## run the tests, by themselves and on 2 ranks
 	@scripts/setup.sh chromium
 	$(PYTHON) -m pytest $(SIDE_BY_SIDE) $(PYTEST_ARGS) </dev/null
+	$(MPIRUN) 2 scripts/one-voice.sh $(PYTHON) -m mpi4py -m pytest -m mpi -p no:cacheprovider $(PYTEST_ARGS) </dev/null $(NONE_OK)
+
+test-all: ## run the tests with those that are left to the night
+	@scripts/setup.sh chromium
+	$(PYTHON) -m pytest $(SIDE_BY_SIDE) -m "not slurm" $(PYTEST_ARGS) </dev/null
 	$(MPIRUN) 2 scripts/one-voice.sh $(PYTHON) -m mpi4py -m pytest -m mpi -p no:cacheprovider $(PYTEST_ARGS) </dev/null $(NONE_OK)
 
 test-debian13: ## run the tests on Debian 13, in a root of its own (needs root)

@@ -63,6 +63,7 @@ tolerance = 1e-8
 """
 
 
+@pytest.mark.nightly
 def test_the_program_is_run_with_and_without_f_exact(tmp_path):
     file = tmp_path / "small.toml"
     file.write_text(STUDY)

@@ -44,6 +44,7 @@ def test_cells_that_a_surface_and_regions_ask_for(body):
 
 
 @pytest.mark.parametrize("method", ["direct", "iterative"])
+@pytest.mark.nightly
 def test_memory_of_a_solve_is_not_underestimated(method):
     """In a process of its own: one that has solved before keeps memory for the next time."""
     code = (

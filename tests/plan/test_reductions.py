@@ -162,6 +162,7 @@ def test_story_tells_what_a_change_costs_with_the_reductions_that_are_used(witho
     assert timed["young, depth"] == "mesh, assembly and solve"
 
 
+@pytest.mark.nightly
 def test_plan_of_a_hundred_thousand_cases_is_made_of_few_steps():
     ratios = [0.2 + 0.002 * i for i in range(100)]
     radii = [f"{1 + 0.1 * i:.1f} mm" for i in range(20)]

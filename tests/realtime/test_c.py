@@ -150,6 +150,7 @@ def test_several_tools_are_those_of_numpy(library, tmp_path, kind):
     assert {library.epsmesh_word(touch.status) for touch in touches} == {b"input"}
 
 
+@pytest.mark.nightly
 def test_a_damaged_file_breaks_nothing(tmp_path):
     write_random(tmp_path / "model.nc")
     program = tmp_path / "test_epsmesh"

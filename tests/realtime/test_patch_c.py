@@ -94,6 +94,7 @@ def test_c_and_numpy_agree(library, tmp_path, kind):
     assert seen >= {"ok", "lost", "outside", "input"}
 
 
+@pytest.mark.nightly
 def test_nothing_breaks_it(tmp_path):
     write_random(tmp_path / "model.nc")
     (tmp_path / "main.c").write_text(_PROGRAM)

@@ -230,6 +230,7 @@ def test_a_figure_that_does_not_suit_says_what_it_lacks(kind):
     assert lacks(dataset(), "force") == ""
 
 
+@pytest.mark.nightly
 def test_the_same_dataset_gives_the_same_file_whatever_the_users_settings_of_matplotlib_are(tmp_path):
     """Nor on a matplotlibrc in the folder that one is in, which may be a stranger's."""
     data = dataset(**LARGE | {"material": {"poisson": [0.3, 0.4]}, "mesh": MESHES})

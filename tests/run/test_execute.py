@@ -258,6 +258,7 @@ def test_gmsh_failure_is_a_failed_case(monkeypatch):
 
 
 @pytest.mark.skipif(WORLD.size > 1, reason="serial")
+@pytest.mark.nightly
 def test_many_cases_do_not_grow_memory():
     """120 cases with as many meshes: what the first forty leave behind is all there ever is."""
     sizes = [f"{5 + 0.01 * i} mm" for i in range(120)]

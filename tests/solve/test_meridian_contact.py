@@ -99,6 +99,7 @@ def test_a_thin_layer_is_touched_as_far_as_it_is_pressed_down():
     assert found.reaction[2] == pytest.approx(pi * 200.0 * depth**2 / 0.04, rel=0.03)  # springs of E / H, ν = 0
 
 
+@pytest.mark.nightly
 def test_the_work_of_the_force_is_the_energy():
     """Between depths dU = F dd, on a body that is round itself: force, radius and energy belong together."""
     section, semi_height, radius = Rounded(pi / 2.4, 0.5), 25.0, 40.0

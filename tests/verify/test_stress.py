@@ -18,6 +18,7 @@ TRUTH = Record("", "ok", origin="axisymmetric", force=1.0, force_error=1e-6)
 
 
 @pytest.mark.skipif(WORLD.size > 1, reason="serial")
+@pytest.mark.nightly
 def test_quick_cells_pass():
     results = list(run(MPI.COMM_SELF, quick=True))
     assert len(results) > 40

@@ -60,6 +60,7 @@ def test_error_bars_of_random_scenes_hold():
     assert found.is_met
 
 
+@pytest.mark.nightly
 def test_error_bars_of_other_proportions_hold():
     found = Coverage(tuple(trials(MPI.COMM_SELF, 12, 3, "proportions")))
     assert len(found.trials) == 12
