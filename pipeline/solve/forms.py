@@ -217,7 +217,7 @@ def compile_forms(
         space = vector_space(mesh, level)
         elastic = ElasticForms(space, regions)
         _ = elastic.stiffness, elastic.action
-        if element == "mixed" and level >= degree:
+        if element == "mixed" and level > 1:  # contact is found from the lowest degree up
             mixed = MixedForms(elastic.displacement, scalar_space(mesh, level - 1))
             _ = mixed.mass, mixed.coupling, mixed.dilation, mixed.pull
         if law != "linear" and level >= degree:

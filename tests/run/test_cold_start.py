@@ -23,6 +23,12 @@ SCENES = {
     "green": {"mesh": {"epsilon": "6 mm", "outside": "green"}, "probe": {"at": ["3 mm", "2 mm"]}},
     "contact": {"probe": SPHERE},
     "slit": {"probe": {**BLADE, "contact": "frictionless", "incision": "6 mm"}},
+    "contact, mixed, degree 3": {
+        "material": {"poisson": 0.49},
+        "probe": SPHERE,
+        "mesh": {"degree": 3, "rim": "3 mm", "element": "mixed"},
+        "solve": {"method": "direct"},
+    },
     "mixed": {"material": {"poisson": 0.49}, "solve": {"method": "iterative"}},
     "large": {"material": {"law": "neo-hookean"}},
 }
