@@ -29,3 +29,9 @@ def _written(letter: str) -> str:
 
 def _is_seen(letter: str) -> bool:
     return letter.isprintable() or unicodedata.category(letter) == "Zs"
+
+
+def counted(number: int, noun: str) -> str:
+    """Write a number with its noun: ``1 case``, ``2 meshes``."""
+    plural = f"{noun}es" if noun.endswith("sh") else f"{noun}s"
+    return f"{number} {noun if number == 1 else plural}"

@@ -113,12 +113,6 @@ def write(name: str, value: Value, unit: str | None = None) -> str:
     return "" if isnan(value) else f"{value * factor:.6g} {word}".rstrip()
 
 
-def counted(number: int, noun: str) -> str:
-    """Write a number with its noun: ``1 case``, ``2 meshes``."""
-    plural = f"{noun}es" if noun.endswith("sh") else f"{noun}s"
-    return f"{number} {noun if number == 1 else plural}"
-
-
 def symbol(name: str) -> str:
     """Return the letter or the word for a quantity."""
     quantity = quantity_of(name)

@@ -23,6 +23,7 @@ from pipeline.run.progress import Progress, Terminal
 from pipeline.run.reading import read_rows
 from pipeline.run.record import Record
 from pipeline.run.store import Store, StoreError
+from pipeline.solve import CompilerError
 from pipeline.stages import stage
 from pipeline.study.sweep import Study
 
@@ -159,6 +160,8 @@ def abort_on_exception(comm: MPI.Comm) -> Iterator[None]:
     """End all ranks when one of them meets an error that nobody handles: the others would wait for ever."""
     try:
         yield
+    except CompilerError:  # on every rank
+        raise
     except Exception:
         if comm.size == 1:
             raise

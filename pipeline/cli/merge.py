@@ -23,7 +23,7 @@ from pipeline.cli.words import (
     load_all,
 )
 from pipeline.files import STORE_NAME, result_files
-from pipeline.quantities import counted
+from pipeline.printable import counted
 
 if TYPE_CHECKING:
     from pipeline.plan.plan import Plan

@@ -9,7 +9,7 @@ from pipeline.cli.console import error
 from pipeline.cli.words import axes_of, warn
 from pipeline.plan.plan import Plan
 from pipeline.plan.shard import Shard
-from pipeline.quantities import counted
+from pipeline.printable import counted
 from pipeline.run.remaining import format_seconds
 
 if TYPE_CHECKING:

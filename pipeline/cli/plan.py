@@ -26,7 +26,7 @@ from pipeline.cli.words import (
     warn,
 )
 from pipeline.files import STORE_NAME
-from pipeline.quantities import counted
+from pipeline.printable import counted
 from pipeline.run.remaining import format_seconds
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from pipeline.cli.console import print_json, warning
 from pipeline.cli.faults import DONE, SOME_FAILED, fail, of_file, refusing
 from pipeline.cli.words import DEFAULT_OUTPUT, Json, check_store
 from pipeline.files import STORE_NAME
-from pipeline.quantities import counted
+from pipeline.printable import counted
 
 if TYPE_CHECKING:
     from pipeline.run.store import Records

@@ -44,7 +44,7 @@ from pipeline.cli.words import (
     warn,
 )
 from pipeline.files import STORE_NAME, result_files
-from pipeline.quantities import counted
+from pipeline.printable import counted
 
 if TYPE_CHECKING:
     from pipeline.plan.plan import Plan
@@ -124,6 +124,7 @@ def run(
     from pipeline.cli.outcome import announce, conclude, print_stages
     from pipeline.cli.outcome import as_data as outcome_data
     from pipeline.run.store import StoreError
+    from pipeline.solve import CompilerError
 
     comm, found = workflow.world(), list[dict[str, Any]]()
     speaks, failed = comm.rank == 0, False
@@ -149,7 +150,7 @@ def run(
             progress = _progress(plan, verbose=verbose) if speaks and not quiet else None
             with workflow.abort_on_exception(comm):
                 outcome = workflow.run(plan, opened, comm, output, progress)
-        except StoreError as wrong:
+        except (StoreError, CompilerError) as wrong:
             fail(Fault(str(wrong), file=study.file))
         except workflow.ResultsError as wrong:
             fault, status = of_results(wrong, study.file)

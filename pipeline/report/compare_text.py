@@ -6,7 +6,8 @@ from typing import Any
 
 import pandas as pd
 
-from pipeline.quantities import counted, readable
+from pipeline.printable import counted
+from pipeline.quantities import readable
 from pipeline.report.compare import Comparison, Pair
 from pipeline.report.guide_text import percent
 

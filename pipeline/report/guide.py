@@ -11,7 +11,7 @@ from math import inf, isfinite
 import numpy as np
 import xarray as xr
 
-from pipeline.quantities import counted
+from pipeline.printable import counted
 from pipeline.report import guide_text
 from pipeline.report.guideline import Guideline
 from pipeline.report.sinking import tools

@@ -6,7 +6,8 @@ from pathlib import Path
 import pandas as pd
 from jinja2 import Environment, StrictUndefined
 
-from pipeline.quantities import counted, symbol, write
+from pipeline.printable import counted
+from pipeline.quantities import symbol, write
 from pipeline.report.guideline import Guideline
 from pipeline.report.laws import Law
 from pipeline.report.table import Labels, words

@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.arrays import BoolArray
-from pipeline.quantities import counted
+from pipeline.printable import counted
 from pipeline.report.table import words
 
 # Processes for each core above which some of them wait: times are then longer than what was done.

@@ -5,13 +5,14 @@ from collections.abc import Collection
 from mpi4py import MPI
 
 from pipeline.plan.steps import Solve
-from pipeline.solve.axisymmetric import compile_axisymmetric
+from pipeline.solve import CompilerError
 from pipeline.solve.cell_values import compile_cell_values
 from pipeline.solve.compiled import compiling
 from pipeline.solve.crack import compile_release
 from pipeline.solve.forms import compile_forms
 from pipeline.solve.kernels import native
-from pipeline.solve.meridian_trials import TRIAL_DEGREE
+from pipeline.solve.meridian.problem import compile_axisymmetric
+from pipeline.solve.meridian.trials import TRIAL_DEGREE
 from pipeline.solve.physics import LAWS
 from pipeline.solve.regular import compile_regular
 from pipeline.stages import stage
@@ -40,10 +41,10 @@ def prepare(comm: MPI.Comm, solves: Collection[Solve]) -> None:
                     for element, degree, of_regions, of_slit in sorted(missing):
                         _compile(element, degree, of_regions=of_regions, of_slit=of_slit)
                 _compiled.update(missing)
-            except native.CompilerError as error:
+            except CompilerError as error:
                 message = str(error)
     if message := comm.bcast(message):
-        raise native.CompilerError(message)
+        raise CompilerError(message)
 
 
 def _forms(solve: Solve) -> tuple[str, int, bool, bool]:

@@ -15,7 +15,6 @@ from pipeline.run.memory import FreeMemory
 from pipeline.run.room import MEMORY_SHARE
 from pipeline.shapes.contact import first_touch
 from pipeline.shapes.probes._round import RoundIndenter
-from pipeline.solve.axisymmetric import MeridianProblem
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.contact.active_set import ContactError
 from pipeline.solve.contact.problem import ContactProblem, Tool
@@ -23,8 +22,9 @@ from pipeline.solve.crack import Front
 from pipeline.solve.far_field import FarField, Place, PointForce
 from pipeline.solve.krylov import SolveError, is_direct
 from pipeline.solve.loads import Loads
-from pipeline.solve.meridian_contact import MeridianContact
-from pipeline.solve.meridian_trials import RoundTool
+from pipeline.solve.meridian.contact import MeridianContact
+from pipeline.solve.meridian.problem import MeridianProblem
+from pipeline.solve.meridian.trials import RoundTool
 from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.regular import BodyField

@@ -1,1 +1,5 @@
-"""Linear elasticity: operators, solvers, reaction force, checks. Knows nothing of study files."""
+"""Elasticity: operators, solvers, reaction force, checks. Knows nothing of study files."""
+
+
+class CompilerError(Exception):
+    """No C compiler works here; raised on every rank."""

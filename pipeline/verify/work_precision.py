@@ -23,9 +23,9 @@ from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import write
 from pipeline.run.execute import compute
 from pipeline.run.record import Record
-from pipeline.solve.axisymmetric import MeridianProblem
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.loads import Loads
+from pipeline.solve.meridian.problem import MeridianProblem
 from pipeline.solve.physics import MaterialLaw
 from pipeline.study.load import parse
 from pipeline.verify import known

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from pipeline.mesh.meridian import Grading, Meridian, generate_meridian
-from pipeline.solve.axisymmetric import MeridianProblem, compile_axisymmetric
 from pipeline.solve.compiled import compiling
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads, Motion
+from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
 from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.verify import known
 
@@ -112,7 +112,7 @@ def test_displacement_and_mixed_elements_agree(monkeypatch):
     meridian = Meridian(4, 3, 1, -1.0)
     forces = []
     for threshold in (0.3, 0.5):
-        monkeypatch.setattr("pipeline.solve.meridian_system.MIXED_FROM", threshold)
+        monkeypatch.setattr("pipeline.solve.meridian.system.MIXED_FROM", threshold)
         forces.append(solve_axisymmetric(meridian, 0.4, True).reaction[2])
     assert forces[0] == pytest.approx(forces[1], rel=1e-7)
 
@@ -152,7 +152,7 @@ def test_error_bar_holds_the_truth(seed, monkeypatch):
     support = [-height * random.uniform(0.05, 1), "bottom", "sides", "bottom+sides"][seed % 4]
     meridian, poisson = Meridian(radius, height, 1, support), [0.0, 0.3, 0.45, 0.49, 0.4999, 0.5][seed]
     exact = solve_axisymmetric(meridian, poisson, seed % 2 == 0)
-    monkeypatch.setattr("pipeline.solve.meridian_refine.GRADINGS", (Grading(1e-4, 1.4, 4.0),))
+    monkeypatch.setattr("pipeline.solve.meridian.refine.GRADINGS", (Grading(1e-4, 1.4, 4.0),))
     rough = solve_axisymmetric(meridian, poisson, seed % 2 == 0, degree=4)
     assert exact.bar < rough.bar
     assert rough.reaction[2] == pytest.approx(exact.reaction[2], rel=rough.bar + exact.bar)
@@ -202,7 +202,7 @@ def test_error_bar_of_layers_holds_the_truth(number, monkeypatch):
     meridian, moduli = LAYERED[number]
     exact = solve_layers(meridian, moduli, number % 2 == 0)
     assert exact.bar < 1e-5
-    monkeypatch.setattr("pipeline.solve.meridian_refine.GRADINGS", (Grading(1e-4, 1.4, 4.0),))
+    monkeypatch.setattr("pipeline.solve.meridian.refine.GRADINGS", (Grading(1e-4, 1.4, 4.0),))
     rough = solve_layers(meridian, moduli, number % 2 == 0, degree=4)
     assert exact.bar < rough.bar < 1e-2
     assert rough.reaction[2] == pytest.approx(exact.reaction[2], rel=rough.bar + exact.bar)

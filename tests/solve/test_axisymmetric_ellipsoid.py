@@ -7,11 +7,11 @@ import pytest
 
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Grading
-from pipeline.solve.axisymmetric import MeridianProblem, compile_axisymmetric
 from pipeline.solve.compiled import compiling
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads
+from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
 from pipeline.solve.physics import MaterialLaw
 from pipeline.verify import known
 
@@ -53,7 +53,7 @@ def test_error_bar_holds_the_truth(name, bonded, poisson, monkeypatch):
     exact = solve(SCENES[name], poisson, bonded)
     assert exact.bar < 1e-5
     assert exact.balance < 1e-9
-    monkeypatch.setattr("pipeline.solve.meridian_refine.GRADINGS", (Grading(1e-4, 1.4, 4.0),))
+    monkeypatch.setattr("pipeline.solve.meridian.refine.GRADINGS", (Grading(1e-4, 1.4, 4.0),))
     rough = solve(SCENES[name], poisson, bonded, degree=4)
     assert rough.reaction[2] == pytest.approx(exact.reaction[2], rel=rough.bar + exact.bar)
 
@@ -68,7 +68,7 @@ def test_arcs_are_followed_closely_enough(monkeypatch):
 def test_displacement_and_mixed_elements_agree(monkeypatch):
     forces = []
     for threshold in (0.3, 0.5):
-        monkeypatch.setattr("pipeline.solve.meridian_system.MIXED_FROM", threshold)
+        monkeypatch.setattr("pipeline.solve.meridian.system.MIXED_FROM", threshold)
         forces.append(solve(SCENES["flat"], 0.4, True).reaction[2])
     assert forces[0] == pytest.approx(forces[1], rel=3e-7)
 

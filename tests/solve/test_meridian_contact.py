@@ -13,14 +13,14 @@ from pipeline.report.dataset import build
 from pipeline.run.execute import compute
 from pipeline.scene.model import PROBE
 from pipeline.shapes.rounded import Rounded
-from pipeline.solve import meridian_signs
-from pipeline.solve.axisymmetric import MeridianProblem, compile_axisymmetric
 from pipeline.solve.compiled import compiling
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads
-from pipeline.solve.meridian_contact import DEGREE, MeridianContact
-from pipeline.solve.meridian_trials import TRIAL_DEGREE, RoundTool
+from pipeline.solve.meridian import signs
+from pipeline.solve.meridian.contact import DEGREE, MeridianContact
+from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
+from pipeline.solve.meridian.trials import TRIAL_DEGREE, RoundTool
 from pipeline.solve.physics import MaterialLaw
 from tests.cases import study
 
@@ -163,7 +163,7 @@ def test_a_pull_is_judged_by_the_mean_pressure(scale, steep, pulls):
     """Pressures 1 - c r² over a patch of radius 1, whose mean is 1 - c/2, of elements of degree 2."""
     ends = np.linspace(0.0, 1.0, 81)
     radii = np.linspace(0.0, 1.0, 161)
-    reactions = -meridian_signs._mass(radii, ends) @ (scale * (1 - steep * radii**2))
+    reactions = -signs._mass(radii, ends) @ (scale * (1 - steep * radii**2))
     here = np.arange(2 * len(radii)).reshape(-1, 2), np.column_stack([radii, 0 * radii])
     nowhere = np.zeros((0, 2), dtype=int), np.zeros((0, 2))
     forms = SimpleNamespace(on=lambda name: here if name == PROBE else nowhere)
@@ -173,9 +173,7 @@ def test_a_pull_is_judged_by_the_mean_pressure(scale, steep, pulls):
     residual[1::2] = reactions
     asked = forms, arrays, residual, residual, 1e-4, lambda r: r, 3e-3
     if not pulls:
-        meridian_signs.check_signs(*asked)
+        signs.check_signs(*asked)
         return
-    with pytest.raises(
-        meridian_signs.LiftsOff, match=r"1.99 mm from the axis the tool would pull with 1.5% of the mean"
-    ):
-        meridian_signs.check_signs(*asked)
+    with pytest.raises(signs.LiftsOff, match=r"1.99 mm from the axis the tool would pull with 1.5% of the mean"):
+        signs.check_signs(*asked)

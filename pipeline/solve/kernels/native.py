@@ -15,6 +15,7 @@ import cffi
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.solve import CompilerError
 from pipeline.solve.compiled import form_cache, quiet_compiler
 
 # Vectors of the cycle, and what products take in single precision.
@@ -22,10 +23,6 @@ Single = npt.NDArray[np.float32]
 
 _FLAGS = ("-O3", "-march=native", "-fvisibility=hidden")
 _FOLDER = Path(__file__).parent
-
-
-class CompilerError(Exception):
-    """No C compiler works here."""
 
 
 def call(name: str, *arguments: Any) -> Any:

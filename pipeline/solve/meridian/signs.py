@@ -8,7 +8,7 @@ from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.meridian import MeridianArrays
 from pipeline.scene.model import FREE, PROBE
 from pipeline.solve.krylov import SolveError
-from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
+from pipeline.solve.meridian.forms import JoinedForms, MeridianForms
 
 # Tension below this share of the mean pressure, penetration below this share of the depth: what a radius that is off
 # by 1e-4 leaves.

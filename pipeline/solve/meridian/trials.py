@@ -1,6 +1,6 @@
 """What a round tool does that touches as far as is tried: linear scenes in the half plane (r, z).
 
-See :mod:`pipeline.solve.meridian_contact`. Lengths are in units of the outer radius of contact, stresses in units of μ
+See :mod:`pipeline.solve.meridian.contact`. Lengths are in units of the outer radius of contact, stresses in units of μ
 of region 0, displacements in metres.
 """
 
@@ -16,9 +16,9 @@ from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import AXIS, Grading, MeridianArrays
 from pipeline.scene.model import FIXED, PROBE
 from pipeline.solve.krylov import SolveError
-from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
-from pipeline.solve.meridian_refine import meshes_of, refined
-from pipeline.solve.meridian_system import HalfPlane, Meshes, factorised, forms_of
+from pipeline.solve.meridian.forms import JoinedForms, MeridianForms
+from pipeline.solve.meridian.refine import meshes_of, refined
+from pipeline.solve.meridian.system import HalfPlane, Meshes, factorised, forms_of
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
 

@@ -25,10 +25,10 @@ from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Grading
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads
-from pipeline.solve.meridian_refine import DirectProblem, best_answer, error_bar, only_along_axis
-from pipeline.solve.meridian_signs import LiftsOff, check_signs
-from pipeline.solve.meridian_system import HalfPlane, max_strain
-from pipeline.solve.meridian_trials import STEP, Rings, RoundTool, Trial, Trials
+from pipeline.solve.meridian.refine import DirectProblem, best_answer, error_bar, only_along_axis
+from pipeline.solve.meridian.signs import LiftsOff, check_signs
+from pipeline.solve.meridian.system import HalfPlane, max_strain
+from pipeline.solve.meridian.trials import STEP, Rings, RoundTool, Trial, Trials
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import reaction
 from pipeline.solve.solution import Solution

@@ -11,8 +11,8 @@ from pipeline.mesh.meridian import Grading, MeridianArrays, meridian_mesh, split
 from pipeline.scene.model import FIXED, PROBE
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads
-from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
-from pipeline.solve.meridian_system import Meshes, Unbalanced
+from pipeline.solve.meridian.forms import JoinedForms, MeridianForms
+from pipeline.solve.meridian.system import Meshes, Unbalanced
 from pipeline.solve.solution import BALANCE_LIMIT
 
 # Meshes in the order in which they are tried, until the error bar is below the accuracy asked for.

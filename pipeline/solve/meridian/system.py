@@ -14,7 +14,7 @@ from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Meridian, MeridianArrays
 from pipeline.quantities import CLEAR
 from pipeline.solve.krylov import SolveError
-from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
+from pipeline.solve.meridian.forms import JoinedForms, MeridianForms
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
 

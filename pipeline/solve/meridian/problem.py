@@ -22,9 +22,9 @@ from pipeline.scene.model import FIXED, PROBE
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads
-from pipeline.solve.meridian_forms import JoinedForms, MeridianForms
-from pipeline.solve.meridian_refine import DirectProblem, best_answer, error_bar, meshes_of, only_along_axis, refined
-from pipeline.solve.meridian_system import (
+from pipeline.solve.meridian.forms import JoinedForms, MeridianForms
+from pipeline.solve.meridian.refine import DirectProblem, best_answer, error_bar, meshes_of, only_along_axis, refined
+from pipeline.solve.meridian.system import (
     HalfPlane,
     Meshes,
     factorised,
