@@ -160,7 +160,7 @@ def abort_on_exception(comm: MPI.Comm) -> Iterator[None]:
     """End all ranks when one of them meets an error that nobody handles: the others would wait for ever."""
     try:
         yield
-    except CompilerError:  # on every rank
+    except (CompilerError, ResultsError):  # on every rank
         raise
     except Exception:
         if comm.size == 1:

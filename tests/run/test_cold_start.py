@@ -5,6 +5,9 @@ import os
 import subprocess
 import sys
 
+import pytest
+
+from tests import commands
 from tests.cases import BLADE
 
 SPHERE = {"action": "pierce", "shape": "sphere", "radius": "6 mm", "depth": "0.5 mm", "contact": "unilateral"}
@@ -83,3 +86,13 @@ def test_without_a_compiler_one_error_says_so(tmp_path):
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=surroundings)
     assert done.returncode != 0
     assert "the C code of epsmesh does not compile" in done.stderr
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_command_without_a_compiler_ends_with_a_sentence(spawn, small, monkeypatch, tmp_path, ranks):
+    without = {"XDG_CACHE_HOME": str(tmp_path), "EPSMESH_CACHE": "", "CC": "/no/compiler"}
+    monkeypatch.setattr(commands, "ENVIRONMENT", commands.ENVIRONMENT | without)
+    done = spawn("run", small, "--output", tmp_path / "results", ranks=ranks)
+    assert done.returncode != 0
+    assert "the C code of epsmesh does not compile" in done.stderr
+    assert "Traceback" not in done.stderr
