@@ -54,6 +54,7 @@ _RESULTS = (*_read("result"), *_LARGEST)
 QUANTITIES = _table(*_MESH, *_read("scene"), *_RESULTS)
 # Names of the dataset's own variables and coordinates: no swept input may have them as its dimension.
 RESERVED = frozenset(quantity.name for quantity in _RESULTS)
+STRESSES = frozenset(quantity.name for quantity in _LARGEST if quantity.unit == "Pa")
 LARGEST = tuple(quantity.name for quantity in _LARGEST)
 MESH_DIMENSIONS = tuple(quantity.name for quantity in _MESH)
 

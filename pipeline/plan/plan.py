@@ -21,7 +21,7 @@ EXACT, _EXACT_SHARE = 1e-3, 0.3
 # Three times the cells, and ten times the time, is what a thousandth takes at the many edges of a slit.
 EXACT_OF_SLIT = 3e-3
 _NO_EXACT = (
-    "F_exact of neo-Hookean bodies is not computed: what their elements converge to is known to their bars only."
+    "F_exact of large displacements is not computed: what their elements converge to is known to their bars only."
 )
 _LOST = "Where the tool does not stand on the body, nothing is solved."
 

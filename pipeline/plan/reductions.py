@@ -25,7 +25,7 @@ _LONE_DEPTHS = (
     "for all."
 )
 _LARGE = (
-    "F is proportional to Young's modulus, and to the depth unless the body is neo-Hookean: cases that differ in them "
+    "F is proportional to Young's modulus, and to the depth unless displacements are large: cases that differ in them "
     "only are solved once."
 )
 

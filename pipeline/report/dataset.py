@@ -27,7 +27,6 @@ _FLOATS = (
     "force",
     "force_error",
     "energy",
-    *LARGEST,
     "balance",
     "time_mesh",
     "time_assemble",
@@ -98,6 +97,8 @@ def _of_records(study: Study, flat: Sequence[Record | None], exact: Sequence[Rec
     found = _FOUND if any(case.probe.is_unilateral for case in study.cases()) else ()
     for name in (*_FLOATS, *found):
         variables[name] = _variable(study, name, [getattr(r, _IN_RECORD.get(name, name)) if r else nan for r in flat])
+    for name in LARGEST:
+        variables[name] = _variable(study, name, [r.largest.get(name, nan) if r else nan for r in flat])
     for name in _COUNTS:
         values = [getattr(r, name) if r and r.status == "ok" else _MISSING for r in flat]
         dims, array, attrs = _variable(study, name, values, dtype=np.int64)
@@ -236,7 +237,6 @@ def _scaled(record: Record | None, scale: Scale) -> Record | None:
     """
     if record is None or record.is_ok:
         return record.scaled(scale) if record else None
-    unknown: dict[str, Any] = dict.fromkeys(LARGEST, nan)
     return replace(
         record,
         force=nan,
@@ -256,7 +256,7 @@ def _scaled(record: Record | None, scale: Scale) -> Record | None:
         load_energy=nan,
         sag=nan,
         load_force_vector=(nan, nan, nan),
-        **unknown,
+        largest={},
     )
 
 

@@ -88,7 +88,7 @@ def _record(solve: Solve, reduced: Reduced, source: Record, problem: QuasiStatic
         force_error=bar,
         force_vector_error=_vector_bars(source, bar * abs(z)),
         energy=mu * reduced.response.energy,
-        **problem.largest(law_of(solve.case), basis.displacement(reduced)),
+        largest=problem.largest(law_of(solve.case), basis.displacement(reduced)),
         balance=reduced.bound,
         iterations=0,
     )

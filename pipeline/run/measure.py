@@ -63,7 +63,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         energy=solution.energy,
         energy_release=solution.release / _front_length(case) if case.probe.slit else nan,
         energy_release_error=solution.release_bar,
-        **solution.largest,
+        largest=solution.largest,
         contact_area=solution.contact_area,
         contact_radius=solution.contact_radius,
         contact_area_error=solution.contact_area_bar,

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 
 from pipeline.plan.plan import Plan
+from pipeline.quantities import LARGEST
 from pipeline.run.record import Record
 from pipeline.run.stop import SKIPPED
 from pipeline.study.place import CLEAR
@@ -30,7 +31,7 @@ def without_contact(case: Case) -> Record | None:
         force_vector=none,
         force_vector_error=none,
         energy=0.0,
-        max_strain=0.0,
+        largest=dict.fromkeys(LARGEST, 0.0),
         contact_area=0.0,
         contact_radius=0.0,
         contact_area_error=0.0,

@@ -8,6 +8,7 @@ from math import isfinite, nan
 from pydantic import TypeAdapter
 
 from pipeline.plan.cost import Observation, speed_up
+from pipeline.quantities import STRESSES
 from pipeline.study.sweep import Scale
 
 # How the message of a case begins that failed for a reason that the program does not know.
@@ -23,7 +24,8 @@ class Record:
     95 % error bar on that, on which ``time_error`` seconds were spent. ``force_vector_error`` (N) are the bars on the
     vector's components, where they are known; ``stiffness`` is that of all six rigid motions, if it was asked for, and
     ``stiffness_error`` has the bars on its entries. ``contact_area`` (m²) and ``contact_radius`` (m) are those of
-    unilateral contact. ``max_strain`` is read clear of the probe's edge.
+    unilateral contact. ``largest`` has the largest values of cells clear of the probe's
+    edge, by their names in the dataset.
     ``energy_release`` (J/m²) is the mean along a slit's front, its relative 95 % bar ``energy_release_error``.
     Loads add ``load_force`` (N), of the bar ``load_force_error`` (N), to the force while the probe is held, in all
     ``load_force_vector`` (N); ``load_energy`` (J) is their strain energy, ``sag`` (m) how far they take a probe that is
@@ -47,7 +49,7 @@ class Record:
     energy: float = nan
     energy_release: float = nan
     energy_release_error: float = nan
-    max_strain: float = nan
+    largest: dict[str, float] = field(default_factory=dict)
     contact_area: float = nan
     contact_radius: float = nan
     contact_area_error: float = nan
@@ -79,6 +81,11 @@ class Record:
     def is_ok(self) -> bool:
         """Whether there is a force to rely on."""
         return self.status == "ok" and isfinite(self.force)
+
+    @property
+    def max_strain(self) -> float:
+        """Largest principal strain of a cell clear of the probe's edge, by magnitude."""
+        return self.largest.get("max_strain", nan)
 
     @property
     def time_total(self) -> float:
@@ -125,7 +132,9 @@ class Record:
             stiffness_error=bars,
             energy=stiffer * deeper**2 * self.energy,
             energy_release=stiffer * deeper**2 * self.energy_release,
-            max_strain=deeper * self.max_strain,
+            largest={
+                name: (stiffer if name in STRESSES else 1.0) * deeper * value for name, value in self.largest.items()
+            },
         )
 
     def to_json(self) -> str:

@@ -1,7 +1,7 @@
 """What is read off a solution cell by cell, from the mean of ∇u over each: principal strains, and largest values.
 
-To report another one, write it as a function of :class:`Cells`, enter it in :data:`LARGEST`, and give it a field in
-``pipeline/run/record.py`` and a line in ``pipeline/quantities.toml``.
+To report another one, write it as a function of :class:`Cells`, enter it in :data:`LARGEST`, and give it a line in
+``pipeline/quantities.toml``. What is in Pa there is scaled with Young's modulus and the depth, all else with the depth.
 """
 
 from collections.abc import Callable
@@ -30,7 +30,11 @@ _clear: WeakKeyDictionary[Any, dict[Front | None, BoolArray]] = WeakKeyDictionar
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Owned cells of a solution: the mean ``gradient`` of the displacement (n, 3, 3), and λ and μ (n), in Pa."""
+    """Owned cells of a solution: the mean ``gradient`` of the displacement (n, 3, 3), and λ and μ (n), in Pa.
+
+    λ is infinite where tissue is incompressible; of mixed elements λ tr ε is not the mean pressure, so that a stress
+    is not known there: return what is not a number.
+    """
 
     gradient: FloatArray
     lame_lambda: FloatArray
@@ -92,8 +96,10 @@ class CellValues:
     def largest(self, law: MaterialLaw, front: Front | None = None) -> dict[str, Any]:
         """Return the largest of each of ``LARGEST`` over cells clear of singular edges, by name; collective."""
         cells, clear = self.cells(law), self._clear_of(front)
-        found = {name: float(value(cells)[clear].max(initial=0.0)) for name, value in LARGEST.items()}
-        return {name: float(self._body.comm.allreduce(value, op=MPI.MAX)) for name, value in found.items()}
+        found = [value(cells)[clear].max(initial=-np.inf) for value in LARGEST.values()]
+        # Not a number on one rank is none on all, which MPI's own maximum does not promise.
+        largest = np.max(self._body.comm.allgather(found), axis=0)
+        return {name: float(value) if value > -np.inf else 0.0 for name, value in zip(LARGEST, largest, strict=True)}
 
     def _clear_of(self, front: Front | None) -> BoolArray:
         known = _clear.setdefault(self._body.mesh, {})

@@ -148,8 +148,8 @@ _COARSE = 'use outside = "coarse" here'
 _ONE_MATERIAL = f"the far field is that of one material, without layers or inclusions: {_COARSE}"
 _PRESSES = f"the far field is that of a probe that presses, and neither slides nor turns nor cuts: {_COARSE}"
 _HOLDS = 'a probe that tissue slides along holds it in one direction only: use contact = "bonded"'
-_LINEAR = 'is for linear elasticity, not for law = "neo-hookean"'
-_OF_LAW = 'with law = "neo-hookean"'
+_LINEAR = "is for linear elasticity, not for a law of large displacements"
+_OF_LAW = "with a law of large displacements"
 
 REFUSALS: tuple[Refusal, ...] = (
     # What the shapes have no keys for: the schema refuses it.
@@ -267,11 +267,11 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "large strains": "large strains are not in proportion to the depth",
     },
     "F_exact": {
-        "large strains": "what elements of neo-Hookean bodies converge to is known to their bars only",
+        "large strains": "at large displacements, what elements converge to is known to their bars only",
     },
     "real-time model": {
         "loads": "[load]: gravity and tractions have no real-time model yet",
-        "large strains": 'material.law = "neo-hookean" has no real-time model: its force is in proportion to nothing',
+        "large strains": "a law of large displacements has no real-time model: its force is in proportion to nothing",
         "slit": f"probe.incision: {_PRESSED_ONLY}",
         "six motions": f'probe.motion = "all": {_PRESSED_ONLY}',
         "cut": f'probe.action = "cut": {_PRESSED_ONLY}',

@@ -139,7 +139,7 @@ def _check_law(material: Material, problems: Problems) -> None:
         problems.error(
             "material.poisson",
             material.poisson,
-            f'must be {least} to {most} with law = "neo-hookean": below, tissue gives way at the probe\'s edge, and '
+            f'must be {least} to {most} with law = "{material.law}": below, tissue gives way at the probe\'s edge, and '
             "elements of displacements alone lock above",
         )
 

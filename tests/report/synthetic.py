@@ -27,7 +27,8 @@ def dataset(failed: int = 0, pending: int = 0, **changes):
         records[solve.key] = Record(
             solve.key, "ok", young=case.material.young, depth=case.probe.depth, force=force,
             force_error=0.01, force_vector=(0.0, 0.0, force), energy=force * 1e-4,
-            max_strain=0.1, balance=1e-12, dofs=1000, cells=300, iterations=9, memory=1e8, time_mesh=seconds,
+            largest={"max_strain": 0.1},
+            balance=1e-12, dofs=1000, cells=300, iterations=9, memory=1e8, time_mesh=seconds,
             time_assemble=seconds, time_setup=seconds, time_solve=seconds, time_error=seconds,
             provenance={"host": "here", "ranks": 1},
         )  # fmt: skip

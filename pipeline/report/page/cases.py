@@ -8,7 +8,7 @@ import xarray as xr
 from markupsafe import Markup
 
 from pipeline.pages import json_in_page
-from pipeline.quantities import QUANTITIES
+from pipeline.quantities import LARGEST, QUANTITIES
 from pipeline.report.words import is_numeric, number, scale, symbol
 
 # Rows of a page of the table.
@@ -32,7 +32,7 @@ _QUANTITIES = (
     "time_solve",
     "time_error",
     "memory",
-    "max_strain",
+    *LARGEST,
     "energy",
     "balance",
 )
