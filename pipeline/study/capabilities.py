@@ -271,7 +271,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
     },
     "real-time model": {
         "loads": "[load]: gravity and tractions have no real-time model yet",
-        "large strains": "a law of large displacements has no real-time model: its force is in proportion to nothing",
+        "large strains": "material.law: large displacements have no real-time model: F is in proportion to nothing",
         "slit": f"probe.incision: {_PRESSED_ONLY}",
         "six motions": f'probe.motion = "all": {_PRESSED_ONLY}',
         "cut": f'probe.action = "cut": {_PRESSED_ONLY}',

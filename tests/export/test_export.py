@@ -124,7 +124,7 @@ def test_tables_of_tensors_know_their_images(shape):
                 "probe": DISC | {"contact": "bonded"},
                 "mesh": {"epsilon": "full", "fine": "2 mm", "coarse": "8 mm", "degree": 2},
             },
-            "neo-hookean",
+            "material.law",
         ),
         ({"body": [CYLINDER | {"name": "a"}, BOX | {"name": "b"}]}, "several"),
         ({"probe": BLADE | {"incision": "4 mm", "action": "cut"}}, "cut"),

