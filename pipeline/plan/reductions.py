@@ -75,7 +75,7 @@ def strike_images(plan: Plan) -> Plan:
             image = EquivalentPlace(other.case.index, from_place(there, matrix))
             images |= dict.fromkeys(solve.serves, image)
     solves = tuple(replace(solve, key=key.get(solve.key, solve.key)) for solve in plan.solves)
-    plan = replace(plan, solves=solves, keys=tuple(key.get(k, k) for k in plan.keys), equivalent=images)
+    plan = replace(plan, solves=solves, keys=_renamed(plan, key), equivalent=images)
     return _merged(plan, "images", reason_of(strike_images))
 
 
@@ -91,7 +91,7 @@ def strike_moved(plan: Plan) -> Plan:
             key[solve.key] = other.key
             images = dict.fromkeys(solve.serves, EquivalentPlace(other.case.index, of_scene=False)) | images
     solves = tuple(replace(solve, key=key.get(solve.key, solve.key)) for solve in plan.solves)
-    plan = replace(plan, solves=solves, keys=tuple(key.get(k, k) for k in plan.keys), equivalent=images)
+    plan = replace(plan, solves=solves, keys=_renamed(plan, key), equivalent=images)
     return _merged(plan, "moved", reason_of(strike_moved))
 
 
@@ -108,7 +108,7 @@ def use_axisymmetry(plan: Plan) -> Plan:
     solves = {solve.key: solve for solve in plan.solves if is_round(solve.case) and solve.case.mesh.model == "auto"}
     key = {old: digest(f"{old} axisymmetric") if not solve.goal else old for old, solve in solves.items()}
     changed = tuple(replace(s, axisymmetric=True, key=key[s.key]) if s.key in key else s for s in plan.solves)
-    plan = replace(plan, solves=changed, keys=tuple(key.get(k, k) for k in plan.keys))
+    plan = replace(plan, solves=changed, keys=_renamed(plan, key))
     return plan.struck_by("axisymmetric", len(key), reason_of(use_axisymmetry))
 
 
@@ -126,7 +126,7 @@ def share_meshes(plan: Plan) -> Plan:
     regions = far_regions([solve.case for solve in plan.solves])
     solves = tuple(_with_far_region(solve, regions) for solve in plan.solves)
     new = {old.key: solve.key for old, solve in zip(plan.solves, solves, strict=True)}
-    plan = replace(plan, solves=solves, keys=tuple(new.get(k, k) for k in plan.keys), shared=True)
+    plan = replace(plan, solves=solves, keys=_renamed(plan, new), shared=True)
     return plan.struck_by("sharing", len(plan.solves) - len(mesh_steps(plan.solves)), reason_of(share_meshes))
 
 
@@ -193,8 +193,13 @@ def _rekeyed(
     """Give every solve the key that ``key`` makes of its case, and merge those that then agree."""
     solves = tuple(replace(solve, key=key(solve.case)) for solve in plan.solves)
     new = dict(zip((solve.key for solve in plan.solves), (solve.key for solve in solves), strict=True))
-    plan = replace(plan, solves=solves, keys=tuple(new.get(k, k) for k in plan.keys))
+    plan = replace(plan, solves=solves, keys=_renamed(plan, new))
     return _merged(plan, name, reason or reason_of(reduction))
+
+
+def _renamed(plan: Plan, new: Mapping[str, str]) -> tuple[str, ...]:
+    """Return the keys of the plan's cases, those in ``new`` replaced."""
+    return tuple(new.get(key, key) for key in plan.keys)
 
 
 def _merged(plan: Plan, name: str, reason: str) -> Plan:
