@@ -26,12 +26,11 @@ from mpi4py import MPI
 from benchmarks.ranks import LARGE
 from pipeline import stages
 from pipeline.run.meshing import mesh_case
-from pipeline.solve.conditions import Conditions
 from pipeline.solve.krylov import LinearSolver
 from pipeline.solve.loads import Loads
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Spaces
+from pipeline.solve.spaces import Conditions, Spaces
 from pipeline.study.load import parse
 from pipeline.verify.machine import MPI_ENVIRONMENT, machine
 

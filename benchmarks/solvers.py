@@ -55,10 +55,9 @@ def measure(element: str, degree: int, poisson: float, size: tuple[float, float]
 
     from pipeline.run.memory import PeakMemory
     from pipeline.run.meshing import mesh_case
-    from pipeline.solve.conditions import Conditions
     from pipeline.solve.physics import MaterialLaw
     from pipeline.solve.quasi_static import QuasiStaticProblem
-    from pipeline.solve.spaces import Spaces
+    from pipeline.solve.spaces import Conditions, Spaces
 
     with threadpool_limits(limits=1), ExitStack() as stack:
         mesh = mesh_case(_case(degree, size), ("x", "y"), MPI.COMM_SELF)

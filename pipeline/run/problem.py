@@ -15,7 +15,6 @@ from pipeline.run.memory import FreeMemory
 from pipeline.run.room import MEMORY_SHARE
 from pipeline.shapes.contact import first_touch
 from pipeline.shapes.probes._round import RoundIndenter
-from pipeline.solve.conditions import Conditions
 from pipeline.solve.contact.active_set import ContactError
 from pipeline.solve.contact.problem import ContactProblem, Tool
 from pipeline.solve.crack import Front
@@ -29,7 +28,7 @@ from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.regular import BodyField
 from pipeline.solve.solution import FieldProblem, Problem, Solution
-from pipeline.solve.spaces import Spaces
+from pipeline.solve.spaces import Conditions, Spaces
 from pipeline.study.sweep import Case
 
 # Unknowns up to which a direct solve is a way out where iterations do not converge.

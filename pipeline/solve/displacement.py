@@ -7,14 +7,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.conditions import Conditions
 from pipeline.solve.crack import Front, Release
 from pipeline.solve.fields import Column, Elements, Enriched, Fields, Products, level_of
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.krylov import Level, LinearSolver, is_direct
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.spaces import ElasticSpace, Spaces
+from pipeline.solve.spaces import Conditions, ElasticSpace, Spaces
 from pipeline.solve.vectors import vector
 from pipeline.stages import Times, recharge, recorded
 

@@ -1,10 +1,9 @@
 """The elements of a body, by their kind: :mod:`pipeline.solve.displacement` or :mod:`pipeline.solve.mixed`."""
 
-from pipeline.solve.conditions import Conditions
 from pipeline.solve.displacement import DisplacementElements
 from pipeline.solve.fields import Elements
 from pipeline.solve.mixed import MixedElements
-from pipeline.solve.spaces import Spaces
+from pipeline.solve.spaces import Conditions, Spaces
 
 
 def elements_of(spaces: Spaces, degree: int, conditions: Conditions, element: str = "displacement") -> Elements:

@@ -11,13 +11,12 @@ from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
-from pipeline.solve.conditions import Conditions, ConstrainedSpace
 from pipeline.solve.crack import Front, Release
 from pipeline.solve.dead_loads import Applied
 from pipeline.solve.krylov import Level
 from pipeline.solve.loads import Loads
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.spaces import ElasticSpace, Spaces
+from pipeline.solve.spaces import Conditions, ConstrainedSpace, ElasticSpace, Spaces
 from pipeline.solve.vectors import global_sum
 
 # A displacement, and for mixed elements a pressure.

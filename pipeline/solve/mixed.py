@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.solve.conditions import Conditions
 from pipeline.solve.crack import Front, Release
 from pipeline.solve.fields import Column, Elements, Enriched, Fields, Products, level_of, transposed
 from pipeline.solve.krylov import SolveError
@@ -24,7 +23,7 @@ from pipeline.solve.loads import Loads
 from pipeline.solve.mixed_space import MixedSpace
 from pipeline.solve.physics import MaterialLaw, SplitLaw
 from pipeline.solve.saddle import Saddle, SaddleSolver
-from pipeline.solve.spaces import Spaces
+from pipeline.solve.spaces import Conditions, Spaces
 from pipeline.stages import Times, recharge, recorded, stage
 
 # λ₀/μ = 1 (ν = ¼): small enough for the multigrid, large enough for the pressure's mass to be a good preconditioner.

@@ -14,14 +14,13 @@ from petsc4py import PETSc
 from pipeline import compat
 from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
-from pipeline.solve.conditions import whole_points
 from pipeline.solve.forms import MixedForms
 from pipeline.solve.kernels.pressure import CellPressures, Coupling, Mass
 from pipeline.solve.krylov import keep
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.region_space import region_wise_space
 from pipeline.solve.saddle import Pair
-from pipeline.solve.spaces import ElasticSpace
+from pipeline.solve.spaces import ElasticSpace, whole_points
 from pipeline.solve.vectors import add_from_ghosts, fill, vector
 from pipeline.stages import stage
 

@@ -24,7 +24,6 @@ from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.cell_values import CellValues
-from pipeline.solve.conditions import Conditions
 from pipeline.solve.crack import Advance, Front
 from pipeline.solve.displacement import DisplacementElements, DisplacementSolver
 from pipeline.solve.elements import elements_of
@@ -38,7 +37,7 @@ from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import Response, reaction, sums
 from pipeline.solve.rim import plain_share
 from pipeline.solve.solution import MOST_ROUNDS, TOLERANCE, Solution, check_balance, rest
-from pipeline.solve.spaces import Spaces
+from pipeline.solve.spaces import Conditions, Spaces
 from pipeline.solve.vectors import global_sum
 from pipeline.stages import recorded, stage
 

@@ -12,7 +12,7 @@ by Betti's theorem within, where the force P of u acts and R has none.
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from typing import Any
@@ -23,18 +23,16 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from pipeline import compat
-from pipeline.arrays import FloatArray, Int32Array, IntArray
+from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve.compiled import form, vector_space
-from pipeline.solve.conditions import Conditions
 from pipeline.solve.far_field import Place, PointForce
 from pipeline.solve.forms import compile_forms, one_cell
 from pipeline.solve.krylov import Level, LinearSolver, SolveError
 from pipeline.solve.loads import Motion
-from pipeline.solve.operator import Operators
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.placed_force import PlacedForce, PlacedPull
-from pipeline.solve.spaces import ElasticSpace, Spaces
+from pipeline.solve.spaces import Conditions, ElasticSpace, Operators, Spaces
 from pipeline.solve.vectors import vector
 
 # Of the elements that R is found with, and of the polynomials that it is kept as.
@@ -220,7 +218,8 @@ def _products(space: ElasticSpace, forces: int) -> Iterator[Callable[[FloatArray
             yield by_form
             return
         whole = stack.enter_context(vector(space.dofs.space))
-        operators, made = Operators(_Free(space.dofs.body, space.dofs.space), space.forms), {}
+        free = np.empty(0, dtype=np.int32)
+        operators, made = Operators(space.dofs.body, space.forms, free, []), {}
 
         def by_matrix(values: FloatArray, law: MaterialLaw) -> FloatArray:
             if law not in made:
@@ -230,16 +229,6 @@ def _products(space: ElasticSpace, forces: int) -> Iterator[Callable[[FloatArray
             return np.array(result.array)
 
         yield by_matrix
-
-
-@dataclass(frozen=True, eq=False)
-class _Free:
-    """A space of displacements of which none is prescribed."""
-
-    body: BodyMesh
-    space: Any
-    prescribed: Int32Array = field(default_factory=lambda: np.empty(0, dtype=np.int32))
-    dirichlet: list[Any] = field(default_factory=list)
 
 
 class _Pull:

@@ -13,9 +13,9 @@ from math import nan
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.conditions import ConstrainedSpace
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads, Vector
+from pipeline.solve.spaces import ConstrainedSpace
 from pipeline.solve.vectors import global_sum
 
 

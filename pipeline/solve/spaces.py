@@ -1,17 +1,210 @@
-"""The displacement spaces of one mesh, shared by all that solve on it."""
+"""The displacement spaces of one mesh, shared by all that solve on it: prescribed dofs, forms, operators.
 
+The operator is K = λ A_λ + μ A_μ, with prescribed dofs eliminated symmetrically.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
+from mpi4py import MPI
 from petsc4py import PETSc
 
-from pipeline.arrays import FloatArray
+from pipeline import compat
+from pipeline.arrays import BoolArray, FloatArray, Int32Array
 from pipeline.mesh.distribute import BodyMesh
-from pipeline.solve.conditions import Conditions, ConstrainedSpace
+from pipeline.scene.model import FIXED, MIRROR, PROBE
+from pipeline.solve.compiled import vector_space
+from pipeline.solve.crack import Front
 from pipeline.solve.dead_loads import Applied, DeadLoads, apply_loads
-from pipeline.solve.forms import ElasticForms
-from pipeline.solve.operator import Operators
+from pipeline.solve.forms import ElasticForms, curved_cells, has_curved_cells
+from pipeline.solve.kernels.assembly import StraightStiffness
+from pipeline.solve.kernels.product import DEGREES, CellOperator, CellStiffness
+from pipeline.solve.krylov import SolveError
+from pipeline.solve.loads import Motion
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.vectors import add_from_ghosts, fill
 from pipeline.stages import stage
+
+_ORIGIN = np.zeros((1, 3))
+# A direction this near to an axis of coordinates is it.
+_SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What is prescribed, whatever its value: on the footprint all components (``bonded``) or that along z alone.
+
+    Nothing is where contact is ``unilateral``: what touches is found, and held by those who find it. The support is
+    held, and on planes of symmetry that bound the mesh so is the displacement across them. A probe that stands in a
+    slit, with that ``front``, touches both of its faces, and without bond holds them apart only: what pushes it on is
+    then at its ``tip``.
+    """
+
+    bonded: bool = True
+    unilateral: bool = False
+    front: Front | None = None
+    tip: Front | None = None
+
+    @property
+    def components(self) -> tuple[int, ...]:
+        """Components of the displacement that the probe prescribes.
+
+        Raises:
+            SolveError: if that would be none of them alone.
+        """
+        if self.unilateral:
+            return ()
+        if self.bonded:
+            return (0, 1, 2)
+        if self.front is None:
+            return (2,)
+        normal = [axis for axis, part in enumerate(self.front.normal) if abs(part) > 1 - _SAME]
+        if not normal:
+            raise SolveError("tissue slides along the faces of a slit that lies along x or y only")
+        return tuple(normal)
+
+
+class ConstrainedSpace:
+    """Displacements of one degree on a mesh, and which of their dofs are prescribed. Holds no operator.
+
+    ``prescribed`` are local dofs (unrolled, owned and ghosts); arrays named ``…_owned`` index the dofs, or for
+    ``probe_owned`` and ``fixed_owned`` the blocks of three dofs, that this rank owns. ``owned`` and ``dofs`` count dofs
+    of this rank, and of all.
+    """
+
+    @stage("spaces, forms")
+    def __init__(self, body: BodyMesh, degree: int, conditions: Conditions):
+        """Collective.
+
+        Raises:
+            SolveError: if what the probe moves and the support share a point.
+        """
+        self._body, self.comm, self.degree, self.conditions = body, body.comm, degree, conditions
+        self.space = space = vector_space(body.mesh, degree)
+        index_map = space.dofmap.index_map
+        self.owned, self.dofs = 3 * index_map.size_local, 3 * index_map.size_global
+        probe, fixed = (_points(space, body, name) for name in (PROBE, FIXED))
+        # What may touch may be held, too, as long as it does not: who finds contact looks after that.
+        if not conditions.unilateral and self.comm.allreduce(len(np.intersect1d(probe, fixed))):
+            raise SolveError("the probe's footprint touches the held face: no displacement satisfies both conditions")
+        mirrors = list(zip(body.mirrored, _planes(space, body), strict=True))
+        single = [(3 * probe + axis, axis) for axis in conditions.components]
+        single += [(3 * plane + axis, axis) for axis, plane in mirrors]
+        zero = np.zeros((), dtype=PETSc.ScalarType)
+        self.dirichlet = [compat.dirichletbc(np.zeros(3, dtype=PETSc.ScalarType), fixed, space)]
+        self.dirichlet += [compat.dirichletbc(zero, dofs, space.sub(axis)) for dofs, axis in single]
+        self._probe, self._fixed, self._sides = probe, fixed, self._sides_of(probe)
+        self.prescribed = np.unique(np.concatenate([*(d for d, _ in single), *(3 * fixed + c for c in range(3))]))
+        self.prescribed_owned = self.prescribed[self.prescribed < self.owned]
+        self.probe_owned, self.fixed_owned = (dofs[dofs < index_map.size_local] for dofs in (probe, fixed))
+
+    @property
+    def body(self) -> BodyMesh:
+        """The mesh."""
+        return self._body
+
+    @property
+    def whole_dofs(self) -> int:
+        """Unknowns of the whole body, of which a half or a quarter may be modelled; collective."""
+        return 3 * whole_points(self.space, self._body)
+
+    def held(self, motion: Motion) -> FloatArray:
+        """Return the displacement (m) that a unit of ``motion`` prescribes, zero elsewhere; local, with ghosts."""
+        index_map = self.space.dofmap.index_map
+        values = np.zeros(3 * (index_map.size_local + index_map.num_ghosts))
+        points = np.asarray(self.space.tabulate_dof_coordinates())[self._probe] if motion.is_rotation else _ORIGIN
+        displacement = np.broadcast_to(motion.at(points, self._sides), (len(self._probe), 3))
+        for component in self.conditions.components:
+            values[3 * self._probe + component] = displacement[:, component]
+        if motion.far is not None:
+            places = np.asarray(self.space.tabulate_dof_coordinates())[self._fixed]
+            values.reshape(-1, 3)[self._fixed] = motion.share * motion.far.at(places)
+        return values
+
+    def _sides_of(self, probe: Int32Array) -> FloatArray | None:
+        """Return of each point of the footprint on which side of a slit its face is, 1 or -1; collective."""
+        if self.conditions.front is None:
+            return None
+        sides = np.full(len(probe), -1.0)
+        sides[np.isin(probe, _points_beyond(self.space, self._body, self.conditions.front))] = 1.0
+        return sides
+
+
+class Operators:
+    """Makes operators of one space of displacements and lends them; what does not depend on the law is laid out once.
+
+    They do not have the rows and columns of ``prescribed`` dofs (local, unrolled), which ``dirichlet`` are for dolfinx.
+    """
+
+    def __init__(self, body: BodyMesh, forms: ElasticForms, prescribed: Int32Array, dirichlet: list[Any]):
+        self._body, self._forms, self._space = body, forms, forms.displacement.function_space
+        self._prescribed, self._dirichlet = prescribed, dirichlet
+
+    @contextmanager
+    def lend(self, law: MaterialLaw) -> Iterator[PETSc.Mat]:
+        """Lend K with entries, of type aij; its borrower may change it; collective.
+
+        The diagonal of prescribed dofs is the first region's μ.
+        """
+        matrix = self._assemble(law, law.lame_mu[0])
+        try:
+            yield matrix
+        finally:
+            matrix.destroy()
+
+    @contextmanager
+    def lend_product(self, law: MaterialLaw) -> Iterator[PETSc.Mat]:
+        """Lend K as a product, without entries; of degree 2 or more; collective.
+
+        Rows of prescribed dofs are those of the identity.
+        """
+        with stage("assembly"):
+            matrix = CellOperator(self.cells, law).matrix()
+        try:
+            yield matrix
+        finally:
+            matrix.destroy()
+
+    @property
+    def multiplies(self) -> bool:
+        """Whether the space has products."""
+        return compat.degree(self._space) in DEGREES
+
+    @cached_property
+    def cells(self) -> CellStiffness:
+        """The cells as products have them, laid out when first asked for; collective. Where :attr:`multiplies`."""
+        return CellStiffness(*self._layout)
+
+    def whole_product(self, law: MaterialLaw, x: FloatArray) -> FloatArray:
+        """Return K x, without conditions, for owned dofs; collective. Where :attr:`multiplies`."""
+        return CellOperator(self.cells, law).whole(x)
+
+    @property
+    def _layout(self) -> tuple[Any, BoolArray | None, Int32Array, Int32Array | None]:
+        return self._space, curved_cells(self._body.mesh), self._prescribed, self._body.regions
+
+    @cached_property
+    def _straight(self) -> StraightStiffness:
+        return StraightStiffness(*self._layout)
+
+    @stage("assembly")
+    def _assemble(self, law: MaterialLaw, diagonal: float) -> PETSc.Mat:
+        self._forms.set_law(law)
+        if self._body.comm.size > 1:
+            matrix = compat.assemble_matrix(self._forms.stiffness, self._dirichlet, diagonal)
+        else:
+            matrix = self._straight.matrix(law, diagonal)
+            if has_curved_cells(self._body.mesh):
+                compat.add_matrix(matrix, self._forms.curved_stiffness, self._dirichlet, diagonal)
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        matrix.setOption(PETSc.Mat.Option.SPD, True)
+        return matrix
 
 
 class ElasticSpace:
@@ -25,7 +218,7 @@ class ElasticSpace:
         """
         self.dofs = ConstrainedSpace(body, degree, conditions)
         self.forms = ElasticForms(self.dofs.space, body.regions)
-        self.operators = Operators(self.dofs, self.forms)
+        self.operators = Operators(body, self.forms, self.dofs.prescribed, self.dofs.dirichlet)
 
     @property
     def degree(self) -> int:
@@ -106,3 +299,32 @@ class Spaces:
         """Free the operators that all spaces keep."""
         while self._made:
             self._made.popitem()
+
+
+def whole_points(space: Any, body: BodyMesh) -> int:
+    """Return the points of ``space`` on the whole body, of which those in a plane have one image; collective."""
+    images = np.full(space.dofmap.index_map.size_local, 2.0 ** len(body.mirrored))
+    for plane in _planes(space, body):
+        images[plane[plane < len(images)]] /= 2
+    return round(body.comm.allreduce(float(images.sum()), op=MPI.SUM))
+
+
+def _planes(space: Any, body: BodyMesh) -> list[Int32Array]:
+    """Local points of ``space`` in each of the planes of symmetry that bound the mesh."""
+    names = [MIRROR["xy"[axis]] for axis in body.mirrored]
+    return [_points(space, body, name) for name in names]
+
+
+def _points_beyond(space: Any, body: BodyMesh, front: Front) -> Int32Array:
+    """Return the points of the footprint's facets whose cells are on the positive side of a slit; collective."""
+    mesh, facets = body.mesh, body.facets[PROBE]
+    tdim = mesh.topology.dim
+    of_facet = mesh.topology.connectivity(tdim - 1, tdim)
+    cells = np.array([of_facet.links(facet)[0] for facet in facets], dtype=np.int64)
+    corners = mesh.geometry.x[compat.geometry_dofs(mesh)[cells, : tdim + 1]].reshape(-1, tdim + 1, 3)
+    beyond = (corners.mean(axis=1) - np.array(front.point)) @ np.array(front.normal) > 0
+    return np.asarray(fem.locate_dofs_topological(space, tdim - 1, facets[beyond]))
+
+
+def _points(space: Any, body: BodyMesh, group: str) -> Int32Array:
+    return np.asarray(fem.locate_dofs_topological(space, body.mesh.topology.dim - 1, body.facets[group]))

@@ -7,11 +7,11 @@ import pytest
 
 from pipeline.mesh.meridian import Grading, Meridian, generate_meridian
 from pipeline.solve.compiled import compiling
-from pipeline.solve.conditions import Conditions
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
 from pipeline.solve.physics import MaterialLaw, Parameters
+from pipeline.solve.spaces import Conditions
 from pipeline.verify import known
 
 

@@ -8,11 +8,11 @@ import pytest
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Grading
 from pipeline.solve.compiled import compiling
-from pipeline.solve.conditions import Conditions
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
 from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.spaces import Conditions
 from pipeline.verify import known
 
 SCENES = {

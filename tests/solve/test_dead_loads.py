@@ -10,11 +10,10 @@ from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.run.dead_loads import dead_loads_of
 from pipeline.run.meshing import mesh_case
-from pipeline.solve.conditions import Conditions
 from pipeline.solve.dead_loads import apply_loads
 from pipeline.solve.load_response import load_bars
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.spaces import ElasticSpace, Spaces
+from pipeline.solve.spaces import Conditions, ElasticSpace, Spaces
 from pipeline.solve.vectors import global_sum, vector
 from tests.cases import solve, study
 

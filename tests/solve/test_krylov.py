@@ -7,13 +7,12 @@ import pytest
 from petsc4py import PETSc
 
 from pipeline.solve import krylov
-from pipeline.solve.conditions import Conditions
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.krylov import Level, LinearSolver, SolveError, keep
 from pipeline.solve.loads import Loads
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import BALANCE_LIMIT, check_balance
-from pipeline.solve.spaces import Spaces
+from pipeline.solve.spaces import Conditions, Spaces
 from tests.solve.test_mixed import DEPTH, PRESS, law, make_mesh
 
 

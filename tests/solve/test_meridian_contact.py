@@ -14,7 +14,6 @@ from pipeline.run.execute import compute
 from pipeline.scene.model import PROBE
 from pipeline.shapes.rounded import Rounded
 from pipeline.solve.compiled import compiling
-from pipeline.solve.conditions import Conditions
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.meridian import signs
@@ -22,6 +21,7 @@ from pipeline.solve.meridian.contact import DEGREE, MeridianContact
 from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
 from pipeline.solve.meridian.trials import TRIAL_DEGREE, RoundTool
 from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.spaces import Conditions
 from tests.cases import study
 
 LAW = MaterialLaw.of(0.3 / 1.3 / 0.4, 0.5 / 1.3)  # E = 1, ν = 0.3

@@ -11,7 +11,6 @@ from petsc4py import PETSc
 
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.run.meshing import mesh_arrays, mesh_case
-from pipeline.solve.conditions import Conditions
 from pipeline.solve.estimate import error_bar
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads
@@ -19,7 +18,7 @@ from pipeline.solve.mixed_space import MixedSpace
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Solution
-from pipeline.solve.spaces import Spaces
+from pipeline.solve.spaces import Conditions, Spaces
 from pipeline.verify import known
 from tests.cases import study
 

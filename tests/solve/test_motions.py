@@ -11,12 +11,11 @@ from pipeline.plan.plan import make_plan
 from pipeline.report import accessor  # noqa: F401 (registers dataset.epsmesh)
 from pipeline.report.dataset import build
 from pipeline.run.execute import compute
-from pipeline.solve.conditions import Conditions
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.response import Sums
-from pipeline.solve.spaces import Spaces
+from pipeline.solve.spaces import Conditions, Spaces
 from pipeline.study.problems import StudyError
 from pipeline.study.sweep import Scale
 from tests.cases import BLADE, solve, study

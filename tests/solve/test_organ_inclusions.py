@@ -7,11 +7,10 @@ from mpi4py import MPI
 
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.run.meshing import mesh_case
-from pipeline.solve.conditions import Conditions
 from pipeline.solve.loads import Loads
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Spaces
+from pipeline.solve.spaces import Conditions, Spaces
 from tests.cases import study
 from tests.organs import ellipsoid, write_stl
 from tests.solve.test_regions import moduli

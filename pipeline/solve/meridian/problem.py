@@ -19,7 +19,6 @@ from pipeline.mesh.meridian import (
     meridian_mesh,
 )
 from pipeline.scene.model import FIXED, PROBE
-from pipeline.solve.conditions import Conditions
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads
 from pipeline.solve.meridian.forms import JoinedForms, MeridianForms
@@ -34,6 +33,7 @@ from pipeline.solve.meridian.system import (
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import reaction
 from pipeline.solve.solution import Solution
+from pipeline.solve.spaces import Conditions
 from pipeline.stages import recorded, stage
 
 DEGREE = 5
