@@ -4,7 +4,7 @@ A disc on a box, a quarter of it, graded to the probe's edge. Set-up and solve a
 finest operator (a product with its blocked matrix), measured around them: so the figures mean the same on another
 machine, and on a busy one, as times are those of the processor. Each row is a process of its own, since a process's
 peak memory is that of its largest solve. From this come ``DIRECT_LIMIT`` in ``pipeline/solve/krylov.py`` and
-``pipeline/solve/mixed.py``, and the bytes per dof in ``pipeline/plan/estimate.py``.
+``pipeline/solve/elements/mixed.py``, and the bytes per dof in ``pipeline/plan/estimate.py``.
 """
 
 import argparse
@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.tables import markdown
-from pipeline.solve.loads import Motion
+from pipeline.solve.loads import Loads, Motion
 
 # Element size far from the probe and at its edge, mm.
 SMALL = {1: ((4, 2), (3, 1), (2, 0.8)), 2: ((10, 3), (8, 1), (5, 0.8)), 3: ((20, 4), (15, 3), (10, 2))}
@@ -145,25 +145,26 @@ def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple
 
 def _mixed_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[Any, Callable[[], Any]]:
     """The same for mixed elements; a set-up that serves all ratios counts for one."""
-    from pipeline.solve.mixed import LAME
+    from pipeline.solve.elements.mixed import LAME
     from pipeline.solve.saddle import SaddleSolver
     from pipeline.solve.solution import TOLERANCE
 
-    direct, space, c = method == "direct", problem.elements.space, 1 / (law.parameters[0].ratio - LAME.lame_lambda[0])
+    direct, elements, c = method == "direct", problem.elements, 1 / (law.parameters[0].ratio - LAME.lame_lambda[0])
     start = time.process_time()
-    saddle = problem.elements.saddle(LAME, stack, direct=direct)
+    saddle = elements.saddle(LAME, stack, direct=direct)
     assemble = time.process_time() - start
     # Neither a product without entries nor the matrix of a direct solve is what others multiply with.
-    unit = stack.enter_context(space.displacements.operators.lend_product(LAME))
-    held = space.displacements.dofs.held(PRESS)
+    unit = stack.enter_context(elements.displacements.operators.lend_product(LAME))
+    press = Loads((PRESS,), (1.0,))
 
     def once() -> tuple[float, float, float, int]:
-        with space.pair() as rhs, space.pair() as unknown:
-            space.lift(rhs, held, LAME)
+        with ExitStack() as made:
+            (column,) = elements.columns(press, made)
+            elements.lift(column, law)
             start = time.process_time()
             with SaddleSolver(saddle, direct=direct) as solver:
                 ready = time.process_time()
-                iterations = solver.solve(c, [rhs], [unknown], problem.elements.stricter * TOLERANCE)
+                iterations = solver.solve(c, [column.right], [column.unknown], elements.stricter * TOLERANCE)
                 return assemble, ready - start, time.process_time() - ready, iterations
 
     return unit, once

@@ -22,8 +22,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.displacement import DisplacementElements
-from pipeline.solve.fields import Column, Enriched, Products
+from pipeline.solve.elements.base import Column, Enriched, Products, Solver
+from pipeline.solve.elements.displacement import DisplacementElements
 from pipeline.solve.forms import HyperelasticForms
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.krylov import LinearSolver
@@ -72,13 +72,11 @@ class Walk:
         return (self.law, (self.motion,)) == (law, loads.motions) and self.reached <= loads.amounts[0]
 
 
-class LoadSteps:
+class LoadSteps(Solver):
     """A solver of displacement elements for a law of large displacements, one material and one motion.
 
     ``stored`` is the energy (J) that the modelled part stores at the end. What is made is freed with the stack.
     """
-
-    is_exact = True
 
     def __init__(self, elements: DisplacementElements, walk: Walk, stack: ExitStack, *, direct: bool):
         """Set up for what a ``walk`` leads to; collective.
@@ -86,6 +84,7 @@ class LoadSteps:
         Raises:
             SolveError: if the preconditioner cannot be set up.
         """
+        super().__init__(elements, walk.law, is_exact=True)
         self._elements, self._walk, self._law = elements, walk, walk.law
         law = walk.law
         self._space = elements.displacements
@@ -95,7 +94,6 @@ class LoadSteps:
         self._forms = HyperelasticForms(self._space.dofs.space, self._space.forms, law.name)
         self._body = Equilibrium(self._space, self._forms, solver)
         stack.callback(self._body.close)
-        self.stored: float | None = None
 
     def lift(self, columns: Sequence[Column]) -> None:
         """Do nothing: what is prescribed is moved step by step."""

@@ -25,10 +25,10 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray
 from pipeline.solve.cell_values import CellValues
 from pipeline.solve.crack import Advance, Front
-from pipeline.solve.displacement import DisplacementElements, DisplacementSolver
 from pipeline.solve.elements import elements_of
+from pipeline.solve.elements.base import Column, Elements, Products, Solver
+from pipeline.solve.elements.displacement import DisplacementElements
 from pipeline.solve.estimate import error_bar, stiffness_bars
-from pipeline.solve.fields import Column, Elements, Products, Solver
 from pipeline.solve.krylov import LinearSolver, SolveError
 from pipeline.solve.load_response import LoadResponse, imbalance, load_response_of, shares
 from pipeline.solve.load_steps import LoadSteps, Walk
@@ -113,12 +113,12 @@ class QuasiStaticProblem:
                 columns = elements.columns(loads, stack)
                 solver.lift(columns)
             with stage("solve"):
-                known = solver.known if keep and isinstance(solver, DisplacementSolver) else {}
+                known = solver.known if keep else {}
                 self._guess(columns, loads, known)
                 iterations, response, load_response = self._iterate(
                     solver, columns, law, loads, known, tolerance=tolerance
                 )
-                if keep and isinstance(solver, DisplacementSolver):
+                if keep:
                     solver.known = {loads.motions[0]: columns[0].unknown[0].array.copy()}
                 if loads.far is not None:
                     loads = _close(columns, response)

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from pipeline.solve.mixed_space import MixedSpace
+from pipeline.solve.elements.pressures import Pressures
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import Conditions, ElasticSpace, Spaces
 from tests.solve.test_mixed import make_mesh
@@ -56,7 +56,7 @@ def test_it_is_the_product_of_the_matrix(degree, material, changes):
 def test_pressures_take_part_as_in_matrices(degree, changes):
     """Coupling, its transpose and mass, on straight and on curved cells, continuous and by region."""
     spaces = Spaces(make_mesh(**changes))
-    space, random = MixedSpace(spaces.body, spaces.get(degree, Conditions())), np.random.default_rng(5)
+    space, random = Pressures(spaces.body, spaces.get(degree, Conditions())), np.random.default_rng(5)
     (coupling, mass), wanted = (space.blocks(entries=entries) for entries in (False, True))
     u, p = (random.standard_normal(size) for size in reversed(coupling.getSize()))
     weight = np.linspace(1.0, 2.0, len(p))

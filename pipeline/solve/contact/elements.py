@@ -19,12 +19,12 @@ from pipeline.solve.contact.candidates import CONDITIONS, Candidates, Numbering,
 from pipeline.solve.contact.levels import Hierarchy, normal_dofs
 from pipeline.solve.dead_loads import Applied
 from pipeline.solve.elements import elements_of
+from pipeline.solve.elements.base import Column, Fields
+from pipeline.solve.elements.mixed import MixedElements
 from pipeline.solve.far_field import FarField
-from pipeline.solve.fields import Column, Fields
 from pipeline.solve.krylov import Level, LinearSolver, SolveError
-from pipeline.solve.mixed import MixedElements
-from pipeline.solve.physics import MaterialLaw, SplitLaw
-from pipeline.solve.saddle import Saddle, SaddleSolver
+from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.saddle import SaddleSolver
 from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.vectors import global_sum
 from pipeline.stages import stage
@@ -84,13 +84,15 @@ class ContactElements(ABC):
     element: str
     # Whether every solve is, to rounding.
     is_exact = False
-    unit = 1.0
+    # Whether the solver can do with dofs that are held by the cycle's smoothers alone.
+    _masks = True
 
     def __init__(self, spaces: Spaces, degree: int, law: MaterialLaw, surface: Surface, method: str, stack: ExitStack):
         """Assemble; collective."""
         self._spaces, self._law, self._surface = spaces, law, surface
         self.plug = elements_of(spaces, degree, CONDITIONS, self.element)
         stack.callback(self.plug.close)
+        self.unit = self.plug.unit(law)
         self.space: ElasticSpace = self.plug.displacements
         self.candidates: Candidates = surface.of(degree)
         self._direct = self.plug.is_direct(method)
@@ -107,10 +109,6 @@ class ContactElements(ABC):
     # ---- what displacement and mixed elements have each of their own ----------------------------------
 
     @abstractmethod
-    def hierarchy_of(self, stack: ExitStack, *, direct: bool) -> Hierarchy:
-        """Return the operators in which nodes may be held, given back with the ``stack``; collective."""
-
-    @abstractmethod
     def use(self, levels: list[Level]) -> None:
         """Solve with these ``levels`` from now on; collective."""
 
@@ -122,13 +120,20 @@ class ContactElements(ABC):
     def product(self, result: Fields) -> None:
         """Write the operator, without a contact set, times the fields into ``result``; collective."""
 
-    @abstractmethod
     def residual(self) -> FloatArray:
         """Return K u (N) with the unmodified operator, owned dofs, for the forms' fields; collective."""
+        with self.plug.fields() as forces:
+            self.plug.apply(forces, self._law)
+            return np.array(forces[0].array)
 
     def couple(self, far: FarShare | None) -> None:
         """Let a far field act on the cut face from now on, or none."""
         self.far = far
+
+    def hierarchy_of(self, stack: ExitStack, *, direct: bool) -> Hierarchy:
+        """Return the operators in which nodes may be held, given back with the ``stack``; collective."""
+        law, degree = self.plug.elastic(self._law), self.plug.degree
+        return Hierarchy(self._spaces, degree, law, self._surface, stack, direct=direct, masks=self._masks)
 
     # ---- sets -----------------------------------------------------------------------------------------
 
@@ -243,10 +248,8 @@ class ContactElements(ABC):
 
         Of displacement elements there is no pressure. What is prescribed becomes a part of the right-hand side.
         """
-        displacement, owned = self.space.forms.displacement, self.space.dofs.owned
-        displacement.interpolate(coarse.space.forms.displacement)
-        self.fields[0].array[:] = displacement.x.array[:owned]
-        self.fields[0].array[self.space.dofs.prescribed_owned] = 0.0
+        displacement = self.space.forms.displacement
+        self.plug.start_from(coarse.plug, self.fields, np.zeros_like(displacement.x.array))
         if coarse.far is not None:
             held = np.zeros_like(displacement.x.array)
             held[self.space.dofs.prescribed] = displacement.x.array[self.space.dofs.prescribed]
@@ -313,10 +316,6 @@ class ContactDisplacement(ContactElements):
     element = "displacement"
     _solver: LinearSolver | None = None
 
-    def hierarchy_of(self, stack: ExitStack, *, direct: bool) -> Hierarchy:
-        """Return the operators in which nodes may be held, given back with the ``stack``; collective."""
-        return Hierarchy(self._spaces, self.plug.degree, self._law, self._surface, stack, direct=direct)
-
     def close(self) -> None:
         """Free the solver."""
         super().close()
@@ -340,12 +339,6 @@ class ContactDisplacement(ContactElements):
         """Write K u into ``result``; collective."""
         self.hierarchy.finest.mult(self.fields[0], result[0])
 
-    def residual(self) -> FloatArray:
-        """Return K u (N) with the unmodified operator, owned dofs, for the forms' displacement; collective."""
-        with self.plug.fields() as (forces,):
-            self.space.apply(forces, self._law)
-            return np.array(forces.array)
-
     def held_levels(self, facets: Int32Array, stack: ExitStack) -> list[Level]:
         """Return the levels of multigrid with the local ``facets`` held, in the place of any set; collective."""
         self.close()
@@ -357,33 +350,22 @@ class ContactMixed(ContactElements):
     """Displacements of degree 2 or more and pressures of one less: reactions are those of K₀ u + Bᵀ p."""
 
     element = "mixed"
+    # The residual of held displacements must vanish: it is part of the norm that is made small.
+    _masks = False
 
     def __init__(self, spaces: Spaces, degree: int, law: MaterialLaw, surface: Surface, method: str, stack: ExitStack):
         """Assemble; collective."""
-        self._split = SplitLaw.of(law)
-        self.unit = self._split.unit
         super().__init__(spaces, degree, law, surface, method, stack)
         assert isinstance(self.plug, MixedElements)
-        self.mixed = self.plug.space
-        self._compliance = self.mixed.by_region(self._split.compliance)
-        self._coupling, self._mass = self.mixed.blocks(entries=self._direct)
+        self._mixed, self._compliance = self.plug, self.plug.compliance(law)
+        self._coupling, self._mass = self.plug.pressures.blocks(entries=self._direct)
         # The energy norm squared of the last correction (J): what is taken away from the energy may vanish by chance.
         self.first_energy = 0.0
-
-    def hierarchy_of(self, stack: ExitStack, *, direct: bool) -> Hierarchy:
-        """Return the operators K₀ in which nodes may be held, given back with the ``stack``; collective.
-
-        The residual of held displacements must vanish: it is part of the norm that is made small.
-        """
-        law, degree = self._split.elastic, self.plug.degree
-        return Hierarchy(self._spaces, degree, law, self._surface, stack, direct=direct, masks=False)
 
     def use(self, levels: list[Level]) -> None:
         """Solve with these ``levels`` from now on; collective."""
         self.close()
-        coupling = self._holding()
-        moduli = tuple(region.lame_lambda + 2 * region.lame_mu for region in self._split.elastic.parameters)
-        saddle = Saddle(levels, coupling, self._mass, self.mixed.by_region(moduli), self.plug.degree - 1)
+        saddle = self._mixed.saddle_of(levels, self._mixed.elastic(self._law), self._holding(), self._mass)
         self._solver = self._solving.enter_context(SaddleSolver(saddle, direct=self._direct))
 
     def _holding(self) -> PETSc.Mat:
@@ -419,17 +401,3 @@ class ContactMixed(ContactElements):
             self._mass.mult(pressure, result[1])
             result[1].array[:] *= -self._compliance
             result[1].axpy(1.0, dilation)
-
-    def residual(self) -> FloatArray:
-        """Return K₀ u + Bᵀ p (N) with the unmodified operator, owned dofs, for the forms' fields; collective."""
-        with self.mixed.pair() as (residual, dilation), self.mixed.pair() as (pull, _):
-            self.mixed.apply(residual, pull, dilation, self._split.elastic)
-            return np.asarray(self.unit * (residual.array + pull.array))
-
-    def start_from(self, coarse: ContactElements) -> None:
-        """Take over the fields of the forms of elements of a lower degree; collective."""
-        if isinstance(coarse, ContactMixed):
-            nothing = np.zeros_like(self.space.forms.displacement.x.array)
-            displacement, pressure = self.fields
-            self.mixed.start_from(coarse.mixed, (displacement, pressure), nothing)
-        super().start_from(coarse)

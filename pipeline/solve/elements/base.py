@@ -1,10 +1,10 @@
 """What all elements have in common: unknown fields, load cases, and what solutions do."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from contextlib import AbstractContextManager, ExitStack
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
@@ -14,10 +14,10 @@ from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.crack import Front, Release
 from pipeline.solve.dead_loads import Applied
 from pipeline.solve.krylov import Level
-from pipeline.solve.loads import Loads
+from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import Conditions, ConstrainedSpace, ElasticSpace, Spaces
-from pipeline.solve.vectors import global_sum
+from pipeline.solve.vectors import global_sum, vector
 
 # A displacement, and for mixed elements a pressure.
 Fields = tuple[PETSc.Vec, ...]
@@ -68,28 +68,37 @@ class Enriched:
     unseen: FloatArray | None = None
 
 
-class Solver(Protocol):
-    """A solver of elements for one law.
+class Solver(ABC):
+    """A solver of ``elements`` for one ``law``.
 
     ``is_exact`` tells that nothing improves what it finds; ``stored`` is the energy (J) of the modelled part where that
-    is not half the work of the force.
+    is not half the work of the force. ``known`` are solutions for a unit of motions that may come again, less what is
+    prescribed.
     """
 
-    is_exact: bool
-    stored: float | None
+    def __init__(self, elements: "Elements", law: MaterialLaw, *, is_exact: bool):
+        self.elements, self.law, self.is_exact = elements, law, is_exact
+        self.stored: float | None = None
+        self.known: dict[Motion, FloatArray] = {}
 
     def lift(self, columns: Sequence[Column]) -> None:
         """Put what columns prescribe and their loads on their right-hand sides; collective."""
+        for column in columns:
+            self.elements.lift(column, self.law)
 
     def products(self, columns: Sequence[Column]) -> Products:
         """Return residuals and energies of solutions; collective."""
+        return self.elements.products(self.law, columns)
 
+    @abstractmethod
     def solve(self, columns: Sequence[Column], tolerance: float) -> int:
         """Lower the energy norm of the error of each solution to a ``tolerance``; return the iterations; collective."""
 
+    @abstractmethod
     def improve(self, columns: Sequence[Column], share: float) -> int:
         """Lower it to that ``share`` of what the last solve left; return the iterations; collective."""
 
+    @abstractmethod
     def enrich(self, columns: Sequence[Column], loads: Loads, stack: ExitStack, *, keep: bool) -> Enriched:
         """Solve on in one degree more; what is made is freed with the ``stack``; collective.
 
@@ -98,7 +107,10 @@ class Solver(Protocol):
 
 
 class Elements(ABC):
-    """Elements of one degree on a mesh, with their conditions. Made with ``elements_of``; ``close`` frees them."""
+    """Elements of one degree on a mesh, with their conditions. Made with ``elements_of``; ``close`` frees them.
+
+    What is written here is for displacements alone; fields that come on top of them add what is theirs.
+    """
 
     # As the study has it.
     element: str
@@ -117,26 +129,27 @@ class Elements(ABC):
         self.displacements: ElasticSpace = spaces.get(degree, conditions)
 
     @property
-    @abstractmethod
     def dofs(self) -> int:
         """Unknowns of the modelled part."""
+        return self.displacements.dofs.dofs
+
+    @property
+    def whole_dofs(self) -> int:
+        """Unknowns of the whole body; collective."""
+        return self.displacements.dofs.whole_dofs
 
     @property
     @abstractmethod
-    def whole_dofs(self) -> int:
-        """Unknowns of the whole body; collective."""
+    def direct_limit(self) -> int:
+        """Unknowns up to which a factorisation is faster than iterations."""
+
+    def is_direct(self, method: str) -> bool:
+        """Decide between a factorisation and iterations."""
+        return method == "direct" or (method == "auto" and self.dofs <= self.direct_limit)
 
     @abstractmethod
     def close(self) -> None:
         """Free what is kept from solve to solve."""
-
-    @abstractmethod
-    def is_direct(self, method: str) -> bool:
-        """Decide between a factorisation and iterations."""
-
-    @abstractmethod
-    def fields(self) -> AbstractContextManager[Fields]:
-        """Lend fields of zeros; collective."""
 
     @abstractmethod
     def set_up(self, law: MaterialLaw, stack: ExitStack, *, direct: bool, keep: bool) -> Solver:
@@ -146,21 +159,88 @@ class Elements(ABC):
             SolveError: if it cannot be set up, or the elements are not for the law.
         """
 
-    @abstractmethod
+    def levels(self, law: MaterialLaw, stack: ExitStack, *, direct: bool) -> list[Level]:
+        """Return the levels of multigrid, or the one of a direct solve, given back with the ``stack``; collective."""
+        degrees = [self.degree] if direct else range(1, self.degree + 1)
+        spaces = [self._spaces.get(degree, self._conditions) for degree in degrees]
+        return [level_of(space, law, stack, direct=direct) for space in spaces]
+
+    # ---- the operator ---------------------------------------------------------------------------------
+
+    def elastic(self, law: MaterialLaw) -> MaterialLaw:
+        """Return the law of the displacements' own operator."""
+        return law
+
+    def unit(self, law: MaterialLaw) -> float:
+        """Return the unit (Pa) of moduli in right-hand sides."""
+        return 1.0
+
+    def apply(self, result: Fields, law: MaterialLaw, *, checked: bool = True) -> None:
+        """Add the unmodified operator times the forms' fields to ``result``, N for displacements; collective.
+
+        ``checked``: see :meth:`ElasticSpace.apply`.
+        """
+        self.displacements.apply(result[0], self.elastic(law), checked=checked)
+
+    def lift(self, column: Column, law: MaterialLaw, *, checked: bool = True) -> None:
+        """Put what a column prescribes and its loads, in the law's unit, on its right-hand side; collective."""
+        if column.applied is None:
+            self.displacements.lift(column.right[0], column.prescribed, self.elastic(law), checked=checked)
+        else:
+            self.displacements.put(column.right[0], column.applied, 1 / self.unit(law))
+
     def products(self, law: MaterialLaw, columns: Sequence[Column], *, checked: bool = True) -> Products:
         """Return residuals and energies of solutions; collective. ``checked``: see :meth:`ElasticSpace.apply`."""
+        found, images = [], []
+        for column in columns:
+            with self.fields() as image, self.fields() as total:
+                self.total(column, total)
+                self.set_fields(total)
+                self.apply(image, law, checked=checked)
+                found.append([part.array.copy() for part in total])
+                images.append([part.array.copy() for part in image])
+        # Each field's part: of pressures it is, at the solution, what compressing takes, with the other sign.
+        parts = [[[x @ y for x, y in zip(field, image, strict=True)] for image in images] for field in found]
+        stretching, *compressing = np.moveaxis(global_sum(self.body.comm, np.array(parts)), -1, 0)
+        return Products(
+            dofs=self.displacements.dofs,
+            moved=[field[0] for field in found],
+            residuals=[image[0] for image in images],
+            stationary=stretching + sum(compressing),
+            energies=np.diag(stretching - sum(compressing)),
+        )
 
-    @abstractmethod
-    def set_fields(self, fields: Fields) -> None:
-        """Make ``fields`` those of the forms; collective."""
-
-    @abstractmethod
     def release(self, law: MaterialLaw, line: Front) -> Release:
         """Return what tells the energy that the present fields of the forms release at a ``line``; collective."""
+        forms = self.displacements.forms
+        forms.set_law(self.elastic(law))
+        return Release(self.body, line, forms.displacement, forms.lame, self._pressure(law), unit=self.unit(law))
 
-    @abstractmethod
-    def lift(self, column: Column, law: MaterialLaw, *, checked: bool = True) -> None:
-        """Put what a column prescribes and its loads on its right-hand side; collective."""
+    def _pressure(self, law: MaterialLaw) -> tuple[Any, Any] | None:
+        """Return a pressure of forms and its compliance, if there is one."""
+        return None
+
+    # ---- fields ---------------------------------------------------------------------------------------
+
+    @contextmanager
+    def fields(self) -> Iterator[Fields]:
+        """Lend fields of zeros; collective."""
+        with vector(self.displacements.dofs.space) as u:
+            yield (u,)
+
+    def set_fields(self, fields: Fields) -> None:
+        """Make ``fields`` those of the forms; collective."""
+        self.displacements.set_displacement(fields[0])
+
+    def start_from(self, coarse: "Elements", unknown: Fields, prescribed: FloatArray) -> None:
+        """Put the fields of the forms of ``coarse``, less what is ``prescribed`` (m), into ``unknown``; collective.
+
+        They are the fields of the own forms then.
+        """
+        displacement, dofs = self.displacements.forms.displacement, self.displacements.dofs
+        displacement.interpolate(coarse.displacements.forms.displacement)
+        unknown[0].array[:] = displacement.x.array[: dofs.owned] - prescribed[: dofs.owned]
+        unknown[0].array[dofs.prescribed_owned] = 0.0
 
     def columns(self, loads: Loads, stack: ExitStack) -> list[Column]:
         """Return a column for each motion, and one more for dead loads, if there are any; collective.
@@ -201,17 +281,9 @@ class Elements(ABC):
             part.copy(whole)
         result[0].array[:] += column.prescribed[: self.displacements.dofs.owned]
 
-    def _sums(self, products: Any) -> FloatArray:
-        return global_sum(self.displacements.dofs.comm, np.array(products))
-
 
 def level_of(space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, direct: bool = False) -> Level:
     """Return a level of multigrid, or of a direct solve; its operator is given back with the ``stack``; collective."""
     operators = space.operators
     matrix = stack.enter_context(operators.lend(law) if direct or space.degree == 1 else operators.lend_product(law))
     return Level(space.dofs.space, matrix, space.dofs.prescribed, not law.is_uniform)
-
-
-def transposed(columns: Sequence[Column]) -> tuple[list[Fields], list[Fields]]:
-    """Return right-hand sides and unknowns of columns."""
-    return [column.right for column in columns], [column.unknown for column in columns]

@@ -1,8 +1,8 @@
-"""The elements of a body, by their kind: :mod:`pipeline.solve.displacement` or :mod:`pipeline.solve.mixed`."""
+"""The elements of a body, by their kind: displacements alone, or displacements and pressures (mixed)."""
 
-from pipeline.solve.displacement import DisplacementElements
-from pipeline.solve.fields import Elements
-from pipeline.solve.mixed import MixedElements
+from pipeline.solve.elements.base import Elements
+from pipeline.solve.elements.displacement import DisplacementElements
+from pipeline.solve.elements.mixed import MixedElements
 from pipeline.solve.spaces import Conditions, Spaces
 
 

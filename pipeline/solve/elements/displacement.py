@@ -1,0 +1,133 @@
+"""Displacement elements: u with a(u, v) = ∫ λ div u div v + 2μ ε(u) : ε(v), solved directly or by multigrid."""
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+
+import numpy as np
+
+from pipeline.arrays import FloatArray
+from pipeline.solve.elements.base import Column, Elements, Enriched, Solver, level_of
+from pipeline.solve.hierarchical_estimate import energy_decrements
+from pipeline.solve.krylov import DIRECT_LIMIT, Level, LinearSolver
+from pipeline.solve.loads import Loads
+from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.spaces import Conditions, Spaces
+from pipeline.solve.vectors import vector
+from pipeline.stages import recharge, recorded
+
+# A solver is made for any tolerance: each solve has its own.
+_ANY = 0.5
+
+
+class DisplacementElements(Elements):
+    """Displacements alone."""
+
+    element, stricter = "displacement", 1.0
+
+    def __init__(self, spaces: Spaces, degree: int, conditions: Conditions):
+        """Prepare; collective."""
+        super().__init__(spaces, degree, conditions)
+        self._kept: DisplacementSolver | None = None
+
+    @property
+    def direct_limit(self) -> int:
+        """Unknowns up to which a factorisation is faster than iterations."""
+        return DIRECT_LIMIT[self.degree]
+
+    def close(self) -> None:
+        """Free what is kept from solve to solve."""
+        if self._kept is not None:
+            self._kept.owner.close()
+        self._kept = None
+
+    def set_up(self, law: MaterialLaw, stack: ExitStack, *, direct: bool, keep: bool) -> "DisplacementSolver":
+        """Return a solver, freed with the ``stack`` unless it is to ``keep``; collective.
+
+        What is kept begins each solve from the best sum of earlier solutions. A factorisation is not kept: it takes
+        much memory beside the next degree.
+        """
+        if self._kept is not None and self._kept.law == law and keep and not direct:
+            recharge(self._kept.cost)
+            return self._kept
+        self.close()
+        found = DisplacementSolver(self, law, direct=direct)
+        if keep and not direct:
+            found.linear.recycle()
+            self._kept = found
+        else:
+            stack.callback(found.owner.close)
+        return found
+
+    def finer(
+        self, law: MaterialLaw, levels: list[Level], stack: ExitStack, below: LinearSolver | None = None
+    ) -> tuple["DisplacementElements", LinearSolver]:
+        """Return elements of one degree more and a solver above ``levels``, freed with the stack; collective.
+
+        ``below`` is the solver of ``levels``, if it is still there.
+        """
+        finer = DisplacementElements(self._spaces, self.degree + 1, self._conditions)
+        if len(levels) == 1 and self.degree > 1:
+            levels = self.levels(law, stack, direct=False)
+        level = level_of(finer.displacements, law, stack)
+        solver = LinearSolver([*levels, level], direct=False, tolerance=_ANY, below=below)
+        stack.callback(solver.close)
+        return finer, solver
+
+
+class DisplacementSolver(Solver):
+    """A solver of displacement elements for a law, by its ``levels``, and the one above it, once it was made.
+
+    ``owner`` frees it, and ``cost`` is what it took to make.
+    """
+
+    elements: DisplacementElements
+
+    def __init__(self, elements: DisplacementElements, law: MaterialLaw, *, direct: bool):
+        """Set up; collective."""
+        super().__init__(elements, law, is_exact=direct)
+        self.owner = ExitStack()
+        self._above: tuple[DisplacementElements, LinearSolver] | None = None
+        self._tolerance = 1.0
+        with ExitStack() as stack, recorded() as self.cost:
+            self.levels = elements.levels(law, stack, direct=direct)
+            self.linear = LinearSolver(self.levels, direct=direct, tolerance=_ANY)
+            stack.callback(self.linear.close)
+            self.owner = stack.pop_all()
+
+    def solve(self, columns: Sequence[Column], tolerance: float) -> int:
+        """Lower the energy norm of each error to a ``tolerance``; return the iterations; collective."""
+        self._tolerance = tolerance
+        return sum(self.linear.solve(column.right[0], column.unknown[0], tolerance) for column in columns)
+
+    def improve(self, columns: Sequence[Column], share: float) -> int:
+        """Lower it to that ``share`` of what the last solve left; return the iterations; collective."""
+        return self.solve(columns, share * self._tolerance)
+
+    def enrich(self, columns: Sequence[Column], loads: Loads, stack: ExitStack, *, keep: bool) -> Enriched:
+        """Solve on in one degree more, from the residuals there; collective."""
+        coarse = self.elements
+        if self.linear.cycle is None and coarse.degree > 1:
+            self.linear.close()  # what the next degree takes is the most memory of all
+        self._above = self._above or coarse.finer(self.law, self.levels, self.owner, self.linear)
+        finer, solver = self._above
+        space, residuals = finer.displacements, []
+        solutions: list[FloatArray] = []
+        for column in columns:
+            residual = stack.enter_context(vector(space.dofs.space))
+            coarse.show([column], [1.0])
+            space.forms.displacement.interpolate(coarse.displacements.forms.displacement)
+            if keep:
+                solutions.append(space.forms.displacement.x.array[: space.dofs.owned].copy())
+            space.apply(residual, self.law, checked=False)
+            residual.scale(-1.0)
+            residual.array[space.dofs.prescribed_owned] = 0.0
+            if loads.dead is not None and column.applied is not None:
+                space.put(residual, space.applied(loads.dead))
+            residuals.append(residual)
+        decrements, corrections, iterations = energy_decrements(solver, residuals, keep_solutions=keep)
+        kept = []
+        for solution, correction in zip(solutions, corrections, strict=False):
+            (values,) = fields = stack.enter_context(finer.fields())
+            values.array[:] = solution + correction
+            kept.append(Column(np.zeros(len(space.forms.displacement.x.array)), None, (), fields))
+        return Enriched(finer, kept, iterations, decrements=decrements)

@@ -1,0 +1,170 @@
+"""The pressures of mixed elements, one degree below the displacements, and what couples them.
+
+They are continuous within each region of a body and jump from one to the next. The pressure of a mixed element is
+λ₁ div u: where λ jumps, so does it, and a continuous one would smear the jump over the cells on either side. Masses and
+Schur complements then weigh the dofs of each region, and nothing couples two.
+"""
+
+from contextlib import ExitStack
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from dolfinx.fem import petsc as fem_petsc
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from pipeline import compat
+from pipeline.arrays import BoolArray, FloatArray, Int32Array, IntArray
+from pipeline.mesh.distribute import BodyMesh
+from pipeline.solve.compiled import scalar_space
+from pipeline.solve.forms import MixedForms
+from pipeline.solve.kernels.pressure import CellPressures, Coupling, Mass
+from pipeline.solve.krylov import keep
+from pipeline.solve.spaces import ElasticSpace, whole_points
+from pipeline.solve.vectors import add_from_ghosts, fill, vector
+from pipeline.stages import stage
+
+
+class Pressures:
+    """Pressures on a mesh, with B(q, u) = ∫ q div u and M(p, q) = ∫ p q.
+
+    They are counted in units of ``unit`` × μ, ``unit`` (1/m) being about one over the element size: the blocks of the
+    saddle point are then of like magnitude in any unit of length. B and M are multiplied cell by cell (:meth:`blocks`),
+    and assembled where entries are asked for. ``dofs`` and ``whole_dofs`` count those of the modelled part, and of the
+    whole body.
+    """
+
+    def __init__(self, body: BodyMesh, displacements: ElasticSpace):
+        """Add pressures to ``displacements`` on a mesh; collective."""
+        self._displacements = displacements
+        self.space, self._region = region_wise_space(body, displacements.degree - 1)
+        self._has_regions = body.regions is not None
+        self.forms = MixedForms(displacements.forms.displacement, self.space)
+        index_map = self.space.dofmap.index_map
+        self._owned, self.dofs = index_map.size_local, index_map.size_global
+        self.whole_dofs = whole_points(self.space, body)
+        self._stack = ExitStack()
+        with stage("assembly"):
+            self._products = CellPressures(self.space, displacements.operators.cells)
+            self.unit = self._products.unit
+
+    def close(self) -> None:
+        """Free the matrices that pressures take part in."""
+        self._stack.close()
+
+    def blocks(self, *, entries: bool) -> tuple[PETSc.Mat, PETSc.Mat]:
+        """Return B and M: with ``entries``, or as products; collective.
+
+        B has columns of zeros for prescribed displacements. Both are kept here, and freed with the pressures.
+        """
+        return self._assembled if entries else self._shells
+
+    def by_region(self, values: tuple[float, ...]) -> float | FloatArray:
+        """Return what a pressure dof has of a value by region: one for all, or an array for this rank's dofs."""
+        return np.array(values)[self._region] if self._has_regions else values[0]
+
+    @property
+    def values(self) -> FloatArray:
+        """The pressure of the forms, owned dofs."""
+        return np.asarray(self.forms.pressure.x.array[: self._owned] / self.unit)
+
+    def set(self, pressure: PETSc.Vec) -> None:
+        """Make ``pressure`` that of the forms; collective."""
+        fill(self.forms.pressure, pressure, self.unit)
+
+    def weighed(self) -> FloatArray:
+        """Return M p for the pressure of the forms, owned dofs; collective."""
+        return self._products.weigh(self.values)
+
+    def pull(self, result: PETSc.Vec, *, checked: bool) -> None:
+        """Add Bᵀ p, for all displacements, to ``result``; collective. ``checked``: see :meth:`ElasticSpace.apply`."""
+        if not checked:
+            result.array[:] += self._products.pull(self.values, whole=True)
+            return
+        with vector(self._displacements.dofs.space) as pull:
+            fem_petsc.assemble_vector(pull, self.forms.pull)
+            add_from_ghosts(pull)
+            result.axpy(1.0, pull)
+
+    def dilate(self, result: PETSc.Vec, *, checked: bool) -> None:
+        """Write B u, of all displacements, into a ``result`` of zeros; collective.
+
+        ``checked``: see :meth:`ElasticSpace.apply`.
+        """
+        if not checked:
+            displacement = self._displacements.forms.displacement.x.array[: self._displacements.dofs.owned]
+            result.array[:] = self._products.dilation(displacement, whole=True)
+            return
+        fem_petsc.assemble_vector(result, self.forms.dilation)
+        add_from_ghosts(result)
+        result.scale(self.unit)
+
+    @cached_property
+    def _shells(self) -> tuple[PETSc.Mat, PETSc.Mat]:
+        coupling, mass = (keep(self._stack, kind(self._products).matrix()) for kind in (Coupling, Mass))
+        return coupling, mass
+
+    @cached_property
+    @stage("assembly")
+    def _assembled(self) -> tuple[PETSc.Mat, PETSc.Mat]:
+        coupling, mass = (
+            keep(self._stack, compat.assemble_matrix(form, [], 1.0)) for form in (self.forms.coupling, self.forms.mass)
+        )
+        free = coupling.createVecRight()
+        free.set(1.0)
+        free.array[self._displacements.dofs.prescribed_owned] = 0.0
+        coupling.diagonalScale(None, free)
+        free.destroy()
+        coupling.scale(self.unit)
+        mass.scale(self.unit**2)
+        return coupling, mass
+
+
+def region_wise_space(body: BodyMesh, degree: int) -> tuple[Any, Int32Array]:
+    """Return the space of scalars of ``degree``, and the region of each owned dof; collective.
+
+    On a mesh of one region it is the continuous space.
+    """
+    space = scalar_space(body.mesh, degree)
+    owned = space.dofmap.index_map.size_local
+    if body.regions is None:
+        return space, np.zeros(owned, dtype=np.int32)
+    count = 1 + body.comm.allreduce(int(body.regions.max(initial=0)), op=MPI.MAX)
+    # A dof has a copy for each region that it is in; the copies of one follow each other.
+    has_copy = _copies(space, body.regions, count)
+    copies = int(has_copy[:owned].sum())
+    first = body.mesh.comm.scan(copies) - copies
+    begins = _first_copies(space, first + np.cumsum(has_copy[:owned].sum(axis=1)) - has_copy[:owned].sum(axis=1))
+    ghosts = (begins[owned:, None] + np.cumsum(has_copy[owned:], axis=1) - 1)[has_copy[owned:]]
+    owners = np.repeat(np.asarray(space.dofmap.index_map.owners), has_copy[owned:].sum(axis=1))
+    number = np.cumsum(has_copy.reshape(-1)).reshape(has_copy.shape) - 1
+    dofs = number[compat.cell_dofs(space), body.regions[:, None]]
+    renumbered = compat.renumbered_space(space, dofs, copies, ghosts, owners)
+    return renumbered, np.nonzero(has_copy[:owned])[1].astype(np.int32)
+
+
+def _copies(space: Any, regions: Int32Array, count: int) -> BoolArray:
+    """Tell, for each local dof and region, whether a cell of any rank that has the dof is in the region."""
+    dofs, columns = compat.cell_dofs(space), []
+    with vector(space) as mark:
+        for region in range(count):
+            with mark.localForm() as local:
+                local.array[:] = 0.0
+                local.array[dofs[regions == region].reshape(-1)] = 1.0
+            add_from_ghosts(mark)
+            columns.append(_with_ghosts(mark) > 0)
+    return np.column_stack(columns)
+
+
+def _first_copies(space: Any, owned: IntArray) -> IntArray:
+    """Return the global number of the first copy of each local dof, given those that this rank owns."""
+    with vector(space) as numbers:
+        numbers.array[:] = owned  # double precision holds them to the last digit
+        return _with_ghosts(numbers).astype(np.int64)
+
+
+def _with_ghosts(values: PETSc.Vec) -> FloatArray:
+    values.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
+    with values.localForm() as local:
+        return np.array(local.array)
