@@ -133,9 +133,9 @@ def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple
         ):
             space.lift(rhs, held, law)
             made = time.process_time()
-            solver = LinearSolver(lent.levels, direct=method == "direct", tolerance=TOLERANCE)
+            solver = LinearSolver(lent.levels, direct=method == "direct")
             ready = time.process_time()
-            iterations = solver.solve(rhs, unknown)
+            iterations = solver.solve(rhs, unknown, TOLERANCE)
             done = time.process_time()
             solver.close()
             return made - start - (ready - made), ready - made, done - ready, iterations

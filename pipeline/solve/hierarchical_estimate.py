@@ -17,12 +17,21 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.krylov import INDEFINITE, LinearSolver, SolveError, check_converged, explained, iterative, keep
+from pipeline.solve.krylov import (
+    INDEFINITE,
+    SOLVERS,
+    LinearSolver,
+    SolveError,
+    check_converged,
+    explained,
+    keep,
+    solver_of,
+)
 from pipeline.solve.vectors import global_sum
 
 # Iterations end when one adds less than this share of the sum; the first few may be short by chance.
 _SMALL = 0.02
-_FEWEST, _MOST = 3, 60
+_FEWEST, _MOST = 3, SOLVERS["energy decrements"]["ksp_max_it"]
 # What is left to gain below this share of the sum is rounding.
 _ROUNDING = 1e-6
 _REASONS = PETSc.KSP.ConvergedReason
@@ -41,9 +50,7 @@ def energy_decrements(
     """
     with ExitStack() as stack, explained():
         checked = _Checked(solver)
-        ksp = iterative(solver.matrix, "cg", stack, checked)
-        ksp.setNormType(PETSc.KSP.NormType.NONE)  # the preconditioner is not applied once more for a norm
-        ksp.setTolerances(max_it=_MOST)
+        ksp = solver_of("energy decrements", solver.matrix, stack, checked)
         solutions = [keep(stack, residual.duplicate()) for residual in residuals]
         found = [_sum(ksp, checked, *pair) for pair in zip(residuals, solutions, strict=True)]
         iterations = sum(count for _, count in found)

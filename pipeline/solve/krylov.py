@@ -25,26 +25,62 @@ from pipeline.stages import stage
 
 # Dofs up to which Cholesky is faster than conjugate gradients, measured: docs/solvers.md.
 DIRECT_LIMIT = {1: 5_000, 2: 1_500, 3: 1_500}
-_MOST_ITERATIONS = 500
 # So many earlier solutions begin the next one, and no more than fit into so many bytes of a process; and Fischer's
 # second method, for operators that are symmetric and positive definite.
 _MOST_RECYCLED, _RECYCLED_BYTES = 48, 100_000_000
 _IN_ENERGY = 2
 
-# Symmetric: Gauss–Seidel down, backwards up. Three entries to a row of the interpolation keep the coarse levels sparse.
-_BOOMERAMG = {
-    "coarsen_type": "HMIS",
-    "interp_type": "ext+i",
-    "strong_threshold": 0.5,
-    "P_max": 3,
-    "no_CF": "",
-    "relax_type_down": "SOR/Jacobi",
-    "relax_type_up": "backward-SOR/Jacobi",
+_CG = {"ksp_type": "cg", "ksp_atol": 0.0, "ksp_initial_guess_nonzero": True}
+_FACTORS = {"ksp_type": "preonly", "pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"}
+_TANGENT = {"ksp_norm_type": "natural", "ksp_rtol": 1e-4, "ksp_max_it": 400}
+# Options of PETSc by what is solved. Iterations improve what they are given, unless it says otherwise.
+SOLVERS: dict[str, dict[str, Any]] = {
+    "factors": _FACTORS,
+    # MUMPS enlarges its work space by this percentage: an indefinite matrix fills in more than the analysis foresees.
+    "factors, indefinite": _FACTORS | {"mat_mumps_icntl_14": 100},
+    "elasticity": _CG | {"ksp_norm_type": "natural", "ksp_max_it": 500},
+    # The preconditioner is not applied once more for a norm.
+    "energy decrements": _CG | {"ksp_norm_type": "none", "ksp_max_it": 60},
+    # Newton's method gains three digits a step, and begins each from nothing.
+    "tangent": _CG | _TANGENT,
+    "Newton's method": {
+        **_CG,
+        **_TANGENT,
+        "ksp_initial_guess_nonzero": False,
+        "snes_type": "newtonls",
+        "snes_linesearch_type": "basic",
+        "snes_rtol": 0.0,
+        "snes_stol": 0.0,
+        "snes_max_it": 25,
+    },
+    "eigenvalues": {"ksp_type": "cg", "ksp_norm_type": "natural", "ksp_rtol": 1e-12, "ksp_max_it": 30},
+    "saddle point": {"ksp_type": "gcr", "ksp_max_it": 300, "ksp_initial_guess_nonzero": True},
+    "mass": {
+        "ksp_type": "chebyshev",
+        "ksp_norm_type": "none",
+        "ksp_chebyshev_esteig_steps": 10,
+        "pc_type": "jacobi",
+    },
+    # Symmetric: Gauss–Seidel down, backwards up. Three entries to a row of the interpolation keep coarse levels sparse.
+    "degree 1": {
+        "pc_type": "hypre",
+        "pc_hypre_type": "boomeramg",
+        "pc_hypre_boomeramg_coarsen_type": "HMIS",
+        "pc_hypre_boomeramg_interp_type": "ext+i",
+        "pc_hypre_boomeramg_strong_threshold": 0.5,
+        "pc_hypre_boomeramg_P_max": 3,
+        "pc_hypre_boomeramg_no_CF": "",
+        "pc_hypre_boomeramg_relax_type_down": "SOR/Jacobi",
+        "pc_hypre_boomeramg_relax_type_up": "backward-SOR/Jacobi",
+    },
 }
 # On several ranks a sweep takes what other ranks hold as it was. Where the material jumps that amplifies, and leaves no
 # definite preconditioner; with the sums of those entries' sizes on the diagonal it cannot (A. H. Baker, R. D. Falgout,
 # T. V. Kolev and U. M. Yang, SIAM J. Sci. Comput. 33, 2864, 2011).
-_BOOMERAMG_OF_RANKS = {"relax_type_down": "l1-Gauss-Seidel", "relax_type_up": "backward-l1-Gauss-Seidel"}
+_ON_RANKS = {
+    "pc_hypre_boomeramg_relax_type_down": "l1-Gauss-Seidel",
+    "pc_hypre_boomeramg_relax_type_up": "backward-l1-Gauss-Seidel",
+}
 
 _prefixes = itertools.count()
 _NONE = np.empty(0, dtype=np.int32)
@@ -92,49 +128,33 @@ def check_converged(ksp: PETSc.KSP) -> int:
     return int(ksp.its)
 
 
-def set_up(solver: PETSc.KSP | PETSc.PC, options: Mapping[str, Any]) -> None:
-    """Set up a KSP or PC with ``options`` of PETSc, which have an own prefix and are removed again; collective."""
+def configure(solver: PETSc.KSP | PETSc.PC | PETSc.SNES, options: Mapping[str, Any]) -> None:
+    """Give a solver ``options`` of PETSc, which have an own prefix and are removed again; collective."""
     held, prefix = PETSc.Options(), f"epsmesh{next(_prefixes)}_"
     try:
-        if options:
-            solver.setOptionsPrefix(prefix)
-            for name, value in options.items():
-                held[prefix + name] = value
-            solver.setFromOptions()
-        solver.setUp()
+        solver.setOptionsPrefix(prefix)
+        for name, value in options.items():
+            held[prefix + name] = value
+        solver.setFromOptions()
     finally:
         for name in options:
             held.delValue(prefix + name)
 
 
-def factorised(matrix: PETSc.Mat, stack: ExitStack, options: Mapping[str, Any] | None = None) -> PETSc.KSP:
-    """Return the solver by a symmetric factorisation of a ``matrix``, freed with the ``stack``; collective."""
-    ksp = keep(stack, PETSc.KSP().create(matrix.comm))
-    ksp.setOperators(matrix)
-    ksp.setType("preonly")
-    ksp.pc.setType("cholesky")
-    ksp.pc.setFactorSolverType("mumps")
-    set_up(ksp, options or {})
-    return ksp
+def solver_of(kind: str, matrix: PETSc.Mat, stack: ExitStack, preconditioner: Any = None, **options: Any) -> PETSc.KSP:
+    """Return a KSP of a ``kind`` of ``SOLVERS``, not set up, freed with the ``stack``; collective.
 
-
-def iterative(
-    matrix: PETSc.Mat, kind: str, stack: ExitStack, preconditioner: Any = None, options: Mapping[str, Any] | None = None
-) -> PETSc.KSP:
-    """Return an iteration of a ``kind`` of PETSc's, freed with the ``stack``; it improves what it is given; collective.
-
-    The ``preconditioner`` is a PC, or a context in Python; without one, the ``options`` name it.
+    The ``preconditioner`` is a PC, or a context in Python; without one, the options name it. More ``options`` of PETSc
+    are added to those of the kind.
     """
     ksp = keep(stack, PETSc.KSP().create(matrix.comm))
     ksp.setOperators(matrix)
-    ksp.setType(kind)
-    ksp.setInitialGuessNonzero(True)
+    configure(ksp, SOLVERS[kind] | options)
     if isinstance(preconditioner, PETSc.PC):
         ksp.setPC(preconditioner)
     elif preconditioner is not None:
         ksp.pc.setType("python")
         ksp.pc.setPythonContext(preconditioner)
-    set_up(ksp, options or {})
     return ksp
 
 
@@ -142,10 +162,8 @@ def algebraic(matrix: PETSc.Mat, stack: ExitStack) -> PETSc.PC:
     """Return hypre's multigrid for a ``matrix`` of degree 1, freed with the ``stack``; collective."""
     pc = keep(stack, PETSc.PC().create(matrix.comm))
     pc.setOperators(matrix)
-    pc.setType("hypre")
-    pc.setHYPREType("boomeramg")
-    chosen = _BOOMERAMG | (_BOOMERAMG_OF_RANKS if matrix.comm.size > 1 else {})
-    set_up(pc, {f"pc_hypre_boomeramg_{name}": value for name, value in chosen.items()})
+    configure(pc, SOLVERS["degree 1"] | (_ON_RANKS if matrix.comm.size > 1 else {}))
+    pc.setUp()
     return pc
 
 
@@ -187,7 +205,7 @@ class LinearSolver:
     """
 
     @stage("set-up")
-    def __init__(self, levels: list[Level], *, direct: bool, tolerance: float, below: "LinearSolver | None" = None):
+    def __init__(self, levels: list[Level], *, direct: bool, below: "LinearSolver | None" = None):
         """Set up; collective. Operators above degree 1 are products, but for that of a ``direct`` solver.
 
         ``below`` is a solver of all levels but the last, if there is one: what it has set up serves on where it can,
@@ -201,12 +219,9 @@ class LinearSolver:
         self._is_direct, self._looked_closer = direct, False
         with ExitStack() as stack, explained():
             self._stack = stack
-            if direct:
-                self.ksp = factorised(self.matrix, stack)
-            else:
-                self.ksp = iterative(self.matrix, "cg", stack, self._preconditioner(below))
-                self.ksp.setNormType(PETSc.KSP.NormType.NATURAL)
-                self.ksp.setTolerances(rtol=tolerance, atol=0.0, max_it=_MOST_ITERATIONS)
+            kind, preconditioner = ("factors", None) if direct else ("elasticity", self._preconditioner(below))
+            self.ksp = solver_of(kind, self.matrix, stack, preconditioner)
+            self.ksp.setUp()
             self._stack = stack.pop_all()
 
     def _preconditioner(self, below: "LinearSolver | None") -> "PETSc.PC | Cycle":
@@ -233,8 +248,8 @@ class LinearSolver:
     ) -> int:
         """Improve ``solution`` and return the iterations; collective. A direct solve does not look at what it holds.
 
-        ``tolerance`` is another one than the solver was made with; a ``target`` is for the energy norm of the error
-        itself, not relative to anything.
+        ``tolerance`` is for the energy norm of the error relative to that of the whole solution, a ``target`` for that
+        norm itself. An iteration takes one of them.
 
         Raises:
             SolveError: if PETSc reports anything but convergence.
@@ -324,6 +339,10 @@ class LinearSolver:
         """
         with explained():
             self.ksp.pc.apply(residual, result)
+
+    def apply(self, _: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
+        """Be the preconditioner of another operator; PETSc calls this."""
+        self.precondition(residual, result)
 
     def close(self) -> None:
         """Free everything that was made."""

@@ -30,7 +30,6 @@ from pipeline.solve.krylov import LinearSolver
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.newton import Equilibrium, LargeError, assemble, tangent_product
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.solution import TOLERANCE
 from pipeline.solve.vectors import global_sum, vector
 from pipeline.stages import Times, recharge, recorded
 
@@ -89,7 +88,7 @@ class LoadSteps(Solver):
         law = walk.law
         self._space = elements.displacements
         self._levels = elements.levels(law, stack, direct=direct)
-        solver = LinearSolver(self._levels, direct=direct, tolerance=TOLERANCE)
+        solver = LinearSolver(self._levels, direct=direct)
         stack.callback(solver.close)
         self._forms = HyperelasticForms(self._space.dofs.space, self._space.forms, law.name)
         self._body = Equilibrium(self._space, self._forms, solver)

@@ -4,9 +4,8 @@ PETSc's SNES with a line search; the linear systems by conjugate gradients, prec
 elasticity, which is set up once: the tangent differs from it by what strain makes of the stiffness.
 """
 
-import itertools
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
@@ -17,22 +16,17 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.solve.forms import HyperelasticForms
-from pipeline.solve.krylov import LinearSolver, SolveError, explain
+from pipeline.solve.krylov import INDEFINITE, SOLVERS, LinearSolver, SolveError, configure, explain, keep, solver_of
 from pipeline.solve.spaces import ElasticSpace
 from pipeline.solve.vectors import add_from_ghosts, fill, vector
 from pipeline.stages import stage
 
-# Each linear system's error, relative, in the energy norm: Newton's method gains three digits a step.
-_LINEAR, _MOST_LINEAR = 1e-4, 400
 # Residual that is left, relative to the forces on what is prescribed, and the most steps to get there.
-_LEFT, _MOST_STEPS = 1e-9, 25
-_INDEFINITE = PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC
+_LEFT = 1e-9
 # A step that turns tissue inside out is halved, at most this often.
 _HALVINGS = 12
 # Of the gain that the slope promises, a step must bring so much.
 _GAIN = 1e-4
-
-_prefixes = itertools.count()
 
 
 class LargeError(SolveError):
@@ -74,7 +68,7 @@ class Equilibrium:
         Raises:
             LargeError: if the tangent is not definite: the tissue gives way.
         """
-        with self._linear() as ksp, vector(self._space.dofs.space) as load:
+        with ExitStack() as stack, vector(self._space.dofs.space) as load:
             self._assemble(displacement)
             self.tangent.mult(prescribed, load)
             load.scale(-1.0)
@@ -83,8 +77,7 @@ class Equilibrium:
             # What is prescribed is there from the beginning: a preconditioner may know nothing of it.
             result.set(0.0)
             result.array[self._held] = prescribed.array[self._held]
-            ksp.setInitialGuessNonzero(True)
-            ksp.setOperators(self.tangent)
+            ksp = solver_of("tangent", self.tangent, stack, self._solver)
             self._run(ksp, ksp, lambda: ksp.solve(load, result))
 
     @stage("Newton's method")
@@ -96,23 +89,17 @@ class Equilibrium:
         Raises:
             LargeError: if there is none nearby.
         """
-        snes = PETSc.SNES().create(self._space.dofs.comm)
-        with self._linear(snes.ksp), vector(self._space.dofs.space) as residual:
-            try:
-                snes.setType("newtonls")
-                snes.setFunction(self._function, residual)
-                snes.setJacobian(self._jacobian, self.tangent, self.tangent)
-                snes.setLineSearchPreCheck(self._shorten)
-                prefix = f"epsmesh_large{next(_prefixes)}_"
-                snes.setOptionsPrefix(prefix)
-                PETSc.Options()[prefix + "snes_linesearch_type"] = "basic"
-                snes.setFromOptions()
-                PETSc.Options().delValue(prefix + "snes_linesearch_type")
-                snes.setTolerances(rtol=0.0, atol=_LEFT * scale, stol=0.0, max_it=_MOST_STEPS)
-                self._run(snes, snes.ksp, lambda: snes.solve(None, displacement))
-                return int(snes.getIterationNumber())
-            finally:
-                snes.destroy()
+        with ExitStack() as stack, vector(self._space.dofs.space) as residual:
+            snes = keep(stack, PETSc.SNES().create(self._space.dofs.comm))
+            configure(snes, SOLVERS["Newton's method"])
+            snes.ksp.pc.setType("python")
+            snes.ksp.pc.setPythonContext(self._solver)
+            snes.setFunction(self._function, residual)
+            snes.setJacobian(self._jacobian, self.tangent, self.tangent)
+            snes.setLineSearchPreCheck(self._shorten)
+            snes.setTolerances(atol=_LEFT * scale)
+            self._run(snes, snes.ksp, lambda: snes.solve(None, displacement))
+            return int(snes.getIterationNumber())
 
     def _function(self, _: PETSc.SNES | None, displacement: PETSc.Vec, result: PETSc.Vec) -> None:
         self._space.set_displacement(displacement)
@@ -148,21 +135,6 @@ class Equilibrium:
                 step.scale(0.5)
         return True
 
-    @contextmanager
-    def _linear(self, ksp: PETSc.KSP | None = None) -> Iterator[PETSc.KSP]:
-        own = ksp is None
-        ksp = ksp or PETSc.KSP().create(self._space.dofs.comm)
-        ksp.setType("cg")
-        ksp.setNormType(PETSc.KSP.NormType.NATURAL)
-        ksp.setTolerances(rtol=_LINEAR, atol=0.0, max_it=_MOST_LINEAR)
-        ksp.pc.setType("python")
-        ksp.pc.setPythonContext(_Preconditioner(self._solver))
-        try:
-            yield ksp
-        finally:
-            if own:
-                ksp.destroy()
-
     def _run(self, solver: Any, ksp: PETSc.KSP, solve: Callable[[], None]) -> None:
         """Run a solver of PETSc, whose linear systems are those of ``ksp``, and see that it has converged; collective.
 
@@ -173,7 +145,7 @@ class Equilibrium:
         """
         try:
             self._counted(solver, solve)
-            if ksp.getConvergedReason() == _INDEFINITE and self._solver.look_closer():
+            if ksp.getConvergedReason() == INDEFINITE and self._solver.look_closer():
                 self._counted(solver, solve)
         except PETSc.Error as error:
             raise LargeError(explain(error)) from error
@@ -183,16 +155,6 @@ class Equilibrium:
     def _counted(self, solver: Any, solve: Callable[[], None]) -> None:
         solve()
         self.iterations += solver.getLinearSolveIterations() if isinstance(solver, PETSc.SNES) else solver.its
-
-
-class _Preconditioner:
-    """The preconditioner of linear elasticity, as one of PETSc's own."""
-
-    def __init__(self, solver: LinearSolver):
-        self._solver = solver
-
-    def apply(self, _: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
-        self._solver.precondition(residual, result)
 
 
 def assemble(form: Any, result: PETSc.Vec) -> None:

@@ -272,7 +272,7 @@ class QuasiStaticProblem:
         direct = elements.is_direct(method)
         with ExitStack() as stack:
             levels = elements.levels(law, stack, direct=direct)
-            solver = LinearSolver(levels, direct=direct, tolerance=0.5)
+            solver = LinearSolver(levels, direct=direct)
             stack.callback(solver.close)
             yield solver
 

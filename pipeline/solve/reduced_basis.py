@@ -17,7 +17,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.krylov import LinearSolver, keep
+from pipeline.solve.krylov import LinearSolver, keep, solver_of
 from pipeline.solve.loads import Loads
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
@@ -26,7 +26,6 @@ from pipeline.solve.vectors import global_sum, vector
 
 # λ_min is estimated from above, by Lanczos: its share that is relied on.
 _TRUST = 0.5
-_LANCZOS, _SETTLED = 30, 1e-12
 _LAMBDA, _MU = MaterialLaw.of(1.0, 0.0), MaterialLaw.of(0.0, 1.0)
 
 
@@ -147,13 +146,8 @@ def _smallest_eigenvalue(solver: LinearSolver, load: PETSc.Vec) -> float:
     if solver.ksp.getType() == "preonly":
         return 1.0
     with ExitStack() as stack:
-        ksp = keep(stack, PETSc.KSP().create(solver.matrix.comm))
-        ksp.setOperators(solver.matrix)
-        ksp.setType("cg")
-        ksp.setPC(solver.ksp.pc)
-        ksp.setNormType(PETSc.KSP.NormType.NATURAL)
+        ksp = solver_of("eigenvalues", solver.matrix, stack, solver.ksp.pc)
         ksp.setComputeEigenvalues(True)
-        ksp.setTolerances(rtol=_SETTLED, max_it=_LANCZOS)
         solution = keep(stack, load.duplicate())
         ksp.solve(load, solution)
         return float(np.min(np.real(ksp.computeEigenvalues())))

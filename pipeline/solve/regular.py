@@ -167,7 +167,7 @@ def _solved(
     free[space.dofs.prescribed] = 0.0
     with space.operators.lend(law) as matrix, _products(space, len(forces)) as product:
         level = Level(space.dofs.space, matrix, space.dofs.prescribed)
-        solver = LinearSolver([level], direct=True, tolerance=0.5)
+        solver = LinearSolver([level], direct=True)
         try:
             for first in range(0, len(forces), _TOGETHER):
                 some = forces[first : first + _TOGETHER]

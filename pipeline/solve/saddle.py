@@ -16,13 +16,13 @@ from dataclasses import dataclass
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.krylov import Level, LinearSolver, check_converged, explained, factorised, iterative, keep
+from pipeline.solve.krylov import SOLVERS, Level, LinearSolver, check_converged, explained, keep, solver_of
 from pipeline.stages import stage
 
 Pair = tuple[PETSc.Vec, PETSc.Vec]
 Weight = float | FloatArray
 
-_MOST_ITERATIONS = 300
+_MOST_ITERATIONS = SOLVERS["saddle point"]["ksp_max_it"]
 # More directions than a solve takes, as a rule, and than one to a tenth: all of them are made and zeroed beforehand.
 _RESTART, _RESTART_ROUGH, _ROUGH = 40, 20, 0.1
 # B K₀⁻¹ Bᵀ is M / (λ₀ + 2μ) inside the body and less where the displacement is held; measured, flat from 0.8 to 1.6.
@@ -30,8 +30,6 @@ _SCHUR = 1.2
 # Chebyshev steps for M preconditioned by its diagonal, and smallest over largest eigenvalue, by the degree of the
 # pressure. Degree 1: 1/5 (A. Wathen, IMA J. Numer. Anal. 7, 449, 1987); the rest measured by the iterations.
 _MASS = {1: (3, 0.2), 2: (5, 0.1), 3: (10, 0.04), 4: (14, 0.02)}
-# Percentage by which MUMPS enlarges its work space: an indefinite matrix fills in more than the analysis foresees.
-_PIVOTING = 100
 
 
 @dataclass(frozen=True)
@@ -66,7 +64,7 @@ class SaddleSolver:
         with ExitStack() as stack, stage("set-up"):
             if not direct:
                 known = None if below is None else below.multigrid
-                self._multigrid = LinearSolver(saddle.levels, direct=False, tolerance=0.5, below=known)
+                self._multigrid = LinearSolver(saddle.levels, direct=False, below=known)
                 stack.callback(self._multigrid.close)
                 self._mass = self._mass_solver(stack)
             self._stack = stack.pop_all()
@@ -124,7 +122,9 @@ class SaddleSolver:
     def _factors(self, nest: PETSc.Mat, stack: ExitStack) -> PETSc.KSP:
         matrix = keep(stack, nest.convert("aij", PETSc.Mat()))
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        return factorised(matrix, stack, {"mat_mumps_icntl_14": _PIVOTING})
+        ksp = solver_of("factors, indefinite", matrix, stack)
+        ksp.setUp()
+        return ksp
 
     def _preconditioner(self, c: Weight, stack: ExitStack) -> "_BlockTriangular":
         saddle = self._saddle
@@ -134,15 +134,9 @@ class SaddleSolver:
 
     def _mass_solver(self, stack: ExitStack) -> PETSc.KSP:
         steps, ratio = _MASS[self._saddle.degree]
-        options = {
-            "ksp_max_it": steps,
-            "ksp_norm_type": "none",
-            "pc_type": "jacobi",
-            "ksp_chebyshev_esteig": f"0,{ratio},0,1.1",
-            "ksp_chebyshev_esteig_steps": 10,
-        }
-        ksp = iterative(self._saddle.mass, "chebyshev", stack, options=options)
-        ksp.setInitialGuessNonzero(False)
+        esteig = f"0,{ratio},0,1.1"
+        ksp = solver_of("mass", self._saddle.mass, stack, ksp_max_it=steps, ksp_chebyshev_esteig=esteig)
+        ksp.setUp()
         return ksp
 
 
@@ -205,8 +199,7 @@ class _EnergyTest:
 
 def _gcr(matrix: PETSc.Mat, block: _BlockTriangular, aim: tuple[float, float | None], stack: ExitStack) -> PETSc.KSP:
     restart = _RESTART_ROUGH if aim[0] >= _ROUGH else _RESTART
-    ksp = iterative(matrix, "gcr", stack, block, {"ksp_gcr_restart": restart})
-    ksp.setTolerances(max_it=_MOST_ITERATIONS)
+    ksp = solver_of("saddle point", matrix, stack, block, ksp_gcr_restart=restart)
     ksp.setConvergenceTest(_EnergyTest(block, *aim))
     return ksp
 

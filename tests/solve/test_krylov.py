@@ -68,12 +68,12 @@ def test_what_does_not_converge_is_a_failure():
     matrix = PETSc.Mat().createAIJ(2, nnz=2, comm=PETSc.COMM_SELF)
     matrix.setValues([0, 1], [0, 1], [1.0, 3.0, 3.0, 1.0])
     matrix.assemble()
-    solver = LinearSolver([Level(None, matrix, np.empty(0, np.int32))], direct=False, tolerance=1e-6)
+    solver = LinearSolver([Level(None, matrix, np.empty(0, np.int32))], direct=False)
     rhs, unknown = matrix.createVecs()
     rhs.setValues([0, 1], [1.0, -1.0])
     rhs.assemble()
     with pytest.raises(SolveError, match="did not converge: diverged_"):
-        solver.solve(rhs, unknown)
+        solver.solve(rhs, unknown, 1e-6)
     solver.close()
 
 
@@ -123,7 +123,7 @@ def test_a_set_up_that_fails_leaves_nothing(monkeypatch):
         monkeypatch.setattr(krylov, "keep", kept)
         monkeypatch.setattr(krylov, "Cycle", cycle)
         with pytest.raises(MemoryError):
-            LinearSolver(solver.levels, direct=False, tolerance=1e-6)
+            LinearSolver(solver.levels, direct=False)
     assert made
     assert all(item.handle == 0 for item in made)
 

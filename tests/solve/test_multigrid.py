@@ -55,7 +55,7 @@ def test_it_is_symmetric_and_positive():
         QuasiStaticProblem(spaces, 3, Conditions()) as problem,
         problem.solver(law(0.4), "iterative") as lent,
     ):
-        solver = LinearSolver(lent.levels, direct=False, tolerance=0.5)
+        solver = LinearSolver(lent.levels, direct=False)
         assert solver.ksp.pc.getType() == "python"
         random = np.random.default_rng(5)
         pairs = []
@@ -85,7 +85,7 @@ def test_an_operator_that_is_not_positive_is_refused():
             operators.lend_product(MaterialLaw.of(-1.0, -1.0)) as turned,
             pytest.raises(SolveError, match="not positive definite"),
         ):
-            LinearSolver([coarse, Level(fine.space, turned, fine.prescribed)], direct=False, tolerance=1e-6)
+            LinearSolver([coarse, Level(fine.space, turned, fine.prescribed)], direct=False)
 
 
 def test_moduli_out_of_range_are_refused():

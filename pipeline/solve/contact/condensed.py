@@ -59,7 +59,7 @@ class CondensedElements(ContactDisplacement):
     def _factor(self) -> LinearSolver:
         space = self.space.dofs
         level = Level(space.space, self.hierarchy.finest, space.prescribed)
-        return LinearSolver([level], direct=True, tolerance=1.0)
+        return LinearSolver([level], direct=True)
 
     @stage("condensation")
     def _condense(self) -> FloatArray:

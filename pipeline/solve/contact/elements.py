@@ -327,7 +327,7 @@ class ContactDisplacement(ContactElements):
             self._solver.hold(levels)
             return
         self.close()
-        self._solver = LinearSolver(levels, direct=self._direct, tolerance=_ANY)
+        self._solver = LinearSolver(levels, direct=self._direct)
         self._solving.callback(self._solver.close)
 
     def correct(self, rest: Fields, correction: Fields, tolerance: float, target: float | None) -> int:

@@ -57,7 +57,7 @@ def _displacement_decrement(
         levels = elements.held_levels(facets, stack)
         matrix = stack.enter_context(finer.operators.lend_product(law))
         levels.append(mask(finer, matrix, law, normal_dofs(finer, facets)))
-        solver = LinearSolver(levels, direct=False, tolerance=0.5)
+        solver = LinearSolver(levels, direct=False)
         stack.callback(solver.close)
         finer.forms.displacement.interpolate(elements.space.forms.displacement)
         finer.apply(residual, law, checked=False)

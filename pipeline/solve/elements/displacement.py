@@ -69,7 +69,7 @@ class DisplacementElements(Elements):
         if len(levels) == 1 and self.degree > 1:
             levels = self.levels(law, stack, direct=False)
         level = level_of(finer.displacements, law, stack)
-        solver = LinearSolver([*levels, level], direct=False, tolerance=_ANY, below=below)
+        solver = LinearSolver([*levels, level], direct=False, below=below)
         stack.callback(solver.close)
         return finer, solver
 
@@ -90,7 +90,7 @@ class DisplacementSolver(Solver):
         self._tolerance = 1.0
         with ExitStack() as stack, recorded() as self.cost:
             self.levels = elements.levels(law, stack, direct=direct)
-            self.linear = LinearSolver(self.levels, direct=direct, tolerance=_ANY)
+            self.linear = LinearSolver(self.levels, direct=direct)
             stack.callback(self.linear.close)
             self.owner = stack.pop_all()
 
