@@ -56,7 +56,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         depth=case.scale.length,
         force=force,
         force_error=bar / abs(force),
-        force_vector=turned_back(turn, _known_of(case, solution)),
+        force_vector=turned_back(turn, _known_of(case, solution.reaction)),
         force_vector_error=_vector_bars(solution, turn),
         stiffness=_rows(solution.stiffness, turn) if case.probe.motion == "all" else (),
         stiffness_error=_rows(solution.bars, turn, bars=True) if case.probe.motion == "all" else (),
@@ -68,7 +68,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         contact_radius=solution.contact_radius,
         contact_area_error=solution.contact_area_bar,
         contact_radius_error=solution.contact_area_bar / 2,
-        **_of_loads(solution, turn),
+        **_of_loads(case, solution),
         balance=solution.balance,
         dofs=solution.dofs,
         cells=solution.cells * 2 ** len(solve.mirrors),
@@ -84,7 +84,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
     )
 
 
-def _of_loads(solution: Solution, turn: FloatArray | None) -> dict[str, Any]:
+def _of_loads(case: Case, solution: Solution) -> dict[str, Any]:
     """Return what a record holds of loads, nothing where there are none."""
     loaded, loads = solution.load_response, solution.response.loads
     if not isnan(solution.sag):  # of found contact: loads bend the surface, and the depth counts from the first touch
@@ -93,24 +93,24 @@ def _of_loads(solution: Solution, turn: FloatArray | None) -> dict[str, Any]:
         return touching | {"load_energy": solution.load_energy, "sag": solution.sag}
     if loaded is None:
         return {}
-    force, axis = loaded.force(loads), (0.0, 0.0, -1.0)
+    force, axis = solution.load_force, (0.0, 0.0, -1.0)
     return {
         "load_force": force[2],
-        "load_force_error": loaded.bar_along(loads, axis),
-        "load_force_vector": turned_back(turn, force),
+        "load_force_error": solution.load_force_bar,
+        "load_force_vector": turned_back(case.frame.turn, _known_of(case, force)),
         "load_energy": loaded.energy,
         # Where the probe bears no force along its axis: held at a depth d it bears k d + load_force.
         "sag": -force[2] / loaded.stiffness_along(loads, axis),
     }
 
 
-def _known_of(case: Case, solution: Solution) -> Vector:
-    """Return the reaction (N), not a number where it is not known and no symmetry makes it nought.
+def _known_of(case: Case, force: Vector) -> Vector:
+    """Return a ``force`` (N) on the probe, not a number where it is not known and no symmetry makes it nought.
 
     A far field of the force along the axis tells that alone. Along a blade on which tissue slides, what pushes on its
     two ends is not looked at.
     """
-    x, y, z = solution.reaction
+    x, y, z = force
     if case.is_closed and case.probe.contact == "bonded":
         return x and nan, y and nan, z
     if case.probe.slit and case.probe.contact != "bonded":

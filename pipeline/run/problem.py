@@ -195,7 +195,8 @@ def solve_problem(case: Case, problem: Problem, *, estimate: bool, meshed: Case 
     if loads.far is not None:
         solution.times.setup += loads.far.seconds
     if solution.is_shut:
-        raise SolveError("the blade's travel presses the slit shut at its front, where its faces would pass each other")
+        cause = "the blade's travel presses" if loads.dead is None else "the blade's travel and the loads press"
+        raise SolveError(f"{cause} the slit shut at its front, where its faces would pass each other")
     return solution
 
 

@@ -15,11 +15,15 @@ and nothing on the front, and along the faces everywhere, so that what is prescr
 stays as it is. dU is what it takes to push the blade on: at its tip the pressure is singular, and leaves a
 configurational force along the blade (D. Bigoni, F. Dal Corso, F. Bosi and D. Misseroni, Mech. Mater. 80, 368, 2015).
 
-It is quadratic in u: of a sum of motions, R_ij tells what each pair of them releases.
+With dead loads f the potential energy takes the place of the strain energy: −dU + df·u is released, df what becomes of
+the nodal forces as the nodes move along.
+
+It is quadratic in the amounts of the motions and of the loads: R_ij tells what each pair of them releases.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from math import isfinite, nan
 from typing import Any
 
@@ -28,7 +32,8 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from pipeline.arrays import FloatArray
+from pipeline import compat
+from pipeline.arrays import BoolArray, FloatArray
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve.compiled import form, scalar_space, vector_space
 from pipeline.solve.estimate import extrapolate_release, release_bar
@@ -38,6 +43,10 @@ from pipeline.solve.physics import strain
 
 # v is 1 up to the first of these shares of its radius, and nothing from the second on.
 _INNER, _OUTER = 0.4, 1.0
+# Nodes are moved by this share of that radius to see what becomes of the loads, and back.
+_STEP = 1e-4
+# The edges of a cell in the order of their nodes (basix).
+_EDGES = [(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)]
 
 
 @dataclass(frozen=True)
@@ -71,31 +80,77 @@ class Front:
 
 @dataclass(frozen=True, eq=False)
 class Advance:
-    """The energy (J/m) that an advance of a line releases: a ``form`` (n, n) of the amounts of n motions.
+    """The energy (J/m) that an advance of a line releases: a quadratic ``form`` (n, n) of ``amounts`` (n).
 
-    ``finer`` is what one degree more makes of it, ``bar`` the relative 95 % bar on what is released.
+    The amounts are those of so many ``motions`` and, with loads, a last 1 for these. ``finer`` is the form in elements
+    of one ``degree`` more, ``energy_bar`` the relative 95 % bar on the energy. If it ``is_extrapolated``, energies are
+    those that the sequence of degrees tends to.
     """
 
     form: FloatArray
+    amounts: FloatArray
+    motions: int
     finer: FloatArray | None = None
-    bar: float = nan
+    degree: int = 0
+    energy_bar: float = nan
+    is_extrapolated: bool = False
 
-    def released(self, amounts: FloatArray) -> float:
-        """Return what is released (J/m)."""
-        return float(amounts @ self.form @ amounts)
+    @property
+    def released(self) -> float:
+        """What is released (J/m)."""
+        return float(self.amounts @ self.gains)
 
-    def with_bar(self, finer: FloatArray, amounts: FloatArray, degree: int, bar: float) -> "Advance":
-        """Return it with what one degree more makes of it; ``bar`` is the relative one on the energy."""
-        found = release_bar(self.released(amounts), float(amounts @ finer @ amounts), degree, bar)
-        return Advance(self.form, finer, found)
+    @property
+    def gains(self) -> FloatArray:
+        """Half of what a unit more of each amount releases (n)."""
+        form = self.form
+        if self.is_extrapolated and self.finer is not None:
+            form = extrapolate_release(form, self.finer, self.degree)
+        return np.asarray(form @ self.amounts)
 
-    def extrapolated(self, amounts: FloatArray, degree: int, bar: float) -> "Advance":
-        """Return what the sequence of degrees tends to, itself without a finer one; ``bar`` is that on the energy."""
+    @property
+    def error(self) -> float:
+        """The 95 % bar (J/m) on it; not a number without a finer form."""
         if self.finer is None:
-            return self
-        finer = float(amounts @ self.finer @ amounts)
-        found = release_bar(self.released(amounts), finer, degree, bar, extrapolated=True)
-        return Advance(extrapolate_release(self.form, self.finer, degree), self.finer, found)
+            return nan
+        finer = float(self.amounts @ self.finer @ self.amounts)
+        size = abs(self.without_loads().own) + abs(self.of_loads().own)
+        return release_bar(self.own, finer, self.degree, extrapolated=self.is_extrapolated) + self.energy_bar * size
+
+    @property
+    def own(self) -> float:
+        """What is released (J/m) in the elements themselves."""
+        return float(self.amounts @ self.form @ self.amounts)
+
+    @property
+    def bar(self) -> float:
+        """The bar relative to what is released in the elements themselves."""
+        return self.error / abs(self.own)
+
+    def without_loads(self) -> "Advance":
+        """Return what the motions alone release."""
+        return self._only(self._is_of_motions)
+
+    def of_loads(self) -> "Advance":
+        """Return what the loads add."""
+        return self._only(~self._is_of_motions)
+
+    def with_finer(self, finer: "Advance", degree: int, energy_bar: float) -> "Advance":
+        """Return it with what elements of one ``degree`` more make of it, and the relative bar on the energy."""
+        return replace(self, finer=finer.form, degree=degree, energy_bar=energy_bar)
+
+    def extrapolated(self, energy_bar: float) -> "Advance":
+        """Return what the sequence of degrees tends to, itself without a finer form."""
+        return replace(self, energy_bar=energy_bar, is_extrapolated=True)
+
+    @property
+    def _is_of_motions(self) -> BoolArray:
+        of_motion = np.arange(len(self.amounts)) < self.motions
+        return np.logical_and.outer(of_motion, of_motion)
+
+    def _only(self, kept: BoolArray) -> "Advance":
+        finer = None if self.finer is None else np.where(kept, self.finer, 0.0)
+        return replace(self, form=np.where(kept, self.form, 0.0), finer=finer)
 
 
 class Release:
@@ -115,17 +170,24 @@ class Release:
 
         ``pressure`` and the λ₀ and μ of ``lame`` are those of mixed elements, moduli are in a ``unit`` (Pa).
         """
-        self._comm, self._unit = body.comm, unit
-        advance = fem.Function(scalar_space(body.mesh, 1))
-        advance.interpolate(front.advance)
-        self._form = _form(displacement, advance, lame, pressure)
+        self._body, self._front, self._unit = body, front, unit
+        self._step = _STEP * front.radius
+        self._form = _form(displacement, _advance(body, front), lame, pressure)
 
     def __call__(self) -> float:
         """Return −dU (J/m) for the present fields, of the modelled part; collective."""
-        return self._unit * float(self._comm.allreduce(fem.assemble_scalar(self._form), op=MPI.SUM))
+        return self._unit * float(self._body.comm.allreduce(fem.assemble_scalar(self._form), op=MPI.SUM))
+
+    def of_forces(self, nodal: Callable[[], FloatArray]) -> FloatArray:
+        """Return df (N/m), what a unit of advance makes of ``nodal`` forces (N) on the mesh as it is; collective."""
+        found = []
+        for step in (self._step, -self._step):
+            with moved_on(self._body, self._front, step):
+                found.append(nodal())
+        return np.asarray(found[0] - found[1]) / (2 * self._step)
 
     def matrix(self, count: int, put: Callable[[FloatArray], None]) -> FloatArray:
-        """Return R (n, n): −dU = c·R·c (J/m), where ``put(c)`` sets the fields of the sum of ``count`` motions c."""
+        """Return R (n, n): −dU = c·R·c (J/m), where ``put(c)`` sets the fields of the sum of ``count`` solutions c."""
         units = np.eye(count)
 
         def of(amounts: FloatArray) -> float:
@@ -138,6 +200,27 @@ class Release:
             for j in range(i):
                 result[i, j] = result[j, i] = (of(units[i] + units[j]) - alone[i, i] - alone[j, j]) / 2
         return result
+
+
+@contextmanager
+def moved_on(body: BodyMesh, front: Front, step: float) -> Iterator[None]:
+    """Move the nodes of the mesh along with a ``front`` that goes on by a ``step`` (m), and back in the end."""
+    advance, nodes, points = _advance(body, front), compat.geometry_dofs(body.mesh), body.mesh.geometry.x
+    corners = advance.x.array[compat.cell_dofs(advance.function_space)]
+    middles = [(corners[:, i] + corners[:, j]) / 2 for i, j in _EDGES] if nodes.shape[1] > len(corners.T) else []
+    moved, before = np.zeros(len(points)), points.copy()
+    moved[nodes] = np.column_stack([corners, *middles])
+    points[:, 2] -= step * moved
+    try:
+        yield
+    finally:
+        points[:] = before
+
+
+def _advance(body: BodyMesh, front: Front) -> Any:
+    found = fem.Function(scalar_space(body.mesh, 1))
+    found.interpolate(front.advance)
+    return found
 
 
 def _form(u: Any, advance: Any, lame: tuple[Any, Any], pressure: Any) -> Any:

@@ -131,13 +131,13 @@ def _limits(
     return _LIMITS_SEVERAL if several and element == "mixed" else _LIMITS[element, degree]
 
 
-def release_bar(released: float, finer: float, degree: int, bar: float, *, extrapolated: bool = False) -> float:
-    """Return the 95 % bar on what a slit's front releases, relative to it, or on what the degrees tend to.
+def release_bar(released: float, finer: float, degree: int, *, extrapolated: bool = False) -> float:
+    """Return the 95 % bar (J/m) on what a slit's front releases, or on what the degrees tend to.
 
-    ``finer`` is what one degree more makes of it, ``bar`` that on the energy, of which it is a derivative.
+    ``finer`` is what one degree more makes of it. The relative bar on the energy, of which it is a derivative, is to
+    be added.
     """
-    share = abs(released - finer) / abs(released)
-    return share * (_RELEASE[1] * _theta(degree) if extrapolated else 1 + _theta(degree)) + bar
+    return abs(released - finer) * (_RELEASE[1] * _theta(degree) if extrapolated else 1 + _theta(degree))
 
 
 def extrapolate_release(released: FloatArray, finer: FloatArray, degree: int) -> FloatArray:

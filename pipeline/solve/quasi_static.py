@@ -230,9 +230,8 @@ class QuasiStaticProblem:
         ]
         bars = stiffness_bars(form, np.array(relative))
         solution = solution.with_bars(decrements, bars, elements.element, apart=loads.apart)
-        amounts = solution.response.amounts
         front, tip = (
-            advance and above and advance.with_bar(above.form, amounts, elements.degree, solution.bar)
+            advance and above and advance.with_finer(above, elements.degree, solution.energy_bar)
             for advance, above in zip((solution.front, solution.tip), released, strict=True)
         )
         return replace(
@@ -248,15 +247,19 @@ class QuasiStaticProblem:
     def _released(
         self, elements: Elements, columns: Sequence[Column], law: MaterialLaw, loads: Loads
     ) -> tuple[Advance | None, Advance | None]:
-        """Return what a slit's front and the blade's tip in the whole body release (J/m), by pairs of motions."""
-        motions = columns[: len(loads.motions)]
+        """Return what a slit's front and the blade's tip in the whole body release (J/m)."""
 
         def of(line: Front | None) -> Advance | None:
             if line is None:
                 return None
             release = elements.release(law, line)
-            found = release.matrix(len(motions), lambda amounts: elements.show(motions, list(amounts)))
-            return Advance(2.0 ** len(self._body.mirrored) * found)
+            found = release.matrix(len(columns), lambda amounts: elements.show(columns, list(amounts)))
+            amounts = np.array([*loads.amounts, *([] if loads.dead is None else [1.0])])
+            if (dead := loads.dead) is not None:
+                works = elements.works(columns, release.of_forces(lambda: elements.displacements.applied(dead).forces))
+                found[:, -1] += works / 2
+                found[-1, :] += works / 2
+            return Advance(2.0 ** len(self._body.mirrored) * found, amounts, len(loads.motions))
 
         return of(self._conditions.front), of(self._conditions.tip)
 

@@ -90,12 +90,24 @@ class Solution:
     def reaction(self) -> Vector:
         """Force of the tissue on the probe (N)."""
         x, y, z = self.response.force
-        return x, y, z if self.tip is None else self.push
+        return x, y, z if self.tip is None else -self.tip.without_loads().released
 
     @property
-    def push(self) -> float:
-        """Force (N) at the tip of a blade along which tissue slides; not a number if there is none."""
-        return nan if self.tip is None else -self.tip.released(self.response.amounts)
+    def load_force(self) -> Vector:
+        """Force of the tissue on the probe (N) that loads add; not a number if there are none."""
+        if self.load_response is None:
+            return nan, nan, nan
+        x, y, z = self.load_response.force(self.response.loads)
+        return x, y, z if self.tip is None else -self.tip.of_loads().released
+
+    @property
+    def load_force_bar(self) -> float:
+        """The 95 % bar (N) on that along the axis, not a number if no motion along it was solved for."""
+        if self.load_response is None:
+            return nan
+        if self.tip is not None:
+            return self.tip.of_loads().error
+        return self.load_response.bar_along(self.response.loads, (0.0, 0.0, -1.0))
 
     @property
     def energy(self) -> float:
@@ -134,6 +146,14 @@ class Solution:
         return float(amounts @ self.bars @ amounts) / (2 * self.response.energy)
 
     @property
+    def energy_bar(self) -> float:
+        """The largest relative 95 % bar on the energies of motions and of loads."""
+        loaded = self.load_response
+        if loaded is None or loaded.bars is None:
+            return self.bar
+        return max(self.bar, float(loaded.bars[-1, -1]) / (2 * loaded.energy))
+
+    @property
     def reaction_bars(self) -> Vector:
         """95 % error bars (N) on the components of the reaction, not a number where no motion was solved for."""
         spanned, bars = np.zeros(3), np.zeros(3)
@@ -144,7 +164,9 @@ class Solution:
                     spanned += np.square(motion.direction)
                     bars += bar * np.abs(motion.direction)
         x, y, z = map(float, np.where(spanned > 1 - 1e-9, bars, nan))
-        return x, y, z if self.tip is None else abs(self.push) * self.tip.bar
+        if self.tip is not None:
+            z = abs(self.reaction[2]) * self.tip.without_loads().bar
+        return x, y, z
 
     def with_bars(self, decrements: FloatArray, bars: FloatArray, element: str, *, apart: bool) -> "Solution":
         """Return the solution with what one degree more takes away, and bars; loads have a row more than motions.
@@ -164,7 +186,7 @@ class Solution:
     @property
     def release(self) -> float:
         """Energy (J) that a metre of advance of the slit's front releases; not a number if there is no slit."""
-        return nan if self.front is None else self.front.released(self.response.amounts)
+        return nan if self.front is None else self.front.released
 
     @property
     def release_bar(self) -> float:
@@ -176,8 +198,8 @@ class Solution:
         """Whether to open a slit further would release less: its faces are pressed together at the front."""
         if self.front is None:
             return False
-        gained = self.front.form @ self.response.amounts
-        return any(g < 0 for g, motion in zip(gained, self.response.loads.motions, strict=True) if any(motion.opening))
+        motions = self.response.loads.motions
+        return any(g < 0 for g, motion in zip(self.front.gains, motions, strict=False) if any(motion.opening))
 
     def extrapolated(self, degree: int, element: str, *, graded: bool = True, elsewhere: bool = False) -> "Solution":
         """Return what the sequence of degrees tends to, ``graded`` to the edge or not; itself if it has no bars.
@@ -206,11 +228,10 @@ class Solution:
         if self.load_response is not None:
             loaded = self.load_response.extrapolated(degree, element, plain=self.plain, graded=graded)
             best = replace(best, load_response=loaded)
-        amounts = self.response.amounts
         return replace(
             best,
-            front=self.front and self.front.extrapolated(amounts, degree, best.bar),
-            tip=self.tip and self.tip.extrapolated(amounts, degree, best.bar),
+            front=self.front and self.front.extrapolated(best.energy_bar),
+            tip=self.tip and self.tip.extrapolated(best.energy_bar),
         )
 
 

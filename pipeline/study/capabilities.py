@@ -212,7 +212,6 @@ REFUSALS: tuple[Refusal, ...] = (
         "it; leave one of the two out",
     ),
     # Loads.
-    Refusal("slit", "loads", "what loads do to a slit is not computed: leave the incision, or [load], out"),
     Refusal(
         "part of the body",
         "loads",

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from pipeline import compat
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import conditions_of, loads_of
-from pipeline.solve.crack import Release
+from pipeline.solve.crack import Release, moved_on
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.rim import clear_cells
 from pipeline.solve.spaces import Spaces
@@ -24,8 +24,9 @@ COARSEST = {"rim": "0.5 mm", "growth": 1.0, "fine": "4 mm"}
 COARSE = {"rim": "0.3 mm", "growth": 0.7, "fine": "3 mm"}
 
 
-def case_of(mesh=COARSE, body=BODY, **probe):
-    return study(body=body, probe={**SLIT_BLADE, **probe}, mesh=mesh).case(())
+def case_of(mesh=COARSE, body=BODY, load=None, **probe):
+    material = {"density": "1060 kg/m^3"} if load else {}
+    return study(body=body, probe={**SLIT_BLADE, **probe}, mesh=mesh, material=material, load=load or {}).case(())
 
 
 def run(case, mirrors=QUARTER, kind="displacement", poisson=0.3, comm=MPI.COMM_SELF, **options):
@@ -35,10 +36,11 @@ def run(case, mirrors=QUARTER, kind="displacement", poisson=0.3, comm=MPI.COMM_S
 
 
 def finer(solution):
-    """Return energy (J) and release (J/m) as elements of one degree more have them."""
-    amounts = solution.response.amounts
-    energy = solution.energy - float(amounts @ solution.decrements @ amounts) / 2
-    return energy, float(amounts @ solution.front.finer @ amounts)
+    """Return potential energy (J) and release (J/m) as elements of one degree more have them."""
+    line, loaded = solution.front, solution.load_response
+    form, decrements = (solution.stiffness, solution.decrements) if loaded is None else (loaded.form, loaded.decrements)
+    energy = float(line.amounts @ (form - decrements) @ line.amounts) / 2
+    return energy, float(line.amounts @ line.finer @ line.amounts)
 
 
 @cache
@@ -65,6 +67,64 @@ def test_change_of_energy():
     ]
     (before, _), (_, release), (after, _) = found
     assert release == pytest.approx((before - after) / (2 * step), rel=0.02)
+
+
+# They pull the faces apart, and along the sides that the front ends in; the edge of the cap is among what is moved.
+LOADS = {
+    "gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"],
+    "traction": [
+        {"on": "sides", "pressure": "-0.3 kPa"},
+        {"on": {"around": ["10 mm", "0 mm", "-3.5 mm"], "radius": "1.5 mm"}, "traction": ["0 Pa", "0 Pa", "-3 kPa"]},
+    ],
+}
+
+
+@pytest.mark.parametrize("kind", ["displacement", "mixed"])
+def test_change_of_energy_under_loads(kind):
+    """It releases what the potential energy of blade and loads together loses, as nodes move on with the front or tip.
+
+    Half of it belongs to the loads.
+    """
+    case, step = case_of(load=LOADS, ends="open", contact="frictionless"), 1e-6
+    mesh, conditions = mesh_case(case, QUARTER, MPI.COMM_SELF), conditions_of(case)
+
+    def solved():
+        with Spaces(mesh) as spaces, QuasiStaticProblem(spaces, 2, conditions, kind) as problem:
+            return problem.solve(law(0.3), loads_of(case), method="direct")
+
+    def energy(front, step):
+        with moved_on(mesh, front, step):
+            found = solved()
+            return float(found.front.amounts @ found.load_response.form @ found.front.amounts) / 2
+
+    here = solved()
+    for line, advance in ((conditions.front, here.front), (conditions.tip, here.tip)):
+        slope = (energy(line, step) - energy(line, -step)) / (2 * step)
+        assert -advance.released == pytest.approx(slope, rel=1e-5)
+        assert abs(advance.of_loads().released) > 0.3 * abs(advance.released)
+    assert here.reaction[2] + here.load_force[2] == pytest.approx(slope, rel=1e-5)
+
+
+def test_loads_that_press_a_slit_shut():
+    """A pressure on all sides closes it at its front: the case fails, and says why."""
+    pressed = {"traction": [{"on": "sides", "pressure": "2 kPa"}]}
+    (record,) = solve(body=BODY, probe={**SLIT_BLADE, "incision": "4 mm"}, mesh=COARSEST, load=pressed).values()
+    assert record.status == "failed"
+    assert "the loads press the slit shut" in record.message
+
+
+def test_a_study_of_a_slit_under_loads():
+    """What they do to a blade along which tissue slides has a bar; they open a slit, and draw the blade in."""
+    probe = {**SLIT_BLADE, "incision": "4 mm"}
+    loads = {"traction": [{"on": "sides", "pressure": "-0.3 kPa"}]}
+    alone = solve(body=BODY, probe=probe, mesh=COARSEST)[()]
+    bonded = solve(body=BODY, probe=probe, mesh=COARSEST, load=loads)[()]
+    slid = solve(body=BODY, probe={**probe, "contact": "frictionless"}, mesh=COARSEST, load=loads)[()]
+    assert bonded.force == pytest.approx(alone.force, rel=1e-9)
+    assert bonded.energy_release > 1.3 * alone.energy_release
+    assert bonded.load_force_error > 0
+    assert slid.load_force < 0 < slid.force
+    assert 0 < slid.load_force_error < 0.3 * abs(slid.load_force)
 
 
 def test_strain_is_read_clear_of_the_front():

@@ -7,7 +7,7 @@ from pipeline.plan.plan import make_plan
 from pipeline.plan.symmetry import is_round, model_planes
 from pipeline.study.load import parse
 from pipeline.study.problems import StudyError
-from tests.cases import BLADE, raw, study
+from tests.cases import raw, study
 
 DOWN = ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]
 CAP = {"around": ["9 mm", "0 mm", "0 mm"], "radius": "3 mm"}
@@ -45,7 +45,6 @@ MISTAKES = {
         {"load": {"traction": [{"on": "top", "pressure": ["1 kPa", "2 kPa"]}]}},
         ["load.traction[1].pressure", "needs a name"],
     ),
-    "slit": (pulled() | {"probe": BLADE | {"incision": "6 mm"}}, ["probe.incision", "not computed"]),
     "column": (pulled() | {"mesh": {"outside": "free", "epsilon": "8 mm"}}, ["mesh.outside", '"coarse"']),
 }  # fmt: skip
 

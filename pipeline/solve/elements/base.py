@@ -281,6 +281,15 @@ class Elements(ABC):
             part.copy(whole)
         result[0].array[:] += column.prescribed[: self.displacements.dofs.owned]
 
+    def works(self, columns: Sequence[Column], forces: FloatArray) -> FloatArray:
+        """Return the work (J) of nodal ``forces`` (N), owned dofs, in each solution; collective."""
+        found = []
+        for column in columns:
+            with self.fields() as total:
+                self.total(column, total)
+                found.append(total[0].array @ forces)
+        return global_sum(self.displacements.dofs.comm, np.array(found))
+
 
 def level_of(space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, direct: bool = False) -> Level:
     """Return a level of multigrid, or of a direct solve; its operator is given back with the ``stack``; collective."""
