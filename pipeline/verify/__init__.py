@@ -28,7 +28,7 @@ def rows(comm: "MPI.Comm", *, quick: bool = False) -> Iterator[Row]:
     found: list[Row] = []
     if comm.rank == 0:
         with compiling():
-            found = list(element_rows(quick=quick))
+            found = list(element_rows())
     yield from comm.bcast(found)
     yield from scene_rows(comm, quick=quick)
     yield from region_rows(comm, quick=quick)

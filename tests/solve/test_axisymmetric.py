@@ -1,5 +1,6 @@
 """The solver for round scenes obeys mechanics: closed forms, published tables, limits, invariances, its error bar."""
 
+from itertools import product
 from math import inf, pi
 
 import numpy as np
@@ -13,6 +14,7 @@ from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetri
 from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.solve.spaces import Conditions
 from pipeline.verify import known
+from tests.sampling import sampled
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -33,7 +35,7 @@ def solve_layers(meridian, moduli, bonded, *, depth=1.0, **options):
         return problem.solve(law, Loads.along((0.0, 0.0, -depth)))
 
 
-@pytest.mark.parametrize(("contact", "poisson"), known.CYLINDER)
+@sampled("contact, poisson", known.CYLINDER, by_day=3)
 def test_reference_cylinder(contact, poisson):
     solution = solve_axisymmetric(Meridian(50e-3, 50e-3, 3e-3), poisson, contact == "bonded")
     error = solution.reaction[2] / 1e-3 / known.CYLINDER[contact, poisson] - 1
@@ -42,8 +44,7 @@ def test_reference_cylinder(contact, poisson):
     assert solution.balance < 1e-9
 
 
-@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.45, 0.49, 0.4999, 0.5])
-@pytest.mark.parametrize("bonded", [True, False])
+@sampled("bonded, poisson", product((True, False), (0.0, 0.3, 0.45, 0.49, 0.4999, 0.5)), by_day=4)
 def test_half_space(bonded, poisson):
     """In a body a million times as wide as the disc F is that of a half-space (closed forms), to 1e-6."""
     exact, _ = known.half_space_disc(1.0, poisson, 1.0, 1.0, "bonded" if bonded else "frictionless")
@@ -58,12 +59,6 @@ def test_element_does_not_depend_on_youngs_modulus():
     assert len({solution.dofs for solution in found}) == 1
     ratios = [solution.reaction[2] / young for solution, young in zip(found, moduli, strict=True)]
     assert ratios == pytest.approx([ratios[0]] * len(ratios), rel=1e-10)
-
-
-@pytest.mark.parametrize("ratio", known.LAYER)
-def test_layer_on_rigid_base(ratio):
-    force = solve_axisymmetric(Meridian(100, 1 / ratio, 1), 0.3, False).reaction[2]
-    assert force == pytest.approx(known.layer(ratio, 1.0, 1.0, 1.0), rel=3e-3)
 
 
 @pytest.mark.parametrize("column", [inf, 1.0])
@@ -93,14 +88,8 @@ def test_clamped_thin_plate():
 
 
 @pytest.mark.parametrize(
-    ("meridian", "bonded"),
-    [
-        (Meridian(5, 3, 1), False),
-        (Meridian(2, 3, 1, "sides"), True),
-        (Meridian(1.3, 2, 1, -0.5), False),
-        (Meridian(9, 2, 1, column=2), True),
-    ],
-)
+    ("meridian", "bonded"), [(Meridian(5, 3, 1), False), (Meridian(9, 2, 1, column=2), True)]
+)  # fmt: skip
 def test_incompressible_is_the_limit(meridian, bonded):
     limit = solve_axisymmetric(meridian, 0.5, bonded).reaction[2]
     gaps = [solve_axisymmetric(meridian, 0.5 - x, bonded).reaction[2] / limit - 1 for x in (1e-4, 1e-5)]
@@ -117,7 +106,7 @@ def test_displacement_and_mixed_elements_agree(monkeypatch):
     assert forces[0] == pytest.approx(forces[1], rel=1e-7)
 
 
-@pytest.mark.parametrize(("unit", "young"), [(1e-3, 1e12), (1 / 3, 1e-3), (10.0, 1e4)])
+@pytest.mark.parametrize(("unit", "young"), [(1e-3, 1e12), (1 / 3, 1e-3)])
 def test_units_do_not_matter(unit, young):
     here, there = (
         solve_axisymmetric(Meridian(5 * u, 3 * u, 0.7 * u, -1.1 * u), 0.45, True, young=e, depth=0.1 * u)
@@ -135,16 +124,16 @@ def test_more_support_is_stiffer():
     def force(**change):
         return solve_axisymmetric(Meridian(3, 2, 1, **change), 0.45, False).reaction[2]
 
-    held = [force(fixed=f) for f in (-2.0, -1.0, -0.1, 0.0)]
+    held = [force(fixed=f) for f in (-2.0, -0.1, 0.0)]
     assert held == sorted(held)
     assert held[0] == pytest.approx(force(), rel=1e-12)
     assert held[-1] == pytest.approx(force(fixed="bottom+sides"), rel=1e-12)
-    kept = [force(column=c) for c in (1.1, 2.0, 3.0)]
+    kept = [force(column=c) for c in (1.1, 2.0)]
     assert kept == sorted(kept)
     assert force(column=2.0, column_fixed=True) > kept[-1] > force(fixed="sides")
 
 
-@pytest.mark.parametrize("seed", range(6))
+@sampled("seed", range(6), by_day=2)
 def test_error_bar_holds_the_truth(seed, monkeypatch):
     """The bar of a rough mesh holds the answer of a fine one of higher degree."""
     random = np.random.default_rng(seed)
@@ -196,7 +185,7 @@ LAYERED = [
 ]
 
 
-@pytest.mark.parametrize("number", range(len(LAYERED)))
+@sampled("number", range(len(LAYERED)), by_day=3)
 def test_error_bar_of_layers_holds_the_truth(number, monkeypatch):
     """The bar of a rough mesh holds the answer of a fine one of higher degree, and the fine one has 1e-5."""
     meridian, moduli = LAYERED[number]

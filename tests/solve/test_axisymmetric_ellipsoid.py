@@ -14,6 +14,7 @@ from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetri
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import Conditions
 from pipeline.verify import known
+from tests.sampling import sampled
 
 SCENES = {
     "ball": EllipticMeridian(10, 10, 1, -2),
@@ -37,7 +38,7 @@ def solve(meridian, poisson, bonded, *, young=1.0, depth=1.0, **options):
         return problem.solve(MaterialLaw.of_moduli(young, poisson), Loads.along((0.0, 0.0, -depth)))
 
 
-@pytest.mark.parametrize(("bonded", "poisson"), [(True, 0.0), (False, 0.3), (True, 0.45), (False, 0.5)])
+@pytest.mark.parametrize(("bonded", "poisson"), [(True, 0.3), (False, 0.5)])
 def test_half_space(bonded, poisson):
     """A disc on a ball a million times as large presses on a half-space."""
     exact, _ = known.half_space_disc(1.0, poisson, 1.0, 1.0, "bonded" if bonded else "frictionless")
@@ -46,8 +47,7 @@ def test_half_space(bonded, poisson):
     assert found.bar < 1e-5
 
 
-@pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize(("bonded", "poisson"), [(True, 0.3), (False, 0.5)])
+@sampled("name, bonded, poisson", [(name, *of) for name in SCENES for of in ((True, 0.3), (False, 0.5))], by_day=4)
 def test_error_bar_holds_the_truth(name, bonded, poisson, monkeypatch):
     """The bar of a rough mesh holds the answer of a fine one of higher degree, and the fine one has 1e-5."""
     exact = solve(SCENES[name], poisson, bonded)
@@ -91,7 +91,7 @@ def test_units_do_not_matter():
 
 
 def test_more_support_is_stiffer():
-    forces = [solve(EllipticMeridian(4, 3, 1, z), 0.45, False).reaction[2] for z in (-2.9, -1.0, 0.0, 2.0, 2.8)]
+    forces = [solve(EllipticMeridian(4, 3, 1, z), 0.45, False).reaction[2] for z in (-2.9, 0.0, 2.8)]
     assert forces == sorted(forces)
 
 

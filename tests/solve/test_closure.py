@@ -1,4 +1,4 @@
-"""A half ball, closed by the far field of a point force: closed forms, bounds, symmetry, work."""
+"""A half ball, closed by the far field of a point force: work, symmetry, places; its forces are known to `verify`."""
 
 import numpy as np
 import pytest
@@ -10,19 +10,9 @@ from pipeline.run import far_field
 from pipeline.run.execute import compute
 from pipeline.solve import regular
 from pipeline.solve.far_field import PointForce
-from pipeline.verify import known
 from tests.cases import solve, study
 
-RADIUS, DEPTH, YOUNG = 2e-3, 0.2e-3, 10e3
 MESH = {"epsilon": "6 mm", "fine": "3 mm", "rim": "0.3 mm", "outside": "halfspace"}
-# Of F on a half-space, where ε = 3a: what the point force leaves out, measured on converged meshes.
-CLOSURE = {("frictionless", 0.3): 1.9e-3, ("bonded", 0.45): 3.3e-3}
-
-
-def _solved(contact="bonded", poisson=0.3, **mesh):
-    return solve(
-        material={"poisson": poisson}, probe={"radius": "2 mm", "contact": contact}, mesh={**MESH, **mesh}
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize("poisson", [0.0, 0.3, 0.5])
@@ -62,16 +52,6 @@ def test_traction_is_that_of_the_displacement(of):
     assert np.einsum("nij,nj->ni", stress, normal) == pytest.approx(traction(at, normal), abs=1e-8)
 
 
-@pytest.mark.parametrize(("contact", "poisson"), CLOSURE)
-def test_force_is_the_half_spaces_from_above(contact, poisson):
-    """What the mesh makes it err by is within the bar, and what the far field leaves out above F."""
-    (record,) = _solved(contact, poisson).values()
-    exact, _ = known.half_space_disc(YOUNG, poisson, RADIUS, DEPTH, contact)
-    error = record.force / exact - 1
-    assert CLOSURE[contact, poisson] <= error <= CLOSURE[contact, poisson] + record.force_error
-    assert 2 * record.energy == pytest.approx(record.force * DEPTH, rel=1e-6)
-
-
 def test_quarter_and_whole_agree():
     """The far field has the symmetry that the tool has, and its energy is shared out."""
     mesh = {**MESH, "epsilon": "5 mm", "fine": "5 mm", "rim": "1 mm", "growth": 2.0}
@@ -88,17 +68,6 @@ def test_young_and_depth_scale_and_poisson_is_solved():
     assert any("far field changes" in struck.reason for struck in plan.struck)
     both = make_plan(study(mesh={**MESH, "outside": ["halfspace", "fixed"]}))
     assert len(both.solves) == len(both.meshes) == 2
-
-
-def test_green_function_makes_it_the_force_on_the_body():
-    """Sides and support change F by 5 %; the body's own far field knows of them."""
-    exact = known.CYLINDER["frictionless", 0.3] * YOUNG * DEPTH * 1e-3
-    (record,) = solve(
-        body=known.CYLINDER_BODY, probe={"radius": "3 mm", "contact": "frictionless"},
-        mesh={**MESH, "epsilon": "9 mm", "outside": "green"},
-    ).values()  # fmt: skip
-    assert known.half_space_disc(YOUNG, 0.3, 3e-3, DEPTH, "frictionless")[0] < 0.96 * exact
-    assert 0 < record.force / exact - 1 < CLOSURE["frictionless", 0.3] + record.force_error
 
 
 def test_half_balls_of_a_path_stand_on_one_mesh():

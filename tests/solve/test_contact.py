@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of, loads_of, tool_of
-from pipeline.solve.contact.active_set import ContactError, Obstacle, State, next_set
+from pipeline.solve.contact.active_set import ContactError
 from pipeline.solve.contact.problem import ContactProblem, Tool
 from pipeline.solve.spaces import Spaces
 from pipeline.study.problems import StudyError
@@ -48,39 +48,6 @@ def pressed(tool=None, **changes):
         yield ContactProblem(spaces, tool or tool_of(case), case.element), law_of(case), loads_of(case)
 
 
-def test_hertz():
-    """F = 4/3 E* √R d^1.5 and a² = R d; a body of 60 a is stiffer than a half-space by about a / H."""
-    far = {"fine": "20 mm", "coarse": "20 mm", "rim": "0.15 mm"}
-    found = record(body=LARGE, mesh=far)
-    assert 1 - found.force_error < found.force / (4 / 3 * MODULUS * sqrt(10e-3) * 0.1e-3**1.5) < 1.025
-    assert found.contact_radius == pytest.approx(1e-3, rel=0.02)
-    assert found.contact_area == pytest.approx(pi * found.contact_radius**2)
-    assert found.energy == pytest.approx(2 / 5 * found.force * 0.1e-3, rel=0.01)
-
-
-def test_candidates_end_where_their_circle_does():
-    """Mid nodes and corners alike; not at the planes of symmetry."""
-    with pressed() as (problem, _, _):
-        candidates = problem._candidates
-    away = np.hypot(*candidates.points[:, :2].T)
-    assert np.array_equal(candidates.is_edge, away > (1 - 1e-6) * away.max())
-    assert np.count_nonzero(candidates.is_edge & candidates.is_corner) > 5
-
-
-def test_every_set_that_was_solved_for_is_counted():
-    with pressed() as (problem, law, loads):
-        before, after = (problem.solve(law, loads).iterations for _ in range(2))
-        assert before >= after >= problem.found.sets > 0
-
-
-def test_cone():
-    """Sneddon: F = 2/π E* tan α d², a = 2/π tan α d."""
-    found = record(body=LARGE, probe=CONE, mesh={"fine": "20 mm", "coarse": "20 mm", "rim": "0.15 mm"})
-    slope = tan(86 * pi / 180)
-    assert 1 - found.force_error < found.force / (2 / pi * MODULUS * slope * 0.1e-3**2) < 1.025
-    assert found.contact_radius == pytest.approx(2 / pi * slope * 0.1e-3, rel=0.03)
-
-
 @pytest.mark.parametrize("element", ["displacement", "mixed"])
 def test_nothing_pulls_and_nothing_comes_through(element):
     with pressed(material={"poisson": 0.45}, mesh=COARSE | {"element": element}) as (problem, law, loads):
@@ -92,12 +59,6 @@ def test_nothing_pulls_and_nothing_comes_through(element):
     assert apart.min() > -1e-9 * obstacle.depth
     assert np.abs(apart[active]).max() < 1e-9 * obstacle.depth
     assert solution.balance < 1e-6
-
-
-def test_what_is_pressed_stays_what_pulls_goes_and_what_came_through_is_held():
-    state = State(1e-3 * np.array([0.0, 1.0, -1.0, 0.0]), np.array([-1.0, 0.0, 0.0, 0.5]), energy=1.0)
-    obstacle = Obstacle(None, np.zeros(4), depth=5e-3)
-    assert next_set(obstacle, np.array([True, False, False, True]), state).tolist() == [True, True, False, False]
 
 
 def swept(mesh, depths, probe=SPHERE, body=LARGE, **changes):
@@ -238,8 +199,11 @@ def test_straight_elements_are_refused():
         study(body=SMALL, probe=SPHERE, mesh=COARSE | {"degree": 1})
 
 
-@pytest.mark.parametrize("poisson", [0.3, 0.49])
-@pytest.mark.parametrize("probe", [SPHERE, CONE | {"depth": "0.07 mm"}, DISC], ids=["sphere", "cone", "disc"])
+@pytest.mark.parametrize(
+    ("probe", "poisson"),
+    [(SPHERE, 0.3), (CONE | {"depth": "0.07 mm"}, 0.49), (DISC, 0.3)],
+    ids=["sphere", "cone", "disc"],
+)
 def test_degree_3_holds_the_force_of_the_meridian_and_is_nearer_to_it(probe, poisson):
     scene = {"probe": probe, "material": {"poisson": poisson}}
     (truth,) = solve(body=SMALL, mesh=COARSE, plan={"without": []}, **scene).values()

@@ -32,8 +32,7 @@ def pulled(pressure):
 # ---- loads ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("poisson", [0.3, 0.49])
-@pytest.mark.parametrize("load", [GRAVITY, pulled(0.5)], ids=["gravity", "cap"])
+@pytest.mark.parametrize(("load", "poisson"), [(GRAVITY, 0.3), (pulled(0.5), 0.49)], ids=["gravity", "cap"])
 def test_disc_that_does_not_lift_off_is_the_prescribed_one_moved_from_its_first_touch(load, poisson):
     """F = k (d + sag) + the force of the loads on a disc that is held: superposition."""
     scene = {"load": load, "material": TISSUE | {"poisson": poisson}, "mesh": {"rim": "0.5 mm"}}
@@ -55,15 +54,13 @@ def test_depth_counts_from_the_first_touch_of_the_surface_as_loads_leave_it():
 
 def test_what_loads_add_is_proportional_to_them_while_they_are_small():
     mesh = {"degree": 3, "rim": "0.3 mm"}
-    nothing, small, twice, back = (record(load=pulled(p) if p else {}, mesh=mesh).force for p in (0, 0.5, 1.0, -0.5))
+    nothing, small, twice = (record(load=pulled(p) if p else {}, mesh=mesh).force for p in (0, 0.5, 1.0))
     assert abs(small - nothing) > 1e-3 * nothing
     assert twice - nothing == pytest.approx(2 * (small - nothing), rel=0.1)
-    assert back - nothing == pytest.approx(nothing - small, rel=0.4)
 
 
-@pytest.mark.parametrize("degree", [2, 3])
-def test_loads_on_a_quarter_a_half_and_the_whole_agree(degree):
-    scene = {"load": GRAVITY, "material": TISSUE, "mesh": {"degree": degree, "rim": "0.6 mm"}}
+def test_loads_on_a_quarter_a_half_and_the_whole_agree():
+    scene = {"load": GRAVITY, "material": TISSUE, "mesh": {"rim": "0.6 mm"}}
     quarter = record(**scene)
     whole = record(**scene | {"mesh": scene["mesh"] | {"model": "3d"}})
     assert quarter.force == pytest.approx(whole.force, rel=3e-8)
@@ -72,7 +69,7 @@ def test_loads_on_a_quarter_a_half_and_the_whole_agree(degree):
 
 def test_force_is_not_scaled_where_loads_bend_the_surface():
     """Not with the modulus: a softer body bends more. Twice as stiff under twice the load, F is twice as large."""
-    load = pulled(["1 kPa", "2 kPa"][0].split()[0])
+    load = pulled(1)
     soft = record(load=load, material={"young": "10 kPa"})
     stiff = record(load=pulled(2), material={"young": "20 kPa"})
     other = record(load=load, material={"young": "20 kPa"})
@@ -80,21 +77,24 @@ def test_force_is_not_scaled_where_loads_bend_the_surface():
     assert abs(other.force / (2 * soft.force) - 1) > 1e-3
 
 
-def test_depths_with_loads_on_one_mesh_are_those_of_each_alone():
-    depths = [f"{depth:.4g} mm" for depth in np.linspace(0.04, 0.12, 10)]
-    probe = SPHERE | {"depth": depths, "depth_range": [depths[0], depths[-1]]}
-    scene = {"body": BOX, "probe": probe, "mesh": MESH, "load": pulled(1.0)}
-    together, alone = (
-        solve(**scene, plan={"without": ["axisymmetric", *more]}) for more in ((), ("condensed", "reuse"))
-    )
-    for index, found in together.items():
-        assert found.force == pytest.approx(alone[index].force, rel=1e-8)
+DEPTHS = [f"{depth:.4g} mm" for depth in np.linspace(0.04, 0.12, 10)]
+ON_ONE_MESH = SPHERE | {"depth": DEPTHS, "depth_range": [DEPTHS[0], DEPTHS[-1]]}
+
+
+@pytest.mark.parametrize("scene", [{"load": pulled(1.0)}, {"mesh": MESH | BALL}], ids=["loads", "half ball"])
+def test_depths_on_one_mesh_are_those_of_each_alone(scene):
+    """On the condensed surface, of ten depths; each by itself, of three of these."""
+    scene, chosen = {"body": BOX, "mesh": MESH} | scene, (0, 4, 9)
+    together = solve(**scene, probe=ON_ONE_MESH)
+    some = ON_ONE_MESH | {"depth": [DEPTHS[number] for number in chosen]}
+    alone = solve(**scene, probe=some, plan={"without": ["axisymmetric", "condensed", "reuse"]})
+    for number, single in zip(chosen, alone.values(), strict=True):
+        assert together[number,].force == pytest.approx(single.force, rel=1e-7)
+        assert together[number,].energy == pytest.approx(single.energy, rel=1e-6)
 
 
 def test_depths_without_loads_have_their_own_bars_beside_loads():
-    depths = [f"{depth:.4g} mm" for depth in np.linspace(0.04, 0.12, 10)]
-    probe = SPHERE | {"depth": depths, "depth_range": [depths[0], depths[-1]]}
-    scene = {"body": BOX, "probe": probe, "mesh": MESH}
+    scene = {"body": BOX, "probe": ON_ONE_MESH, "mesh": MESH}
     loads = [{"name": "pulled", **pulled(20.0)}, {"name": "none"}]
     beside, alone = solve(**scene, load=loads), solve(**scene)
     for (number,), found in alone.items():
@@ -171,18 +171,6 @@ def test_mixed_elements_take_a_far_field(poisson):
     hertz = HERTZ * (1 - 0.3**2) / (1 - poisson**2)
     assert found.force == pytest.approx(hertz, rel=found.force_error)
     assert found.force_error < 0.05
-
-
-def test_condensed_surface_of_a_half_ball_gives_the_forces_of_each_depth_alone():
-    depths = [f"{depth:.4g} mm" for depth in np.linspace(0.04, 0.12, 10)]
-    probe = SPHERE | {"depth": depths, "depth_range": [depths[0], depths[-1]]}
-    scene = {"body": BOX, "probe": probe, "mesh": MESH | BALL}
-    together, alone = (
-        solve(**scene, plan={"without": ["axisymmetric", *more]}) for more in ((), ("condensed", "reuse"))
-    )
-    for index, found in together.items():
-        assert found.force == pytest.approx(alone[index].force, rel=1e-7)
-        assert found.energy == pytest.approx(alone[index].energy, rel=1e-6)
 
 
 # ---- tilted tools -----------------------------------------------------------------------------------------

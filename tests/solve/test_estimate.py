@@ -11,6 +11,7 @@ from pipeline.solve.estimate import error_bar, extrapolate, is_graded
 from pipeline.solve.rim import plain_share
 from pipeline.study.load import parse
 from tests.cases import BLADE, solve, study
+from tests.sampling import sampled
 
 # Scenes of random proportions on meshes with elements as large as the probe, whose bars were too small:
 # radius, height (mm), fixed, ν, contact, probe's radius, fine, coarse, rim (mm), degree.
@@ -49,7 +50,7 @@ def force(content, mesh, *, solid):
     return record
 
 
-@pytest.mark.parametrize("case", MISSED, ids=str)
+@sampled("case", [(case,) for case in MISSED], by_day=4)
 def test_bars_of_coarse_meshes_hold_the_truth(case):
     content, mesh = scene(*case)
     found, truth = force(content, mesh, solid=True), force(content, {"accuracy": "0.1 %"}, solid=False)
@@ -58,7 +59,7 @@ def test_bars_of_coarse_meshes_hold_the_truth(case):
     assert error <= found.force_error <= max(2 * error, 0.02)
 
 
-@pytest.mark.parametrize("case", [MISSED[0], MISSED[4], MISSED[7], MISSED[9]], ids=str)
+@sampled("case", [(MISSED[number],) for number in (0, 4, 7, 9)], by_day=1)
 def test_extrapolation_from_a_coarse_mesh_holds_the_truth(case):
     """An accuracy may be asked of sizes that the study file insists on, but for ε, which chosen sizes need not."""
     content, mesh = scene(*case)
@@ -130,7 +131,7 @@ THIN = [
 ]
 
 
-@pytest.mark.parametrize("case", THIN, ids=str)
+@sampled("case", [(case,) for case in THIN], by_day=2)
 def test_accuracies_of_mixed_elements_hold_in_thin_bodies(case):
     content, mesh = scene(*case)
     given = {key: mesh[key] for key in ("rim", "growth", "degree")}

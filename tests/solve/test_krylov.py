@@ -1,7 +1,5 @@
 """Conjugate gradients with multigrid: exact enough for F, balanced near locking, indifferent to the mesh's size."""
 
-import time
-
 import numpy as np
 import pytest
 from petsc4py import PETSc
@@ -16,8 +14,7 @@ from pipeline.solve.spaces import Conditions, Spaces
 from tests.solve.test_mixed import DEPTH, PRESS, law, make_mesh
 
 
-@pytest.mark.parametrize("degree", [1, 2, 3])
-@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.49])
+@pytest.mark.parametrize(("degree", "poisson"), [(1, 0.3), (2, 0.49), (3, 0.0)])
 def test_default_tolerance_is_enough_for_f(degree, poisson):
     with QuasiStaticProblem(Spaces(make_mesh(mesh={"degree": min(degree, 2)})), degree, Conditions()) as problem:
         usual = problem.solve(law(poisson), PRESS, method="iterative")
@@ -41,26 +38,6 @@ def test_forces_that_do_not_balance_are_a_failure():
         pytest.raises(SolveError, match="do not balance"),
     ):
         problem.solve(law(0.3), PRESS, method="iterative", tolerance=1e-3)
-
-
-def test_times_are_those_that_passed():
-    mesh, begin = make_mesh(), time.perf_counter()
-    with QuasiStaticProblem(Spaces(mesh), 2, Conditions()) as problem:
-        found = problem.solve(law(0.3), PRESS, method="iterative", estimate=True)
-    times = found.times
-    assert min(times.assemble, times.setup, times.solve, times.error) > 0
-    assert times.total + times.error <= time.perf_counter() - begin
-
-
-@pytest.mark.parametrize(("direct", "levels", "serves"), [(False, 1, True), (True, 1, False), (False, 2, True)])
-def test_what_is_set_up_serves_above_it_unless_it_is_a_factorisation(direct, levels, serves):
-    solver = object.__new__(LinearSolver)
-    solver._is_direct = direct
-    solver.levels = [Level(None, None, np.empty(0)) for _ in range(levels)]
-    above = Level(None, None, np.empty(0))
-    assert solver.carries([*solver.levels, above]) == serves
-    assert not solver.carries([above, *solver.levels])
-    assert not solver.carries([*solver.levels, Level(None, None, np.empty(0), held=np.zeros(1))])
 
 
 def test_what_does_not_converge_is_a_failure():

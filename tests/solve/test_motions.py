@@ -16,7 +16,6 @@ from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.response import Sums
 from pipeline.solve.spaces import Conditions, Spaces
-from pipeline.study.problems import StudyError
 from pipeline.study.sweep import Scale
 from tests.cases import BLADE, solve, study
 from tests.solve.test_mixed import law, make_mesh
@@ -217,11 +216,6 @@ def test_dataset_has_the_stiffness():
 def solved_dataset(**changes):
     plan = make_plan(study(**changes))
     return build(plan, compute(plan, MPI.COMM_SELF))
-
-
-def test_all_motions_are_for_bonded_probes():
-    with pytest.raises(StudyError, match="one direction only"):
-        study(probe={"motion": "all", "contact": "frictionless"})
 
 
 def test_what_several_movements_change_in_a_plan():

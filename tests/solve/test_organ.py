@@ -33,8 +33,9 @@ def test_a_box_given_as_triangles_is_a_box(tmp_path_factory, contact):
     assert abs(one.force / other.force - 1) < 0.002
 
 
-@pytest.mark.parametrize("contact", ["bonded", "frictionless"])
-@pytest.mark.parametrize("axis", [None, [-0.3, 0.1, -1.0]], ids=["normal", "inclined"])
+@pytest.mark.parametrize(
+    ("contact", "axis"), [("bonded", None), ("frictionless", [-0.3, 0.1, -1.0])], ids=["normal", "inclined"]
+)
 def test_an_ellipsoid_given_as_triangles_is_an_ellipsoid_wherever_it_is_touched(tmp_path, contact, axis):
     """Pressed on its flank: force, its direction and what is in balance are those of the exact surface."""
     path = write_stl(tmp_path / "ellipsoid.stl", *ellipsoid(24))
