@@ -74,7 +74,7 @@ def prepare(
 
     ``fresh`` computes again what is stored; a timing study always does, but for F_exact. ``without`` names reductions
     that are not to be used. A ``shard`` plans its own part only, and reads, but never writes, the store ``beside``
-    its own, too. Cases with which the process of an earlier run ended are on record as failed, whatever ``fresh`` says:
+    its own, too. Cases with which the process of an earlier run ended have failed, unless their force is read back:
     this run leaves them out, and the next one tries them again.
 
     Raises:
@@ -94,8 +94,9 @@ def prepare(
                 if shard is not None:
                     opened.records = _known_beside(beside, wanted) | opened.records
             ended = fail_begun(opened.store, {*declared.keys, *declared.reference_keys})
-            opened.records |= ended
-            opened.notices = tuple(filter(None, (opened.store.notice, _what_ended(len(ended)))))
+            left_out = _what_ended(len(ended.keys() - opened.records.keys()))
+            opened.records = ended | opened.records
+            opened.notices = tuple(filter(None, (opened.store.notice, left_out)))
         except StoreError as error:
             message = str(error)
     message, stored, cost = comm.bcast((message, sorted(opened.records), cost))

@@ -10,6 +10,7 @@ from pipeline.cli.console import load_solvers, print_json, warning
 from pipeline.cli.faults import BAD_INPUT, DONE, SOME_FAILED, Fault, fail, of_file, of_option, of_unwritten, refusing
 from pipeline.cli.words import DEFAULT_OUTPUT, File, Json, check_machine, check_output, load_all
 from pipeline.files import LEAST_ROOM
+from pipeline.printable import counted
 
 if TYPE_CHECKING:
     from pipeline.export.export import Exported
@@ -106,7 +107,7 @@ def _tell(exported: "Exported", wanted: float, path: Path, *, as_json: bool) -> 
     if as_json:
         print_json(found)
         return
-    print(f"wrote {path}: {found['places']} places solved for, {found['coefficients']} coefficients")
+    print(f"wrote {path}: {counted(int(found['places']), 'place')} solved for, {found['coefficients']} coefficients")
     print(
         f"judged on {found['judged']} touches: {100 * found['held']:.0f} % held by their bars, largest error "
         f"{100 * found['largest_error']:.2g} %, median bar {100 * found['median_bar']:.2g} %"

@@ -62,15 +62,24 @@ def of_study(wrong: "StudyError", hint: str = "") -> list[Fault]:
     ]
 
 
-def fail(*faults: Fault | str, status: int = BAD_INPUT) -> NoReturn:
-    """Exit, by default for bad input, with one voice if there are several ranks: the first one's, where it agrees.
+def leave_it_to_first_rank() -> None:
+    """Wait, on the other ranks, until the first one has spoken: all are ended as soon as one leaves with a bad status.
 
-    Where JSON was asked for, standard output gets an object with the status and the errors.
+    Who is still here after that is alone in what it found, and is to speak.
     """
     if not is_first_rank():
-        # All ranks are ended as soon as one leaves with a bad status: the first one must have spoken by then. Who is
-        # still here after that is alone in what it found.
         time.sleep(_PATIENCE)
+
+
+def fail(*faults: Fault | str, status: int = BAD_INPUT, on_all_ranks: bool = False) -> NoReturn:
+    """Exit, by default for bad input, with one voice if there are several ranks: the first one's, where it agrees.
+
+    What is known to be said ``on_all_ranks`` the others do not say: once MPI has begun, none ends before all do.
+    Where JSON was asked for, standard output gets an object with the status and the errors.
+    """
+    if on_all_ranks and not is_first_rank():
+        raise typer.Exit(status)
+    leave_it_to_first_rank()
     found = [fault if isinstance(fault, Fault) else Fault(fault) for fault in faults]
     tell(found)
     if is_json_wanted():

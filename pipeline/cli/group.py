@@ -10,7 +10,16 @@ import typer
 from typer.core import TyperGroup
 
 from pipeline.cli.console import JSON, has_printed_json, print_json
-from pipeline.cli.faults import INTERRUPTED, SOME_FAILED, Fault, as_data, fail, of_file, of_unwritten
+from pipeline.cli.faults import (
+    INTERRUPTED,
+    SOME_FAILED,
+    Fault,
+    as_data,
+    fail,
+    leave_it_to_first_rank,
+    of_file,
+    of_unwritten,
+)
 from pipeline.files import NOT_UTF8, is_utf8
 from pipeline.launcher import is_first_rank, is_interrupt, is_launched
 from pipeline.printable import printable
@@ -75,10 +84,12 @@ def _end_ranks() -> None:
 
 def _tell(wrong: BaseException, words: Sequence[str]) -> None:
     """Print what ended a command of these ``words`` as JSON, if it was asked for that and has printed none itself."""
+    usage = getattr(wrong, "format_message", None)  # of words that make no command, in every version of the library
+    if usage is not None:
+        leave_it_to_first_rank()
     # An exit tells its reason before; help is no error.
     if isinstance(wrong, typer.Exit) or has_printed_json() or not is_first_rank():
         return
-    usage = getattr(wrong, "format_message", None)  # of words that make no command, in every version of the library
     if isinstance(wrong, KeyboardInterrupt):
         found, status = Fault("interrupted"), INTERRUPTED
     elif usage is not None:

@@ -91,7 +91,7 @@ def _show(study: "Study", found: dict[str, Any], *, quiet: bool, verbose: bool, 
         return
     exact = f" ({found['exact']} of them for F_exact)" if found["exact"] else ""
     to_do = f"{', '.join(counted(found[name], noun) for name, noun in _TO_DO.items())}{exact}"
-    on = f"on {found['ranks']} {'rank' if found['ranks'] == 1 else 'ranks'}"
+    on = f"on {counted(found['ranks'], 'rank')}"
     cost = f"{format_seconds(found['seconds'])} {on}, {found['memory'] / 1e9:,.1f} GB for the largest step"
     if quiet:
         print(f"{study.file}: {counted(found['cases'], 'case')}; to do: {to_do}{f'; {cost}' if found['steps'] else ''}")
@@ -103,6 +103,8 @@ def _show(study: "Study", found: dict[str, Any], *, quiet: bool, verbose: bool, 
     if (unasked := found["exact_unasked"])["scenes"]:
         more = format_seconds(unasked["seconds"])
         print(f"  {'exact':13} {unasked['scenes']:6}  F_exact is not asked for: `exact = true` would add {more}.")
+    for note in found["notes"]:
+        print(f"  {note}")
     print(f"  to do: {to_do}")
     if found["steps"]:
         print(f"  estimate: {cost}")
@@ -245,9 +247,9 @@ def _squeezed(text: Any) -> str:
 
 
 def _line(step: dict[str, Any]) -> str:
-    size, gigabytes, ranks = f"{step['cells']:9,.0f} cells", step["memory"] / 1e9, step["ranks"]
-    on = f"on {ranks} rank" + "s" * (ranks > 1)
+    size, gigabytes = f"{step['cells']:9,.0f} cells", step["memory"] / 1e9
+    solves, on = counted(step["solves"], "solve"), f"on {counted(step['ranks'], 'rank')}"
     return (
-        f"    {step['kind']:8} {size} {step['solves']:4} solves {format_seconds(step['seconds']):>8} {on}"
+        f"    {step['kind']:8} {size} {solves:>11} {format_seconds(step['seconds']):>8} {on}"
         f" {gigabytes:5,.1f} GB  {step['case']}"
     )

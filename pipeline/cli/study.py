@@ -151,10 +151,10 @@ def run(
             with workflow.abort_on_exception(comm):
                 outcome = workflow.run(plan, opened, comm, output, progress)
         except (StoreError, CompilerError) as wrong:
-            fail(Fault(str(wrong), file=study.file))
+            fail(Fault(str(wrong), file=study.file), on_all_ranks=True)
         except workflow.ResultsError as wrong:
             fault, status = of_results(wrong, study.file)
-            fail(fault, status=status)
+            fail(fault, status=status, on_all_ranks=True)
         if speaks:
             seconds = time.monotonic() - start
             conclude(plan, opened, outcome, seconds, part, quiet=quiet or as_json)

@@ -91,9 +91,7 @@ def fields_of(
         if comm.size > 1:
             raise
         why = f"failed: {type(failure).__name__}: {failure}"
-    if comm.rank > 0:
-        raise typer.Exit(SOME_FAILED)
-    fail(Fault(why, file=study.file, key="CASE", value=str(case)), status=SOME_FAILED)
+    fail(Fault(why, file=study.file, key="CASE", value=str(case)), status=SOME_FAILED, on_all_ranks=True)
 
 
 def _write(study: "Study", fields: "Fields", stem: Path, export: str | None, missing: str, *, as_json: bool) -> None:

@@ -12,6 +12,11 @@ from pipeline.plan.schedule import schedule
 from pipeline.plan.steps import MeshStep, Solve, mesh_steps
 from pipeline.study.sweep import Case
 
+_MAY_END = (
+    "How deep a probe can be followed at large displacements is not known beforehand. A depth that is not reached "
+    "fails, and tells how far it came. Smaller depths of the same sweep keep their forces."
+)
+
 
 def summary(plan: Plan, ranks: int = 1) -> dict[str, Any]:
     """Return the plan as plain data: ``steps`` in the order in which they begin, with the ranks that each gets."""
@@ -41,6 +46,7 @@ def summary(plan: Plan, ranks: int = 1) -> dict[str, Any]:
         "exact": sum(solve.is_reference for solve in plan.solves),
         "exact_unasked": _unasked(plan),
         "struck": [{"name": s.name, "count": s.count, "reason": s.reason} for s in plan.struck],
+        "notes": [_MAY_END] if any(solve.case.material.is_large for solve in plan.solves) else [],
         "seconds": seconds,
         "memory": max((step["memory"] for step in steps), default=0.0),
         "ranks": ranks,

@@ -16,7 +16,7 @@ class Attempts:
 
     def __init__(self) -> None:
         self._earlier: dict[str, list[Record]] = {}
-        self._again: list[Solve] = []
+        self._again: dict[str, Solve] = {}
 
     def judge(self, solve: Solve, record: Record) -> Record | None:
         """Return the record to keep of a solve, or None if its next mesh is to be tried: see :meth:`take_again`."""
@@ -25,13 +25,17 @@ class Attempts:
             return record
         if record.is_ok and record.force_error > solve.goal and solve.later:
             self._earlier.setdefault(solve.key, []).append(record)
-            self._again.append(solve.again(record.force_error))
+            self._again[solve.key] = solve.again(record.force_error)
             return None
         return _concluded(solve, record, self._earlier.pop(solve.key, []))
 
+    def goes_on(self, solve: Solve) -> bool:
+        """Tell whether the next mesh of a solve is to be tried."""
+        return solve.key in self._again
+
     def take_again(self) -> tuple[Solve, ...]:
         """Return the solves whose next mesh is to be tried, each once."""
-        again, self._again = tuple(self._again), []
+        again, self._again = tuple(self._again.values()), {}
         return again
 
 

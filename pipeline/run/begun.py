@@ -72,9 +72,9 @@ class Begun:
 
 
 def fail_begun(store: Store, keys: Collection[str]) -> dict[str, Record]:
-    """Put on record, and return by key, the failures of those of ``keys`` with which a process was ended.
+    """Return by key the failures of those of ``keys`` with which a process was ended, and put them on record.
 
-    A force that is on record stays. Files of processes that still run, and of other studies, are left alone.
+    A force that is on record stays there. Files of processes that still run, and of other studies, are left alone.
 
     Raises:
         StoreError: if the store cannot be written.
@@ -87,8 +87,8 @@ def fail_begun(store: Store, keys: Collection[str]) -> dict[str, Record]:
             continue
         known = store.get(begun) if why else {}
         for key in begun if why else ():
+            failed[key] = Record(key, "failed", why)
             if key not in known or not known[key].is_ok:
-                failed[key] = Record(key, "failed", why)
                 store.put(failed[key])
         path.unlink(missing_ok=True)
     return {key: record for key, record in failed.items() if key in keys}

@@ -19,7 +19,9 @@ from pipeline.solve.krylov import SolveError
 
 T = TypeVar("T")
 
-# Seconds that a rank waits with a failure of its own for the others, which may be in a call that needs all ranks.
+# Seconds that a rank waits with a failure of its own for the others, which may be in a call that needs all ranks. They
+# may as well be about to come: at an assembly or a set-up of their own, which on large meshes takes that long. To wait
+# in vain costs a run that has ended anyway a minute; not to wait costs one that could go on all its cases.
 PATIENCE = 60.0
 _PAUSE = 2e-3
 _EXPECTED = (CaseFailure, MeshError, SolveError)

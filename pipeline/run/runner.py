@@ -108,7 +108,7 @@ class StepRunner:
             following = todo.pop(0)
             found = self._caught(partial(self._way_of(following), following, PeakMemory(self._comm)))
             if isinstance(found, Failure):
-                self._fail([solve for solve in following.solves if solve.key not in self._records], found)
+                self._fail([solve for solve in following.solves if not self._is_seen_to(solve)], found)
             give_back(self._comm)
             if again := self._attempts.take_again():
                 prepare(self._comm, again)
@@ -117,6 +117,10 @@ class StepRunner:
     def free(self) -> None:
         """Free what belongs to the communicator; collective."""
         self._attempt.free()
+
+    def _is_seen_to(self, solve: Solve) -> bool:
+        """Tell whether a solve has its record, or will get it on another mesh."""
+        return solve.key in self._records or self._attempts.goes_on(solve)
 
     def _way_of(self, step: MeshStep) -> Callable[[MeshStep, PeakMemory], None]:
         if step.axisymmetric:
@@ -266,7 +270,7 @@ class StepRunner:
             self._finish(solve, found)
 
     def _begin(self, *solves: Solve) -> None:
-        self._keys = [solve.key for solve in solves if solve.key not in self._records]
+        self._keys = [solve.key for solve in solves if not self._is_seen_to(solve)]
         self._begun.name(self._keys)
 
     def _fail(self, solves: Sequence[Solve], failure: Failure) -> None:

@@ -18,6 +18,7 @@ from pipeline.cli.console import print_json
 from pipeline.report.figures import KINDS
 from tests.commands import ENVIRONMENT, ROOT
 from tests.conftest import SMALL
+from tests.studies import small_text
 
 
 def strict(text: str):
@@ -190,3 +191,22 @@ def test_what_is_no_store_is_left_alone(epsmesh, tmp_path, monkeypatch):
         assert "is not a case store" in refused.stderr
     assert letter.read_text() == "Dear reader"
     assert epsmesh("plot", letter.rename(tmp_path / "letter.nc")).exit_code == 2
+
+
+def test_several_ranks_have_one_voice_for_words_that_make_no_command(spawn):
+    done = spawn("run", "studies/quick.toml", "--nonsense", ranks=2)
+    assert done.returncode != 0
+    assert done.stderr.count("No such option: --nonsense") == 1
+
+
+def test_one_of_a_thing_is_called_so_and_letters_that_are_seen_are_written_as_they_are(epsmesh, tmp_path):
+    """No "1 cases", and no escape for a µ, in what people or scripts get."""
+    file = tmp_path / "µm.toml"
+    one = {"mesh": {"epsilon": "4000 µm"}, "solve": {"exact": False}}
+    file.write_text(small_text(title="Breadth in µm", **one))
+    for words in (("validate", file), ("plan", file), ("plan", file, "--json"), ("run", file), ("status", file)):
+        done = epsmesh(*words, *(() if words[0] == "validate" else ("--output", tmp_path / "out")))
+        told = done.stdout + done.stderr
+        assert done.exit_code == 0, told
+        assert "µm" in told
+        assert not re.search(r"\\u00|(?<![\d.])1 (cases|solves|meshes|operators|steps|ranks|places)\b", told), told

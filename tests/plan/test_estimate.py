@@ -91,3 +91,9 @@ def test_the_bar_of_a_timed_case_is_found_on_what_symmetry_leaves():
         ).solves
     ]
     assert memory[0] < 0.8 * memory[1]
+
+
+def test_a_plan_says_that_large_displacements_may_not_be_followed_to_their_end():
+    large, linear = (summary(make_plan(study(material={"law": law}))) for law in ("neo-hookean", "linear"))
+    assert "is not known beforehand" in " ".join(large["notes"])
+    assert linear["notes"] == []

@@ -12,6 +12,7 @@ from pipeline.run.attempts import Attempts
 from pipeline.run.execute import compute, execute
 from pipeline.run.progress import Progress
 from pipeline.run.record import Record
+from pipeline.run.runner import StepRunner
 from pipeline.study.load import parse
 from tests.cases import raw, study
 
@@ -146,6 +147,24 @@ def test_accuracy_without_memory_for_its_proof_is_refused_and_no_finer_mesh_is_t
         assert "the error bar that proves the accuracy needs about" in case.message
         assert "GB of memory" in exact.message
     assert sum(text == "meshing: the one case" for text in notes.texts) <= 1
+
+
+def test_a_solve_that_waits_for_its_next_mesh_has_one_record_whatever_else_fails(monkeypatch):
+    """A step that fails beside any case takes down those that have no record, and not the one that is to go on."""
+
+    on_mesh, bars, found = StepRunner._on_mesh, iter((1.0, 1e-9)), []
+
+    def breaks(runner, step, memory):
+        on_mesh(runner, step, memory)
+        if not found:
+            raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setattr(StepRunner, "_solve", lambda _, solve, *__: record(next(bars), key=solve.key))
+    monkeypatch.setattr(StepRunner, "_on_mesh", breaks)
+    wanted = {"mesh": {"accuracy": GOAL}, "solve": {"exact": False}, "plan": {}}
+    plan = make_plan(parse({**raw(), **wanted}), without=("axisymmetric",))
+    assert execute(plan, MPI.COMM_SELF, found.append, Progress()) == 0
+    assert [(one.key, one.status) for one in found] == [(plan.keys[0], "ok")]
 
 
 @pytest.mark.mpi

@@ -10,9 +10,12 @@ import pytest
 import xarray as xr
 from mpi4py import MPI
 
+from pipeline.plan.plan import make_plan
 from pipeline.run.begun import Begun, fail_begun
 from pipeline.run.record import Record
 from pipeline.run.store import Store
+from pipeline.workflow import prepare
+from tests.cases import study
 from tests.commands import ENVIRONMENT, ROOT
 from tests.studies import small_text
 
@@ -95,8 +98,25 @@ def test_a_reason_that_was_written_is_that_of_the_failure(store: Store):
 def test_a_force_that_is_on_record_stays(store: Store):
     store.put(Record("a", "ok", force=1.0))
     run(BEGIN.format(asked="SIGCONT", goes_on=False), store.path)
-    assert list(fail_begun(store, {"a", "b"})) == ["b"]
-    assert store.get({"a"})["a"].is_ok
+    assert sorted(fail_begun(store, {"a", "b"})) == ["a", "b"]
+    found = store.get({"a", "b"})
+    assert (found["a"].is_ok, found["b"].status) == (True, "failed")
+
+
+@pytest.mark.parametrize("fresh", [False, True])
+def test_a_case_that_ends_its_process_is_left_out_of_a_fresh_run_though_an_older_force_is_on_record(
+    store: Store, fresh: bool
+):
+    """It would end that run, too, and every one after it. Where forces are read back, its own is."""
+    wanted = study()
+    (key,) = make_plan(wanted).keys
+    store.put(Record(key, "ok", young=1e4, depth=2e-4, force=1.0, force_error=0.1))
+    with Begun(store.path) as begun:
+        begun.name([key], "MemoryError: on rank 1")
+    plan, opened = prepare(wanted, MPI.COMM_SELF, store.path, fresh=fresh)
+    opened.store.close()
+    assert plan.solves == ()
+    assert (opened.records[key].is_ok, bool(opened.notices)) == (not fresh, fresh)
 
 
 def test_a_damaged_file_blames_no_case(store: Store):
