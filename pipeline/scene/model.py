@@ -20,7 +20,7 @@ from pipeline.scene.slit import draw_plane, draw_slit, mirror_of, singular_curve
 from pipeline.scene.tessellate import NotASolid, read_solid
 from pipeline.shapes.bodies.cad import SIZES, FromCad
 from pipeline.shapes.body import Body, Drawn
-from pipeline.shapes.contact import is_flat
+from pipeline.shapes.contact import is_flat, is_level
 from pipeline.shapes.frame import Frame
 from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.probe import Probe
@@ -197,13 +197,17 @@ def _add_positive_side(scene: Scene) -> int:
 
 
 def _add_column(scene: Scene) -> int:
-    """Add the cylinder round the probe's axis, through the tissue below the contact, or the ball round the contact."""
+    """Add the cylinder round the probe's axis, through the tissue along it, or the ball round the contact."""
     if scene.is_ball:
         centre = (scene.units(c) for c in scene.frame.point)
         return int(gmsh.model.occ.addSphere(*centre, scene.units(scene.column)))
     frame, depth = scene.frame, scene.units(scene.body.thickness(scene.frame))
+    if is_level(scene.body, frame):
+        length = depth
+    else:  # beyond the surface on both sides, which may rise beside the contact
+        depth, length = 2 * _BODY_SIZE, 4 * _BODY_SIZE
     end = [scene.units(c) + depth * a for c, a in zip(frame.point, frame.axis, strict=True)]
-    return int(gmsh.model.occ.addCylinder(*end, *(depth * o for o in frame.outward), scene.units(scene.column)))
+    return int(gmsh.model.occ.addCylinder(*end, *(length * o for o in frame.outward), scene.units(scene.column)))
 
 
 def _add_level(height: float) -> int:

@@ -14,6 +14,7 @@ from typing import Any, Protocol, cast
 
 from pipeline.shapes.body import Body, Layered
 from pipeline.shapes.contact import is_flat, is_level
+from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section, in_mm
@@ -128,9 +129,11 @@ FEATURES: dict[str, Feature] = {
         lambda s: bool(getattr(s.probe, "depth_range", None)),
         lambda s: [in_mm(depth) for depth in getattr(s.probe, "depth_range", None) or ()],
     ),
-    "inclined tool or surface": Feature("probe.axis", _PLACE, lambda s: not _is_level(s)),
     "curved or inclined surface": Feature("probe.axis", _PLACE, lambda s: not _is_flat(s)),
     "no flat top": Feature("body.shape", _PLACE, lambda s: not (isinstance(s.body, Layered) and _is_level(s))),
+    "surface of a file, inclined": Feature(
+        "body.shape", _PLACE, lambda s: isinstance(s.body, FromFile) and not _is_level(s), lambda s: s.body.shape
+    ),
     "kept column": Feature("mesh.outside", _KEPT, _is_column, _outside),
     "fixed column": Feature("mesh.outside", _KEPT, lambda s: s.mesh.outside == "fixed" and _is_column(s), _outside),
     "half ball": Feature("mesh.outside", _KEPT, _is_ball, _outside),
@@ -176,8 +179,9 @@ REFUSALS: tuple[Refusal, ...] = (
     # A column that is kept of the body.
     Refusal(
         "kept column",
-        "inclined tool or surface",
-        f"a column is kept below a level face that the probe presses straight down on only: {_COARSE}",
+        "surface of a file, inclined",
+        "a column is cut out of boxes, cylinders and ellipsoids, and straight down out of level faces of CAD files: a "
+        f"surface of triangles is not cut, and of a CAD body more than one piece may be left. {_COARSE.capitalize()}",
     ),
     Refusal("fixed column", "open slit", 'is what an open slit would run into: use ends = "blade"'),
     # Degrees of elements.

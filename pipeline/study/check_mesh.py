@@ -47,11 +47,10 @@ def check_chosen(meshes: Sequence[Mesh], problems: Problems) -> None:
 def held_gaps(body: Body, probe: Probe, mesh: Mesh) -> dict[str, float]:
     """Return the distances (m) between the probe's edge and the faces held beside it, by the key that sets them."""
     frame, gaps = probe.frame_on(body), {}
-    if isinstance(body, FromFile) and isfinite(gap := held_gap(body, probe, frame)):
-        gaps["body.fixed"] = gap
-    if not is_level(body, frame):
-        return {"body.fixed": gap} if isfinite(gap := held_gap(body, probe, frame)) else {}
-    if not gaps and (beside := body.support.gap(probe.gap(body, frame))) is not None:
+    if isinstance(body, FromFile) or not is_level(body, frame):
+        if isfinite(gap := held_gap(body, probe, frame)):
+            gaps["body.fixed"] = gap
+    elif (beside := body.support.gap(probe.gap(body, frame))) is not None:
         gaps["body.fixed"] = beside
     if mesh.outside not in ("coarse", "free") and isfinite(column := mesh.column(body.reach(frame))):
         gaps["mesh.epsilon"] = column - (probe.expected_radius if isinstance(probe, Indenter) else probe.circumradius)
@@ -96,7 +95,7 @@ def check_gap(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
 def _meets_held_column(body: Body, probe: Probe, mesh: Mesh) -> bool:
     """Tell whether the tissue would have to be pushed in where it is held, which no displacement does."""
     frame = probe.frame_on(body)
-    if mesh.outside != "fixed" or probe.slit is not None or not is_level(body, frame):
+    if mesh.outside != "fixed" or probe.slit is not None:
         return False
     column = mesh.column(body.reach(frame))
     return column <= probe.pressed * (1 + ON_EDGE)

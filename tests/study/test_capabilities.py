@@ -24,7 +24,7 @@ HAVING = {
     "kept column": {"mesh": {"epsilon": "9 mm", "outside": "free"}},
     "half ball": {"mesh": {"epsilon": "9 mm", "outside": "halfspace"}},
     "own far field": {"mesh": {"epsilon": "9 mm", "outside": "green"}},
-    "inclined tool or surface": {"probe": {"axis": [0.1, 0, -1]}},
+    "curved or inclined surface": {"probe": {"axis": [0.1, 0, -1]}},
     "degree 1": {"mesh": {"degree": 1}},
 }
 

@@ -1,0 +1,59 @@
+"""Columns cut out along a tilted axis, or out of a curved body: their volume, and what they do to the force."""
+
+from math import cos, pi, radians, sin
+
+import numpy as np
+import pytest
+
+from pipeline.mesh.of_case import mesh_arrays
+from tests.cases import solve, study
+from tests.mesh.test_mesh import area
+from tests.mesh.test_regions import volumes
+
+TILT = radians(10)
+AXIS = [sin(TILT), 0.0, -cos(TILT)]
+EGG = {"shape": "ellipsoid", "axes": ["24 mm", "24 mm", "20 mm"], "fixed": {"below": "-8 mm"}}
+SCENES = {
+    "tilted": {"probe": {"axis": AXIS}},
+    "on a curved body": {"body": EGG},
+    "beside its top": {"body": EGG, "probe": {"at": ["6 mm", "4 mm"]}},
+    "found": {"body": EGG, "probe": {"shape": "sphere", "radius": "6 mm", "depth": "0.3 mm", "contact": "unilateral"}},
+    "slides": {"probe": {"shape": "blade", "length": "8 mm", "width": "2 mm", "depth": "0.2 mm", "axis": AXIS}},
+}
+RADIUS = 9e-3
+
+
+def volume(**changes) -> float:
+    mesh = mesh_arrays(study(mesh={"epsilon": "9 mm", "outside": "free", "fine": "3 mm"}, **changes).case(()), ())
+    mesh = mesh if mesh.regions is not None else type(mesh)(**{**vars(mesh), "regions": np.zeros(len(mesh.cells))})
+    return 1e-9 * sum(volumes(mesh).values())
+
+
+def test_a_tilted_column_reaches_through_the_body():
+    """It rises to the top on the side where that is above the contact: between two planes, pi r² h / cos."""
+    assert volume(**SCENES["tilted"]) == pytest.approx(pi * RADIUS**2 * 20e-3 / cos(TILT), rel=2e-4)
+
+
+def test_a_column_of_a_curved_body_ends_at_its_surface():
+    a, c = 24e-3, 20e-3
+    exact = 4 / 3 * pi * a * a * c * (1 - (1 - (RADIUS / a) ** 2) ** 1.5)
+    assert volume(**SCENES["on a curved body"]) == pytest.approx(exact, rel=2e-4)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_free_column_is_softer_than_the_body_and_a_fixed_one_stiffer(name):
+    """What is cut away stored energy; what is held stores none. Wider columns are nearer to the whole."""
+    sizes = {"epsilon": ["9 mm", "14 mm", "full"], "outside": ["free", "fixed"]}
+    found = solve(mesh=sizes, **SCENES[name])
+    assert all(record.status == "ok" for record in found.values()), [record.message for record in found.values()]
+    force = np.array([[found[i, j].force for j in range(2)] for i in range(3)])
+    assert force[2, 0] == pytest.approx(force[2, 1], rel=1e-9)
+    (narrow_free, narrow_fixed), (free, fixed), (whole, _) = force
+    assert narrow_free < free < whole < fixed < narrow_fixed
+
+
+def test_the_sides_of_a_column_are_round():
+    mesh = mesh_arrays(
+        study(mesh={"epsilon": "9 mm", "outside": "free", "fine": "3 mm"}, **SCENES["tilted"]).case(()), ()
+    )
+    assert area(mesh, "cut") == pytest.approx(2 * pi * RADIUS * 20e-3 / cos(TILT), rel=0.02)
