@@ -131,7 +131,7 @@ def features(solve: Solve) -> tuple[str, float, float]:
     case = solve.case
     if solve.axisymmetric:
         return _FOUND if case.probe.is_unilateral else "meridian", 1.0, 0.0
-    words = [case.material.law if case.material.is_large else case.element, str(case.mesh.degree)]
+    words = [case.formulation, str(case.mesh.degree)]
     words += [str(case.movements)] if case.movements > 1 else []
     words += ["found"] if case.probe.is_unilateral else []
     words += ["regions"] if case.body.regions else []

@@ -7,18 +7,16 @@ from pipeline.study.sweep import Case
 
 # Volume of gmsh's mean tetrahedron in units of the cube of the size asked for: measured, docs/performance.md.
 _TETRAHEDRON = 0.21
-# Bytes for each dof at the peak of a solve, degree by degree: multigrid, whose operators are products or, for large
-# displacements, matrices, and what conjugate residuals keep, little where a tenth is enough; the factor of a
-# system of 50,000 dofs. Measured: docs/solvers.md.
+# Bytes for each dof at the peak of a solve, degree by degree, of elements or of a law of large displacements:
+# multigrid, whose operators are products or, for large displacements, matrices, and what conjugate residuals keep;
+# for an error bar, where a tenth is enough, little; the factor of a system of 50,000 dofs. Measured: docs/solvers.md.
 _BYTES_PER_DOF = {
     "displacement": {1: 3000, 2: 700, 3: 420, 4: 420},
     "mixed": {2: 1450, 3: 1200, 4: 1200},
-    "mixed, roughly": {3: 850, 4: 850},
-    "large, roughly": {2: 600, 3: 600, 4: 600},
-    "displacement, matrices": {1: 3000, 2: 1900, 3: 2000, 4: 2800},
-    "mixed, matrices": {2: 3800, 3: 4000, 4: 5600},
-    "direct": {1: 9000, 2: 9000, 3: 10_000},
+    "large": {1: 3000, 2: 1900, 3: 2000, 4: 2800},
 }
+_OF_BAR = {"displacement": {2: 700, 3: 420, 4: 420}, "mixed": {3: 850, 4: 850}, "large": {2: 600, 3: 600, 4: 600}}
+_OF_FACTOR = {1: 9000, 2: 9000, 3: 10_000}
 # And what a reduced basis keeps besides: a hierarchy for its bound, and five vectors of each of some eight solutions.
 _BYTES_OF_BASIS = {1: 1000, 2: 1100, 3: 1800, 4: 2500}
 _BASE = 200e6
@@ -109,33 +107,17 @@ def dofs(count: float, degree: int) -> float:
     return _DOFS_PER_CELL[degree] * count
 
 
-def solving_memory(
-    dofs: float,
-    degree: int,
-    *,
-    direct: bool,
-    mixed: bool = False,
-    large: bool = False,
-    roughly: bool = False,
-) -> float:
-    """Estimate the bytes that a solve takes, all ranks together.
-
-    ``large`` displacements have matrices, but not in their error bar. To solve ``roughly``, as an error bar does, is to
-    a tenth.
-    """
-    kind = "direct" if direct else "large" if large and roughly else "mixed" if mixed else "displacement"
-    kind += ", matrices" * (large and not direct and not roughly)
-    kind += ", roughly" * (roughly and kind in ("mixed", "large"))
-    per_dof = _BYTES_PER_DOF[kind][degree]
-    # Fill of a factorisation in 3D grows like dofs^(4/3); the figure above is for 50,000.
-    growth = (dofs / 50_000) ** (1 / 3) if direct else 1.0
-    return _BASE + per_dof * growth * dofs
+def solving_memory(dofs: float, degree: int, formulation: str = "displacement", *, direct: bool) -> float:
+    """Estimate the bytes that a solve takes, all ranks together; ``formulation`` is that of its case."""
+    if direct:  # fill of a factorisation in 3D grows like dofs^(4/3); the figure above is for 50,000
+        return _BASE + _OF_FACTOR[degree] * (dofs / 50_000) ** (1 / 3) * dofs
+    return _BASE + _BYTES_PER_DOF.get(formulation, _BYTES_PER_DOF["large"])[degree] * dofs
 
 
-def enriched_memory(dofs: float, degree: int, *, mixed: bool = False, large: bool = False) -> float:
+def enriched_memory(dofs: float, degree: int, formulation: str = "displacement") -> float:
     """Estimate the bytes that an error bar takes: a solve of one degree more than that of ``dofs`` unknowns."""
     growth = _DOFS_PER_CELL[degree + 1] / _DOFS_PER_CELL[degree]
-    return solving_memory(growth * dofs, degree + 1, direct=False, mixed=mixed, large=large, roughly=True)
+    return _BASE + _OF_BAR.get(formulation, _OF_BAR["large"])[degree + 1] * growth * dofs
 
 
 def peak_memory(case: Case, share: float = 1.0, of_bar: float | None = None, *, reduced: bool = False) -> float:
@@ -143,9 +125,9 @@ def peak_memory(case: Case, share: float = 1.0, of_bar: float | None = None, *, 
 
     ``of_bar`` is the part of the body that the bar is found on, if that is another; ``reduced`` cases have a basis.
     """
-    degree, mixed, large = case.mesh.degree, case.element == "mixed", case.material.is_large
+    degree = case.mesh.degree
     count = dofs((share if of_bar is None else of_bar) * cells(case), degree)
-    enriched = enriched_memory(count, degree, mixed=mixed, large=large)
+    enriched = enriched_memory(count, degree, case.formulation)
     basis = basis_memory(dofs(share * cells(case), degree), degree) if reduced else 0.0
     return _LOADED + max(case_memory(case, share), enriched) + basis
 
@@ -165,8 +147,6 @@ def case_memory(case: Case, share: float = 1.0) -> float:
 
     ``share`` is the part of the body that is modelled.
     """
-    count, degree = share * cells(case), case.mesh.degree
-    direct, mixed = case.solve.method == "direct", case.element == "mixed"
-    large = case.material.is_large
-    solving = solving_memory(dofs(count, degree), degree, direct=direct, mixed=mixed, large=large)
+    count, degree, direct = share * cells(case), case.mesh.degree, case.solve.method == "direct"
+    solving = solving_memory(dofs(count, degree), degree, case.formulation, direct=direct)
     return max(_BASE + _BYTES_PER_CELL * count, solving)

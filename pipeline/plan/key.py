@@ -76,10 +76,8 @@ def operator_key(case: Case) -> str:
     """Key of the case's spaces and conditions on its mesh: all but the material's moduli, and the depth if contact is
     found, or if displacements are large.
     """
-    walks = case.probe.is_unilateral or case.material.is_large
-    probe = text_of(case.probe, (*_UNPHYSICAL, "depth") if walks else _UNPHYSICAL)
-    law = [case.material.law] if case.material.is_large else []
-    return digest("\n".join([mesh_key(case), probe, str(case.mesh.degree), case.element, *law]))
+    probe = text_of(case.probe, (*_UNPHYSICAL, "depth") if case.is_followed else _UNPHYSICAL)
+    return digest("\n".join([mesh_key(case), probe, str(case.mesh.degree), case.formulation]))
 
 
 def normalised(case: Case) -> Case:

@@ -16,17 +16,9 @@ from pipeline.shapes.body import Body
 from pipeline.study.closure import FarRegion
 from pipeline.study.sweep import Case
 
-_OF_STRESS_ALONE = (
-    "F is proportional to Young's modulus, and to the depth unless contact grows with it or the tool stands in a slit: "
-    "cases that differ in them only are solved once."
-)
 _LONE_DEPTHS = (
     "No start from neighbouring depths: each depth of this tool has a mesh of its own; probe.depth_range makes it one "
     "for all."
-)
-_LARGE = (
-    "F is proportional to Young's modulus, and to the depth unless displacements are large: cases that differ in them "
-    "only are solved once."
 )
 
 
@@ -41,9 +33,9 @@ def strike_duplicates(plan: Plan) -> Plan:
 
 
 def strike_scaled(plan: Plan) -> Plan:
-    """F is proportional to Young's modulus and to the depth: cases that differ in them only are solved once."""
-    reason = "" if all(solve.case.probe.proportional_to for solve in plan.solves) else _OF_STRESS_ALONE
-    reason = _LARGE if any(solve.case.material.is_large for solve in plan.solves) else reason
+    """F is proportional to Young's modulus and, unless contact grows with it, displacements are large or the tool is in
+    a slit, to the depth: cases that differ in them only are solved once.
+    """
     first: dict[str, Case] = {}
     deeper: dict[tuple[int, ...], ProportionalDepth] = {}
     for solve in plan.solves:
@@ -56,7 +48,7 @@ def strike_scaled(plan: Plan) -> Plan:
         text = depth_key(case)
         return case_key(first[text] if text else case, folded=True, scaled=True)
 
-    return _rekeyed(replace(plan, proportional=deeper), "scaling", strike_scaled, key, reason)
+    return _rekeyed(replace(plan, proportional=deeper), "scaling", strike_scaled, key)
 
 
 def strike_images(plan: Plan) -> Plan:
@@ -140,7 +132,9 @@ def _with_far_region(solve: Solve, regions: Mapping[Body, FarRegion]) -> Solve:
 
 
 def reuse_solutions(plan: Plan) -> Plan:
-    """A solve begins from the solutions for neighbouring Poisson's ratios or places, or depths if contact is found."""
+    """A solve begins from the solutions for neighbouring Poisson's ratios or places, or, where contact is found or
+    displacements are large, depths.
+    """
     plan = replace(plan, reuse=True)
     operators = [operator for step in plan.meshes for operator in step.operators if not step.axisymmetric]
     count = sum(len(operator.solves) - _fresh(operator) for operator in operators)
@@ -187,14 +181,12 @@ REDUCTIONS: dict[str, Callable[[Plan], Plan]] = {
 }
 
 
-def _rekeyed(
-    plan: Plan, name: str, reduction: Callable[[Plan], Plan], key: Callable[..., str], reason: str = ""
-) -> Plan:
+def _rekeyed(plan: Plan, name: str, reduction: Callable[[Plan], Plan], key: Callable[..., str]) -> Plan:
     """Give every solve the key that ``key`` makes of its case, and merge those that then agree."""
     solves = tuple(replace(solve, key=key(solve.case)) for solve in plan.solves)
     new = dict(zip((solve.key for solve in plan.solves), (solve.key for solve in solves), strict=True))
     plan = replace(plan, solves=solves, keys=_renamed(plan, new))
-    return _merged(plan, name, reason or reason_of(reduction))
+    return _merged(plan, name, reason_of(reduction))
 
 
 def _renamed(plan: Plan, new: Mapping[str, str]) -> tuple[str, ...]:
@@ -221,9 +213,7 @@ def _mirrored(solve: Solve) -> Solve:
 
 def _fresh(operator: OperatorStep) -> int:
     """Return how many solves of an operator have no neighbour to begin from."""
-    if operator.case.material.is_large:
-        return len(operator.solves)
-    return len(operator.sweeps) if operator.case.probe.is_unilateral else 1
+    return len(operator.sweeps) if operator.case.is_followed else 1
 
 
 def _has_lone_depths(operators: list[OperatorStep]) -> bool:

@@ -54,9 +54,7 @@ def _forms(solve: Solve) -> tuple[str, int, bool, bool]:
         half_plane = body.half_plane()
         kind = "elliptic" if half_plane and half_plane.is_curved else "axisymmetric"
         return kind, TRIAL_DEGREE if solve.case.probe.is_unilateral else 0, False, False
-    if solve.case.material.is_large:
-        return solve.case.material.law, mesh.degree, False, False
-    return solve.case.element, mesh.degree, bool(body.regions), solve.case.probe.slit is not None
+    return solve.case.formulation, mesh.degree, bool(body.regions), solve.case.probe.slit is not None
 
 
 def _compile(element: str, degree: int, *, of_regions: bool, of_slit: bool) -> None:

@@ -57,10 +57,9 @@ def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: boo
 def memory_of(case: Case, dofs: int) -> tuple[float, float]:
     """Return the bytes that a solve of ``case`` with so many ``dofs`` takes, and its error bar."""
     degree, direct = case.mesh.degree, is_direct(case.solve.method, dofs, case.mesh.degree)
-    kind = {"mixed": case.element == "mixed", "large": case.material.is_large}
     return (
-        estimate.solving_memory(dofs, degree, direct=direct, **kind),
-        estimate.enriched_memory(dofs, degree, **kind),
+        estimate.solving_memory(dofs, degree, case.formulation, direct=direct),
+        estimate.enriched_memory(dofs, degree, case.formulation),
     )
 
 

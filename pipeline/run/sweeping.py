@@ -11,7 +11,7 @@ def in_order(step: OperatorStep, *, condensed: bool) -> Iterator[Solve]:
 
     On a ``condensed`` surface a depth costs less than its error bar. Those come first of which others take theirs.
     """
-    if not (step.case.probe.is_unilateral or step.case.material.is_large):
+    if not step.case.is_followed:
         yield from step.solves
         return
     for sweep in step.sweeps:

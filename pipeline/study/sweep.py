@@ -223,6 +223,16 @@ class Case:
         """The element that solves it: displacement or mixed."""
         return "displacement" if self.material.is_large else self.mesh.element_for(self.poisson)
 
+    @property
+    def formulation(self) -> str:
+        """What is solved: the element of linear elasticity, or the name of the law of large displacements."""
+        return self.material.law if self.material.is_large else self.element
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether a depth is reached over smaller ones: contact is found, or displacements are large."""
+        return self.probe.is_unilateral or self.material.is_large
+
     def __str__(self) -> str:
         return ", ".join(f"{name} = {text}" for name, text in self.words.items()) or "the one case"
 
