@@ -23,7 +23,7 @@ def fields(body: dict, poissons: tuple[float, float], margin: float) -> FarField
 
 @pytest.mark.parametrize(
     ("body", "most"),
-    [(BOX, 0.004), (CYLINDER, 0.004), (CYLINDER | {"layers": [SKIN | {"thickness": "6 mm"}]}, 0.012)],
+    [(CYLINDER, 0.004), (CYLINDER | {"layers": [SKIN | {"thickness": "6 mm"}]}, 0.012)],
 )
 def test_a_table_of_two_places_is_reciprocal_and_knows_each_by_itself(body, most, monkeypatch):
     monkeypatch.setattr(far, "_POISSONS", 2)
@@ -79,7 +79,7 @@ def test_the_bar_holds_what_a_table_of_few_places_misses(monkeypatch):
     assert 0.004 < off.max() < pairs.error
 
 
-@pytest.mark.parametrize(("poisson", "apart"), [(0.3, 9e-3), (0.45, 16e-3)])
+@pytest.mark.parametrize(("poisson", "apart"), [(0.45, 16e-3)])
 def test_two_discs_are_those_of_other_elements(poisson, apart):
     """Box of 40 x 40 x 20 mm: what the one takes of the other's force, by quadratic elements that know both edges."""
     body, depth, radii = BOX | {"size": ["40 mm", "40 mm", "20 mm"]}, 1e-4, (1.5e-3, 2.5e-3)

@@ -14,12 +14,6 @@ def outside_slurm(monkeypatch):
         monkeypatch.delenv(name, raising=False)
 
 
-@pytest.mark.mpi
-def test_machines_count_once():
-    total = psutil.virtual_memory().total
-    assert 0 < FreeMemory(MPI.COMM_WORLD).available() <= total
-
-
 def test_what_slurm_grants(monkeypatch):
     free = FreeMemory(MPI.COMM_SELF).available()
     resident = psutil.Process().memory_info().rss
