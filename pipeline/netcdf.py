@@ -1,4 +1,4 @@
-"""netCDF files: written whole or not at all, with a checksum behind every array."""
+"""netCDF files: written whole or not at all, with a checksum behind every array of numbers or letters."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -21,9 +21,10 @@ def write_netcdf(
     kind: Literal["NETCDF4", "NETCDF3_64BIT"],
     encoding: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> None:
-    """Write ``dataset`` to ``path`` in one piece or not at all; netCDF4 with a Fletcher-32 checksum on every array.
+    """Write ``dataset`` to ``path`` in one piece or not at all; netCDF4 with a Fletcher-32 checksum on arrays.
 
-    Texts become arrays of characters, which checksums cover, too: HDF5 keeps texts of varying length elsewhere.
+    Texts become arrays of characters, which checksums cover, too: HDF5 keeps texts of varying length elsewhere. Single
+    numbers (arrays without a dimension) and attributes have no checksum: HDF5 filters work on arrays stored in chunks.
     HDF5 ends the process if the disk fills while it writes, so that room for the whole file is taken first.
 
     Raises:

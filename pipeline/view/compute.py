@@ -16,8 +16,7 @@ from pipeline.mesh.generate import MeshArrays, MeshError
 from pipeline.mesh.of_case import upright
 from pipeline.mesh.reflect import reflect, reflect_vectors
 from pipeline.plan import estimate
-from pipeline.plan.plan import declare, first_attempts
-from pipeline.plan.reductions import use_axisymmetry
+from pipeline.plan.plan import declare, first_attempts, make_plan
 from pipeline.plan.steps import Solve
 from pipeline.plan.symmetry import mirror_planes, model_planes
 from pipeline.run.attempts import Attempts
@@ -49,14 +48,14 @@ Note = Callable[[str], None]
 def solve_to_view(study: Study, case: Case) -> Solve:
     """Return how ``case`` is computed to be looked at: in three dimensions, on what symmetry leaves of the body.
 
-    It is ``axisymmetric`` if a run solves it on its meridian: the force comes from there, too.
+    As in a run, its force may come from a meridian (``axisymmetric``), and its far field from a mesh that the places of
+    the study share.
     """
-    plan = declare(study)
-    if not study.solve.timing and not {"axisymmetric", "all"} & {*study.planning.without}:
-        plan = use_axisymmetry(plan)
-    solves = first_attempts(plan).solves
-    solve = next(solve for solve in solves if case.index in solve.serves)
-    return replace(solve, mirrors=model_planes(case)) if case.mesh.model == "auto" else solve
+    run = next(solve for solve in make_plan(study).solves if case.index in solve.serves)
+    solve = next(solve for solve in first_attempts(declare(study)).solves if case.index in solve.serves)
+    mirrors = model_planes(case) if case.mesh.model == "auto" else ()
+    shown = replace(solve.case, far_region=run.case.far_region)
+    return replace(solve, case=shown, mirrors=mirrors, axisymmetric=run.axisymmetric)
 
 
 def compute_fields(
@@ -111,16 +110,16 @@ def _attempt(
     solve: Solve, comm: MPI.Comm, bar: bool, cache: MeshCache | None, note: Note
 ) -> tuple[Record, Fields | None]:
     """Solve on one mesh; return the record that a run would have of it and, on rank 0, the fields."""
-    case = solve.case
+    case, meshed = solve.case, solve.meshed_case
     arrays = _arrays(solve, comm, cache, note)
     prepare(comm, [solve])
-    mesh = distribute(comm, arrays and upright(case, arrays))
-    with Spaces(mesh) as spaces, problem_of(spaces, case) as problem:
+    mesh = distribute(comm, arrays and upright(meshed, arrays))
+    with Spaces(mesh) as spaces, problem_of(spaces, meshed) as problem:
         needed, with_bar = memory_of(case, problem.dofs)
         check_memory(FreeMemory(comm), needed, "solving")
         room = bar and not lacks_memory(FreeMemory(comm), with_bar, "")
         note(f"solving for {problem.dofs} unknowns")
-        solution = solve_problem(case, problem, estimate=room or solve.goal is not None)
+        solution = solve_problem(case, problem, estimate=room or solve.goal is not None, meshed=meshed)
         points = comm.bcast(len(arrays.points) if arrays is not None else 0)
         displacement, strain = _gathered(mesh, problem, points)
         if case.frame.turn is not None:
@@ -133,10 +132,11 @@ def _attempt(
 
 
 def _arrays(solve: Solve, comm: MPI.Comm, cache: MeshCache | None, note: Note) -> MeshArrays | None:
-    """Return, on rank 0, the mesh of the part of the body that is modelled."""
-    check_memory(FreeMemory(comm), estimate.case_memory(solve.case, share=0.5 ** len(solve.mirrors)), "this case")
+    """Return, on rank 0, the mesh of the part of the body that is modelled; of a half ball, where a run makes it."""
+    case = solve.meshed_case
+    check_memory(FreeMemory(comm), estimate.case_memory(case, share=0.5 ** len(solve.mirrors)), "this case")
     note("meshing")
-    return on_first_rank(comm, lambda: cached_arrays(solve.case, solve.mirrors, cache))
+    return on_first_rank(comm, lambda: cached_arrays(case, solve.mirrors, cache))
 
 
 def _gathered(mesh: BodyMesh, problem: FieldProblem, points: int) -> tuple[FloatArray, FloatArray]:
@@ -181,7 +181,8 @@ def _whole(
     if strain is not None:
         strain = np.tile(strain, 2 ** len(mirrors))
     whole = reflect(arrays, mirrors)
-    fields = Fields(case, whole.points, whole.cells, whole.facets, mirror_planes(case), displacement, strain)
+    points = whole.points + np.subtract(case.frame.point, solve.meshed_case.frame.point)
+    fields = Fields(case, points, whole.cells, whole.facets, mirror_planes(case), displacement, strain)
     if whole.regions is None:
         return fields
     # Where layers fill the body nothing is left of the tissue that has number 0.

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from pipeline.plan.plan import make_plan
 from pipeline.plan.recipe import Rung
+from pipeline.run.execute import compute
 from pipeline.run.problem import CaseFailure
 from pipeline.scene.model import FIXED, PROBE
 from pipeline.view.compute import compute_fields, solve_to_view
@@ -142,6 +144,22 @@ def test_force_of_a_round_scene_is_the_meridian_s(mesh):
     assert found.on_meridian
     assert (found.force, found.force_error) == pytest.approx((record.force, record.force_error), rel=1e-9)
     assert found.displacement.shape == found.points.shape
+
+
+def test_force_of_a_place_on_a_path_is_the_run_s():
+    places = [["-6 mm", "2 mm"], ["0 mm", "2 mm"], ["4 mm", "2 mm"], ["7 mm", "-3 mm"]]
+    mesh = {"epsilon": "5 mm", "fine": "2.5 mm", "rim": "1 mm", "outside": "green"}
+    made = study(mesh=mesh, probe={"at": places}, plan={"without": []})
+    plan = make_plan(made)
+    assert any(solve.case.far_region for solve in plan.solves)
+    records = compute(plan, MPI.COMM_SELF)
+    for case in list(made.cases())[:2]:
+        record = records[next(solve.key for solve in plan.solves if case.index in solve.serves)]
+        found = compute_fields(solve_to_view(made, case), MPI.COMM_SELF)
+        assert found.force == pytest.approx(record.force, rel=1e-9)
+        at = np.unique(found.facets[PROBE])
+        np.testing.assert_allclose(found.points[at].mean(axis=0), case.frame.point, atol=1e-5)
+        np.testing.assert_allclose(found.displacement[at], np.broadcast_to(case.travel, (len(at), 3)), atol=1e-12)
 
 
 @pytest.mark.mpi
