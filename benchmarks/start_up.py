@@ -26,7 +26,7 @@ COMMANDS = {
     "plan": ["plan", "studies/quick.toml"],
     "plan figure3": ["plan", "studies/figure3.toml"],
     "status": ["status", "studies/quick.toml"],
-    "explain": ["explain", "studies/quick.toml"],
+    "plan of a case": ["plan", "studies/quick.toml", "0"],
 }
 HERE = Path(__file__).parents[1]
 _REPEATS = 15

@@ -3,7 +3,6 @@
 import json
 import re
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -139,7 +138,7 @@ def dataset_page() -> str:
 
 def commands_page() -> str:
     """Return the page of every command with its arguments and options."""
-    root = typer.main.get_command(app)
+    root: Any = typer.main.get_command(app)
     lines = [
         "# Commands",
         "",
@@ -148,20 +147,12 @@ def commands_page() -> str:
         "Exit status: 0 done, 1 some cases failed, 2 the input is wrong, 130 interrupted. "
         "Errors and progress go to standard error. Colour is for terminals; `NO_COLOR=1` does without.",
     ]
-    for name, command in _commands(root):
+    for name, command in root.commands.items():
         lines += ["", f"## `epsmesh {name}`", "", *_help(command.help or "")]
         rows = [row for parameter in command.params if (row := _parameter(parameter))]
         if rows:
             lines += [*_table(("", "meaning", "default")), *rows]
     return "\n".join(lines) + "\n"
-
-
-def _commands(group: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    for name, command in group.commands.items():
-        if hasattr(command, "commands"):
-            yield from _commands(command, f"{prefix}{name} ")
-        else:
-            yield f"{prefix}{name}", command
 
 
 def _help(text: str) -> list[str]:

@@ -169,11 +169,11 @@ def test_run_killed_at_random_moments_yields_the_same_dataset(spawn, small, whol
         assert last.returncode == 1
         last = spawn("run", small, "--output", tmp_path / "killed")
     assert last.returncode == 0, last.stderr
-    assert spawn("store", "verify", "--store", tmp_path / "killed" / "cases.sqlite").returncode == 0
+    assert spawn("store", "--store", tmp_path / "killed" / "cases.sqlite").returncode == 0
     assert_same(*(folder / "small.nc" for folder in (tmp_path / "killed", whole)), alike=False)
 
 
-def test_plan_explain_and_store(epsmesh, spawn, small, whole, tmp_path):
+def test_plan_story_and_store(epsmesh, spawn, small, whole, tmp_path):
     planned = json.loads(epsmesh("plan", small, "--output", tmp_path, "--json").stdout)
     assert planned["cases"] == 12
     assert {"full", "symmetry", "sharing"} <= {struck["name"] for struck in planned["struck"]}
@@ -184,19 +184,19 @@ def test_plan_explain_and_store(epsmesh, spawn, small, whole, tmp_path):
     shutil.copy(whole / "cases.sqlite", tmp_path)
     assert spawn("run", small, "--output", tmp_path, "-q").returncode == 0
     assert json.loads(epsmesh("plan", small, "--output", tmp_path, "--json").stdout)["solves"] == 0
-    told = epsmesh("explain", small, "poisson=0.3, epsilon=full", "--output", tmp_path).stdout
+    told = epsmesh("plan", small, "poisson=0.3, epsilon=full", "--output", tmp_path).stdout
     assert "epsilon = full" in told
     assert "origin: symmetric" in told
     assert "proportional" in told
-    assert epsmesh("explain", small, "poisson=0.31", "--output", tmp_path).exit_code == 2
+    assert epsmesh("plan", small, "poisson=0.31", "--output", tmp_path).exit_code == 2
     store = tmp_path / "cases.sqlite"
-    listed = json.loads(epsmesh("store", "list", "--store", store, "--json").stdout)
+    listed = json.loads(epsmesh("store", "--store", store, "--json").stdout)
     assert listed["records"] == planned["solves"]
-    assert epsmesh("store", "verify", "--store", store).exit_code == 0
-    assert "would be removed: --yes does it" in epsmesh("store", "prune", "--days", "0", "--store", store).stdout
-    assert json.loads(epsmesh("store", "list", "--store", store, "--json").stdout)["records"] == planned["solves"]
-    assert "kB: removed" in epsmesh("store", "prune", "--days", "0", "--store", store, "--yes").stdout
-    assert json.loads(epsmesh("store", "list", "--store", store, "--json").stdout)["records"] == 0
+    assert epsmesh("store", "--store", store).exit_code == 0
+    assert "would be removed: --yes does it" in epsmesh("store", "--prune", "--days", "0", "--store", store).stdout
+    assert json.loads(epsmesh("store", "--store", store, "--json").stdout)["records"] == planned["solves"]
+    assert "kB: removed" in epsmesh("store", "--prune", "--days", "0", "--store", store, "--yes").stdout
+    assert json.loads(epsmesh("store", "--store", store, "--json").stdout)["records"] == 0
 
 
 def test_validate_status_and_plot(epsmesh, small, tmp_path):

@@ -244,7 +244,7 @@ def test_no_file_writes_on_a_terminal_what_it_does_not_say(tmp_path):
     start = (data := bytearray(model.read_bytes())).index(b"reciprocal")
     data[start : start + 3], data[start + 16 : start + 20] = b"\x1b[2", b"\xff" * 4
     model.write_bytes(data)
-    commands = [("validate", mine), ("store", "verify", "--store", store), ("touch", model), ("touch", mine)]
+    commands = [("validate", mine), ("store", "--store", store), ("touch", model), ("touch", mine)]
     for words in (*commands, *((*words, "--json") for words in commands)):
         done = spawn(*words)
         text = done.stdout + done.stderr
@@ -269,7 +269,7 @@ def test_commands_that_messages_name_hold_one_command_each(tmp_path, epsmesh):
     store = tmp_path / "x; reboot.sqlite"
     store.write_bytes(b"no store" * 100)
     told = epsmesh("status", "studies/quick.toml", "--store", store).stderr
-    assert f"`epsmesh store prune --store '{store}' --yes`" in told
+    assert f"`epsmesh store --prune --yes --store '{store}'`" in told
     (tmp_path / "$(reboot).toml").write_text("")
     told = epsmesh("plot", tmp_path / "$(reboot).toml").stderr
     assert f"`epsmesh run '{tmp_path}/$(reboot).toml'`" in told

@@ -38,7 +38,6 @@ _COMMANDS: tuple[Callable[..., None], ...] = (
     study.run,
     merge.merge,
     study.status,
-    plan.explain,
     report.plot,
     report.report,
     guide.guide,
@@ -49,11 +48,11 @@ _COMMANDS: tuple[Callable[..., None], ...] = (
     touch.touch,
     checks.verify,
     checks.benchmark,
+    store.store,
     study.version,
 )
 for _command in _COMMANDS:
     app.command()(_command)
-app.add_typer(store.app, name="store")
 
 
 def _print_version(is_wanted: bool) -> None:

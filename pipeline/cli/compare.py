@@ -1,18 +1,13 @@
 """The command that holds the results of two runs against each other."""
 
-from pathlib import Path
-from typing import Annotated
-
 import typer
 
 from pipeline.cli.console import print_json, warning
 from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail
-from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output
+from pipeline.cli.words import DEFAULT_OUTPUT, Dataset, Json, Output
 
 # What is compared, and what is refused.
 _HOWTO = "docs/howto/compare.md"
-
-Dataset = Annotated[Path, typer.Argument(help="A dataset (.nc), or a study file whose dataset exists.")]
 
 
 def compare(a: Dataset, b: Dataset, output: Output = DEFAULT_OUTPUT, as_json: Json = False) -> None:

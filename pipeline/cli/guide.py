@@ -1,20 +1,19 @@
 """The command that answers from a dataset how large ε must be."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from pipeline.cli.console import print_json
 from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_file
-from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output, read_dataset
+from pipeline.cli.words import DEFAULT_OUTPUT, Dataset, Json, Output, read_dataset
 
 # What it asks and answers.
 _HOWTO = "docs/guideline.md"
 
 
 def guide(
-    file: Annotated[Path, typer.Argument(help="A dataset (.nc), or a study file whose dataset exists.")],
+    file: Dataset,
     accuracy: Annotated[str | None, typer.Option(help='How near F must be to F_exact: "5%".')] = None,
     budget: Annotated[str | None, typer.Option(help='How long a case may take: "10ms".')] = None,
     output: Output = DEFAULT_OUTPUT,

@@ -1,4 +1,4 @@
-"""The commands that tell what a run would do, before it is begun."""
+"""The command that tells what a run would do, before it is begun; and what a case is by its labels."""
 
 import re
 import sys
@@ -42,6 +42,14 @@ _MOST_STEPS = 20
 
 def plan(
     file: File,
+    case: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[CASE]",
+            help='Of one case alone: "poisson=0.3, epsilon=10 mm", or its number.',
+            show_default=False,
+        ),
+    ] = None,
     output: Output = DEFAULT_OUTPUT,
     store: StoreFile = None,
     without: Without = None,
@@ -56,17 +64,24 @@ def plan(
 ) -> None:
     """Show what a study needs done, and what is struck out.
 
-    With the reasons, and an estimate of time and memory. Ends with 1 if no case would fit into memory.
+    With the reasons, and an estimate of time and memory. Ends with 1 if no case would fit into memory. Of one case: its
+    steps, where its force is from, what it shares with others, and what a change would cost.
 
     Example: epsmesh plan studies/figure3.toml
 
     Example: epsmesh plan studies/figure3.toml --without symmetry
+
+    Example: epsmesh plan studies/figure3.toml "poisson=0.3, epsilon=10 mm, outside=free"
     """
     from pipeline.plan.describe import summary
     from pipeline.run.room import MEMORY_SHARE, machine_room
 
     (study,) = load_all([file])
-    made, _ = _planned(study, output, store, check_names(without))
+    chosen = None if case is None else find_case(study, case)
+    made, records = _planned(study, output, store, check_names(without))
+    if chosen is not None:
+        _tell(made, records, chosen, as_json=as_json)
+        return
     found = summary(made, ranks)
     room = machine_room() if memory is None else 1e9 * memory
     most = MEMORY_SHARE * room
@@ -121,28 +136,11 @@ def _list_steps(steps: list[dict[str, Any]], most: int | None) -> None:
         print(f"    … and {len(steps) - most} smaller steps: --verbose lists them")
 
 
-def explain(
-    file: File,
-    case: Annotated[
-        str, typer.Argument(metavar="CASE", help='A case: "poisson=0.3, epsilon=10 mm", or its number.')
-    ] = "0",
-    output: Output = DEFAULT_OUTPUT,
-    store: StoreFile = None,
-    without: Without = None,
-    as_json: Json = False,
-) -> None:
-    """Tell one case's story: its steps and where its force is from.
-
-    Also what it shares with others, and what a change would cost.
-
-    Example: epsmesh explain studies/figure3.toml "poisson=0.3, epsilon=10 mm, outside=free"
-    """
+def _tell(made: "Plan", records: "dict[str, Record]", case: "Case", *, as_json: bool) -> None:
+    """Print one case's story."""
     from pipeline.plan.describe import story
 
-    (study,) = load_all([file])
-    chosen = find_case(study, case)
-    made, records = _planned(study, output, store, check_names(without))
-    found = story(made, chosen.index)
+    found = story(made, case.index)
     record = records.get(found["key"])
     if record:
         found["record"] = {
@@ -160,7 +158,7 @@ def explain(
     for name, value in found.items():
         if name == "case" or not value:
             continue
-        lines = [f"{k}: {_short(v)}" for k, v in value.items()] if isinstance(value, dict) else value
+        lines = [f"{k}: {_written(k, v)}" for k, v in value.items()] if isinstance(value, dict) else value
         if isinstance(lines, list):
             print(f"  {name.replace('_', ' ')}:")
             for line in lines:
@@ -169,8 +167,13 @@ def explain(
             print(f"  {name.replace('_', ' ')}: {value}")
 
 
-def _short(value: Any) -> Any:
-    return f"{value:.6g}" if isinstance(value, float) else value
+def _written(name: str, value: Any) -> Any:
+    """Return a number of a record with its unit."""
+    from pipeline.quantities import write
+
+    if not isinstance(value, float):
+        return value
+    return f"{value:.3g}" if name == "seconds" else write(name, value)
 
 
 def _planned(

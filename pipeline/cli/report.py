@@ -1,18 +1,15 @@
 """The commands that show a dataset: figures, report."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from pipeline.cli.console import print_json
 from pipeline.cli.faults import Fault, fail, of_option
-from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output, check_machine, check_output, read_dataset
+from pipeline.cli.words import DEFAULT_OUTPUT, Dataset, Json, Output, check_machine, check_output, read_dataset
 
 # Bytes that a page may take: figures, parts of the first one and some thousand cases; a scene besides.
 _PAGE, _PAGE_WITH_SCENE = 6_000_000, 12_000_000
-
-Dataset = Annotated[Path, typer.Argument(help="A dataset (.nc), or a study file whose dataset exists.")]
 
 # No scene at all.
 _NONE = "none"

@@ -1,10 +1,8 @@
-"""The commands that look after the case store and the mesh cache."""
+"""The command that looks after the case store."""
 
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -14,25 +12,60 @@ from pipeline.cli.words import DEFAULT_OUTPUT, Json, check_store
 from pipeline.files import STORE_NAME
 from pipeline.printable import counted
 
-if TYPE_CHECKING:
-    from pipeline.run.store import Records
-
-app = typer.Typer(
-    no_args_is_help=True, help="Look after the case store: list, prune, verify.\n\nExample: epsmesh store list"
-)
-
-StoreFile = Annotated[Path, typer.Option("--store", metavar="FILE", help="The case store.")]
+_MOST_PROBLEMS = 20  # that are listed
 DEFAULT_STORE = DEFAULT_OUTPUT / STORE_NAME
 
 
-@app.command("list")
-def list_records(store: StoreFile = DEFAULT_STORE, as_json: Json = False) -> None:
-    """Count the records, by status and by what computed them.
+def store(
+    store: Annotated[Path, typer.Option("--store", metavar="FILE", help="The case store.")] = DEFAULT_STORE,
+    prune: Annotated[
+        bool, typer.Option("--prune", help="Say what would be removed: records that cannot be read, and what is named.")
+    ] = False,
+    days: Annotated[
+        float | None,
+        typer.Option(metavar="DAYS", help="With --prune: what was stored so many days ago, or before.", min=0),
+    ] = None,
+    failed: Annotated[bool, typer.Option("--failed", help="With --prune: failed cases.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="With --prune: remove them.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Count the records of the case store, by status and by what computed them, and check each; or remove some.
 
-    Example: epsmesh store list
+    Exit status 1 if a record cannot be read or makes no sense. With --prune --yes a file that is damaged as a whole is
+    moved aside, and a new store begun.
+
+    Example: epsmesh store
+
+    Example: epsmesh store --prune --days 90 --failed
+
+    Example: epsmesh store --prune --days 90 --failed --yes
     """
-    with _read(store) as opened:
-        rows = list(opened.records())
+    if not prune and (days is not None or failed or yes):
+        fail("--days, --failed and --yes say what is removed: give --prune, too")
+    if not store.exists():
+        fail(of_file(store, "there is no such store; `epsmesh run` makes one in its results"))
+    check_store(store)
+    if not prune:
+        _check(store, as_json=as_json)
+    from pipeline.run.store import StoreError
+
+    older_than = None if days is None else 86400 * days
+    with refusing(StoreError, file=store):
+        found = _found(store, older_than, failed=failed)
+    moved = _prune(store, older_than, failed=failed) if yes else ""
+    if as_json:
+        print_json(found | {"done": yes, "notice": moved})
+    else:
+        print(f"{store}: {_said(found, done=yes)}")
+
+
+def _check(store: Path, *, as_json: bool) -> NoReturn:
+    """Say what the store holds and what is wrong with it, and exit."""
+    from pipeline.run.reading import open_to_read
+    from pipeline.run.store import StoreError
+
+    with refusing(StoreError, file=store), open_to_read(store) as opened:
+        rows, problems = list(opened.records()), list(opened.problems())
     content: dict[str, Any] = {
         "file": str(store),
         "records": len(rows),
@@ -41,47 +74,23 @@ def list_records(store: StoreFile = DEFAULT_STORE, as_json: Json = False) -> Non
         "origin": dict(Counter(r.origin for r in rows)),
         "versions": dict(Counter(_versions(r.provenance) for r in rows)),
         "seconds": sum(r.time_total for r in rows if r.is_ok),
+        "sound": not problems,
+        "problems": problems,
     }
     if as_json:
         print_json(content)
-        return
-    print(
-        f"{store}: {counted(len(rows), 'record')}, {content['bytes'] / 1e6:.2g} MB, {content['seconds']:.0f} s of work"
-    )
-    for name in ("status", "origin", "versions"):
-        for value, count in content[name].items():
-            print(f"  {count:6} {value}")
-
-
-@app.command()
-def prune(
-    store: StoreFile = DEFAULT_STORE,
-    days: Annotated[
-        float | None, typer.Option(metavar="DAYS", help="Remove what was stored longer ago.", min=0)
-    ] = None,
-    failed: Annotated[bool, typer.Option("--failed", help="Remove failed cases.")] = False,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do it: without this, only say what would go.")] = False,
-    as_json: Json = False,
-) -> None:
-    """Remove records that are old or failed, and those that cannot be read; without --yes, say which.
-
-    A file that is damaged as a whole is moved aside, and a new store begun.
-
-    Example: epsmesh store prune --days 90 --failed
-
-    Example: epsmesh store prune --days 90 --failed --yes
-    """
-    from pipeline.run.store import StoreError
-
-    _check(store)
-    older_than = None if days is None else 86400 * days
-    with refusing(StoreError, file=store):
-        found = _found(store, older_than, failed=failed)
-    moved = _prune(store, older_than, failed=failed) if yes else ""
-    if as_json:
-        print_json(found | {"done": yes, "notice": moved})
-        return
-    print(f"{store}: {_said(found, done=yes)}")
+    else:
+        size, work = f"{content['bytes'] / 1e6:.2g} MB", f"{content['seconds']:.0f} s of work"
+        state = counted(len(problems), "problem") if problems else "sound"
+        print(f"{store}: {counted(len(rows), 'record')}, {size}, {work}; {state}")
+        for name in ("status", "origin", "versions"):
+            for value, count in content[name].items():
+                print(f"  {count:6} {value}")
+        for problem in problems[:_MOST_PROBLEMS]:
+            print(problem)
+        if len(problems) > _MOST_PROBLEMS:
+            print(f"… and {len(problems) - _MOST_PROBLEMS} more: --json lists them")
+    raise typer.Exit(SOME_FAILED if problems else DONE)
 
 
 def _said(found: dict[str, Any], *, done: bool) -> str:
@@ -128,42 +137,6 @@ def _prune(store: Path, older_than: float | None, *, failed: bool) -> str:
         opened.prune(older_than=older_than, failed=failed)
         opened.close()
     return opened.notice
-
-
-@app.command()
-def verify(store: StoreFile = DEFAULT_STORE, as_json: Json = False) -> None:
-    """Check that every record can be read and makes sense.
-
-    Exit status 1 if one does not.
-
-    Example: epsmesh store verify
-    """
-    with _read(store) as opened:
-        problems = list(opened.problems())
-    if as_json:
-        print_json({"file": str(store), "sound": not problems, "problems": problems})
-    else:
-        for problem in problems:
-            print(problem)
-        print(f"{store}: {counted(len(problems), 'problem') if problems else 'sound'}")
-    raise typer.Exit(SOME_FAILED if problems else DONE)
-
-
-@contextmanager
-def _read(path: Path) -> Iterator["Records"]:
-    """Open a store that is left as it is; exit if there is none, or if it cannot be read."""
-    from pipeline.run.reading import open_to_read
-    from pipeline.run.store import StoreError
-
-    _check(path)
-    with refusing(StoreError, file=path), open_to_read(path) as opened:
-        yield opened
-
-
-def _check(path: Path) -> None:
-    if not path.exists():
-        fail(of_file(path, "there is no such store; `epsmesh run` makes one in its results"))
-    check_store(path)
 
 
 def _versions(provenance: dict[str, str | int]) -> str:

@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -10,6 +11,7 @@ from pipeline.cli.console import print_json
 from pipeline.cli.faults import fail, of_file
 from pipeline.cli.words import Json, check_output
 
+MODEL = ".epsm.nc"  # what `export` writes
 _PAGE = 4_000_000  # bytes that it may take
 
 
@@ -53,8 +55,15 @@ def touch(
             return
         text = render(surface, model.name)
     except (ModelError, OSError) as problem:
-        fail(of_file(model, getattr(problem, "strerror", None) or str(problem), "docs/howto/touch.md"))
+        why = getattr(problem, "strerror", None) or str(problem)
+        fail(of_file(model, f"{why}{_meant(model)}", "docs/howto/touch.md"))
     _serve(text, open_it=open_it, as_json=as_json)
+
+
+def _meant(file: Path) -> str:
+    """Return what makes a model, for what is none."""
+    study = quote(str(file if file.suffix == ".toml" else file.with_suffix(".toml").name))
+    return "" if file.name.endswith(MODEL) else f"; a model ends in {MODEL}: `epsmesh export {study}` makes one"
 
 
 def _serve(text: str, *, open_it: bool, as_json: bool) -> None:

@@ -27,8 +27,34 @@ _UNWRITABLE = ": cannot be written: "
 _COMPILED = 5_000_000  # bytes that compiled forms may take
 DEFAULT_OUTPUT, DEFAULT_MESHES = Path("results"), Path("meshes/cache")
 
-Files = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Study files (TOML).", show_default=False)]
-File = Annotated[Path, typer.Argument(metavar="FILE", help="A study file (TOML).", show_default=False)]
+STUDIES = Path("studies")
+
+
+def _by_name(given: "Path | list[Path]") -> "Path | list[Path]":
+    """Return study files, those that `epsmesh new NAME` has made by their names, too."""
+    if isinstance(given, list | tuple):
+        return [_of_name(file) for file in given]
+    return _of_name(given)
+
+
+def _of_name(file: Path) -> Path:
+    made = STUDIES / f"{file}.toml"
+    return made if file.name == str(file) and not file.exists() and made.is_file() else file
+
+
+Files = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="FILE...", help="Study files (TOML), or names in studies/.", show_default=False, callback=_by_name
+    ),
+]
+File = Annotated[
+    Path,
+    typer.Argument(
+        metavar="FILE", help="A study file (TOML), or a name in studies/.", show_default=False, callback=_by_name
+    ),
+]
+Dataset = Annotated[Path, typer.Argument(help="A dataset (.nc), or a study whose dataset exists.", callback=_by_name)]
 Output = Annotated[Path, typer.Option(metavar="DIR", help="Folder of the results.")]
 StoreFile = Annotated[
     Path | None, typer.Option("--store", metavar="FILE", help=f"Case store [default: DIR/{STORE_NAME}].")
@@ -77,12 +103,14 @@ def load_all(files: list[Path]) -> "list[Study]":
 
 
 def meant(file: Path) -> str:
-    """Return ``; did you mean …?`` for a study file that is not there, and of a folder what to give instead."""
+    """Return ``; did you mean …?`` for a study file that is not there; of a folder or a .nc, what to give."""
+    if file.suffix == ".nc":
+        return "; a study file ends in .toml: a dataset is for `report`, `plot` and `guide`, a model for `touch`"
     if file.is_dir():
         return f": give its files, such as {file / '*.toml'}"
     if file.exists():
         return ""
-    known = {path.stem: path for path in (*file.parent.glob("*.toml"), *Path("studies").glob("*.toml"))}
+    known = {path.stem: path for path in (*file.parent.glob("*.toml"), *STUDIES.glob("*.toml"))}
     close = difflib.get_close_matches(file.stem, known, n=1, cutoff=0.5)
     return f"; did you mean {known[close[0]]}?" if close else ""
 

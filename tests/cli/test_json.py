@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-from pipeline.cli import app, store
+from pipeline.cli import app
 from pipeline.report.dataset import write
 from pipeline.report.guide import guide
 from pipeline.report.guide_text import settings, text
@@ -17,10 +17,7 @@ from tests.commands import ROOT
 from tests.report.chosen import TEXT, dataset
 
 SCALPEL = TEXT[TEXT.rindex("[[probe]]") : TEXT.index("[mesh]")]
-NAMES = sorted(
-    f"{group}{command.name or command.callback.__name__}"
-    for group, commands in (("", app), ("store ", store.app)) for command in commands.registered_commands
-)  # fmt: skip
+NAMES = sorted(command.callback.__name__ for command in app.registered_commands)
 
 
 def failed(done, status=2):
@@ -51,8 +48,8 @@ def here(known, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_command_takes_json_and_words_that_make_no_command_are_told_in_it(epsmesh, name):
-    assert "--json" in epsmesh(*name.split(), "--help").stdout
-    (error,) = failed(epsmesh(*name.split(), "--json", "--jsn"))
+    assert "--json" in epsmesh(name, "--help").stdout
+    (error,) = failed(epsmesh(name, "--json", "--jsn"))
     assert "--jsn" in error["message"]
 
 
@@ -67,7 +64,7 @@ def test_unknown_commands_and_missing_words_are_told(epsmesh):
     assert (error["key"], error["value"], "0.1" in error["allowed"]) == ("--memory", "-1", True)
 
 
-@pytest.mark.parametrize("command", ["plan", "run", "status", "explain", "merge", "view", "export"])
+@pytest.mark.parametrize("command", ["plan", "run", "status", "merge", "view", "export"])
 def test_a_bad_study_is_told_problem_by_problem(epsmesh, small, command):
     small.write_text(small.read_text().replace('"2 mm"', "2").replace("0.4", "0.9"))
     done = epsmesh(command, small, "--json")
@@ -91,12 +88,12 @@ def test_a_bad_study_is_told_problem_by_problem(epsmesh, small, command):
         ("report absent.nc --json", None),
         ("new ../x --json", "NAME"),
         ("new x --like nothing --json", "--like"),
-        ("explain SMALL colour=3 --json", "CASE"),
+        ("plan SMALL colour=3 --json", "CASE"),
         ("plan SMALL --without magic --json", "--without"),
         ("run SMALL --shard 9/3 --json", "--shard"),
         ("run SMALL --output known.nc --json", None),
-        ("store list --store absent --json", None),
-        ("store prune --store known.nc --json", "--store"),
+        ("store --store absent --json", None),
+        ("store --prune --store known.nc --json", "--store"),
         ("touch known.nc --json", None),
         ("export SMALL --accuracy 90% --json", "--accuracy"),
     ],
@@ -143,14 +140,14 @@ def test_pruning_says_first_what_would_go(epsmesh, tmp_path):
         opened.put(Record(f"k{number}", "failed" if number < 2 else "ok", force=1.0))
     opened.close()
     before = path.read_bytes()
-    words = ("store", "prune", "--store", path, "--failed", "--json")
+    words = ("store", "--prune", "--store", path, "--failed", "--json")
     told = json.loads(epsmesh(*words).stdout)
     assert (told["remove"], told["records"], told["reasons"], told["done"]) == (2, 5, {"failed": 2}, False)
     assert 500 < told["bytes"] < 10_000
     assert path.read_bytes() == before
     assert json.loads(epsmesh(*words, "--yes").stdout)["done"]
-    assert json.loads(epsmesh("store", "verify", "--store", path, "--json").stdout)["sound"]
-    assert json.loads(epsmesh("store", "list", "--store", path, "--json").stdout)["records"] == 3
+    assert json.loads(epsmesh("store", "--store", path, "--json").stdout)["sound"]
+    assert json.loads(epsmesh("store", "--store", path, "--json").stdout)["records"] == 3
     assert "none of 3 records would be removed" in epsmesh(*words[:-1]).stdout
 
 

@@ -59,7 +59,7 @@ def test_help_loads_no_study_no_plan_and_no_shape():
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("command", ["validate", "plan", "status", "explain"])
+@pytest.mark.parametrize("command", ["validate", "plan", "status"])
 def test_a_study_loads_the_shapes_that_it_names_alone(command, study, tmp_path):
     modules = loaded(command, study, within=tmp_path)
     assert not libraries(modules) & (_SLOW | _ELSEWHERE - ({"sqlite3"} if command == "status" else set()))

@@ -155,8 +155,8 @@ def test_a_store_that_cannot_be_changed_is_told(epsmesh, results, tmp_path, monk
     with sqlite3.connect(path) as database:
         database.execute("UPDATE records SET record = ''")
     monkeypatch.setattr("pipeline.run.store._open", lambda path: sqlite3.connect(f"file:{path}?mode=ro", uri=True))
-    assert epsmesh("store", "prune", "--store", path).exit_code == 0
-    done = epsmesh("store", "prune", "--store", path, "--yes")
+    assert epsmesh("store", "--prune", "--store", path).exit_code == 0
+    done = epsmesh("store", "--prune", "--store", path, "--yes")
     assert done.exit_code == 2
     assert "readonly" in done.stderr
 
@@ -181,7 +181,7 @@ def test_streams_that_are_closed_are_none_of_a_commands_files(results, tmp_path,
     done = subprocess.run(f"{run} {closed}", shell=True, cwd=tmp_path, env=ENVIRONMENT, check=False)
     assert done.returncode == 0
     assert (tmp_path / "out" / "small.nc").is_file()
-    assert epsmesh_here("store", "verify", "--store", tmp_path / "out" / "cases.sqlite").exit_code == 0
+    assert epsmesh_here("store", "--store", tmp_path / "out" / "cases.sqlite").exit_code == 0
 
 
 @pytest.mark.parametrize("command", ["validate", "plot", "touch"])

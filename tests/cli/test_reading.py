@@ -11,7 +11,7 @@ from pipeline.run.record import Record
 from pipeline.run.store import Store
 from pipeline.study.load import load
 
-LOOKING = ("plan", "status", "explain")
+LOOKING = ("plan", "status")
 
 
 def contents(folder):
@@ -32,7 +32,7 @@ def fill(path, plan, **states):
     store.close()
 
 
-@pytest.mark.parametrize("words", [*((name, "FILE") for name in LOOKING), ("store", "list"), ("store", "verify")])
+@pytest.mark.parametrize("words", [*((name, "FILE") for name in LOOKING), ("plan", "FILE", "0"), ("store",)])
 def test_a_damaged_store_is_named_and_left_where_it_is(epsmesh, small, tmp_path, words):
     store = tmp_path / "kept" / "cases.sqlite"
     store.parent.mkdir()
@@ -41,11 +41,11 @@ def test_a_damaged_store_is_named_and_left_where_it_is(epsmesh, small, tmp_path,
     done = epsmesh(*(small if word == "FILE" else word for word in words), "--store", store)
     assert done.exit_code == 2
     assert f"the case store {store} is damaged" in done.stderr
-    assert f"`epsmesh store prune --store {store} --yes` moves it aside" in done.stderr
-    preview = epsmesh("store", "prune", "--store", store)
+    assert f"`epsmesh store --prune --yes --store {store}` moves it aside" in done.stderr
+    preview = epsmesh("store", "--prune", "--store", store)
     assert "is damaged as a whole" in preview.stdout
     assert contents(tmp_path) == before
-    mended = epsmesh("store", "prune", "--store", store, "--yes")
+    mended = epsmesh("store", "--prune", "--store", store, "--yes")
     assert mended.exit_code == 0
     assert "it was moved to" in mended.stderr
     assert epsmesh(*(small if word == "FILE" else word for word in words), "--store", store).exit_code == 0
@@ -64,11 +64,11 @@ def test_an_unreadable_record_is_told_with_what_removes_it(epsmesh, small, tmp_p
     done = epsmesh(command, small, "--store", store)
     assert (done.exit_code, done.exception is None or isinstance(done.exception, SystemExit)) == (2, True)
     assert f"record {plan.keys[0]} cannot be read" in done.stderr
-    assert f"`epsmesh store prune --store {store} --yes` removes it" in done.stderr
-    preview = json.loads(epsmesh("store", "prune", "--store", store, "--json").stdout)
+    assert f"`epsmesh store --prune --yes --store {store}` removes it" in done.stderr
+    preview = json.loads(epsmesh("store", "--prune", "--store", store, "--json").stdout)
     assert (preview["remove"], preview["reasons"], preview["done"]) == (1, {"cannot be read": 1}, False)
     assert contents(tmp_path) == before
-    assert epsmesh("store", "prune", "--store", store, "--yes").exit_code == 0
+    assert epsmesh("store", "--prune", "--store", store, "--yes").exit_code == 0
     assert epsmesh(command, small, "--store", store).exit_code == 0
 
 
@@ -113,22 +113,22 @@ def test_a_plan_of_which_nothing_fits_into_memory_ends_with_1(epsmesh, small):
     assert (some.exit_code, "steps do not fit" in some.stderr) == (0, True)
 
 
-def test_explain_tells_what_the_plan_used(epsmesh, small):
+def test_the_story_of_a_case_tells_what_the_plan_used(epsmesh, small):
     for without, words in (([], "F is proportional"), (["--without", "scaling"], "one solve, on the same mesh")):
-        told = json.loads(epsmesh("explain", small, *without, "--json").stdout)
+        told = json.loads(epsmesh("plan", small, "0", *without, "--json").stdout)
         assert words in told["changes"]["young, depth"]
 
 
 def test_a_case_that_some_labels_name_is_said_to_be_the_first_of_several(epsmesh, small):
-    done = epsmesh("explain", small, "poisson=0.4")
+    done = epsmesh("plan", small, "poisson=0.4")
     assert done.stdout.startswith("poisson = 0.4, epsilon = 4 mm, outside = coarse")
     assert "the first of 6 such cases, which differ in epsilon, outside" in done.stderr
-    assert epsmesh("explain", small, "poisson=0.4, epsilon=4 mm, outside=free").stderr == ""
+    assert epsmesh("plan", small, "poisson=0.4, epsilon=4 mm, outside=free").stderr == ""
 
 
 @pytest.mark.parametrize("case", ["epsilon=0.4 cm", "epsilon=4.0 mm", "poisson=30 %, epsilon=4e-3 m"])
 def test_a_case_is_found_by_its_numbers_in_any_unit(epsmesh, small, case):
-    assert epsmesh("explain", small, case).stdout.startswith("poisson = 0.3, epsilon = 4 mm")
+    assert epsmesh("plan", small, case).stdout.startswith("poisson = 0.3, epsilon = 4 mm")
 
 
 def test_a_force_on_record_that_is_no_number_is_computed_again(epsmesh, small, tmp_path):

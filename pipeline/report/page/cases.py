@@ -90,7 +90,7 @@ def case_table(dataset: xr.Dataset) -> Table:
     dims = [str(dim) for dim in dataset["status"].dims]
     size = dataset["status"].size
     states = [str(state) for state in dataset["status"].values.ravel()]
-    numbers = Column("case", "case", list(range(size)), "the number by which `epsmesh explain` knows it")
+    numbers = Column("case", "case", list(range(size)), "the number by which `epsmesh plan` knows it")
     axes = [_axis(dataset, dim, position, dims) for position, dim in enumerate(dims)]
     quantities = [_quantity(dataset[name].transpose(*dims), name) for name in _QUANTITIES if name in dataset]
     status = _texts("status", states, QUANTITIES["status"].meaning, is_filter=True)
