@@ -20,7 +20,7 @@ from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve.compiled import cellwise_space, form, vector_space
 from pipeline.solve.crack import Front
 from pipeline.solve.forms import dx, one_cell
-from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.physics import MaterialLaw, of_regions
 from pipeline.solve.rim import clear_cells
 from pipeline.stages import stage
 
@@ -79,13 +79,11 @@ class CellValues:
             np.asarray(fem.assemble_vector(part).array).reshape(-1, 3, 3)[:owned]
             for part in (self._integral, self._volume)
         )
-        regions = np.zeros(owned, dtype=np.int32)
-        if self._body.regions is not None and not law.is_uniform:
-            regions = self._body.regions[:owned]
+        regions = self._body.regions
         return Cells(
             gradient=integral / volume,
-            lame_lambda=np.array(law.lame_lambda)[regions],
-            lame_mu=np.array(law.lame_mu)[regions],
+            lame_lambda=of_regions(law.lame_lambda, regions, owned),
+            lame_mu=of_regions(law.lame_mu, regions, owned),
             is_linear=law.is_linear,
         )
 

@@ -20,8 +20,8 @@ from pipeline.mesh.distribute import distribute
 from pipeline.mesh.generate import MeshArrays
 from pipeline.solve.compiled import cellwise_space, form, scalar_space, vector_space
 from pipeline.solve.kernels.assembly import cell_kernel
-from pipeline.solve.kernels.curved import quadrature_degree
-from pipeline.solve.physics import LAWS, MaterialLaw, strain
+from pipeline.solve.kernels.cells import quadrature_degree
+from pipeline.solve.physics import LAWS, MaterialLaw, of_regions, strain
 
 # Marks of cells, and the bulge of an edge, in units of its length, that rounding may leave.
 _NEITHER, _STRAIGHT, _CURVED = 0, 1, 2
@@ -41,28 +41,35 @@ class ElasticForms:
     def __init__(self, space: Any, regions: Int32Array | None = None):
         self._space, self._regions = space, regions
         self.displacement = fem.Function(space)
-        if regions is None:
-            self.lame = fem.Constant(space.mesh, 1.0), fem.Constant(space.mesh, 1.0)
-            return
-        cellwise = cellwise_space(space.mesh, ())
-        self.lame = fem.Function(cellwise), fem.Function(cellwise)
-        self._cells = compat.cell_dofs(cellwise).reshape(-1)
+        self.lame = self._coefficient(), self._coefficient()
 
     def set_law(self, law: MaterialLaw) -> None:
         """Set λ and μ (Pa) for the next assembly."""
         for place, values in zip(self.lame, (law.lame_lambda, law.lame_mu), strict=True):
-            if self._regions is None:
-                (place.value,) = values
-            else:
-                place.x.array[self._cells] = np.array(values)[self._regions if len(values) > 1 else 0]
+            self._put(place, values)
 
     def by_region(self, values: tuple[float, ...]) -> Any:
         """Return a constant of forms, or a function, that has one of ``values`` in each region."""
-        if self._regions is None:
-            return fem.Constant(self._space.mesh, values[0])
-        result = fem.Function(cellwise_space(self._space.mesh, ()))
-        result.x.array[self._cells] = np.array(values)[self._regions if len(values) > 1 else 0]
+        result = self._coefficient()
+        self._put(result, values)
         return result
+
+    def _coefficient(self) -> Any:
+        if self._regions is None:
+            return fem.Constant(self._space.mesh, 1.0)
+        return fem.Function(self._cellwise)
+
+    @cached_property
+    def _cellwise(self) -> Any:
+        return cellwise_space(self._space.mesh, ())
+
+    def _put(self, coefficient: Any, values: tuple[float, ...]) -> None:
+        if self._regions is None:
+            (coefficient.value,) = values
+        else:
+            coefficient.x.array[compat.cell_dofs(coefficient.function_space).reshape(-1)] = of_regions(
+                values, self._regions, len(self._regions)
+            )
 
     @cached_property
     def stiffness(self) -> Any:

@@ -18,8 +18,7 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.arrays import FloatArray
-from pipeline.solve.kernels.interpolation import free, interpolation
-from pipeline.solve.kernels.multigrid import Cycle, SmoothedLevel
+from pipeline.solve.kernels.multigrid import Cycle, SmoothedLevel, free, interpolation
 from pipeline.solve.kernels.product import operator_of
 from pipeline.stages import stage
 

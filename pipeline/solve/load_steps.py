@@ -28,9 +28,9 @@ from pipeline.solve.forms import HyperelasticForms
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.krylov import LinearSolver
 from pipeline.solve.loads import Loads, Motion
-from pipeline.solve.newton import Equilibrium, LargeError, assemble, tangent_product
+from pipeline.solve.newton import Equilibrium, LargeError, tangent_product
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.vectors import global_sum, vector
+from pipeline.solve.vectors import assemble, global_sum, vector
 from pipeline.stages import Times, recharge, recorded
 
 # The depth is reached in so many steps at least; smaller ones than this share of it are not tried.

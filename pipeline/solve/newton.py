@@ -18,7 +18,7 @@ from pipeline import compat
 from pipeline.solve.forms import HyperelasticForms
 from pipeline.solve.krylov import INDEFINITE, SOLVERS, LinearSolver, SolveError, configure, explain, keep, solver_of
 from pipeline.solve.spaces import ElasticSpace
-from pipeline.solve.vectors import add_from_ghosts, fill, vector
+from pipeline.solve.vectors import assemble, fill, vector
 from pipeline.stages import stage
 
 # Residual that is left, relative to the forces on what is prescribed, and the most steps to get there.
@@ -155,14 +155,6 @@ class Equilibrium:
     def _counted(self, solver: Any, solve: Callable[[], None]) -> None:
         solve()
         self.iterations += solver.getLinearSolveIterations() if isinstance(solver, PETSc.SNES) else solver.its
-
-
-def assemble(form: Any, result: PETSc.Vec) -> None:
-    """Assemble a linear form into ``result``, ghosts summed up; collective."""
-    with result.localForm() as local:
-        local.set(0.0)
-    fem_petsc.assemble_vector(result, form)
-    add_from_ghosts(result)
 
 
 def tangent_product(forms: HyperelasticForms, x: PETSc.Vec, result: PETSc.Vec) -> None:

@@ -11,8 +11,10 @@ from functools import cached_property
 from math import inf
 from typing import Any
 
+import numpy as np
 import ufl
 
+from pipeline.arrays import FloatArray, Int32Array
 from pipeline.shapes.tissue import lame
 
 # λ₁ in units of μ, at least: λ₀ may then be −μ/4, and K₀ is definite as long as it is above −2μ/3.
@@ -89,6 +91,13 @@ class MaterialLaw:
     def is_uniform(self) -> bool:
         """Whether there is one material."""
         return len(self.parameters) == 1
+
+
+def of_regions(values: Sequence[float], regions: Int32Array | None, count: int) -> FloatArray:
+    """Return which of ``values`` by region each of ``count`` cells has, in ``regions``; one value is that of all."""
+    if regions is None or len(values) == 1:
+        return np.full(count, values[0], dtype=np.float64)
+    return np.array(values, dtype=np.float64)[regions[:count]]
 
 
 @dataclass(frozen=True)

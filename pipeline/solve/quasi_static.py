@@ -27,7 +27,7 @@ from pipeline.solve.cell_values import CellValues
 from pipeline.solve.crack import Advance, Front
 from pipeline.solve.elements import elements_of
 from pipeline.solve.elements.base import Column, Elements, Products, Solver
-from pipeline.solve.elements.displacement import DisplacementElements
+from pipeline.solve.elements.displacement import DisplacementElements, DisplacementSolver
 from pipeline.solve.estimate import error_bar, stiffness_bars
 from pipeline.solve.krylov import LinearSolver, SolveError
 from pipeline.solve.load_response import LoadResponse, imbalance, load_response_of, shares
@@ -272,12 +272,11 @@ class QuasiStaticProblem:
         """
         elements = self.elements
         assert isinstance(elements, DisplacementElements)
-        direct = elements.is_direct(method)
-        with ExitStack() as stack:
-            levels = elements.levels(law, stack, direct=direct)
-            solver = LinearSolver(levels, direct=direct)
-            stack.callback(solver.close)
-            yield solver
+        found = DisplacementSolver(elements, law, direct=elements.is_direct(method))
+        try:
+            yield found.linear
+        finally:
+            found.owner.close()
 
     def fields(self) -> tuple[Any, FloatArray]:
         """Return the last solution's displacement (m) and the principal strains of each owned cell; collective."""

@@ -211,7 +211,6 @@ def _products(space: ElasticSpace, forces: int) -> Iterator[Callable[[FloatArray
 
             def by_form(values: FloatArray, law: MaterialLaw) -> FloatArray:
                 space.forms.displacement.x.array[:] = values
-                result.set(0.0)
                 space.apply(result, law)
                 return np.array(result.array)
 

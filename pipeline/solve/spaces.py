@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from dolfinx import fem
-from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -28,7 +27,7 @@ from pipeline.solve.kernels.product import DEGREES, CellOperator, CellStiffness
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Motion
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.vectors import add_from_ghosts, fill
+from pipeline.solve.vectors import assemble, fill
 from pipeline.stages import stage
 
 _ORIGIN = np.zeros((1, 3))
@@ -227,16 +226,15 @@ class ElasticSpace:
 
     @stage("residuals")
     def apply(self, result: PETSc.Vec, law: MaterialLaw, *, checked: bool = True) -> None:
-        """Add K u (N), with the unmodified operator and the forms' displacement, to ``result``; collective.
+        """Write K u (N), with the unmodified operator and the forms' displacement, into ``result``; collective.
 
         ``checked``: never by the code that solves multiply with, so that each agrees with the other.
         """
         if not checked and self.operators.multiplies:
-            result.array[:] += self.operators.whole_product(law, self.forms.displacement.x.array[: self.dofs.owned])
+            result.array[:] = self.operators.whole_product(law, self.forms.displacement.x.array[: self.dofs.owned])
             return
         self.forms.set_law(law)
-        fem_petsc.assemble_vector(result, self.forms.action)
-        add_from_ghosts(result)
+        assemble(self.forms.action, result)
 
     def lift(self, rhs: PETSc.Vec, held: FloatArray, law: MaterialLaw, *, checked: bool = True) -> None:
         """Put the loads of the prescribed displacements ``held`` into ``rhs``; collective.

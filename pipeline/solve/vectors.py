@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -32,6 +33,14 @@ def fill(function: Any, values: PETSc.Vec, factor: float = 1.0) -> None:
     values.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
     with values.localForm() as local:
         function.x.array[:] = factor * local.array if factor != 1.0 else local.array
+
+
+def assemble(form: Any, result: PETSc.Vec) -> None:
+    """Write the vector of a linear form into ``result``; collective."""
+    with result.localForm() as local:
+        local.set(0.0)
+    fem_petsc.assemble_vector(result, form)
+    add_from_ghosts(result)
 
 
 def add_from_ghosts(values: PETSc.Vec) -> None:

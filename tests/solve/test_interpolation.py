@@ -9,7 +9,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from pipeline.solve.compiled import vector_space
-from pipeline.solve.kernels.interpolation import interpolation
+from pipeline.solve.kernels.multigrid import interpolation
 from tests.solve.test_mixed import make_mesh
 
 

@@ -176,7 +176,7 @@ class Elements(ABC):
         return 1.0
 
     def apply(self, result: Fields, law: MaterialLaw, *, checked: bool = True) -> None:
-        """Add the unmodified operator times the forms' fields to ``result``, N for displacements; collective.
+        """Write the unmodified operator times the forms' fields into ``result``, N for displacements; collective.
 
         ``checked``: see :meth:`ElasticSpace.apply`.
         """

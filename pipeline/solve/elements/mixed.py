@@ -107,14 +107,14 @@ class MixedElements(Elements):
             unknown[1].array[:] = self.pressures.values
 
     def apply(self, result: Fields, law: MaterialLaw, *, checked: bool = True) -> None:
-        """Add K₀ u + Bᵀ p (N) and B u − M p / λ₁ of the forms' fields to ``result``; collective."""
-        with super().fields() as (forces,), vector(self.pressures.space) as rates:
-            super().apply((forces,), law, checked=checked)
-            self.pressures.pull(forces, checked=checked)
-            self.pressures.dilate(rates, checked=checked)
-            rates.array[:] -= self.compliance(law) * self.pressures.weighed()
-            for whole, part in zip(result, (forces, rates), strict=True):
-                whole.axpy(self.unit(law), part)
+        """Write K₀ u + Bᵀ p (N) and B u − M p / λ₁ of the forms' fields into ``result``; collective."""
+        forces, rates = result
+        super().apply(result, law, checked=checked)
+        self.pressures.pull(forces, checked=checked)
+        self.pressures.dilate(rates, checked=checked)
+        rates.array[:] -= self.compliance(law) * self.pressures.weighed()
+        for part in result:
+            part.scale(self.unit(law))
 
     def lift(self, column: Column, law: MaterialLaw, *, checked: bool = True) -> None:
         """Put what a column prescribes and its loads, in the law's unit, on its right-hand side; collective."""

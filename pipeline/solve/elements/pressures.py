@@ -10,7 +10,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -22,7 +21,7 @@ from pipeline.solve.forms import MixedForms
 from pipeline.solve.kernels.pressure import CellPressures, Coupling, Mass
 from pipeline.solve.krylov import keep
 from pipeline.solve.spaces import ElasticSpace, whole_points
-from pipeline.solve.vectors import add_from_ghosts, fill, vector
+from pipeline.solve.vectors import add_from_ghosts, assemble, fill, vector
 from pipeline.stages import stage
 
 
@@ -83,21 +82,16 @@ class Pressures:
             result.array[:] += self._products.pull(self.values, whole=True)
             return
         with vector(self._displacements.dofs.space) as pull:
-            fem_petsc.assemble_vector(pull, self.forms.pull)
-            add_from_ghosts(pull)
+            assemble(self.forms.pull, pull)
             result.axpy(1.0, pull)
 
     def dilate(self, result: PETSc.Vec, *, checked: bool) -> None:
-        """Write B u, of all displacements, into a ``result`` of zeros; collective.
-
-        ``checked``: see :meth:`ElasticSpace.apply`.
-        """
+        """Write B u, of all displacements, into ``result``; collective. ``checked``: see :meth:`ElasticSpace.apply`."""
         if not checked:
             displacement = self._displacements.forms.displacement.x.array[: self._displacements.dofs.owned]
             result.array[:] = self._products.dilation(displacement, whole=True)
             return
-        fem_petsc.assemble_vector(result, self.forms.dilation)
-        add_from_ghosts(result)
+        assemble(self.forms.dilation, result)
         result.scale(self.unit)
 
     @cached_property

@@ -39,8 +39,7 @@ class StraightStiffness:
 
         The caller destroys it.
         """
-        # A law of one material holds for every region.
-        regions = self._regions if len(law.lame_mu) > 1 else np.zeros_like(self._regions)
+        regions = np.zeros_like(self._regions) if law.is_uniform else self._regions
         blocks = np.zeros((len(self._columns), 9))
         call(
             "add_stiffness", len(self._which), self._which, self._dofs.shape[1], self._corners, self._dofs,

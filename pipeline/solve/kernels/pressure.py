@@ -12,8 +12,7 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.arrays import FloatArray, Int32Array
-from pipeline.solve.kernels.cells import corners, owned_cells, reference
-from pipeline.solve.kernels.ghosts import Ghosts
+from pipeline.solve.kernels.cells import Ghosts, corners, owned_cells, reference
 from pipeline.solve.kernels.native import call
 from pipeline.solve.kernels.product import CellStiffness, bernstein
 

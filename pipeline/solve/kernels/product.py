@@ -17,9 +17,16 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
-from pipeline.solve.kernels.cells import LANES, Lanes, corners, owned_cells, reference, straight_cells
-from pipeline.solve.kernels.curved import CurvedCells
-from pipeline.solve.kernels.ghosts import Ghosts
+from pipeline.solve.kernels.cells import (
+    LANES,
+    CurvedCells,
+    Ghosts,
+    Lanes,
+    corners,
+    owned_cells,
+    reference,
+    straight_cells,
+)
 from pipeline.solve.kernels.native import Single, call
 from pipeline.solve.physics import MaterialLaw
 
