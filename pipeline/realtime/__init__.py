@@ -3,9 +3,10 @@
 from pipeline.realtime.classic import ModelError
 from pipeline.realtime.model import Model
 from pipeline.realtime.patch import Patch, Tip
+from pipeline.realtime.query import Query
 from pipeline.realtime.read import load
 from pipeline.realtime.sources import sources
 from pipeline.realtime.surface import Surface, load_surface
 from pipeline.realtime.touch import Touch
 
-__all__ = ["Model", "ModelError", "Patch", "Surface", "Tip", "Touch", "load", "load_surface", "sources"]
+__all__ = ["Model", "ModelError", "Patch", "Query", "Surface", "Tip", "Touch", "load", "load_surface", "sources"]

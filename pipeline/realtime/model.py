@@ -3,33 +3,23 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import atan2, hypot, inf, isfinite, nan, pi
+from math import hypot, inf, isfinite, nan
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.realtime.blade import blade
-from pipeline.realtime.contact import Bonded, Disc, ball, cone
 from pipeline.realtime.doubt import errors
 from pipeline.realtime.face import Face, Spot
 from pipeline.realtime.pairs import Pairs
 from pipeline.realtime.place import Contact, Place, Tool
+from pipeline.realtime.query import Query
 from pipeline.realtime.several import TOUCHING, Pressing, TooLargeError, pressed, settle, too_near
 from pipeline.realtime.table import Table
-from pipeline.realtime.touch import SENTENCES, Touch, refused
+from pipeline.realtime.touch import Touch, refused
 
-# The smallest tool (m).
-_SMALLEST = 1e-6
 # How far the regular part of a bonded tool may be off, in units of (1 - 2ν) a/room².
 _STICKS = 0.1
-# What may be said of the contact of a tool.
-_CONTACTS = {
-    "disc": ("frictionless", "bonded"),
-    "blade": ("frictionless",),
-    "sphere": ("unilateral",),
-    "cone": ("unilateral",),
-}
 
 
 class _Asked(NamedTuple):
@@ -71,32 +61,29 @@ class Model:
     bend_error: float = 0.0
     pairs: Pairs | None = None
 
-    def query(
-        self,
-        tool: str,
-        *,
-        at: Sequence[float],
-        depth: float,
-        radius: float = nan,
-        angle: float = nan,
-        young: float | None = None,
-        poisson: float | None = None,
-        axis: Sequence[float] | None = None,
-        length: float = nan,
-        width: float = nan,
-        along: Sequence[float] | None = None,
-        contact: str | None = None,
-    ) -> Touch:
-        """Return what a ``tool`` of a ``radius`` (m; ``angle`` of a cone, rad, to its axis) feels ``at`` x, y, z (m).
+    def __repr__(self) -> str:
+        x, y = (2e3 * size for size in self.table.reach)
+        region = f"a region of {x:.3g} mm across" if self.table.is_round else f"a region of {x:.3g} × {y:.3g} mm"
+        tissue = f"{1e3 * self.thickness:.3g} mm of tissue, E = {self.young:.4g} Pa, ν = {self.poisson:.3g}"
+        low, high = self.table.poisson
+        return f"Model of {region}, {tissue}{f' ({low:.3g} to {high:.3g})' if high > low else ''}"
 
-        ``depth`` (m) is along the inward normal, as is ``axis``; without ``young`` (Pa) or ``poisson`` those of the
-        study count. A blade has a ``length`` and a ``width`` (m) and lies ``along`` a direction, or the face's x.
-        ``contact`` is "frictionless" (a disc, a blade) or "unilateral" (a sphere, a cone), or of a disc "bonded": such
-        a one sticks where it is. Raises nothing: see ``status``.
+    def query(self, tool: str, **asked: Any) -> Touch:
+        """Return what a ``tool`` feels: ``asked`` as :class:`pipeline.realtime.query.Query` has it.
+
+        Raises nothing where the model has no answer: see ``status``.
+
+        Raises:
+            TypeError: if a query has no such keyword, or lacks its place or its depth.
         """
-        asked = self._asked(tool, at, depth, (radius, angle, length, width), young, poisson, axis, along, contact)
+        return self.answer(Query(tool, **asked))
+
+    def answer(self, query: Query) -> Touch:
+        """Return what the tool of a ``query`` feels."""
+        asked = self._asked(query)
         if isinstance(asked, str):
             return refused(asked)
+        depth = query.depth
         if depth <= TOUCHING:
             return refused("lost")
         try:
@@ -118,7 +105,7 @@ class Model:
         """
         if len(tools) <= 1:
             return [self.query(**tool, young=young, poisson=poisson) for tool in tools]
-        asked = [self._asked_of(**tool, young=young, poisson=poisson) for tool in tools]
+        asked = [self._asked(Query(**tool, young=young, poisson=poisson)) for tool in tools]
         refusals = {number: each for number, each in enumerate(asked) if isinstance(each, str)}
         if self.pairs is None:
             refusals = dict.fromkeys(range(len(tools)), "alone")
@@ -166,54 +153,26 @@ class Model:
         broken = [number for number, touch in enumerate(found) if touch.status == "damaged"]
         return dict.fromkeys(broken, "damaged") if broken else found
 
-    def _asked_of(
-        self,
-        tool: str,
-        *,
-        at: Sequence[float],
-        depth: float,
-        radius: float = nan,
-        angle: float = nan,
-        young: float | None = None,
-        poisson: float | None = None,
-        axis: Sequence[float] | None = None,
-        length: float = nan,
-        width: float = nan,
-        along: Sequence[float] | None = None,
-        contact: str | None = None,
-    ) -> _Asked | str:
-        """As a query has it."""
-        return self._asked(tool, at, depth, (radius, angle, length, width), young, poisson, axis, along, contact)
-
-    def _asked(
-        self,
-        tool: str,
-        at: Sequence[float],
-        depth: float,
-        sizes: tuple[float, float, float, float],
-        young: float | None,
-        poisson: float | None,
-        axis: Sequence[float] | None,
-        along: Sequence[float] | None,
-        contact: str | None,
-    ) -> _Asked | str:
-        """Return a query, or the status of one that the model does not answer."""
-        modulus = self.young if young is None else float(young)
-        ratio = self.poisson if poisson is None else float(poisson)
-        shape = self._tool(tool, contact, sizes, along)
+    def _asked(self, query: Query) -> _Asked | str:
+        """Return a query that makes sense, or the status of one that the model does not answer."""
+        modulus = self.young if query.young is None else float(query.young)
+        ratio = self.poisson if query.poisson is None else float(query.poisson)
+        shape = self.shape(query)
         if isinstance(shape, str):
             return shape
-        x, y, z = self._local(at)
-        if not (
-            isfinite(x) and isfinite(y) and isfinite(z) and isfinite(depth) and isfinite(ratio) and 0 < modulus < inf
-        ):
+        x, y, z = self._local(query.at)
+        if not (all(map(isfinite, (x, y, z, query.depth, ratio))) and 0 < modulus < inf):
             return "input"
         if not self.table.holds(x, y):
             return "outside"
         spot = self.face.at(self.table, x, y)
-        if reason := self._misfit(z - spot.height, depth, ratio, axis, spot):
+        if reason := self._misfit(z - spot.height, query.depth, ratio, query.axis, spot):
             return reason
-        return _Asked(shape, x, y, depth, spot, self.room(x, y), modulus, ratio)
+        return _Asked(shape, x, y, query.depth, spot, self.room(x, y), modulus, ratio)
+
+    def shape(self, query: Query) -> Tool | str:
+        """Return the tool of a query, or the status of one that is none, or that the model has no tables for."""
+        return query.shape(self.axes, has_tensors=len(self.table.tensors) > 0)
 
     def _place(self, asked: _Asked) -> Place:
         """Return what is known of a query's place.
@@ -258,43 +217,6 @@ class Model:
             return min(self.sides[0] - hypot(x, y), self.thickness)
         return min(self.sides[0] - abs(x), self.sides[1] - abs(y), self.thickness)
 
-    def tool(
-        self, name: str, contact: str | None, sizes: tuple[float, float, float, float], along: Sequence[float] | None
-    ) -> Tool:
-        """Return a tool of radius, angle, length and width ``sizes`` as a query has it.
-
-        Raises:
-            ValueError: if it is none, or the model has no tables for it.
-        """
-        found = self._tool(name, contact, sizes, along)
-        if isinstance(found, str):
-            raise ValueError(SENTENCES[found])
-        return found
-
-    def _tool(
-        self, name: str, contact: str | None, sizes: tuple[float, float, float, float], along: Sequence[float] | None
-    ) -> Tool | str:
-        """Return a tool, or the status of one that is none, or that the model has no tables for."""
-        if name not in _CONTACTS or contact not in (None, *_CONTACTS[name]):
-            return "tool"
-        if (name == "blade" or contact == "bonded") and not len(self.table.tensors):
-            return "tool"
-        if name != "blade":
-            return _bonded(sizes[0]) if contact == "bonded" else _round(name, *sizes[:2])
-        if not all(isfinite(size) for size in sizes[2:]):
-            return "tool"
-        if min(sizes[2:]) < _SMALLEST:
-            return "input"
-        edge_x, edge_y = 1.0, 0.0
-        if along is not None:
-            given = np.asarray(along, dtype=float)
-            if given.shape != (3,) or not np.isfinite(given).all():
-                return "input"
-            edge_x, edge_y, _ = (self.axes @ given).tolist()
-        if not hypot(edge_x, edge_y) > 0:
-            return "input"
-        return blade(sizes[2], sizes[3], atan2(edge_y, edge_x)) or "tool"
-
     @cached_property
     def _frame(self) -> list[list[float]]:
         """The axes, as numbers."""
@@ -337,21 +259,3 @@ class Model:
         # Tissue that sticks is pulled inwards or outwards as well, more the more its volume changes.
         pulled = _STICKS * (1 - 2 * place.poisson) * contact.radius / room if sticks else 0.0
         return (of_c + beyond * share + pulled) / room + of_h * bent * contact.mean_square
-
-
-def _bonded(radius: float) -> Tool | str:
-    if not isfinite(radius):
-        return "tool"
-    return Bonded(radius) if radius >= _SMALLEST else "input"
-
-
-def _round(name: str, radius: float, angle: float) -> Tool | str:
-    """Return a tool, or the status of one that is none."""
-    sizes = (radius, angle) if name == "cone" else (radius,)
-    if not all(isfinite(size) for size in sizes):
-        return "tool"
-    if radius < _SMALLEST or (name == "cone" and not 0.01 <= angle <= pi / 2 - 0.001):
-        return "input"
-    if name == "disc":
-        return Disc(radius)
-    return ball(radius) if name == "sphere" else cone(angle, radius)

@@ -4,10 +4,10 @@ Near the tool it is that of a half-space (``pipeline.realtime.near``); what else
 curvature, adds the regular part R of its Green's function, which the file keeps as a few modes of the surface.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import nan
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pipeline.realtime.classic import ModelError, read_numbers
 from pipeline.realtime.model import Model
 from pipeline.realtime.near import Footprint
+from pipeline.realtime.query import Query
 from pipeline.realtime.read import model_of
 from pipeline.realtime.table import middle_of, polynomials
 from pipeline.realtime.touch import Touch
@@ -79,53 +80,27 @@ class Surface:
         """The vertices of each triangle (m, 3), round its outward normal."""
         return self.table.triangles
 
-    def press(
-        self,
-        tool: str,
-        *,
-        at: Sequence[float],
-        depth: float,
-        radius: float = nan,
-        angle: float = nan,
-        young: float | None = None,
-        poisson: float | None = None,
-        length: float = nan,
-        width: float = nan,
-        along: Sequence[float] | None = None,
-        contact: str | None = None,
-    ) -> tuple[Touch, Array]:
+    def press(self, tool: str, **asked: Any) -> tuple[Touch, Array]:
         """Return what ``Model.query`` returns, and the displacement (n, 3), in m, of all points.
 
         It is 0 where the tool does not touch, and NaN if the model refuses.
         """
-        model, table = self.model, self.table
-        touch = model.query(
-            tool,
-            at=at,
-            depth=depth,
-            radius=radius,
-            angle=angle,
-            young=young,
-            poisson=poisson,
-            length=length,
-            width=width,
-            along=along,
-            contact=contact,
-        )
-        if touch.status != "ok":
+        model, table, query = self.model, self.table, Query(tool, **asked)
+        touch, shape = model.answer(query), model.shape(query)
+        if touch.status != "ok" or isinstance(shape, str):
             return touch, np.full(table.points.shape, 0.0 if touch.status == "lost" else nan)
-        ratio = model.poisson if poisson is None else float(poisson)
-        x, y, z = (model.axes @ (np.asarray(at, dtype=float) - model.origin)).tolist()
-        foot = Footprint.of(model.tool(tool, contact, (radius, angle, length, width), along), touch.contact_radius)
+        ratio = model.poisson if query.poisson is None else float(query.poisson)
+        x, y, z = (model.axes @ (np.asarray(query.at, dtype=float) - model.origin)).tolist()
+        foot = Footprint.of(shape, touch.contact_radius)
         turn = model.face.at(model.table, x, y).turn
-        force = float(turn[2] @ model.axes @ touch.force) / (model.young if young is None else float(young))
+        force = float(turn[2] @ model.axes @ touch.force) / (model.young if query.young is None else float(query.young))
         away = (table.points - (x, y, z)) @ turn.T
         moved = foot.field(away, ratio, _ON_FACE * model.thickness) @ turn
         moved += table.far(x, y, ratio, foot.spread)
         moved *= force
         # What the tool covers goes with it.
         below = foot.within(away)
-        more = foot.tool.lifted(away[below]) - depth - moved[below] @ turn[2]
+        more = foot.tool.lifted(away[below]) - query.depth - moved[below] @ turn[2]
         moved[below] += more[:, None] * turn[2]
         if not np.isfinite(moved).all():
             return Touch("damaged", np.full(3, nan)), np.full(moved.shape, nan)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 SENTENCES = {
     "ok": "",
     "lost": "The tool does not touch.",
-    "outside": "The place is outside the model's region: move the tool there, or export a wider region.",
+    "outside": "The place is outside the model's region: move the tool into it; `print(model)` tells its size.",
     "large": "The tool, or its contact, is too large for a place so near to a side or the bottom.",
     "deep": "The depth is more than the model was made for.",
     "tool": "The model knows no such tool, or it lacks a size: disc(radius), sphere(radius), cone(radius, angle), "
@@ -39,6 +39,13 @@ class Touch:
     force_error: float = nan
     stiffness: float = nan
     contact_radius: float = nan
+
+    def __repr__(self) -> str:
+        if self.message:
+            return f"Touch({self.status!r}: {self.message})"
+        x, y, z = self.force
+        of_contact = f"{self.stiffness:.6g} N/m, contact radius {self.contact_radius:.6g} m"
+        return f"Touch({self.status!r}: ({x:.6g}, {y:.6g}, {z:.6g}) N ± {100 * self.force_error:.2g} %, {of_contact})"
 
     @property
     def message(self) -> str:

@@ -250,3 +250,16 @@ def test_tables_that_make_no_sense_give_a_status():
     table = replace(model.table, reciprocal=-model.table.reciprocal)
     touch = replace(model, table=table).query("disc", radius=2e-3, at=AT, depth=1e-4)
     assert touch.status == "damaged"
+
+
+def test_a_model_and_a_touch_print_what_they_are_in_a_line():
+    model = random_model()
+    assert len(repr(model)) < 200
+    assert f"E = {model.young:.4g} Pa" in repr(model)
+    touch = model.query("disc", at=(1e3, 0.0, 0.0), depth=1e-4, radius=1e-3)
+    assert touch.message in repr(touch)
+
+
+def test_a_query_with_a_word_that_there_is_not_is_refused():
+    with pytest.raises(TypeError, match="raduis"):
+        random_model().query("disc", at=(0.0, 0.0, 0.0), depth=1e-4, raduis=1e-3)
