@@ -43,12 +43,25 @@ class Scene(Protocol):
 
 @dataclass(frozen=True)
 class Feature:
-    """Where a study says it, the ``parts`` of a scene that tell whether it has it, and what it is there."""
+    """The ``key`` at which a study says it, whether a scene has it, and how its value is written.
+
+    ``also`` are the parts of a scene that tell, besides the section of the key.
+    """
 
     key: str
-    parts: tuple[str, ...]
     holds: Callable[[Scene], bool]
-    value: Callable[[Scene], Any] = lambda _: None
+    also: tuple[str, ...] = ()
+    write: Callable[[Any], Any] = lambda value: value if isinstance(value, str | float) else None
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The parts of a scene that tell whether it has it."""
+        return self.key.partition(".")[0], *self.also
+
+    def value(self, scene: Scene) -> Any:
+        """Return what a study says at the key, as a message quotes it; None where that would say nothing."""
+        section, _, key = self.key.partition(".")
+        return self.write(getattr(getattr(scene, section), key, None))
 
 
 @dataclass(frozen=True)
@@ -62,7 +75,6 @@ class Refusal:
 
 _PARTS = ("body", "material", "probe", "mesh", "load")
 _PLACE = ("body", "probe")
-_KEPT = ("body", "probe", "mesh")
 
 
 def _is_ball(scene: Scene) -> bool:
@@ -81,70 +93,39 @@ def _is_flat(scene: Scene) -> bool:
     return is_flat(scene.body, scene.probe, scene.probe.frame_on(scene.body))
 
 
-def _slice(scene: Scene) -> float:
-    return float(getattr(scene.probe, "slice", 0.0))
-
-
-def _outside(scene: Scene) -> str:
-    return scene.mesh.outside
-
-
-def _degree(scene: Scene) -> int:
-    return scene.mesh.degree
-
-
-def _contact(scene: Scene) -> str:
-    return str(scene.probe.contact)
-
-
 FEATURES: dict[str, Feature] = {
-    "layers": Feature("body.layers", ("body",), lambda s: isinstance(s.body, Layered) and bool(s.body.layers)),
-    "inclusion": Feature("body.inclusion", ("body",), lambda s: bool(s.body.inclusion)),
-    "curved body": Feature("body.shape", ("body",), lambda s: not isinstance(s.body, Layered), lambda s: s.body.shape),
-    "large strains": Feature("material.law", ("material",), lambda s: s.material.is_large, lambda s: s.material.law),
-    "ν > 0.49": Feature(
-        "material.poisson",
-        ("material",),
-        lambda s: s.material.poisson > MOST_OF_GREEN,
-        lambda s: s.material.poisson,
-    ),
-    "tool that is not flat": Feature(
-        "probe.shape", ("probe",), lambda s: isinstance(s.probe, Indenter), lambda s: s.probe.shape
-    ),
-    "found contact": Feature("probe.contact", ("probe",), lambda s: s.probe.is_unilateral, _contact),
-    "frictionless contact": Feature("probe.contact", ("probe",), lambda s: s.probe.contact == "frictionless", _contact),
-    "cut": Feature("probe.action", ("probe",), lambda s: s.probe.action == "cut", lambda s: s.probe.action),
-    "slice": Feature("probe.slice", ("probe",), lambda s: _slice(s) != 0, lambda s: in_mm(_slice(s))),
-    "slit": Feature(
-        "probe.incision",
-        ("probe",),
-        lambda s: s.probe.slit is not None,
-        lambda s: s.probe.slit and in_mm(s.probe.slit.depth),
-    ),
-    "open slit": Feature("probe.ends", ("probe",), lambda s: bool(s.probe.slit and s.probe.slit.is_open)),
-    "six motions": Feature("probe.motion", ("probe",), lambda s: s.probe.motion == "all", lambda s: s.probe.motion),
+    "layers": Feature("body.layers", lambda s: isinstance(s.body, Layered) and bool(s.body.layers)),
+    "inclusion": Feature("body.inclusion", lambda s: bool(s.body.inclusion)),
+    "curved body": Feature("body.shape", lambda s: not isinstance(s.body, Layered)),
+    "large strains": Feature("material.law", lambda s: s.material.is_large),
+    "ν > 0.49": Feature("material.poisson", lambda s: s.material.poisson > MOST_OF_GREEN),
+    "tool that is not flat": Feature("probe.shape", lambda s: isinstance(s.probe, Indenter)),
+    "found contact": Feature("probe.contact", lambda s: s.probe.is_unilateral),
+    "frictionless contact": Feature("probe.contact", lambda s: s.probe.contact == "frictionless"),
+    "cut": Feature("probe.action", lambda s: s.probe.action == "cut"),
+    "slice": Feature("probe.slice", lambda s: getattr(s.probe, "slice", 0.0) != 0, write=in_mm),
+    "slit": Feature("probe.incision", lambda s: s.probe.slit is not None, write=in_mm),
+    "open slit": Feature("probe.ends", lambda s: bool(s.probe.slit and s.probe.slit.is_open)),
+    "six motions": Feature("probe.motion", lambda s: s.probe.motion == "all"),
     "range of depths": Feature(
         "probe.depth_range",
-        ("probe",),
         lambda s: bool(getattr(s.probe, "depth_range", None)),
-        lambda s: [in_mm(depth) for depth in getattr(s.probe, "depth_range", None) or ()],
+        write=lambda depths: [in_mm(depth) for depth in depths],
     ),
-    "curved or inclined surface": Feature("probe.axis", _PLACE, lambda s: not _is_flat(s)),
-    "no flat top": Feature("body.shape", _PLACE, lambda s: not (isinstance(s.body, Layered) and _is_level(s))),
+    "curved or inclined surface": Feature("probe.axis", lambda s: not _is_flat(s), ("body",)),
+    "no flat top": Feature("body.shape", lambda s: not (isinstance(s.body, Layered) and _is_level(s)), ("probe",)),
     "surface of a file, inclined": Feature(
-        "body.shape", _PLACE, lambda s: isinstance(s.body, FromFile) and not _is_level(s), lambda s: s.body.shape
+        "body.shape", lambda s: isinstance(s.body, FromFile) and not _is_level(s), ("probe",)
     ),
-    "kept column": Feature("mesh.outside", _KEPT, _is_column, _outside),
-    "fixed column": Feature("mesh.outside", _KEPT, lambda s: s.mesh.outside == "fixed" and _is_column(s), _outside),
-    "half ball": Feature("mesh.outside", _KEPT, _is_ball, _outside),
-    "own far field": Feature("mesh.outside", _KEPT, lambda s: s.mesh.outside == "green" and _is_ball(s), _outside),
-    "part of the body": Feature(
-        "mesh.outside", ("mesh",), lambda s: s.mesh.outside != "coarse" and isfinite(s.mesh.epsilon), _outside
-    ),
-    "degree 1": Feature("mesh.degree", ("mesh",), lambda s: s.mesh.degree == 1, _degree),
-    "mixed elements": Feature("mesh.element", ("mesh",), lambda s: s.mesh.element == "mixed", lambda s: s.mesh.element),
-    "accuracy": Feature("mesh.accuracy", ("mesh",), lambda s: s.mesh.accuracy is not None, lambda s: s.mesh.accuracy),
-    "loads": Feature("load", ("load",), lambda s: s.load.acts),
+    "kept column": Feature("mesh.outside", _is_column, _PLACE),
+    "fixed column": Feature("mesh.outside", lambda s: s.mesh.outside == "fixed" and _is_column(s), _PLACE),
+    "half ball": Feature("mesh.outside", _is_ball, _PLACE),
+    "own far field": Feature("mesh.outside", lambda s: s.mesh.outside == "green" and _is_ball(s), _PLACE),
+    "part of the body": Feature("mesh.outside", lambda s: s.mesh.outside != "coarse" and isfinite(s.mesh.epsilon)),
+    "degree 1": Feature("mesh.degree", lambda s: s.mesh.degree == 1, write=int),
+    "mixed elements": Feature("mesh.element", lambda s: s.mesh.element == "mixed"),
+    "accuracy": Feature("mesh.accuracy", lambda s: s.mesh.accuracy is not None),
+    "loads": Feature("load", lambda s: s.load.acts),
 }
 
 _COARSE = 'use outside = "coarse" here'

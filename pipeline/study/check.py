@@ -19,9 +19,9 @@ from pipeline.study.check_mesh import (
     check_epsilon,
     check_gap,
     check_locking,
-    check_outside,
     check_reference,
     check_sizes,
+    check_support,
 )
 from pipeline.study.closure import check_ball
 from pipeline.study.place import place_error
@@ -41,42 +41,24 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     """Check single sections, then those that must fit each other."""
     bodies, probes = cast(Sequence[Body], sections["body"]), cast(Sequence[Probe], sections["probe"])
     materials, meshes = cast(Sequence[Material], sections["material"]), cast(Sequence[Mesh], sections["mesh"])
-    for body in bodies:
-        if isinstance(body, FromFile):
-            with problems.about(body=body):
-                for notice in body.notices:
-                    problems.warn("body.file", body.file, notice)
+    problems.each(_tell_notices, body=bodies)
     linear = [material for material in materials if not material.is_large]
-    for probe in probes:
-        with problems.about(probe=probe):
-            if linear:
-                _check_depth(probe, problems)
-            probe.check(problems)
-    for mesh in meshes:
-        with problems.about(mesh=mesh):
-            check_sizes(mesh, problems)
+    if linear:
+        problems.each(_check_depth, probe=probes)
+    problems.each(lambda probe, _: probe.check(problems), probe=probes)
+    problems.each(check_sizes, mesh=meshes)
     check_chosen(meshes, problems)
-    for mesh, probe in itertools.product(meshes, probes):
-        with problems.about(mesh=mesh, probe=probe):
-            check_epsilon(mesh, probe, problems)
-    for body, mesh in itertools.product(bodies, meshes):
-        with problems.about(body=body, mesh=mesh):
-            body.support.check(body.heights, mesh.fine, problems)
-            check_outside(body, mesh, problems)
+    problems.each(check_epsilon, mesh=meshes, probe=probes)
+    problems.each(check_support, body=bodies, mesh=meshes)
     way = next((axis for axis in axes if axis.off), None)
     placed = _placed(bodies, probes, way, problems)
-    for (body, probe), mesh in itertools.product(placed, meshes):
-        with problems.about(body=body, probe=probe, mesh=mesh):
-            check_column(body, probe, mesh, problems)
-            check_ball(body, probe, mesh, problems)
-            check_gap(body, probe, mesh, problems)
-            check_slit_in(body, probe, mesh, problems)
+    for body, probe in placed:
+        for check in (check_column, check_ball, check_gap, check_slit_in):
+            problems.each(check, body=(body,), probe=(probe,), mesh=meshes)
     check_features(sections, placed, problems)
-    _check_materials(bodies, materials, problems)
-    for body, material, mesh in itertools.product(bodies, linear, meshes):
-        with problems.about(body=body, material=material, mesh=mesh):
-            ratios = {f"{key}.poisson": tissue.poisson for key, tissue in tissues_of(body, material)}
-            check_locking(ratios, mesh, problems)
+    problems.each(_check_law, material=materials)
+    problems.each(_check_softness, body=bodies, material=materials)
+    problems.each(check_locking, body=bodies, material=linear, mesh=meshes)
     check_reference(meshes, axes, problems)
     for solve in cast(Sequence[Solving], sections["solve"]):
         if "repeats" in solve.model_fields_set and not solve.timing:
@@ -116,20 +98,22 @@ def _check_depth(probe: Probe, problems: Problems) -> None:
         )
 
 
-def _check_materials(bodies: Sequence[Body], materials: Sequence[Material], problems: Problems) -> None:
-    """Refuse what a law is not computed for, and warn of moduli that no tissue has: an m may stand for an M."""
-    for material in materials:
-        with problems.about(material=material):
-            _check_law(material, problems)
-    for body, material in itertools.product(bodies, materials):
-        with problems.about(body=body, material=material):
-            for key, tissue in tissues_of(body, material):
-                if tissue.young < _SOFTEST:
-                    problems.warn(
-                        f"{key}.young",
-                        f"{tissue.young:g} Pa",
-                        "is softer than any tissue; mPa are thousandths of a pascal, MPa are millions",
-                    )
+def _tell_notices(body: Body, problems: Problems) -> None:
+    """Tell what was found in the file of a body."""
+    if isinstance(body, FromFile):
+        for notice in body.notices:
+            problems.warn("body.file", body.file, notice)
+
+
+def _check_softness(body: Body, material: Material, problems: Problems) -> None:
+    """Warn of moduli that no tissue has: an m may stand for an M."""
+    for key, tissue in tissues_of(body, material):
+        if tissue.young < _SOFTEST:
+            problems.warn(
+                f"{key}.young",
+                f"{tissue.young:g} Pa",
+                "is softer than any tissue; mPa are thousandths of a pascal, MPa are millions",
+            )
 
 
 def _check_law(material: Material, problems: Problems) -> None:

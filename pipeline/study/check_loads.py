@@ -32,9 +32,7 @@ def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     if not acting:
         return
     if any(any(load.gravity) for load in acting):
-        for body, material in product(bodies, materials):
-            with problems.about(body=body, material=material):
-                _check_densities(body, material, problems)
+        problems.each(_check_densities, body=bodies, material=materials)
     for body, load in product(bodies, acting):
         for number, traction in enumerate(load.traction, start=1):
             with problems.about(body=body):
@@ -42,10 +40,8 @@ def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
 
 
 def _check_traction(body: Body, probes: Sequence[Probe], traction: Traction, key: str, problems: Problems) -> None:
-    if _check_place(body, traction, key, problems) and isinstance(traction.on, Cap):
-        for probe in probes:
-            with problems.about(probe=probe):
-                _check_beside(body, probe, traction.on, key, problems)
+    if _check_place(body, traction, key, problems) and isinstance(cap := traction.on, Cap):
+        problems.each(lambda probe, _: _check_beside(body, probe, cap, key, problems), probe=probes)
 
 
 def _makes_sense(load: Load, problems: Problems) -> bool:

@@ -11,7 +11,8 @@ from pipeline.shapes.probe import ON_EDGE, Probe
 from pipeline.shapes.section import in_mm
 from pipeline.study.place import held_gap
 from pipeline.study.problems import Problems
-from pipeline.study.schema import Mesh
+from pipeline.study.regions import tissues_of
+from pipeline.study.schema import Material, Mesh
 from pipeline.study.sweep import Axis
 
 # Displacement elements lock as ν nears ½: from the first value on visibly, from the second on F is worth nothing
@@ -120,8 +121,9 @@ def check_epsilon(mesh: Mesh, probe: Probe, problems: Problems) -> None:
         )
 
 
-def check_outside(body: Body, mesh: Mesh, problems: Problems) -> None:
-    """Refuse a column that nothing holds."""
+def check_support(body: Body, mesh: Mesh, problems: Problems) -> None:
+    """Refuse a support that elements cannot follow, and a column that nothing holds."""
+    body.support.check(body.heights, mesh.fine, problems)
     if mesh.outside == "free" and not body.support.holds_column() and isfinite(mesh.epsilon):
         problems.error(
             "mesh.outside",
@@ -131,8 +133,9 @@ def check_outside(body: Body, mesh: Mesh, problems: Problems) -> None:
         )
 
 
-def check_locking(poissons: dict[str, float], mesh: Mesh, problems: Problems) -> None:
-    """Check elements against Poisson's ratios, by key, of all the materials of a body."""
+def check_locking(body: Body, material: Material, mesh: Mesh, problems: Problems) -> None:
+    """Check elements against Poisson's ratios of all the materials of a body."""
+    poissons = {f"{key}.poisson": tissue.poisson for key, tissue in tissues_of(body, material)}
     if mesh.element_for(max(poissons.values())) == "mixed":
         if max(poissons.values()) <= _LEAST_MIXED:
             problems.error(

@@ -3,9 +3,10 @@
 import difflib
 import json
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any, Literal, get_origin
 
 from pydantic import BaseModel, ValidationError
@@ -89,6 +90,15 @@ class Problems:
             yield
         finally:
             self._about = before
+
+    def each(self, check: Callable[..., Any], **sections: Iterable[Any]) -> None:
+        """Call ``check`` with every combination of one of each of ``sections``, and with this list.
+
+        What it reports names the tables of arrays that they are: see :meth:`about`.
+        """
+        for chosen in product(*sections.values()):
+            with self.about(**dict(zip(sections, chosen, strict=True))):
+                check(*chosen, self)
 
     def error(self, key: str, found: Any, allowed: str) -> None:
         """Add an error."""

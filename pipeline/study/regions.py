@@ -47,17 +47,9 @@ _THINNEST = 1e-6
 def check_regions(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
     """Check layers and inclusions of every body, and whether there is a material for what they leave."""
     bodies, before = cast(Sequence[Body], sections["body"]), len(problems.errors)
-    for body in bodies:
-        with problems.about(body=body):
-            _check_names(body, problems)
-            if isinstance(body, Layered):
-                _check_layers(body, problems)
-            for number, inclusion in enumerate(body.inclusion, start=1):
-                if (inclusion.radius is None) == (inclusion.axes is None):
-                    problems.error(f"body.inclusion[{number}]", None, "needs a radius (a ball) or axes (an ellipsoid)")
-    for body in bodies if len(problems.errors) == before else ():
-        with problems.about(body=body):
-            _check_inclusions(body, problems)
+    problems.each(_check_pieces, body=bodies)
+    if len(problems.errors) == before:
+        problems.each(_check_inclusions, body=bodies)
     _check_axes(axes, problems)
     _check_sweep(bodies, axes, problems)
     _check_material(bodies, cast(Sequence[Material], sections["material"]), axes, problems)
@@ -78,10 +70,16 @@ def tissues_of(body: Body, material: Material) -> Iterator[tuple[str, Tissue | M
         yield f"body.{place}", region
 
 
-def _check_names(body: Body, problems: Problems) -> None:
+def _check_pieces(body: Body, problems: Problems) -> None:
+    """Check each layer and inclusion by itself."""
     names = [region.name for region in body.regions]
     for name in sorted({name for name in names if names.count(name) > 1}):
         problems.error("body", name, "is the name of more than one layer or inclusion; names must differ")
+    if isinstance(body, Layered):
+        _check_layers(body, problems)
+    for number, inclusion in enumerate(body.inclusion, start=1):
+        if (inclusion.radius is None) == (inclusion.axes is None):
+            problems.error(f"body.inclusion[{number}]", None, "needs a radius (a ball) or axes (an ellipsoid)")
 
 
 def _check_layers(body: Layered, problems: Problems) -> None:

@@ -149,9 +149,6 @@ MISTAKES = {
     "direction along the normal": (
         {"probe": BLADE | {"at": ["20 mm", "0 mm", "-9 mm"], "direction": [1, 0, 0]}}, ["probe.direction", "10° aside"],
     ),
-    "column aside": (
-        {"probe": {"axis": [0.5, 0, -1]}, "mesh": {"outside": "free", "epsilon": "8 mm"}}, ["mesh.outside", "coarse"],
-    ),
     "ellipsoid with faces": ({"body": ELLIPSOID | {"fixed": "bottom"}}, ["body.fixed", "below"]),
     "ellipsoid without support": (
         {"body": {"shape": "ellipsoid", "axes": ["9 mm"] * 3}}, ["body.fixed", "is required"],

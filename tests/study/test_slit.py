@@ -84,7 +84,7 @@ def test_depths_are_not_scaled():
     plan = make_plan(parse(raw(probe=probe, material={"young": ["1 kPa", "2 kPa"]})))
     (scaling,) = (struck for struck in plan.struck if struck.name == "scaling")
     assert scaling.count > 0
-    assert "stands in a slit" in scaling.reason
+    assert "the tool is in a slit" in scaling.reason
 
 
 def test_no_incision():

@@ -44,7 +44,7 @@ def test_what_does_not_fit_together_is_told_beside_what_cannot_be_read():
 
 def test_an_unknown_key_does_not_hide_what_does_not_fit_together():
     probe = {"axis": [0.5, 0, -1], "incison": "1 mm", "length": "4 mm"}
-    content = raw(probe=probe, mesh={"degree": 1, "outside": "free", "epsilon": "9 mm", "step": 3})
+    content = raw(probe=probe, mesh={"degree": 1, "outside": "halfspace", "epsilon": "9 mm", "step": 3})
     problems = {problem.key: problem.allowed for problem in told(content).problems}
     assert set(problems) == {"probe.incison", "probe.length", "mesh.degree", "mesh.step", "mesh.outside"}
     assert problems["probe.incison"] == "unknown key; did you mean `incision`? a disc has none: blade has"
