@@ -70,13 +70,11 @@ def test_help_has_an_example():
     assert "Example: epsmesh guide studies/figure3.toml --accuracy 5%" in call("--help").stdout
 
 
-@pytest.mark.parametrize("command", ["guide", "plot", "compare", "report"])
+@pytest.mark.parametrize("command", ["guide", "compare"])
 def test_commands_that_answer_for_a_study_that_has_changed_since_say_so(results, command):
     """From one place, and alike; nothing is said where the study is as it was run, or the dataset was named."""
     study, options = results / "known.toml", ["--output", results]
-    options += {"guide": ["--accuracy", "5%"], "compare": [results / "known.nc"], "report": ["--scene", "none"]}.get(
-        command, []
-    )
+    options += {"guide": ["--accuracy", "5%"], "compare": [results / "known.nc"]}[command]
     study.write_text(TEXT)
     assert "has changed since" not in epsmesh(command, study, *options).stderr
     study.write_text(f"{TEXT}\n# later")

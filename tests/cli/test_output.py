@@ -161,19 +161,17 @@ def test_a_store_that_cannot_be_changed_is_told(epsmesh, results, tmp_path, monk
     assert "readonly" in done.stderr
 
 
-@pytest.mark.parametrize("arguments", [("version",), ("version", "--json"), ("plan", "small.toml"), ("--help",)])
+@pytest.mark.parametrize("arguments", [("plan", "small.toml", "--json"), ("--help",)])
 def test_a_command_whose_reader_went_away_ends_with_0(results, arguments):
-    for _ in range(2):
-        reading, writing = os.pipe()
-        os.close(reading)
-        done = subprocess.run(
-            command(*arguments), stdout=writing, stderr=subprocess.PIPE, text=True, cwd=results, check=False
-        )
-        os.close(writing)
-        assert (done.returncode, "Traceback" in done.stderr) == (0, False)
+    reading, writing = os.pipe()
+    os.close(reading)
+    words = command(*arguments)
+    done = subprocess.run(words, stdout=writing, stderr=subprocess.PIPE, text=True, cwd=results, check=False)
+    os.close(writing)
+    assert (done.returncode, "Traceback" in done.stderr) == (0, False)
 
 
-@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("closed", [">&-", "<&- >&- 2>&-"])
 def test_streams_that_are_closed_are_none_of_a_commands_files(results, tmp_path, closed):
     """What libraries print would else go into the case store, or into what takes its number next."""
     shutil.copy(results / "small.toml", tmp_path)
