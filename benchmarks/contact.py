@@ -22,8 +22,7 @@ from pipeline.plan.plan import make_plan
 from pipeline.plan.symmetry import model_planes
 from pipeline.run.execute import compute
 from pipeline.run.meshing import mesh_case
-from pipeline.run.problem import law_of, loads_of, tool_of
-from pipeline.solve.contact.problem import ContactProblem
+from pipeline.run.problem import law_of, loads_of, problem_of
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Solution
 from pipeline.solve.spaces import Conditions, Spaces
@@ -56,7 +55,7 @@ def _study(poisson: float, rim: str, depth: str | list[str], **probe: Any) -> di
 
 def found(body: BodyMesh, case: Case, *, estimate: bool) -> Solution:
     """Find the area of contact of a case on its mesh; collective."""
-    with Spaces(body) as spaces, ContactProblem(spaces, tool_of(case), case.element) as problem:
+    with Spaces(body) as spaces, problem_of(spaces, case) as problem:
         return problem.solve(law_of(case), loads_of(case), estimate=estimate)
 
 

@@ -16,7 +16,7 @@ from pipeline.shapes.contact import first_touch
 from pipeline.shapes.frame import Vector
 from pipeline.shapes.indenter import Indenter
 from pipeline.solve.estimate import is_graded
-from pipeline.solve.solution import Solution
+from pipeline.solve.solution import Contact, Solution
 from pipeline.study.sweep import Case
 
 _ROUNDING = 1e-9
@@ -64,10 +64,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         energy_release=solution.release / _front_length(case) if case.probe.slit else nan,
         energy_release_error=solution.release_bar,
         largest=solution.largest,
-        contact_area=solution.contact_area,
-        contact_radius=solution.contact_radius,
-        contact_area_error=solution.contact_area_bar,
-        contact_radius_error=solution.contact_area_bar / 2,
+        **_of_contact(solution.contact),
         **_of_loads(case, solution),
         balance=solution.balance,
         dofs=solution.dofs,
@@ -84,13 +81,21 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
     )
 
 
+def _of_contact(contact: Contact | None) -> dict[str, Any]:
+    """Return what a record holds of contact that was found, nothing where it was prescribed."""
+    if contact is None:
+        return {}
+    bars = {"contact_area_error": contact.bar, "contact_radius_error": contact.bar / 2}
+    return {"contact_area": contact.area, "contact_radius": contact.radius, **bars}
+
+
 def _of_loads(case: Case, solution: Solution) -> dict[str, Any]:
     """Return what a record holds of loads, nothing where there are none."""
-    loaded, loads = solution.load_response, solution.response.loads
-    if not isnan(solution.sag):  # of found contact: loads bend the surface, and the depth counts from the first touch
+    loaded, loads, contact = solution.load_response, solution.response.loads, solution.contact
+    if contact and not isnan(contact.sag):  # loads bend the surface, and the depth counts from the first touch
         none = (0.0, 0.0, 0.0)
         touching = {"load_force": 0.0, "load_force_error": 0.0, "load_force_vector": none}
-        return touching | {"load_energy": solution.load_energy, "sag": solution.sag}
+        return touching | {"load_energy": contact.load_energy, "sag": contact.sag}
     if loaded is None:
         return {}
     force, axis = solution.load_force, (0.0, 0.0, -1.0)

@@ -16,7 +16,7 @@ from pipeline.run.room import MEMORY_SHARE
 from pipeline.shapes.contact import first_touch
 from pipeline.shapes.probes._round import RoundIndenter
 from pipeline.solve.contact.active_set import ContactError
-from pipeline.solve.contact.problem import ContactProblem, Tool
+from pipeline.solve.contact.search import Tool
 from pipeline.solve.crack import Front
 from pipeline.solve.far_field import FarField, Place, PointForce
 from pipeline.solve.krylov import SolveError, is_direct
@@ -27,7 +27,7 @@ from pipeline.solve.meridian.trials import RoundTool
 from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.regular import BodyField
-from pipeline.solve.solution import FieldProblem, Problem, Solution
+from pipeline.solve.solution import Problem, Solution
 from pipeline.solve.spaces import Conditions, Spaces
 from pipeline.study.sweep import Case
 
@@ -42,16 +42,14 @@ class CaseFailure(Exception):
     """A case cannot be computed, for a reason that all ranks have agreed on."""
 
 
-def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: bool = False) -> FieldProblem:
+def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: bool = False) -> QuasiStaticProblem:
     """Return what solves cases in the spaces of the mesh of ``case``, by the elements that suit it; collective.
 
     ``case`` is the one that the mesh was made for: the tool is there. ``condense`` says that many depths are to come.
     """
-    if case.probe.is_unilateral:
-        return ContactProblem(
-            spaces, tool_of(case), case.element, degree=case.mesh.degree, reuse=reuse, condense=condense
-        )
-    return QuasiStaticProblem(spaces, case.mesh.degree, conditions_of(case), case.element, reuse=reuse)
+    tool = tool_of(case) if case.probe.is_unilateral else None
+    degree, conditions = case.mesh.degree, conditions_of(case)
+    return QuasiStaticProblem(spaces, degree, conditions, case.element, tool=tool, reuse=reuse, condense=condense)
 
 
 def memory_of(case: Case, dofs: int) -> tuple[float, float]:

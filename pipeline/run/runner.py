@@ -41,7 +41,6 @@ from pipeline.run.record import Record
 from pipeline.run.room import machine_load
 from pipeline.run.sweeping import in_order
 from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.solution import FieldProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.stages import Times, recorded
 
@@ -214,7 +213,7 @@ class StepRunner:
         give_back(self._comm)
         return record
 
-    def _solve(self, solve: Solve, problem: FieldProblem, meshed: Meshed, bar: Bar) -> Record:
+    def _solve(self, solve: Solve, problem: QuasiStaticProblem, meshed: Meshed, bar: Bar) -> Record:
         needed, with_bar = memory_of(solve.case, problem.dofs)
         check_memory(self._free, needed, "solving")
         missing = self._lacks_room(bar, with_bar)

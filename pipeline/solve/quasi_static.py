@@ -24,9 +24,10 @@ from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.cell_values import CellValues
+from pipeline.solve.contact.search import ContactSearch, Tool
 from pipeline.solve.crack import Advance, Front
 from pipeline.solve.elements import elements_of
-from pipeline.solve.elements.base import Column, Elements, Products, Solver
+from pipeline.solve.elements.base import Column, Elements, Equilibrium, Products, Solver, close_far
 from pipeline.solve.elements.displacement import DisplacementElements, DisplacementSolver
 from pipeline.solve.estimate import error_bar, stiffness_bars
 from pipeline.solve.krylov import LinearSolver, SolveError
@@ -58,17 +59,23 @@ class QuasiStaticProblem:
         conditions: Conditions,
         element: str = "displacement",
         *,
+        tool: Tool | None = None,
         reuse: bool = False,
+        condense: bool = False,
     ):
         """Prepare elements of a ``degree``, of a kind, "displacement" or "mixed"; collective.
 
-        ``reuse`` begins each solve from the solution of the one before: depths of a nonlinear law share one walk.
+        Where contact is unilateral, what touches of the ``tool`` is found. ``reuse`` begins each solve from the
+        solution of the one before: depths of a nonlinear law share one walk. ``condense``: see ``ContactSearch``.
 
         Raises:
             SolveError: if footprint and support share a point: no displacement satisfies both.
         """
         self.elements: Elements = elements_of(spaces, degree, conditions, element)
         self.corrections: dict[Motion, tuple[FloatArray, ...]] = {}
+        self.contact: ContactSearch | None = None
+        if tool is not None:
+            self.contact = ContactSearch(spaces, self.elements, tool, reuse=reuse, condense=condense)
         self._walk: Walk | None = None  # to the last depth in a body of a law that is not linear
         self._reuse = reuse and element == "displacement"
         self._body, self._conditions = spaces.body, conditions
@@ -80,6 +87,8 @@ class QuasiStaticProblem:
 
     def __exit__(self, *_: object) -> None:
         self.corrections.clear()
+        if self.contact is not None:
+            self.contact.close()
         self.elements.close()
 
     @property
@@ -102,49 +111,62 @@ class QuasiStaticProblem:
         more, for the solution's ``decrements``, which may be negative for mixed ones, and ``bars``.
 
         Raises:
-            SolveError: if the elements are not for the law, the solver did not converge, or the solution fails a check.
+            SolveError: if the elements are not for the law, the solver did not converge, or the solution fails a check;
+                a ContactError, if contact is not found.
         """
-        elements, direct = self.elements, self.elements.is_direct(method)
+        self._law = law
         with recorded() as times, ExitStack() as stack:
-            # A tool at many places: the same operator, another far field each time.
-            keep = self._reuse and loads.far is not None and not direct
-            solver = self._set_up(law, loads, stack, direct=direct, keep=keep)
-            with stage("assembly"):
-                columns = elements.columns(loads, stack)
-                solver.lift(columns)
-            with stage("solve"):
-                known = solver.known if keep else {}
-                self._guess(columns, loads, known)
-                iterations, response, load_response = self._iterate(
-                    solver, columns, law, loads, known, tolerance=tolerance
-                )
-                if keep:
-                    solver.known = {loads.motions[0]: columns[0].unknown[0].array.copy()}
-                if loads.far is not None:
-                    loads = _close(columns, response)
-                    response = _balanced(self._response(solver.products(columns), columns, law, loads)[0])
-                self.corrections = {
-                    motion: tuple(part.array.copy() for part in column.unknown)
-                    for motion, column in zip(loads.motions, columns, strict=False)
-                }
-            front, tip = self._released(elements, columns, law, loads)
-            elements.show(columns)
+            if self.contact is None:
+                found = self._prescribed(law, loads, stack, method=method, tolerance=tolerance)
+            else:
+                with stage("solve"):
+                    found = self.contact.solve(law, loads, stack, method=method, tolerance=tolerance)
+            front, tip = self._released(self.elements, found.columns, law, found.loads)
+            self.elements.show(found.columns)
+            stored = found.solver.stored
             solution = Solution(
-                response=response,
-                load_response=load_response,
+                response=found.response,
+                load_response=found.load_response,
+                contact=found.contact,
                 largest=self._values.largest(law, self._conditions.front),
-                dofs=elements.whole_dofs,
+                dofs=self.elements.whole_dofs,
                 cells=self._body.cells,
-                iterations=iterations,
+                iterations=found.iterations,
                 times=times,
                 front=front,
                 tip=tip,
-                stored=None if solver.stored is None else 2.0 ** len(self._body.mirrored) * solver.stored,
+                stored=None if stored is None else 2.0 ** len(self._body.mirrored) * stored,
             )
             if estimate:
-                solution = self._estimated(solution, solver, columns, law, loads)
-                elements.show(columns)
+                solution = self._estimated(solution, found, law)
+                self.elements.show(found.columns)
         return solution
+
+    def _prescribed(
+        self, law: MaterialLaw, loads: Loads, stack: ExitStack, *, method: str, tolerance: float
+    ) -> Equilibrium:
+        """Solve for each motion of ``loads``, prescribed on the footprint, and for dead loads; collective."""
+        direct = self.elements.is_direct(method)
+        # A tool at many places: the same operator, another far field each time.
+        keep = self._reuse and loads.far is not None and not direct
+        solver = self._set_up(law, loads, stack, direct=direct, keep=keep)
+        with stage("assembly"):
+            columns = self.elements.columns(loads, stack)
+            solver.lift(columns)
+        with stage("solve"):
+            known = solver.known if keep else {}
+            self._guess(columns, loads, known)
+            iterations, response, load_response = self._iterate(solver, columns, law, loads, known, tolerance=tolerance)
+            if keep:
+                solver.known = {loads.motions[0]: columns[0].unknown[0].array.copy()}
+            if loads.far is not None:
+                loads = close_far(columns, loads, -float(response.stiffness[1, 0] / response.stiffness[1, 1]))
+                response = _balanced(self._response(solver.products(columns), columns, law, loads)[0])
+            self.corrections = {
+                motion: tuple(part.array.copy() for part in column.unknown)
+                for motion, column in zip(loads.motions, columns, strict=False)
+            }
+        return Equilibrium(solver, columns, loads, iterations, response, load_response)
 
     def _iterate(
         self,
@@ -206,13 +228,11 @@ class QuasiStaticProblem:
         return replace(response, balance=balance), load_response
 
     @stage("error bar")
-    def _estimated(
-        self, solution: Solution, solver: Solver, columns: Sequence[Column], law: MaterialLaw, loads: Loads
-    ) -> Solution:
+    def _estimated(self, solution: Solution, found: Equilibrium, law: MaterialLaw) -> Solution:
         """Return the last ``solution`` with its bars; collective."""
-        elements, whole = self.elements, 2.0 ** len(self._body.mirrored)
+        elements, columns, loads, whole = self.elements, found.columns, found.loads, 2.0 ** len(self._body.mirrored)
         with ExitStack() as stack:
-            finer = solver.enrich(columns, loads, stack, keep=self._conditions.front is not None)
+            finer = found.solver.enrich(columns, loads, stack, keep=self._conditions.front is not None)
             form = _form(solution.response, solution.load_response)
             if finer.decrements is None:
                 products = finer.elements.products(law, finer.columns, checked=False)
@@ -222,20 +242,21 @@ class QuasiStaticProblem:
             released = self._released(finer.elements, finer.columns, law, loads) if finer.columns else (None, None)
         plain = plain_share(self._body)
         unseen = None if finer.unseen is None else shares(np.diag(whole * finer.unseen), form)
-        relative = [
-            error_bar(share, elements.degree, elements.element, plain=plain, unseen=rest)
-            for share, rest in zip(
-                shares(decrements, form), np.zeros(len(form)) if unseen is None else unseen, strict=True
-            )
-        ]
-        bars = stiffness_bars(form, np.array(relative))
-        solution = solution.with_bars(decrements, bars, elements.element, apart=loads.apart)
+        relative = finer.relative
+        if relative is None:
+            rests = np.zeros(len(form)) if unseen is None else unseen
+            relative = np.array([
+                error_bar(share, elements.degree, elements.element, plain=plain, unseen=rest)
+                for share, rest in zip(shares(decrements, form), rests, strict=True)
+            ])  # fmt: skip
+        solution = solution.with_bars(decrements, stiffness_bars(form, relative), elements.element, apart=loads.apart)
         front, tip = (
             advance and above and advance.with_finer(above, elements.degree, solution.energy_bar)
             for advance, above in zip((solution.front, solution.tip), released, strict=True)
         )
         return replace(
             solution,
+            contact=found.contact and replace(found.contact, bar=finer.area_bar),
             plain=plain,
             unseen=None if unseen is None else unseen[: len(loads.motions)],
             front=front,
@@ -294,7 +315,6 @@ class QuasiStaticProblem:
         Raises:
             SolveError: if it cannot be set up, or the elements are not for the law.
         """
-        self._law = law
         if law.is_linear:
             return self.elements.set_up(law, stack, direct=direct, keep=keep)
         if not isinstance(self.elements, DisplacementElements):
@@ -308,22 +328,6 @@ class QuasiStaticProblem:
 
 def _motion(loads: Loads, number: int) -> Motion | None:
     return loads.motions[number] if number < len(loads.motions) else None
-
-
-def _close(columns: list[Column], response: Response) -> Loads:
-    """Make one motion, with its share of the far field, of two: return it.
-
-    Raises:
-        SolveError: if the tool's movement has none.
-    """
-    share = -float(response.stiffness[1, 0] / response.stiffness[1, 1])
-    if not np.isfinite(share):
-        raise SolveError("the far field is not a number")
-    tool, far = columns[0], columns.pop(1)
-    for part, of_field in zip(tool.unknown, far.unknown, strict=True):
-        part.axpy(share, of_field)
-    tool.prescribed = tool.prescribed + share * far.prescribed
-    return response.loads.closed(share)
 
 
 def _form(response: Response, load_response: LoadResponse | None) -> FloatArray:

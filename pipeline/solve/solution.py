@@ -1,7 +1,7 @@
 """What one solve gives, whatever the elements, and how well it must have been solved."""
 
 from dataclasses import dataclass, replace
-from math import isfinite, isnan, nan
+from math import isfinite, isnan, nan, pi
 from typing import Any, Protocol, Self
 
 import numpy as np
@@ -48,6 +48,24 @@ def check_balance(balance: float) -> None:
         raise SolveError(f"forces do not balance: relative error {balance:.1e}, allowed {BALANCE_LIMIT:.0e}")
 
 
+@dataclass(frozen=True)
+class Contact:
+    """Contact that was found: its area (m²), with a relative 95 % bar where one was asked for.
+
+    ``sag`` (m) is how far loads have moved the first touch, ``load_energy`` (J) their strain energy without the probe.
+    """
+
+    area: float
+    bar: float = nan
+    sag: float = nan
+    load_energy: float = nan
+
+    @property
+    def radius(self) -> float:
+        """Radius (m) of a disc of that area."""
+        return float(self.area / pi) ** 0.5
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Solution:
     """What one solve gives; all values global and equal on every rank."""
@@ -74,13 +92,7 @@ class Solution:
     unseen: FloatArray | None = None
     estimate_iterations: int = 0
 
-    # Of contact that is found: area (m²), its relative 95 % bar, and radius (m); how far loads have moved the first
-    # touch (m), and their strain energy without the probe (J).
-    contact_area: float = nan
-    contact_area_bar: float = nan
-    contact_radius: float = nan
-    sag: float = nan
-    load_energy: float = nan
+    contact: Contact | None = None  # where it is found
 
     # Energy released (pipeline.solve.crack) by a slit's front, and by the tip of a blade along which tissue slides.
     front: Advance | None = None
@@ -260,10 +272,3 @@ class Problem(Protocol):
         Raises:
             SolveError: if the solver did not converge, or the solution fails a check.
         """
-
-
-class FieldProblem(Problem, Protocol):
-    """A problem whose last solution can be looked at."""
-
-    def fields(self) -> tuple[Any, FloatArray]:
-        """Return the last displacement (m), a function, and the principal strains of each owned cell; collective."""

@@ -11,9 +11,8 @@ from pipeline.mesh.distribute import distribute
 from pipeline.mesh.generate import MeshArrays
 from pipeline.mesh.of_case import mesh_arrays
 from pipeline.run.meshing import on_first_rank
-from pipeline.run.problem import solve_problem, tool_of
+from pipeline.run.problem import problem_of, solve_problem
 from pipeline.scene.model import FREE, MIRROR
-from pipeline.solve.contact.problem import ContactProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.study.load import parse
 from pipeline.study.sweep import Case
@@ -45,7 +44,7 @@ def strip(comm: MPI.Comm, thick: float, poisson: float) -> tuple[float, float, f
     depth, share = layer_wedge(1 / tan(radians(_ANGLE)), _HALF, thick * _HALF, poisson)
     case = _case(thick, depth, poisson)
     body = distribute(comm, on_first_rank(comm, lambda: _held_apart(mesh_arrays(case, _QUARTER))))
-    with Spaces(body) as spaces, ContactProblem(spaces, tool_of(case), case.element) as problem:
+    with Spaces(body) as spaces, problem_of(spaces, case) as problem:
         found = solve_problem(case, problem, estimate=True)
     return _YOUNG / (1 - poisson**2) * share, found.reaction[2] / _LENGTH, found.bar
 

@@ -37,7 +37,7 @@ from pipeline.run.problem import (
 from pipeline.run.record import Record
 from pipeline.solve.compiled import vector_space
 from pipeline.solve.krylov import SolveError
-from pipeline.solve.solution import FieldProblem
+from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.study.sweep import Case, Study
 from pipeline.view.fields import Fields
@@ -139,7 +139,7 @@ def _arrays(solve: Solve, comm: MPI.Comm, cache: MeshCache | None, note: Note) -
     return on_first_rank(comm, lambda: cached_arrays(case, solve.mirrors, cache))
 
 
-def _gathered(mesh: BodyMesh, problem: FieldProblem, points: int) -> tuple[FloatArray, FloatArray]:
+def _gathered(mesh: BodyMesh, problem: QuasiStaticProblem, points: int) -> tuple[FloatArray, FloatArray]:
     """Return, on rank 0, the displacement of every point of the mesh as it was made, and the strain of every cell.
 
     A displacement of higher degree is interpolated to the order of the mesh: exact at its nodes.

@@ -11,7 +11,9 @@ from mpi4py import MPI
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of, loads_of, tool_of
 from pipeline.solve.contact.active_set import ContactError
-from pipeline.solve.contact.problem import ContactProblem, Tool
+from pipeline.solve.contact.candidates import CONDITIONS
+from pipeline.solve.contact.search import Tool
+from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.study.problems import StudyError
 from tests.cases import solve, study
@@ -45,14 +47,15 @@ def pressed(tool=None, **changes):
     (case,) = study(**{"body": SMALL, "probe": SPHERE, "mesh": COARSE} | changes).cases()
     body = mesh_case(case, ("y",) if tool else ("x", "y"), MPI.COMM_SELF)
     with Spaces(body) as spaces:
-        yield ContactProblem(spaces, tool or tool_of(case), case.element), law_of(case), loads_of(case)
+        problem = QuasiStaticProblem(spaces, 2, CONDITIONS, case.element, tool=tool or tool_of(case))
+        yield problem, law_of(case), loads_of(case)
 
 
 @pytest.mark.parametrize("element", ["displacement", "mixed"])
 def test_nothing_pulls_and_nothing_comes_through(element):
     with pressed(material={"poisson": 0.45}, mesh=COARSE | {"element": element}) as (problem, law, loads):
         solution = problem.solve(law, loads)
-    state, active, obstacle = problem.found.state, problem.found.active, problem.obstacle
+    state, active, obstacle = problem.contact.found.state, problem.contact.found.active, problem.contact.obstacle
     apart = obstacle.bounds - state.moved
     assert (state.reactions[active & ~obstacle.candidates.is_corner] < 0).all()
     assert np.abs(state.reactions[~active]).max() < 1e-6 * solution.reaction[2]
@@ -112,7 +115,7 @@ def test_face_that_is_inclined_lifts_off_on_one_side():
     inclined = Tool(lambda points: 0.15 * points[:, 0], lambda points: np.ones(len(points), dtype=bool))
     with pressed(inclined, probe=DISC) as (problem, law, loads):
         force = problem.solve(law, loads).reaction[2]
-    touching = problem.obstacle.candidates.points[problem.found.active, 0]
+    touching = problem.contact.obstacle.candidates.points[problem.contact.found.active, 0]
     assert touching.min() < -0.95e-3
     assert 0.0 < touching.max() < 0.9e-3
     assert force > record(probe=DISC).force

@@ -56,7 +56,7 @@ def test_a_flat_tool_wider_than_a_column_covers_it():
     found = pressed(flat(3.0), 0.1, column)
     known = MeridianProblem(column, Conditions(bonded=False)).solve(LAW, Loads.along((0.0, 0.0, -0.1)))
     assert found.response.stiffness == pytest.approx(known.response.stiffness, rel=1e-9)
-    assert found.contact_area == pytest.approx(4 * pi, rel=1e-12)
+    assert found.contact.area == pytest.approx(4 * pi, rel=1e-12)
     with pytest.raises(SolveError, match="edge of what is kept"):
         pressed(RoundTool(Rounded(0.0, 200.0).height, 200.0), 0.1, column)
 
@@ -71,11 +71,11 @@ def test_force_and_depth_on_a_deep_body_are_those_of_the_half_space(section, kin
     the surface of a body of 200 radii sinks less by c F, c of about 0.4 % of 1 / (2 E* a).
     """
     found = pressed(RoundTool(section.height, 20.0 if kinks else 8.0, kinks), depth, Meridian(200.0, 200.0, 1.0))
-    exact = PLANE * sneddon(section, found.contact_radius)
+    exact = PLANE * sneddon(section, found.contact.radius)
     assert found.reaction[2] == pytest.approx(exact, rel=1e-6)
     assert found.bar < 1e-5
-    assert found.contact_area == pytest.approx(pi * found.contact_radius**2)
-    assert found.contact_radius == pytest.approx(section.contact_radius(depth), rel=5e-3)
+    assert found.contact.area == pytest.approx(pi * found.contact.radius**2)
+    assert found.contact.radius == pytest.approx(section.contact_radius(depth), rel=5e-3)
     closed = 2 / pi * tan(pi / 3) * depth**2 if kinks else sneddon(section, section.contact_radius(depth))
     assert found.reaction[2] / (PLANE * closed) - 1 == pytest.approx(3.97e-3, rel=0.02)
     assert found.iterations <= 6
@@ -88,14 +88,14 @@ def test_a_flat_disc_touches_with_all_of_its_face():
     known = MeridianProblem(meridian, Conditions(bonded=False)).solve(LAW, Loads.along((0.0, 0.0, -depth)))
     assert found.reaction[2] == pytest.approx(known.reaction[2], rel=1e-9)
     assert found.energy == pytest.approx(known.energy, rel=1e-9)
-    assert found.contact_radius == 3.0
+    assert found.contact.radius == 3.0
 
 
 def test_a_thin_layer_is_touched_as_far_as_it_is_pressed_down():
     """On a layer much thinner than contact is wide a ball touches up to where it and the surface intersect."""
     ball, depth = Rounded(0.0, 200.0), 0.005
     found = pressed(RoundTool(ball.height, 200.0), depth, Meridian(20.0, 0.04, 1.0), MaterialLaw.of(0.0, 0.5))
-    assert found.contact_radius == pytest.approx(sqrt(2 * 200.0 * depth), rel=0.01)
+    assert found.contact.radius == pytest.approx(sqrt(2 * 200.0 * depth), rel=0.01)
     assert found.reaction[2] == pytest.approx(pi * 200.0 * depth**2 / 0.04, rel=0.03)  # springs of E / H, ν = 0
 
 
@@ -126,8 +126,8 @@ def test_a_disc_on_a_stiff_skin_lifts_off_in_a_ring():
     press = Loads.along((0.0, 0.0, -depth))
     found = MeridianContact(skin, flat(5.0), degree=4, accuracy=1e-3).solve(law, press)
     assert found.reaction[2] == pytest.approx(2.07474, rel=1e-4)
-    assert found.contact_area == pytest.approx(16.17, rel=1e-2)
-    assert found.contact_radius == pytest.approx(sqrt(found.contact_area / pi))
+    assert found.contact.area == pytest.approx(16.17, rel=1e-2)
+    assert found.contact.radius == pytest.approx(sqrt(found.contact.area / pi))
     assert found.energy == pytest.approx(found.reaction[2] * depth / 2, rel=1e-9)  # flat on flat: F goes like the depth
     assert found.reaction[2] < MeridianProblem(skin, Conditions(bonded=False)).solve(law, press).reaction[2]
 

@@ -3,6 +3,7 @@
 Contact is decided node by node for all ranks at once: they are a few thousand at most, and each rank holds them all.
 """
 
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -15,6 +16,8 @@ from pipeline.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.scene.model import PROBE
 from pipeline.solve.contact.facet import FACET_CORNERS, FacetNodes, facet_nodes
+from pipeline.solve.elements import elements_of
+from pipeline.solve.elements.base import Elements
 from pipeline.solve.spaces import Conditions, Spaces
 from pipeline.solve.vectors import global_sum
 
@@ -171,18 +174,27 @@ def _edge(body: BodyMesh, points: FloatArray, facets: IntArray, shape: FacetNode
 
 
 class Surface:
-    """The candidates of a mesh by the degree of their nodes, found when first asked for."""
+    """The elements of a mesh, of which nodes may touch, and the candidates by their degree, found when first asked for.
+
+    ``spaces`` are those of the mesh.
+    """
 
     def __init__(self, spaces: Spaces):
-        self._spaces = spaces
+        self.spaces = spaces
         self._found: dict[int, Candidates] = {}
 
     def of(self, degree: int) -> Candidates:
         """Return the candidates of a ``degree``; collective."""
         if degree not in self._found:
-            space = self._spaces.get(degree, CONDITIONS).dofs.space
-            self._found[degree] = find_candidates(self._spaces.body, space)
+            space = self.spaces.get(degree, CONDITIONS).dofs.space
+            self._found[degree] = find_candidates(self.spaces.body, space)
         return self._found[degree]
+
+    def elements(self, degree: int, element: str, stack: ExitStack) -> Elements:
+        """Return elements of a ``degree`` and a kind, which the ``stack`` closes; collective."""
+        found = elements_of(self.spaces, degree, CONDITIONS, element)
+        stack.callback(found.close)
+        return found
 
 
 class Numbering:

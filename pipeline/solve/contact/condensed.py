@@ -15,9 +15,9 @@ from pipeline.solve.contact.active_set import State
 from pipeline.solve.contact.candidates import Candidates, Surface
 from pipeline.solve.contact.elements import ContactDisplacement, FarShare, Unknowns
 from pipeline.solve.contact.levels import Hierarchy
+from pipeline.solve.elements.base import Elements
 from pipeline.solve.krylov import Level, LinearSolver, SolveError
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.spaces import ElasticSpace, Spaces
 from pipeline.solve.vectors import vector
 from pipeline.stages import stage
 
@@ -27,10 +27,10 @@ _MOST_CANDIDATES = 1_500
 _TOGETHER = 64
 
 
-def suits(space: ElasticSpace, candidates: Candidates, method: str) -> bool:
+def suits(elements: Elements, candidates: Candidates, method: str) -> bool:
     """Tell whether to condense the surface of a small body: on one process, if a direct solve is not ruled out."""
-    small = len(candidates) <= _MOST_CANDIDATES
-    return method != "iterative" and space.dofs.comm.size == 1 and small
+    small = len(candidates) <= _MOST_CANDIDATES and elements.body.comm.size == 1
+    return method != "iterative" and elements.element == "displacement" and small
 
 
 class CondensedElements(ContactDisplacement):
@@ -38,13 +38,13 @@ class CondensedElements(ContactDisplacement):
 
     is_exact = True
 
-    def __init__(self, spaces: Spaces, degree: int, law: MaterialLaw, surface: Surface, stack: ExitStack):
+    def __init__(self, elements: Elements, surface: Surface, law: MaterialLaw, method: str, stack: ExitStack):
         """Assemble, factorise and condense.
 
         Raises:
             SolveError: if the factorisation fails.
         """
-        super().__init__(spaces, degree, law, surface, "direct", stack)
+        super().__init__(elements, surface, law, method, stack)
         self._stack = stack
         self._multigrid: Hierarchy | None = None
         self._free = self._factor()

@@ -15,17 +15,17 @@ from petsc4py import PETSc
 
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
 from pipeline.solve.contact.active_set import State
-from pipeline.solve.contact.candidates import CONDITIONS, Candidates, Numbering, Surface
+from pipeline.solve.contact.candidates import Candidates, Numbering, Surface
 from pipeline.solve.contact.levels import Hierarchy, normal_dofs
 from pipeline.solve.dead_loads import Applied
-from pipeline.solve.elements import elements_of
-from pipeline.solve.elements.base import Column, Fields
+from pipeline.solve.elements.base import Column, Elements, Fields
 from pipeline.solve.elements.mixed import MixedElements
 from pipeline.solve.far_field import FarField
 from pipeline.solve.krylov import Level, LinearSolver, SolveError
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.saddle import SaddleSolver
-from pipeline.solve.spaces import ElasticSpace, Spaces
+from pipeline.solve.solution import check_balance
+from pipeline.solve.spaces import ElasticSpace
 from pipeline.solve.vectors import global_sum
 from pipeline.stages import stage
 
@@ -80,31 +80,34 @@ class ContactElements(ABC):
     the cut face, None without. ``unit`` (Pa) is that of the law's moduli: energies and forces are in J and N.
     """
 
-    # As the study has it.
-    element: str
     # Whether every solve is, to rounding.
     is_exact = False
     # Whether the solver can do with dofs that are held by the cycle's smoothers alone.
     _masks = True
 
-    def __init__(self, spaces: Spaces, degree: int, law: MaterialLaw, surface: Surface, method: str, stack: ExitStack):
+    def __init__(self, elements: Elements, surface: Surface, law: MaterialLaw, method: str, stack: ExitStack):
         """Assemble; collective."""
-        self._spaces, self._law, self._surface = spaces, law, surface
-        self.plug = elements_of(spaces, degree, CONDITIONS, self.element)
-        stack.callback(self.plug.close)
-        self.unit = self.plug.unit(law)
-        self.space: ElasticSpace = self.plug.displacements
-        self.candidates: Candidates = surface.of(degree)
-        self._direct = self.plug.is_direct(method)
+        self.plug, self.surface, self.law = elements, surface, law
+        self.unit = elements.unit(law)
+        self.space: ElasticSpace = elements.displacements
+        self.candidates: Candidates = surface.of(elements.degree)
+        self._direct = elements.is_direct(method)
         self.hierarchy = self.hierarchy_of(stack, direct=self._direct)
         self.numbering: Numbering = self.hierarchy.numbering
-        self.fields: Fields = stack.enter_context(self.plug.fields())
+        self.fields: Fields = stack.enter_context(elements.fields())
         self.load: Unknowns | None = None
         self.far: FarShare | None = None
         self._active: BoolArray = np.zeros(len(self.candidates), dtype=bool)
         self._held: Int32Array = np.empty(0, dtype=np.int32)
         self._solving = ExitStack()
         stack.callback(self.close)
+
+    def finer(self, stack: ExitStack) -> "ContactElements":
+        """Return elements of one degree more, which begin with the fields of the forms; collective."""
+        elements = self.surface.elements(self.plug.degree + 1, self.plug.element, stack)
+        found = contact_elements(elements, self.surface, self.law, "iterative", stack)
+        found.start_from(self)
+        return found
 
     # ---- what displacement and mixed elements have each of their own ----------------------------------
 
@@ -120,20 +123,14 @@ class ContactElements(ABC):
     def product(self, result: Fields) -> None:
         """Write the operator, without a contact set, times the fields into ``result``; collective."""
 
-    def residual(self) -> FloatArray:
-        """Return K u (N) with the unmodified operator, owned dofs, for the forms' fields; collective."""
-        with self.plug.fields() as forces:
-            self.plug.apply(forces, self._law)
-            return np.array(forces[0].array)
-
     def couple(self, far: FarShare | None) -> None:
         """Let a far field act on the cut face from now on, or none."""
         self.far = far
 
     def hierarchy_of(self, stack: ExitStack, *, direct: bool) -> Hierarchy:
         """Return the operators in which nodes may be held, given back with the ``stack``; collective."""
-        law, degree = self.plug.elastic(self._law), self.plug.degree
-        return Hierarchy(self._spaces, degree, law, self._surface, stack, direct=direct, masks=self._masks)
+        law, degree = self.plug.elastic(self.law), self.plug.degree
+        return Hierarchy(self.surface, degree, law, stack, direct=direct, masks=self._masks)
 
     # ---- sets -----------------------------------------------------------------------------------------
 
@@ -253,46 +250,43 @@ class ContactElements(ABC):
         if coarse.far is not None:
             held = np.zeros_like(displacement.x.array)
             held[self.space.dofs.prescribed] = displacement.x.array[self.space.dofs.prescribed]
-            self.load = self.right_side(held)
+            with self.plug.fields() as right, self.plug.fields() as unknown:
+                self.load = self.right_side(Column(prescribed=held, applied=None, right=right, unknown=unknown))
 
-    def show(self, loaded: FreeResponse | None = None) -> None:
-        """Make the solution, and what loads do besides, the fields of the space's forms; collective."""
-        parts = [(1.0, self.unknowns())]
-        if self.far is not None:
-            parts.append((self.far.share, self.far.unit.unknowns))
-        if loaded is not None:
-            parts.append((1.0, loaded.unknowns))
-        columns = zip(*(values for _, values in parts), strict=True)
-        factors = [factor for factor, _ in parts]
-        self._put_fields(tuple(np.tensordot(factors, column, 1) for column in columns))
-
-    def _put_fields(self, unknowns: Unknowns) -> None:
-        with self.plug.fields() as fields:
-            for field, values in zip(fields, unknowns, strict=True):
-                field.array[:] = values
-            self.plug.set_fields(fields)
+    def show(self) -> None:
+        """Make what is solved for, far field aside, the fields of the forms; collective."""
+        self.plug.set_fields(self.fields)
 
     # ---- without a probe ------------------------------------------------------------------------------
 
-    def right_side(self, prescribed: FloatArray, applied: Applied | None = None) -> Unknowns:
-        """Return the right-hand side of ``prescribed`` displacements (m, with ghosts), or of loads; collective."""
-        with self.plug.fields() as right, self.plug.fields() as unknown:
-            column = Column(prescribed=prescribed, applied=applied, right=right, unknown=unknown)
-            self.plug.lift(column, self._law)
-            return tuple(np.array(part.array) for part in right)
+    def right_side(self, column: Column) -> Unknowns:
+        """Return the right-hand side of what a ``column`` prescribes, or of its loads; collective."""
+        self.plug.lift(column, self.law)
+        return tuple(np.array(part.array) for part in column.right)
 
-    def free_response(self, tolerance: float, prescribed: FloatArray, applied: Applied | None = None) -> FreeResponse:
-        """Return what ``prescribed`` displacements (m, local with ghosts) or loads do without a probe; collective.
+    def free_response(self, column: Column, tolerance: float) -> FreeResponse:
+        """Return what a unit of a ``column`` does without a probe, and make it the column's solution; collective.
 
         Raises:
-            SolveError: if the solver does not converge.
+            SolveError: if the solver does not converge, or forces do not balance.
         """
-        displacement, *others = self.relax(tolerance, self.right_side(prescribed, applied))
-        displacement = displacement + prescribed[: self.space.dofs.owned]
-        found = (displacement, *others)
-        self._put_fields(found)
-        work = global_sum(self.space.dofs.comm, np.array([displacement @ self.residual()]))
-        return FreeResponse(found, self.numbering.gather(displacement), float(work[0]))
+        found = self.relax(tolerance, self.right_side(column))
+        self.plug.put(column, found)
+        products = self.plug.products(self.law, [column])
+        (moved,), (residual,) = products.moved, products.residuals
+        energy = float(global_sum(self.space.dofs.comm, np.array([moved @ residual]))[0])
+        if column.applied is not None:
+            check_balance(self._imbalance(column.applied, moved, residual, energy))
+        return FreeResponse((moved, *found[1:]), self.numbering.gather(moved), energy)
+
+    def _imbalance(self, applied: Applied, moved: FloatArray, residual: FloatArray, energy: float) -> float:
+        """Return the relative error of work and forces of loads; collective."""
+        space, mirrored = self.space.dofs, self.plug.body.mirrored
+        on_support = (residual - applied.forces).reshape(-1, 3)[space.fixed_owned].sum(axis=0)
+        *support, work = global_sum(space.comm, np.array([*on_support, moved @ applied.forces]))
+        rest = [s + f for axis, (s, f) in enumerate(zip(support, applied.resultant, strict=True))
+                if axis not in mirrored]  # fmt: skip
+        return max(float(np.linalg.norm(rest)) / applied.size, abs(energy / work - 1) if work else 0.0)
 
     def relax(self, tolerance: float, load: Unknowns) -> Unknowns:
         """Return the solution for a ``load`` with nothing held by the probe; collective.
@@ -313,7 +307,6 @@ class ContactElements(ABC):
 class ContactDisplacement(ContactElements):
     """Displacements of degree 1 or more."""
 
-    element = "displacement"
     _solver: LinearSolver | None = None
 
     def close(self) -> None:
@@ -349,23 +342,21 @@ class ContactDisplacement(ContactElements):
 class ContactMixed(ContactElements):
     """Displacements of degree 2 or more and pressures of one less: reactions are those of K₀ u + Bᵀ p."""
 
-    element = "mixed"
     # The residual of held displacements must vanish: it is part of the norm that is made small.
     _masks = False
 
-    def __init__(self, spaces: Spaces, degree: int, law: MaterialLaw, surface: Surface, method: str, stack: ExitStack):
+    def __init__(self, elements: MixedElements, surface: Surface, law: MaterialLaw, method: str, stack: ExitStack):
         """Assemble; collective."""
-        super().__init__(spaces, degree, law, surface, method, stack)
-        assert isinstance(self.plug, MixedElements)
-        self._mixed, self._compliance = self.plug, self.plug.compliance(law)
-        self._coupling, self._mass = self.plug.pressures.blocks(entries=self._direct)
+        super().__init__(elements, surface, law, method, stack)
+        self._mixed, self._compliance = elements, elements.compliance(law)
+        self._coupling, self._mass = elements.pressures.blocks(entries=self._direct)
         # The energy norm squared of the last correction (J): what is taken away from the energy may vanish by chance.
         self.first_energy = 0.0
 
     def use(self, levels: list[Level]) -> None:
         """Solve with these ``levels`` from now on; collective."""
         self.close()
-        saddle = self._mixed.saddle_of(levels, self._mixed.elastic(self._law), self._holding(), self._mass)
+        saddle = self._mixed.saddle_of(levels, self._mixed.elastic(self.law), self._holding(), self._mass)
         self._solver = self._solving.enter_context(SaddleSolver(saddle, direct=self._direct))
 
     def _holding(self) -> PETSc.Mat:
@@ -401,3 +392,12 @@ class ContactMixed(ContactElements):
             self._mass.mult(pressure, result[1])
             result[1].array[:] *= -self._compliance
             result[1].axpy(1.0, dilation)
+
+
+def contact_elements(
+    elements: Elements, surface: Surface, law: MaterialLaw, method: str, stack: ExitStack
+) -> ContactElements:
+    """Return ``elements`` with operators in which candidates may be held; collective. The ``stack`` frees them."""
+    if isinstance(elements, MixedElements):
+        return ContactMixed(elements, surface, law, method, stack)
+    return ContactDisplacement(elements, surface, law, method, stack)

@@ -14,15 +14,12 @@ import numpy as np
 
 from pipeline.arrays import Int32Array
 from pipeline.solve.contact.active_set import Found, Obstacle, find_set
-from pipeline.solve.contact.candidates import CONDITIONS, Surface
+from pipeline.solve.contact.candidates import CONDITIONS
 from pipeline.solve.contact.elements import ContactDisplacement, ContactElements, ContactMixed
 from pipeline.solve.contact.levels import mask, normal_dofs
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.krylov import LinearSolver
-from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.spaces import Spaces
 from pipeline.solve.vectors import vector
-from pipeline.stages import stage
 
 # Relative energy norm of the error to which the solution of the next degree is found for the error bar.
 _ESTIMATE_TOLERANCE = 0.1
@@ -30,10 +27,7 @@ _ESTIMATE_TOLERANCE = 0.1
 _AGAIN = (1e-3, 1e-5)
 
 
-@stage("error bar")
-def decrement(
-    spaces: Spaces, elements: ContactElements, law: MaterialLaw, surface: Surface, facets: Int32Array
-) -> tuple[float, float, int]:
+def decrement(elements: ContactElements, facets: Int32Array) -> tuple[float, float, int]:
     """Return what one degree more takes away of twice the energy (J) of the modelled part, and the iterations.
 
     In between is N (J) of mixed elements, none of others. Collective. The local ``facets`` are held; the fields are
@@ -43,16 +37,14 @@ def decrement(
         SolveError: if the solver does not converge.
     """
     if isinstance(elements, ContactMixed):
-        return _mixed_decrement(spaces, elements, law, surface, facets)
+        return _mixed_decrement(elements, facets)
     assert isinstance(elements, ContactDisplacement)
-    taken, iterations = _displacement_decrement(spaces, elements, law, facets)
+    taken, iterations = _displacement_decrement(elements, facets)
     return taken, 0.0, iterations
 
 
-def _displacement_decrement(
-    spaces: Spaces, elements: ContactDisplacement, law: MaterialLaw, facets: Int32Array
-) -> tuple[float, int]:
-    finer = spaces.get(elements.space.degree + 1, CONDITIONS)
+def _displacement_decrement(elements: ContactDisplacement, facets: Int32Array) -> tuple[float, int]:
+    finer, law = elements.surface.spaces.get(elements.space.degree + 1, CONDITIONS), elements.law
     with ExitStack() as stack, vector(finer.dofs.space) as residual:
         levels = elements.held_levels(facets, stack)
         matrix = stack.enter_context(finer.operators.lend_product(law))
@@ -68,38 +60,30 @@ def _displacement_decrement(
     return float(decrements[0, 0]), iterations
 
 
-def _mixed_decrement(
-    spaces: Spaces, elements: ContactMixed, law: MaterialLaw, surface: Surface, facets: Int32Array
-) -> tuple[float, float, int]:
+def _mixed_decrement(elements: ContactMixed, facets: Int32Array) -> tuple[float, float, int]:
     elements.close()
     with ExitStack() as stack:
-        finer = ContactMixed(spaces, elements.space.degree + 1, law, surface, "iterative", stack)
-        finer.start_from(elements)
+        finer = elements.finer(stack)
+        assert isinstance(finer, ContactMixed)
         finer.hold_facets(facets)
         before = finer.energy()
         iterations = finer.approach(np.zeros(len(finer.candidates)), _ESTIMATE_TOLERANCE, None)  # nothing held moves
         return before - finer.energy(), finer.first_energy, iterations
 
 
-@stage("error bar")
-def found_again(
-    spaces: Spaces, elements: ContactElements, law: MaterialLaw, surface: Surface, tool: Obstacle,
-    found: Found,
-) -> tuple[float, int]:  # fmt: skip
+def found_again(elements: ContactElements, obstacle: Obstacle, found: Found) -> tuple[float, int]:
     """Return the share of the force that one degree more takes away, contact found again, and the sets; collective.
 
-    ``tool`` is what is in the way of the nodes of that degree, far field aside.
+    ``obstacle`` is what is in the way of the nodes of that degree, far field aside.
 
     Raises:
         SolveError: if the solver does not converge.
         ContactError: if the contact does not settle.
     """
     elements.close()
-    kind = ContactMixed if isinstance(elements, ContactMixed) else ContactDisplacement
     with ExitStack() as stack:
-        finer = kind(spaces, elements.space.degree + 1, law, surface, "iterative", stack)
-        finer.start_from(elements)
+        finer = elements.finer(stack)
         active = elements.candidates.raised(found.active, finer.candidates)
-        again = find_set(finer, tool, active, _AGAIN, found.state.energy)
+        again = find_set(finer, obstacle, active, _AGAIN, found.state.energy)
     force, finer_force = (float(-one.state.reactions[one.active].sum()) for one in (found, again))
     return 1 - finer_force / force, again.sets

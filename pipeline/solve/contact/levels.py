@@ -11,7 +11,7 @@ from pipeline.solve.contact.candidates import CONDITIONS, Numbering, Surface
 from pipeline.solve.kernels.product import is_product
 from pipeline.solve.krylov import Level
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.spaces import ElasticSpace, Spaces
+from pipeline.solve.spaces import ElasticSpace
 
 _SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
 
@@ -24,12 +24,11 @@ class Hierarchy:
     """
 
     def __init__(
-        self, spaces: Spaces, degree: int, law: MaterialLaw, surface: Surface, stack: ExitStack, *, direct: bool,
-        masks: bool = True,
-    ):  # fmt: skip
+        self, surface: Surface, degree: int, law: MaterialLaw, stack: ExitStack, *, direct: bool, masks: bool = True
+    ):
         """Assemble; collective. What is made is given back with the ``stack``."""
         degrees = [degree] if direct else range(1, degree + 1)
-        found = [spaces.get(d, CONDITIONS) for d in degrees]
+        found = [surface.spaces.get(d, CONDITIONS) for d in degrees]
         lent = [s.operators.lend_product(law) if s.degree > 1 and not direct else s.operators.lend(law) for s in found]
         matrices = [stack.enter_context(matrix) for matrix in lent]
         is_masked = masks and not direct

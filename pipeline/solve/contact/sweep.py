@@ -101,10 +101,10 @@ class Sweep:
         )
         return Guess(active, unknowns, last.found.state.energy * (obstacle.depth / last.depth) ** 2)
 
-    def keep(self, depth: float, found: Found) -> None:
-        """Remember what was found at a ``depth`` (m)."""
+    def keep(self, depth: float, found: Found, unknowns: Unknowns) -> None:
+        """Remember what was ``found`` at a ``depth`` (m), and what was solved for there."""
         others = [known for known in self._known if known.depth != depth]
-        self._known = [*others, _Known(depth, found, self.elements.unknowns())][-_REMEMBERED:]
+        self._known = [*others, _Known(depth, found, unknowns)][-_REMEMBERED:]
 
     def keep_bar(self, depth: float, taken: float, share: float, far: FarField | None = None) -> None:
         """Remember the share of the energy that one degree more takes away at a ``depth`` (m), and the force's bar.

@@ -4,7 +4,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from typing import Any
+from math import nan
+from typing import Any, Protocol
 
 import numpy as np
 from petsc4py import PETSc
@@ -13,9 +14,12 @@ from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.crack import Front, Release
 from pipeline.solve.dead_loads import Applied
-from pipeline.solve.krylov import Level
+from pipeline.solve.krylov import Level, SolveError
+from pipeline.solve.load_response import LoadResponse
 from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.response import Response
+from pipeline.solve.solution import Contact
 from pipeline.solve.spaces import Conditions, ConstrainedSpace, ElasticSpace, Spaces
 from pipeline.solve.vectors import global_sum, vector
 
@@ -58,7 +62,8 @@ class Enriched:
     """What one degree more makes of n solutions: ``columns`` in ``elements`` of that degree, if they were to be kept.
 
     ``decrements`` (n, n), J, is what it takes from their energies, None where that is to be found from the columns;
-    ``unseen`` (n), J, are N of mixed elements.
+    ``unseen`` (n), J, are N of mixed elements; ``relative`` (n) are 95 % bars, None where they follow from both;
+    ``area_bar`` is that on the area of contact that is found.
     """
 
     elements: "Elements"
@@ -66,6 +71,36 @@ class Enriched:
     iterations: int
     decrements: FloatArray | None = None
     unseen: FloatArray | None = None
+    relative: FloatArray | None = None
+    area_bar: float = nan
+
+
+class Enriching(Protocol):
+    """What can go on in one degree more from the solutions that it found.
+
+    ``stored`` is the energy (J) of the modelled part where that is not half the work of the force.
+    """
+
+    stored: float | None
+
+    def enrich(self, columns: Sequence[Column], loads: Loads, stack: ExitStack, *, keep: bool) -> Enriched:
+        """Solve on in one degree more; what is made is freed with the ``stack``; collective.
+
+        ``keep`` asks for the solutions, too.
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """What a ``solver`` found for ``loads``: a column for each motion, one more for dead loads, and what they do."""
+
+    solver: Enriching
+    columns: list[Column]
+    loads: Loads
+    iterations: int
+    response: Response
+    load_response: LoadResponse | None = None
+    contact: Contact | None = None
 
 
 class Solver(ABC):
@@ -275,6 +310,12 @@ class Elements(ABC):
                 total[0].array[:] += amount * column.prescribed[: self.displacements.dofs.owned]
             self.set_fields(total)
 
+    def put(self, column: Column, values: Sequence[FloatArray], amount: float = 1.0) -> None:
+        """Make owned ``values`` of the fields, for an ``amount`` of what a column is a unit of, its solution."""
+        for part, of_field in zip(column.unknown, values, strict=True):
+            part.array[:] = of_field / amount
+        column.unknown[0].array[self.displacements.dofs.prescribed_owned] = 0.0
+
     def total(self, column: Column, result: Fields) -> None:
         """Write a solution into ``result``."""
         for whole, part in zip(result, column.unknown, strict=True):
@@ -289,6 +330,21 @@ class Elements(ABC):
                 self.total(column, total)
                 found.append(total[0].array @ forces)
         return global_sum(self.displacements.dofs.comm, np.array(found))
+
+
+def close_far(columns: list[Column], loads: Loads, share: float) -> Loads:
+    """Make one motion, with its ``share`` of the far field, of two: return it.
+
+    Raises:
+        SolveError: if the tool's movement has none.
+    """
+    if not np.isfinite(share):
+        raise SolveError("the far field is not a number")
+    tool, far = columns[0], columns.pop(1)
+    for part, of_field in zip(tool.unknown, far.unknown, strict=True):
+        part.axpy(share, of_field)
+    tool.prescribed = tool.prescribed + share * far.prescribed
+    return loads.closed(share)
 
 
 def level_of(space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, direct: bool = False) -> Level:

@@ -31,7 +31,7 @@ from pipeline.solve.meridian.system import HalfPlane, max_strain
 from pipeline.solve.meridian.trials import STEP, Rings, RoundTool, Trial, Trials
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import reaction
-from pipeline.solve.solution import Solution
+from pipeline.solve.solution import Contact, Solution
 from pipeline.stages import recorded, stage
 
 DEGREE = 5
@@ -89,9 +89,7 @@ class MeridianContact(DirectProblem):
             iterations=search.trials.count,
             times=times,
             bars=best.error * response.stiffness,
-            contact_area=best.area,
-            contact_radius=(best.area / pi) ** 0.5,
-            contact_area_bar=best.error,
+            contact=Contact(best.area, best.error),
             stored=scale * best.twice_energy / 2,
         )
 
