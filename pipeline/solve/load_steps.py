@@ -31,7 +31,6 @@ from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.newton import Equilibrium, LargeError, tangent_product
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.vectors import assemble, global_sum, vector
-from pipeline.stages import Times, recharge, recorded
 
 # The depth is reached in so many steps at least; smaller ones than this share of it are not tried.
 _FEWEST, _SMALLEST = 3, 1 / 50
@@ -49,8 +48,7 @@ class Walk:
     """How far a ``motion`` of the probe has gone in a body of a ``law``.
 
     ``path`` has depth (m), force (N) and energy (J) of each step, of the modelled part; ``displacement`` (owned dofs)
-    is that at the last one. ``times`` and ``iterations`` are what it took, and no depth begins with a step of more than
-    the last one, ``step`` (m).
+    is that at the last one. No depth begins with a step of more than the last one, ``step`` (m).
     """
 
     law: MaterialLaw
@@ -58,8 +56,6 @@ class Walk:
     displacement: FloatArray
     path: list[tuple[float, float, float]] = field(default_factory=lambda: [(0.0, 0.0, 0.0)])
     step: float = inf
-    iterations: int = 0
-    times: list[Times] = field(default_factory=list)
 
     @property
     def reached(self) -> float:
@@ -98,14 +94,14 @@ class LoadSteps(Solver):
         """Do nothing: what is prescribed is moved step by step."""
 
     def solve(self, columns: Sequence[Column], tolerance: float) -> int:
-        """Press to the depth of the one column; return the iterations; collective.
+        """Press from where the walk has come to the depth of the one column; return the iterations; collective.
 
         ``tolerance`` has no part in it: Newton's method ends where what it gains is rounding.
 
         Raises:
             LargeError: if Newton's method does not get there, or what it finds fails a check.
         """
-        (column,) = columns
+        (column,), before = columns, self._body.iterations
         self._space.forms.set_law(self._law)
         owned = self._space.dofs.owned
         with vector(self._space.dofs.space) as displacement:
@@ -114,7 +110,7 @@ class LoadSteps(Solver):
             column.unknown[0].array[self._space.dofs.prescribed_owned] = 0.0
         check_path(path, _ROUNDING * self._law.lame_mu[0] * self._volume())
         self.stored = float(path[-1, 2])
-        return self._walk.iterations
+        return self._body.iterations - before
 
     def improve(self, columns: Sequence[Column], share: float) -> int:
         """Raise an error: Newton's method has done all that it can."""
@@ -186,11 +182,8 @@ class LoadSteps(Solver):
         walk, depth, space = self._walk, column.amount, self._space.dofs.space
         displacement.array[:] = walk.displacement
         longest = depth / _FEWEST
-        step, before = min(walk.step, longest), self._body.iterations
-        for times in walk.times:
-            recharge(times)
-        with recorded() as times, ExitStack() as stack:
-            walk.times.append(times)
+        step = min(walk.step, longest)
+        with ExitStack() as stack:
             unit, rate, trial, forces = (stack.enter_context(vector(space)) for _ in range(4))
             unit.array[:] = column.prescribed[: self._space.dofs.owned]
             while (reached := walk.reached) < depth:
@@ -202,7 +195,6 @@ class LoadSteps(Solver):
                 there = depth if step >= depth - reached else reached + step
                 walk.path.append((there, forces.dot(unit), energy))
                 walk.displacement[:] = displacement.array
-                walk.iterations, before = walk.iterations + self._body.iterations - before, self._body.iterations
                 walk.step = step = min(step * (2 if steps <= _EASY else 1), longest)
         return np.array(walk.path)
 

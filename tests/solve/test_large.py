@@ -134,9 +134,9 @@ def test_depths_of_a_sweep_share_one_walk(monkeypatch):
         assert record.force == pytest.approx(alone.force, rel=1e-8)
         assert record.force_error == pytest.approx(alone.force_error, rel=1e-2)  # of iterations
         assert record.max_strain == pytest.approx(alone.max_strain, rel=1e-6)
-    (alone,) = solve(material=LARGE, probe={"depth": "9 mm"}).values()
+    assert second.iterations < alone.iterations  # those from the depth before on
+    solve(material=LARGE, probe={"depth": "9 mm"})
     assert shared < len(ends)
-    assert second.time_solve > first.time_solve  # of a case alone
 
 
 def test_a_force_that_is_not_the_derivative_of_the_energy_is_refused():
