@@ -82,7 +82,7 @@ slurm-test: setup ## run the job scripts on a Slurm of two virtual nodes, instal
 verify: setup ## forces against closed forms, tables and the program's other paths
 	$(EPSMESH) verify
 
-benchmark: setup ## every table of docs/performance.md, into results/ (an idle machine, an hour and a half)
+benchmark: setup ## every table of docs/performance.md, into results/ (an idle machine, half an hour)
 	@scripts/peers.sh
 	$(PYTHON) -m benchmarks.start_up
 	$(PYTHON) -m benchmarks.ranks
@@ -97,14 +97,13 @@ benchmark: setup ## every table of docs/performance.md, into results/ (an idle m
 	$(PYTHON) -m benchmarks.paths
 	$(PYTHON) -m benchmarks.scaling
 	$(EPSMESH) benchmark
-	$(PYTHON) -m benchmarks.reductions
 	$(EPSMESH) run studies/speedup.toml --fresh
 
 peers: setup ## NGSolve and scikit-fem against this program, time to a true error (an idle machine): results/peers.md
 	@scripts/peers.sh
 	$(PYTHON) -m benchmarks.peers $(PEERS_ARGS)
 
-plain-loop: setup ## a study as a plain FEniCSx script runs it, against this program (idle, an hour or two)
+plain-loop: setup ## a study as a plain FEniCSx script runs it, against this program, with and without reductions (idle, an hour or two)
 	$(PYTHON) -m benchmarks.plain_loop $(STUDY) $(LOOP_ARGS)
 
 realtime: setup ## the real-time evaluator: a shared library, and its tests in C, C++, Python and under sanitizers

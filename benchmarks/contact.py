@@ -1,22 +1,23 @@
 """What it takes to find the area of contact: against one that is prescribed on the same mesh, and over many depths.
 
-    python -m benchmarks.contact       writes results/contact.json
+    python -m benchmarks.contact
 
 Seconds are those of a processor, medians of runs that alternate; forms are compiled before. A linear solve is all that
 a frictionless footprint takes on the mesh of a ball: spaces, assembly, set-up and iterations. Found contact is to take
 four of them at most, and the error bar to add what it adds there. About a minute.
 """
 
-import json
 import time
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from statistics import median
 from typing import Any
 
 from mpi4py import MPI
 
+from benchmarks.processor import by_turns, median_seconds
+from benchmarks.scenes import graded, study
+from benchmarks.tables import options, write
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.plan.plan import make_plan
 from pipeline.plan.symmetry import model_planes
@@ -29,10 +30,9 @@ from pipeline.solve.spaces import Conditions, Spaces
 from pipeline.study.load import parse
 from pipeline.study.sweep import Case
 
-_REPEATS = 5
+_REPEATS = 3
 _BODY = {"shape": "cylinder", "radius": "6 mm", "height": "5 mm", "fixed": "bottom"}
 _BALL = {"shape": "sphere", "radius": "10 mm", "contact": "unilateral"}
-_MESH = {"epsilon": "full", "fine": "2 mm", "coarse": "2 mm", "growth": 0.5, "degree": 2}
 _DEPTHS = [f"{0.05 + 0.2 * n / 11:.6g} mm" for n in range(12)]
 # Ways to solve many depths, with the reductions that each leaves out and whether all have one mesh.
 _WAYS: dict[str, tuple[tuple[str, ...], bool]] = {
@@ -44,13 +44,7 @@ _WAYS: dict[str, tuple[tuple[str, ...], bool]] = {
 
 
 def _study(poisson: float, rim: str, depth: str | list[str], **probe: Any) -> dict[str, Any]:
-    return {
-        "body": _BODY,
-        "material": {"young": "10 kPa", "poisson": poisson},
-        "probe": _BALL | {"depth": depth} | probe,
-        "mesh": _MESH | {"rim": rim},
-        "solve": {"exact": False},
-    }
+    return study(_BODY, poisson, _BALL | {"depth": depth} | probe, graded("2 mm", "2 mm", rim, 0.5, degree=2))
 
 
 def found(body: BodyMesh, case: Case, *, estimate: bool) -> Solution:
@@ -78,13 +72,7 @@ def in_linear_solves(poisson: float, rim: str = "0.12 mm", repeats: int = _REPEA
         for what, estimate in (("force", False), ("force and bar", True))
     }
     solutions = {name: way() for name, way in ways.items()}  # compiles
-    seconds: dict[str, list[float]] = {name: [] for name in ways}
-    for _ in range(repeats):
-        for name, way in ways.items():
-            start = time.process_time()
-            way()
-            seconds[name].append(time.process_time() - start)
-    spent = {name: median(of_one) for name, of_one in seconds.items()}
+    spent = median_seconds(ways, repeats)
     return {
         "poisson": poisson,
         "element": case.element,
@@ -97,39 +85,42 @@ def in_linear_solves(poisson: float, rim: str = "0.12 mm", repeats: int = _REPEA
 
 def sweeps(repeats: int = _REPEATS) -> dict[str, dict[str, float]]:
     """Return what twelve depths take, mesh and error bars included, in each of the ways; by how much F differs."""
-    result: dict[str, dict[str, float]] = {}
-    forces: dict[str, list[float]] = {}
-    seconds: dict[str, list[float]] = {name: [] for name in _WAYS}
-    for _ in range(repeats):
-        for name, (without, on_one) in _WAYS.items():
-            probe = {"depth_range": [_DEPTHS[0], _DEPTHS[-1]]} if on_one else {}
-            plan = make_plan(parse(_study(0.3, "0.3 mm", _DEPTHS, **probe)), without=("axisymmetric", *without))
-            start = time.process_time()
-            records = compute(plan, MPI.COMM_SELF)
-            seconds[name].append(time.process_time() - start)
-            forces[name] = [records[key].force for key in plan.keys]
-    plain = forces["one mesh, each depth by itself"]
-    for name in _WAYS:
-        off = max(abs(force / other - 1) for force, other in zip(forces[name], plain, strict=True))
-        result[name] = {"seconds": median(seconds[name]), "F differs by": off}
-    return result
+    found = by_turns({name: partial(_sweep, *way) for name, way in _WAYS.items()}, repeats)
+    (_, plain), *_ = found["one mesh, each depth by itself"]
+    return {
+        name: {
+            "seconds": median(seconds for seconds, _ in runs),
+            "F differs by": max(abs(force / other - 1) for force, other in zip(runs[0][1], plain, strict=True)),
+        }
+        for name, runs in found.items()
+    }
 
 
-def main(output: Path = Path("results")) -> dict[str, Any]:
+def _sweep(without: tuple[str, ...], on_one: bool) -> tuple[float, list[float]]:
+    """Return the seconds of twelve depths, and the forces (N)."""
+    probe = {"depth_range": [_DEPTHS[0], _DEPTHS[-1]]} if on_one else {}
+    plan = make_plan(parse(_study(0.3, "0.3 mm", _DEPTHS, **probe)), without=("axisymmetric", *without))
+    start = time.process_time()
+    records = compute(plan, MPI.COMM_SELF)
+    return time.process_time() - start, [records[key].force for key in plan.keys]
+
+
+def main() -> None:
     """Measure, print and write."""
-    rows = [in_linear_solves(poisson) for poisson in (0.3, 0.49)]
+    parser = options(__doc__)
+    parser.add_argument("--repeats", type=int, default=_REPEATS)
+    asked = parser.parse_args()
+    rows = [in_linear_solves(poisson, repeats=asked.repeats) for poisson in (0.3, 0.49)]
     for row in rows:
         print(
             f"ball, ν = {row['poisson']:g}, {row['dofs']:,} dofs of {row['element']} elements: contact found in "
             f"{row['linear solves']:.1f} linear solves (asked: 4), with the error bar {row['with the error bar']:.1f} "
             "times as long as prescribed contact with its bar"
         )
-    depths = sweeps()
+    depths = sweeps(asked.repeats)
     for name, values in depths.items():
         print(f"12 depths, {name}: {values['seconds']:.2f} s, F differs by {values['F differs by']:.0e}")
-    output.mkdir(exist_ok=True)
-    (output / "contact.json").write_text(json.dumps({"found": rows, "depths": depths}, indent=2))
-    return {"found": rows, "depths": depths}
+    write("contact", asked.output, {"found": rows, "depths": depths})
 
 
 if __name__ == "__main__":

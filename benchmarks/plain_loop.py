@@ -2,14 +2,13 @@
 
 Every case is meshed, assembled and solved by itself (:mod:`benchmarks.plain_case`): nothing is shared, no error bars,
 no F_exact, no file is written. The program runs the same study with all of that, as ``epsmesh run --fresh`` does,
-start-up included, and once more without F_exact. Compiled forms are in their caches for both.
+start-up included, once more without F_exact, and a part of it once more with every case solved whole and for itself,
+which tells what the reductions save. Compiled forms are in their caches for all.
 
 ``python -m benchmarks.plain_loop [STUDY]`` wants an idle machine, and takes an hour or two for figure3.toml;
 ``--sample 24`` times so many cases, spread over the sizes of meshes, and extrapolates.
 """
 
-import argparse
-import json
 import os
 import re
 import subprocess
@@ -26,17 +25,20 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 
 from benchmarks.plain_case import MOST_DIRECT, SOLVERS, Solved, solve
-from benchmarks.processor import processor_seconds
+from benchmarks.processor import ROOT, processor_seconds
+from benchmarks.tables import markdown, options, write
+from pipeline.arrays import FloatArray
 from pipeline.plan import estimate
 from pipeline.study.load import load
 from pipeline.study.sweep import Case, Study
 from pipeline.verify.machine import machine
 
-ROOT = Path(__file__).parents[1]
 # Compiles what a run of the program needs, in seconds.
 _WARM_UP = ROOT / "studies" / "quick.toml"
 # Plain elements and quarter-point ones leave different errors at the rim.
 _DIFFER = 0.02
+_WITH = "this program, error bars and F_exact"
+_WHOLE = "the same, every case whole and for itself"
 
 
 def chosen(study: Study, count: int | None) -> list[tuple[Case, float]]:
@@ -50,26 +52,37 @@ def chosen(study: Study, count: int | None) -> list[tuple[Case, float]]:
     return [(cases[stratum[len(stratum) // 2]], float(len(stratum))) for stratum in strata]
 
 
-def run_program(study: Study, folder: Path, *, exact: bool) -> dict[str, Any]:
-    """Run the program afresh on a study; return seconds, processor seconds, and the dataset's path."""
+def run_program(study: Study, folder: Path, *, exact: bool = True, parts: int = 0) -> dict[str, Any]:
+    """Run the program afresh on a study; return seconds, processor seconds, and the dataset's path.
+
+    With ``parts``, nothing is reduced, one of so many parts that cost alike is run, and counted as often.
+    """
     text = study.text
     if not exact:
         text = re.sub(r"^exact\b.*$", "", text, flags=re.MULTILINE)
         text, found = re.subn(r"^\[solve\]", "[solve]\nexact = false", text, flags=re.MULTILINE)
         text = text if found else f"{text}\n[solve]\nexact = false\n"
+    folder.mkdir()
     file = folder / f"{study.name}.toml"
     file.write_text(text)
+    places = ["--store", str(folder / "cases.sqlite"), "--meshes", str(folder / "meshes")]
+    whole = ("--without", "all")
     used, start = processor_seconds(), time.perf_counter()
-    _epsmesh(file, folder)
+    if parts:
+        _epsmesh("run", file, "--quiet", *whole, "--shard", f"1/{parts}", *places[2:])
+    else:
+        _epsmesh("run", file, "--quiet", "--fresh", *places)
     seconds, used = time.perf_counter() - start, processor_seconds() - used
-    return {"seconds": seconds, "cpu": used, "dataset": folder / f"{study.name}.nc"}
+    if parts:
+        _epsmesh("merge", file, *whole, *places[:2])
+    often = max(parts, 1)
+    return {"seconds": often * seconds, "cpu": often * used, "dataset": folder / f"{study.name}.nc"}
 
 
-def _epsmesh(file: Path, folder: Path) -> None:
-    command = [sys.executable, "-m", "pipeline", "run", str(file), "--fresh", "--quiet"]
-    places = ["--store", str(folder / "cases.sqlite"), "--output", str(folder), "--meshes", str(folder / "meshes")]
+def _epsmesh(command: str, file: Path, *words: str) -> None:
+    whole = [sys.executable, "-m", "pipeline", command, str(file), "--output", str(file.parent), *words]
     path = os.pathsep.join(part for part in (str(ROOT), os.environ.get("PYTHONPATH", "")) if part)
-    done = subprocess.run([*command, *places], env=os.environ | {"PYTHONPATH": path}, check=False)
+    done = subprocess.run(whole, env=os.environ | {"PYTHONPATH": path}, check=False)
     if done.returncode > 1:
         raise RuntimeError(f"the program ended with status {done.returncode}")
 
@@ -90,38 +103,35 @@ def run_loop(cases: Sequence[tuple[Case, float]], solver: str, most_direct: int)
     return found
 
 
-def compare(dataset: Path, solved: Sequence[Solved]) -> list[float]:
-    """Return by how much each plain F differs from the program's, relative to it."""
+def forces(dataset: Path) -> FloatArray:
+    """Return F (N) of all cases; not a number where there is none."""
     with xr.open_dataset(dataset) as data:
-        forces = data["force"].values
-    return [one.force / float(forces[one.index]) - 1 for one in solved]
+        return np.array(data["force"].values)
 
 
 def report(study: Study, result: dict[str, Any]) -> str:
     """Return the comparison in markdown."""
-    loop, program = result["plain_loop"], result["program"]
-    lines = [
-        f"`{study.name}`: {result['cases']} cases, {len(result['measured'])} of them timed in the plain loop.",
-        "",
-        "| | time (s) | processor time (s) | ratio | ratio, processor |",
-        "|---|---|---|---|---|",
-        f"| plain loop, no error bars, no F_exact | {loop['seconds']:.0f} | {loop['cpu']:.0f} | | |",
+    loop, measured = result["plain_loop"], result["measured"]
+    rows = [
+        {
+            "": name,
+            "time (s)": own["seconds"],
+            "processor time (s)": own["cpu"],
+            "ratio": loop["seconds"] / own["seconds"],
+            "ratio, processor": loop["cpu"] / own["cpu"],
+        }
+        for name, own in {"plain loop, no error bars, no F_exact": loop, **result["program"]}.items()
     ]
-    names = {"with F_exact": "this program, error bars and F_exact", "without F_exact": "this program, error bars"}
-    for key, name in names.items():
-        own = program[key]
-        faster = f"{loop['seconds'] / own['seconds']:.1f} | {loop['cpu'] / own['cpu']:.1f}"
-        lines.append(f"| {name} | {own['seconds']:.0f} | {own['cpu']:.0f} | {faster} |")
+    columns = {"": "", "time (s)": ".0f", "processor time (s)": ".0f", "ratio": ".1f", "ratio, processor": ".1f"}
     parts = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in loop["parts"].items())
-    worst = max(result["measured"], key=lambda one: abs(one["deviation"]))
-    lines += [
-        "",
-        f"Parts of the plain loop: {parts}.",
-        "",
+    worst = max(measured, key=lambda one: abs(one["deviation"]))
+    return (
+        f"`{study.name}`: {result['cases']} cases, {len(measured)} of them timed in the plain loop.\n\n"
+        f"{markdown(rows, columns)}\nParts of the plain loop: {parts}.\n\n"
         f"Its F differs from the program's by {100 * result['median_deviation']:.2f} % in the median, at most by "
-        f"{100 * worst['deviation']:+.2f} % ({worst['case']}).",
-    ]
-    return "\n".join(lines) + "\n"
+        f"{100 * worst['deviation']:+.2f} % ({worst['case']}).\n\n"
+        f"Reductions change F by {result['reduced']:.1e} at most.\n"
+    )
 
 
 def totals(cases: Sequence[tuple[Case, float]], solved: Sequence[Solved]) -> dict[str, Any]:
@@ -135,37 +145,41 @@ def totals(cases: Sequence[tuple[Case, float]], solved: Sequence[Solved]) -> dic
 
 
 def main() -> int:
-    """Time both; return 1 if their forces differ by more than the elements explain."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    """Time all; return 1 if their forces differ by more than the elements explain."""
+    parser = options(__doc__)
     parser.add_argument("study", nargs="?", type=Path, default=ROOT / "studies" / "figure3.toml")
     parser.add_argument("--sample", type=int, help="time so many cases only, and extrapolate")
+    parser.add_argument("--parts", type=int, default=4, help="of these, one is run without reductions")
     parser.add_argument("--solver", choices=SOLVERS, default="gamg", help="for what is too large for a direct solve")
     parser.add_argument("--most-direct", type=int, default=MOST_DIRECT, help="unknowns up to which MUMPS solves")
-    parser.add_argument("--output", type=Path, default=Path("results"))
-    options = parser.parse_args()
+    asked = parser.parse_args()
     os.environ["OMP_NUM_THREADS"] = "1"
-    study = load(options.study)
-    cases = chosen(study, options.sample)
+    study = load(asked.study)
+    cases = chosen(study, asked.sample)
+    ways: dict[str, dict[str, Any]] = {
+        _WITH: {},
+        "this program, error bars": {"exact": False},
+        _WHOLE: {"parts": asked.parts},
+    }
     with TemporaryDirectory() as folder:
-        _epsmesh(_WARM_UP, Path(folder, "warm-up"))
+        run_program(load(_WARM_UP), Path(folder, "warm-up"))
         program = {}
-        for key, exact in (("without F_exact", False), ("with F_exact", True)):
-            place = Path(folder, key.replace(" ", "-"))
-            place.mkdir()
-            program[key] = run_program(study, place, exact=exact)
-            print(f"this program, {key}: {program[key]['seconds']:.0f} s, {program[key]['cpu']:.0f} s cpu", flush=True)
+        for number, (name, how) in enumerate(ways.items()):
+            program[name] = run_program(study, Path(folder, str(number)), **how)
+            print(f"{name}: {program[name]['seconds']:.0f} s, {program[name]['cpu']:.0f} s cpu", flush=True)
         with threadpool_limits(limits=1):
-            solved = run_loop(cases, options.solver, options.most_direct)
-        deviations = compare(program["with F_exact"].pop("dataset"), solved)
-    program["without F_exact"].pop("dataset")
+            solved = run_loop(cases, asked.solver, asked.most_direct)
+        with_all, _, whole = (forces(own.pop("dataset")) for own in program.values())
+    deviations = [one.force / float(with_all[one.index]) - 1 for one in solved]
     result = {
         "study": study.name,
         "cases": len(list(study.cases())),
         "machine": machine(),
-        "solver": options.solver,
-        "most_direct": options.most_direct,
+        "solver": asked.solver,
+        "most_direct": asked.most_direct,
         "program": program,
         "plain_loop": totals(cases, solved),
+        "reduced": float(np.nanmax(np.abs(whole / with_all - 1))),
         "median_deviation": float(np.median(np.abs(deviations))),
         "measured": [
             asdict(one) | {"stands_for": weight, "deviation": deviation}
@@ -173,9 +187,7 @@ def main() -> int:
         ],
     }
     text = report(study, result)
-    options.output.mkdir(parents=True, exist_ok=True)
-    (options.output / "plain_loop.json").write_text(json.dumps(result, indent=1) + "\n")
-    (options.output / "plain_loop.md").write_text(text)
+    write("plain_loop", asked.output, result, text)
     print(f"\n{text}")
     return int(max(map(abs, deviations)) > _DIFFER)
 

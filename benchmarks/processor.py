@@ -1,9 +1,85 @@
-"""Processor time: other programs on the machine lengthen it far less than the time that passes."""
+"""How a benchmark measures: seconds of the processor, ways by turns, and processes of their own.
 
+Other programs on the machine lengthen processor time far less than the time that passes.
+"""
+
+import json
+import os
 import resource
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pipeline.verify.machine import MPI_ENVIRONMENT
+
+ROOT = Path(__file__).parents[1]
+# Debian's own mpirun: another one on PATH would not fit Debian's mpi4py.
+MPIRUN = ("/usr/bin/mpirun", "--oversubscribe", "-n")
+Answer = TypeVar("Answer")
 
 
 def processor_seconds() -> float:
     """Return what this process and the children that it waited for have used of processors."""
     used = [resource.getrusage(whose) for whose in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(one.ru_utime + one.ru_stime for one in used)
+
+
+def by_turns(ways: Mapping[str, Callable[[], Answer]], repeats: int) -> dict[str, list[Answer]]:
+    """Return what each way gives at each of its ``repeats``; ways take turns, to share what else the machine does."""
+    found: dict[str, list[Answer]] = {name: [] for name in ways}
+    for _ in range(repeats):
+        for name, way in ways.items():
+            found[name].append(way())
+    return found
+
+
+def median_seconds(ways: Mapping[str, Callable[[], Any]], repeats: int) -> dict[str, float]:
+    """Return the median of the processor's seconds of this process that each way takes, by turns."""
+
+    def timed(way: Callable[[], Any]) -> float:
+        start = time.process_time()
+        way()
+        return time.process_time() - start
+
+    found = by_turns({name: lambda way=way: timed(way) for name, way in ways.items()}, repeats)
+    return {name: statistics.median(seconds) for name, seconds in found.items()}
+
+
+def ask(words: Sequence[str], ranks: int = 1, tree: Path = ROOT, launcher: Sequence[str] = ()) -> Any:
+    """Run Python with ``words`` in a process, or on ``ranks``, of its own; return the last line, JSON, that it prints.
+
+    It has one thread, and imports what it needs from the checkout ``tree``. ``launcher`` are more words for mpirun.
+
+    Raises:
+        RuntimeError: with what it said, if it fails.
+    """
+    many = [*MPIRUN, str(ranks), *launcher] if ranks > 1 or launcher else []
+    paths = os.environ | MPI_ENVIRONMENT | {"PYTHONPATH": str(tree)}
+    done = subprocess.run(
+        [*many, sys.executable, "-m", "mpi4py", *words],
+        cwd=tree,
+        env=paths,
+        check=False,
+        capture_output=True,
+        text=True,
+    )
+    if done.returncode:
+        raise RuntimeError(f"{' '.join(words)[:200]}: status {done.returncode}\n{done.stdout}{done.stderr}")
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def run(study: dict[str, Any], ranks: int = 1, tree: Path = ROOT, **how: Any) -> dict[str, Any]:
+    """Return what a run of ``study`` takes and gives in a process of its own: see :mod:`benchmarks.one_run`.
+
+    Raises:
+        RuntimeError: if a case fails.
+    """
+    worker = str(Path(__file__).with_name("one_run.py"))
+    found: dict[str, Any] = ask([worker, json.dumps(study), json.dumps(how)], ranks, tree)
+    if found["message"]:
+        raise RuntimeError(found["message"])
+    return found

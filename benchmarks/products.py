@@ -5,19 +5,15 @@ medians; ways take turns, so that each has its share of what else the machine do
 product stands beside it: pattern and assembly of a matrix, or the layout of cells; and the bytes that are then kept.
 """
 
-import argparse
-import json
-import statistics
 import time
-from collections.abc import Callable
 from contextlib import ExitStack
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.solvers import YOUNG, _case
-from benchmarks.tables import markdown
+from benchmarks.processor import median_seconds
+from benchmarks.solvers import YOUNG, case_of
+from benchmarks.tables import Table, options
 
 # Element size far from the probe and at its edge, mm.
 SIZES = ((3.0, 0.5), (1.7, 0.2), (1.0, 0.2))
@@ -48,7 +44,7 @@ def measure(size: tuple[float, float], degrees: list[int]) -> list[dict[str, Any
 
     law = MaterialLaw.of_moduli(YOUNG, 0.3)
     with threadpool_limits(limits=1):
-        mesh = mesh_case(_case(2, size), ("x", "y"), MPI.COMM_SELF)
+        mesh = mesh_case(case_of(2, size), ("x", "y"), MPI.COMM_SELF)
         rows = []
         for degree in degrees:
             with Spaces(mesh) as spaces:
@@ -71,13 +67,12 @@ def _row(space: Any, law: Any) -> dict[str, Any]:
         x.array[space.dofs.prescribed] = 0.0
         cells = operator.getPythonContext()
         single = x.array.astype(np.float32), np.empty(x.getSize(), dtype=np.float32)
-        found = _medians(
-            {
-                "petsc": lambda: matrix.mult(x, y),
-                "cells_double": lambda: operator.mult(x, y),
-                "cells_single": lambda: cells.multiply(*single),
-            }
-        )
+        ways = {
+            "petsc": lambda: matrix.mult(x, y),
+            "cells_double": lambda: operator.mult(x, y),
+            "cells_single": lambda: cells.multiply(*single),
+        }
+        found = {name: 1e3 * seconds for name, seconds in median_seconds(ways, ROUNDS).items()}
         return {
             "degree": space.degree,
             "dofs": space.dofs.dofs,
@@ -90,29 +85,17 @@ def _row(space: Any, law: Any) -> dict[str, Any]:
         }
 
 
-def _medians(ways: dict[str, Callable[[], Any]]) -> dict[str, float]:
-    """Return the milliseconds that each way takes, which take turns."""
-    taken: dict[str, list[float]] = {name: [] for name in ways}
-    for _ in range(ROUNDS):
-        for name, way in ways.items():
-            start = time.process_time()
-            way()
-            taken[name].append(1e3 * (time.process_time() - start))
-    return {name: statistics.median(values) for name, values in taken.items()}
-
-
 def main() -> None:
     """Measure, and write ``products.json`` and ``products.md``."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser = options(__doc__)
     parser.add_argument("--largest", type=int, default=len(SIZES), help="how many of the sizes")
     parser.add_argument("--degrees", type=int, nargs="+", default=[2, 3], choices=(2, 3, 4))
-    parser.add_argument("--output", type=Path, default=Path("results"))
-    arguments = parser.parse_args()
-    rows = [row for size in SIZES[: arguments.largest] for row in measure(size, arguments.degrees)]
-    arguments.output.mkdir(parents=True, exist_ok=True)
-    (arguments.output / "products.json").write_text(json.dumps(rows, indent=1))
-    (arguments.output / "products.md").write_text(markdown(rows, COLUMNS))
-    print(markdown(rows, COLUMNS))
+    asked = parser.parse_args()
+    table = Table(COLUMNS)
+    for size in SIZES[: asked.largest]:
+        for row in measure(size, asked.degrees):
+            table.add(row)
+    table.write("products", asked.output)
 
 
 if __name__ == "__main__":

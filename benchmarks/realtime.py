@@ -21,12 +21,13 @@ from types import MappingProxyType
 
 import numpy as np
 
+from benchmarks.tables import markdown
 from benchmarks.touches import NAMES, add_groups, flat_kinds, groups_of
 from pipeline.arrays import FloatArray
 from pipeline.export.checks import TOOLS, Check, with_bar
 from pipeline.export.export import export, write
 from pipeline.export.full import Solver
-from pipeline.export.scope import scope_of
+from pipeline.export.scope import Scope, scope_of
 from pipeline.export.tabulate import shares
 from pipeline.realtime import load
 from pipeline.realtime.model import Model
@@ -35,7 +36,11 @@ from pipeline.study.load import load as load_study
 _FOLDER = Path("results/realtime")
 # Of models; of the full solves that they are judged by, flat tools, those on organs, and others; how many their bars
 # are fitted to, and judged on as well.
-_ACCURACY, _PRECISE, _PRECISE_ORGAN, _PRECISE_ROUND, _CHECKS = 0.01, 0.0025, 0.005, 0.006, 12
+ACCURACY, _PRECISE, _PRECISE_ORGAN, _PRECISE_ROUND, _CHECKS = 0.01, 0.0025, 0.005, 0.006, 12
+_COLUMNS = (
+    "model", "tool", "touches", "places", "median error", "largest", "held", "with truth's bar", "bar/error",
+    "truth's bar", "half-space", "nearest point",
+)  # fmt: skip
 _FLAT = (
     '\n[probe]\nshape = "disc"\ncontact = "frictionless"\nradius = "4 mm"\ndepth = "0.1 mm"\n[mesh]\naccuracy = "1 %"\n'
 )
@@ -100,19 +105,14 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=inf, help="of processor time for full solves")
     parser.add_argument("--seconds", type=float, default=60.0, help="of a loop at 1 kHz")
     asked = parser.parse_args()
-    _FOLDER.mkdir(parents=True, exist_ok=True)
     names, end = asked.models.split(","), time.process_time() + 60 * asked.minutes
     rounds = {name: _touches(name, asked.touches, asked.round) for name in names}
     while rounds and time.process_time() < end:
         for name in list(rounds):
             if next(rounds[name], None) is None:
                 del rounds[name]
-    print("| model | tool | touches | places | median error | largest | held | with truth's bar | bar/error | ", end="")
-    print("truth's bar | half-space | nearest point |")
-    print("|" + 12 * "---|")
-    for name in names:
-        for line in _lines(name, load(_FOLDER / f"{name}.epsm.nc")):
-            print(line, flush=True)
+    rows = [row for name in names for row in _rows(name, load(_FOLDER / f"{name}.epsm.nc"))]
+    print(markdown(rows, dict.fromkeys(_COLUMNS, "")))
     if asked.seconds > 0:
         print()
         print(_latency(_FOLDER / f"{names[0]}.epsm.nc", asked.seconds))
@@ -131,18 +131,25 @@ def _touches(name: str, flat: int, others: int) -> Iterator[list[Check]]:
 
 
 def _model(name: str) -> tuple[Model, Solver]:
-    """Return a model, made if there is none yet, and what solves its touches."""
-    study, path = _FOLDER / f"{name}.toml", _FOLDER / f"{name}.epsm.nc"
+    """Return a model, and what solves its touches."""
+    model, scope = model_of(name, _FOLDER, _CHECKS)
+    precise = _PRECISE if scope.body.half_sides else _PRECISE_ORGAN
+    return model, Solver(scope.sections, scope.file, scope.young, precise)
+
+
+def model_of(name: str, folder: Path, checks: int) -> tuple[Model, Scope]:
+    """Return the model of a study by its ``name`` in :data:`STUDIES`, made in ``folder`` if there is none yet."""
+    study, path = folder / f"{name}.toml", folder / f"{name}.epsm.nc"
+    folder.mkdir(parents=True, exist_ok=True)
     study.write_text(STUDIES[name], encoding="utf-8")
     scope = scope_of(load_study(study))
     if not path.exists():
-        write(export(scope, _ACCURACY, _CHECKS), path, scope, study, "benchmark")
-    precise = _PRECISE if scope.body.half_sides else _PRECISE_ORGAN
-    return load(path), Solver(scope.sections, scope.file, scope.young, precise)
+        write(export(scope, ACCURACY, checks), path, scope, study, "benchmark")
+    return load(path), scope
 
 
-def _lines(name: str, model: Model) -> Iterator[str]:
-    """Yield a line for each tool, and one for all that are flat."""
+def _rows(name: str, model: Model) -> Iterator[dict[str, str]]:
+    """Yield a row for each tool, and one for all that are flat."""
     flat, others = (_judged(model, groups_of(_records(name, tools))) for tools in ("touches", "round"))
     for tool, groups in [
         *((tool, flat) for tool in (*TOOLS, "all")),
@@ -150,7 +157,7 @@ def _lines(name: str, model: Model) -> Iterator[str]:
     ]:
         of = [group for group in groups if tool in ("all", NAMES[group[0].kind])]
         if of:
-            yield "| " + " | ".join([name, tool, *_cells(model, of)]) + " |"
+            yield dict(zip(_COLUMNS, (name, tool, *_cells(model, of)), strict=True))
 
 
 def _judged(model: Model, groups: Mapping[int, Sequence[Check]]) -> list[list[Check]]:

@@ -21,6 +21,7 @@ from tempfile import TemporaryDirectory
 import psutil
 from mpi4py import MPI
 
+from benchmarks.scenes import many_small
 from pipeline.plan.plan import make_plan
 from pipeline.run.execute import execute
 from pipeline.run.progress import Progress
@@ -34,32 +35,6 @@ _PACE = 0.1
 _ANSWER = 10e-3  # s
 _MARKS = 20
 _ASKED = 50
-
-
-def study(cases: int) -> dict[str, object]:
-    """Return a study of small scenes, of which ten share a mesh and none another's solution."""
-    meshes = max(cases // _ON_A_MESH, 1)
-    return {
-        "body": {"shape": "box", "size": ["30 mm", "30 mm", "15 mm"], "fixed": "bottom"},
-        "material": {"young": "10 kPa", "poisson": [0.04 * number for number in range(_ON_A_MESH)]},
-        "probe": {
-            "action": "pierce",
-            "shape": "disc",
-            "radius": [f"{2 + i / meshes:.6f} mm" for i in range(meshes)],
-            "depth": "0.1 mm",
-        },
-        "mesh": {
-            "epsilon": "full",
-            "fine": "6 mm",
-            "coarse": "6 mm",
-            "rim": "1 mm",
-            "growth": 0.9,
-            "degree": 1,
-            "model": "3d",
-        },
-        "solve": {"exact": False},
-        "plan": {"without": ["reduced"]},
-    }
 
 
 @dataclass
@@ -108,7 +83,7 @@ class Log:
 def main(cases: int) -> int:
     """Run the soak; collective. Returns the exit status."""
     comm = MPI.COMM_WORLD
-    plan = make_plan(parse(study(cases)))
+    plan = make_plan(parse(many_small(cases, _ON_A_MESH)))
     with TemporaryDirectory() as folder:
         log = Log(Store(Path(folder) / "cases.sqlite"), max(cases // _MARKS, 1)) if comm.rank == 0 else None
         failed = execute(plan, comm, log.keep if log else lambda _: None, Progress())

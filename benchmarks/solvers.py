@@ -7,22 +7,21 @@ peak memory is that of its largest solve. From this come ``DIRECT_LIMIT`` in ``p
 ``pipeline/solve/elements/mixed.py``, and the bytes per dof in ``pipeline/plan/estimate.py``.
 """
 
-import argparse
 import itertools
 import json
 import statistics
-import subprocess
 import sys
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from math import exp, log
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.tables import markdown
+from benchmarks.processor import ask
+from benchmarks.scenes import BOX, DISC, graded, study
+from benchmarks.tables import Table, markdown, options, write
 from pipeline.solve.loads import Loads, Motion
 
 # Element size far from the probe and at its edge, mm.
@@ -31,6 +30,8 @@ LARGE = {1: ((1, 0.2), (0.6, 0.2)), 2: ((1.7, 0.2), (1.0, 0.2), (0.63, 0.2)), 3:
 RATIOS = {"displacement": (0.3, 0.45, 0.49), "mixed": (0.45, 0.49, 0.4999)}
 YOUNG = 10e3
 PRESS = Motion((0.0, 0.0, -1.0))
+# Solves that take longer than so many seconds vary by less than what they are told to.
+_ENOUGH = 8.0
 COLUMNS = {
     "element": "",
     "degree": "d",
@@ -60,22 +61,22 @@ def measure(element: str, degree: int, poisson: float, size: tuple[float, float]
     from pipeline.solve.spaces import Conditions, Spaces
 
     with threadpool_limits(limits=1), ExitStack() as stack:
-        mesh = mesh_case(_case(degree, size), ("x", "y"), MPI.COMM_SELF)
+        mesh = mesh_case(case_of(degree, size), ("x", "y"), MPI.COMM_SELF)
         base = PeakMemory(MPI.COMM_SELF)
         held = base.peak()
         problem = stack.enter_context(
             QuasiStaticProblem(stack.enter_context(Spaces(mesh)), degree, Conditions(), element)
         )
-        run = _mixed_run if isinstance(problem, "mixed") else _elastic_run
+        run = _mixed_run if element == "mixed" else _elastic_run
         matrix, once = run(problem, MaterialLaw.of_moduli(YOUNG, poisson), method, stack)
-        runs = []
-        for _ in range(repeats):
+        runs, start = [], time.process_time()
+        while len(runs) < repeats and (not runs or time.process_time() - start < _ENOUGH):
             before = _application(matrix)
             assemble, setup, solve, iterations = once()
             unit = (before + _application(matrix)) / 2
             runs.append((assemble / unit, setup / unit, solve / unit, unit))
         assemble, setup, solve, unit = (statistics.median(values) for values in zip(*runs, strict=True))
-        moved = matrix.getInfo()["nz_used"] * (8 + 4 / 9) + 16 * matrix.getSize()[0]
+        moved = _entries(matrix) + 16 * matrix.getSize()[0]
         row = {
             "element": element,
             "degree": degree,
@@ -94,23 +95,12 @@ def measure(element: str, degree: int, poisson: float, size: tuple[float, float]
     print(json.dumps(row), flush=True)
 
 
-def _case(degree: int, size: tuple[float, float]) -> Any:
+def case_of(degree: int, size: tuple[float, float]) -> Any:
+    """Return the case whose mesh has elements of these sizes (mm)."""
     from pipeline.study.load import parse
 
-    content = {
-        "body": {"shape": "box", "size": ["60 mm", "60 mm", "20 mm"], "fixed": "bottom"},
-        "material": {"young": "10 kPa", "poisson": 0.3},
-        "probe": {"action": "pierce", "shape": "disc", "radius": "2 mm", "depth": "0.2 mm"},
-        "mesh": {
-            "epsilon": "full",
-            "fine": f"{size[0]} mm",
-            "coarse": "20 mm",
-            "rim": f"{size[1]} mm",
-            "growth": 0.5,
-            "degree": degree,
-        },
-    }
-    return parse(content).case(())
+    mesh = graded(f"{size[0]} mm", "20 mm", f"{size[1]} mm", 0.5, degree=degree)
+    return parse(study(BOX, 0.3, DISC, mesh)).case(())
 
 
 def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[Any, Callable[[], Any]]:
@@ -184,6 +174,12 @@ def _application(matrix: Any, times: int = 9) -> float:
     return statistics.median(seconds)
 
 
+def _entries(matrix: Any) -> float:
+    """Return the bytes of a matrix, or of what a product cell by cell keeps."""
+    is_product = matrix.getType() == "python"
+    return matrix.getPythonContext().nbytes if is_product else matrix.getInfo()["nz_used"] * (8 + 4 / 9)
+
+
 def _stream() -> float:
     """Return the bandwidth of memory (bytes/s): a sum of two long arrays into a third."""
     a, b, c = np.zeros(10_000_000), np.ones(10_000_000), np.ones(10_000_000)
@@ -226,33 +222,28 @@ def plan(largest: int) -> list[tuple[str, int, float, tuple[float, float], str]]
 
 
 def main() -> None:
-    """Measure, and write ``solvers.json`` and ``solvers.md``."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    """Measure, print and write."""
+    parser = options(__doc__)
     parser.add_argument("--one", help="a row, as JSON: what runs in a process of its own")
-    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--repeats", type=int, default=3, help="at most")
+    parser.add_argument("--rows", type=int, help="the first of them only")
     parser.add_argument(
         "--largest", type=int, default=3, help="how many of the large sizes; the third is a million dofs"
     )
-    parser.add_argument("--output", type=Path, default=Path("results"))
-    arguments = parser.parse_args()
-    if arguments.one:
-        measure(*json.loads(arguments.one), repeats=arguments.repeats)
+    asked = parser.parse_args()
+    if asked.one:
+        measure(*json.loads(asked.one), repeats=asked.repeats)
         return
-    rows = []
-    for case in plan(arguments.largest):
-        command = [sys.executable, "-m", "benchmarks.solvers", "--one", json.dumps(case)]
-        done = subprocess.run([*command, "--repeats", str(arguments.repeats)], stdout=subprocess.PIPE, check=False)
-        if done.returncode:
-            print(f"failed: {case}", file=sys.stderr)
-            continue
-        rows.append(json.loads(done.stdout))
-        print(markdown(rows[-1:], COLUMNS).splitlines()[-1], flush=True)
-    arguments.output.mkdir(parents=True, exist_ok=True)
-    crossed = crossovers(rows)
-    (arguments.output / "solvers.json").write_text(json.dumps({"rows": rows, "crossover": crossed}, indent=1))
+    table = Table(COLUMNS)
+    for case in plan(asked.largest)[: asked.rows]:
+        try:
+            table.add(ask(["-m", "benchmarks.solvers", "--one", json.dumps(case), "--repeats", str(asked.repeats)]))
+        except RuntimeError as error:  # without the memory for one of them the others are still worth something
+            print(f"failed: {error}", file=sys.stderr)
+    crossed = crossovers(table.rows)
     said = "".join(f"- {name}: {dofs} dofs\n" for name, dofs in crossed.items())
-    text = f"{markdown(rows, COLUMNS)}\nDirect and iterative take the same time at\n\n{said}"
-    (arguments.output / "solvers.md").write_text(text)
+    text = f"{markdown(table.rows, COLUMNS)}\nDirect and iterative take the same time at\n\n{said}"
+    write("solvers", asked.output, {"rows": table.rows, "crossover": crossed}, text)
 
 
 if __name__ == "__main__":

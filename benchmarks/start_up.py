@@ -3,20 +3,21 @@
 python -m benchmarks.start_up                  this program
 python -m benchmarks.start_up ../earlier ...   and other checkouts of it, by turns, on the studies of the last one
 
-Writes results/start_up.json. Each command runs in a process of its own, as where it is installed: with the bytecode
+Each command runs in a process of its own, as where it is installed: with the bytecode
 that Python keeps. Seconds of the processor depend less than those of the clock on what else the machine does; the least
 of them depends least.
 """
 
-import json
 import os
-import resource
 import shutil
 import statistics
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+from benchmarks.processor import ROOT, processor_seconds
+from benchmarks.tables import options, write
 
 COMMANDS = {
     "--help": ["--help"],
@@ -28,17 +29,20 @@ COMMANDS = {
     "status": ["status", "studies/quick.toml"],
     "plan of a case": ["plan", "studies/quick.toml", "0"],
 }
-HERE = Path(__file__).parents[1]
 _REPEATS = 15
 
 
-def main(*others: str, output: Path = Path("results")) -> dict[str, dict[str, dict[str, float]]]:
+def main() -> None:
     """Measure, print and write: by checkout and command, the least and the median of the seconds, and the modules."""
-    trees = [HERE, *(Path(other).resolve() for other in others)]
+    parser = options(__doc__)
+    parser.add_argument("others", nargs="*", type=Path, help="other checkouts")
+    parser.add_argument("--repeats", type=int, default=_REPEATS)
+    asked = parser.parse_args()
+    trees = [ROOT, *(other.resolve() for other in asked.others)]
     seconds: dict[tuple[Path, str], list[float]] = {(tree, name): [] for tree in trees for name in COMMANDS}
     modules: dict[tuple[Path, str], int] = {}
     with tempfile.TemporaryDirectory() as folder:
-        for turn in range(_REPEATS + 1):
+        for turn in range(asked.repeats + 1):
             for name, arguments in COMMANDS.items():
                 for tree in trees:
                     place = Path(folder) / "place"
@@ -62,9 +66,7 @@ def main(*others: str, output: Path = Path("results")) -> dict[str, dict[str, di
     for name in COMMANDS:
         row = (found[str(tree)][name] for tree in trees)
         print(f"{name:18}", *(f"{one['least']:.3f} {one['median']:.3f} s {one['modules']:4} modules" for one in row))
-    output.mkdir(exist_ok=True)
-    (output / "start_up.json").write_text(json.dumps(found, indent=2))
-    return found
+    write("start_up", asked.output, found)
 
 
 def _run(tree: Path, words: list[str], place: Path) -> str:
@@ -77,10 +79,9 @@ def _run(tree: Path, words: list[str], place: Path) -> str:
 
 
 def _seconds(tree: Path, arguments: list[str], place: Path) -> float:
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    before = processor_seconds()
     _run(tree, ["-m", "pipeline", *arguments], place)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return processor_seconds() - before
 
 
 def _modules(tree: Path, arguments: list[str], place: Path) -> int:
@@ -95,4 +96,4 @@ def _modules(tree: Path, arguments: list[str], place: Path) -> int:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    main()

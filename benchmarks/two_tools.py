@@ -18,18 +18,16 @@ from statistics import median
 
 import numpy as np
 
-from benchmarks.realtime import STUDIES
+from benchmarks.realtime import model_of
 from benchmarks.two_discs import Disc, forces, meshed
 from pipeline.export.checks import random_place
-from pipeline.export.export import export, write
-from pipeline.export.scope import Scope, scope_of
-from pipeline.realtime import Model, load
+from pipeline.export.scope import Scope
+from pipeline.realtime import Model
 from pipeline.realtime.several import NEAR
 from pipeline.shapes.body import Layered
-from pipeline.study.load import load as load_study
 
 _FOLDER = Path("results/two_tools")
-_ACCURACY, _CHECKS, _SIZES, _DEPTHS, _SEED = 0.01, 6, (0.04, 0.25), (5e-5, 2e-4), 77
+_CHECKS, _SIZES, _DEPTHS, _SEED = 6, (0.04, 0.25), (5e-5, 2e-4), 77
 # Middles are up to so many times both radii apart: beyond, there is little to see.
 _APART = 8.0
 
@@ -62,7 +60,7 @@ def main() -> None:
 
 
 def _lines(name: str, pairs: int, finer: float) -> Iterator[str]:
-    model, scope = _model(name)
+    model, scope = model_of(name, _FOLDER, _CHECKS)
     rng, found = np.random.default_rng(_SEED), defaultdict(list)
     for _ in range(pairs):
         for poisson, felt in _solved(model, scope, _pair(model, rng), rng.uniform(*_DEPTHS, 2).tolist(), finer):
@@ -75,16 +73,6 @@ def _lines(name: str, pairs: int, finer: float) -> Iterator[str]:
             f"{100 * max(lost):.1f} % | {100 * median(errors):.2g} %, {100 * max(errors):.2g} % | {held} | "
             f"{100 * median(each.bar for each in felt):.2g} % |"
         )
-
-
-def _model(name: str) -> tuple[Model, Scope]:
-    study, path = _FOLDER / f"{name}.toml", _FOLDER / f"{name}.epsm.nc"
-    _FOLDER.mkdir(parents=True, exist_ok=True)
-    study.write_text(STUDIES[name])
-    scope = scope_of(load_study(study))
-    if not path.exists():
-        write(export(scope, _ACCURACY, _CHECKS), path, scope, study, "benchmark")
-    return load(path), scope
 
 
 def _pair(model: Model, rng: np.random.Generator) -> list[Disc]:

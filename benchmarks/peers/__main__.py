@@ -8,7 +8,6 @@ import json
 import sys
 from collections.abc import Iterator
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 from benchmarks.peers.figure import draw
@@ -17,46 +16,51 @@ from benchmarks.peers.results import TARGETS, Run, breakdown, medians, standings
 from benchmarks.peers.settings import CONTACT_GRID, GRIDS, LADDERS, MERIDIAN, PROGRAM, Settings
 from benchmarks.peers.tasks import TASKS
 from benchmarks.peers.truth import Truth, converge, known
+from benchmarks.tables import options, write
 from pipeline.verify.machine import machine
+
+# Runs of more processor seconds vary too little to be repeated.
+_LONG = 3.0
 
 
 def main() -> int:
     """Run everything that is asked for; return 1 if a setting failed or two truths differ."""
-    options = _options()
-    truths = {name: converge(name) if options.truth else known(TASKS[name]) for name in options.scenes}
+    asked = _options()
+    truths = {name: converge(name) if asked.truth else known(TASKS[name]) for name in asked.scenes}
     print(truths_table(truths), flush=True)
-    if options.scan:
-        _scan(options, truths)
+    if asked.scan:
+        _scan(asked, truths)
         return 0
     runs: list[Run] = []
     failures: list[dict[str, Any]] = []
-    for program, job in _jobs(options):
-        for answer in _answers(program, job):
+    slow: set[str] = set()
+    for program, job in _jobs(asked):
+        job["settings"] = [setting for setting in job["settings"] if _name(program, job, setting) not in slow]
+        for answer in _answers(program, job) if job["settings"] else ():
             if "failed" in answer:
                 failures.append({"program": program, "scene": job["scene"], **answer})
                 print(f"{program}, {job['scene']}: {answer['setting']}: {answer['failed']}", file=sys.stderr)
                 continue
             runs.append(_run(program, job, answer, truths))
+            if runs[-1].cpu > _LONG:
+                slow.add(_name(program, job, answer["setting"]))
             print(_line(runs[-1]), flush=True)
     runs = medians(runs)
     found = standings(runs)
     texts = [truths_table(truths), table(found), breakdown(found)]
-    if options.cpu:
+    if asked.cpu:
         texts.insert(2, "Processor time instead of time:\n\n" + table(standings(runs, "cpu")))
-    options.output.mkdir(parents=True, exist_ok=True)
-    (options.output / "peers.md").write_text("\n\n".join(texts) + "\n")
-    content = to_json(truths, runs, machine() | {"repeats": options.repeats}, failures)
-    (options.output / "peers.json").write_text(json.dumps(content, indent=1) + "\n")
-    print("", *texts, draw(runs, options.output / "peers.png"), sep="\n\n")
+    content = to_json(truths, runs, machine() | {"repeats": asked.repeats}, failures)
+    write("peers", asked.output, content, "\n\n".join(texts) + "\n")
+    print("", *texts, draw(runs, asked.output / "peers.png"), sep="\n\n")
     return int(bool(failures) or not all(truth.agree for truth in truths.values()))
 
 
 def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = options(__doc__)
     parser.add_argument("--scenes", nargs="+", choices=TASKS, default=list(TASKS))
     parser.add_argument("--programs", nargs="+", choices=MODULES, default=list(MODULES))
     parser.add_argument("--repeats", type=int, default=3, help="runs of each setting; the median counts")
-    parser.add_argument("--output", type=Path, default=Path("results"))
     parser.add_argument("--truth", action="store_true", help="converge every scene again, in two programs")
     parser.add_argument("--two", action="store_true", help="also on two ranks, NGSolve on two threads")
     parser.add_argument("--cpu", action="store_true", help="also a table of processor times, for a busy machine")
@@ -64,14 +68,18 @@ def _options() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _jobs(options: argparse.Namespace) -> Iterator[tuple[str, dict[str, Any]]]:
+def _jobs(asked: argparse.Namespace) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield who is asked for what: all in turn, again and again, as no machine is always as fast."""
-    for name, _ in product(options.scenes, range(options.repeats)):
-        for program in options.programs:
+    for name, _ in product(asked.scenes, range(asked.repeats)):
+        for program in asked.programs:
             if not _settings(program, name, 1):
                 continue
-            for threads in (1, 2) if options.two and program != "scikit-fem" else (1,):
+            for threads in (1, 2) if asked.two and program != "scikit-fem" else (1,):
                 yield program, {"scene": name, "threads": threads, "settings": _settings(program, name, threads)}
+
+
+def _name(program: str, job: dict[str, Any], setting: dict[str, Any]) -> str:
+    return json.dumps([program, job["scene"], job["threads"], setting])
 
 
 def _settings(program: str, scene: str, threads: int) -> Settings:
@@ -100,10 +108,10 @@ def _line(run: Run) -> str:
     )
 
 
-def _scan(options: argparse.Namespace, truths: dict[str, Truth]) -> None:
+def _scan(asked: argparse.Namespace, truths: dict[str, Truth]) -> None:
     """Print, for each peer and scene, the settings that reach each true error soonest, by processor time."""
-    for name in options.scenes:
-        for program in (p for p in options.programs if name in LADDERS.get(p, {})):
+    for name in asked.scenes:
+        for program in (p for p in asked.programs if name in LADDERS.get(p, {})):
             job = {"scene": name, "threads": 1, "settings": _grid(program, name), "warm": False}
             answers = [answer for answer in ask(program, job) if "failed" not in answer]
             runs = sorted((_run(program, job, a, truths) for a in answers), key=lambda run: run.cpu)

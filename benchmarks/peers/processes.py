@@ -5,16 +5,14 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
-ROOT = Path(__file__).parents[2]
+from benchmarks.processor import MPIRUN, ROOT
+
 PEERS_PYTHON = ROOT / ".venv-peers" / "bin" / "python"
 MODULES = {"program": "program", "NGSolve": "ngsolve_model", "scikit-fem": "skfem_model"}
 PEERS = ("NGSolve", "scikit-fem")
-# Debian's own mpirun: another one on PATH would not fit Debian's mpi4py.
-_MPIRUN = ("/usr/bin/mpirun", "--oversubscribe", "-n")
 
 
 def ask(program: str, job: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -27,7 +25,7 @@ def ask(program: str, job: dict[str, Any]) -> Iterator[dict[str, Any]]:
         raise RuntimeError(f"{PEERS_PYTHON} is not there: scripts/peers.sh makes it")
     python = str(PEERS_PYTHON if program in PEERS else sys.executable)
     ranks = job.get("threads", 1) if program == "program" else 1
-    launcher = [*_MPIRUN, str(ranks)] if ranks > 1 else []
+    launcher = [*MPIRUN, str(ranks)] if ranks > 1 else []
     command = [*launcher, python, "-m", f"benchmarks.peers.{MODULES[program]}"]
     with (
         TemporaryFile("w+") as errors,

@@ -9,9 +9,11 @@ from typing import Any
 from benchmarks.peers.processes import PEERS
 from benchmarks.peers.tasks import TASKS
 from benchmarks.peers.truth import Truth
+from benchmarks.tables import markdown
 
 TARGETS = (1e-2, 3e-3, 1e-3)
 GOAL = 0.5  # this program's time over the best peer's
+_PLACE, _RATIO = ("scene", "threads", "true error"), "asked / best peer"
 
 
 @dataclass(frozen=True)
@@ -103,15 +105,19 @@ def _fastest(runs: Iterable[Run], clock: str) -> Run | None:
 
 def table(found: Sequence[Standing]) -> str:
     """Return the standings in markdown."""
-    names = ("scene", "threads", "true error", "program, asked", "program, hindsight", "meridian", *PEERS)
-    lines = [f"| {' | '.join(names)} | asked / best peer |", "|---" * (len(names) + 1) + "|"]
+    names = ("program, asked", "program, hindsight", "meridian", *PEERS)
+    rows = []
     for s in found:
-        cells = [TASKS[s.scene].title, str(s.threads), f"{100 * s.target:g} %"]
-        cells += [_cell(run, s.clock) for run in (s.asked, s.hindsight, s.meridian, *s.peers.values())]
+        cells = (_cell(run, s.clock) for run in (s.asked, s.hindsight, s.meridian, *s.peers.values()))
         ratio = s.ratio
         verdict = "" if ratio is None else f"{ratio:.2f}{'' if ratio <= GOAL else ' (missed)'}"
-        lines.append(f"| {' | '.join(cells)} | {verdict} |")
-    return "\n".join(lines)
+        rows.append(_place(s, TASKS[s.scene].title) | dict(zip(names, cells, strict=True)) | {_RATIO: verdict})
+    return markdown(rows, dict.fromkeys([*_PLACE, *names, _RATIO], ""))
+
+
+def _place(s: Standing, title: str) -> dict[str, str]:
+    """Return the first cells of a row."""
+    return dict(zip(_PLACE, (title, str(s.threads), f"{100 * s.target:g} %"), strict=True))
 
 
 def _cell(run: Run | None, clock: str) -> str:
@@ -120,33 +126,36 @@ def _cell(run: Run | None, clock: str) -> str:
 
 def breakdown(found: Sequence[Standing]) -> str:
     """Return, in markdown, where the time of this program goes, and of the best peer."""
-    lines = ["| scene | threads | true error | who | setting | seconds | parts |", "|---" * 7 + "|"]
-    for s in found:
-        for who, run in (("program, asked", s.asked), ("best peer", s.best_peer)):
-            if run:
-                parts = ", ".join(f"{name} {seconds:.2f}" for name, seconds in run.parts.items())
-                setting = ", ".join(f"{key} {value}" for key, value in run.setting.items())
-                cells = (
-                    s.scene,
-                    str(s.threads),
-                    f"{100 * s.target:g} %",
-                    f"{who} ({run.program})",
-                    setting,
-                    f"{run.seconds:.2f}",
-                    parts,
-                )
-                lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
+    rows = [
+        _place(s, s.scene)
+        | {
+            "who": f"{who} ({run.program})",
+            "setting": ", ".join(f"{key} {value}" for key, value in run.setting.items()),
+            "seconds": f"{run.seconds:.2f}",
+            "parts": ", ".join(f"{name} {seconds:.2f}" for name, seconds in run.parts.items()),
+        }
+        for s in found
+        for who, run in (("program, asked", s.asked), ("best peer", s.best_peer))
+        if run
+    ]
+    return markdown(rows, dict.fromkeys((*_PLACE, "who", "setting", "seconds", "parts"), ""))
 
 
 def truths_table(truths: dict[str, Truth]) -> str:
     """Return, in markdown, what F is and who says so."""
-    lines = ["| scene | F/(E·d·mm) | bar | sources | |", "|---|---|---|---|---|"]
-    for name, truth in truths.items():
-        sources = ", ".join(f"{who} {force:.6f} ± {100 * bar:.2g} %" for who, (force, bar) in truth.sources.items())
-        verdict = "agree" if truth.agree else "DO NOT AGREE"
-        lines.append(f"| {TASKS[name].title} | {truth.force:.6f} | {100 * truth.bar:.2g} % | {sources} | {verdict} |")
-    return "\n".join(lines)
+    rows = [
+        {
+            "scene": TASKS[name].title,
+            "F/(E·d·mm)": truth.force,
+            "bar (%)": 100 * truth.bar,
+            "sources": ", ".join(
+                f"{who} {force:.6f} ± {100 * bar:.2g} %" for who, (force, bar) in truth.sources.items()
+            ),
+            "": "agree" if truth.agree else "DO NOT AGREE",
+        }
+        for name, truth in truths.items()
+    ]
+    return markdown(rows, {"scene": "", "F/(E·d·mm)": ".6f", "bar (%)": ".2g", "sources": "", "": ""})
 
 
 def to_json(

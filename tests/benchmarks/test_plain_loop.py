@@ -1,5 +1,6 @@
 """The plain loop solves the program's cases, on its sizes, to like forces; a sample stands for the whole study."""
 
+import numpy as np
 import pytest
 import xarray as xr
 from mpi4py import MPI
@@ -68,9 +69,20 @@ def test_the_program_is_run_with_and_without_f_exact(tmp_path):
     file = tmp_path / "small.toml"
     file.write_text(STUDY)
     for exact in (True, False):
-        place = tmp_path / str(exact)
-        place.mkdir()
-        found = plain_loop.run_program(load(file), place, exact=exact)
+        found = plain_loop.run_program(load(file), tmp_path / str(exact), exact=exact)
         with xr.open_dataset(found["dataset"]) as data:
             assert bool(data["force_exact"].notnull().all()) is exact
         assert found["cpu"] > 0
+
+
+@pytest.mark.nightly
+def test_a_part_without_reductions_has_the_same_forces(tmp_path):
+    file = tmp_path / "small.toml"
+    file.write_text(STUDY.replace('"full"', '["6 mm", "8 mm", "10 mm", "full"]'))
+    with_all, part = (
+        plain_loop.forces(plain_loop.run_program(load(file), tmp_path / str(parts), parts=parts)["dataset"])
+        for parts in (0, 2)
+    )
+    known = ~np.isnan(part)
+    assert 0 < known.sum() < known.size
+    assert part[known] == pytest.approx(with_all[known], rel=1e-6)

@@ -1,0 +1,90 @@
+"""One run in a process, or on ranks, of its own: what it takes and gives, as a line of JSON.
+
+    python benchmarks/one_run.py STUDY [OPTIONS]        both are JSON: a study, and arguments of ``measure``
+
+It imports ``pipeline`` alone, of whatever checkout: a change is seen on one machine at one time. Start-up, the compiler
+and what is loaded at the first solve are not counted.
+"""
+
+import json
+import resource
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from math import inf
+from types import SimpleNamespace
+from typing import Any
+
+from mpi4py import MPI
+from threadpoolctl import threadpool_limits
+
+from pipeline import stages
+from pipeline.plan import estimate
+from pipeline.plan.plan import make_plan
+from pipeline.run.compile import prepare
+from pipeline.run.execute import compute
+from pipeline.study.load import parse
+
+WARM = {
+    "body": {"shape": "box", "size": ["30 mm", "30 mm", "15 mm"], "fixed": "bottom"},
+    "material": {"young": "10 kPa", "poisson": 0.3},
+    "probe": {"action": "pierce", "shape": "disc", "radius": "2 mm", "depth": "0.1 mm"},
+    "mesh": {"epsilon": "full", "fine": "6 mm", "coarse": "6 mm", "rim": "1 mm", "growth": 0.9, "degree": 1},
+    "solve": {"exact": False},
+}
+_OF_A_CASE = ("dofs", "iterations", "force", "memory", "time_mesh", "time_assemble", "time_setup", "time_solve")
+
+
+@contextmanager
+def stages_by(clock: Callable[[], float]) -> Iterator[None]:
+    """Let stages, from nought, count the seconds of another ``clock``."""
+    before = stages.time
+    stages.table()
+    stages.seconds.clear()
+    stages.time, stages._since[0] = SimpleNamespace(perf_counter=clock), clock()  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        stages.time, stages._since[0] = before, before.perf_counter()
+
+
+def measure(
+    study: Any, without: tuple[str, ...] = (), *, bar: bool = True, by_processor: bool = True
+) -> dict[str, Any]:
+    """Run a study on all ranks; collective.
+
+    Reductions named ``without`` are left out; without a ``bar``, it is as if there were no memory for it. Times of the
+    first case, and of all error bars, are the processor's if ``by_processor``.
+    """
+    comm, used, clock = MPI.COMM_WORLD, time.process_time, time.perf_counter
+    if not bar:
+        estimate.enriched_memory = lambda *_, **__: inf
+    plan = make_plan(parse(study), without=without)
+    prepare(comm, plan.solves)
+    with threadpool_limits(limits=1):
+        compute(make_plan(parse(WARM)), comm)
+        with stages_by(used if by_processor else clock):
+            comm.barrier()
+            start, before = clock(), used()
+            records = compute(plan, comm)
+            wall, spent = clock() - start, used() - before
+            bars = sum(seconds for stage, seconds, _ in stages.table() if stage.startswith("error bar"))
+    first, *_ = records.values()
+    return {
+        "wall": wall,
+        "processor": comm.allreduce(spent),
+        "bar": bars,
+        "peak": comm.allreduce(1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss),
+        "cases": len(records),
+        "solved": len(plan.solves),
+        "message": next((record.message for record in records.values() if not record.is_ok), ""),
+        "force_error": max(record.force_error for record in records.values()),
+        **{name: getattr(first, name) for name in _OF_A_CASE},
+    }
+
+
+if __name__ == "__main__":
+    found = measure(json.loads(sys.argv[1]), **json.loads(sys.argv[2] if len(sys.argv) > 2 else "{}"))
+    if MPI.COMM_WORLD.rank == 0:
+        print(json.dumps(found))
