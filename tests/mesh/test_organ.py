@@ -27,6 +27,7 @@ from pipeline.shapes.surface import Surface
 from tests.cases import study
 from tests.mesh.test_mesh import area, volume
 from tests.organs import AXES, box, ellipsoid, sphere, write_stl
+from tests.sampling import sampled
 
 BELOW = -10e-3
 _NO_EDGES = np.zeros((0, 2), dtype=np.int64)
@@ -237,7 +238,7 @@ def test_a_thin_brim_is_meshed_whatever_the_elements_of_the_ball_are(tmp_path):
     assert qualities(mesh).min() > 0.05
 
 
-@pytest.mark.parametrize("seed", [7, 8])
+@sampled("seed", [7, 8], by_day=1)
 def test_a_folded_surface_is_meshed(tmp_path, seed):
     """Large elements cross in its folds: points are moved apart, or the file's own facets stay where that fails."""
     _, points, facets = folded(seed)

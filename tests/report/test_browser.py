@@ -164,8 +164,7 @@ def test_every_scene_has_a_curve_that_can_be_hidden(browser, path):
     assert browser.messages == []
 
 
-@pytest.mark.parametrize("dark", [False, True])
-@pytest.mark.parametrize("width", [375, 1280])
+@pytest.mark.parametrize(("width", "dark"), [(375, True), (1280, False)])
 def test_fits_the_screen_with_enough_contrast(browser, path, width, dark):
     browser.look_like(width, 800, dark=dark)
     browser.open(path)

@@ -7,18 +7,17 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from pipeline.report.figures import KINDS, choose, draw, figure, lacks
 from pipeline.report.figures.curves import positions
 from pipeline.report.figures.facets import arrange, rest
 from pipeline.report.figures.ratio import ratio_facets
-from pipeline.report.figures.style import COLOURS, log_scale, new_figure
+from pipeline.report.figures.style import COLOURS
 from pipeline.report.pareto import front, is_by_chance
 from pipeline.report.words import choice, heading, points
 from pipeline.study.problems import StudyError
-from tests.cases import raw
 from tests.report.synthetic import EPSILONS, FIGURE, dataset
+from tests.sampling import sampled
 
 EXACT = {"exact": True}
 LARGE = {
@@ -29,18 +28,6 @@ LARGE = {
 MESHES = {"epsilon": ["5 mm", "full"], "outside": ["coarse", "free"], "degree": [1, 2], "fine": ["5 mm", "4 mm"]}
 SIZES = {"solve": EXACT, "mesh": {"rim": ["1 mm", "0.5 mm", "0.02 mm"], "fine": ["5 mm", "4 mm"]}}
 SMALLER = FIGURE | {"solve": EXACT, "material": {"poisson": [0.3, 0.4]}, "mesh": {"epsilon": ["4 mm", "8 mm", "full"]}}
-LONG = {
-    "title": "A title that says everything about the study at once, the tissue, the needle, the support, " * 4,
-    "probe": [
-        {**raw()["probe"], "radius": "1 mm", "name": "a blunt 14-gauge biopsy needle of the second generation"},
-        {**raw()["probe"], "radius": "2 mm", "name": f"a trocar without_any_blank_{'0123456789' * 4} in its number"},
-    ],
-    "material": [
-        {"name": f"porcine liver parenchyma ex vivo, perfused at 37 degrees, sample number {i}", "young": "8 kPa",
-         "poisson": 0.3 + 0.05 * i} for i in range(3)
-    ],
-    "mesh": {"epsilon": EPSILONS, "outside": ["coarse", "free", "fixed"]},
-}  # fmt: skip
 # name: study, its main figure, the others
 STUDIES = {
     "with F_exact": (SMALLER, "ratio", {"error", "force", "compliance"}),
@@ -53,11 +40,9 @@ STUDIES = {
     "sizes": (SIZES, "error", {"force"}),
     "large": (LARGE, "ratio", {"error", "force", "compliance"}),
 }
-SMALLEST = 9.0  # points
-SLACK = 1.0  # pixels
 
 
-@pytest.mark.parametrize("name", STUDIES)
+@sampled("name", STUDIES, by_day=5)
 def test_every_study_gets_the_figures_that_suit_it(tmp_path, name):
     study, main, others = STUDIES[name]
     data = dataset(**study)
@@ -98,49 +83,6 @@ def test_forces_and_errors_are_drawn_as_they_are_in_the_dataset():
     assert {*np.round(drawn, 9)} <= {*np.round(errors, 9)}
     assert first.get_xlabel() == "ε-mesh radius ε, mm"
     assert heading(data["force"]) == "reaction force F, mN"
-
-
-@pytest.mark.parametrize("name", ["figure", "long", "large"])
-def test_words_are_large_enough_and_inside_the_figure(name):
-    """With the longest names and titles, too; words of one axis cover nothing of each other."""
-    data = dataset(**{"figure": FIGURE, "long": LONG, "large": LARGE}[name])
-    for kind in choose(data):
-        drawn = figure(data, kind)
-        FigureCanvasAgg(drawn).draw()
-        width, height = drawn.canvas.get_width_height()
-        for text in words_of(drawn):
-            box = text.get_window_extent()
-            assert text.get_size() >= SMALLEST
-            assert box.x0 > -SLACK and box.y0 > -SLACK, (kind, text)
-            assert box.x1 < width + SLACK and box.y1 < height + SLACK, (kind, text)
-        for ax in drawn.axes:
-            assert ax.get_window_extent().height > 0.5 * drawn.dpi, kind
-            boxes = [label.get_window_extent() for label in ticks_of(ax.xaxis) if not label.get_rotation()]
-            assert all(one.x1 < other.x0 + SLACK for one, other in itertools.pairwise(boxes)), kind
-
-
-def words_of(drawn):
-    """Return all words of a figure that are seen."""
-    found = list(drawn.texts)
-    for ax in drawn.axes:
-        found += [ax.title, ax.xaxis.label, ax.yaxis.label, *ticks_of(ax.xaxis), *ticks_of(ax.yaxis)]
-        found += ax.get_legend().get_texts() if ax.get_legend() else []
-    return [text for text in found if text.get_visible() and text.get_text().strip()]
-
-
-def ticks_of(axis):
-    """Return the words of the ticks that are within an axis."""
-    low, high = sorted(axis.get_view_interval())
-    ticks = zip(axis.get_ticklocs(), axis.get_ticklabels(), strict=False)
-    return [text for place, text in ticks if low <= place <= high and text.get_text()]
-
-
-def test_panels_of_one_outside_share_a_scale():
-    axes = figure(dataset(**FIGURE), "ratio").axes
-    ratios, speedups = (np.array([[ax.get_ylim() for ax in axes[3 * i : 3 * i + 3]] for i in rows])
-                        for rows in ((0, 2), (1, 3)))  # fmt: skip
-    assert (ratios[0] == ratios[1]).all()
-    assert (speedups == speedups[0, 0]).all()
 
 
 def test_what_loads_add_is_drawn_below_the_force():
@@ -294,15 +236,6 @@ def test_axes_are_in_units_people_use():
     assert heading(dataset(**SIZES)["rim"]).endswith(", mm")
 
 
-@pytest.mark.parametrize(("low", "high"), [(28e3, 80e3), (1, 2), (3e-3, 2e4)])
-def test_a_logarithmic_axis_has_numbers(low, high):
-    ax = new_figure(3, 3).subplots()
-    ax.plot([low, high], [1, 2])
-    log_scale(ax, "x")
-    ticks = [tick for tick in ax.get_xticks() if low / 1.05 <= tick <= 1.05 * high]
-    assert 2 <= len(ticks) <= 7
-
-
 def test_an_error_that_a_finer_mesh_does_not_keep_is_one_of_chance():
     """Along ε up to full order, where F passes F_exact, and along the rim, at which the finest is the smallest."""
     error = xr.DataArray(
@@ -349,15 +282,6 @@ def lab(rgb):
     xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]) @ rgb
     x, y, z = (np.cbrt(value) if value > 0.008856 else 7.787 * value + 16 / 116 for value in xyz / (0.9505, 1, 1.089))
     return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
-
-
-def test_earlier_figure_survives_a_failed_drawing(tmp_path):
-    data = dataset(mesh={"epsilon": EPSILONS})
-    (path,) = draw(data, tmp_path / "a", ["png"])
-    before = path.read_bytes()
-    with pytest.raises(KeyError):
-        draw(data.drop_vars("time_total"), tmp_path / "a", ["png"])
-    assert path.read_bytes() == before
 
 
 def test_points_are_written_as_people_write_them():

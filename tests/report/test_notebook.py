@@ -28,7 +28,7 @@ def ratio(case):
     return 1.001 if case.is_full or case.mesh.outside == "coarse" else 1.001 * (1 - exp(-case.mesh.epsilon / 5e-3))
 
 
-@pytest.mark.parametrize("name", STUDIES)
+@pytest.mark.parametrize("name", ["figure", pytest.param("one curve", marks=pytest.mark.nightly)])
 def test_notebook_runs(name, tmp_path, monkeypatch):
     write(dataset(STUDIES[name], ratio=ratio), tmp_path / "small.nc")
     monkeypatch.setenv("EPSMESH_DATASET", str(tmp_path / "small.nc"))

@@ -7,17 +7,15 @@ import sys
 from html.parser import HTMLParser
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from pipeline.pages import json_in_page
-from pipeline.report import page
 from pipeline.report.dataset import write
 from pipeline.report.figures import draw
 from pipeline.report.guide import guide
 from pipeline.report.page import render, write_page
 from pipeline.report.page.cases import case_table
-from pipeline.report.page.guideline import ACCURACY, Section, guide_section
+from pipeline.report.page.guideline import ACCURACY, guide_section
 from pipeline.report.table import number_of
 from tests.cases import BLADE, raw
 from tests.commands import epsmesh
@@ -130,6 +128,17 @@ def test_failures_come_first_and_say_why():
     assert sorted(table.order) == list(range(data["status"].size))
     text = render(data, "small")
     assert text.index("it went wrong") < text.index("<svg") < text.index('id="table"')
+    assert 'id="guide"' not in text  # F_exact is not known
+
+
+def test_the_report_begins_with_the_answer_and_says_how_it_is_turned_round_unless_it_is():
+    data, words = chosen.dataset(), "epsmesh report results/chosen.nc --scene answer"
+    page, section = render(data, "chosen"), guide_section(data)
+    seen = [text.strip() for text in Reader(page).texts if text.strip()]
+    assert seen.index(section.setting) < seen.index("cases")
+    assert all(seen.index(detail) < seen.index("cases") for _, detail in section.details)
+    assert words in page
+    assert words not in render(data, "chosen", "<p>a scene</p>")
 
 
 def test_table_says_what_the_dataset_says():
@@ -155,22 +164,6 @@ def test_a_written_dataset_gives_the_same_table(tmp_path):
     assert case_table(xr.load_dataset(tmp_path / "small.nc")).json == case_table(data).json
 
 
-def test_what_was_struck_out_is_told_with_its_reason():
-    text = Reader(render(dataset(material={"young": ["10 kPa", "20 kPa", "30 kPa"]}), "small")).texts
-    assert any("proportional to Young's modulus" in piece for piece in text)
-
-
-def test_a_guide_stands_in_the_page_where_there_is_one(monkeypatch):
-    settings = pd.DataFrame([{"ε": "10 mm", "error": "< 5 %"}, {"ε": "20 mm", "error": "1 %"}])
-    section = Section("Asked for: <5 %", "Smallest ε: <10 mm", [("cost", "<1 s")], [], settings)
-    monkeypatch.setattr(page, "guide_section", lambda _: section)
-    text = render(small(), "small")
-    answer, settings = '<section id="answer">.*Smallest ε: &lt;10 mm', '<section id="guide">.*<td>&lt; 5 %</td>'
-    assert re.search(f"{answer}.*{settings}", text, re.DOTALL)
-    monkeypatch.setattr(page, "guide_section", lambda _: None)
-    assert 'id="guide"' not in render(small(), "small")
-
-
 def test_the_guide_of_the_page_is_that_of_the_epsmesh():
     assert guide_section(small()) is None  # F_exact is not known
     section, found = guide_section(chosen.dataset()), guide(chosen.dataset(), ACCURACY)
@@ -190,21 +183,6 @@ def test_the_case_of_the_answer_is_known_by_its_number():
     case = data.isel(dict(zip(data["force"].dims, np.unravel_index(number, data["force"].shape), strict=True)))
     assert float(case["force"]) == verdict.force
     assert float(case["epsilon"]) == verdict.labels["epsilon"]
-
-
-def test_a_report_says_how_the_answer_is_turned_round_unless_it_is():
-    words = "epsmesh report results/chosen.nc --scene answer"
-    assert words in render(chosen.dataset(), "chosen")
-    assert words not in render(chosen.dataset(), "chosen", "<p>a scene</p>")
-    assert words not in render(small(), "small")
-
-
-def test_the_report_begins_with_the_answer():
-    told = Reader(render(chosen.dataset(), "chosen")).texts
-    section = guide_section(chosen.dataset())
-    seen = [text.strip() for text in told if text.strip()]
-    assert seen.index(section.setting) < seen.index("cases")
-    assert all(seen.index(words) < seen.index("cases") for _, words in section.details)
 
 
 @pytest.mark.parametrize("study", [{}, {"failed": 99}, {"mesh": {"outside": ["coarse", "free"], "epsilon": "8 mm"}}])
