@@ -1,5 +1,6 @@
 """The command that makes a real-time model of a study's body."""
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -78,7 +79,7 @@ def export(
     from pipeline.solve.krylov import SolveError
 
     comm = workflow.world()
-    ranks = Ranks(comm)
+    ranks = Ranks(comm, (lambda text: print(text, file=sys.stderr, flush=True)) if comm.rank == 0 else lambda _: None)
     fault, status = Fault(""), DONE
     # Of several ranks each is one thread: BLAS's own would take the others' cores.
     threads = threadpool_limits(1 if comm.size > 1 else None, user_api="blas")
@@ -107,6 +108,7 @@ def _tell(exported: "Exported", wanted: float, path: Path, *, as_json: bool) -> 
     if as_json:
         print_json(found)
         return
+    print(repr(exported.model))
     print(f"wrote {path}: {counted(int(found['places']), 'place')} solved for, {found['coefficients']} coefficients")
     print(
         f"judged on {found['judged']} touches: {100 * found['held']:.0f} % held by their bars, largest error "

@@ -79,7 +79,7 @@ def check_touches(model: Model, solver: Solver, touches: Sequence[Check], ranks:
         (found,) = solved(model, solver, asked, [asked.poisson] if low < high else None)
         return found
 
-    return ranks.in_turn(touches, check)
+    return ranks.in_turn(touches, check, "full solves to check against")
 
 
 def random_touch(model: Model, rng: np.random.Generator, kind: int) -> Check:

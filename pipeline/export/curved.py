@@ -64,7 +64,7 @@ def curved_model(
 
     def found(places: Places, poisson: float) -> FloatArray:
         unknown = [place for place in dict.fromkeys(places) if place not in known]
-        for place, (values, bars) in zip(unknown, ranks.in_turn(unknown, regular), strict=True):
+        for place, (values, bars) in zip(unknown, ranks.in_turn(unknown, regular, "places solved for"), strict=True):
             known[place] = values
             told.extend(bars)
         return np.array([known[place][ratios.index(poisson)] for place in places])

@@ -108,6 +108,7 @@ def export(
     fitted, judged = ([with_bar(model, check) for check in half] for half in (fitted, judged))
     seen, unseen = None, ""
     if surface or scope.is_flat:
+        ranks.note("the visible surface")
         try:
             far = far_fields(seen_body(scope, model, margin, ranks), scope.poissons)
         except ExportError as reason:
@@ -132,11 +133,13 @@ def _flat(
     region = Region.of(scope.body, margin)
     if min(region.reach) <= 0:
         raise ExportError("the body leaves no region: ask for a smaller margin")
+    ranks.note("meshing the body")
     mesh = coarse_mesh(scope.case, region, ranks=ranks)
     solved: list[tuple[float, float]] = []
 
     def counted(places: Places, poisson: float) -> FloatArray:
         solved.extend(places)
+        ranks.note(f"places solved for: {len(solved)}, ν = {poisson:.3g}")
         tissues = scope.tissues_at(poisson)
         law = MaterialLaw.of(*tissues) if tissues else None
         return np.array(ranks.together(places, lambda some: list(compliances(mesh, region, some, poisson, law))))

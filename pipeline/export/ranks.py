@@ -20,6 +20,7 @@ class Ranks:
     """
 
     comm: MPI.Comm
+    note: Callable[[str], None] = lambda text: None  # told, on the first rank, what is being worked on
 
     def on_first(self, make: Callable[[], Found]) -> Found:
         """Return on every rank what ``make`` gives on the first one."""
@@ -37,12 +38,13 @@ class Ranks:
             found, wrong = {}, error
         return self._gathered(len(items), found, wrong)
 
-    def in_turn(self, items: Sequence[Item], work: Callable[[Item], Found]) -> list[Found]:
-        """Return what ``work`` makes of each of ``items``: a rank takes the next one as soon as it is free."""
+    def in_turn(self, items: Sequence[Item], work: Callable[[Item], Found], what: str) -> list[Found]:
+        """Return what ``work`` makes of each of ``items``, called ``what``: a free rank takes the next one."""
         found: dict[int, Found] = {}
         wrong = None
         with Counter(self.comm, self.comm.rank, self.comm.size) as counter:
             while wrong is None and (number := counter.next()) < len(items):
+                self.note(f"{what}: {number + 1} of {len(items)}")
                 try:
                     found[number] = work(items[number])
                 except Exception as error:

@@ -323,6 +323,7 @@ def _attributes(plan: Plan, records: list[Record | None], run: Mapping[str, Any]
         "reductions": json.dumps([vars(struck) for struck in plan.struck], ensure_ascii=False),
         "epsilon_is_full": int(all(isinf(epsilon) for epsilon in epsilons)),
         "timing": int(study.solve.timing),
+        **({"warnings": "\n".join(study.warnings)} if study.warnings else {}),
         "version_epsmesh": __version__,
         **provenance,
         **run,

@@ -51,7 +51,7 @@ def dataset_path(file: str | Path, output: str | Path = "results") -> Path:
 def read(file: str | Path, output: str | Path = "results", warn: Callable[[str], None] = warnings.warn) -> xr.Dataset:
     """Return the dataset meant by ``file``, in memory: a later run may write it anew.
 
-    ``warn`` is called if ``file`` is a study that has changed since its dataset was made.
+    ``warn`` is called with each warning of the dataset's study, and if ``file`` is a study that has changed since.
 
     Raises:
         DatasetError: if there is none, or if it is not a study's.
@@ -60,6 +60,8 @@ def read(file: str | Path, output: str | Path = "results", warn: Callable[[str],
     dataset = _shown(load(path))
     if missing := [name for name in _NEEDED if name not in {*dataset.data_vars, *dataset.attrs}]:
         raise DatasetError(f"{path}: not a study's dataset: it has no {', '.join(missing)}")
+    for warning in filter(None, str(dataset.attrs.get("warnings", "")).split("\n")):
+        warn(warning)
     study = Path(file)
     if study != path and study.is_file() and _text_of(study) != dataset.attrs["study"]:
         warn(f"{study} has changed since {path} was made, which answers for the study as it was: run it again")

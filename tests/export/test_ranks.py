@@ -31,7 +31,7 @@ def squares(share: str, count: int, ranks: Ranks = WORLD) -> tuple[list[int], li
         return number**2
 
     if share == "in_turn":
-        return ranks.in_turn(range(count), square), own
+        return ranks.in_turn(range(count), square, "squares"), own
     return ranks.together(range(count), lambda some: [square(number) for number in some]), own
 
 

@@ -213,7 +213,7 @@ def test_commands_take_a_study_file(tmp_path):
     assert (done.exit_code, done.stdout.strip()) == (0, str(tmp_path / "small.html"))
     assert "has changed since" in done.stderr
     study.write_text("title = 'x'", encoding="utf-8-sig")  # the mark of some editors is no part of it
-    assert epsmesh("report", study, "--output", tmp_path).stderr == ""
+    assert "changed since" not in epsmesh("report", study, "--output", tmp_path).stderr
     done = epsmesh("plot", study, "--output", tmp_path)
     assert done.stdout.split() == [str(tmp_path / f"small.{suffix}") for suffix in ("png", "svg")]
 
@@ -238,3 +238,15 @@ def test_bad_input_is_told(arguments, words, tmp_path):
     done = epsmesh(*(argument.format(**files) for argument in arguments))
     assert done.exit_code == 2
     assert words in done.stderr
+
+
+def test_a_warning_of_the_study_is_in_its_dataset_and_report_and_told_by_who_reads_it(tmp_path):
+    """An error bar is the mesh's: what the model leaves out is said wherever the force is."""
+    deep = chosen.dataset(chosen.TEXT.replace('depth = "0.2 mm"', 'depth = "1 mm"'))
+    write(deep, tmp_path / "deep.nc")
+    warning = deep.attrs["warnings"].split("\n")[0]
+    assert "linear elasticity is an extrapolation" in warning
+    done = epsmesh("report", tmp_path / "deep.nc", "--scene", "none")
+    assert f"warning: {warning}" in done.stderr
+    assert "linear elasticity is an extrapolation" in (tmp_path / "deep.html").read_text()
+    assert "warnings" not in chosen.dataset(chosen.TEXT.replace('"0.1 mm"', '"0.04 mm"')).attrs
