@@ -33,6 +33,7 @@ MIRROR = {"x": "mirror_x", "y": "mirror_y"}
 
 _BODY_SIZE = 100.0  # extent of the body in the model: OpenCASCADE's tolerance of 1e-7 is then 1e-9 of it
 _CLOSE = 1e-6 * _BODY_SIZE  # in the model's unit
+_NEAR = 1e-3  # within this share of the column's radius from the contact there is tissue of one piece
 # Surfaces whose points are all in one group, however their faces are trimmed; points a side on faces of others.
 _FILLED, _TRIMMED = ("Plane", "Cylinder"), 12
 
@@ -112,6 +113,7 @@ def build(scene: Scene) -> list[int]:
     volumes = [(3, _add_body(scene))]
     if scene.is_cut:
         volumes, _ = occ.intersect(volumes, [(3, _add_column(scene))])
+        volumes = _touched(scene, volumes)
     if scene.mirrors:
         volumes, _ = occ.intersect(volumes, [(3, _add_positive_side(scene))])
     printed, beside = _add_contact(scene, volumes)
@@ -208,6 +210,21 @@ def _add_column(scene: Scene) -> int:
         depth, length = 2 * _BODY_SIZE, 4 * _BODY_SIZE
     end = [scene.units(c) + depth * a for c, a in zip(frame.point, frame.axis, strict=True)]
     return int(gmsh.model.occ.addCylinder(*end, *(length * o for o in frame.outward), scene.units(scene.column)))
+
+
+def _touched(scene: Scene, pieces: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Return the piece that the probe touches, and remove the others: of a body with hollows, a column has several."""
+    if len(pieces) < 2:
+        return pieces
+    occ, radius = gmsh.model.occ, _NEAR * scene.units(scene.column)
+    kept = []
+    for piece in pieces:
+        ball = (3, occ.addSphere(*map(scene.units, scene.frame.point), radius))
+        common, _ = occ.intersect([piece], [ball], removeObject=False)
+        kept += [piece] if common else []
+        occ.remove(common, recursive=True)
+    occ.remove([piece for piece in pieces if piece not in kept], recursive=True)
+    return kept
 
 
 def _add_level(height: float) -> int:

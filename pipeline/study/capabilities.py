@@ -114,9 +114,7 @@ FEATURES: dict[str, Feature] = {
     ),
     "curved or inclined surface": Feature("probe.axis", lambda s: not _is_flat(s), ("body",)),
     "no flat top": Feature("body.shape", lambda s: not (isinstance(s.body, Layered) and _is_level(s)), ("probe",)),
-    "surface of a file, inclined": Feature(
-        "body.shape", lambda s: isinstance(s.body, FromFile) and not _is_level(s), ("probe",)
-    ),
+    "body of triangles": Feature("body.shape", lambda s: isinstance(s.body, FromFile) and not s.body.HAS_NAMES),
     "kept column": Feature("mesh.outside", _is_column, _PLACE),
     "fixed column": Feature("mesh.outside", lambda s: s.mesh.outside == "fixed" and _is_column(s), _PLACE),
     "half ball": Feature("mesh.outside", _is_ball, _PLACE),
@@ -160,9 +158,8 @@ REFUSALS: tuple[Refusal, ...] = (
     # A column that is kept of the body.
     Refusal(
         "kept column",
-        "surface of a file, inclined",
-        "a column is cut out of boxes, cylinders and ellipsoids, and straight down out of level faces of CAD files: a "
-        f"surface of triangles is not cut, and of a CAD body more than one piece may be left. {_COARSE.capitalize()}",
+        "body of triangles",
+        f"a column is cut out of bodies that are drawn and of CAD files, and not out of triangles: {_COARSE}",
     ),
     Refusal("fixed column", "open slit", 'is what an open slit would run into: use ends = "blade"'),
     # Degrees of elements.

@@ -1,5 +1,7 @@
 """Columns cut out along a tilted axis, or out of a curved body: their volume, and what they do to the force."""
 
+import subprocess
+import sys
 from math import cos, pi, radians, sin
 
 import numpy as np
@@ -21,6 +23,13 @@ SCENES = {
     "slides": {"probe": {"shape": "blade", "length": "8 mm", "width": "2 mm", "depth": "0.2 mm", "axis": AXIS}},
 }
 RADIUS = 9e-3
+# A box with a hollow from side to side, between two plates.
+_DRAW = """
+import sys, gmsh
+gmsh.initialize(); gmsh.option.setNumber("General.Terminal", 0); occ = gmsh.model.occ
+occ.cut([(3, occ.addBox(-20, -20, -20, 40, 40, 20))], [(3, occ.addBox(-15, -20, -14, 30, 40, 6))])
+occ.synchronize(); gmsh.write(sys.argv[1])
+"""
 
 
 def volume(**changes) -> float:
@@ -57,3 +66,18 @@ def test_the_sides_of_a_column_are_round():
         study(mesh={"epsilon": "9 mm", "outside": "free", "fine": "3 mm"}, **SCENES["tilted"]).case(()), ()
     )
     assert area(mesh, "cut") == pytest.approx(2 * pi * RADIUS * 20e-3 / cos(TILT), rel=0.02)
+
+
+@pytest.mark.parametrize("axis", [[0.0, 0.0, -1.0], AXIS])
+def test_of_a_hollow_body_the_piece_is_kept_that_the_probe_touches(tmp_path, axis):
+    """Held at its side, it is a plate like any other; what of the column lies below the hollow is none of it."""
+    file = tmp_path / "hollow.brep"
+    subprocess.run([sys.executable, "-c", _DRAW, str(file)], check=True, capture_output=True)
+    hollow = {"shape": "cad", "file": str(file), "unit": "mm", "fixed": {"below": "-16 mm"}}
+    plate = {"shape": "box", "size": ["40 mm", "40 mm", "8 mm"], "fixed": "sides"}
+    mesh = {"epsilon": "9 mm", "outside": "fixed", "fine": "3 mm"}
+    (a,), (b,) = (solve(body=body, mesh=mesh, probe={"axis": axis}).values() for body in (hollow, plate))
+    assert (a.status, b.status) == ("ok", "ok"), (a.message, b.message)
+    assert a.force == pytest.approx(b.force, rel=2 * (a.force_error + b.force_error))
+    mesh = mesh_arrays(study(body=hollow, mesh=mesh, probe={"axis": axis}).case(()), ())
+    assert mesh.points[:, 2].min() == pytest.approx(-8e-3, abs=1e-9)
