@@ -58,13 +58,13 @@ def _row(space: Any, law: Any) -> dict[str, Any]:
     library()
     with ExitStack() as stack:
         start = time.process_time()
-        operator = stack.enter_context(space.operators.lend_product(law))
+        operator = stack.enter_context(space.lend_product(law))
         laid_out = time.process_time()
-        matrix = stack.enter_context(space.operators.lend(law))
+        matrix = stack.enter_context(space.lend(law))
         assembled = time.process_time()
         x, y = matrix.createVecs()
         x.array[:] = np.random.default_rng(0).standard_normal(x.getSize())
-        x.array[space.dofs.prescribed] = 0.0
+        x.array[space.prescribed] = 0.0
         cells = operator.getPythonContext()
         single = x.array.astype(np.float32), np.empty(x.getSize(), dtype=np.float32)
         ways = {
@@ -75,13 +75,13 @@ def _row(space: Any, law: Any) -> dict[str, Any]:
         found = {name: 1e3 * seconds for name, seconds in median_seconds(ways, ROUNDS).items()}
         return {
             "degree": space.degree,
-            "dofs": space.dofs.dofs,
+            "dofs": space.size,
             "assemble": assembled - laid_out,
             "lay_out": laid_out - start,
             **found,
             "ratio": found["petsc"] / found["cells_single"],
-            "matrix_bytes": 12 * matrix.getInfo()["nz_used"] / space.dofs.dofs,
-            "cells_bytes": cells.nbytes / space.dofs.dofs,
+            "matrix_bytes": 12 * matrix.getInfo()["nz_used"] / space.size,
+            "cells_bytes": cells.nbytes / space.size,
         }
 
 

@@ -110,16 +110,16 @@ def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple
     from pipeline.solve.vectors import vector
 
     space = problem.elements.displacements
-    lend = space.operators.lend_product if space.degree > 1 else space.operators.lend
+    lend = space.lend_product if space.degree > 1 else space.lend
     unit = stack.enter_context(lend(law))
-    held = space.dofs.held(PRESS)
+    held = space.held(PRESS)
 
     def once() -> tuple[float, float, float, int]:
         start = time.process_time()
         with (
             problem.solver(law, method) as lent,
-            vector(space.dofs.space) as rhs,
-            vector(space.dofs.space) as unknown,
+            vector(space.space) as rhs,
+            vector(space.space) as unknown,
         ):
             space.lift(rhs, held, law)
             made = time.process_time()
@@ -144,7 +144,7 @@ def _mixed_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[A
     saddle = elements.saddle(LAME, stack, direct=direct)
     assemble = time.process_time() - start
     # Neither a product without entries nor the matrix of a direct solve is what others multiply with.
-    unit = stack.enter_context(elements.displacements.operators.lend_product(LAME))
+    unit = stack.enter_context(elements.displacements.lend_product(LAME))
     press = Loads((PRESS,), (1.0,))
 
     def once() -> tuple[float, float, float, int]:

@@ -86,7 +86,7 @@ class LoadSteps(Solver):
         self._levels = elements.levels(law, stack, direct=direct)
         solver = LinearSolver(self._levels, direct=direct)
         stack.callback(solver.close)
-        self._forms = HyperelasticForms(self._space.dofs.space, self._space.forms, law.name)
+        self._forms = HyperelasticForms(self._space.space, self._space.forms, law.name)
         self._body = Equilibrium(self._space, self._forms, solver)
         stack.callback(self._body.close)
 
@@ -103,11 +103,11 @@ class LoadSteps(Solver):
         """
         (column,), before = columns, self._body.iterations
         self._space.forms.set_law(self._law)
-        owned = self._space.dofs.owned
-        with vector(self._space.dofs.space) as displacement:
+        owned = self._space.owned
+        with vector(self._space.space) as displacement:
             path = self._press(displacement, column)
             column.unknown[0].array[:] = displacement.array / column.amount - column.prescribed[:owned]
-            column.unknown[0].array[self._space.dofs.prescribed_owned] = 0.0
+            column.unknown[0].array[self._space.prescribed_owned] = 0.0
         check_path(path, _ROUNDING * self._law.lame_mu[0] * self._volume())
         self.stored = float(path[-1, 2])
         return self._body.iterations - before
@@ -118,14 +118,14 @@ class LoadSteps(Solver):
 
     def products(self, columns: Sequence[Column]) -> Products:
         """Return the residual and the work of the solution, both as a secant: for a unit of the motion."""
-        (column,), dofs = columns, self._space.dofs
-        with vector(dofs.space) as displacement, vector(dofs.space) as forces:
+        (column,), space = columns, self._space
+        with vector(space.space) as displacement, vector(space.space) as forces:
             self._at(column, displacement)
             self._body.forces(displacement, forces)
             residual, moved = forces.array / column.amount, displacement.array / column.amount
-        held = dofs.prescribed_owned
-        work = global_sum(dofs.comm, np.array([residual[held] @ column.prescribed[held]]))
-        return Products(dofs, [moved], [residual], work[None], work)
+        held = space.prescribed_owned
+        work = global_sum(space.comm, np.array([residual[held] @ column.prescribed[held]]))
+        return Products(space, [moved], [residual], work[None], work)
 
     def enrich(self, columns: Sequence[Column], loads: Loads, stack: ExitStack, *, keep: bool) -> Enriched:
         """Solve on in one degree more, from the residuals of the solution and of its rate there; collective.
@@ -134,26 +134,26 @@ class LoadSteps(Solver):
             LargeError: if elements of that degree give way.
         """
         (column,), space = columns, self._space
-        displacement, rate, unit = (stack.enter_context(vector(space.dofs.space)) for _ in range(3))
+        displacement, rate, unit = (stack.enter_context(vector(space.space)) for _ in range(3))
         self._at(column, displacement)
-        unit.array[:] = column.prescribed[: space.dofs.owned]
+        unit.array[:] = column.prescribed[: space.owned]
         self._body.move(displacement, unit, rate)
         elements, solver = self._elements.finer(self._law, self._levels, stack)
         finer = elements.displacements
-        forms = HyperelasticForms(finer.dofs.space, finer.forms, self._law.name)
+        forms = HyperelasticForms(finer.space, finer.forms, self._law.name)
         finer.forms.set_law(self._law)
-        residuals = [stack.enter_context(vector(finer.dofs.space)) for _ in range(2)]
-        with vector(finer.dofs.space) as there:
+        residuals = [stack.enter_context(vector(finer.space)) for _ in range(2)]
+        with vector(finer.space) as there:
             space.set_displacement(rate)
             finer.forms.displacement.interpolate(space.forms.displacement)
-            there.array[:] = finer.forms.displacement.x.array[: finer.dofs.owned]
+            there.array[:] = finer.forms.displacement.x.array[: finer.owned]
             space.set_displacement(displacement)
             finer.forms.displacement.interpolate(space.forms.displacement)
             assemble(forms.residual, residuals[0])
             tangent_product(forms, there, residuals[1])
         for residual in residuals:
             residual.scale(-1.0)
-            residual.array[finer.dofs.prescribed_owned] = 0.0
+            residual.array[finer.prescribed_owned] = 0.0
         if not all(np.isfinite(residual.norm()) for residual in residuals):
             raise LargeError("elements of one degree more turn tissue inside out, so that no error bar can be made")
         found, _, iterations = energy_decrements(solver, residuals)
@@ -179,13 +179,13 @@ class LoadSteps(Solver):
         Raises:
             LargeError: if that gets too small; the walk has come as far as it says.
         """
-        walk, depth, space = self._walk, column.amount, self._space.dofs.space
+        walk, depth, space = self._walk, column.amount, self._space.space
         displacement.array[:] = walk.displacement
         longest = depth / _FEWEST
         step = min(walk.step, longest)
         with ExitStack() as stack:
             unit, rate, trial, forces = (stack.enter_context(vector(space)) for _ in range(4))
-            unit.array[:] = column.prescribed[: self._space.dofs.owned]
+            unit.array[:] = column.prescribed[: self._space.owned]
             while (reached := walk.reached) < depth:
                 self._body.move(displacement, unit, rate)
                 step, steps = self._step(displacement, rate, trial, walk, step, depth)
@@ -208,7 +208,7 @@ class LoadSteps(Solver):
         reached = walk.reached
         if step > (1 - _SLIVER) * (depth - reached):
             step = depth - reached  # not one more for what rounding leaves
-        with vector(self._space.dofs.space) as forces:
+        with vector(self._space.space) as forces:
             while True:
                 trial.array[:] = displacement.array + step * rate.array
                 try:
@@ -232,9 +232,8 @@ class LoadSteps(Solver):
         )
 
     def _norm_on_held(self, forces: PETSc.Vec) -> float:
-        dofs = self._space.dofs
-        on_held = forces.array[dofs.prescribed_owned]
-        return float(np.sqrt(dofs.comm.allreduce(float(on_held @ on_held))))
+        on_held = forces.array[self._space.prescribed_owned]
+        return float(np.sqrt(self._space.comm.allreduce(float(on_held @ on_held))))
 
     def _volume(self) -> float:
         body = self._elements.body

@@ -39,11 +39,11 @@ class Equilibrium:
     def __init__(self, space: ElasticSpace, forms: HyperelasticForms, solver: LinearSolver):
         """Set up; collective. ``solver`` is that of linear elasticity."""
         self._space, self._forms, self._solver = space, forms, solver
-        self._held = space.dofs.prescribed_owned
+        self._held = space.prescribed_owned
         self.tangent = fem_petsc.create_matrix(forms.tangent)
         self.tangent.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         self.tangent.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
-        start = 3 * space.dofs.space.dofmap.index_map.local_range[0]
+        start = 3 * space.space.dofmap.index_map.local_range[0]
         self._rows = (self._held + start).astype(PETSc.IntType)
         self.iterations = 0
 
@@ -54,7 +54,7 @@ class Equilibrium:
     def energy(self, displacement: PETSc.Vec) -> float:
         """Return the stored energy (J) of the modelled part, not a number if tissue is inside out; collective."""
         self._space.set_displacement(displacement)
-        return float(self._space.dofs.comm.allreduce(fem.assemble_scalar(self._forms.energy), op=MPI.SUM))
+        return float(self._space.comm.allreduce(fem.assemble_scalar(self._forms.energy), op=MPI.SUM))
 
     def forces(self, displacement: PETSc.Vec, result: PETSc.Vec) -> None:
         """Write the nodal forces (N), on prescribed dofs, too, into ``result``; collective."""
@@ -68,7 +68,7 @@ class Equilibrium:
         Raises:
             LargeError: if the tangent is not definite: the tissue gives way.
         """
-        with ExitStack() as stack, vector(self._space.dofs.space) as load:
+        with ExitStack() as stack, vector(self._space.space) as load:
             self._assemble(displacement)
             self.tangent.mult(prescribed, load)
             load.scale(-1.0)
@@ -89,8 +89,8 @@ class Equilibrium:
         Raises:
             LargeError: if there is none nearby.
         """
-        with ExitStack() as stack, vector(self._space.dofs.space) as residual:
-            snes = keep(stack, PETSc.SNES().create(self._space.dofs.comm))
+        with ExitStack() as stack, vector(self._space.space) as residual:
+            snes = keep(stack, PETSc.SNES().create(self._space.comm))
             configure(snes, SOLVERS["Newton's method"])
             snes.ksp.pc.setType("python")
             snes.ksp.pc.setPythonContext(self._solver)
@@ -119,7 +119,7 @@ class Equilibrium:
 
         Where rounding hides what is gained of that, the residual tells.
         """
-        with vector(self._space.dofs.space) as there, vector(self._space.dofs.space) as residual:
+        with vector(self._space.space) as there, vector(self._space.space) as residual:
             stored = self.energy(here)
             self._function(None, here, residual)
             left, slope = residual.norm(), residual.dot(step)

@@ -214,7 +214,7 @@ class QuasiStaticProblem:
             residual if column.applied is None else residual - column.applied.forces
             for residual, column in zip(found.residuals, columns, strict=True)
         ]
-        total = sums(found.dofs, residuals, [column.prescribed for column in motions])
+        total = sums(found.space, residuals, [column.prescribed for column in motions])
         beyond = _energy_beyond(loads, law.lame_mu[0], mirrored)
         response = reaction(loads, found.stationary[:count, :count] + beyond, total.on_probe[:count], mirrored)
         balance = total.imbalance(found.energies[:count], loads, mirrored)
@@ -222,7 +222,7 @@ class QuasiStaticProblem:
             return replace(response, balance=balance), None
         (applied,) = (column.applied for column in loaded)
         assert applied is not None
-        works = global_sum(found.dofs.comm, np.array([u @ applied.forces for u in found.moved]))
+        works = global_sum(found.space.comm, np.array([u @ applied.forces for u in found.moved]))
         balance = max(balance, imbalance(total, found.energies, works, applied, loads, mirrored))
         load_response = load_response_of(found.stationary, works, total.on_probe[-1], mirrored, apart=loads.apart)
         return replace(response, balance=balance), load_response
@@ -321,7 +321,7 @@ class QuasiStaticProblem:
             raise SolveError(f"the law {law.name} is for displacement elements")
         walk = self._walk
         if walk is None or not walk.leads_to(law, loads):
-            walk = Walk(law, loads.motions[0], np.zeros(self.elements.displacements.dofs.owned))
+            walk = Walk(law, loads.motions[0], np.zeros(self.elements.displacements.owned))
         self._walk = walk if self._reuse else None
         return LoadSteps(self.elements, walk, stack, direct=direct)
 

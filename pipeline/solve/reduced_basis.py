@@ -45,7 +45,7 @@ class ReducedBasis:
         """Begin with no solutions, for ``loads`` of one motion; ``smallest`` is the least t asked for. Collective."""
         self._problem, self._space = problem, problem.elements.displacements
         (motion,) = loads.motions
-        self._loads, self._mirrored = loads, self._space.dofs.body.mirrored
+        self._loads, self._mirrored = loads, self._space.body.mirrored
         self._stack = ExitStack()
         self._solver = self._stack.enter_context(problem.solver(MaterialLaw.of(smallest, 1.0), method))
         # What the residual is made of: first the loads, then two for each w.
@@ -55,7 +55,7 @@ class ReducedBasis:
         self._products = np.zeros((0, 2))  # w_i · parts_j
         self._result = self._vector()
         held = self._vector()
-        held.array[:] = self._space.dofs.held(motion)[: self._space.dofs.owned]
+        held.array[:] = self._space.held(motion)[: self._space.owned]
         self._held = held
         self._held_energy = [self._add(held, law, sign=-1.0) for law in (_LAMBDA, _MU)]
         self._residual, self._under_p = self._vector(), self._vector()
@@ -77,7 +77,7 @@ class ReducedBasis:
             added.axpy(-added.dot(other), other)
         norm = added.norm()
         if norm <= 1e-10 * float(
-            np.linalg.norm(global_sum(self._space.dofs.comm, np.array([correction @ correction]))) ** 0.5
+            np.linalg.norm(global_sum(self._space.comm, np.array([correction @ correction]))) ** 0.5
         ):
             return
         added.scale(1 / norm)
@@ -130,15 +130,15 @@ class ReducedBasis:
         space.set_displacement(values)
         space.apply(part, law)
         energy = float(part.dot(values))
-        on_probe = part.array.reshape(-1, 3)[space.dofs.probe_owned].sum(axis=0)
-        self._reactions.append(global_sum(space.dofs.comm, on_probe))
+        on_probe = part.array.reshape(-1, 3)[space.probe_owned].sum(axis=0)
+        self._reactions.append(global_sum(space.comm, on_probe))
         part.scale(sign)
-        part.array[space.dofs.prescribed_owned] = 0.0
+        part.array[space.prescribed_owned] = 0.0
         self._parts.append(part)
         return energy
 
     def _vector(self) -> PETSc.Vec:
-        return self._stack.enter_context(vector(self._space.dofs.space))
+        return self._stack.enter_context(vector(self._space.space))
 
 
 def _smallest_eigenvalue(solver: LinearSolver, load: PETSc.Vec) -> float:

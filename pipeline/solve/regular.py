@@ -32,7 +32,7 @@ from pipeline.solve.krylov import Level, LinearSolver, SolveError
 from pipeline.solve.loads import Motion
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.placed_force import PlacedForce, PlacedPull
-from pipeline.solve.spaces import Conditions, ElasticSpace, Operators, Spaces
+from pipeline.solve.spaces import Conditions, ElasticSpace, Spaces
 from pipeline.solve.vectors import vector
 
 # Of the elements that R is found with, and of the polynomials that it is kept as.
@@ -139,7 +139,7 @@ def regular_parts(body: BodyMesh, forces: Sequence[PointForce], law: MaterialLaw
     """
     with Spaces(body) as spaces:
         space = spaces.get(DEGREE, Conditions(unilateral=True))
-        places = np.asarray(space.dofs.space.tabulate_dof_coordinates())
+        places = np.asarray(space.space.tabulate_dof_coordinates())
         for force, values in zip(forces, _solved(space, forces, places, law), strict=True):
             yield _fitted(body, force, places, values.reshape(-1, 3))
 
@@ -162,16 +162,16 @@ def _solved(
     others = None if law is None else _beyond(law, own)
     law = law or own
     is_placed = isinstance(forces[0], PlacedForce)
-    pull: Any = PlacedPull(space.dofs.space) if is_placed else _Pull(space.dofs.space, places)
+    pull: Any = PlacedPull(space.space) if is_placed else _Pull(space.space, places)
     free = np.ones(len(places) * 3)
-    free[space.dofs.prescribed] = 0.0
-    with space.operators.lend(law) as matrix, _products(space, len(forces)) as product:
-        level = Level(space.dofs.space, matrix, space.dofs.prescribed)
+    free[space.prescribed] = 0.0
+    with space.lend(law) as matrix, _products(space, len(forces)) as product:
+        level = Level(space.space, matrix, space.prescribed)
         solver = LinearSolver([level], direct=True)
         try:
             for first in range(0, len(forces), _TOGETHER):
                 some = forces[first : first + _TOGETHER]
-                held = np.array([space.dofs.held(Motion(far=force, share=-1.0)) for force in some])
+                held = np.array([space.held(Motion(far=force, share=-1.0)) for force in some])
                 loads = np.zeros((len(free), len(some)), order="F")
                 for column, (force, values) in enumerate(zip(some, held, strict=True)):
                     load = product(values, law) + pull.of(force)
@@ -206,7 +206,7 @@ def _field(force: PointForce, places: FloatArray) -> FloatArray:
 @contextmanager
 def _products(space: ElasticSpace, forces: int) -> Iterator[Callable[[FloatArray, MaterialLaw], FloatArray]]:
     """Lend what makes K u of u on all dofs, none held, for any law: if it is for many forces, by a matrix for each."""
-    with vector(space.dofs.space) as result, ExitStack() as stack:
+    with vector(space.space) as result, ExitStack() as stack:
         if forces < _MANY:
 
             def by_form(values: FloatArray, law: MaterialLaw) -> FloatArray:
@@ -216,13 +216,12 @@ def _products(space: ElasticSpace, forces: int) -> Iterator[Callable[[FloatArray
 
             yield by_form
             return
-        whole = stack.enter_context(vector(space.dofs.space))
-        free = np.empty(0, dtype=np.int32)
-        operators, made = Operators(space.dofs.body, space.forms, free, []), {}
+        whole = stack.enter_context(vector(space.space))
+        made: dict[MaterialLaw, Any] = {}
 
         def by_matrix(values: FloatArray, law: MaterialLaw) -> FloatArray:
             if law not in made:
-                made[law] = stack.enter_context(operators.lend(law))
+                made[law] = stack.enter_context(space.lend(law, whole=True))
             whole.array[:] = values
             made[law].mult(whole, result)
             return np.array(result.array)
@@ -301,8 +300,8 @@ def regular_on_boundary(body: BodyMesh, forces: Sequence[PointForce], law: Mater
     """
     with Spaces(body) as spaces:
         space = spaces.get(DEGREE, Conditions(unilateral=True))
-        places = np.asarray(space.dofs.space.tabulate_dof_coordinates())
-        used, triangles = np.unique(_outer_triangles(compat.cell_dofs(space.dofs.space), places), return_inverse=True)
+        places = np.asarray(space.space.tabulate_dof_coordinates())
+        used, triangles = np.unique(_outer_triangles(compat.cell_dofs(space.space), places), return_inverse=True)
         values = [found.reshape(-1, 3)[used] for found in _solved(space, forces, places, law)]
     return OnBoundary(places[used], triangles.reshape(-1, 6), np.array(values))
 

@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Loads, Vector
-from pipeline.solve.spaces import ConstrainedSpace
+from pipeline.solve.spaces import ElasticSpace
 from pipeline.solve.vectors import global_sum
 
 
@@ -106,7 +106,7 @@ class Sums:
         return float(max((np.abs(self.works - twice_energies) / twice_energies).max(), forces.max()))
 
 
-def sums(space: ConstrainedSpace, residuals: Sequence[FloatArray], held: Sequence[FloatArray]) -> Sums:
+def sums(space: ElasticSpace, residuals: Sequence[FloatArray], held: Sequence[FloatArray]) -> Sums:
     """Return what residuals of n motions (owned dofs) sum up to; ``held`` are the prescribed values; collective.
 
     One residual more is that of loads.

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline import compat
-from pipeline.arrays import BoolArray, FloatArray, Int32Array
+from pipeline.arrays import FloatArray, Int32Array
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.scene.model import FIXED, MIRROR, PROBE
 from pipeline.solve.compiled import vector_space
@@ -31,6 +31,7 @@ from pipeline.solve.vectors import assemble, fill
 from pipeline.stages import stage
 
 _ORIGIN = np.zeros((1, 3))
+_NO_DOFS = np.empty(0, dtype=np.int32)
 # A direction this near to an axis of coordinates is it.
 _SAME = 1e-9
 
@@ -69,12 +70,12 @@ class Conditions:
         return tuple(normal)
 
 
-class ConstrainedSpace:
-    """Displacements of one degree on a mesh, and which of their dofs are prescribed. Holds no operator.
+class ElasticSpace:
+    """Displacements of one degree on a mesh: which of their dofs are prescribed, their forms, and operators of both.
 
     ``prescribed`` are local dofs (unrolled, owned and ghosts); arrays named ``…_owned`` index the dofs, or for
-    ``probe_owned`` and ``fixed_owned`` the blocks of three dofs, that this rank owns. ``owned`` and ``dofs`` count dofs
-    of this rank, and of all.
+    ``probe_owned`` and ``fixed_owned`` the blocks of three dofs, that this rank owns. ``owned`` and ``size`` count dofs
+    of this rank, and of all. ``space`` and ``dirichlet`` are dolfinx's.
     """
 
     @stage("spaces, forms")
@@ -84,10 +85,10 @@ class ConstrainedSpace:
         Raises:
             SolveError: if what the probe moves and the support share a point.
         """
-        self._body, self.comm, self.degree, self.conditions = body, body.comm, degree, conditions
+        self.body, self.comm, self.degree, self.conditions = body, body.comm, degree, conditions
         self.space = space = vector_space(body.mesh, degree)
         index_map = space.dofmap.index_map
-        self.owned, self.dofs = 3 * index_map.size_local, 3 * index_map.size_global
+        self.owned, self.size = 3 * index_map.size_local, 3 * index_map.size_global
         probe, fixed = (_points(space, body, name) for name in (PROBE, FIXED))
         # What may touch may be held, too, as long as it does not: who finds contact looks after that.
         if not conditions.unilateral and self.comm.allreduce(len(np.intersect1d(probe, fixed))):
@@ -102,16 +103,12 @@ class ConstrainedSpace:
         self.prescribed = np.unique(np.concatenate([*(d for d, _ in single), *(3 * fixed + c for c in range(3))]))
         self.prescribed_owned = self.prescribed[self.prescribed < self.owned]
         self.probe_owned, self.fixed_owned = (dofs[dofs < index_map.size_local] for dofs in (probe, fixed))
-
-    @property
-    def body(self) -> BodyMesh:
-        """The mesh."""
-        return self._body
+        self.forms = ElasticForms(space, body.regions)
 
     @property
     def whole_dofs(self) -> int:
         """Unknowns of the whole body, of which a half or a quarter may be modelled; collective."""
-        return 3 * whole_points(self.space, self._body)
+        return 3 * whole_points(self.space, self.body)
 
     def held(self, motion: Motion) -> FloatArray:
         """Return the displacement (m) that a unit of ``motion`` prescribes, zero elsewhere; local, with ghosts."""
@@ -126,32 +123,15 @@ class ConstrainedSpace:
             values.reshape(-1, 3)[self._fixed] = motion.share * motion.far.at(places)
         return values
 
-    def _sides_of(self, probe: Int32Array) -> FloatArray | None:
-        """Return of each point of the footprint on which side of a slit its face is, 1 or -1; collective."""
-        if self.conditions.front is None:
-            return None
-        sides = np.full(len(probe), -1.0)
-        sides[np.isin(probe, _points_beyond(self.space, self._body, self.conditions.front))] = 1.0
-        return sides
-
-
-class Operators:
-    """Makes operators of one space of displacements and lends them; what does not depend on the law is laid out once.
-
-    They do not have the rows and columns of ``prescribed`` dofs (local, unrolled), which ``dirichlet`` are for dolfinx.
-    """
-
-    def __init__(self, body: BodyMesh, forms: ElasticForms, prescribed: Int32Array, dirichlet: list[Any]):
-        self._body, self._forms, self._space = body, forms, forms.displacement.function_space
-        self._prescribed, self._dirichlet = prescribed, dirichlet
+    # ---- operators -------------------------------------------------------------------------------------
 
     @contextmanager
-    def lend(self, law: MaterialLaw) -> Iterator[PETSc.Mat]:
+    def lend(self, law: MaterialLaw, *, whole: bool = False) -> Iterator[PETSc.Mat]:
         """Lend K with entries, of type aij; its borrower may change it; collective.
 
-        The diagonal of prescribed dofs is the first region's μ.
+        The diagonal of prescribed dofs is the first region's μ; as a ``whole`` K is without any conditions.
         """
-        matrix = self._assemble(law, law.lame_mu[0])
+        matrix = self._assemble(law, whole=whole)
         try:
             yield matrix
         finally:
@@ -170,59 +150,28 @@ class Operators:
         finally:
             matrix.destroy()
 
-    @property
-    def multiplies(self) -> bool:
-        """Whether the space has products."""
-        return compat.degree(self._space) in DEGREES
-
     @cached_property
     def cells(self) -> CellStiffness:
-        """The cells as products have them, laid out when first asked for; collective. Where :attr:`multiplies`."""
-        return CellStiffness(*self._layout)
-
-    def whole_product(self, law: MaterialLaw, x: FloatArray) -> FloatArray:
-        """Return K x, without conditions, for owned dofs; collective. Where :attr:`multiplies`."""
-        return CellOperator(self.cells, law).whole(x)
-
-    @property
-    def _layout(self) -> tuple[Any, BoolArray | None, Int32Array, Int32Array | None]:
-        return self._space, curved_cells(self._body.mesh), self._prescribed, self._body.regions
+        """The cells as products have them, laid out when first asked for; of degree 2 or more; collective."""
+        return CellStiffness(self.space, curved_cells(self.body.mesh), self.prescribed, self.body.regions)
 
     @cached_property
     def _straight(self) -> StraightStiffness:
-        return StraightStiffness(*self._layout)
+        return StraightStiffness(self.space, curved_cells(self.body.mesh), self.body.regions)
 
     @stage("assembly")
-    def _assemble(self, law: MaterialLaw, diagonal: float) -> PETSc.Mat:
-        self._forms.set_law(law)
-        if self._body.comm.size > 1:
-            matrix = compat.assemble_matrix(self._forms.stiffness, self._dirichlet, diagonal)
+    def _assemble(self, law: MaterialLaw, *, whole: bool) -> PETSc.Mat:
+        self.forms.set_law(law)
+        dirichlet, diagonal = [] if whole else self.dirichlet, law.lame_mu[0]
+        if self.comm.size > 1:
+            matrix = compat.assemble_matrix(self.forms.stiffness, dirichlet, diagonal)
         else:
-            matrix = self._straight.matrix(law, diagonal)
-            if has_curved_cells(self._body.mesh):
-                compat.add_matrix(matrix, self._forms.curved_stiffness, self._dirichlet, diagonal)
+            matrix = self._straight.matrix(law, _NO_DOFS if whole else self.prescribed, diagonal)
+            if has_curved_cells(self.body.mesh):
+                compat.add_matrix(matrix, self.forms.curved_stiffness, dirichlet, diagonal)
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         matrix.setOption(PETSc.Mat.Option.SPD, True)
         return matrix
-
-
-class ElasticSpace:
-    """Displacements of one degree: their dofs with conditions, their forms, and the operators made of both."""
-
-    def __init__(self, body: BodyMesh, degree: int, conditions: Conditions):
-        """Collective.
-
-        Raises:
-            SolveError: if footprint and support share a point: no displacement satisfies both.
-        """
-        self.dofs = ConstrainedSpace(body, degree, conditions)
-        self.forms = ElasticForms(self.dofs.space, body.regions)
-        self.operators = Operators(body, self.forms, self.dofs.prescribed, self.dofs.dirichlet)
-
-    @property
-    def degree(self) -> int:
-        """Polynomial degree."""
-        return self.dofs.degree
 
     @stage("residuals")
     def apply(self, result: PETSc.Vec, law: MaterialLaw, *, checked: bool = True) -> None:
@@ -230,11 +179,11 @@ class ElasticSpace:
 
         ``checked``: never by the code that solves multiply with, so that each agrees with the other.
         """
-        if not checked and self.operators.multiplies:
-            result.array[:] = self.operators.whole_product(law, self.forms.displacement.x.array[: self.dofs.owned])
-            return
-        self.forms.set_law(law)
-        assemble(self.forms.action, result)
+        if checked or self.degree not in DEGREES:
+            self.forms.set_law(law)
+            assemble(self.forms.action, result)
+        else:
+            result.array[:] = CellOperator(self.cells, law).whole(self.forms.displacement.x.array[: self.owned])
 
     def lift(self, rhs: PETSc.Vec, held: FloatArray, law: MaterialLaw, *, checked: bool = True) -> None:
         """Put the loads of the prescribed displacements ``held`` into ``rhs``; collective.
@@ -245,7 +194,7 @@ class ElasticSpace:
         self.forms.displacement.x.array[:] = held
         self.apply(rhs, law, checked=checked)
         rhs.scale(-1.0)
-        rhs.array[self.dofs.prescribed_owned] = 0.0
+        rhs.array[self.prescribed_owned] = 0.0
 
     @stage("loads")
     def applied(self, loads: DeadLoads) -> Applied:
@@ -254,16 +203,24 @@ class ElasticSpace:
         Raises:
             SolveError: if no facet carries a traction.
         """
-        return apply_loads(loads, self.dofs.body, self.dofs.space)
+        return apply_loads(loads, self.body, self.space)
 
     def put(self, rhs: PETSc.Vec, applied: Applied, factor: float = 1.0) -> None:
         """Add ``factor`` times loads to ``rhs``, but for the prescribed dofs."""
         rhs.array[:] += factor * applied.forces
-        rhs.array[self.dofs.prescribed_owned] = 0.0
+        rhs.array[self.prescribed_owned] = 0.0
 
     def set_displacement(self, values: PETSc.Vec, factor: float = 1.0) -> None:
         """Make ``factor`` times ``values`` the displacement of the forms; collective."""
         fill(self.forms.displacement, values, factor)
+
+    def _sides_of(self, probe: Int32Array) -> FloatArray | None:
+        """Return of each point of the footprint on which side of a slit its face is, 1 or -1; collective."""
+        if self.conditions.front is None:
+            return None
+        sides = np.full(len(probe), -1.0)
+        sides[np.isin(probe, _points_beyond(self.space, self.body, self.conditions.front))] = 1.0
+        return sides
 
 
 class Spaces:

@@ -63,10 +63,14 @@ def _work_without_probe(comm: MPI.Comm, load: Section) -> float:
     dead = dead_loads_of(case)
     assert dead is not None
     with Spaces(found) as spaces, QuasiStaticProblem(spaces, 2, Conditions(unilateral=True)) as problem:
-        dofs = problem.elements.displacements.dofs
-        applied = apply_loads(dead, found, dofs.space)
-        with vector(dofs.space) as rhs, vector(dofs.space) as unknown, problem.solver(law_of(case), "direct") as solver:
-            problem.elements.displacements.put(rhs, applied)
+        space = problem.elements.displacements
+        applied = apply_loads(dead, found, space.space)
+        with (
+            vector(space.space) as rhs,
+            vector(space.space) as unknown,
+            problem.solver(law_of(case), "direct") as solver,
+        ):
+            space.put(rhs, applied)
             solver.solve(rhs, unknown)
             return float(global_sum(comm, np.array([unknown.array @ applied.forces]))[0])
 

@@ -53,11 +53,11 @@ def test_closed_forms_leave_no_residual(body, degree, load, exact):
     with Spaces(body) as spaces:
         space: ElasticSpace = spaces.get(degree, Conditions(unilateral=True))
         space.forms.displacement.interpolate(exact)
-        applied = apply_loads(dead, body, space.dofs.space)
-        with vector(space.dofs.space) as residual:
+        applied = apply_loads(dead, body, space.space)
+        with vector(space.space) as residual:
             space.apply(residual, MaterialLaw.of_moduli(YOUNG, 0.0))
             left = residual.array - applied.forces
-    left[space.dofs.prescribed_owned] = 0.0
+    left[space.prescribed_owned] = 0.0
     assert np.abs(left).max() < 1e-9 * applied.size
 
 
@@ -66,7 +66,7 @@ def test_resultants_are_those_of_the_loads(body):
     found = []
     for kept in (GRAVITY, {"traction": load["traction"][:1]}, {"traction": load["traction"][1:]}):
         with Spaces(body) as spaces:
-            space = spaces.get(2, Conditions()).dofs.space
+            space = spaces.get(2, Conditions()).space
             found.append(apply_loads(dead_loads_of(study(material=HEAVY, load=kept).case(())), body, space).resultant)
     # Of a quarter of the box, in which half of the cap lies.
     assert found[0] == pytest.approx([0, 0, -WEIGHT * 20e-3**3], abs=1e-12)
@@ -79,7 +79,7 @@ def test_each_layer_has_its_own_weight():
     case = study(body={"layers": [skin]}, material=HEAVY, load=GRAVITY, mesh={"degree": 1}).case(())
     layered = mesh_case(case, ("x", "y"), MPI.COMM_SELF)
     with Spaces(layered) as spaces:
-        applied = apply_loads(dead_loads_of(case), layered, spaces.get(1, Conditions()).dofs.space)
+        applied = apply_loads(dead_loads_of(case), layered, spaces.get(1, Conditions()).space)
     assert applied.resultant == pytest.approx([0, 0, -WEIGHT * (2 * 5e-3 + 15e-3) * 20e-3**2], abs=1e-12)
 
 
@@ -106,7 +106,7 @@ def test_what_ranks_add_for_each_other_counts():
     load = {**GRAVITY, "traction": [PULL]}
     body = mesh_case(study(mesh={"degree": 1}).case(()), ("x", "y"), MPI.COMM_WORLD)
     with Spaces(body) as spaces:
-        space = spaces.get(2, Conditions()).dofs.space
+        space = spaces.get(2, Conditions()).space
         applied = apply_loads(dead_loads_of(study(material=HEAVY, load=load).case(())), body, space)
     whole = global_sum(body.comm, applied.forces.reshape(-1, 3).sum(axis=0))
     assert whole == pytest.approx(applied.resultant, rel=1e-9)

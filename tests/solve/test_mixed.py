@@ -65,7 +65,7 @@ def test_patch(degree):
         compression = c * elements.pressures.weighed()
         assert np.abs(result[1].array).max() < 1e-12 * np.abs(compression).max()
         surface = mesh.exterior_facet_indices(body.mesh.topology)
-        outer = fem.locate_dofs_topological(space.dofs.space, 2, surface)
+        outer = fem.locate_dofs_topological(space.space, 2, surface)
         forces = result[0].array.reshape(-1, 3)
         inner = np.setdiff1d(np.arange(len(forces)), outer)
         assert len(inner)

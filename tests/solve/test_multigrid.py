@@ -80,9 +80,8 @@ def test_an_operator_that_is_not_positive_is_refused():
         problem.solver(law(0.3), "iterative") as solver,
     ):
         coarse, fine = solver.levels
-        operators = problem.elements.displacements.operators
         with (
-            operators.lend_product(MaterialLaw.of(-1.0, -1.0)) as turned,
+            problem.elements.displacements.lend_product(MaterialLaw.of(-1.0, -1.0)) as turned,
             pytest.raises(SolveError, match="not positive definite"),
         ):
             LinearSolver([coarse, Level(fine.space, turned, fine.prescribed)], direct=False)

@@ -186,7 +186,7 @@ class Surface:
     def of(self, degree: int) -> Candidates:
         """Return the candidates of a ``degree``; collective."""
         if degree not in self._found:
-            space = self.spaces.get(degree, CONDITIONS).dofs.space
+            space = self.spaces.get(degree, CONDITIONS).space
             self._found[degree] = find_candidates(self.spaces.body, space)
         return self._found[degree]
 

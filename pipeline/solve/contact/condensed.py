@@ -57,14 +57,14 @@ class CondensedElements(ContactDisplacement):
             self._near = self._compliance = self._condense()
 
     def _factor(self) -> LinearSolver:
-        space = self.space.dofs
+        space = self.space
         level = Level(space.space, self.hierarchy.finest, space.prescribed)
         return LinearSolver([level], direct=True)
 
     @stage("condensation")
     def _condense(self) -> FloatArray:
         """Return C (n, n), in m/N, symmetric."""
-        count, size = len(self._dofs), self.space.dofs.owned
+        count, size = len(self._dofs), self.space.owned
         compliance = np.empty((count, count))
         for first in range(0, count, _TOGETHER):
             here = self._dofs[first : first + _TOGETHER]
@@ -117,14 +117,14 @@ class CondensedElements(ContactDisplacement):
 
     def unknowns(self) -> Unknowns:
         """Return the displacement (m) of the whole body, owned dofs, for the reactions found."""
-        with vector(self.space.dofs.space) as loads:
+        with vector(self.space.space) as loads:
             self.numbering.put(loads.array, self._reactions, self._active)
             self._free.solve(loads, self.fields[0])
         return super().unknowns()
 
     def relax(self, tolerance: float, load: Unknowns) -> Unknowns:
         """Return the solution for a ``load`` with nothing held by the probe."""
-        space = self.space.dofs
+        space = self.space
         with vector(space.space) as rhs, vector(space.space) as found:
             (rhs.array[:],) = load
             rhs.array[space.prescribed_owned] = 0.0

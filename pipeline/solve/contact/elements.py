@@ -156,7 +156,7 @@ class ContactElements(ABC):
             SolveError: if the solver cannot be set up.
         """
         dofs = normal_dofs(self.space, facets)
-        self._active, self._held = np.zeros(len(self.candidates), dtype=bool), dofs[dofs < self.space.dofs.owned]
+        self._active, self._held = np.zeros(len(self.candidates), dtype=bool), dofs[dofs < self.space.owned]
         self.use(self.hierarchy.hold_facets(facets))
 
     def improve(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
@@ -191,7 +191,7 @@ class ContactElements(ABC):
                 part.scale(-1.0)
                 if self.load is not None:
                     part.array[:] += self.load[number]
-            rest[0].array[self.space.dofs.prescribed_owned] = 0.0
+            rest[0].array[self.space.prescribed_owned] = 0.0
             rest[0].array[self._held] = 0.0
             target = None if energy is None else tolerance * (energy / self.unit) ** 0.5
             iterations = self.correct(rest, correction, tolerance, target)
@@ -249,7 +249,7 @@ class ContactElements(ABC):
         self.plug.start_from(coarse.plug, self.fields, np.zeros_like(displacement.x.array))
         if coarse.far is not None:
             held = np.zeros_like(displacement.x.array)
-            held[self.space.dofs.prescribed] = displacement.x.array[self.space.dofs.prescribed]
+            held[self.space.prescribed] = displacement.x.array[self.space.prescribed]
             with self.plug.fields() as right, self.plug.fields() as unknown:
                 self.load = self.right_side(Column(prescribed=held, applied=None, right=right, unknown=unknown))
 
@@ -274,14 +274,14 @@ class ContactElements(ABC):
         self.plug.put(column, found)
         products = self.plug.products(self.law, [column])
         (moved,), (residual,) = products.moved, products.residuals
-        energy = float(global_sum(self.space.dofs.comm, np.array([moved @ residual]))[0])
+        energy = float(global_sum(self.space.comm, np.array([moved @ residual]))[0])
         if column.applied is not None:
             check_balance(self._imbalance(column.applied, moved, residual, energy))
         return FreeResponse((moved, *found[1:]), self.numbering.gather(moved), energy)
 
     def _imbalance(self, applied: Applied, moved: FloatArray, residual: FloatArray, energy: float) -> float:
         """Return the relative error of work and forces of loads; collective."""
-        space, mirrored = self.space.dofs, self.plug.body.mirrored
+        space, mirrored = self.space, self.plug.body.mirrored
         on_support = (residual - applied.forces).reshape(-1, 3)[space.fixed_owned].sum(axis=0)
         *support, work = global_sum(space.comm, np.array([*on_support, moved @ applied.forces]))
         rest = [s + f for axis, (s, f) in enumerate(zip(support, applied.resultant, strict=True))

@@ -45,9 +45,9 @@ def decrement(elements: ContactElements, facets: Int32Array) -> tuple[float, flo
 
 def _displacement_decrement(elements: ContactDisplacement, facets: Int32Array) -> tuple[float, int]:
     finer, law = elements.surface.spaces.get(elements.space.degree + 1, CONDITIONS), elements.law
-    with ExitStack() as stack, vector(finer.dofs.space) as residual:
+    with ExitStack() as stack, vector(finer.space) as residual:
         levels = elements.held_levels(facets, stack)
-        matrix = stack.enter_context(finer.operators.lend_product(law))
+        matrix = stack.enter_context(finer.lend_product(law))
         levels.append(mask(finer, matrix, law, normal_dofs(finer, facets)))
         solver = LinearSolver(levels, direct=False)
         stack.callback(solver.close)
@@ -55,7 +55,7 @@ def _displacement_decrement(elements: ContactDisplacement, facets: Int32Array) -
         finer.apply(residual, law, checked=False)
         residual.scale(-1.0)
         held = levels[-1].prescribed
-        residual.array[held[held < finer.dofs.owned]] = 0.0
+        residual.array[held[held < finer.owned]] = 0.0
         decrements, _, iterations = energy_decrements(solver, [residual])
     return float(decrements[0, 0]), iterations
 

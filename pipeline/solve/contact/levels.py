@@ -29,7 +29,7 @@ class Hierarchy:
         """Assemble; collective. What is made is given back with the ``stack``."""
         degrees = [degree] if direct else range(1, degree + 1)
         found = [surface.spaces.get(d, CONDITIONS) for d in degrees]
-        lent = [s.operators.lend_product(law) if s.degree > 1 and not direct else s.operators.lend(law) for s in found]
+        lent = [s.lend_product(law) if s.degree > 1 and not direct else s.lend(law) for s in found]
         matrices = [stack.enter_context(matrix) for matrix in lent]
         is_masked = masks and not direct
         self._operators = [
@@ -37,7 +37,7 @@ class Hierarchy:
             for space, matrix in zip(found, matrices, strict=True)
         ]
         self._candidates = [surface.of(d) for d in degrees]
-        self._numberings = [Numbering(s.dofs.space, c.numbers) for s, c in zip(found, self._candidates, strict=True)]
+        self._numberings = [Numbering(s.space, c.numbers) for s, c in zip(found, self._candidates, strict=True)]
 
     @property
     def finest(self) -> PETSc.Mat:
@@ -88,8 +88,8 @@ class HeldOperator:
         if is_product(self._matrix):
             matrix = self._matrix.getPythonContext().holding(dofs).matrix()
             self._stack.callback(matrix.destroy)
-            held = np.union1d(self.space.dofs.prescribed, dofs)
-            return Level(self.space.dofs.space, matrix, held, not self._law.is_uniform)
+            held = np.union1d(self.space.prescribed, dofs)
+            return Level(self.space.space, matrix, held, not self._law.is_uniform)
         if self._is_held:
             self.free.copy(self._matrix, structure=_SAME)
         self._is_held = True
@@ -98,18 +98,17 @@ class HeldOperator:
 
 def mask(space: ElasticSpace, matrix: PETSc.Mat, law: MaterialLaw, dofs: Int32Array) -> Level:
     """Return the level of a ``matrix`` of one process that stays as it is; ``dofs`` (unrolled) are held by its user."""
-    return Level(space.dofs.space, matrix, np.union1d(space.dofs.prescribed, dofs), not law.is_uniform, dofs)
+    return Level(space.space, matrix, np.union1d(space.prescribed, dofs), not law.is_uniform, dofs)
 
 
 def hold(space: ElasticSpace, matrix: PETSc.Mat, law: MaterialLaw, dofs: Int32Array) -> Level:
     """Return the level of a ``matrix`` after zeroing rows and columns of ``dofs`` (local, unrolled); collective."""
     first, _ = matrix.getOwnershipRange()
-    matrix.zeroRowsColumns((first + dofs[dofs < space.dofs.owned]).astype(PETSc.IntType), diag=law.lame_mu[0])
-    return Level(space.dofs.space, matrix, np.union1d(space.dofs.prescribed, dofs), not law.is_uniform)
+    matrix.zeroRowsColumns((first + dofs[dofs < space.owned]).astype(PETSc.IntType), diag=law.lame_mu[0])
+    return Level(space.space, matrix, np.union1d(space.prescribed, dofs), not law.is_uniform)
 
 
 def normal_dofs(space: ElasticSpace, facets: Int32Array) -> Int32Array:
     """Return the local dofs (unrolled, owned and ghosts) along z in the local ``facets``; collective."""
-    dofs = space.dofs
-    found = fem.locate_dofs_topological(dofs.space, dofs.body.mesh.topology.dim - 1, facets)
+    found = fem.locate_dofs_topological(space.space, space.body.mesh.topology.dim - 1, facets)
     return np.asarray(3 * found + 2, dtype=np.int32)

@@ -297,7 +297,7 @@ class ContactSearch:
 
     def _held_by_support(self) -> BoolArray:
         """Tell which candidates (n) are held by the support; collective. Of them none is ever found to touch."""
-        space = self._elements.displacements.dofs
+        space = self._elements.displacements
         is_held = np.zeros(space.owned)
         is_held[3 * space.fixed_owned + 2] = 1.0
         return np.asarray(Numbering(space.space, self.candidates.numbers).gather(is_held) > 0)
@@ -312,7 +312,7 @@ class ContactSearch:
 
     def _response(self, column: Column, found: Found, law: MaterialLaw, loads: Loads) -> Response:
         """Return the force for the depth, as if it were proportional to it; its balance is that of all checks."""
-        space, state, (depth,) = self._elements.displacements.dofs, found.state, loads.amounts
+        space, state, (depth,) = self._elements.displacements, found.state, loads.amounts
         force = self._force
         (residual,) = self._elements.products(law, [column]).residuals
         local = depth * residual.reshape(-1, 3)[space.fixed_owned, 2].sum()

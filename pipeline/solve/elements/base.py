@@ -20,7 +20,7 @@ from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import Response
 from pipeline.solve.solution import Contact
-from pipeline.solve.spaces import Conditions, ConstrainedSpace, ElasticSpace, Spaces
+from pipeline.solve.spaces import Conditions, ElasticSpace, Spaces
 from pipeline.solve.vectors import global_sum, vector
 
 # A displacement, and for mixed elements a pressure.
@@ -50,7 +50,7 @@ class Products:
     ``energies`` (n) are twice the strain energies. Energies are global, of the part that is modelled.
     """
 
-    dofs: ConstrainedSpace
+    space: ElasticSpace
     moved: list[FloatArray]
     residuals: list[FloatArray]
     stationary: FloatArray
@@ -166,12 +166,12 @@ class Elements(ABC):
     @property
     def dofs(self) -> int:
         """Unknowns of the modelled part."""
-        return self.displacements.dofs.dofs
+        return self.displacements.size
 
     @property
     def whole_dofs(self) -> int:
         """Unknowns of the whole body; collective."""
-        return self.displacements.dofs.whole_dofs
+        return self.displacements.whole_dofs
 
     @property
     @abstractmethod
@@ -238,7 +238,7 @@ class Elements(ABC):
         parts = [[[x @ y for x, y in zip(field, image, strict=True)] for image in images] for field in found]
         stretching, *compressing = np.moveaxis(global_sum(self.body.comm, np.array(parts)), -1, 0)
         return Products(
-            dofs=self.displacements.dofs,
+            space=self.displacements,
             moved=[field[0] for field in found],
             residuals=[image[0] for image in images],
             stationary=stretching + sum(compressing),
@@ -260,7 +260,7 @@ class Elements(ABC):
     @contextmanager
     def fields(self) -> Iterator[Fields]:
         """Lend fields of zeros; collective."""
-        with vector(self.displacements.dofs.space) as u:
+        with vector(self.displacements.space) as u:
             yield (u,)
 
     def set_fields(self, fields: Fields) -> None:
@@ -272,18 +272,17 @@ class Elements(ABC):
 
         They are the fields of the own forms then.
         """
-        displacement, dofs = self.displacements.forms.displacement, self.displacements.dofs
+        displacement, space = self.displacements.forms.displacement, self.displacements
         displacement.interpolate(coarse.displacements.forms.displacement)
-        unknown[0].array[:] = displacement.x.array[: dofs.owned] - prescribed[: dofs.owned]
-        unknown[0].array[dofs.prescribed_owned] = 0.0
+        unknown[0].array[:] = displacement.x.array[: space.owned] - prescribed[: space.owned]
+        unknown[0].array[space.prescribed_owned] = 0.0
 
     def columns(self, loads: Loads, stack: ExitStack) -> list[Column]:
         """Return a column for each motion, and one more for dead loads, if there are any; collective.
 
         They have no solution yet, and are freed with the ``stack``.
         """
-        dofs = self.displacements.dofs
-        prescribed = [dofs.held(motion) for motion in loads.motions]
+        prescribed = [self.displacements.held(motion) for motion in loads.motions]
         amounts = [*loads.amounts]
         applied: list[Applied | None] = [None for _ in prescribed]
         if loads.dead is not None:
@@ -307,20 +306,20 @@ class Elements(ABC):
             for column, amount in zip(columns, amounts or [column.amount for column in columns], strict=True):
                 for whole, part in zip(total, column.unknown, strict=True):
                     whole.axpy(amount, part)
-                total[0].array[:] += amount * column.prescribed[: self.displacements.dofs.owned]
+                total[0].array[:] += amount * column.prescribed[: self.displacements.owned]
             self.set_fields(total)
 
     def put(self, column: Column, values: Sequence[FloatArray], amount: float = 1.0) -> None:
         """Make owned ``values`` of the fields, for an ``amount`` of what a column is a unit of, its solution."""
         for part, of_field in zip(column.unknown, values, strict=True):
             part.array[:] = of_field / amount
-        column.unknown[0].array[self.displacements.dofs.prescribed_owned] = 0.0
+        column.unknown[0].array[self.displacements.prescribed_owned] = 0.0
 
     def total(self, column: Column, result: Fields) -> None:
         """Write a solution into ``result``."""
         for whole, part in zip(result, column.unknown, strict=True):
             part.copy(whole)
-        result[0].array[:] += column.prescribed[: self.displacements.dofs.owned]
+        result[0].array[:] += column.prescribed[: self.displacements.owned]
 
     def works(self, columns: Sequence[Column], forces: FloatArray) -> FloatArray:
         """Return the work (J) of nodal ``forces`` (N), owned dofs, in each solution; collective."""
@@ -329,7 +328,7 @@ class Elements(ABC):
             with self.fields() as total:
                 self.total(column, total)
                 found.append(total[0].array @ forces)
-        return global_sum(self.displacements.dofs.comm, np.array(found))
+        return global_sum(self.displacements.comm, np.array(found))
 
 
 def close_far(columns: list[Column], loads: Loads, share: float) -> Loads:
@@ -349,6 +348,5 @@ def close_far(columns: list[Column], loads: Loads, share: float) -> Loads:
 
 def level_of(space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, direct: bool = False) -> Level:
     """Return a level of multigrid, or of a direct solve; its operator is given back with the ``stack``; collective."""
-    operators = space.operators
-    matrix = stack.enter_context(operators.lend(law) if direct or space.degree == 1 else operators.lend_product(law))
-    return Level(space.dofs.space, matrix, space.dofs.prescribed, not law.is_uniform)
+    matrix = stack.enter_context(space.lend(law) if direct or space.degree == 1 else space.lend_product(law))
+    return Level(space.space, matrix, space.prescribed, not law.is_uniform)

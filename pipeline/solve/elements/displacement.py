@@ -113,14 +113,14 @@ class DisplacementSolver(Solver):
         space, residuals = finer.displacements, []
         solutions: list[FloatArray] = []
         for column in columns:
-            residual = stack.enter_context(vector(space.dofs.space))
+            residual = stack.enter_context(vector(space.space))
             coarse.show([column], [1.0])
             space.forms.displacement.interpolate(coarse.displacements.forms.displacement)
             if keep:
-                solutions.append(space.forms.displacement.x.array[: space.dofs.owned].copy())
+                solutions.append(space.forms.displacement.x.array[: space.owned].copy())
             space.apply(residual, self.law, checked=False)
             residual.scale(-1.0)
-            residual.array[space.dofs.prescribed_owned] = 0.0
+            residual.array[space.prescribed_owned] = 0.0
             if loads.dead is not None and column.applied is not None:
                 space.put(residual, space.applied(loads.dead))
             residuals.append(residual)

@@ -45,7 +45,7 @@ class Pressures:
         self.whole_dofs = whole_points(self.space, body)
         self._stack = ExitStack()
         with stage("assembly"):
-            self._products = CellPressures(self.space, displacements.operators.cells)
+            self._products = CellPressures(self.space, displacements.cells)
             self.unit = self._products.unit
 
     def close(self) -> None:
@@ -81,14 +81,14 @@ class Pressures:
         if not checked:
             result.array[:] += self._products.pull(self.values, whole=True)
             return
-        with vector(self._displacements.dofs.space) as pull:
+        with vector(self._displacements.space) as pull:
             assemble(self.forms.pull, pull)
             result.axpy(1.0, pull)
 
     def dilate(self, result: PETSc.Vec, *, checked: bool) -> None:
         """Write B u, of all displacements, into ``result``; collective. ``checked``: see :meth:`ElasticSpace.apply`."""
         if not checked:
-            displacement = self._displacements.forms.displacement.x.array[: self._displacements.dofs.owned]
+            displacement = self._displacements.forms.displacement.x.array[: self._displacements.owned]
             result.array[:] = self._products.dilation(displacement, whole=True)
             return
         assemble(self.forms.dilation, result)
@@ -107,7 +107,7 @@ class Pressures:
         )
         free = coupling.createVecRight()
         free.set(1.0)
-        free.array[self._displacements.dofs.prescribed_owned] = 0.0
+        free.array[self._displacements.prescribed_owned] = 0.0
         coupling.diagonalScale(None, free)
         free.destroy()
         coupling.scale(self.unit)

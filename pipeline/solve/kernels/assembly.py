@@ -21,34 +21,34 @@ from pipeline.solve.physics import MaterialLaw
 class StraightStiffness:
     """The straight cells of a space of displacements on one process, and the pattern of the operator on all cells.
 
-    ``curved`` tells for each cell whether it is left to others, None if none is; ``prescribed`` are the dofs (unrolled)
-    whose rows and columns the operator does not have; ``regions`` number what cells are made of.
+    ``curved`` tells for each cell whether it is left to others, None if none is; ``regions`` number what cells are made
+    of.
     """
 
-    def __init__(self, space: Any, curved: BoolArray | None, prescribed: Int32Array, regions: Int32Array | None = None):
+    def __init__(self, space: Any, curved: BoolArray | None, regions: Int32Array | None = None):
         self._dofs = owned_cells(space)
         self._which = straight_cells(curved, len(self._dofs))
         self._regions = np.zeros(len(self._dofs), dtype=np.int32) if regions is None else regions
         self._corners, self._tensors = corners(space.mesh), _reference_tensors(compat.degree(space))
-        self._prescribed, self._free = prescribed, np.ones(3 * space.dofmap.index_map.size_local)
-        self._free[prescribed] = 0.0
         self._offsets, self._columns, self._places = _pattern(self._dofs, space.dofmap.index_map.size_local)
 
-    def matrix(self, law: MaterialLaw, diagonal: float) -> PETSc.Mat:
-        """Return the straight cells' part, with room for the others and the ``diagonal`` of prescribed dofs.
+    def matrix(self, law: MaterialLaw, prescribed: Int32Array, diagonal: float) -> PETSc.Mat:
+        """Return the straight cells' part, with room for the others; the caller destroys it.
 
-        The caller destroys it.
+        ``prescribed`` dofs (unrolled) have no row or column, but for a ``diagonal``.
         """
+        free = np.ones(3 * (len(self._offsets) - 1))
+        free[prescribed] = 0.0
         regions = np.zeros_like(self._regions) if law.is_uniform else self._regions
         blocks = np.zeros((len(self._columns), 9))
         call(
             "add_stiffness", len(self._which), self._which, self._dofs.shape[1], self._corners, self._dofs,
-            self._places, self._tensors, self._free, regions, np.array(law.lame_lambda, dtype=float),
+            self._places, self._tensors, free, regions, np.array(law.lame_lambda, dtype=float),
             np.array(law.lame_mu, dtype=float), blocks,
         )  # fmt: skip
         row = np.repeat(np.arange(len(self._offsets) - 1, dtype=np.int32), np.diff(self._offsets))
         on_diagonal = np.flatnonzero(self._columns == row)
-        blocks[on_diagonal[self._prescribed // 3], 4 * (self._prescribed % 3)] = diagonal
+        blocks[on_diagonal[prescribed // 3], 4 * (prescribed % 3)] = diagonal
         offsets, columns, places = self._unrolled
         values = np.empty(blocks.size)
         values[places] = blocks
