@@ -59,7 +59,7 @@ docs: setup ## build the documentation; a warning is an error
 test: ## run the tests, by themselves and on 2 ranks
 	@scripts/setup.sh chromium
 	$(PYTHON) -m pytest $(SIDE_BY_SIDE) $(PYTEST_ARGS) </dev/null
-	$(MPIRUN) 2 scripts/one-voice.sh $(PYTHON) -m mpi4py -m pytest -m mpi -p no:cacheprovider $(PYTEST_ARGS) </dev/null $(NONE_OK)
+	$(MPIRUN) 2 scripts/one-voice.sh $(PYTHON) -m mpi4py -m pytest -m "mpi and not nightly" -p no:cacheprovider $(PYTEST_ARGS) </dev/null $(NONE_OK)
 
 test-all: ## run the tests with those that are left to the night
 	@scripts/setup.sh chromium
