@@ -101,7 +101,8 @@ def features_page() -> str:
 
 def dataset_page() -> str:
     """Return the page of every variable of a dataset."""
-    found: dict[str, dict[str, Any]] = {"body_message": attributes("body_message")}  # of files that were mended alone
+    of_files = ("surface_deviation", "body_message")
+    found: dict[str, dict[str, Any]] = {name: attributes(name) for name in of_files}
     for changes in _VARIANTS:
         study = tomllib.loads(starter("study"))
         for section, keys in changes.items():
@@ -117,8 +118,8 @@ def dataset_page() -> str:
         "dimension `path`, a raster `x` and `y`: lengths in m, and `at_x`, `at_y` and `at_z` are then coordinates. "
         "`epsilon` is infinite for the full order.",
         "",
-        'What belongs to loads, slits, unilateral contact, `motion = "all"`, several laws or a mended file is there '
-        "only where the study has it.",
+        'What belongs to loads, slits, unilateral contact, `motion = "all"`, several laws, a surface of triangles or a '
+        "mended file is there only where the study has it.",
         "",
         *_table(("variable", "unit", "meaning")),
     ]

@@ -1,6 +1,7 @@
 """From arrays on one process to a distributed dolfinx mesh with named boundary facets."""
 
 from dataclasses import dataclass
+from math import nan
 from typing import Any
 
 import dolfinx
@@ -19,12 +20,14 @@ class BodyMesh:
     """A distributed mesh and the facets, local to this rank, of each boundary group.
 
     ``regions`` numbers the region of each local cell, ghosts too; None for a body of one material.
+    ``deviation`` (m) is how far its points are from the surface of a file of triangles; not a number of other bodies.
     """
 
     mesh: Any
     facets: dict[str, Int32Array]
     cells: int  # global
     regions: Int32Array | None = None
+    deviation: float = nan
 
     @property
     def owned_cells(self) -> int:
@@ -47,12 +50,12 @@ def distribute(comm: MPI.Comm, arrays: MeshArrays | None) -> BodyMesh:
     """Create the dolfinx mesh of ``arrays``, which only rank 0 holds; collective."""
     if arrays is not None:
         cells, points = arrays.cells, arrays.points
-        width, surface, count = cells.shape[1], arrays.facets, len(cells)
+        known = cells.shape[1], arrays.facets, len(cells), arrays.deviation
     else:
-        cells, points, width, surface, count = np.empty((0, 0), np.int64), np.empty((0, 3)), 0, {}, 0
-    width, surface, count = comm.bcast((width, surface, count))
+        cells, points, known = np.empty((0, 0), np.int64), np.empty((0, 3)), None
+    width, surface, count, deviation = comm.bcast(known)
     mesh = compat.create_mesh(comm, cells.reshape(-1, width), points, order=1 if width == 4 else 2)
-    return BodyMesh(mesh, _find_facets(mesh, surface), count, _find_regions(comm, mesh, arrays))
+    return BodyMesh(mesh, _find_facets(mesh, surface), count, _find_regions(comm, mesh, arrays), deviation)
 
 
 def _find_regions(comm: MPI.Comm, mesh: Any, arrays: MeshArrays | None) -> Int32Array | None:

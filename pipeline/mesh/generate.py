@@ -4,7 +4,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from math import ceil
+from math import ceil, nan
 from typing import Any
 
 import gmsh
@@ -51,6 +51,7 @@ class MeshArrays:
     ``regions`` (m) numbers the region of each cell, among those of the body; None for a body of one material. A region
     that the mesh does not reach has no cell. ``bent``, until cells are curved,
     holds edges (k, 2) on faces that only the geometry kernel knows, and the mid nodes (k, 3) that it gave them, in m.
+    ``deviation`` (m) is how far points are from the surface of a file of triangles; not a number of other bodies.
     """
 
     points: FloatArray
@@ -60,6 +61,7 @@ class MeshArrays:
     seconds: float
     regions: IntArray | None = None
     bent: tuple[IntArray, FloatArray] | None = None
+    deviation: float = nan
 
 
 @stage("gmsh")

@@ -20,6 +20,7 @@ from pipeline.run.outcome import without_contact
 from pipeline.run.record import Record
 from pipeline.shapes.frame import Frame, PlaceError
 from pipeline.shapes.from_file import FromFile
+from pipeline.shapes.scanned import Scanned
 from pipeline.study.sweep import Axis, Case, Scale, Study
 
 # The variables that are taken as they are from the records of the cases, and from those of F_exact.
@@ -42,6 +43,8 @@ _FLOATS = (
 _IN_RECORD = {"machine_load": "load"}
 # Those of contact that is found, if any of the study's is.
 _FOUND = ("contact_area", "contact_area_error", "contact_radius", "contact_radius_error")
+# Of bodies of triangles.
+_SCANNED = ("surface_deviation",)
 _COUNTS = ("dofs", "cells", "iterations")
 # Of loads, if any of the study's acts; nought where none does.
 _OF_LOADS = ("load_force", "load_force_error", "load_energy", "sag")
@@ -95,7 +98,8 @@ def _of_records(study: Study, flat: Sequence[Record | None], exact: Sequence[Rec
     """Return what every dataset has of the records of the cases, and of those of F_exact."""
     variables: dict[str, Any] = {}
     found = _FOUND if any(case.probe.is_unilateral for case in study.cases()) else ()
-    for name in (*_FLOATS, *found):
+    scanned = _SCANNED if any(isinstance(case.body, Scanned) for case in study.cases()) else ()
+    for name in (*_FLOATS, *found, *scanned):
         variables[name] = _variable(study, name, [getattr(r, _IN_RECORD.get(name, name)) if r else nan for r in flat])
     for name in LARGEST:
         variables[name] = _variable(study, name, [r.largest.get(name, nan) if r else nan for r in flat])

@@ -19,7 +19,7 @@ from pipeline.stages import stage
 from pipeline.study.sweep import Case
 
 # Raise by hand when the same case gives another mesh.
-MESH_VERSION = 5
+MESH_VERSION = 6
 LIMIT = 2_000_000_000  # bytes
 
 
@@ -47,6 +47,7 @@ class MeshCache:
                 content["rim"],
                 float(content["seconds"]),
                 content.get("regions"),
+                deviation=float(content["deviation"]),
             )
             _touch(path)
         except FileNotFoundError:
@@ -64,6 +65,7 @@ class MeshCache:
         if mesh.regions is not None:
             arrays["regions"] = mesh.regions
         own = {"points": mesh.points, "cells": mesh.cells, "rim": mesh.rim, "seconds": np.float64(mesh.seconds)}
+        own |= {"deviation": np.float64(mesh.deviation)}
         self._keep(path, arrays | own)
 
     @stage("mesh cache")

@@ -29,8 +29,9 @@ class Record:
     ``energy_release`` (J/m²) is the mean along a slit's front, its relative 95 % bar ``energy_release_error``.
     Loads add ``load_force`` (N), of the bar ``load_force_error`` (N), to the force while the probe is held, in all
     ``load_force_vector`` (N); ``load_energy`` (J) is their strain energy, ``sag`` (m) how far they take a probe that is
-    free along its axis. ``kind``, ``planned_cells`` and ``poisson`` are what its cost was estimated from
-    (:mod:`pipeline.plan.cost`), ``group`` the ranks that computed it. What times are worth tell ``time_spread``, that
+    free along its axis. ``surface_deviation`` (m) is how far the mesh is from the surface in the body's file.
+    ``kind``, ``planned_cells`` and ``poisson`` are what its cost was estimated from (:mod:`pipeline.plan.cost`),
+    ``group`` the ranks that computed it. What times are worth tell ``time_spread``, that
     of repeats relative to their median, and ``load``, the processes a core that ran or wanted to.
     """
 
@@ -60,6 +61,7 @@ class Record:
     load_energy: float = nan
     sag: float = nan
     balance: float = nan
+    surface_deviation: float = nan
     dofs: int = 0
     cells: int = 0
     iterations: int = 0

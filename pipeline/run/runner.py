@@ -220,7 +220,8 @@ class StepRunner:
         estimate_it = bar is not Bar.NONE and not missing
         solution = solve_problem(solve.case, problem, estimate=estimate_it, meshed=solve.meshed_case)
         record = record_of(solve, solution, meshed.times.mesh)
-        return replace(self._stamp(record, meshed.memory), message=missing)
+        stamped = self._stamp(record, meshed.memory)
+        return replace(stamped, message=missing, surface_deviation=meshed.mesh.deviation)
 
     def _lacks_room(self, bar: Bar, needed: float) -> str:
         """Return what to say if there is no memory for an error bar that may be left out; collective.

@@ -15,6 +15,7 @@ from pipeline.mesh.of_case import mesh_arrays
 from pipeline.mesh.organ import make
 from pipeline.mesh.organ.base import far_surface
 from pipeline.mesh.organ.make import mesh_organ, mesh_scanned
+from pipeline.mesh.organ.remesh import _closed
 from pipeline.mesh.organ.sheet import FREE, PROBE, Sheet, edges_of
 from pipeline.mesh.organ.untangle import TangledError, bad_facets, untangled
 from pipeline.mesh.size import Sizes
@@ -208,7 +209,7 @@ def test_specks_and_needles_of_the_file_do_not_matter(tmp_path):
 
 
 def test_a_surface_that_is_not_the_files_is_never_filled(file, monkeypatch):
-    """Too small a one, and an open one, are failures that are told."""
+    """Too small a one, one that is drawn out at a point, and an open one, are failures that are told."""
     a_scene = scene(file)
     far = far_surface(a_scene.body)
     to_sizes = make._to_sizes
@@ -219,6 +220,16 @@ def test_a_surface_that_is_not_the_files_is_never_filled(file, monkeypatch):
 
     monkeypatch.setattr(make, "_to_sizes", shrunk)
     with pytest.raises(MeshError, match=r"0\.06\d times the body's volume too little"):
+        mesh_organ(a_scene, SIZES, far)
+
+    def drawn_out(*given):
+        sheet = to_sizes(*given)
+        points = sheet.points.copy()
+        points[np.argmin(points[:, 2])] *= 1.2
+        return replace(sheet, points=points)
+
+    monkeypatch.setattr(make, "_to_sizes", drawn_out)
+    with pytest.raises(TangledError, match=r"leaves the file's by \d"):
         mesh_organ(a_scene, SIZES, far)
     opened = replace(far.sheet, facets=far.sheet.facets[1:], group=far.sheet.group[1:])
     monkeypatch.setattr(make, "_to_sizes", lambda *given: opened)
@@ -252,6 +263,7 @@ def test_a_folded_surface_is_meshed(tmp_path, seed):
     assert not flat_cells(mesh.points, mesh.cells[:, :4]).any()
     assert np.quantile(qualities(mesh), 0.01) > 0.1
     assert np.quantile(off, 0.9) < 1e-9
+    assert mesh.deviation == pytest.approx(off.max())
 
 
 def test_a_tangle_that_nothing_mends_is_told_by_its_place(file, monkeypatch):
@@ -279,6 +291,38 @@ def test_facets_folded_upon_each_other_are_opened():
     np.testing.assert_array_equal(opened.points[rim], points[rim])
     assert (opened.points != points).any(axis=1).sum() < 10
     assert bad_facets(sheet).any() and not bad_facets(opened).any()
+
+
+def test_a_facet_without_height_is_opened():
+    """A corner of a ball's facet lies on the edge across: no neighbours are folded, and yet tetrahedra fail."""
+    points, facets = sphere(12)
+    a, b, c = facets[np.argmax((points[facets][..., 2] < 0).all(axis=1))]
+    points = points.copy()
+    points[a] = points[[b, c]].mean(axis=0)
+    sheet = Sheet(points, facets, np.full(len(facets), FREE), _NO_EDGES)
+    opened = untangled(sheet, np.empty(0, np.int64))
+    assert sheet.heights.min() < 1e-12 and opened.heights.min() > 0.1
+    assert bad_facets(sheet).any() and not bad_facets(opened).any()
+
+
+def test_fins_and_holes_that_a_remesher_leaves_are_mended():
+    """A facet that hangs on by an edge goes, and so does one behind it; one that is missing is put back."""
+    points, facets = sphere(6)
+    a, b, _ = facets[0]
+    count = len(points)
+    fins = [(a, b, count), (b, count + 1, count)]
+    broken = Sheet(
+        np.vstack([points, 1.2 * points[[a, b]]]),
+        np.vstack([facets[:50], facets[51:], fins]),
+        np.full(len(facets) + 1, FREE),
+        _NO_EDGES,
+    )
+    with pytest.raises(MeshError, match="not closed"):
+        edges_of(broken.facets)
+    mended = _closed(broken)
+    edges_of(mended.facets)
+    assert len(mended.facets) == len(facets) and len(mended.points) == len(points)
+    assert mended.volume == pytest.approx(Sheet(points, facets, np.full(len(facets), FREE), _NO_EDGES).volume)
 
 
 def sharpest(sheet):

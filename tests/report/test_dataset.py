@@ -96,7 +96,9 @@ def test_what_was_done_to_a_bodys_file_is_told_beside_its_forces(tmp_path):
     facets[0] = facets[0, ::-1]
     mended = body | {"file": str(write_stl(tmp_path / "mended.stl", points, facets))}
     probe = {"at": ["5 mm", "3 mm"], "radius": "4 mm"}
-    assert "body_message" not in dataset(body=whole, probe=probe)
+    found = dataset(body=whole, probe=probe)
+    assert "body_message" not in found and "surface_deviation" not in dataset()
+    assert "surface_deviation" in found
     data = dataset(body=mended, probe=probe)
     assert data["status"] == "ok" and "repaired: 1 inverted facets turned" in str(data["body_message"].values)
 

@@ -20,6 +20,7 @@ from pipeline.mesh.organ.volume import fill
 from pipeline.mesh.regions import inclusion_sizes
 from pipeline.mesh.size import Sizes
 from pipeline.scene.model import Scene
+from pipeline.shapes.body import Body
 from pipeline.shapes.scanned import Scanned
 
 # The surface is meshed twice: only the second time its points are dense where sizes change fast.
@@ -32,6 +33,9 @@ _FINER = (1, 2, 4)
 _TOO_LARGE = 2
 # The remesher turns lengths into units of its own and back, which moves points by rounding.
 _SAME = 1e-6
+# Points are put back onto the file's surface, unless facets would turn over or cross by that: they stay away from it by
+# less than this share of elements there, as chords of folds of their size do.
+_MOST_OFF = 0.25
 # A share of the body's volume: chords of elements leave half a per cent of an organ out, which their curved edges bring
 # back; where folds are as fine as elements, it is more, and F not that of the file.
 MOST_EXCESS = 0.03
@@ -92,12 +96,14 @@ def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
     sheet = _to_sizes(contact, field, _Truth(scene, far, lift))
     sheet = untangled(sheet, np.unique(sheet.facets[sheet.group == PROBE]))
     _check_whole(sheet, scene.body.volume)
+    deviation = _deviation(sheet, scene.body, field)
     points, cells, regions = fill(sheet.points, sheet.facets, field, inclusion_surfaces(scene.body.inclusion, field))
     if (flat := flat_cells(points, cells)).any():
         raise TangledError.at(points[cells[flat]], "gmsh left a flat tetrahedron")
     facets = {name: sheet.facets[sheet.group == number] for number, name in group_names().items()}
     rim = np.unique(sheet.border(PROBE))
-    return MeshArrays(points, orient(points, cells), facets, rim, perf_counter() - start, regions)
+    seconds = perf_counter() - start
+    return MeshArrays(points, orient(points, cells), facets, rim, seconds, regions, deviation=deviation)
 
 
 def _check(scene: Scene) -> None:
@@ -121,6 +127,21 @@ def _check_whole(sheet: Sheet, volume: float) -> None:
             f"the surface, meshed anew, holds {abs(excess):.2g} times the body's volume too {amount}: "
             "smooth it, or give a smaller `fine`"
         )
+
+
+def _deviation(sheet: Sheet, body: Body, field: Field) -> float:
+    """Return how far (m) points of the sheet are from the file's surface.
+
+    Raises:
+        TangledError: if that is more than elements there allow.
+    """
+    (skin,) = body.surfaces()["skin"]
+    distance = skin.distance(sheet.points)
+    far = distance > _MOST_OFF * field.at(sheet.points)
+    if far.any():
+        what = f"the surface, meshed anew, leaves the file's by {1e3 * distance[far].max():.2g} mm"
+        raise TangledError(sheet.points[far], distance[far], what)
+    return float(distance.max())
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.generate import MeshError
-from pipeline.mesh.organ.sheet import Sheet, edges_of
+from pipeline.mesh.organ.sheet import Sheet, compact, edges_of
 from pipeline.shapes.triangles import half_edges
 from pipeline.stages import stage
 
@@ -142,27 +142,34 @@ def _read(text: str) -> Sheet:
 
 
 def _closed(sheet: Sheet) -> Sheet:
-    """Return the sheet with the holes closed that a remesher leaves where it drops a facet."""
+    """Return the sheet without the fins that a remesher leaves, and with the holes closed where it drops a facet."""
+    sheet = _without_fins(sheet)
     pairs = half_edges(sheet.facets)
     base = len(sheet.points)
     keys, back = pairs @ np.array([base, 1]), pairs @ np.array([1, base])
     alone = ~np.isin(keys, back)
-    if not alone.any():
-        return sheet
     # Round a hole one goes against its facets.
     following = {end: start for start, end in pairs[alone].tolist()}
     owner = dict(zip(pairs[alone][:, 1].tolist(), np.repeat(sheet.group, 3)[alone].tolist(), strict=True))
-    facets, groups = [], []
+    facets, groups = [sheet.facets], [sheet.group]
     while following:
         first = min(following)
         loop, point = [first], following.pop(first)
         while point != first and point in following:
             loop.append(point)
             point = following.pop(point)
-        facets += [(first, loop[k], loop[k + 1]) for k in range(1, len(loop) - 1)]
-        groups += [owner[first]] * (len(loop) - 2)
-    if not facets:
-        return sheet
-    return Sheet(
-        sheet.points, np.vstack([sheet.facets, facets]), np.concatenate([sheet.group, groups]), sheet.sharp
-    )  # fmt: skip
+        fan = [(first, loop[k], loop[k + 1]) for k in range(1, len(loop) - 1)]
+        facets.append(np.array(fan, dtype=np.int64).reshape(-1, 3))
+        groups.append(np.full(len(fan), owner[first]))
+    return Sheet(sheet.points, np.vstack(facets), np.concatenate(groups), sheet.sharp)
+
+
+def _without_fins(sheet: Sheet) -> Sheet:
+    """Return the sheet without facets that hang on to it by one edge, or by none."""
+    while True:
+        keys = _keys(half_edges(sheet.facets), len(sheet.points))
+        _, number, times = np.unique(keys, return_inverse=True, return_counts=True)
+        joined = (times[number].reshape(-1, 3) > 1).sum(axis=1) > 1
+        if joined.all():
+            return sheet
+        sheet = compact(Sheet(sheet.points, sheet.facets[joined], sheet.group[joined], sheet.sharp))[0]

@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.generate import MeshError
 from pipeline.scene import model
-from pipeline.shapes.triangles import closed_edges, enclosed, half_edges
+from pipeline.shapes.triangles import closed_edges, doubled_normals, enclosed, half_edges
 
 # Numbers of the groups, which the remesher keeps apart.
 FREE, FIXED, PROBE = 1, 2, 3
@@ -33,10 +33,17 @@ class Sheet:
     @property
     def normals(self) -> FloatArray:
         """Unit normals (m, 3) of the facets."""
-        a, b, c = (self.points[self.facets[:, k]] for k in range(3))
-        normal = np.cross(b - a, c - a)
+        normal = doubled_normals(self.points, self.facets)
         length = np.linalg.norm(normal, axis=1, keepdims=True)
         return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+
+    @property
+    def heights(self) -> FloatArray:
+        """Heights (m) of the facets over their longest edges, as shares of these."""
+        corners = self.points[self.facets]
+        longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
+        doubled = np.linalg.norm(doubled_normals(self.points, self.facets), axis=1)
+        return np.divide(doubled, longest**2, out=np.zeros(len(corners)), where=longest > 0)
 
     @property
     def centres(self) -> FloatArray:

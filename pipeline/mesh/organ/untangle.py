@@ -10,10 +10,12 @@ from pipeline.mesh.generate import MeshError
 from pipeline.mesh.organ.sheet import Sheet, edges_of
 from pipeline.shapes.files.crossings import crossings
 
-# Neighbours with less between them are folded: a tetrahedron in there would be flat.
-_FOLDED = radians(10.0)
-# A fold of the file itself may be as sharp as this.
-_SHARPEST = radians(1.0)
+# Neighbours with less between them are folded: a tetrahedron in there would be flat. A fold of the file itself may be
+# as sharp as the second angle.
+_FOLDED, _SHARPEST = radians(10.0), radians(1.0)
+# Facets whose height is this share of their longest edge are needles, on which tetrahedra fail; the second share may
+# remain.
+_THIN, _THINNEST = 1e-3, 1e-6
 # Points of bad facets are moved so often; after so many rounds, those next to them are moved, too.
 _ROUNDS, _WIDER = 12, 4
 
@@ -32,14 +34,24 @@ class TangledError(MeshError):
         return TangledError(corners.mean(axis=1), np.ptp(corners, axis=1).max(axis=1), *what)
 
 
-def bad_facets(sheet: Sheet, folded: float = _FOLDED) -> BoolArray:
-    """Tell which facets cross others, or have less than the angle ``folded`` between them and a neighbour."""
-    bad = np.zeros(len(sheet.facets), dtype=bool)
-    bad[crossings(sheet.points, sheet.facets)] = True
+def bad_facets(sheet: Sheet) -> BoolArray:
+    """Tell which facets cross others, are needles, or are folded upon a neighbour."""
+    return _crossing(sheet) | _misshapen(sheet, _FOLDED, _THIN)
+
+
+def _crossing(sheet: Sheet) -> BoolArray:
+    found = np.zeros(len(sheet.facets), dtype=bool)
+    found[crossings(sheet.points, sheet.facets)] = True
+    return found
+
+
+def _misshapen(sheet: Sheet, angle: float, height: float) -> BoolArray:
+    """Tell which facets have less than an ``angle`` (rad) to a neighbour, or a ``height`` (share) less than that."""
+    found = sheet.heights < height
     _, sides = edges_of(sheet.facets)
     normals = sheet.normals
-    bad[sides[(normals[sides[:, 0]] * normals[sides[:, 1]]).sum(axis=1) < -cos(folded)]] = True
-    return bad
+    found[sides[(normals[sides[:, 0]] * normals[sides[:, 1]]).sum(axis=1) < -cos(angle)]] = True
+    return found
 
 
 def untangled(sheet: Sheet, stay: IntArray) -> Sheet:
@@ -60,10 +72,11 @@ def untangled(sheet: Sheet, stay: IntArray) -> Sheet:
     share = beside.sum(axis=1)
     fillable: Sheet | None = None
     for number in range(_ROUNDS):
-        bad = bad_facets(sheet)
+        crossing = _crossing(sheet)
+        bad = crossing | _misshapen(sheet, _FOLDED, _THIN)
         if not bad.any():
             return sheet
-        if fillable is None and not bad_facets(sheet, _SHARPEST).any():
+        if fillable is None and not (crossing.any() or _misshapen(sheet, _SHARPEST, _THINNEST).any()):
             fillable = sheet
         if number == 0:
             first = sheet.points[sheet.facets[bad]]

@@ -5,12 +5,14 @@ from functools import cache
 
 import numpy as np
 
-from pipeline.arrays import FloatArray, IntArray
+from pipeline.arrays import BoolArray, FloatArray, IntArray
 
 _Exact = tuple[Fraction, Fraction, Fraction]
 
 # Pairs that are decided again, 1 ms each: of a surface with more, some do cross.
 _MOST = 2000
+# Volumes above this share of the cube of a facet's extent have the sign that floating point gives them.
+_SURE = 1e-9
 
 
 def crossings(points: FloatArray, facets: IntArray) -> IntArray:
@@ -24,6 +26,7 @@ def crossings(points: FloatArray, facets: IntArray) -> IntArray:
     # Its predicates hold with the constants, and in the rounding, that a process begins with: in one that other
     # libraries had worked in, facets of a good surface were seen to cross.
     doubtful = np.array([len({*facets[i]} & {*facets[j]}) < 2 for i, j in pairs], dtype=bool)
+    doubtful[doubtful] = ~_surely_cross(points[facets[pairs[doubtful]]])
     again = np.flatnonzero(doubtful)[:_MOST]
     wrong = [number for number in again if not _cross(*points[facets[pairs[number]]])]
     return np.delete(pairs, wrong, axis=0)
@@ -42,6 +45,29 @@ def _search(points: FloatArray, facets: IntArray) -> IntArray:
     _, pairs, _ = find_self_intersections(np.ascontiguousarray(points), np.ascontiguousarray(facets))
     pairs = pairs.reshape(-1, 2)
     return pairs[np.lexsort(pairs.T[::-1])]  # threads find them in any order
+
+
+def _surely_cross(corners: FloatArray) -> BoolArray:
+    """Tell which pairs of triangles (n, 2, 3, 3) cross by more than rounding: an edge of one goes through the other."""
+    found = np.zeros(len(corners), dtype=bool)
+    least = _SURE * np.ptp(corners, axis=(1, 2)).max(axis=1, initial=0.0) ** 3
+    for one, other in ((0, 1), (1, 0)):
+        a, b, c = np.moveaxis(corners[:, one], 1, 0)
+        for k in range(3):
+            p, q = corners[:, other, k], corners[:, other, (k + 1) % 3]
+            sides = np.stack([_volume(p, a, b, c), -_volume(q, a, b, c)])
+            turns = np.stack([_volume(p, q, a, b), _volume(p, q, b, c), _volume(p, q, c, a)])
+            found |= _same_sign(sides, least) & _same_sign(turns, least)
+    return found
+
+
+def _volume(p: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
+    volumes: FloatArray = np.einsum("ij,ij->i", a - p, np.cross(b - p, c - p))
+    return volumes
+
+
+def _same_sign(values: FloatArray, least: FloatArray) -> BoolArray:
+    return np.asarray((values > least).all(axis=0) | (values < -least).all(axis=0))
 
 
 def _cross(one: FloatArray, other: FloatArray) -> bool:

@@ -36,3 +36,15 @@ def test_pairs_that_are_found_by_mistake_are_dropped(monkeypatch):
     monkeypatch.setattr(module, "_make_exact", lambda: None)
     monkeypatch.setattr(module, "_search", lambda *_: pairs)
     assert not len(crossings(points, facets))
+
+
+def test_what_floating_point_is_sure_of_is_so_in_rational_numbers():
+    random = np.random.Generator(np.random.PCG64(1))
+    corners = random.standard_normal((400, 2, 3, 3))
+    corners[::4, 1, 0] = corners[::4, 0, 0]
+    sure = module._surely_cross(corners)
+    exact = np.array([module._cross(*pair) for pair in corners])
+    assert 20 < sure.sum() < 200
+    np.testing.assert_array_equal(sure[1::4], exact[1::4])
+    assert exact[sure].all()
+    assert not len(module._surely_cross(corners[:0]))
