@@ -10,9 +10,9 @@ from pipeline.cli.plan import find_case
 from pipeline.cli.view import fields_of
 from pipeline.cli.words import DEFAULT_MESHES, faults_of_machine
 from pipeline.plan.estimate import cells
-from pipeline.report.guide import guide
-from pipeline.report.page.guideline import ACCURACY
-from pipeline.report.table import DatasetError, number_of, study_of
+from pipeline.report.guide import USUAL_ACCURACY, guide
+from pipeline.report.table import DatasetError, case_at, study_of
+from pipeline.study.sweep import Case, Study
 
 # The case of the report's answer.
 _ANSWER = "answer"
@@ -27,10 +27,11 @@ def scene_of(path: Path, dataset: xr.Dataset, text: str) -> str:
         fail(of_file(path, "--scene needs the study's text, as this version reads it"))
     if text == _ANSWER:
         try:
-            text = _number_of_answer(dataset)
+            chosen = _of_answer(dataset, study)
         except DatasetError as wrong:
             fail(of_file(path, f"--scene {_ANSWER} needs an answer: {wrong}; name a case by its number"))
-    chosen = find_case(study, text, "--scene")
+    else:
+        chosen = find_case(study, text, "--scene")
     from pipeline.view.page import render
     from pipeline.workflow import world
 
@@ -45,7 +46,7 @@ def scene_at_hand(dataset: xr.Dataset) -> str:
     if study is None or faults_of_machine():
         return ""
     try:
-        case = find_case(study, _number_of_answer(dataset))
+        case = _of_answer(dataset, study)
     except DatasetError:
         return ""
     if case.lost_contact:
@@ -70,14 +71,15 @@ def scene_at_hand(dataset: xr.Dataset) -> str:
     return render(fields, study.title) if fields is not None else ""
 
 
-def _number_of_answer(dataset: xr.Dataset) -> str:
-    """Return the number of the case that limits the answer of the report.
+def _of_answer(dataset: xr.Dataset, study: Study) -> Case:
+    """Return the case that limits the answer of the report.
 
     Raises:
         DatasetError: if there is no answer.
     """
-    found = guide(dataset, ACCURACY)
+    found = guide(dataset, USUAL_ACCURACY)
     verdict = found.answer or found.best
-    if verdict is None:
+    case = case_at(dataset, study, verdict.labels | (verdict.limit or {})) if verdict else None
+    if case is None:
         raise DatasetError("no setting was judged")
-    return str(number_of(dataset, verdict.labels | (verdict.limit or {})))
+    return case

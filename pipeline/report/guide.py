@@ -20,14 +20,27 @@ from pipeline.report.times import doubts
 from pipeline.report.verdict import choose, judge, keeps, most_accurate
 from pipeline.units import parse_quantity
 
+# The accuracy that the report asks for; `epsmesh guide` answers for any.
+USUAL_ACCURACY = "5 %"
+
 
 class Guide(Guideline):
-    """A guideline that prints as the text for people."""
+    """A guideline in words, which prints as the text for people."""
 
-    def __str__(self) -> str:
-        return guide_text.text(self)
+    question = property(guide_text.question)
+    setting = property(guide_text.setting)
+    details = property(guide_text.details)
+    others = property(guide_text.others)
+    settings = property(guide_text.settings)
+    __str__ = __repr__ = guide_text.text
 
-    __repr__ = __str__
+
+def guide_if_any(dataset: xr.Dataset) -> Guide | None:
+    """Return the guide for a usual accuracy, or None if nothing can be judged."""
+    try:
+        return guide(dataset, USUAL_ACCURACY)
+    except DatasetError:
+        return None
 
 
 def guide(dataset: xr.Dataset, accuracy: str | float | None = None, budget: str | float | None = None) -> Guide:

@@ -26,10 +26,6 @@ def text(guide: Guideline) -> str:
     lost = "; ".join([*map(words, guide.lost[:4]), *(["…"] if len(guide.lost) > 4 else [])])
     return template.render(
         guide=guide,
-        question=question(guide),
-        setting=setting(guide),
-        details=details(guide),
-        others=others(guide),
         table=shown,
         lost=f"{counted(len(guide.lost), 'scene')} ({lost})",
     ).rstrip()

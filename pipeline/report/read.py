@@ -1,15 +1,15 @@
-"""Read a dataset that a run has written: by its own name, or by its study's."""
+"""Read a dataset that a run has written, which may be damaged: by its own name, or by its study's."""
 
 import warnings
 from collections.abc import Callable
+from math import prod
 from pathlib import Path
 from shlex import quote
 
 import numpy as np
 import xarray as xr
 
-from pipeline.printable import printable_lines
-from pipeline.report.load import load
+from pipeline.printable import printable, printable_lines
 from pipeline.report.table import DatasetError
 
 # What every dataset of a study has, and figures and report are made from.
@@ -28,6 +28,9 @@ _NEEDED = (
     "reductions",
     "study",
 )
+# Twice what the most cases that a study may have take.
+_LARGEST = 1_000_000_000  # bytes
+_POINTER = 8  # to a text
 
 
 def dataset_path(file: str | Path, output: str | Path = "results") -> Path:
@@ -66,6 +69,36 @@ def read(file: str | Path, output: str | Path = "results", warn: Callable[[str],
     if study != path and study.is_file() and _text_of(study) != dataset.attrs["study"]:
         warn(f"{study} has changed since {path} was made, which answers for the study as it was: run it again")
     return dataset
+
+
+def load(path: Path) -> xr.Dataset:
+    """Return the dataset at ``path``, in memory; every array is compared with its checksum.
+
+    Raises:
+        DatasetError: if it is damaged, no netCDF, or beyond what any study has.
+    """
+    try:
+        # A few bytes of a packed file may stand for any number of values.
+        if (size := _size(path)) > _LARGEST:
+            raise DatasetError(f"{path}: would take {size / 1e9:.3g} GB: no study's dataset has more than 1")
+        return xr.load_dataset(path)
+    except DatasetError:
+        raise
+    except Exception as error:  # of a damaged file the libraries raise many kinds
+        why = next(iter(str(error).splitlines()), type(error).__name__)
+        raise DatasetError(
+            f"{path}: cannot be read as netCDF: {printable(why)}: it is damaged, or no dataset; "
+            "`epsmesh run` writes that of a study again, of what the case store holds"
+        ) from None
+
+
+def _size(path: Path) -> int:
+    """Return how many bytes the variables of a file take in memory, without reading them."""
+    from netCDF4 import Dataset  # noqa: PLC0415 (xarray loads it, too)
+
+    with Dataset(path) as file:
+        kinds = [(variable.shape, variable.dtype) for variable in file.variables.values()]
+        return sum(prod(map(int, shape)) * getattr(kind, "itemsize", _POINTER) for shape, kind in kinds)
 
 
 def _text_of(study: Path) -> str:

@@ -149,16 +149,6 @@ def words(labels: Labels) -> str:
     return ", ".join(parts) or "the one setting"
 
 
-def number_of(dataset: xr.Dataset, labels: Labels) -> int:
-    """Return the number, counted from 0, of the first case that has ``labels``."""
-    sizes = [dataset.sizes[dim] for dim in dataset["force"].dims]
-    place = [
-        int(np.flatnonzero([_plain(value) == labels[dim] for value in dataset[dim].values])[0]) if dim in labels else 0
-        for dim in map(str, dataset["force"].dims)
-    ]
-    return int(np.ravel_multi_index(place, sizes)) if sizes else 0
-
-
 def _labels(dataset: xr.Dataset, dims: list[str]) -> list[Labels]:
     values = ([_plain(value) for value in dataset[dim].values] for dim in dims)
     return [dict(zip(dims, labels, strict=True)) for labels in itertools.product(*values)]

@@ -7,9 +7,8 @@ import pytest
 
 from pipeline.cli import app
 from pipeline.report.dataset import write
-from pipeline.report.guide import guide
+from pipeline.report.guide import USUAL_ACCURACY, guide, guide_if_any
 from pipeline.report.guide_text import settings, text
-from pipeline.report.page.guideline import ACCURACY, guide_section
 from pipeline.run.record import Record
 from pipeline.run.store import Store
 from pipeline.shapes.probes.blade import Blade
@@ -153,14 +152,14 @@ def test_pruning_says_first_what_would_go(epsmesh, tmp_path):
 
 def test_report_and_guide_agree_on_every_number():
     data = dataset()
-    found, section = guide(data, ACCURACY), guide_section(data)
+    found, section = guide(data, USUAL_ACCURACY), guide_if_any(data)
     assert section.settings.equals(settings(found))
     words = text(found)
     details = [told for _, told in section.details]
     assert all(line in words for line in (section.question, section.setting, *details, *section.others))
     # What takes longest in one scene is not what it usually takes: neither stands for the other.
     slow = dataset(seconds=lambda case: 1 + 9 * (case.material.poisson > 0.35) * isinstance(case.probe, Blade))
-    table = guide_section(slow).settings
+    table = guide_if_any(slow).settings
     assert (table["longest time"] != table["median time"]).all()
 
 

@@ -6,7 +6,7 @@ import pytest
 import xarray as xr
 
 from pipeline.report.dataset import write
-from pipeline.report.load import load
+from pipeline.report.read import load
 from pipeline.report.table import DatasetError
 from tests.report.synthetic import FIGURE, dataset
 

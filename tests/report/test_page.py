@@ -12,11 +12,10 @@ import pytest
 from pipeline.pages import json_in_page
 from pipeline.report.dataset import write
 from pipeline.report.figures import draw
-from pipeline.report.guide import guide
+from pipeline.report.guide import USUAL_ACCURACY, guide, guide_if_any
 from pipeline.report.page import render, write_page
 from pipeline.report.page.cases import case_table
-from pipeline.report.page.guideline import ACCURACY, guide_section
-from pipeline.report.table import number_of
+from pipeline.report.table import case_at, study_of
 from tests.cases import BLADE, raw
 from tests.commands import epsmesh
 from tests.report import chosen
@@ -133,7 +132,7 @@ def test_failures_come_first_and_say_why():
 
 def test_the_report_begins_with_the_answer_and_says_how_it_is_turned_round_unless_it_is():
     data, words = chosen.dataset(), "epsmesh report results/chosen.nc --scene answer"
-    page, section = render(data, "chosen"), guide_section(data)
+    page, section = render(data, "chosen"), guide_if_any(data)
     seen = [text.strip() for text in Reader(page).texts if text.strip()]
     assert seen.index(section.setting) < seen.index("cases")
     assert all(seen.index(detail) < seen.index("cases") for _, detail in section.details)
@@ -165,8 +164,8 @@ def test_a_written_dataset_gives_the_same_table(tmp_path):
 
 
 def test_the_guide_of_the_page_is_that_of_the_epsmesh():
-    assert guide_section(small()) is None  # F_exact is not known
-    section, found = guide_section(chosen.dataset()), guide(chosen.dataset(), ACCURACY)
+    assert guide_if_any(small()) is None  # F_exact is not known
+    section, found = guide_if_any(chosen.dataset()), guide(chosen.dataset(), USUAL_ACCURACY)
     assert section is not None
     assert len(section.settings) == len(found.verdicts)
     assert section.setting in str(found)
@@ -175,12 +174,12 @@ def test_the_guide_of_the_page_is_that_of_the_epsmesh():
     assert all(line in str(found) for line in (*(words for _, words in section.details), *section.others))
 
 
-def test_the_case_of_the_answer_is_known_by_its_number():
+def test_the_case_of_the_answer_is_found_by_its_labels():
     data = chosen.dataset()
-    found = guide(data, ACCURACY)
+    found = guide(data, USUAL_ACCURACY)
     verdict = found.answer or found.best
-    number = number_of(data, verdict.labels | verdict.limit)
-    case = data.isel(dict(zip(data["force"].dims, np.unravel_index(number, data["force"].shape), strict=True)))
+    found = case_at(data, study_of(data), verdict.labels | verdict.limit)
+    case = data.isel(dict(zip(data["force"].dims, found.index, strict=True)))
     assert float(case["force"]) == verdict.force
     assert float(case["epsilon"]) == verdict.labels["epsilon"]
 

@@ -12,11 +12,10 @@ import xarray as xr
 from pipeline.files import write_whole
 from pipeline.pages import hash_of, joined, render_page
 from pipeline.report.figures import choose, describe, figure
+from pipeline.report.guide import guide_if_any
 from pipeline.report.page.cases import FIRST_ROWS, case_table
-from pipeline.report.page.facts import facts, failures, provenance, reproduce, without_exact
-from pipeline.report.page.guideline import guide_section
+from pipeline.report.page.facts import by_status, facts, origins, provenance, reproduce, struck, without_exact
 from pipeline.report.page.inline import inline_svg
-from pipeline.report.page.skipped import origins, skipped, struck
 
 # What the answer says of times, and the headlines need not say again.
 _TOLD = "speed-ups"
@@ -42,7 +41,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
     A page in a page is bound by the policies of both: the report's must allow the scripts of the ``scene``.
     """
     study = str(dataset.attrs.get("study", ""))
-    guide = guide_section(dataset)
+    guide = guide_if_any(dataset)
     table = case_table(dataset)
     plotly = joined(_VENDOR / "plotly-basic.min.js")
     names = [column.name for column in table.columns]
@@ -57,7 +56,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         scene=scene,
         scene_scripts=_SCRIPT.findall(scene)[:2],
         facts=[fact for fact in facts(dataset) if not (guide and fact[0] == _TOLD)],
-        failures=failures(dataset),
+        failures=by_status(dataset, "failed"),
         without_exact=without_exact(dataset),
         figures=_figures(dataset),
         guide=guide,
@@ -66,7 +65,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         first_rows=FIRST_ROWS,
         struck=struck(dataset),
         origins=origins(dataset),
-        skipped=skipped(dataset),
+        skipped=by_status(dataset, "skipped"),
         study=study,
         study_link=f"data:text/plain;charset=utf-8,{quote(study)}",
         provenance=provenance(dataset),

@@ -1,5 +1,6 @@
-"""What a report says first: how many cases, what failed, where it was computed, how to run it again."""
+"""What a report says beside tables: how many cases, what failed or was not done, and how to run it again."""
 
+import json
 import re
 from collections import defaultdict
 from datetime import datetime
@@ -22,6 +23,16 @@ _STATES = {
     "skipped": "skipped",
     "lost": "without contact",
     "pending": "not yet run",
+}
+
+_ORIGINS = {
+    "solved": "solved for themselves, on the whole body",
+    "symmetric": "solved on a half or a quarter of the body",
+    "axisymmetric": "solved on the meridian of a round scene",
+    "scaled": "F of another case, in proportion to Young's modulus and depth",
+    "image": "F of another place, of which this one is the image",
+    "reduced": "from a reduced basis in Poisson's ratio, with a bound on the error",
+    "stored": "read back from the case store",
 }
 
 
@@ -49,9 +60,9 @@ def facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
     return found
 
 
-def failures(dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return the messages of failed cases, the most frequent first, with some of their cases."""
-    return _by_message(dataset, "failed", "message")
+def by_status(dataset: xr.Dataset, status: str) -> list[dict[str, Any]]:
+    """Return the messages of the cases of a status, the most frequent first, with some of their cases."""
+    return _by_message(dataset, status, "message")
 
 
 def without_exact(dataset: xr.Dataset) -> list[dict[str, Any]]:
@@ -59,9 +70,20 @@ def without_exact(dataset: xr.Dataset) -> list[dict[str, Any]]:
     return _by_message(dataset, "", "force_exact_message")
 
 
-def by_status(dataset: xr.Dataset, status: str) -> list[dict[str, Any]]:
-    """Return the messages of the cases of a status, with some of their cases."""
-    return _by_message(dataset, status, "message")
+def struck(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return what the run's plan struck out: name, how many solves, reason."""
+    return list(json.loads(dataset.attrs["reductions"]))
+
+
+def origins(dataset: xr.Dataset) -> list[tuple[int, str, str]]:
+    """Return how forces were obtained: number of cases, word, what it means."""
+    names, counts = np.unique([name for name in dataset["origin"].values.ravel() if name], return_counts=True)
+    found = [(int(count), str(name), _meaning(str(name))) for name, count in zip(names, counts, strict=True)]
+    return sorted(found, reverse=True)
+
+
+def _meaning(origin: str) -> str:
+    return "; ".join(meaning for word in origin.split(", ") if (meaning := _ORIGINS.get(word, "")))
 
 
 def provenance(dataset: xr.Dataset) -> list[tuple[str, str]]:
