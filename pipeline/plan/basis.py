@@ -19,7 +19,7 @@ def use_reduced_basis(plan: Plan) -> Plan:
     obstacles = [obstacle("reduced basis", operator.case) for operator in operators]
     tolerance = plan.study.planning.tolerance
     many = {
-        solve.key: digest(f"{solve.key} reduced {tolerance!r}")
+        solve.key
         for operator, obstacle in zip(operators, obstacles, strict=True)
         if not obstacle
         for solve in operator.solves
@@ -27,8 +27,12 @@ def use_reduced_basis(plan: Plan) -> Plan:
     if operators and not many:
         reason = f"No reduced basis: {obstacles[0]}, and each is solved."
         return replace(plan, struck=(*plan.struck, Struck("reduced", 0, reason)))
-    solves = tuple(replace(s, key=many[s.key], reduced=True) if s.key in many else s for s in plan.solves)
-    plan = replace(plan, solves=solves, keys=tuple(many.get(key, key) for key in plan.keys))
+    plan = plan.with_solves(
+        [
+            replace(s, key=digest(f"{s.key} reduced {tolerance!r}"), reduced=True) if s.key in many else s
+            for s in plan.solves
+        ]
+    )
     return plan.struck_by("reduced", len(many), reason_of(use_reduced_basis))
 
 

@@ -51,7 +51,7 @@ class EquivalentPlace:
         return x, y, z
 
 
-def image_key(case: Case, *, scaled: bool) -> tuple[str, Matrix] | None:
+def image_key(case: Case, scaled: bool) -> tuple[str, Matrix] | None:
     """Return a key that images have in common, and the matrix (3, 3) that takes the case to where they are compared.
 
     ``scaled`` leaves out what F is proportional to. None where no images are looked for: on bodies without symmetry,
@@ -69,19 +69,19 @@ def image_key(case: Case, *, scaled: bool) -> tuple[str, Matrix] | None:
     return digest("\n".join([case_key(elsewhere, scaled=scaled), str(case.is_full), str(place)])), matrix
 
 
-def moved_key(case: Case, *, scaled: bool) -> str:
-    """Return a key that all places have in common where what is kept of the body is the same, "" where it is not.
+def moved_key(case: Case, scaled: bool) -> tuple[str, Matrix] | None:
+    """Return a key that all places have in common where what is kept of the body is the same, None where it is not.
 
     That is a column in level layers, or a half ball closed by a half-space, clear of the sides. Not where inclusions
     or loads are, and not one that the body's own far field closes, which knows where it stands.
     """
     body, frame = case.body, case.frame
     if not case.is_truncated or not isinstance(body, Layered) or obstacle("equivalent places", case):
-        return ""
+        return None
     if not is_level(body, frame) or body.gap(frame.point) <= (1 + _SAME) * case.column:
-        return ""
+        return None
     elsewhere = replace(case, probe=case.probe.model_copy(update={"at": NOWHERE}))
-    return digest("\n".join([case_key(elsewhere, scaled=scaled), "moved"]))
+    return digest("\n".join([case_key(elsewhere, scaled=scaled), "moved"])), _UNITY
 
 
 def _compared(case: Case) -> Iterator[tuple[tuple[float, ...], Matrix]]:

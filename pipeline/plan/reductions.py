@@ -53,38 +53,40 @@ def strike_scaled(plan: Plan) -> Plan:
 
 def strike_images(plan: Plan) -> Plan:
     """Places that are each other's image, mirrored or turned about the body's axis, are solved once."""
-    first: dict[str, tuple[Solve, Matrix]] = {}
-    key: dict[str, str] = {}
-    images: dict[tuple[int, ...], EquivalentPlace] = {}
-    for solve in plan.solves if _sweeps_places(plan) else ():
-        found = image_key(solve.case, scaled="scaling" in plan.used)
-        if found is None:
-            continue
-        text, matrix = found
-        other, there = first.setdefault(text, (solve, matrix))
-        if other is not solve:
-            key[solve.key] = other.key
-            image = EquivalentPlace(other.case.index, from_place(there, matrix))
-            images |= dict.fromkeys(solve.serves, image)
-    solves = tuple(replace(solve, key=key.get(solve.key, solve.key)) for solve in plan.solves)
-    plan = replace(plan, solves=solves, keys=_renamed(plan, key), equivalent=images)
-    return _merged(plan, "images", reason_of(strike_images))
+    return _struck_places(plan, "images", strike_images, image_key, of_scene=True)
 
 
 def strike_moved(plan: Plan) -> Plan:
     """A column, or a half ball that a half-space closes, is the same anywhere on flat tissue: it is solved once."""
-    first: dict[str, Solve] = {}
-    key: dict[str, str] = {}
-    images = dict(plan.equivalent)
-    for solve in plan.solves if _sweeps_places(plan) else ():
-        text = moved_key(solve.case, scaled="scaling" in plan.used)
-        other = first.setdefault(text, solve) if text else solve
+    return _struck_places(plan, "moved", strike_moved, moved_key, of_scene=False)
+
+
+def _struck_places(
+    plan: Plan,
+    name: str,
+    reduction: Callable[[Plan], Plan],
+    key_of: Callable[[Case, bool], tuple[str, Matrix] | None],
+    *,
+    of_scene: bool,
+) -> Plan:
+    """Let the first of all solves of which ``key_of`` gives one key, each with the matrix to it, stand for the others.
+
+    ``of_scene`` says that the whole body is the other's image, too.
+    """
+    first: dict[str, tuple[Solve, Matrix]] = {}
+    places: dict[tuple[int, ...], EquivalentPlace] = {}
+    solves = list(plan.solves)
+    for number, solve in enumerate(plan.solves if _sweeps_places(plan) else ()):
+        if (found := key_of(solve.case, "scaling" in plan.used)) is None:
+            continue
+        text, matrix = found
+        other, there = first.setdefault(text, (solve, matrix))
         if other is not solve:
-            key[solve.key] = other.key
-            images = dict.fromkeys(solve.serves, EquivalentPlace(other.case.index, of_scene=False)) | images
-    solves = tuple(replace(solve, key=key.get(solve.key, solve.key)) for solve in plan.solves)
-    plan = replace(plan, solves=solves, keys=_renamed(plan, key), equivalent=images)
-    return _merged(plan, "moved", reason_of(strike_moved))
+            solves[number] = replace(solve, key=other.key)
+            place = EquivalentPlace(other.case.index, from_place(there, matrix), of_scene)
+            places |= dict.fromkeys(solve.serves, place)
+    plan = replace(plan.with_solves(solves), equivalent=places | dict(plan.equivalent))
+    return _merged(plan, name, reason_of(reduction))
 
 
 def _sweeps_places(plan: Plan) -> bool:
@@ -97,11 +99,16 @@ def use_axisymmetry(plan: Plan) -> Plan:
     """A round scene of which the mesh is not the question is solved on its meridian, on a mesh of its own."""
     if not _asks_for_accuracy_or_truncation(plan):
         return plan
-    solves = {solve.key: solve for solve in plan.solves if is_round(solve.case) and solve.case.mesh.model == "auto"}
-    key = {old: digest(f"{old} axisymmetric") if not solve.goal else old for old, solve in solves.items()}
-    changed = tuple(replace(s, axisymmetric=True, key=key[s.key]) if s.key in key else s for s in plan.solves)
-    plan = replace(plan, solves=changed, keys=_renamed(plan, key))
-    return plan.struck_by("axisymmetric", len(key), reason_of(use_axisymmetry))
+    solves = tuple(map(_on_meridian, plan.solves))
+    count = sum(solve.axisymmetric for solve in solves)
+    return plan.with_solves(solves).struck_by("axisymmetric", count, reason_of(use_axisymmetry))
+
+
+def _on_meridian(solve: Solve) -> Solve:
+    """Return a solve of a round scene on its meridian: another force than that of the mesh asked for, another key."""
+    if not is_round(solve.case) or solve.case.mesh.model != "auto":
+        return solve
+    return replace(solve, axisymmetric=True, key=solve.key if solve.goal else digest(f"{solve.key} axisymmetric"))
 
 
 def use_symmetry(plan: Plan) -> Plan:
@@ -116,9 +123,7 @@ def share_meshes(plan: Plan) -> Plan:
     balls that the body's own far field closes, in the place, too. The far fields of many places share a mesh as well.
     """
     regions = far_regions([solve.case for solve in plan.solves])
-    solves = tuple(_with_far_region(solve, regions) for solve in plan.solves)
-    new = {old.key: solve.key for old, solve in zip(plan.solves, solves, strict=True)}
-    plan = replace(plan, solves=solves, keys=_renamed(plan, new), shared=True)
+    plan = replace(plan.with_solves([_with_far_region(solve, regions) for solve in plan.solves]), shared=True)
     return plan.struck_by("sharing", len(plan.solves) - len(mesh_steps(plan.solves)), reason_of(share_meshes))
 
 
@@ -183,15 +188,8 @@ REDUCTIONS: dict[str, Callable[[Plan], Plan]] = {
 
 def _rekeyed(plan: Plan, name: str, reduction: Callable[[Plan], Plan], key: Callable[..., str]) -> Plan:
     """Give every solve the key that ``key`` makes of its case, and merge those that then agree."""
-    solves = tuple(replace(solve, key=key(solve.case)) for solve in plan.solves)
-    new = dict(zip((solve.key for solve in plan.solves), (solve.key for solve in solves), strict=True))
-    plan = replace(plan, solves=solves, keys=_renamed(plan, new))
+    plan = plan.with_solves([replace(solve, key=key(solve.case)) for solve in plan.solves])
     return _merged(plan, name, reason_of(reduction))
-
-
-def _renamed(plan: Plan, new: Mapping[str, str]) -> tuple[str, ...]:
-    """Return the keys of the plan's cases, those in ``new`` replaced."""
-    return tuple(new.get(key, key) for key in plan.keys)
 
 
 def _merged(plan: Plan, name: str, reason: str) -> Plan:

@@ -1,6 +1,6 @@
 """The work that a study needs, as a value that reductions make smaller, each with its reason."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from pipeline.plan.cost import CostModel
@@ -68,6 +68,11 @@ class Plan:
     def meshes(self) -> tuple[MeshStep, ...]:
         """The solves grouped by mesh and operator, in the study's order, or each by itself."""
         return mesh_steps(self.solves, shared=self.shared)
+
+    def with_solves(self, solves: Sequence[Solve]) -> "Plan":
+        """Return the plan with ``solves`` in the place of its own, one for each; its cases have their keys."""
+        key = {old.key: new.key for old, new in zip(self.solves, solves, strict=True)}
+        return replace(self, solves=tuple(solves), keys=tuple(key.get(old, old) for old in self.keys))
 
     def struck_by(self, name: str, count: int, reason: str) -> "Plan":
         """Return the plan with a note of what a reduction did, if it did anything."""
