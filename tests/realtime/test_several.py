@@ -108,32 +108,6 @@ def test_forces_are_slopes_of_one_energy(pair, is_round):
         assert touches[number].stiffness == pytest.approx((up - down) / 2e-9, rel=1e-5)
 
 
-@pytest.mark.parametrize("pair", [(0, 0), (0, 1), (1, 2), (3, 1)])
-@pytest.mark.parametrize("is_round", [False, True])
-@pytest.mark.parametrize("share", [0.0, 1.0])
-def test_a_closed_path_of_two_tools_does_no_work(pair, is_round, share):
-    """One tool alone goes round, or both, up and down as well."""
-    model, count = random_model(is_round=is_round), 96
-    works, sizes, stored = [], [], 0.0
-    for angle in 2 * pi * np.arange(count) / count:
-        turns = (angle, 2 * angle + 1)
-        asked, moved = [], []
-        for number, (turn, size) in enumerate(zip(turns, (1.0, share), strict=True)):
-            x, y, _ = (FIRST, SECOND)[number]
-            at = (x + 3e-3 * size * np.cos(turn), y + 2e-3 * size * np.sin(turn), 0.0)
-            depth = 3e-4 + 5e-5 * size * np.sin(turn + 1)
-            asked.append(TOOLS[pair[number]] | {"at": at, "depth": depth})
-            speed = (1, 2)[number] * size
-            moved.append(speed * np.array([-3e-3 * np.sin(turn), 2e-3 * np.cos(turn), -5e-5 * np.cos(turn + 1)]))
-        forces = np.array([touch.force for touch in together(model, *asked)])
-        stored = stored or 0.4 * float(forces[:, 2] @ [each["depth"] for each in asked])
-        works.append((forces * moved).sum())
-        sizes.append((forces * moved)[:, :2].sum())
-    assert abs(2 * pi * np.mean(works)) < 1e-8 * stored
-    # It is the forces aside that make it so.
-    assert abs(2 * pi * np.mean(sizes)) > 1e-4 * stored
-
-
 def test_two_tools_feel_each_other_alike():
     """E. Betti, 1872: what the one changes of the other's force as it goes down, the other changes of its."""
     model, step = random_model(), 1e-8

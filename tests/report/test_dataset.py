@@ -7,7 +7,6 @@ import pytest
 import xarray as xr
 
 import pipeline.report.accessor  # noqa: F401
-from pipeline import quantities
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build, write
 from pipeline.report.read import read
@@ -110,8 +109,6 @@ def test_names_of_the_dataset_are_refused_as_dimensions_before_anything_is_compu
     ball = {"name": "contact", "at": ["0 mm", "0 mm", "-12 mm"], "radius": ["2 mm", "3 mm"], "young": "50 kPa"}
     with pytest.raises(StudyError, match=r"a dimension contact_radius, the name of a result .* another name"):
         dataset(body={"inclusion": [ball | {"poisson": 0.4}]})
-    with pytest.raises(ValueError, match="two quantities of a dataset are called force"):
-        quantities._table(quantities.QUANTITIES["force"], quantities.QUANTITIES["force"])
 
 
 def test_a_dataset_finds_the_files_of_its_study_from_any_folder(tmp_path, monkeypatch):

@@ -163,17 +163,6 @@ def test_a_written_dataset_gives_the_same_table(tmp_path):
     assert case_table(xr.load_dataset(tmp_path / "small.nc")).json == case_table(data).json
 
 
-def test_the_guide_of_the_page_is_that_of_the_epsmesh():
-    assert guide_if_any(small()) is None  # F_exact is not known
-    section, found = guide_if_any(chosen.dataset()), guide(chosen.dataset(), USUAL_ACCURACY)
-    assert section is not None
-    assert len(section.settings) == len(found.verdicts)
-    assert section.setting in str(found)
-    assert section.question in str(found)
-    assert {name for name, _ in section.details} >= {"worst error", "cost", "mesh"}
-    assert all(line in str(found) for line in (*(words for _, words in section.details), *section.others))
-
-
 def test_the_case_of_the_answer_is_found_by_its_labels():
     data = chosen.dataset()
     found = guide(data, USUAL_ACCURACY)

@@ -2,14 +2,11 @@
 
 import subprocess
 import sys
-import time
-import weakref
 from math import inf
 
 import pytest
 from mpi4py import MPI
 
-from pipeline.run import memory
 from pipeline.run.memory import FreeMemory
 from pipeline.run.room import container_room
 
@@ -65,24 +62,3 @@ def test_ranks_agree():
     found = MPI.COMM_WORLD.allgather(FreeMemory(MPI.COMM_WORLD).available())
     assert len(set(found)) == 1
     assert found[0] > 0
-
-
-class Ring:
-    """What refers to itself, as dolfinx's meshes do."""
-
-    def __init__(self):
-        self.own = self
-
-
-@pytest.mark.mpi
-@pytest.mark.parametrize("comm", [MPI.COMM_SELF, MPI.COMM_WORLD], ids=["self", "world"])
-def test_what_is_freed_waits_its_turn_on_one_rank(monkeypatch, comm):
-    """Several free their communicators at once."""
-    monkeypatch.setattr(memory, "_next", [inf])
-    ring = weakref.ref(Ring())
-    memory.give_back(comm)
-    assert (ring() is None) == (comm.size > 1)
-    memory._next[0] = 0.0
-    memory.give_back(comm)
-    assert ring() is None
-    assert time.perf_counter() < memory._next[0] < inf

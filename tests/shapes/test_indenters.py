@@ -94,11 +94,6 @@ def test_tools_that_make_no_sense_are_refused(probe, words):
     assert all(word in str(refused.value) for word in words), str(refused.value)
 
 
-def test_straight_elements_are_refused():
-    with pytest.raises(StudyError, match="where contact is found"):
-        study(probe=SPHERE, mesh={"degree": 1})
-
-
 @pytest.mark.parametrize(("probe", "warned"), [(SPHERE, False), (SPHERE | {"depth": "1 mm"}, True), (CONE, False),
                                                (CONE | {"angle": "60 deg"}, True)], ids=str)  # fmt: skip
 def test_steep_tools_are_warned_of(probe, warned):

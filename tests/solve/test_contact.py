@@ -197,11 +197,6 @@ def test_a_tool_may_come_as_near_to_a_held_column_as_it_does_not_go_below_the_su
             study(body=SMALL, probe=SPHERE, mesh=mesh | {"epsilon": "1.41 mm"})
 
 
-def test_straight_elements_are_refused():
-    with pytest.raises(StudyError, match="too low where contact is found"):
-        study(body=SMALL, probe=SPHERE, mesh=COARSE | {"degree": 1})
-
-
 @pytest.mark.parametrize(
     ("probe", "poisson"),
     [(SPHERE, 0.3), (CONE | {"depth": "0.07 mm"}, 0.49), (DISC, 0.3)],
