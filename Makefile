@@ -33,7 +33,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's own mpirun: another one on PATH would not fit Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies docs test test-all test-debian13 debian release slurm-test verify benchmark peers plain-loop realtime resolution stress coverage pairs fuzz soak faults mutants lint format clean
+.PHONY: help setup study studies docs test test-all test-debian13 debian docker-steps release slurm-test verify benchmark peers plain-loop realtime resolution stress coverage pairs fuzz soak faults mutants lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -71,6 +71,9 @@ test-debian13: ## run the tests on Debian 13, in a root of its own (needs root)
 
 debian: ## run other targets on another Debian, in a root of its own (needs root): make debian SUITE=sid GOALS=realtime
 	@DEBIAN_SUITE=$(SUITE) GOALS="$(GOALS)" scripts/test-debian13.sh
+
+docker-steps: ## run the steps of the Dockerfile in a root of Debian 12 (needs root)
+	@DEBIAN_SUITE=bookworm STEPS=Dockerfile scripts/test-debian13.sh
 
 release: ## build sdist and wheel into dist/, install both, and run a study from there
 	@scripts/setup.sh

@@ -14,9 +14,9 @@ packages=(
 python=/usr/bin/python3
 venv=.venv
 # EXTRAS=view adds what draws pictures of a case. A venv that has it keeps it.
-extras=dev,docs,repair
+extras=dev,docs,images,repair
 if [[ ${EXTRAS:-} == view ]] || compgen -G "$venv/lib/python*/site-packages/pyvista" >/dev/null; then
-    extras=dev,docs,repair,view
+    extras=dev,docs,images,repair,view
     packages+=(libegl1)
 fi
 stamp=$venv/.epsmesh-setup

@@ -4,7 +4,7 @@
 #   GOALS=…            these targets of make instead
 #   DEBIAN_SUITE=…     this Debian instead: sid
 #   DEBIAN13_ROOT=DIR  the root's folder, for checkouts that share one
-# A run of the whole suite on Debian 13 is written down in .ci/debian13, which .ci/run quotes.
+#   STEPS=Dockerfile   the RUN steps of this file and a small study instead
 set -euo pipefail
 cd "$(dirname "$0")/.."
 ((EUID == 0)) || { echo "test-debian13: needs root: a Debian 13 root is made, mounted and entered" >&2; exit 1; }
@@ -48,22 +48,8 @@ environment=(PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/src LANG=C.UTF-8)
 for name in http_proxy https_proxy no_proxy HTTP_PROXY HTTPS_PROXY NO_PROXY PIP_INDEX_URL PIP_CERT PIP_FIND_LINKS PIP_EXTRA_INDEX_URL PYTEST_ADDOPTS; do
     [[ -n ${!name:-} ]] && environment+=("$name=${!name}")
 done
-# The commit, before anybody goes on to the next one.
-commit=$(git rev-parse HEAD)
-[[ -z $(git status --porcelain --untracked-files=no) ]] || commit+=" with changes"
-log=$root.log
-status=0
-chroot "$root" env -i "${environment[@]}" make -C /src/epsmesh $goals PYTEST_ARGS="${PYTEST_ARGS:-}" </dev/null 2>&1 | tee "$log" || status=$?
-[[ "$suite $goals" == "trixie test" && -z ${PYTEST_ARGS:-}${PYTEST_ADDOPTS:-} ]] || exit "$status"
-
-# pytest's last line of each run: first the serial one, then the one on 2 ranks.
-mapfile -t counts < <(sed -nE 's/\x1b\[[0-9;]*m//g; s/^=* *(([0-9]+ [a-z]+(, )?)+) in [0-9.]+s.*/\1/p' "$log")
-{
-    echo "commit: $commit"
-    echo "date: $(date -u +%F)"
-    echo "libraries: $(chroot "$root" dpkg-query -W -f '${Package} ${Version}  ' python3-dolfinx-real python3-numpy openmpi-bin | sed 's/ *$//')"
-    echo "serial: ${counts[0]:-not finished}"
-    echo "2 ranks: ${counts[1]:-not run}"
-    echo "result: $( ((status)) && echo failed || echo passed)"
-} >.ci/debian13
-exit "$status"
+command=(make -C /src/epsmesh $goals PYTEST_ARGS="${PYTEST_ARGS:-}")
+if [[ -n ${STEPS:-} ]]; then
+    command=(bash -exc "cd /src/epsmesh; $(sed -n 's/^RUN \(.*\)/\1;/p' "$STEPS") make study STUDY=studies/quick.toml")
+fi
+chroot "$root" env -i "${environment[@]}" "${command[@]}" </dev/null 2>&1 | tee "$root.log"

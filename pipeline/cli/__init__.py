@@ -12,6 +12,7 @@ from pipeline.cli import checks, compare, evaluator, export, guide, merge, new, 
 from pipeline.cli.console import error, make_patient, what_was_not_written
 from pipeline.cli.faults import BAD_INPUT
 from pipeline.cli.group import Commands
+from pipeline.cli.libraries import how_to_get
 
 _HELP = """How fine must a mesh be, and where, for the reaction force of a surgical tool?
 
@@ -78,6 +79,11 @@ def main() -> None:
         make_patient()
     try:
         app(prog_name="epsmesh")
+    except ModuleNotFoundError as missing:
+        if (remedy := how_to_get(missing.name)) is None:
+            raise
+        error(remedy)
+        sys.exit(BAD_INPUT)
     finally:
         if why := what_was_not_written():
             error(f"standard output: {why}")

@@ -84,3 +84,30 @@ def test_a_user_without_a_name_and_a_home_has_that_of_a_container(monkeypatch):
     monkeypatch.setattr(pwd, "getpwuid", {}.__getitem__)
     _have_a_home()
     assert os.environ["HOME"] == "/"
+
+
+WITHOUT = """
+import sys
+sys.modules[sys.argv.pop(1)] = None  # as if it were not installed
+from pipeline.__main__ import main
+main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("library", "remedy"), [("dolfinx", "environment.yml"), ("gmsh", "make setup"), ("mpi4py", "make setup")]
+)
+def test_a_library_that_is_missing_is_named_with_what_installs_it(library, remedy, small, tmp_path):
+    words = ["run", str(small), "--output", str(tmp_path / "results")]
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT, library, *words],
+        cwd=ROOT,
+        env=ENVIRONMENT | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2, done.stderr
+    assert f"the library {library} is missing" in done.stderr
+    assert remedy in done.stderr
+    assert "Traceback" not in done.stderr

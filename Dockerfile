@@ -1,0 +1,10 @@
+# docker build -t epsmesh . && docker run --rm -it -v "$PWD/results:/epsmesh/results" epsmesh
+FROM debian:12
+WORKDIR /epsmesh
+COPY . .
+RUN apt-get update
+RUN apt-get install -y --no-install-recommends ca-certificates make git
+RUN make setup
+ENV PATH=/epsmesh/.venv/bin:$PATH
+ENV OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+CMD ["make", "study"]
