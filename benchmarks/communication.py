@@ -26,7 +26,7 @@ from benchmarks.tables import markdown, options, write
 from pipeline import stages
 from pipeline.run.meshing import mesh_case
 from pipeline.solve.krylov import LinearSolver
-from pipeline.solve.loads import Loads
+from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Conditions, Spaces
@@ -51,9 +51,9 @@ def measure(fine: str, degree: int) -> dict[str, Any]:
     study = LARGE | {"mesh": LARGE["mesh"] | {"fine": fine, "degree": degree}}
     case = parse(study).case(())
     body = mesh_case(case, (), comm)
-    law, loads = MaterialLaw.of_moduli(10e3, 0.3), Loads.along((0.0, 0.0, -0.2e-3))
+    law, movement = MaterialLaw.of_moduli(10e3, 0.3), Movement.along((0.0, 0.0, -0.2e-3))
     with Spaces(body) as spaces, _watched() as sent, QuasiStaticProblem(spaces, degree, Conditions()) as problem:
-        solution = problem.solve(law, loads, method="iterative", estimate=True)
+        solution = problem.solve(law, movement, method="iterative", estimate=True)
         work = _stages()
     local = {name: sent[name] / sent["iterations"] for name in _MPI} | work
     return {

@@ -23,7 +23,7 @@ from pipeline.plan.plan import make_plan
 from pipeline.plan.symmetry import model_planes
 from pipeline.run.execute import compute
 from pipeline.run.meshing import mesh_case
-from pipeline.run.problem import law_of, loads_of, problem_of
+from pipeline.run.problem import law_of, movement_of, problem_of
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Solution
 from pipeline.solve.spaces import Conditions, Spaces
@@ -50,7 +50,7 @@ def _study(poisson: float, rim: str, depth: str | list[str], **probe: Any) -> di
 def found(body: BodyMesh, case: Case, *, estimate: bool) -> Solution:
     """Find the area of contact of a case on its mesh; collective."""
     with Spaces(body) as spaces, problem_of(spaces, case) as problem:
-        return problem.solve(law_of(case), loads_of(case), estimate=estimate)
+        return problem.solve(law_of(case), movement_of(case), estimate=estimate)
 
 
 def prescribed(body: BodyMesh, case: Case, *, estimate: bool) -> Solution:
@@ -59,7 +59,7 @@ def prescribed(body: BodyMesh, case: Case, *, estimate: bool) -> Solution:
         Spaces(body) as spaces,
         QuasiStaticProblem(spaces, case.mesh.degree, Conditions(bonded=False), case.element) as problem,
     ):
-        return problem.solve(law_of(case), loads_of(case), estimate=estimate)
+        return problem.solve(law_of(case), movement_of(case), estimate=estimate)
 
 
 def in_linear_solves(poisson: float, rim: str = "0.12 mm", repeats: int = _REPEATS) -> dict[str, Any]:

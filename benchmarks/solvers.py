@@ -22,7 +22,7 @@ import numpy as np
 from benchmarks.processor import ask
 from benchmarks.scenes import BOX, DISC, graded, study
 from benchmarks.tables import Table, markdown, options, write
-from pipeline.solve.loads import Loads, Motion
+from pipeline.solve.movement import Motion, Movement
 
 # Element size far from the probe and at its edge, mm.
 SMALL = {1: ((4, 2), (3, 1), (2, 0.8)), 2: ((10, 3), (8, 1), (5, 0.8)), 3: ((20, 4), (15, 3), (10, 2))}
@@ -145,7 +145,7 @@ def _mixed_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[A
     assemble = time.process_time() - start
     # Neither a product without entries nor the matrix of a direct solve is what others multiply with.
     unit = stack.enter_context(elements.displacements.lend_product(LAME))
-    press = Loads((PRESS,), (1.0,))
+    press = Movement((PRESS,), (1.0,))
 
     def once() -> tuple[float, float, float, int]:
         with ExitStack() as made:
@@ -232,7 +232,7 @@ def main() -> None:
     )
     asked = parser.parse_args()
     if asked.one:
-        measure(*json.loads(asked.one), repeats=asked.repeats)
+        measure(*json.movement(asked.one), repeats=asked.repeats)
         return
     table = Table(COLUMNS)
     for case in plan(asked.largest)[: asked.rows]:

@@ -6,7 +6,7 @@ from math import inf, isnan, nan
 
 from pipeline.plan.steps import Solve
 from pipeline.run.measure import turned_back
-from pipeline.run.problem import law_of, loads_of
+from pipeline.run.problem import law_of, movement_of
 from pipeline.run.record import Record
 from pipeline.shapes.frame import Vector
 from pipeline.solve.quasi_static import QuasiStaticProblem
@@ -27,7 +27,7 @@ def reduced_records(
     solved: dict[float, Record] = {}
     found: dict[str, Reduced] = {}
     case = todo[0].case
-    with ReducedBasis(problem, loads_of(case), _ratio(todo[0]), case.solve.method) as basis:
+    with ReducedBasis(problem, movement_of(case), _ratio(todo[0]), case.solve.method) as basis:
         ends = [todo[0], todo[-1]]
         while todo:
             following = ends.pop() if ends else max(todo, key=lambda s: abs(found[s.key].bound) if found else inf)

@@ -91,7 +91,7 @@ def _of_contact(contact: Contact | None) -> dict[str, Any]:
 
 def _of_loads(case: Case, solution: Solution) -> dict[str, Any]:
     """Return what a record holds of loads, nothing where there are none."""
-    loaded, loads, contact = solution.load_response, solution.response.loads, solution.contact
+    loaded, movement, contact = solution.load_response, solution.response.movement, solution.contact
     if contact and not isnan(contact.sag):  # loads bend the surface, and the depth counts from the first touch
         none = (0.0, 0.0, 0.0)
         touching = {"load_force": 0.0, "load_force_error": 0.0, "load_force_vector": none}
@@ -105,7 +105,7 @@ def _of_loads(case: Case, solution: Solution) -> dict[str, Any]:
         "load_force_vector": turned_back(case.frame.turn, _known_of(case, force)),
         "load_energy": loaded.energy,
         # Where the probe bears no force along its axis: held at a depth d it bears k d + load_force.
-        "sag": -force[2] / loaded.stiffness_along(loads, axis),
+        "sag": -force[2] / loaded.stiffness_along(movement, axis),
     }
 
 

@@ -9,8 +9,8 @@ from pipeline.arrays import FloatArray
 from pipeline.mesh.of_case import meridian_of
 from pipeline.plan import estimate
 from pipeline.plan.symmetry import mirror_planes, movement_planes
-from pipeline.run.dead_loads import dead_loads_of
 from pipeline.run.far_field import far_field_of
+from pipeline.run.loads import loads_of
 from pipeline.run.memory import FreeMemory
 from pipeline.run.room import MEMORY_SHARE
 from pipeline.shapes.contact import first_touch
@@ -20,10 +20,10 @@ from pipeline.solve.contact.search import Tool
 from pipeline.solve.crack import Front
 from pipeline.solve.far_field import FarField, Place, PointForce
 from pipeline.solve.krylov import SolveError, is_direct
-from pipeline.solve.loads import Loads
 from pipeline.solve.meridian.contact import MeridianContact
 from pipeline.solve.meridian.problem import MeridianProblem
 from pipeline.solve.meridian.trials import RoundTool
+from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.regular import BodyField
@@ -136,27 +136,27 @@ def round_tool_of(case: Case) -> RoundTool:
     return RoundTool(gap, probe.circumradius)
 
 
-def loads_of(case: Case, meshed: Case | None = None) -> Loads:
+def movement_of(case: Case, meshed: Case | None = None) -> Movement:
     """Return how the probe of ``case`` moves, and what loads act, on the mesh turned so that it presses along -z.
 
     ``meshed`` is the case that the mesh was made for, if that is another: a half ball elsewhere on the body.
     """
-    return replace(_movement_of(case, meshed or case), dead=dead_loads_of(case))
+    return replace(_motions_of(case, meshed or case), loads=loads_of(case))
 
 
-def _movement_of(case: Case, meshed: Case) -> Loads:
+def _motions_of(case: Case, meshed: Case) -> Movement:
     frame = case.frame.upright
     travel = case.probe.travel(frame)
     if case.probe.motion == "all":
-        return Loads.all(travel, frame.point)
+        return Movement.all(travel, frame.point)
     if slit := case.probe.slit:
         # Along flanks that it slides on, tissue does not go with the blade.
-        pressed = Loads.along(travel) if case.probe.contact == "bonded" else Loads((), ())
+        pressed = Movement.along(travel) if case.probe.contact == "bonded" else Movement((), ())
         return pressed.opened(case.frame.upright.across, slit.width / 2)
     if case.is_closed:
-        return Loads.along(travel).with_far(_moved(far_field_of(case), meshed.frame.point))
+        return Movement.along(travel).with_far(_moved(far_field_of(case), meshed.frame.point))
     # Across a plane of symmetry a probe slides without force along its axis, and presses without force along itself.
-    return Loads.along(travel, apart=mirror_planes(case) != movement_planes(case))
+    return Movement.along(travel, apart=mirror_planes(case) != movement_planes(case))
 
 
 @lru_cache(_FAR_FIELDS)
@@ -174,25 +174,25 @@ def law_of(case: Case) -> MaterialLaw:
 def solve_problem(case: Case, problem: Problem, *, estimate: bool, meshed: Case | None = None) -> Solution:
     """Solve a case; where iterations do not converge and the system is small, directly. Collective.
 
-    ``meshed`` is the case that the mesh was made for, if that is another: see ``loads_of``.
+    ``meshed`` is the case that the mesh was made for, if that is another: see ``movement_of``.
 
     Raises:
         SolveError: if that fails, too, or what is found cannot be.
     """
-    law, loads = law_of(case), loads_of(case, meshed)
+    law, movement = law_of(case), movement_of(case, meshed)
     method, tolerance = case.solve.method, case.solve.tolerance
     try:
-        solution = problem.solve(law, loads, method=method, tolerance=tolerance, estimate=estimate)
+        solution = problem.solve(law, movement, method=method, tolerance=tolerance, estimate=estimate)
     except ContactError:
         raise
     except SolveError:
         if method != "auto" or not law.is_linear or not 0 < problem.dofs <= _MOST_DIRECT:
             raise
-        solution = problem.solve(law, loads, method="direct", tolerance=tolerance, estimate=estimate)
-    if loads.far is not None:
-        solution.times.setup += loads.far.seconds
+        solution = problem.solve(law, movement, method="direct", tolerance=tolerance, estimate=estimate)
+    if movement.far is not None:
+        solution.times.setup += movement.far.seconds
     if solution.is_shut:
-        cause = "the blade's travel presses" if loads.dead is None else "the blade's travel and the loads press"
+        cause = "the blade's travel presses" if movement.loads is None else "the blade's travel and the loads press"
         raise SolveError(f"{cause} the slit shut at its front, where its faces would pass each other")
     return solution
 

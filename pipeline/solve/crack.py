@@ -38,7 +38,7 @@ from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve.compiled import form, scalar_space, vector_space
 from pipeline.solve.estimate import extrapolate_release, release_bar
 from pipeline.solve.forms import ElasticForms, dx, one_cell
-from pipeline.solve.loads import Vector
+from pipeline.solve.movement import Vector
 from pipeline.solve.physics import strain
 
 # v is 1 up to the first of these shares of its radius, and nothing from the second on.

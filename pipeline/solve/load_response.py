@@ -17,10 +17,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.dead_loads import Applied
 from pipeline.solve.estimate import extrapolate
 from pipeline.solve.krylov import SolveError
-from pipeline.solve.loads import Loads, Vector
+from pipeline.solve.loads import Applied
+from pipeline.solve.movement import Movement, Vector
 from pipeline.solve.response import Sums, whole_force
 
 # A bar on what loads do to the probe, in units of the root of both bars: so many cosines, and what remains without.
@@ -48,26 +48,26 @@ class LoadResponse:
         """Strain energy (J) of the loads while the probe is held."""
         return float(-self.form[-1, -1]) / 2
 
-    def force(self, loads: Loads) -> Vector:
+    def force(self, movement: Movement) -> Vector:
         """Return the force of the tissue on the probe (N) that the loads add."""
         force = self.forces
-        for motion, needed in zip(loads.motions, self.form[:-1, -1], strict=True):
+        for motion, needed in zip(movement.motions, self.form[:-1, -1], strict=True):
             direction = np.array(motion.direction)
             if motion.is_translation:
                 force = force - (needed + force @ direction) * direction
         x, y, z = map(float, force)
         return x, y, z
 
-    def bar_along(self, loads: Loads, direction: Vector) -> float:
+    def bar_along(self, movement: Movement, direction: Vector) -> float:
         """Return the 95 % bar (N) on the force along a direction, not a number if no motion was solved along it."""
-        for number, motion in enumerate(loads.motions):
+        for number, motion in enumerate(movement.motions):
             if self.bars is not None and abs(abs(np.dot(motion.direction, direction)) - 1) < 1e-9:
                 return float(self.bars[number, -1])
         return float("nan")
 
-    def stiffness_along(self, loads: Loads, direction: Vector) -> float:
+    def stiffness_along(self, movement: Movement, direction: Vector) -> float:
         """Return the stiffness (N/m) of the motion that was solved along a direction, not a number without one."""
-        for number, motion in enumerate(loads.motions):
+        for number, motion in enumerate(movement.motions):
             if abs(abs(np.dot(motion.direction, direction)) - 1) < 1e-9:
                 return float(self.form[number, number])
         return float("nan")
@@ -125,7 +125,7 @@ def load_bars(bars: FloatArray, decrements: FloatArray, element: str) -> FloatAr
 
 
 def imbalance(
-    found: Sums, energies: FloatArray, works: FloatArray, applied: Applied, loads: Loads, mirrored: Sequence[int]
+    found: Sums, energies: FloatArray, works: FloatArray, applied: Applied, movement: Movement, mirrored: Sequence[int]
 ) -> float:
     """Return the largest relative error of what must hold of loads, all of the modelled part.
 
@@ -133,7 +133,7 @@ def imbalance(
     force on the held probe is, by reciprocity, the work of the loads in its motion. ``found`` are sums of the residuals
     of all motions and of the loads, ``energies`` (n + 1) twice the strain energies, ``works`` (n + 1) f·u_j.
     """
-    straight = np.array([motion.is_translation for motion in loads.motions])
+    straight = np.array([motion.is_translation for motion in movement.motions])
     stiffest = energies[:-1][straight].max() if straight.any() else energies[:-1].max()
     least = _NO_WORK * applied.size**2 / stiffest
     work = abs(energies[-1] - works[-1]) / max(abs(works[-1]), least)

@@ -27,7 +27,7 @@ from pipeline.solve.elements.displacement import DisplacementElements
 from pipeline.solve.forms import HyperelasticForms
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.krylov import LinearSolver
-from pipeline.solve.loads import Loads, Motion
+from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.newton import Equilibrium, LargeError, tangent_product
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.vectors import assemble, global_sum, vector
@@ -62,9 +62,9 @@ class Walk:
         """The depth (m) of the last step."""
         return self.path[-1][0]
 
-    def leads_to(self, law: MaterialLaw, loads: Loads) -> bool:
-        """Tell whether it is on the way to what ``loads`` do."""
-        return (self.law, (self.motion,)) == (law, loads.motions) and self.reached <= loads.amounts[0]
+    def leads_to(self, law: MaterialLaw, movement: Movement) -> bool:
+        """Tell whether it is on the way to what ``movement`` do."""
+        return (self.law, (self.motion,)) == (law, movement.motions) and self.reached <= movement.amounts[0]
 
 
 class LoadSteps(Solver):
@@ -127,7 +127,7 @@ class LoadSteps(Solver):
         work = global_sum(space.comm, np.array([residual[held] @ column.prescribed[held]]))
         return Products(space, [moved], [residual], work[None], work)
 
-    def enrich(self, columns: Sequence[Column], loads: Loads, stack: ExitStack, *, keep: bool) -> Enriched:
+    def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
         """Solve on in one degree more, from the residuals of the solution and of its rate there; collective.
 
         Raises:

@@ -1,111 +1,206 @@
-"""What the probe does: a rigid movement, put together of a few that are each solved for once."""
+"""Dead loads: weights and tractions that keep their size and direction while the body deforms.
 
-from dataclasses import dataclass, replace
-from math import hypot
+    f_i = ∫ ρ g · φ_i dx + ∫ t · φ_i ds
 
+Tractions act on what is free: not under the probe, nor where the body is held. Those on a cap end within facets, which
+are cut into small pieces there, so that the resultant is that of the cap and not that of whole facets.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import basix
 import numpy as np
 
-from pipeline.arrays import FloatArray
-from pipeline.solve.dead_loads import DeadLoads
-from pipeline.solve.far_field import FarField
+from pipeline import compat
+from pipeline.arrays import BoolArray, FloatArray, Int32Array
+from pipeline.mesh.distribute import BodyMesh
+from pipeline.scene.model import FREE
+from pipeline.solve.krylov import SolveError
+from pipeline.solve.vectors import add_from_ghosts, global_sum, vector
 
 Vector = tuple[float, float, float]
 
-_ZERO: Vector = (0.0, 0.0, 0.0)
+_CORNERS = np.vstack([np.zeros(3), np.eye(3)])  # of the reference cell
+_FACETS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])  # corners of its facets, in the order of dolfinx
+# The map of a curved cell has so many degrees more than the functions on it.
+_CURVED = 3
+# Pieces of a facet that a cap's edge cuts are this much smaller than the cap's radius, but in so many halvings at most.
+_PIECE, _MOST_HALVINGS = 32, 7
+# Cells that are looked at together.
+_CHUNK = 20_000
 
 
-@dataclass(frozen=True)
-class Motion:
-    """A unit of one movement: along the unit vector ``direction``, or about the axis ``rotation`` of a point.
+@dataclass(frozen=True, eq=False)
+class SurfaceLoad:
+    """A ``traction`` (Pa), or a ``pressure`` (Pa) against the outward normal, on part of the free boundary.
 
-    A unit is a metre, or, for the small rotation ω × (x − ``centre``), a radian. ``opening`` moves what the probe
-    touches of a slit's faces apart, each by a metre: the face on the side of that unit vector along it, the other back.
-    ``far`` moves the cut face, by ``share`` of a unit of that field.
+    ``on_facets`` tells of facets, by their corners (n, 3, 3) and outward unit normals (n, 3), whether they may carry
+    it; ``within``, None for all, is the centre (m) and the radius (m) of the ball that bounds it.
     """
 
-    direction: Vector = _ZERO
-    rotation: Vector = _ZERO
-    centre: Vector = _ZERO
-    opening: Vector = _ZERO
-    far: FarField | None = None
-    share: float = 0.0
-
-    @property
-    def is_rotation(self) -> bool:
-        """Whether it turns the probe."""
-        return any(self.rotation)
-
-    @property
-    def is_translation(self) -> bool:
-        """Whether it moves the probe along a direction."""
-        return any(self.direction)
-
-    def at(self, points: FloatArray, sides: FloatArray | None = None) -> FloatArray:
-        """Return the displacement of a unit (m), at ``points`` (m), shape (points, 3).
-
-        ``sides`` (points) are 1 or -1, for the faces of a slit on either side of its plane.
-        """
-        if any(self.opening):
-            if sides is None:
-                raise ValueError("there is no slit to be opened")
-            return np.asarray(np.outer(sides, np.array(self.opening)))
-        turned = np.cross(np.array(self.rotation), points - np.array(self.centre))
-        return np.asarray(np.array(self.direction) + turned)
+    on_facets: Callable[[FloatArray, FloatArray], BoolArray]
+    traction: Vector = (0.0, 0.0, 0.0)
+    pressure: float = 0.0
+    within: tuple[Vector, float] | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Loads:
-    """What moves: the sum of ``motions``, each by its amount (m, or rad); translations are along orthogonal directions.
+    """Weights (N/m³) of each region of the body, and loads on its surface, on the mesh as it is solved."""
 
-    ``apart`` says that symmetry keeps the motions apart: none takes any work in the movement of another. ``dead`` are
-    the loads that act on the tissue meanwhile.
+    weights: tuple[Vector, ...] = ()
+    surface: tuple[SurfaceLoad, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Applied:
+    """Loads on the dofs of a space: ``forces`` (N) on those that this rank owns, as they act on the modelled part.
+
+    ``size`` (N) is the integral of their magnitude and ``resultant`` (3), in N, that of the loads; both global.
     """
 
-    motions: tuple[Motion, ...]
-    amounts: tuple[float, ...]
-    apart: bool = False
-    dead: DeadLoads | None = None
+    forces: FloatArray
+    size: float
+    resultant: FloatArray
 
-    @property
-    def far(self) -> FarField | None:
-        """What closes the cut face, if it is not simply held."""
-        return next((motion.far for motion in self.motions if motion.far is not None), None)
+    def times(self, factor: float) -> "Applied":
+        """Return ``factor`` times the loads."""
+        return Applied(factor * self.forces, factor * self.size, factor * self.resultant)
 
-    @property
-    def shares(self) -> FloatArray:
-        """How much of the far field belongs to each motion."""
-        return np.array([motion.share for motion in self.motions])
 
-    @staticmethod
-    def along(travel: Vector, *, apart: bool = False) -> "Loads":
-        """Return the loads of a probe that presses by −z of ``travel`` (m) and slides by the rest of it."""
-        x, y, z = travel
-        slide = hypot(x, y)
-        press = Motion((0.0, 0.0, -1.0))
-        if not slide:
-            return Loads((press,), (-z,))
-        return Loads((press, Motion((x / slide, y / slide, 0.0))), (-z, slide), apart)
+def apply_loads(loads: Loads, body: BodyMesh, space: Any) -> Applied:
+    """Return the loads on the dofs of ``space``, a space of displacements on the mesh of ``body``; collective.
 
-    @staticmethod
-    def all(travel: Vector, centre: Vector) -> "Loads":
-        """Return ``travel`` (m) as an amount of all six rigid motions: along x, y, z, and about those axes."""
-        axes: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-        motions = [Motion(axis) for axis in axes] + [Motion(rotation=axis, centre=centre) for axis in axes]
-        return Loads(tuple(motions), (*travel, 0.0, 0.0, 0.0))
+    Raises:
+        SolveError: if no facet carries a load on the surface.
+    """
+    dofs = compat.cell_dofs(space)
+    with vector(space) as forces:
+        with forces.localForm() as local:
+            nodal, found = np.zeros((local.getLocalSize() // 3, 3)), []
+            if any(any(weight) for weight in loads.weights):
+                found.append(_add_weights(loads.weights, body, space, dofs, nodal))
+            found += [_add_traction(load, body, space, dofs, nodal) for load in loads.surface]
+            local.array[:] = nodal.reshape(-1)
+        add_from_ghosts(forces)
+        totals = global_sum(body.comm, np.array(found).reshape(-1, 5))
+        if len(totals) and not np.all(totals[:, 4] > 0):
+            raise SolveError("no free part of the surface carries a traction: it lies under the probe, or is held")
+        return Applied(forces.array.copy(), float(totals[:, 3].sum()), totals[:, :3].sum(axis=0))
 
-    def opened(self, normal: Vector, amount: float) -> "Loads":
-        """Return the loads of a probe that also holds each face of a slit ``amount`` (m) off its plane."""
-        return replace(self, motions=(*self.motions, Motion(opening=normal)), amounts=(*self.amounts, amount))
 
-    def with_far(self, far: FarField) -> "Loads":
-        """Return the loads with a unit of the ``far`` field as a motion more, whose amount is to be found."""
-        return Loads((*self.motions, Motion(far=far, share=1.0)), (*self.amounts, 0.0))
+def _add_weights(
+    weights: tuple[Vector, ...], body: BodyMesh, space: Any, dofs: Int32Array, nodal: FloatArray
+) -> list[float]:
+    """Add the body's weight to ``nodal`` forces; return what it is on this rank: x, y, z, magnitude, volume."""
+    degree, geometry = compat.degree(space), _nodes(body)
+    order = 1 if geometry.shape[1] == 4 else 2
+    points, quadrature = basix.make_quadrature(basix.CellType.tetrahedron, degree + (0 if order == 1 else _CURVED))
+    functions, gradients = _table(degree, points)[0], _table(order, points)[1:]
+    by_region = np.array(weights)
+    sums = np.zeros(5)
+    for start in range(0, body.owned_cells, _CHUNK):
+        cells = np.arange(start, min(start + _CHUNK, body.owned_cells))
+        jacobian = np.einsum("aqk,ckx->cqxa", gradients, geometry[cells])
+        measure = np.abs(np.linalg.det(jacobian)) * quadrature
+        regions = 0 if body.regions is None or len(weights) == 1 else body.regions[cells]
+        weight = np.broadcast_to(by_region[regions], (len(cells), 3))
+        shares = measure @ functions
+        np.add.at(nodal, dofs[cells].reshape(-1), (shares[:, :, None] * weight[:, None, :]).reshape(-1, 3))
+        volumes = measure.sum(axis=1)
+        sums += [*(volumes @ weight), volumes @ np.linalg.norm(weight, axis=1), volumes.sum()]
+    return [*map(float, sums)]
 
-    def closed(self, share: float) -> "Loads":
-        """Return the loads of one motion and a far field as those of one motion, with that ``share`` of the field."""
-        press, far = self.motions
-        return Loads((replace(press, far=far.far, share=share),), self.amounts[:1])
 
-    def times(self, factor: float) -> "Loads":
-        """Return ``factor`` times the movement."""
-        return replace(self, amounts=tuple(factor * amount for amount in self.amounts))
+def _add_traction(load: SurfaceLoad, body: BodyMesh, space: Any, dofs: Int32Array, nodal: FloatArray) -> list[float]:
+    """Add a load on the surface to ``nodal`` forces; return what it is on this rank: x, y, z, magnitude, area."""
+    sums = np.zeros(5)
+    cells, sides = _free_facets(body)
+    geometry = _nodes(body)[cells]
+    corners = geometry[np.arange(len(cells))[:, None], _FACETS[sides]]
+    opposite = geometry[np.arange(len(cells)), sides]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals *= np.sign(np.einsum("cx,cx->c", corners[:, 0] - opposite, normals))[:, None]
+    halvings = _halvings(load, corners)
+    carries = load.on_facets(corners, normals) & (halvings >= 0)
+    degree = compat.degree(space) + (0 if geometry.shape[1] == 4 else _CURVED)
+    for side in range(4):
+        for count in np.unique(halvings[carries & (sides == side)]):
+            chosen = np.flatnonzero(carries & (sides == side) & (halvings == count))
+            flat, quadrature = _rule(degree, int(count))
+            a, b, c = _CORNERS[_FACETS[side]]
+            points = a + flat[:, :1] * (b - a) + flat[:, 1:] * (c - a)
+            values = _table(compat.degree(space), points)[0]
+            order = 1 if geometry.shape[1] == 4 else 2
+            places, gradients = _table(order, points)[0], _table(order, points)[1:]
+            for part in np.array_split(chosen, -(-len(chosen) * len(points) // 500_000)):
+                x = np.einsum("qk,ckx->cqx", places, geometry[part])
+                jacobian = np.einsum("aqk,ckx->cqxa", gradients, geometry[part])
+                areas = np.cross(jacobian @ (b - a), jacobian @ (c - a)) * quadrature[:, None]
+                areas *= np.sign(np.einsum("cqx,cx->cq", areas, normals[part]))[:, :, None]
+                if load.within is not None:
+                    centre, radius = load.within
+                    areas *= (np.linalg.norm(x - np.array(centre), axis=2) <= radius)[:, :, None]
+                size = np.linalg.norm(areas, axis=2)
+                forces = np.array(load.traction) * size[:, :, None] - load.pressure * areas
+                shares = np.einsum("qi,cqx->cix", values, forces)
+                np.add.at(nodal, dofs[cells[part]].reshape(-1), shares.reshape(-1, 3))
+                total, magnitude = forces.sum(axis=(0, 1)), np.linalg.norm(forces, axis=2).sum()
+                sums += [*total, magnitude, size.sum()]
+    return [*map(float, sums)]
+
+
+def _free_facets(body: BodyMesh) -> tuple[Int32Array, Int32Array]:
+    """Return the owned cells with a free facet, and which of their facets it is, one of each for each facet."""
+    topology, tdim = body.mesh.topology, body.mesh.topology.dim
+    topology.create_connectivity(tdim - 1, tdim)
+    topology.create_connectivity(tdim, tdim - 1)
+    of_facet, of_cell = topology.connectivity(tdim - 1, tdim), topology.connectivity(tdim, tdim - 1)
+    facets = body.facets.get(FREE, np.empty(0, dtype=np.int32))
+    cells = np.array([of_facet.links(facet)[0] for facet in facets], dtype=np.int32)
+    owned = cells < body.owned_cells
+    cells, facets = cells[owned], facets[owned]
+    beside = of_cell.array.reshape(-1, 4)[cells]
+    return cells, np.asarray((beside == facets[:, None]).argmax(axis=1), dtype=np.int32)
+
+
+def _halvings(load: SurfaceLoad, corners: FloatArray) -> Int32Array:
+    """Return how often each facet's sides are halved for the quadrature, -1 where it is clear of the load's ball."""
+    halvings = np.zeros(len(corners), dtype=np.int32)
+    if load.within is None:
+        return halvings
+    centre, radius = np.array(load.within[0]), load.within[1]
+    middle = corners.mean(axis=1)
+    # A facet lies within this of its middle; one that is bent, a little farther out.
+    size = 1.2 * np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+    away = np.linalg.norm(middle - centre, axis=1)
+    needed = np.ceil(np.log2(np.maximum(1.0, _PIECE * size / radius)))
+    halvings[:] = np.clip(np.maximum(needed, 2), 0, _MOST_HALVINGS)
+    halvings[away + size <= radius] = 0
+    halvings[away - size > radius] = -1
+    return halvings
+
+
+def _nodes(body: BodyMesh) -> FloatArray:
+    """Return the nodes (m) of each local cell, (cells, 4 or 10, 3)."""
+    return np.asarray(body.mesh.geometry.x[compat.geometry_dofs(body.mesh)])
+
+
+def _table(degree: int, points: FloatArray) -> FloatArray:
+    """Return values, and derivatives along the three axes, of the functions of ``degree`` on the reference cell."""
+    return np.asarray(compat.reference_element(degree).tabulate(1, points)[:, :, :, 0])
+
+
+@cache
+def _rule(degree: int, halvings: int) -> tuple[FloatArray, FloatArray]:
+    """Return points (q, 2) and weights (q) on the reference triangle, of pieces of which each is a rule of its own."""
+    points, weights = basix.make_quadrature(basix.CellType.triangle, degree if halvings == 0 else 1)
+    for _ in range(halvings):
+        moved = [points + shift for shift in ([0.0, 0.0], [1.0, 0.0], [0.0, 1.0])]
+        points = np.vstack([*moved, 1.0 - points]) / 2
+        weights = np.tile(weights, 4) / 4
+    return points, weights

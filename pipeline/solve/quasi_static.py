@@ -33,7 +33,7 @@ from pipeline.solve.estimate import error_bar, stiffness_bars
 from pipeline.solve.krylov import LinearSolver, SolveError
 from pipeline.solve.load_response import LoadResponse, imbalance, load_response_of, shares
 from pipeline.solve.load_steps import LoadSteps, Walk
-from pipeline.solve.loads import Loads, Motion
+from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import Response, reaction, sums
 from pipeline.solve.rim import plain_share
@@ -99,13 +99,13 @@ class QuasiStaticProblem:
     def solve(
         self,
         law: MaterialLaw,
-        loads: Loads,
+        movement: Movement,
         *,
         method: str = "auto",
         tolerance: float = TOLERANCE,
         estimate: bool = False,
     ) -> Solution:
-        """Solve for each motion of ``loads``, with one set-up, and return forces and checks; collective.
+        """Solve for each motion of ``movement``, with one set-up, and return forces and checks; collective.
 
         ``tolerance`` is that of the energy norm of the solver's error. ``estimate`` goes on in elements of one degree
         more, for the solution's ``decrements``, which may be negative for mixed ones, and ``bars``.
@@ -117,11 +117,11 @@ class QuasiStaticProblem:
         self._law = law
         with recorded() as times, ExitStack() as stack:
             if self.contact is None:
-                found = self._prescribed(law, loads, stack, method=method, tolerance=tolerance)
+                found = self._prescribed(law, movement, stack, method=method, tolerance=tolerance)
             else:
                 with stage("solve"):
-                    found = self.contact.solve(law, loads, stack, method=method, tolerance=tolerance)
-            front, tip = self._released(self.elements, found.columns, law, found.loads)
+                    found = self.contact.solve(law, movement, stack, method=method, tolerance=tolerance)
+            front, tip = self._released(self.elements, found.columns, law, found.movement)
             self.elements.show(found.columns)
             stored = found.solver.stored
             solution = Solution(
@@ -143,37 +143,39 @@ class QuasiStaticProblem:
         return solution
 
     def _prescribed(
-        self, law: MaterialLaw, loads: Loads, stack: ExitStack, *, method: str, tolerance: float
+        self, law: MaterialLaw, movement: Movement, stack: ExitStack, *, method: str, tolerance: float
     ) -> Equilibrium:
-        """Solve for each motion of ``loads``, prescribed on the footprint, and for dead loads; collective."""
+        """Solve for each motion of ``movement``, prescribed on the footprint, and for dead loads; collective."""
         direct = self.elements.is_direct(method)
         # A tool at many places: the same operator, another far field each time.
-        keep = self._reuse and loads.far is not None and not direct
-        solver = self._set_up(law, loads, stack, direct=direct, keep=keep)
+        keep = self._reuse and movement.far is not None and not direct
+        solver = self._set_up(law, movement, stack, direct=direct, keep=keep)
         with stage("assembly"):
-            columns = self.elements.columns(loads, stack)
+            columns = self.elements.columns(movement, stack)
             solver.lift(columns)
         with stage("solve"):
             known = solver.known if keep else {}
-            self._guess(columns, loads, known)
-            iterations, response, load_response = self._iterate(solver, columns, law, loads, known, tolerance=tolerance)
+            self._guess(columns, movement, known)
+            iterations, response, load_response = self._iterate(
+                solver, columns, law, movement, known, tolerance=tolerance
+            )
             if keep:
-                solver.known = {loads.motions[0]: columns[0].unknown[0].array.copy()}
-            if loads.far is not None:
-                loads = close_far(columns, loads, -float(response.stiffness[1, 0] / response.stiffness[1, 1]))
-                response = _balanced(self._response(solver.products(columns), columns, law, loads)[0])
+                solver.known = {movement.motions[0]: columns[0].unknown[0].array.copy()}
+            if movement.far is not None:
+                movement = close_far(columns, movement, -float(response.stiffness[1, 0] / response.stiffness[1, 1]))
+                response = _balanced(self._response(solver.products(columns), columns, law, movement)[0])
             self.corrections = {
                 motion: tuple(part.array.copy() for part in column.unknown)
-                for motion, column in zip(loads.motions, columns, strict=False)
+                for motion, column in zip(movement.motions, columns, strict=False)
             }
-        return Equilibrium(solver, columns, loads, iterations, response, load_response)
+        return Equilibrium(solver, columns, movement, iterations, response, load_response)
 
     def _iterate(
         self,
         solver: Solver,
         columns: list[Column],
         law: MaterialLaw,
-        loads: Loads,
+        movement: Movement,
         known: Mapping[Motion, FloatArray],
         *,
         tolerance: float,
@@ -183,11 +185,11 @@ class QuasiStaticProblem:
         Raises:
             SolveError: if they do not.
         """
-        aim = tolerance * min(self.elements.stricter, TWO_SIDED if loads.far is not None else 1.0)
-        todo = [column for number, column in enumerate(columns) if _motion(loads, number) not in known]
+        aim = tolerance * min(self.elements.stricter, TWO_SIDED if movement.far is not None else 1.0)
+        todo = [column for number, column in enumerate(columns) if _motion(movement, number) not in known]
         iterations = solver.solve(todo, aim)
         for further in range(MOST_ROUNDS + 1):
-            response, load_response = self._response(solver.products(columns), columns, law, loads)
+            response, load_response = self._response(solver.products(columns), columns, law, movement)
             share = rest(response.balance, tolerance)
             if solver.is_exact or share == 1.0 or further == MOST_ROUNDS:
                 break
@@ -195,9 +197,9 @@ class QuasiStaticProblem:
         check_balance(response.balance)
         return iterations, response, load_response
 
-    def _guess(self, columns: Sequence[Column], loads: Loads, known: Mapping[Motion, FloatArray]) -> None:
+    def _guess(self, columns: Sequence[Column], movement: Movement, known: Mapping[Motion, FloatArray]) -> None:
         """Begin with the last solution for each motion, or with one that is ``known``."""
-        for motion, column in zip(loads.motions, columns, strict=False):
+        for motion, column in zip(movement.motions, columns, strict=False):
             if self._reuse and motion in self.corrections:
                 for part, values in zip(column.unknown, self.corrections[motion], strict=True):
                     part.array[:] = values
@@ -205,41 +207,46 @@ class QuasiStaticProblem:
                 column.unknown[0].array[:] = known[motion]
 
     def _response(
-        self, found: Products, columns: Sequence[Column], law: MaterialLaw, loads: Loads
+        self, found: Products, columns: Sequence[Column], law: MaterialLaw, movement: Movement
     ) -> tuple[Response, LoadResponse | None]:
         """Return the response to the motions, and what dead loads do, of which the last column is; collective."""
-        count, mirrored = len(loads.motions), self._body.mirrored
+        count, mirrored = len(movement.motions), self._body.mirrored
         motions, loaded = columns[:count], columns[count:]
         residuals = [
             residual if column.applied is None else residual - column.applied.forces
             for residual, column in zip(found.residuals, columns, strict=True)
         ]
         total = sums(found.space, residuals, [column.prescribed for column in motions])
-        beyond = _energy_beyond(loads, law.lame_mu[0], mirrored)
-        response = reaction(loads, found.stationary[:count, :count] + beyond, total.on_probe[:count], mirrored)
-        balance = total.imbalance(found.energies[:count], loads, mirrored)
+        beyond = _energy_beyond(movement, law.lame_mu[0], mirrored)
+        response = reaction(movement, found.stationary[:count, :count] + beyond, total.on_probe[:count], mirrored)
+        balance = total.imbalance(found.energies[:count], movement, mirrored)
         if not loaded:
             return replace(response, balance=balance), None
         (applied,) = (column.applied for column in loaded)
         assert applied is not None
         works = global_sum(found.space.comm, np.array([u @ applied.forces for u in found.moved]))
-        balance = max(balance, imbalance(total, found.energies, works, applied, loads, mirrored))
-        load_response = load_response_of(found.stationary, works, total.on_probe[-1], mirrored, apart=loads.apart)
+        balance = max(balance, imbalance(total, found.energies, works, applied, movement, mirrored))
+        load_response = load_response_of(found.stationary, works, total.on_probe[-1], mirrored, apart=movement.apart)
         return replace(response, balance=balance), load_response
 
     @stage("error bar")
     def _estimated(self, solution: Solution, found: Equilibrium, law: MaterialLaw) -> Solution:
         """Return the last ``solution`` with its bars; collective."""
-        elements, columns, loads, whole = self.elements, found.columns, found.loads, 2.0 ** len(self._body.mirrored)
+        elements, columns, movement, whole = (
+            self.elements,
+            found.columns,
+            found.movement,
+            2.0 ** len(self._body.mirrored),
+        )
         with ExitStack() as stack:
-            finer = found.solver.enrich(columns, loads, stack, keep=self._conditions.front is not None)
+            finer = found.solver.enrich(columns, movement, stack, keep=self._conditions.front is not None)
             form = _form(solution.response, solution.load_response)
             if finer.decrements is None:
                 products = finer.elements.products(law, finer.columns, checked=False)
-                decrements = form - _form(*self._response(products, finer.columns, law, loads))
+                decrements = form - _form(*self._response(products, finer.columns, law, movement))
             else:
                 decrements = whole * finer.decrements
-            released = self._released(finer.elements, finer.columns, law, loads) if finer.columns else (None, None)
+            released = self._released(finer.elements, finer.columns, law, movement) if finer.columns else (None, None)
         plain = plain_share(self._body)
         unseen = None if finer.unseen is None else shares(np.diag(whole * finer.unseen), form)
         relative = finer.relative
@@ -249,7 +256,9 @@ class QuasiStaticProblem:
                 error_bar(share, elements.degree, elements.element, plain=plain, unseen=rest)
                 for share, rest in zip(shares(decrements, form), rests, strict=True)
             ])  # fmt: skip
-        solution = solution.with_bars(decrements, stiffness_bars(form, relative), elements.element, apart=loads.apart)
+        solution = solution.with_bars(
+            decrements, stiffness_bars(form, relative), elements.element, apart=movement.apart
+        )
         front, tip = (
             advance and above and advance.with_finer(above, elements.degree, solution.energy_bar)
             for advance, above in zip((solution.front, solution.tip), released, strict=True)
@@ -258,7 +267,7 @@ class QuasiStaticProblem:
             solution,
             contact=found.contact and replace(found.contact, bar=finer.area_bar),
             plain=plain,
-            unseen=None if unseen is None else unseen[: len(loads.motions)],
+            unseen=None if unseen is None else unseen[: len(movement.motions)],
             front=front,
             tip=tip,
             estimate_iterations=finer.iterations,
@@ -266,7 +275,7 @@ class QuasiStaticProblem:
 
     @stage("energy release")
     def _released(
-        self, elements: Elements, columns: Sequence[Column], law: MaterialLaw, loads: Loads
+        self, elements: Elements, columns: Sequence[Column], law: MaterialLaw, movement: Movement
     ) -> tuple[Advance | None, Advance | None]:
         """Return what a slit's front and the blade's tip in the whole body release (J/m)."""
 
@@ -275,12 +284,12 @@ class QuasiStaticProblem:
                 return None
             release = elements.release(law, line)
             found = release.matrix(len(columns), lambda amounts: elements.show(columns, list(amounts)))
-            amounts = np.array([*loads.amounts, *([] if loads.dead is None else [1.0])])
-            if (dead := loads.dead) is not None:
-                works = elements.works(columns, release.of_forces(lambda: elements.displacements.applied(dead).forces))
+            amounts = np.array([*movement.amounts, *([] if movement.loads is None else [1.0])])
+            if (loads := movement.loads) is not None:
+                works = elements.works(columns, release.of_forces(lambda: elements.displacements.applied(loads).forces))
                 found[:, -1] += works / 2
                 found[-1, :] += works / 2
-            return Advance(2.0 ** len(self._body.mirrored) * found, amounts, len(loads.motions))
+            return Advance(2.0 ** len(self._body.mirrored) * found, amounts, len(movement.motions))
 
         return of(self._conditions.front), of(self._conditions.tip)
 
@@ -309,7 +318,7 @@ class QuasiStaticProblem:
         self.elements.displacements.set_displacement(displacement)
         return self._values.largest(law, self._conditions.front)
 
-    def _set_up(self, law: MaterialLaw, loads: Loads, stack: ExitStack, *, direct: bool, keep: bool) -> Solver:
+    def _set_up(self, law: MaterialLaw, movement: Movement, stack: ExitStack, *, direct: bool, keep: bool) -> Solver:
         """Return a solver for a law, freed with the ``stack`` unless it is to ``keep``; collective.
 
         Raises:
@@ -320,14 +329,14 @@ class QuasiStaticProblem:
         if not isinstance(self.elements, DisplacementElements):
             raise SolveError(f"the law {law.name} is for displacement elements")
         walk = self._walk
-        if walk is None or not walk.leads_to(law, loads):
-            walk = Walk(law, loads.motions[0], np.zeros(self.elements.displacements.owned))
+        if walk is None or not walk.leads_to(law, movement):
+            walk = Walk(law, movement.motions[0], np.zeros(self.elements.displacements.owned))
         self._walk = walk if self._reuse else None
         return LoadSteps(self.elements, walk, stack, direct=direct)
 
 
-def _motion(loads: Loads, number: int) -> Motion | None:
-    return loads.motions[number] if number < len(loads.motions) else None
+def _motion(movement: Movement, number: int) -> Motion | None:
+    return movement.motions[number] if number < len(movement.motions) else None
 
 
 def _form(response: Response, load_response: LoadResponse | None) -> FloatArray:
@@ -335,11 +344,11 @@ def _form(response: Response, load_response: LoadResponse | None) -> FloatArray:
     return response.stiffness if load_response is None else load_response.form
 
 
-def _energy_beyond(loads: Loads, mu: float, mirrored: Sequence[int]) -> FloatArray | float:
+def _energy_beyond(movement: Movement, mu: float, mirrored: Sequence[int]) -> FloatArray | float:
     """Return twice the strain energies (n, n), by pairs of motions, beyond the cut face of the part modelled."""
-    if loads.far is None:
+    if movement.far is None:
         return 0.0
-    return np.outer(loads.shares, loads.shares) * loads.far.stiffness(mu) / 2.0 ** len(mirrored)
+    return np.outer(movement.shares, movement.shares) * movement.far.stiffness(mu) / 2.0 ** len(mirrored)
 
 
 def _balanced(response: Response) -> Response:

@@ -18,7 +18,7 @@ from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.krylov import LinearSolver, keep, solver_of
-from pipeline.solve.loads import Loads
+from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.response import Response, reaction
@@ -41,11 +41,11 @@ class Reduced:
 class ReducedBasis:
     """Solutions of a problem for a few t, and what follows from them for others; a context manager."""
 
-    def __init__(self, problem: QuasiStaticProblem, loads: Loads, smallest: float, method: str):
-        """Begin with no solutions, for ``loads`` of one motion; ``smallest`` is the least t asked for. Collective."""
+    def __init__(self, problem: QuasiStaticProblem, movement: Movement, smallest: float, method: str):
+        """Begin without solutions for a ``movement`` of one motion, ``smallest`` the least t asked for. Collective."""
         self._problem, self._space = problem, problem.elements.displacements
-        (motion,) = loads.motions
-        self._loads, self._mirrored = loads, self._space.body.mirrored
+        (motion,) = movement.motions
+        self._loads, self._mirrored = movement, self._space.body.mirrored
         self._stack = ExitStack()
         self._solver = self._stack.enter_context(problem.solver(MaterialLaw.of(smallest, 1.0), method))
         # What the residual is made of: first the loads, then two for each w.
@@ -99,14 +99,14 @@ class ReducedBasis:
         """
         count = len(self._solutions)
         theta = np.array([t, 1.0])
-        loads, columns = self._products[:, :2], self._products[:, 2:].reshape(count, count, 2)
-        weights = np.linalg.solve(columns @ theta, loads @ theta)
+        movement, columns = self._products[:, :2], self._products[:, 2:].reshape(count, count, 2)
+        weights = np.linalg.solve(columns @ theta, movement @ theta)
         mixture = np.concatenate([theta, -np.outer(weights, theta).reshape(-1)])
         self._residual.set(0.0)
         self._residual.maxpy(mixture, self._parts)
         self._solver.precondition(self._residual, self._under_p)
         residual = float(self._residual.dot(self._under_p))
-        twice_energy = float(np.dot(self._held_energy, theta) - weights @ (loads @ theta))
+        twice_energy = float(np.dot(self._held_energy, theta) - weights @ (movement @ theta))
         reactions = np.array(self._reactions)  # for each part, of the unmodified operator
         on_probe = reactions.T @ np.concatenate([theta, np.outer(weights, theta).reshape(-1)])
         response = reaction(self._loads, np.array([[twice_energy]]), on_probe[None, :], self._mirrored)

@@ -29,7 +29,7 @@ from pipeline.solve.compiled import form, vector_space
 from pipeline.solve.far_field import Place, PointForce
 from pipeline.solve.forms import compile_forms, one_cell
 from pipeline.solve.krylov import Level, LinearSolver, SolveError
-from pipeline.solve.loads import Motion
+from pipeline.solve.movement import Motion
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.placed_force import PlacedForce, PlacedPull
 from pipeline.solve.spaces import Conditions, ElasticSpace, Spaces

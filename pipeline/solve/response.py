@@ -14,7 +14,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.krylov import SolveError
-from pipeline.solve.loads import Loads, Vector
+from pipeline.solve.movement import Movement, Vector
 from pipeline.solve.spaces import ElasticSpace
 from pipeline.solve.vectors import global_sum
 
@@ -29,7 +29,7 @@ class Response:
     relative errors of F·d = 2U and of F_probe + F_support = 0.
     """
 
-    loads: Loads
+    movement: Movement
     stiffness: FloatArray
     forces: FloatArray
     balance: float = nan
@@ -37,13 +37,13 @@ class Response:
     @property
     def amounts(self) -> FloatArray:
         """Amounts of the motions (m, or rad)."""
-        return np.array(self.loads.amounts)
+        return np.array(self.movement.amounts)
 
     @property
     def force(self) -> Vector:
         """Force of the tissue on the probe (N) in the movement of all motions together."""
         force, along = self.amounts @ self.forces, self.stiffness @ self.amounts
-        for motion, conjugate in zip(self.loads.motions, along, strict=True):
+        for motion, conjugate in zip(self.movement.motions, along, strict=True):
             direction = np.array(motion.direction)
             if motion.is_translation:
                 force = force - (conjugate + force @ direction) * direction
@@ -57,7 +57,7 @@ class Response:
 
 
 def reaction(
-    loads: Loads, stationary: FloatArray, on_probe: FloatArray, mirrored: Sequence[int] = (), balance: float = nan
+    movement: Movement, stationary: FloatArray, on_probe: FloatArray, mirrored: Sequence[int] = (), balance: float = nan
 ) -> Response:
     """Return the response of the whole body, from what belongs to the modelled part of it.
 
@@ -71,9 +71,9 @@ def reaction(
     if not (np.all(np.isfinite(stationary)) and np.all(np.isfinite(on_probe)) and taken.min() > 0):
         raise SolveError(f"the solution is not a number or has no energy (2U = {taken.min():g} J for a unit of travel)")
     stiffness = 2.0 ** len(mirrored) * (stationary + stationary.T) / 2
-    if loads.apart:
+    if movement.apart:
         stiffness = np.diag(np.diag(stiffness))
-    return Response(loads, stiffness, -whole_force(on_probe, mirrored), balance)
+    return Response(movement, stiffness, -whole_force(on_probe, mirrored), balance)
 
 
 @dataclass(frozen=True)
@@ -89,16 +89,16 @@ class Sums:
     works: FloatArray
     crossed: FloatArray
 
-    def imbalance(self, twice_energies: FloatArray, loads: Loads, mirrored: Sequence[int]) -> float:
+    def imbalance(self, twice_energies: FloatArray, movement: Movement, mirrored: Sequence[int]) -> float:
         """Return the largest relative error of F·d = 2U (``twice_energies``, n) and of F_probe + F_support = 0.
 
         A rotation, or a slit that is opened, may take no force at all: its forces are measured by what its energy is
         worth in a translation.
         """
-        count = len(loads.motions)
+        count = len(movement.motions)
         on_probe, on_support = (whole_force(part[:count], mirrored) for part in (self.on_probe, self.on_support))
         size = np.linalg.norm(on_probe, axis=1)
-        straight = np.array([motion.is_translation for motion in loads.motions])
+        straight = np.array([motion.is_translation for motion in movement.motions])
         stiffest = twice_energies[straight].max() if straight.any() else twice_energies.max()
         worth = 2.0 ** len(mirrored) * np.sqrt(np.abs(twice_energies * stiffest))
         size = np.where(straight, size, np.maximum(size, worth))

@@ -11,7 +11,7 @@ from pipeline.solve.crack import Advance
 from pipeline.solve.estimate import extrapolate, extrapolate_found
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.load_response import LoadResponse, load_bars
-from pipeline.solve.loads import Loads, Vector
+from pipeline.solve.movement import Movement, Vector
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import Response
 from pipeline.stages import Times
@@ -109,7 +109,7 @@ class Solution:
         """Force of the tissue on the probe (N) that loads add; not a number if there are none."""
         if self.load_response is None:
             return nan, nan, nan
-        x, y, z = self.load_response.force(self.response.loads)
+        x, y, z = self.load_response.force(self.response.movement)
         return x, y, z if self.tip is None else -self.tip.of_loads().released
 
     @property
@@ -119,7 +119,7 @@ class Solution:
             return nan
         if self.tip is not None:
             return self.tip.of_loads().error
-        return self.load_response.bar_along(self.response.loads, (0.0, 0.0, -1.0))
+        return self.load_response.bar_along(self.response.movement, (0.0, 0.0, -1.0))
 
     @property
     def energy(self) -> float:
@@ -171,7 +171,7 @@ class Solution:
         spanned, bars = np.zeros(3), np.zeros(3)
         if self.bars is not None:
             conjugate = self.bars @ np.abs(self.response.amounts)
-            for motion, bar in zip(self.response.loads.motions, conjugate, strict=True):
+            for motion, bar in zip(self.response.movement.motions, conjugate, strict=True):
                 if motion.is_translation:
                     spanned += np.square(motion.direction)
                     bars += bar * np.abs(motion.direction)
@@ -185,7 +185,7 @@ class Solution:
 
         The entries between motions that symmetry keeps ``apart`` are zero, and known to be.
         """
-        count = len(self.response.loads.motions)
+        count = len(self.response.movement.motions)
         decrements, bars = decrements.copy(), bars.copy()
         if apart:
             for matrix in (decrements, bars):
@@ -210,7 +210,7 @@ class Solution:
         """Whether to open a slit further would release less: its faces are pressed together at the front."""
         if self.front is None:
             return False
-        motions = self.response.loads.motions
+        motions = self.response.movement.motions
         return any(g < 0 for g, motion in zip(self.front.gains, motions, strict=False) if any(motion.opening))
 
     def extrapolated(self, degree: int, element: str, *, graded: bool = True, elsewhere: bool = False) -> "Solution":
@@ -261,7 +261,7 @@ class Problem(Protocol):
     def solve(
         self,
         law: MaterialLaw,
-        loads: Loads,
+        movement: Movement,
         *,
         method: str = "auto",
         tolerance: float = TOLERANCE,

@@ -20,12 +20,12 @@ from pipeline.mesh.distribute import BodyMesh
 from pipeline.scene.model import FIXED, MIRROR, PROBE
 from pipeline.solve.compiled import vector_space
 from pipeline.solve.crack import Front
-from pipeline.solve.dead_loads import Applied, DeadLoads, apply_loads
 from pipeline.solve.forms import ElasticForms, curved_cells, has_curved_cells
 from pipeline.solve.kernels.assembly import StraightStiffness
 from pipeline.solve.kernels.product import DEGREES, CellOperator, CellStiffness
 from pipeline.solve.krylov import SolveError
-from pipeline.solve.loads import Motion
+from pipeline.solve.loads import Applied, Loads, apply_loads
+from pipeline.solve.movement import Motion
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.vectors import assemble, fill
 from pipeline.stages import stage
@@ -197,7 +197,7 @@ class ElasticSpace:
         rhs.array[self.prescribed_owned] = 0.0
 
     @stage("loads")
-    def applied(self, loads: DeadLoads) -> Applied:
+    def applied(self, loads: Loads) -> Applied:
         """Return dead loads on the dofs of the space; collective.
 
         Raises:

@@ -7,12 +7,12 @@ import numpy as np
 from mpi4py import MPI
 
 from pipeline.plan.plan import make_plan
-from pipeline.run.dead_loads import dead_loads_of
 from pipeline.run.execute import compute
+from pipeline.run.loads import loads_of
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of
 from pipeline.run.record import Record
-from pipeline.solve.dead_loads import apply_loads
+from pipeline.solve.loads import apply_loads
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Conditions, Spaces
 from pipeline.solve.vectors import global_sum, vector
@@ -60,11 +60,11 @@ def _work_without_probe(comm: MPI.Comm, load: Section) -> float:
     study = parse({"body": body, "material": tissue(0.0) | _HEAVY, "probe": probe, "mesh": straight, "load": load})
     case = study.case(())
     found = mesh_case(case, (), comm)
-    dead = dead_loads_of(case)
-    assert dead is not None
+    loads = loads_of(case)
+    assert loads is not None
     with Spaces(found) as spaces, QuasiStaticProblem(spaces, 2, Conditions(unilateral=True)) as problem:
         space = problem.elements.displacements
-        applied = apply_loads(dead, found, space.space)
+        applied = apply_loads(loads, found, space.space)
         with (
             vector(space.space) as rhs,
             vector(space.space) as unknown,

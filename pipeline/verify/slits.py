@@ -15,7 +15,7 @@ from pipeline.run.meshing import on_first_rank
 from pipeline.run.problem import conditions_of
 from pipeline.run.record import Record
 from pipeline.scene.model import FIXED, FREE, PROBE, SLIT
-from pipeline.solve.loads import Loads
+from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Conditions, Spaces
@@ -86,8 +86,8 @@ def strip(comm: MPI.Comm, degree: int) -> tuple[float, float]:
     front = conditions_of(case).front
     assert front is not None
     with Spaces(body) as spaces, QuasiStaticProblem(spaces, degree, Conditions(front=front)) as problem:
-        loads = Loads((), ()).opened(front.normal, _MOVED)
-        found = problem.solve(MaterialLaw.of_moduli(_YOUNG, 0.0), loads, estimate=True)
+        movement = Movement((), ()).opened(front.normal, _MOVED)
+        found = problem.solve(MaterialLaw.of_moduli(_YOUNG, 0.0), movement, estimate=True)
     return found.release / _WIDTH, found.release_bar
 
 

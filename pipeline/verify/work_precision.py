@@ -23,8 +23,8 @@ from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import write
 from pipeline.run.execute import compute
 from pipeline.run.record import Record
-from pipeline.solve.loads import Loads
 from pipeline.solve.meridian.problem import MeridianProblem
+from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import Conditions
 from pipeline.study.load import parse
@@ -148,8 +148,8 @@ def _meridians(nu: float, repeats: int) -> Iterator[Point]:
     """The axisymmetric solver by degree, on the first of its meshes."""
     for level, degree in enumerate(AXISYMMETRIC):
         problem = MeridianProblem(Meridian(50e-3, 50e-3, 3e-3), Conditions(), degree=degree, accuracy=1.0)
-        law, loads = MaterialLaw.of_moduli(YOUNG, nu), Loads.along((0.0, 0.0, -DEPTH))
-        runs = [problem.solve(law, loads) for _ in range(repeats + 1)]
+        law, movement = MaterialLaw.of_moduli(YOUNG, nu), Movement.along((0.0, 0.0, -DEPTH))
+        runs = [problem.solve(law, movement) for _ in range(repeats + 1)]
         seconds = statistics.median(r.times.total for r in runs[1:])
         last = runs[-1]
         error = last.reaction[2] / _exact(nu) - 1

@@ -9,8 +9,8 @@ import pytest
 from pipeline.mesh.meridian import Grading, Meridian, generate_meridian
 from pipeline.solve.compiled import compiling
 from pipeline.solve.krylov import SolveError
-from pipeline.solve.loads import Loads, Motion
 from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
+from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.solve.spaces import Conditions
 from pipeline.verify import known
@@ -32,7 +32,7 @@ def solve_layers(meridian, moduli, bonded, *, depth=1.0, **options):
     """Solve for the moduli (E, ν) of each region."""
     law = MaterialLaw(tuple(Parameters.of_moduli(*each) for each in moduli))
     with MeridianProblem(meridian, Conditions(bonded), **options) as problem:
-        return problem.solve(law, Loads.along((0.0, 0.0, -depth)))
+        return problem.solve(law, Movement.along((0.0, 0.0, -depth)))
 
 
 @sampled("contact, poisson", known.CYLINDER, by_day=3)
@@ -238,4 +238,4 @@ def test_impossible_scenes_are_refused(meridian, message):
 @pytest.mark.parametrize("motion", [Motion((1.0, 0.0, 0.0)), Motion(rotation=(0.0, 0.0, 1.0))])
 def test_other_movements_are_refused(motion):
     with pytest.raises(SolveError, match="along its axis"):
-        MeridianProblem(Meridian(5, 2, 1), Conditions()).solve(MaterialLaw.of(1.0, 1.0), Loads((motion,), (1.0,)))
+        MeridianProblem(Meridian(5, 2, 1), Conditions()).solve(MaterialLaw.of(1.0, 1.0), Movement((motion,), (1.0,)))

@@ -9,8 +9,8 @@ from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Grading
 from pipeline.solve.compiled import compiling
 from pipeline.solve.krylov import SolveError
-from pipeline.solve.loads import Loads
 from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
+from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import Conditions
 from pipeline.verify import known
@@ -35,7 +35,7 @@ def _forms():
 
 def solve(meridian, poisson, bonded, *, young=1.0, depth=1.0, **options):
     with MeridianProblem(meridian, Conditions(bonded), **options) as problem:
-        return problem.solve(MaterialLaw.of_moduli(young, poisson), Loads.along((0.0, 0.0, -depth)))
+        return problem.solve(MaterialLaw.of_moduli(young, poisson), Movement.along((0.0, 0.0, -depth)))
 
 
 @pytest.mark.parametrize(("bonded", "poisson"), [(True, 0.3), (False, 0.5)])

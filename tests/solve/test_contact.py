@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from pipeline.run.meshing import mesh_case
-from pipeline.run.problem import law_of, loads_of, tool_of
+from pipeline.run.problem import law_of, movement_of, tool_of
 from pipeline.solve.contact.active_set import ContactError
 from pipeline.solve.contact.candidates import CONDITIONS
 from pipeline.solve.contact.search import Tool
@@ -48,13 +48,13 @@ def pressed(tool=None, **changes):
     body = mesh_case(case, ("y",) if tool else ("x", "y"), MPI.COMM_SELF)
     with Spaces(body) as spaces:
         problem = QuasiStaticProblem(spaces, 2, CONDITIONS, case.element, tool=tool or tool_of(case))
-        yield problem, law_of(case), loads_of(case)
+        yield problem, law_of(case), movement_of(case)
 
 
 @pytest.mark.parametrize("element", ["displacement", "mixed"])
 def test_nothing_pulls_and_nothing_comes_through(element):
-    with pressed(material={"poisson": 0.45}, mesh=COARSE | {"element": element}) as (problem, law, loads):
-        solution = problem.solve(law, loads)
+    with pressed(material={"poisson": 0.45}, mesh=COARSE | {"element": element}) as (problem, law, movement):
+        solution = problem.solve(law, movement)
     state, active, obstacle = problem.contact.found.state, problem.contact.found.active, problem.contact.obstacle
     apart = obstacle.bounds - state.moved
     assert (state.reactions[active & ~obstacle.candidates.is_corner] < 0).all()
@@ -113,8 +113,8 @@ def test_flat_probe_that_does_not_lift_off_is_the_frictionless_one():
 def test_face_that_is_inclined_lifts_off_on_one_side():
     """If it stuck to the surface, tilting would add no force: pull on one side what it presses on the other."""
     inclined = Tool(lambda points: 0.15 * points[:, 0], lambda points: np.ones(len(points), dtype=bool))
-    with pressed(inclined, probe=DISC) as (problem, law, loads):
-        force = problem.solve(law, loads).reaction[2]
+    with pressed(inclined, probe=DISC) as (problem, law, movement):
+        force = problem.solve(law, movement).reaction[2]
     touching = problem.contact.obstacle.candidates.points[problem.contact.found.active, 0]
     assert touching.min() < -0.95e-3
     assert 0.0 < touching.max() < 0.9e-3
@@ -171,8 +171,8 @@ def test_error_bar_holds_a_finer_mesh(scene):
 
 def test_contact_that_is_cut_off_is_refused():
     ball = Tool(lambda x: (x[:, :2] ** 2).sum(axis=1) / 40e-3, lambda x: np.zeros(len(x), dtype=bool))
-    with pressed(ball, probe=DISC) as (problem, law, loads), pytest.raises(ContactError, match="reaches the edge"):
-        problem.solve(law, loads)
+    with pressed(ball, probe=DISC) as (problem, law, movement), pytest.raises(ContactError, match="reaches the edge"):
+        problem.solve(law, movement)
 
 
 def test_what_may_touch_may_be_held_as_long_as_it_does_not():
@@ -183,8 +183,11 @@ def test_what_may_touch_may_be_held_as_long_as_it_does_not():
     assert known.origin == "axisymmetric"
     assert found.force == pytest.approx(known.force, rel=found.force_error)
     flat = Tool(lambda x: np.zeros(len(x)), lambda x: np.ones(len(x), dtype=bool))
-    with pressed(flat, mesh=COARSE | column) as (problem, law, loads), pytest.raises(ContactError, match="runs into"):
-        problem.solve(law, loads)
+    with (
+        pressed(flat, mesh=COARSE | column) as (problem, law, movement),
+        pytest.raises(ContactError, match="runs into"),
+    ):
+        problem.solve(law, movement)
 
 
 def test_a_tool_may_come_as_near_to_a_held_column_as_it_does_not_go_below_the_surface_there():

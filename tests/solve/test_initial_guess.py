@@ -22,10 +22,10 @@ def test_a_solve_begins_from_the_best_sum_of_earlier_ones():
     ):
         solver.recycle()
         random, right, unknown = np.random.default_rng(3), *solver.matrix.createVecs()
-        loads = random.standard_normal((4, right.getSize()))
-        loads[:, solver.levels[-1].prescribed] = 0.0
+        movement = random.standard_normal((4, right.getSize()))
+        movement[:, solver.levels[-1].prescribed] = 0.0
         counts, solutions = [], []
-        for load in [*loads, np.array([1.0, 2.0, 0.0, -1.0]) @ loads]:
+        for load in [*movement, np.array([1.0, 2.0, 0.0, -1.0]) @ movement]:
             right.array[:] = load
             counts.append(solver.solve(right, unknown, 1e-8))
             solutions.append(unknown.array.copy())

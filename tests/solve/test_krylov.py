@@ -7,7 +7,7 @@ from petsc4py import PETSc
 from pipeline.solve import krylov
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.krylov import Level, LinearSolver, SolveError, keep
-from pipeline.solve.loads import Loads
+from pipeline.solve.movement import Movement
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import BALANCE_LIMIT, check_balance
 from pipeline.solve.spaces import Conditions, Spaces
@@ -26,7 +26,7 @@ def test_default_tolerance_is_enough_for_f(degree, poisson):
 
 def test_force_of_a_probe_that_slices_is_as_exact():
     """Its force along the axis is not the work alone: both movements are solved for."""
-    slicing = Loads.along((DEPTH / 2, 0.0, -DEPTH))
+    slicing = Movement.along((DEPTH / 2, 0.0, -DEPTH))
     with QuasiStaticProblem(Spaces(make_mesh(mirrors=("y",))), 2, Conditions()) as problem:
         usual, direct = (problem.solve(law(0.45), slicing, method=method) for method in ("iterative", "direct"))
     assert usual.reaction == pytest.approx(direct.reaction, rel=1e-7, abs=1e-7 * direct.reaction[2])

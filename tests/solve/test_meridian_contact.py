@@ -13,10 +13,10 @@ from pipeline.run.execute import compute
 from pipeline.shapes.rounded import Rounded
 from pipeline.solve.compiled import compiling
 from pipeline.solve.krylov import SolveError
-from pipeline.solve.loads import Loads
 from pipeline.solve.meridian.contact import DEGREE, MeridianContact
 from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
 from pipeline.solve.meridian.trials import TRIAL_DEGREE, RoundTool
+from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import Conditions
 from tests.cases import study
@@ -33,7 +33,7 @@ def _compiled():
 
 
 def pressed(tool, depth, meridian, law=LAW, degree=DEGREE):
-    return MeridianContact(meridian, tool, degree=degree).solve(law, Loads.along((0.0, 0.0, -depth)))
+    return MeridianContact(meridian, tool, degree=degree).solve(law, Movement.along((0.0, 0.0, -depth)))
 
 
 def flat(radius):
@@ -51,7 +51,7 @@ def test_a_flat_tool_wider_than_a_column_covers_it():
     """Tissue that cannot lift off is pressed as below the frictionless tool that moves as far."""
     column = Meridian(12.0, 6.0, 3.0, column=2.0)
     found = pressed(flat(3.0), 0.1, column)
-    known = MeridianProblem(column, Conditions(bonded=False)).solve(LAW, Loads.along((0.0, 0.0, -0.1)))
+    known = MeridianProblem(column, Conditions(bonded=False)).solve(LAW, Movement.along((0.0, 0.0, -0.1)))
     assert found.response.stiffness == pytest.approx(known.response.stiffness, rel=1e-9)
     assert found.contact.area == pytest.approx(4 * pi, rel=1e-12)
     with pytest.raises(SolveError, match="edge of what is kept"):
@@ -82,7 +82,7 @@ def test_a_flat_disc_touches_with_all_of_its_face():
     """As the prescribed footprint does, and to the same bar: nothing lifts off."""
     meridian, depth = Meridian(50.0, 50.0, 3.0), 0.5
     found = pressed(flat(3.0), depth, meridian)
-    known = MeridianProblem(meridian, Conditions(bonded=False)).solve(LAW, Loads.along((0.0, 0.0, -depth)))
+    known = MeridianProblem(meridian, Conditions(bonded=False)).solve(LAW, Movement.along((0.0, 0.0, -depth)))
     assert found.reaction[2] == pytest.approx(known.reaction[2], rel=1e-9)
     assert found.energy == pytest.approx(known.energy, rel=1e-9)
     assert found.contact.radius == 3.0
@@ -120,7 +120,7 @@ def test_a_disc_on_a_stiff_skin_lifts_off_in_a_ring():
     skin, depth = Meridian(30.0, 20.0, 5.0, interfaces=(-1.0,)), 0.1
     stiff = MaterialLaw.of(0.3 / 1.3 / 0.4 * 30, 0.5 / 1.3 * 30)
     law = MaterialLaw.of(LAW.lame_lambda + stiff.lame_lambda, LAW.lame_mu + stiff.lame_mu)
-    press = Loads.along((0.0, 0.0, -depth))
+    press = Movement.along((0.0, 0.0, -depth))
     found = MeridianContact(skin, flat(5.0), degree=4, accuracy=1e-3).solve(law, press)
     assert found.reaction[2] == pytest.approx(2.07474, rel=1e-4)
     assert found.contact.area == pytest.approx(16.17, rel=1e-2)

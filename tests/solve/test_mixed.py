@@ -14,7 +14,7 @@ from pipeline.run.meshing import mesh_arrays, mesh_case
 from pipeline.solve.elements.mixed import MixedElements
 from pipeline.solve.estimate import error_bar
 from pipeline.solve.krylov import SolveError
-from pipeline.solve.loads import Loads
+from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Solution
@@ -30,7 +30,7 @@ QUARTER = ("x", "y")
 EXACT = {(name, nu): value for (name, nu), value in known.CYLINDER.items() if nu >= 0.45}
 
 
-PRESS = Loads.along((0.0, 0.0, -DEPTH))
+PRESS = Movement.along((0.0, 0.0, -DEPTH))
 
 
 def law(poisson: float, young: float = YOUNG) -> MaterialLaw:

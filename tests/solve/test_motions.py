@@ -11,7 +11,7 @@ from pipeline.plan.plan import make_plan
 from pipeline.report import accessor  # noqa: F401 (registers dataset.epsmesh)
 from pipeline.report.dataset import build
 from pipeline.run.execute import compute
-from pipeline.solve.loads import Loads, Motion
+from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.response import Sums
@@ -25,16 +25,16 @@ OFF = {"probe": {"at": ["4 mm", "2 mm"]}}
 KINDS = pytest.mark.parametrize(("kind", "poisson"), [("displacement", 0.3), ("mixed", 0.49)])
 
 
-def run(kind, loads, poisson=0.3, comm=MPI.COMM_SELF, mesh=None, **options):
+def run(kind, movement, poisson=0.3, comm=MPI.COMM_SELF, mesh=None, **options):
     with (
         Spaces(mesh or make_mesh(comm, (), **OFF)) as spaces,
         QuasiStaticProblem(spaces, 2, Conditions(), kind) as problem,
     ):
-        return problem.solve(law(poisson), loads, **options)
+        return problem.solve(law(poisson), movement, **options)
 
 
 def all_six(centre=(4e-3, 2e-3, 0.0), travel=TRAVEL):
-    return Loads.all(travel, centre)
+    return Movement.all(travel, centre)
 
 
 @pytest.mark.mpi
@@ -43,9 +43,9 @@ def all_six(centre=(4e-3, 2e-3, 0.0), travel=TRAVEL):
 def test_movements_superpose(kind, poisson, method):
     """Press and slide, each solved for, give the force and the energy of both at once."""
     norm = float(np.linalg.norm(TRAVEL))
-    together = Loads((Motion(tuple(t / norm for t in TRAVEL)),), (norm,))
+    together = Movement((Motion(tuple(t / norm for t in TRAVEL)),), (norm,))
     options = {"method": method, "tolerance": 1e-10, "comm": MPI.COMM_WORLD}
-    whole, parts = (run(kind, loads, poisson, **options) for loads in (together, Loads.along(TRAVEL)))
+    whole, parts = (run(kind, movement, poisson, **options) for movement in (together, Movement.along(TRAVEL)))
     assert parts.energy == pytest.approx(whole.energy, rel=1e-9)
     assert parts.reaction == pytest.approx(whole.reaction, rel=1e-8, abs=1e-8 * whole.reaction[2])
     assert parts.max_strain == pytest.approx(whole.max_strain, rel=1e-7)
@@ -74,7 +74,7 @@ def test_rotations_are_those_of_the_residuals():
     """Reciprocity: the torque of the pressed probe's residual is what turning it takes along the axis."""
     found = run("displacement", all_six(), tolerance=1e-10)
     with Spaces(make_mesh(mirrors=(), **OFF)) as spaces, QuasiStaticProblem(spaces, 2, Conditions()) as problem:
-        turned = problem.solve(law(0.3), Loads((all_six().motions[3],), (1.0,)), tolerance=1e-10)
+        turned = problem.solve(law(0.3), Movement((all_six().motions[3],), (1.0,)), tolerance=1e-10)
         assert turned.response.forces[0] == pytest.approx(-found.stiffness[:3, 3], rel=1e-6)
         assert 2 * turned.energy == pytest.approx(found.stiffness[3, 3], rel=1e-9)
 
@@ -90,8 +90,8 @@ def on_half_space(poisson):
     spaces = Spaces(make_mesh(mirrors=(), **changes))
     material = MaterialLaw.of_moduli(2 * (1 + poisson), poisson)
     with spaces, QuasiStaticProblem(spaces, 2, Conditions()) as problem:
-        loads = Loads.all((0.0, 0.0, -1.0), (0.0, 0.0, 0.0))
-        solution = problem.solve(material, loads, estimate=True).extrapolated(2, "displacement")
+        movement = Movement.all((0.0, 0.0, -1.0), (0.0, 0.0, 0.0))
+        solution = problem.solve(material, movement, estimate=True).extrapolated(2, "displacement")
     unit = 1e-3 * np.outer([1, 1, 1, 1e-3, 1e-3, 1e-3], [1, 1, 1, 1e-3, 1e-3, 1e-3])
     return solution.stiffness / unit, solution.bars / unit
 
@@ -125,8 +125,8 @@ def test_slide_and_tilt_of_a_bonded_disc():
     }
     spaces = Spaces(make_mesh(mirrors=(), **changes))
     with spaces, QuasiStaticProblem(spaces, 2, Conditions(), "mixed") as problem:
-        loads = Loads.all((0.0, 0.0, -1.0), (0.0, 0.0, 0.0))
-        solution = problem.solve(MaterialLaw.of_moduli(3.0, 0.5), loads, estimate=True).extrapolated(2, "mixed")
+        movement = Movement.all((0.0, 0.0, -1.0), (0.0, 0.0, 0.0))
+        solution = problem.solve(MaterialLaw.of_moduli(3.0, 0.5), movement, estimate=True).extrapolated(2, "mixed")
     unit = 1e-3 * np.outer([1, 1, 1, 1e-3, 1e-3, 1e-3], [1, 1, 1, 1e-3, 1e-3, 1e-3])
     stiffness, bars = solution.stiffness / unit, solution.bars / unit
     assert stiffness[3, 3] == pytest.approx(16 / 3, abs=bars[3, 3] + 1e-4)
@@ -150,8 +150,10 @@ def test_bars_of_movements_hold_those_of_finer_meshes(kind, poisson):
 
 def test_one_movement_is_a_matrix_of_one():
     """What one degree more takes away, and the bars, are the same whether a movement is solved for alone or not."""
-    press = Loads.along((0.0, 0.0, -1.0))
-    alone, among = (run("displacement", loads, estimate=True) for loads in (press, Loads.along((1.0, 0.0, -1.0))))
+    press = Movement.along((0.0, 0.0, -1.0))
+    alone, among = (
+        run("displacement", movement, estimate=True) for movement in (press, Movement.along((1.0, 0.0, -1.0)))
+    )
     assert among.stiffness[0, 0] == pytest.approx(alone.stiffness[0, 0], rel=1e-9)
     assert among.decrements[0, 0] == pytest.approx(alone.decrements[0, 0], rel=1e-6)
     assert among.bars[0, 0] == pytest.approx(alone.bars[0, 0], rel=1e-6)
@@ -259,14 +261,14 @@ def test_a_slide_takes_a_finer_mesh():
 @pytest.mark.parametrize("mirrored", [(), (0,), (0, 1)])
 def test_forces_that_do_not_balance_are_told_by_what_a_motion_is_worth(mirrored):
     """Of a translation by its force; of a turn, which may take none, by what its energy is worth in a translation."""
-    loads = Loads((Motion(direction=(0.0, 0.0, 1.0)), Motion(rotation=(0.0, 0.0, 1.0))), (1.0, 1.0))
+    movement = Movement((Motion(direction=(0.0, 0.0, 1.0)), Motion(rotation=(0.0, 0.0, 1.0))), (1.0, 1.0))
     energies, off = np.array([400.0, 1.0]), 1e-3
     straight = np.array([[0.0, 0.0, 400.0], [0.0, 0.0, 0.0]])
 
     def missed(of_push=0.0, of_turn=0.0, of_work=0.0):
         on_support = -straight + [[0.0, 0.0, of_push], [0.0, 0.0, of_turn]]
         return Sums(straight, on_support, np.add(energies, [0.0, of_work]), np.zeros(2)).imbalance(
-            energies, loads, mirrored
+            energies, movement, mirrored
         )
 
     assert missed() == 0.0

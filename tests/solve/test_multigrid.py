@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from pipeline.solve.kernels import multigrid
 from pipeline.solve.krylov import Level, LinearSolver, SolveError
-from pipeline.solve.loads import Loads
+from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Conditions, Spaces
@@ -16,9 +16,9 @@ pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="for one process
 FINE = {"mesh": {"rim": "0.5 mm", "fine": "3 mm"}}
 
 
-def solved(kind, degree, material, loads=PRESS, **options):
+def solved(kind, degree, material, movement=PRESS, **options):
     with Spaces(make_mesh(**FINE)) as spaces, QuasiStaticProblem(spaces, degree, Conditions(), kind) as problem:
-        return problem.solve(material, loads, method="iterative", estimate=True, **options)
+        return problem.solve(material, movement, method="iterative", estimate=True, **options)
 
 
 def test_a_tolerance_below_that_of_a_float_is_met():
@@ -45,7 +45,7 @@ def test_no_unit_runs_out_of_numbers(stiffer, deeper):
     (tissue,), depth = law(0.3).parameters, PRESS.amounts[0]
     known = solved("displacement", 2, law(0.3))
     material = MaterialLaw.of(stiffer * tissue.lame_lambda, stiffer * tissue.lame_mu)
-    found = solved("displacement", 2, material, Loads(PRESS.motions, (deeper * depth,)))
+    found = solved("displacement", 2, material, Movement(PRESS.motions, (deeper * depth,)))
     assert found.reaction[2] == pytest.approx(stiffer * deeper * known.reaction[2], rel=1e-8)
 
 

@@ -7,7 +7,7 @@ from mpi4py import MPI
 
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.run.meshing import mesh_case
-from pipeline.solve.loads import Loads
+from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Conditions, Spaces
@@ -19,7 +19,7 @@ TUMOUR = {"name": "tumour", "at": ["-30 mm", "2 mm", "15 mm"], "axes": ["8 mm", 
           "poisson": 0.3}  # fmt: skip
 PROBE = {"shape": "disc", "radius": "4 mm", "depth": "0.2 mm", "at": ["-36 mm", "0 mm", "24 mm"]}
 MESH = {"epsilon": "full", "fine": "15 mm", "coarse": "60 mm", "rim": "1.5 mm", "growth": 1.0}
-PRESS = Loads.along((0.0, 0.0, -0.2e-3))
+PRESS = Movement.along((0.0, 0.0, -0.2e-3))
 NATIVE = {"shape": "ellipsoid", "axes": ["60 mm", "45 mm", "30 mm"], "fixed": {"below": "-10 mm"}}
 
 

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of
-from pipeline.solve.loads import Loads
+from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw, SplitLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Solution
@@ -21,7 +21,7 @@ from tests.cases import study
 SKIN = {"name": "skin", "thickness": "3 mm", "young": "60 kPa", "poisson": 0.3}
 BALL = {"name": "tumour", "at": ["0 mm", "0 mm", "-10 mm"], "radius": "4 mm", "young": "50 kPa", "poisson": 0.45}
 BODY = {"layers": [SKIN], "inclusion": [BALL]}
-PRESS = Loads.along((0.0, 0.0, -0.2e-3))
+PRESS = Movement.along((0.0, 0.0, -0.2e-3))
 QUARTER = ("x", "y")
 
 

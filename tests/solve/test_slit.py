@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from pipeline import compat
 from pipeline.run.meshing import mesh_case
-from pipeline.run.problem import conditions_of, loads_of
+from pipeline.run.problem import conditions_of, movement_of
 from pipeline.solve.crack import Release, moved_on
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.rim import clear_cells
@@ -31,7 +31,7 @@ def case_of(mesh=COARSE, body=BODY, load=None, **probe):
 def run(case, mirrors=QUARTER, kind="displacement", poisson=0.3, comm=MPI.COMM_SELF, **options):
     mesh = mesh_case(case, mirrors, comm)
     with Spaces(mesh) as spaces, QuasiStaticProblem(spaces, case.mesh.degree, conditions_of(case), kind) as problem:
-        return problem.solve(law(poisson), loads_of(case), **options)
+        return problem.solve(law(poisson), movement_of(case), **options)
 
 
 def finer(solution):
@@ -79,7 +79,7 @@ def test_change_of_energy_under_loads(kind):
 
     def solved():
         with Spaces(mesh) as spaces, QuasiStaticProblem(spaces, 2, conditions, kind) as problem:
-            return problem.solve(law(0.3), loads_of(case), method="direct")
+            return problem.solve(law(0.3), movement_of(case), method="direct")
 
     def energy(front, step):
         with moved_on(mesh, front, step):
@@ -105,10 +105,10 @@ def test_loads_that_press_a_slit_shut():
 def test_a_study_of_a_slit_under_loads():
     """What they do to a blade along which tissue slides has a bar; they open a slit, and draw the blade in."""
     probe = {**SLIT_BLADE, "incision": "4 mm"}
-    loads = {"traction": [{"on": "sides", "pressure": "-0.3 kPa"}]}
+    movement = {"traction": [{"on": "sides", "pressure": "-0.3 kPa"}]}
     alone = solve(body=BODY, probe=probe, mesh=COARSEST)[()]
-    bonded = solve(body=BODY, probe=probe, mesh=COARSEST, load=loads)[()]
-    slid = solve(body=BODY, probe={**probe, "contact": "frictionless"}, mesh=COARSEST, load=loads)[()]
+    bonded = solve(body=BODY, probe=probe, mesh=COARSEST, load=movement)[()]
+    slid = solve(body=BODY, probe={**probe, "contact": "frictionless"}, mesh=COARSEST, load=movement)[()]
     assert bonded.force == pytest.approx(alone.force, rel=1e-9)
     assert bonded.energy_release > 1.3 * alone.energy_release
     assert bonded.load_force_error > 0

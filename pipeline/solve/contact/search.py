@@ -26,7 +26,7 @@ from pipeline.solve.contact.touch import Touch
 from pipeline.solve.elements.base import Column, Elements, Enriched, Equilibrium, close_far
 from pipeline.solve.estimate import error_bar, found_again_bar, found_bar
 from pipeline.solve.krylov import SolveError
-from pipeline.solve.loads import Loads
+from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import Response, reaction
 from pipeline.solve.rim import plain_share
@@ -95,8 +95,10 @@ class ContactSearch:
             self._sweep.close()
             self._sweep = None
 
-    def solve(self, law: MaterialLaw, loads: Loads, stack: ExitStack, *, method: str, tolerance: float) -> Equilibrium:
-        """Find the contact at the depth of ``loads``, and the force; collective. The ``stack`` frees what is made.
+    def solve(
+        self, law: MaterialLaw, movement: Movement, stack: ExitStack, *, method: str, tolerance: float
+    ) -> Equilibrium:
+        """Find the contact at the depth of ``movement``, and the force; collective. The ``stack`` frees what is made.
 
         Raises:
             SolveError: if a linear solver fails, or the solution a check.
@@ -104,12 +106,12 @@ class ContactSearch:
                 what is held of the body.
         """
         strict = _STRICTER * tolerance
-        columns = self._elements.columns(loads, stack)
+        columns = self._elements.columns(movement, stack)
         sweep = self._sweep_of(law, method, stack)
         elements = sweep.elements
-        self._couple(elements, loads, columns, law.lame_mu[0], strict)
-        loaded = None if loads.dead is None else elements.free_response(columns[-1], strict)
-        depth = loads.amounts[0]
+        self._couple(elements, movement, columns, law.lame_mu[0], strict)
+        loaded = None if movement.loads is None else elements.free_response(columns[-1], strict)
+        depth = movement.amounts[0]
         heights = self._touch.heights(self.candidates, loaded)
         self.obstacle = Obstacle(self.candidates, heights - depth, depth)
         if np.any(self.obstacle.bounds[self._supported] < 0):
@@ -120,8 +122,8 @@ class ContactSearch:
         unknowns = elements.unknowns()
         self._elements.put(columns[0], unknowns, depth)
         if elements.far is not None:
-            loads = close_far(columns, loads, elements.far.share / depth)
-        response = self._response(columns[0], found, law, loads)
+            movement = close_far(columns, movement, elements.far.share / depth)
+        response = self._response(columns[0], found, law, movement)
         check_balance(response.balance)
         if self._reuse:
             sweep.keep(depth, found, unknowns)
@@ -131,22 +133,22 @@ class ContactSearch:
         if loaded is not None:
             sag = self._touch.sag(self.candidates, loaded)
             contact = replace(contact, sag=sag, load_energy=self._whole * loaded.energy / 2)
-        return Equilibrium(self, columns, loads, first + found.sets, response, contact=contact)
+        return Equilibrium(self, columns, movement, first + found.sets, response, contact=contact)
 
     # ---- what acts besides the probe ------------------------------------------------------------------
 
     def _couple(
-        self, elements: ContactElements, loads: Loads, columns: Sequence[Column], mu: float, tolerance: float
+        self, elements: ContactElements, movement: Movement, columns: Sequence[Column], mu: float, tolerance: float
     ) -> None:
-        """Let the far field of ``loads``, if there is one, act on the cut face; collective."""
-        if loads.far is None:
+        """Let the far field of ``movement``, if there is one, act on the cut face; collective."""
+        if movement.far is None:
             elements.couple(None)
             return
         far = columns[1]
-        if elements.far is None or elements.far.field != loads.far:
+        if elements.far is None or elements.far.field != movement.far:
             unit = elements.free_response(far, tolerance)
-            beyond = loads.far.stiffness(mu) / self._whole
-            elements.couple(FarShare(loads.far, unit, unit.energy + beyond))
+            beyond = movement.far.stiffness(mu) / self._whole
+            elements.couple(FarShare(movement.far, unit, unit.energy + beyond))
         else:
             self._elements.put(far, elements.far.unit.unknowns)
 
@@ -224,7 +226,7 @@ class ContactSearch:
 
     # ---- error bar ------------------------------------------------------------------------------------
 
-    def enrich(self, columns: Sequence[Column], loads: Loads, stack: ExitStack, *, keep: bool) -> Enriched:
+    def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
         """Return what one degree more makes of the force that was found last, and its bar; collective.
 
         Where loads act each depth has its own, as it has where the surface is not condensed.
@@ -234,12 +236,12 @@ class ContactSearch:
         assert self._last is not None
         (sweep, loaded), depth, iterations = self._last, self.obstacle.depth, 0
         at_edge = self._area_of(self.found, sweep.law).bar
-        known = sweep.bar(depth, loads.far) if loaded is None else None
+        known = sweep.bar(depth, movement.far) if loaded is None else None
         if known is None:
             self._elements.show(columns[:1])
             taken, share, iterations = self._estimated(sweep, loaded, at_edge)
             if loaded is None:
-                sweep.keep_bar(depth, taken, share, loads.far)
+                sweep.keep_bar(depth, taken, share, movement.far)
         else:
             taken, share = known
         decrements = np.array([[taken * self._force / depth]])
@@ -310,9 +312,9 @@ class ContactSearch:
                 "press the probe in less far, or set it up straighter"
             )
 
-    def _response(self, column: Column, found: Found, law: MaterialLaw, loads: Loads) -> Response:
+    def _response(self, column: Column, found: Found, law: MaterialLaw, movement: Movement) -> Response:
         """Return the force for the depth, as if it were proportional to it; its balance is that of all checks."""
-        space, state, (depth,) = self._elements.displacements, found.state, loads.amounts
+        space, state, (depth,) = self._elements.displacements, found.state, movement.amounts
         force = self._force
         (residual,) = self._elements.products(law, [column]).residuals
         local = depth * residual.reshape(-1, 3)[space.fixed_owned, 2].sum()
@@ -321,7 +323,7 @@ class ContactSearch:
         balance = max(abs(support / force - 1), abs(work / state.energy - 1))
         per_depth = force / depth
         return reaction(
-            loads, np.array([[per_depth]]), np.array([[0.0, 0.0, -per_depth]]), self._body.mirrored, balance
+            movement, np.array([[per_depth]]), np.array([[0.0, 0.0, -per_depth]]), self._body.mirrored, balance
         )
 
 

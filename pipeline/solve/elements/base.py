@@ -13,10 +13,10 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.crack import Front, Release
-from pipeline.solve.dead_loads import Applied
 from pipeline.solve.krylov import Level, SolveError
 from pipeline.solve.load_response import LoadResponse
-from pipeline.solve.loads import Loads, Motion
+from pipeline.solve.loads import Applied
+from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import Response
 from pipeline.solve.solution import Contact
@@ -83,7 +83,7 @@ class Enriching(Protocol):
 
     stored: float | None
 
-    def enrich(self, columns: Sequence[Column], loads: Loads, stack: ExitStack, *, keep: bool) -> Enriched:
+    def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
         """Solve on in one degree more; what is made is freed with the ``stack``; collective.
 
         ``keep`` asks for the solutions, too.
@@ -92,11 +92,11 @@ class Enriching(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """What a ``solver`` found for ``loads``: a column for each motion, one more for dead loads, and what they do."""
+    """What a ``solver`` found for ``movement``: a column for each motion, one more for dead loads, and what they do."""
 
     solver: Enriching
     columns: list[Column]
-    loads: Loads
+    movement: Movement
     iterations: int
     response: Response
     load_response: LoadResponse | None = None
@@ -134,7 +134,7 @@ class Solver(ABC):
         """Lower it to that ``share`` of what the last solve left; return the iterations; collective."""
 
     @abstractmethod
-    def enrich(self, columns: Sequence[Column], loads: Loads, stack: ExitStack, *, keep: bool) -> Enriched:
+    def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
         """Solve on in one degree more; what is made is freed with the ``stack``; collective.
 
         ``keep`` asks for the solutions, too.
@@ -277,18 +277,18 @@ class Elements(ABC):
         unknown[0].array[:] = displacement.x.array[: space.owned] - prescribed[: space.owned]
         unknown[0].array[space.prescribed_owned] = 0.0
 
-    def columns(self, loads: Loads, stack: ExitStack) -> list[Column]:
+    def columns(self, movement: Movement, stack: ExitStack) -> list[Column]:
         """Return a column for each motion, and one more for dead loads, if there are any; collective.
 
         They have no solution yet, and are freed with the ``stack``.
         """
-        prescribed = [self.displacements.held(motion) for motion in loads.motions]
-        amounts = [*loads.amounts]
+        prescribed = [self.displacements.held(motion) for motion in movement.motions]
+        amounts = [*movement.amounts]
         applied: list[Applied | None] = [None for _ in prescribed]
-        if loads.dead is not None:
+        if movement.loads is not None:
             prescribed.append(np.zeros(len(self.displacements.forms.displacement.x.array)))
             amounts.append(1.0)
-            applied.append(self.displacements.applied(loads.dead))
+            applied.append(self.displacements.applied(movement.loads))
         return [
             Column(
                 prescribed=values,
@@ -331,7 +331,7 @@ class Elements(ABC):
         return global_sum(self.displacements.comm, np.array(found))
 
 
-def close_far(columns: list[Column], loads: Loads, share: float) -> Loads:
+def close_far(columns: list[Column], movement: Movement, share: float) -> Movement:
     """Make one motion, with its ``share`` of the far field, of two: return it.
 
     Raises:
@@ -343,7 +343,7 @@ def close_far(columns: list[Column], loads: Loads, share: float) -> Loads:
     for part, of_field in zip(tool.unknown, far.unknown, strict=True):
         part.axpy(share, of_field)
     tool.prescribed = tool.prescribed + share * far.prescribed
-    return loads.closed(share)
+    return movement.closed(share)
 
 
 def level_of(space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, direct: bool = False) -> Level:

@@ -9,7 +9,7 @@ from pipeline.arrays import FloatArray
 from pipeline.solve.elements.base import Column, Elements, Enriched, Solver, level_of
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.krylov import DIRECT_LIMIT, Level, LinearSolver
-from pipeline.solve.loads import Loads
+from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import Conditions, Spaces
 from pipeline.solve.vectors import vector
@@ -103,7 +103,7 @@ class DisplacementSolver(Solver):
         """Lower it to that ``share`` of what the last solve left; return the iterations; collective."""
         return self.solve(columns, share * self._tolerance)
 
-    def enrich(self, columns: Sequence[Column], loads: Loads, stack: ExitStack, *, keep: bool) -> Enriched:
+    def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
         """Solve on in one degree more, from the residuals there; collective."""
         coarse = self.elements
         if self.linear.cycle is None and coarse.degree > 1:
@@ -121,8 +121,8 @@ class DisplacementSolver(Solver):
             space.apply(residual, self.law, checked=False)
             residual.scale(-1.0)
             residual.array[space.prescribed_owned] = 0.0
-            if loads.dead is not None and column.applied is not None:
-                space.put(residual, space.applied(loads.dead))
+            if movement.loads is not None and column.applied is not None:
+                space.put(residual, space.applied(movement.loads))
             residuals.append(residual)
         decrements, corrections, iterations = energy_decrements(solver, residuals, keep_solutions=keep)
         kept = []

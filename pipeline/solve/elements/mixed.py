@@ -21,7 +21,7 @@ from pipeline.arrays import FloatArray
 from pipeline.solve.elements.base import Column, Elements, Enriched, Fields, Solver
 from pipeline.solve.elements.pressures import Pressures
 from pipeline.solve.krylov import Level, SolveError
-from pipeline.solve.loads import Loads
+from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw, SplitLaw
 from pipeline.solve.saddle import Saddle, SaddleSolver
 from pipeline.solve.spaces import Conditions, Spaces
@@ -189,13 +189,13 @@ class MixedSolver(Solver):
         """Lower it to that ``share`` of what the last solve left; return the iterations; collective."""
         return self.solve(columns, share)
 
-    def enrich(self, columns: Sequence[Column], loads: Loads, stack: ExitStack, *, keep: bool) -> Enriched:
+    def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
         """Solve on in elements of one degree more; collective."""
         coarse, finer = self.elements, self.elements.finer()
         below = coarse._solvers.get(False, (None, None))[0]
         saddle = finer._solver(coarse.elastic(self.law), direct=False, below=below)
         above = MixedSolver(finer, self.law, saddle, is_exact=False)
-        found = finer.columns(loads, stack)
+        found = finer.columns(movement, stack)
         for column, fine in zip(columns, found, strict=True):
             coarse.show([column], [1.0])
             finer.start_from(coarse, fine.unknown, fine.prescribed)

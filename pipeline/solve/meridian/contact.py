@@ -24,11 +24,11 @@ from pipeline.arrays import FloatArray
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Grading
 from pipeline.solve.krylov import SolveError
-from pipeline.solve.loads import Loads
 from pipeline.solve.meridian.refine import DirectProblem, best_answer, error_bar, only_along_axis
 from pipeline.solve.meridian.signs import LiftsOff, check_signs
 from pipeline.solve.meridian.system import HalfPlane, max_strain
 from pipeline.solve.meridian.trials import STEP, Rings, RoundTool, Trial, Trials
+from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import reaction
 from pipeline.solve.solution import Contact, Solution
@@ -55,7 +55,13 @@ class MeridianContact(DirectProblem):
 
     @stage("axisymmetric contact")
     def solve(
-        self, law: MaterialLaw, loads: Loads, *, method: str = "auto", tolerance: float = 0.0, estimate: bool = True
+        self,
+        law: MaterialLaw,
+        movement: Movement,
+        *,
+        method: str = "auto",
+        tolerance: float = 0.0,
+        estimate: bool = True,
     ) -> Solution:
         """Find the contact at a depth, 0 <= ν <= 0.5, and its force.
 
@@ -65,8 +71,8 @@ class MeridianContact(DirectProblem):
             SolveError: if contact is no round patch, with rings lost or not, reaches the edge of the body, or is not
                 found; if a solve fails a check, or the error bar stays above 1e-3.
         """
-        only_along_axis(loads)
-        (depth,) = loads.amounts
+        only_along_axis(movement)
+        (depth,) = movement.amounts
         with recorded() as times:
             search = _Search(self._meridian, self._tool, law)
             patch = search.find(depth)
@@ -79,7 +85,7 @@ class MeridianContact(DirectProblem):
         scale = law.lame_mu[0] * best.trial.unit
         per_depth = scale * best.force / depth
         response = reaction(
-            loads, np.array([[per_depth]]), np.array([[0.0, 0.0, -per_depth]]), balance=best.trial.balance
+            movement, np.array([[per_depth]]), np.array([[0.0, 0.0, -per_depth]]), balance=best.trial.balance
         )
         return Solution(
             response=response,

@@ -20,7 +20,6 @@ from pipeline.mesh.meridian import (
 )
 from pipeline.scene.model import FIXED, PROBE
 from pipeline.solve.krylov import SolveError
-from pipeline.solve.loads import Loads
 from pipeline.solve.meridian.forms import JoinedForms, MeridianForms
 from pipeline.solve.meridian.refine import DirectProblem, best_answer, error_bar, meshes_of, only_along_axis, refined
 from pipeline.solve.meridian.system import (
@@ -30,6 +29,7 @@ from pipeline.solve.meridian.system import (
     forms_of,
     max_strain,
 )
+from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import reaction
 from pipeline.solve.solution import Solution
@@ -49,7 +49,13 @@ class MeridianProblem(DirectProblem):
 
     @stage("axisymmetric")
     def solve(
-        self, law: MaterialLaw, loads: Loads, *, method: str = "auto", tolerance: float = 0.0, estimate: bool = True
+        self,
+        law: MaterialLaw,
+        movement: Movement,
+        *,
+        method: str = "auto",
+        tolerance: float = 0.0,
+        estimate: bool = True,
     ) -> Solution:
         """Solve for 0 <= ν <= 0.5 and a movement along the axis; directly, refined until round-off stops it.
 
@@ -62,7 +68,7 @@ class MeridianProblem(DirectProblem):
             SolveError: if the conditions contradict each other or nothing is held, if a solve fails a check, or if the
                 error bar stays above 1e-3.
         """
-        only_along_axis(loads)
+        only_along_axis(movement)
         for tissue in law.parameters:
             if not 0 <= tissue.poisson <= 0.5:
                 raise SolveError(f"Poisson's ratio is {tissue.poisson:g}, must be between 0 and 0.5")
@@ -74,9 +80,9 @@ class MeridianProblem(DirectProblem):
 
         with recorded() as times:
             best = best_answer(solve_on, self._accuracy)
-        a, mu, (amount,) = self._meridian.unit, law.lame_mu[0], loads.amounts
+        a, mu, (amount,) = self._meridian.unit, law.lame_mu[0], movement.amounts
         response = reaction(
-            loads,
+            movement,
             np.array([[mu * a * best.stationary]]),
             np.array([[0.0, 0.0, mu * a * best.on_probe]]),
             balance=best.balance,

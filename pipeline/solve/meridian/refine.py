@@ -10,9 +10,9 @@ from pipeline.arrays import FloatArray, Int32Array, IntArray
 from pipeline.mesh.meridian import Grading, MeridianArrays, meridian_mesh, split_regions
 from pipeline.scene.model import FIXED, PROBE
 from pipeline.solve.krylov import SolveError
-from pipeline.solve.loads import Loads
 from pipeline.solve.meridian.forms import JoinedForms, MeridianForms
 from pipeline.solve.meridian.system import Meshes, Unbalanced
+from pipeline.solve.movement import Movement
 from pipeline.solve.solution import BALANCE_LIMIT
 
 # Meshes in the order in which they are tried, until the error bar is below the accuracy asked for.
@@ -49,13 +49,13 @@ class Answer(Protocol):
 A = TypeVar("A", bound=Answer)
 
 
-def only_along_axis(loads: Loads) -> None:
+def only_along_axis(movement: Movement) -> None:
     """Refuse what a half plane cannot show.
 
     Raises:
         SolveError: if the probe does anything but press along its axis.
     """
-    if len(loads.motions) > 1 or loads.motions[0].is_rotation or any(loads.motions[0].direction[:2]):
+    if len(movement.motions) > 1 or movement.motions[0].is_rotation or any(movement.motions[0].direction[:2]):
         raise SolveError("the meridian serves movements along its axis only")
 
 

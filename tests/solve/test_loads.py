@@ -8,10 +8,10 @@ from mpi4py import MPI
 
 from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
-from pipeline.run.dead_loads import dead_loads_of
+from pipeline.run.loads import loads_of
 from pipeline.run.meshing import mesh_case
-from pipeline.solve.dead_loads import apply_loads
 from pipeline.solve.load_response import load_bars
+from pipeline.solve.loads import apply_loads
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import Conditions, ElasticSpace, Spaces
 from pipeline.solve.vectors import global_sum, vector
@@ -49,11 +49,11 @@ def squeezed(x: FloatArray) -> FloatArray:
     ("load", "exact"), [(GRAVITY, own_weight), ({"traction": [SIDES]}, squeezed)], ids=["weight", "tension"]
 )
 def test_closed_forms_leave_no_residual(body, degree, load, exact):
-    dead = dead_loads_of(study(material=HEAVY, load=load).case(()))
+    loads = loads_of(study(material=HEAVY, load=load).case(()))
     with Spaces(body) as spaces:
         space: ElasticSpace = spaces.get(degree, Conditions(unilateral=True))
         space.forms.displacement.interpolate(exact)
-        applied = apply_loads(dead, body, space.space)
+        applied = apply_loads(loads, body, space.space)
         with vector(space.space) as residual:
             space.apply(residual, MaterialLaw.of_moduli(YOUNG, 0.0))
             left = residual.array - applied.forces
@@ -67,7 +67,7 @@ def test_resultants_are_those_of_the_loads(body):
     for kept in (GRAVITY, {"traction": load["traction"][:1]}, {"traction": load["traction"][1:]}):
         with Spaces(body) as spaces:
             space = spaces.get(2, Conditions()).space
-            found.append(apply_loads(dead_loads_of(study(material=HEAVY, load=kept).case(())), body, space).resultant)
+            found.append(apply_loads(loads_of(study(material=HEAVY, load=kept).case(())), body, space).resultant)
     # Of a quarter of the box, in which half of the cap lies.
     assert found[0] == pytest.approx([0, 0, -WEIGHT * 20e-3**3], abs=1e-12)
     assert found[1] == pytest.approx([100 * 2 * 20e-3 * 20e-3, 0, 0], abs=1e-12)
@@ -79,7 +79,7 @@ def test_each_layer_has_its_own_weight():
     case = study(body={"layers": [skin]}, material=HEAVY, load=GRAVITY, mesh={"degree": 1}).case(())
     layered = mesh_case(case, ("x", "y"), MPI.COMM_SELF)
     with Spaces(layered) as spaces:
-        applied = apply_loads(dead_loads_of(case), layered, spaces.get(1, Conditions()).space)
+        applied = apply_loads(loads_of(case), layered, spaces.get(1, Conditions()).space)
     assert applied.resultant == pytest.approx([0, 0, -WEIGHT * (2 * 5e-3 + 15e-3) * 20e-3**2], abs=1e-12)
 
 
@@ -107,7 +107,7 @@ def test_what_ranks_add_for_each_other_counts():
     body = mesh_case(study(mesh={"degree": 1}).case(()), ("x", "y"), MPI.COMM_WORLD)
     with Spaces(body) as spaces:
         space = spaces.get(2, Conditions()).space
-        applied = apply_loads(dead_loads_of(study(material=HEAVY, load=load).case(())), body, space)
+        applied = apply_loads(loads_of(study(material=HEAVY, load=load).case(())), body, space)
     whole = global_sum(body.comm, applied.forces.reshape(-1, 3).sum(axis=0))
     assert whole == pytest.approx(applied.resultant, rel=1e-9)
 

@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.surface import Surface
-from pipeline.solve.dead_loads import DeadLoads, SurfaceLoad
+from pipeline.solve.loads import Loads, SurfaceLoad
 from pipeline.study.loads import FREE, Cap, Traction
 from pipeline.study.sweep import Case
 
@@ -16,7 +16,7 @@ _Test = Callable[[FloatArray, FloatArray], BoolArray]
 _SAME_WAY = 0.5
 
 
-def dead_loads_of(case: Case) -> DeadLoads | None:
+def loads_of(case: Case) -> Loads | None:
     """Return the loads of ``case``, None if there are none."""
     load, turn = case.load, case.frame.turn
     if not load.acts:
@@ -26,7 +26,7 @@ def dead_loads_of(case: Case) -> DeadLoads | None:
         gravity = _turned(turn, load.gravity)
         densities = [density or 0.0 for density in case.densities]
         weights = tuple((rho * gravity[0], rho * gravity[1], rho * gravity[2]) for rho in densities)
-    return DeadLoads(weights, tuple(_surface_load(case, traction) for traction in load.traction if traction.acts))
+    return Loads(weights, tuple(_surface_load(case, traction) for traction in load.traction if traction.acts))
 
 
 def _surface_load(case: Case, traction: Traction) -> SurfaceLoad:
