@@ -4,13 +4,13 @@ import typer
 
 from pipeline.cli.console import print_json, warning
 from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail
-from pipeline.cli.words import DEFAULT_OUTPUT, Dataset, Json, Output
+from pipeline.cli.words import DEFAULT_OUTPUT, Dataset, Found, Json
 
 # What is compared, and what is refused.
 _HOWTO = "docs/howto/compare.md"
 
 
-def compare(a: Dataset, b: Dataset, output: Output = DEFAULT_OUTPUT, as_json: Json = False) -> None:
+def compare(a: Dataset, b: Dataset, output: Found = DEFAULT_OUTPUT, as_json: Json = False) -> None:
     """Say whether the forces of two datasets agree within their error bars, case by case, and which took longer.
 
     Cases are matched by the values of the study's keys, and not by their names: other meshes, machines, or versions may

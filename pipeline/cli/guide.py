@@ -6,7 +6,7 @@ import typer
 
 from pipeline.cli.console import print_json
 from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_file
-from pipeline.cli.words import DEFAULT_OUTPUT, Dataset, Json, Output, read_dataset
+from pipeline.cli.words import DEFAULT_OUTPUT, Dataset, Found, Json, read_dataset
 
 # What it asks and answers.
 _HOWTO = "docs/guideline.md"
@@ -16,7 +16,7 @@ def guide(
     file: Dataset,
     accuracy: Annotated[str | None, typer.Option(help='How near F must be to F_exact: "5%".')] = None,
     budget: Annotated[str | None, typer.Option(help='How long a case may take: "10ms".')] = None,
-    output: Output = DEFAULT_OUTPUT,
+    output: Found = DEFAULT_OUTPUT,
     as_json: Json = False,
 ) -> None:
     """Say how small ε may be for an accuracy, or what is best within a budget, over all scenes of a study.

@@ -6,7 +6,7 @@ import typer
 
 from pipeline.cli.console import print_json
 from pipeline.cli.faults import Fault, fail, of_option
-from pipeline.cli.words import DEFAULT_OUTPUT, Dataset, Json, Output, check_machine, check_output, read_dataset
+from pipeline.cli.words import DEFAULT_OUTPUT, Dataset, Found, Json, check_machine, check_output, read_dataset
 
 # Bytes that a page may take: figures, parts of the first one and some thousand cases; a scene besides.
 _PAGE, _PAGE_WITH_SCENE = 6_000_000, 12_000_000
@@ -17,7 +17,7 @@ _NONE = "none"
 
 def plot(
     file: Dataset,
-    output: Output = DEFAULT_OUTPUT,
+    output: Found = DEFAULT_OUTPUT,
     kind: Annotated[
         list[str] | None,
         typer.Option(
@@ -59,7 +59,7 @@ def plot(
 
 def report(
     file: Dataset,
-    output: Output = DEFAULT_OUTPUT,
+    output: Found = DEFAULT_OUTPUT,
     scene: Annotated[
         str | None,
         typer.Option(

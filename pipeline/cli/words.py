@@ -56,6 +56,9 @@ File = Annotated[
 ]
 Dataset = Annotated[Path, typer.Argument(help="A dataset (.nc), or a study whose dataset exists.", callback=_by_name)]
 Output = Annotated[Path, typer.Option(metavar="DIR", help="Folder of the results.")]
+Found = Annotated[
+    Path, typer.Option("--output", metavar="DIR", help="Folder in which the dataset of a study is looked for.")
+]
 StoreFile = Annotated[
     Path | None, typer.Option("--store", metavar="FILE", help=f"Case store [default: DIR/{STORE_NAME}].")
 ]

@@ -35,6 +35,7 @@ from pipeline.study.sweep import Axis
 _LINEAR = 0.10
 # No tissue is softer (Pa): brain and fat have some hundred.
 _SOFTEST = 1.0
+_OR_LOST = '; or write `off = "lost"` in [probe.path]'
 
 
 def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...], problems: Problems) -> None:
@@ -165,7 +166,8 @@ def _check_place(body: Body, probe: Probe, way: Axis | None, problems: Problems)
     error = place_error(body, probe)
     if error is not None and not (way and way.off == "lost" and error.key == "at"):
         found, key = getattr(probe, error.key), way.path if way and error.key == "at" else f"probe.{error.key}"
-        problems.error(key, [in_mm(x) for x in found] if error.key == "at" else found and list(found), str(error))
+        why = f"{error}{_OR_LOST if way and error.key == 'at' and not probe.slit else ''}"
+        problems.error(key, [in_mm(x) for x in found] if error.key == "at" else found and list(found), why)
     return error is None
 
 
