@@ -8,9 +8,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import isinf
 
+from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from pipeline.shapes.section import Section, Words, words_of
+from pipeline.shapes.section import Words, words_of
 from pipeline.study.json_schema import takes_of
 from pipeline.study.schema import NESTED, SECTIONS, TABLES
 
@@ -79,7 +80,7 @@ def heading(section: str) -> str:
     return f"[[{section}]]" if section in _labelled() else f"[{section}]"
 
 
-def _inner(section: str) -> dict[str, type[Section]]:
+def _inner(section: str) -> dict[str, type[BaseModel]]:
     """Return the models of the tables within a section."""
     return NESTED.get(section, {}) | TABLES.get(section, {})
 
@@ -89,14 +90,14 @@ def _labelled() -> set[str]:
     return {f"{section}.{key}" for section, pieces in NESTED.items() for key in pieces}
 
 
-def shapes_of(section: str) -> dict[str, type[Section]]:
+def shapes_of(section: str) -> dict[str, type[BaseModel]]:
     """Return the models of a section by shape; one without shapes has the one shape ''."""
     outer, _, piece = section.partition(".")
     model = _inner(outer)[piece] if piece else SECTIONS[section]
     return dict(model) if isinstance(model, Mapping) else {"": model}
 
 
-def _takes(model: type[Section], name: str) -> str:
+def _takes(model: type[BaseModel], name: str) -> str:
     """Say what a key takes, as far as its type tells."""
     if name == "epsilon":
         return 'length > 0 | "full"'

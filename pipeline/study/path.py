@@ -6,11 +6,11 @@ from itertools import pairwise, product
 from math import cos, dist, pi, prod, sin
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Discriminator, Field, Tag, ValidationError
 from pydantic_core import PydanticCustomError
 
 from pipeline.shapes.section import Section, Words, in_mm
-from pipeline.study.problems import Problems, nearest
+from pipeline.study.problems import Problems, allowed, nearest, tuples
 from pipeline.units import Coordinate, Length, canonical
 
 # Digits behind the point of a metre: what is less is rounding of sines and of shares of a line.
@@ -26,11 +26,21 @@ def _two_or_three(point: Point) -> Point:
     return point
 
 
+def _several(points: Any) -> Any:
+    if not isinstance(points, tuple) or len(points) < 2:
+        raise PydanticCustomError("not_supported", "must be a list of two places at least; for one, use `at`")
+    return points
+
+
 Place = Annotated[tuple[Coordinate, ...], AfterValidator(_two_or_three)]
 Steps = Annotated[int, Field(ge=2, le=_MOST)]
 
 
-class Line(Section):
+class _Table(BaseModel):
+    model_config = Section.model_config
+
+
+class Line(_Table):
     """Places at equal distances on a straight line, both ends among them."""
 
     start: Annotated[Place, Field(alias="from")]
@@ -38,7 +48,7 @@ class Line(Section):
     steps: Steps
 
 
-class Circle(Section):
+class Circle(_Table):
     """Places at equal distances on a level circle, the first one along x from its centre."""
 
     centre: Place
@@ -46,7 +56,7 @@ class Circle(Section):
     steps: Steps
 
 
-class Range(Section):
+class Range(_Table):
     """Coordinates at equal distances, both ends among them."""
 
     start: Annotated[Coordinate, Field(alias="from")]
@@ -54,17 +64,32 @@ class Range(Section):
     steps: Steps
 
 
-class Raster(Section):
+_OF_RASTER = "must be a list of two lengths at least, or a table of from, to and steps"
+
+
+def _kind(value: Any) -> str | None:
+    """Return which form coordinates have; None where it is neither."""
+    is_table, is_list = isinstance(value, dict | Range), isinstance(value, tuple) and len(value) > 1
+    return "table" if is_table else "list" if is_list else None
+
+
+Coordinates = Annotated[
+    Annotated[tuple[Coordinate, ...], Field(max_length=_MOST), Tag("list")] | Annotated[Range, Tag("table")],
+    Discriminator(_kind, custom_error_type="not_supported", custom_error_message=_OF_RASTER),
+]
+
+
+class Raster(_Table):
     """All places of a grid, seen from above."""
 
-    x: Annotated[tuple[Coordinate, ...], Field(min_length=2, max_length=_MOST)] | Range
-    y: Annotated[tuple[Coordinate, ...], Field(min_length=2, max_length=_MOST)] | Range
+    x: Coordinates
+    y: Coordinates
 
 
 _POINT = "two coordinates, of the highest point there, or three, from which the nearest point of the surface is taken"
 
 
-class Path(Section):
+class Path(_Table):
     """The section as a study's author sees it: one of its forms, and what becomes of places off the body."""
 
     line: Annotated[
@@ -96,6 +121,7 @@ class Path(Section):
     ] = None
     points: Annotated[
         tuple[Place, ...] | None,
+        BeforeValidator(_several),
         Words(
             "Places one by one. The dimension `path` is the length from the first one, straight from place to place.",
             '[["0 mm", "0 mm"], ["3 mm", "0 mm"], ["8 mm", "2 mm"]]',
@@ -112,7 +138,7 @@ class Path(Section):
     ] = "refuse"
 
 
-_FORMS: dict[str, type[Section] | None] = {"line": Line, "circle": Circle, "raster": Raster, "points": None}
+_FORMS = ("line", "circle", "raster", "points")
 
 
 @dataclass(frozen=True)
@@ -137,16 +163,21 @@ def read_path(raw: Any, where: str, problems: Problems) -> Way | None:
 
     ``where`` is the table's place in the study file.
     """
-    before = len(problems.errors)
-    forms = _forms_of(raw, where, problems)
+    if not isinstance(raw, dict):
+        problems.error(where, raw, f"must be a table: write [{where}] and one of {', '.join(_FORMS)}")
+        return None
+    before, forms = len(problems.errors), [key for key in raw if key in _FORMS]
+    if len(forms) != 1:
+        found = f"has {' and '.join(forms)}" if forms else "has no place"
+        problems.error(where, None, f"{found}: give one of {', '.join(_FORMS)}")
+    try:
+        path = Path.model_validate({key: tuples(value) for key, value in raw.items()})
+    except ValidationError as error:
+        for item in error.errors():
+            _report(item, raw, where, problems)
     if len(problems.errors) > before:
         return None
     (form,) = forms
-    try:
-        path = Path.model_validate({key: _tuples(value) for key, value in raw.items()})
-    except ValidationError as error:
-        _report(error, raw, where, problems)
-        return None
     if path.raster is not None:
         count = prod(v.steps if isinstance(v, Range) else len(v) for v in (path.raster.x, path.raster.y))
         if count > _MOST:
@@ -157,70 +188,31 @@ def read_path(raw: Any, where: str, problems: Problems) -> Way | None:
     return None if len(problems.errors) > before else way
 
 
-def _forms_of(raw: Any, where: str, problems: Problems) -> list[str]:
-    """Return the one form that a path has; report what else is wrong with its tables' keys."""
-    if not isinstance(raw, dict):
-        problems.error(where, raw, f"must be a table: write [{where}] and one of {', '.join(_FORMS)}")
-        return []
-    forms = [key for key in raw if key in _FORMS]
-    for key in raw:
-        if key not in Path.model_fields or key == "name":
-            problems.error(f"{where}.{key}", raw[key], f"unknown key; {nearest(key, [*_FORMS, 'off'])}")
-    if len(forms) != 1:
-        found = f"has {' and '.join(forms)}" if forms else "has no place"
-        problems.error(where, None, f"{found}: give one of {', '.join(_FORMS)}")
-    for form in forms:
-        model, table = _FORMS[form], raw[form]
-        if model is None:
-            if not isinstance(table, list) or len(table) < 2:
-                problems.error(f"{where}.{form}", table, "must be a list of two places at least; for one, use `at`")
-            continue
-        _check_keys(table, model, f"{where}.{form}", problems)
-        for key in ("x", "y") if model is Raster and isinstance(table, dict) else ():
-            if isinstance(table.get(key), dict):
-                _check_keys(table[key], Range, f"{where}.{form}.{key}", problems)
-            elif key in table and (not isinstance(table[key], list) or len(table[key]) < 2):
-                allowed = "must be a list of two lengths at least, or a table of from, to and steps"
-                problems.error(f"{where}.{form}.{key}", table[key], allowed)
-    return forms
+# The tables within each table, by key; those of x and y are what stands in the place of a list.
+_INNER: dict[str, type[BaseModel]] = {"line": Line, "circle": Circle, "raster": Raster, "x": Range, "y": Range}
 
 
-def _check_keys(table: Any, model: type[Section], where: str, problems: Problems) -> None:
-    keys = [field.alias or name for name, field in model.model_fields.items() if name != "name"]
-    if not isinstance(table, dict):
-        problems.error(where, table, f"must be a table of {', '.join(keys)}")
-        return
-    for key in table:
-        if key not in keys:
-            problems.error(f"{where}.{key}", table[key], f"unknown key; {nearest(key, keys)}")
-    for key in keys:
-        if key not in table:
-            problems.error(f"{where}.{key}", None, "is required")
-
-
-def _report(error: ValidationError, raw: Mapping[str, Any], where: str, problems: Problems) -> None:
-    """Report pydantic's errors at the key, of a table within the path, that they are about."""
-    for item in error.errors():
-        found: Any = raw
-        key = where
-        for step in item["loc"]:
-            if isinstance(step, str) and isinstance(found, dict) and step in found:
-                found, key = found[step], f"{key}.{step}"
-            elif isinstance(step, int) and isinstance(found, list) and step < len(found):
-                found, key = found[step], f"{key}[{step + 1}]"
-        if isinstance(found, dict) != ("Range" in item["loc"]) and key.endswith((".raster.x", ".raster.y")):
-            continue  # of the other form
-        context = item.get("ctx", {})
-        if item["type"] == "quantity":
-            allowed = f"must be {context['allowed']}"
-        elif item["type"] in ("greater_than_equal", "less_than_equal", "greater_than"):
-            words = {"ge": "at least", "le": "at most", "gt": "greater than"}
-            allowed = "must be " + " and ".join(f"{words[k]} {v:g}" for k, v in context.items() if k in words)
-        elif item["type"] == "tuple_type":
-            allowed = 'must be a list of lengths, such as ["5 mm", "0 mm"]'
-        else:
-            allowed = item["msg"].replace("Input should be", "must be")
-        problems.error(key, found, allowed)
+def _report(item: Any, raw: Mapping[str, Any], where: str, problems: Problems) -> None:
+    """Report one of pydantic's errors at the key, of a table within the path, that it is about."""
+    found: Any = raw
+    model: type[BaseModel] = Path
+    for step in item["loc"]:
+        if isinstance(step, str) and isinstance(found, dict) and step in found:
+            found, where, model = found[step], f"{where}.{step}", _INNER.get(step, model)
+        elif isinstance(step, int):
+            found, where = found[step], f"{where}[{step + 1}]"
+    keys = [field.alias or name for name, field in model.model_fields.items()]
+    match item["type"]:
+        case "missing":
+            problems.error(f"{where}.{item['loc'][-1]}", None, "is required")
+        case "extra_forbidden":
+            problems.error(where, found, f"unknown key; {nearest(str(item['loc'][-1]), keys)}")
+        case "model_type":
+            problems.error(where, found, f"must be a table of {', '.join(keys)}")
+        case "tuple_type":
+            problems.error(where, found, 'must be a list of lengths, such as ["5 mm", "0 mm"]')
+        case _:
+            problems.error(where, found, allowed(item, model))
 
 
 def _way_of(path: Path, form: str) -> Way:
@@ -274,9 +266,3 @@ def _spread(start: float, to: float, steps: int) -> tuple[float, ...]:
 
 def _round(length: float) -> float:
     return canonical(round(length, _DIGITS)) + 0.0
-
-
-def _tuples(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _tuples(v) for key, v in value.items()}
-    return tuple(_tuples(v) for v in value) if isinstance(value, list) else value

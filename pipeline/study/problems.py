@@ -173,7 +173,7 @@ class Problems:
             what = f"must be an array of tables: write [[{where}.{key}]]" if inner else "must be a table"
             self.error(f"{where}.{key}".rstrip("."), found, what)
         else:
-            self.error(f"{where}.{key}".rstrip("."), found, _allowed({**item, "loc": place}, model))
+            self.error(f"{where}.{key}".rstrip("."), found, allowed({**item, "loc": place}, model))
 
     def _add(self, problems: list[Problem], problem: Problem) -> None:
         """Add a problem; if it is there already, of other tables, it is of these, too."""
@@ -209,7 +209,15 @@ def closest(name: str, known: Iterable[str]) -> str:
     return next(iter(difflib.get_close_matches(name, known, n=1, cutoff=_ALIKE) or begun), "")
 
 
-def _allowed(item: Any, model: type[BaseModel]) -> str:
+def tuples(value: Any) -> Any:
+    """Return a value of a study file as strict models take it: lists as tuples, within tables, too."""
+    if isinstance(value, dict):
+        return {key: tuples(v) for key, v in value.items()}
+    return tuple(map(tuples, value)) if isinstance(value, list) else value
+
+
+def allowed(item: Any, model: type[BaseModel]) -> str:
+    """Return what one of pydantic's errors says is allowed at a key of ``model``."""
     context = item.get("ctx", {})
     match item["type"]:
         case "missing" if len(item["loc"]) == 1:
@@ -225,8 +233,8 @@ def _allowed(item: Any, model: type[BaseModel]) -> str:
             return f"must be {context['allowed']}"
         case "missing" | "too_short" | "too_long" | "tuple_type":
             return _list_of(model, str(item["loc"][0]))
-        case "float_type" | "int_type":
-            return "must be a number, without a unit or quotation marks"
+        case "float_type" | "int_type" as kind:
+            return f"must be a {'whole ' * (kind == 'int_type')}number, without a unit or quotation marks"
         case "bool_type":
             return "must be true or false, without quotation marks"
         case "string_pattern_mismatch":

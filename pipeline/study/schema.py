@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from math import inf
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BaseModel, BeforeValidator, Field
 from pydantic_core import PydanticCustomError
 
 from pipeline.shapes.regions import Inclusion, Layer
@@ -272,4 +272,4 @@ NESTED: dict[str, dict[str, type[Section]]] = {
 # Sections that say how, not what: their lists are no sweeps.
 SINGLE = ("solve", "plan", "figure")
 # Tables within a section that stand for one of its keys.
-TABLES: dict[str, dict[str, type[Section]]] = {"probe": {"path": Path}}
+TABLES: dict[str, dict[str, type[BaseModel]]] = {"probe": {"path": Path}}

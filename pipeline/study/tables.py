@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from pipeline.shapes.section import Section
 from pipeline.study.path import Way, read_path
-from pipeline.study.problems import MOST_ERRORS, Problems, closest, nearest
+from pipeline.study.problems import MOST_ERRORS, Problems, closest, nearest, tuples
 from pipeline.study.read import check_text
 from pipeline.study.schema import NESTED, SECTIONS, SINGLE
 from pipeline.study.sweep import Axis
@@ -275,10 +275,4 @@ def _validate_each(
 
 
 def _validate(model: type[Section], raw: dict[str, Any]) -> Section:
-    return model.model_validate({key: _tuples(value) for key, value in raw.items()})
-
-
-def _tuples(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _tuples(v) for key, v in value.items()}
-    return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
+    return model.model_validate({key: tuples(value) for key, value in raw.items()})

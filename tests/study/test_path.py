@@ -74,7 +74,7 @@ WRONG = {
     "unknown key": ({"line": LINE | {"step": 3}}, ["probe.path.line.step = 3", "did you mean `steps`?"]),
     "missing key": ({"line": {"from": ["0 mm", "0 mm"], "steps": 3}}, ["probe.path.line.to", "required"]),
     "one step": ({"line": LINE | {"steps": 1}}, ["probe.path.line.steps = 1", "at least 2"]),
-    "half a step": ({"line": LINE | {"steps": 2.5}}, ["probe.path.line.steps = 2.5", "integer"]),
+    "half a step": ({"line": LINE | {"steps": 2.5}}, ["probe.path.line.steps = 2.5", "whole number"]),
     "no unit": ({"line": LINE | {"to": ["10 mm", 0]}}, ["probe.path.line.to[2] = 0", "number with a unit"]),
     "no length": ({"circle": {"centre": ["0 mm", "0 mm"], "radius": "5 kPa", "steps": 4}}, ["radius", "a length"]),
     "one coordinate": ({"points": [["0 mm", "0 mm"], ["1 mm"]]}, ["probe.path.points[2]", "2 or 3"]),
