@@ -65,36 +65,6 @@ def test_arcs_are_followed_closely_enough(monkeypatch):
     assert solve(SCENES["slender"], 0.3, False).reaction[2] == pytest.approx(before, rel=1e-7)
 
 
-def test_displacement_and_mixed_elements_agree(monkeypatch):
-    forces = []
-    for threshold in (0.3, 0.5):
-        monkeypatch.setattr("pipeline.solve.meridian.system.MIXED_FROM", threshold)
-        forces.append(solve(SCENES["flat"], 0.4, True).reaction[2])
-    assert forces[0] == pytest.approx(forces[1], rel=3e-7)
-
-
-def test_incompressible_is_the_limit():
-    limit = solve(SCENES["ball"], 0.5, True).reaction[2]
-    gaps = [solve(SCENES["ball"], 0.5 - x, True).reaction[2] / limit - 1 for x in (1e-4, 1e-5)]
-    assert gaps[0] < 0
-    assert gaps[1] == pytest.approx(gaps[0] / 10, rel=0.05)
-
-
-def test_units_do_not_matter():
-    here, there = (
-        solve(EllipticMeridian(5 * u, 3 * u, 0.7 * u, 0.1 * u), 0.45, True, young=e, depth=0.1 * u)
-        for u, e in ((1.0, 1.0), (1e-3, 1e12))
-    )
-    assert there.reaction[2] == pytest.approx(1e6 * here.reaction[2], rel=1e-11)
-    assert there.max_strain == pytest.approx(here.max_strain, rel=1e-8)
-    assert there.dofs == here.dofs
-
-
-def test_more_support_is_stiffer():
-    forces = [solve(EllipticMeridian(4, 3, 1, z), 0.45, False).reaction[2] for z in (-2.9, 0.0, 2.8)]
-    assert forces == sorted(forces)
-
-
 def test_mesh_is_repeatable_and_follows_the_surface():
     meridian = EllipticMeridian(7.3, 2.1, 0.9, -1.3)
     first, second = (meridian.mesh(Grading()) for _ in range(2))

@@ -121,16 +121,6 @@ def test_face_that_is_inclined_lifts_off_on_one_side():
     assert force > record(probe=DISC).force
 
 
-@pytest.mark.parametrize("changes", [{}, {"probe": SPHERE | {"at": ["1 mm", "0 mm"]}}], ids=["quarter", "half"])
-def test_symmetric_part_gives_the_force_of_the_whole(changes):
-    part, whole = (record(mesh=mesh, **changes) for mesh in ({}, {"model": "3d"}))
-    assert (part.origin, whole.origin) == ("symmetric", "solved")
-    assert part.force == pytest.approx(whole.force, rel=3e-8)
-    assert part.contact_area == pytest.approx(whole.contact_area, rel=1e-6)
-    assert part.energy == pytest.approx(whole.energy, rel=3e-8)
-    assert part.force_error == pytest.approx(whole.force_error, rel=0.05)
-
-
 def test_direct_and_iterative_agree():
     direct, iterative = (record(solve={"method": method}).force for method in ("direct", "iterative"))
     assert iterative == pytest.approx(direct, rel=3e-8)

@@ -125,13 +125,6 @@ def test_loads_grow_apart_from_depth_and_modulus(pulled):
     assert pulled.force * pulled.sag / pulled.depth + pulled.load_force == pytest.approx(0, abs=1e-9)
 
 
-def test_symmetry_changes_nothing(pulled):
-    (whole,) = solve(load={"traction": [PULL]}, mesh={"model": "3d"}).values()
-    assert pulled.origin == "symmetric"
-    assert whole.load_force_vector == pytest.approx(pulled.load_force_vector, abs=1e-6 * pulled.load_force_vector[0])
-    assert whole.load_energy == pytest.approx(pulled.load_energy, rel=1e-6)
-
-
 @pytest.mark.parametrize("contact", ["bonded", "frictionless"])
 def test_pressure_on_incompressible_tissue_is_borne_by_the_probe(contact):
     """Held all round, with the pressure on what is left of the top: it is the same everywhere, and nothing moves."""

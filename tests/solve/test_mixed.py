@@ -165,13 +165,6 @@ def test_units_do_not_matter(method):
         assert other[3:] == pytest.approx(numbers[0][3:], rel=1e-3)
 
 
-def test_quarter_is_the_whole():
-    quarter, whole = (solve(make_mesh(mirrors=mirrors), 0.5, method="direct") for mirrors in (QUARTER, ()))
-    assert quarter.reaction[2] == pytest.approx(whole.reaction[2], rel=1e-9)
-    assert quarter.energy == pytest.approx(whole.energy, rel=1e-9)
-    assert np.hypot(*whole.reaction[:2]) < 1e-6 * whole.reaction[2]
-
-
 def test_small_ratios_are_refused():
     with pytest.raises(SolveError, match=r"above 0\.25"):
         solve(make_mesh(), 0.25)

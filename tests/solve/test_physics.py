@@ -8,6 +8,8 @@ from pipeline.verify import known
 from tests.cases import BLADE, force, solve
 from tests.sampling import sampled
 
+CAP = {"around": ["9 mm", "0 mm", "0 mm"], "radius": "3 mm"}
+BALL = {"shape": "sphere", "radius": "10 mm", "depth": "0.1 mm"}
 # What displacement elements of degree 2 are for.
 EXACT = {(contact, nu): value for (contact, nu), value in known.CYLINDER.items() if nu <= 0.45}
 UNIT = 10e3 * 0.2e-3 * 1e-3
@@ -102,6 +104,11 @@ def test_blade_direction_and_slice():
         "column": (2, {"mesh": {"epsilon": "8 mm", "outside": "free"}}),
         "below": (2, {"body": {"fixed": {"below": "-15 mm"}}, "probe": {"contact": "frictionless"}}),
         "oblique": (0, {"probe": BLADE | {"direction": [1.0, 2.0, 0.0]}}),
+        "mixed": (2, {"material": {"poisson": 0.5}}),
+        "slit": (2, {"probe": BLADE | {"width": "1 mm", "incision": "4 mm"}, "mesh": {"fine": "4 mm"}}),
+        "loads": (1, {"load": {"traction": [{"on": CAP, "traction": ["1 kPa", "0 Pa", "200 Pa"]}]}}),
+        "found contact": (2, {"probe": BALL, "mesh": {"rim": "0.5 mm"}}),
+        "found contact off centre": (1, {"probe": BALL | {"at": ["1 mm", "0 mm"]}, "mesh": {"rim": "0.5 mm"}}),
     }.values(),
 )
 def test_symmetric_part_gives_the_force_of_the_whole(planes, changes):
@@ -113,8 +120,11 @@ def test_symmetric_part_gives_the_force_of_the_whole(planes, changes):
     assert part.origin == ("symmetric" if planes else "solved")
     assert whole.origin == "solved"
     assert (part.cells, part.dofs) == (whole.cells, whole.dofs)
-    assert part.force == pytest.approx(whole.force, rel=1e-8)
-    assert part.energy == pytest.approx(whole.energy, rel=1e-8)
+    assert part.force == pytest.approx(whole.force, rel=3e-8)
+    assert part.energy == pytest.approx(whole.energy, rel=3e-8)
+    linear = ("max_strain", "energy_release", "load_force", "load_energy", "contact_area")
+    for name in linear:  # in the solver's error
+        assert getattr(part, name) == pytest.approx(getattr(whole, name), rel=1e-5, nan_ok=True)
     assert part.force_vector == pytest.approx(whole.force_vector, rel=1e-6, abs=1e-8 * whole.force)
     assert part.force_error == pytest.approx(whole.force_error, rel=0.05)
 

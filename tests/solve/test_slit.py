@@ -160,14 +160,6 @@ def test_flanks_that_slide():
     assert here.balance < 1e-6
 
 
-def test_symmetry():
-    """A quarter of the body gives what the whole does, whose slit is made by reflection."""
-    whole = run(case_of(), ())
-    assert whole.release == pytest.approx(quarter().release, rel=1e-5)
-    assert whole.reaction[2] == pytest.approx(quarter().reaction[2], rel=1e-6)
-    assert whole.energy == pytest.approx(quarter().energy, rel=1e-8)
-
-
 @pytest.mark.mpi
 @pytest.mark.parametrize(
     ("mirrors", "place"), [(("x",), {"at": ["0 mm", "0.01 mm"]}), ((), {"direction": [1.0, 0.01, 0.0]})]

@@ -31,11 +31,6 @@ def test_converges_as_the_edge_is_refined():
     assert fine == pytest.approx(truth, rel=0.1)
 
 
-def test_half_a_body_and_all_of_it_have_the_same():
-    quarter, whole = (strain(mesh={"model": model}, solve={"tolerance": 1e-10}) for model in ("auto", "3d"))
-    assert quarter == pytest.approx(whole, rel=1e-6)
-
-
 def test_strain_at_the_front_of_a_slit_is_left_out_of_its_own_body_only():
     """Which cells are clear of singular edges is known of each front, on one mesh."""
     case = case_of()
