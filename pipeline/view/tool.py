@@ -6,6 +6,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.scene.model import PROBE
+from pipeline.shapes.contact import first_touch
 from pipeline.shapes.indenter import Indenter
 from pipeline.view.fields import Fields
 
@@ -32,7 +33,9 @@ def tool_of(fields: Fields) -> Tool:
     length, outward = _LENGTH * case.probe.circumradius, np.array(case.frame.outward)
     if isinstance(case.probe, Indenter):
         lines = _lines(case.probe, length)
-        points = np.asarray(case.frame.world(lines.reshape(-1, 3)))
+        # The depth counts from where the tool first touches, which may be beside its axis.
+        *_, first = first_touch(case.body, case.probe, case.frame)
+        points = case.frame.world(lines.reshape(-1, 3)) - first * outward
         return Tool(points, _between_lines(*lines.shape[:2]), np.tile(case.travel, (len(points), 1)))
     used, corners = np.unique(fields.facets[PROBE], return_inverse=True)
     base, below = fields.points[used], corners.reshape(-1, 3)

@@ -137,6 +137,28 @@ def test_a_ball_has_its_shape_and_its_depth():
     assert (told["start"], told["factor"], told["keeps_depth"]) == (1, found.visible_factor, True)
 
 
+def test_a_tilted_ball_is_where_tissue_touches_it():
+    """Its depth counts from the first touch, beside its axis: the tissue is neither in it nor off it everywhere.
+
+    Nearly incompressible tissue hardly moves aside, which small strains would take for a way into the ball.
+    """
+    tilted = {"shape": "sphere", "radius": "6 mm", "depth": "0.5 mm", "contact": "unilateral"}
+    made = study(
+        probe=tilted | {"at": ["0 mm", "0 mm", "0 mm"], "axis": [0.08, 0, -1]},
+        material={"poisson": 0.49},
+        mesh={"rim": "0.1 mm"},
+    )
+    (case,) = made.cases()
+    found = compute_fields(solve_to_view(made, case), MPI.COMM_SELF)
+    tool, outward = tool_of(found), np.array(case.frame.outward)
+    tip = tool.points[np.argmin(tool.points @ outward)] + tool.moved[0]
+    surface = np.unique(np.vstack(list(found.facets.values())))
+    moved = found.points[surface] + found.displacement[surface]
+    clear = np.linalg.norm(moved - (tip + 6e-3 * outward), axis=1) - 6e-3
+    near = np.linalg.norm(found.points[surface] - found.contact, axis=1) < 3e-3
+    assert abs(clear[near].min()) < 1e-5  # the first touch is 2e-5 before the axis meets the surface
+
+
 def test_a_flat_tool_moves_with_its_footprint(fields):
     tool = tool_of(fields)
     on_face = tool.points[:, 2] > -1e-9
