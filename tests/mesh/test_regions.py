@@ -101,23 +101,19 @@ def test_the_lowest_layer_has_elements_as_small_as_its_thickness_asks_for():
         assert np.median(longest) < 0.9e-3
 
 
-@pytest.mark.parametrize("contact", ["frictionless", "bonded"])
-def test_a_column_without_the_inclusion_is_one_of_the_other_tissue(contact):
+@pytest.mark.parametrize(("contact", "poisson"), [("frictionless", 0.3), ("bonded", 0.49)])
+def test_a_column_without_the_inclusion_is_one_of_the_other_tissue(contact, poisson):
     """From the study to the force, by displacements and by displacements and pressures."""
-    for poisson in (0.3, 0.49):
-        changes = {
-            "mesh": {"epsilon": ["6 mm", "full"], "outside": "free"},
-            "material": {"poisson": poisson},
-            "probe": {"contact": contact},
-        }
-        aside = BALL | {"at": ["15 mm", "0 mm", "-10 mm"], "poisson": poisson}
-        stiff, same = (
-            solve(body={"inclusion": [aside | {"young": young}]}, **changes) for young in ("50 kPa", "10 kPa")
-        )
-        column, whole = ((0,), (1,))
-        assert {record.status for record in (*stiff.values(), *same.values())} == {"ok"}
-        assert stiff[column].force == pytest.approx(same[column].force, rel=1e-8)
-        assert stiff[whole].force > (1 + 1e-5) * same[whole].force
+    changes = {
+        "mesh": {"epsilon": ["6 mm", "full"], "outside": "free"},
+        "material": {"poisson": poisson},
+        "probe": {"contact": contact},
+    }
+    aside = BALL | {"at": ["15 mm", "0 mm", "-10 mm"], "poisson": poisson}
+    stiff, same = (solve(body={"inclusion": [aside | {"young": young}]}, **changes) for young in ("50 kPa", "10 kPa"))
+    assert {record.status for record in (*stiff.values(), *same.values())} == {"ok"}
+    assert stiff[0,].force == pytest.approx(same[0,].force, rel=1e-8)
+    assert stiff[1,].force > (1 + 1e-5) * same[1,].force
 
 
 def test_cells_of_a_kept_column_have_their_regions_whichever_it_reaches(tmp_path):
