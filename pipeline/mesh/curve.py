@@ -15,7 +15,7 @@ from pipeline.scene.model import FIXED, MIRROR, PROBE, Scene
 from pipeline.shapes.ovoid import Ovoid
 from pipeline.shapes.scanned import Scanned
 from pipeline.shapes.surface import Surface
-from pipeline.shapes.triangles import half_edges
+from pipeline.shapes.triangles import edge_keys
 from pipeline.stages import stage
 
 # Edges of the reference tetrahedron in the order of basix's quadratic nodes 4 to 9.
@@ -175,7 +175,7 @@ def _interface_edges(mesh: MeshArrays, regions: IntArray) -> IntArray:
     sorted_corners, owner = corners[order], np.repeat(regions, 4)[order]
     twins = np.all(sorted_corners[1:] == sorted_corners[:-1], axis=1) & (owner[1:] != owner[:-1])
     triangles = sorted_corners[1:][twins]
-    return np.unique(_key(mesh, np.sort(half_edges(triangles), axis=1)))
+    return np.unique(edge_keys(triangles, len(mesh.points)))
 
 
 def _key(mesh: MeshArrays, edges: IntArray) -> IntArray:
@@ -185,7 +185,7 @@ def _key(mesh: MeshArrays, edges: IntArray) -> IntArray:
 def _facet_edges(mesh: MeshArrays, names: object) -> IntArray:
     """Keys of the edges of the boundary triangles in the named groups."""
     facets = np.concatenate([mesh.facets[name] for name in names])  # type: ignore[attr-defined]
-    return np.unique(_key(mesh, np.sort(half_edges(facets), axis=1)))
+    return np.unique(edge_keys(facets, len(mesh.points)))
 
 
 def _quarter_points(mesh: MeshArrays, edges: IntArray, middle: FloatArray) -> FloatArray:

@@ -167,10 +167,16 @@ def _collect(scene: Scene, rim_curves: list[int], start: float) -> MeshArrays:
         facets[name] = _elements(2, gmsh.model.getEntitiesForPhysicalGroup(dim, group), 3, position)
     assert set(facets) <= {PROBE, FIXED, FREE, CUT, SLIT, *MIRROR.values()}
     rim = [position[mesh.getNodes(1, curve, includeBoundary=True)[0]] for curve in rim_curves]
-    bent = middle_nodes(position, scale) if isinstance(scene.body, FromCad) and not scene.straight else None
-    if bent:
-        bent = (_numbers(len(points), cells)[bent[0]], bent[1])
-    points, cells, facets, rim_points = _drop_unused(points, cells, facets, np.unique(np.concatenate(rim)))
+    # Points that a cell uses are numbered without gaps.
+    used, rim_points = np.zeros(len(points), dtype=bool), np.unique(np.concatenate(rim))
+    used[cells] = True
+    number = np.cumsum(used) - 1
+    points, cells, rim_points = points[used], number[cells], number[rim_points[used[rim_points]]]
+    facets = {name: number[f] for name, f in facets.items()}
+    bent = None
+    if isinstance(scene.body, FromCad) and not scene.straight:
+        edges, middle = middle_nodes(position, scale)
+        bent = number[edges], middle
     return MeshArrays(points, orient(points, cells), facets, rim_points, time.perf_counter() - start, regions, bent)
 
 
@@ -189,24 +195,6 @@ def _elements(dim: int, entities: list[int], size: int, position: IntArray) -> I
     parts = [gmsh.model.mesh.getElements(dim, tag)[2] for tag in entities]
     nodes = [part[0] for part in parts if len(part)]
     return position[np.concatenate(nodes)].reshape(-1, size) if nodes else np.empty((0, size), dtype=np.int64)
-
-
-def _drop_unused(
-    points: FloatArray, cells: IntArray, facets: dict[str, IntArray], rim: IntArray
-) -> tuple[FloatArray, IntArray, dict[str, IntArray], IntArray]:
-    """Number the points that a cell uses without gaps."""
-    used = np.zeros(len(points), dtype=bool)
-    used[cells] = True
-    number = np.cumsum(used) - 1
-    return points[used], number[cells], {name: number[f] for name, f in facets.items()}, number[rim[used[rim]]]
-
-
-def _numbers(count: int, cells: IntArray) -> IntArray:
-    """Return the numbers of ``count`` points once those without cells are dropped."""
-    used = np.zeros(count, dtype=bool)
-    used[cells] = True
-    numbers: IntArray = np.cumsum(used) - 1
-    return numbers
 
 
 def flat_cells(points: FloatArray, cells: IntArray) -> BoolArray:

@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.generate import MeshArrays, MeshError
 from pipeline.scene.model import PROBE, SLIT, Scene
-from pipeline.shapes.triangles import half_edges
+from pipeline.shapes.triangles import edge_keys
 
 
 def open_slit(mesh: MeshArrays, scene: Scene) -> MeshArrays:
@@ -40,16 +40,10 @@ def open_slit(mesh: MeshArrays, scene: Scene) -> MeshArrays:
 def _front(mesh: MeshArrays, faces: IntArray) -> IntArray:
     """Return the points of the slit's front: edges of one of its triangles, not on the body's surface."""
     count = len(mesh.points)
-    keys, times = np.unique(_edges(faces, count), return_counts=True)
+    keys, times = np.unique(edge_keys(faces, count), return_counts=True)
     outer = np.concatenate([f for name, f in mesh.facets.items() if name not in (PROBE, SLIT)])
-    front = np.setdiff1d(keys[times == 1], _edges(outer, count))
+    front = np.setdiff1d(keys[times == 1], edge_keys(outer, count))
     return np.unique([front // count, front % count])
-
-
-def _edges(triangles: IntArray, count: int) -> IntArray:
-    """Return keys of the edges of triangles."""
-    pairs = np.sort(half_edges(triangles), axis=1)
-    return pairs[:, 0] * count + pairs[:, 1]
 
 
 def _is_beyond(points: FloatArray, scene: Scene) -> BoolArray:

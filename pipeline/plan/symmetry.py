@@ -63,18 +63,18 @@ def _is_held_below_stiffer(case: Case) -> bool:
 
 def body_planes(body: Body) -> tuple[str, ...]:
     """Return the planes in which a body, its support and what is in it are their own mirror images."""
-    held = {*body.mirror_planes()} & {*body.support.mirror_planes()}
+    own = body.mirror_planes()
     # An inclusion is its own image, or there is no symmetry: pairs of images are not looked for.
     return tuple(
         plane
         for number, plane in enumerate(PLANES)
-        if plane in held and all(inclusion.at[number] == 0.0 for inclusion in body.inclusion)
+        if plane in own and all(inclusion.at[number] == 0.0 for inclusion in body.inclusion)
     )
 
 
 def is_body_round(body: Body) -> bool:
     """Tell whether a body, its support and what is in it are the same all round the z axis."""
-    return body.half_plane() is not None and body.support.is_round()
+    return body.half_plane() is not None
 
 
 @lru_cache(_MANY)

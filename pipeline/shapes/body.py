@@ -189,7 +189,11 @@ class Body(Section, ABC):
 
 
 class Drawn(Body):
-    """A body that a CAD kernel draws."""
+    """A body that a CAD kernel draws, its middle on the z axis."""
+
+    def mirror_planes(self) -> tuple[str, ...]:
+        """Return both planes."""
+        return "x", "y"
 
     @abstractmethod
     def draw(self, kernel: Any, units: Units, frame: Frame | None = None) -> int:
@@ -232,6 +236,26 @@ class Layered(Drawn):
     def is_round(self) -> bool:
         """Whether the top and what is in it are the same all round the z axis."""
         return self.has_round_top and self.holds_round
+
+    @property
+    @abstractmethod
+    def corners(self) -> FloatArray:
+        """Points (n, 3), in m, whose convex hull just holds it."""
+
+    @abstractmethod
+    def far_side(self, x: float, y: float) -> float:
+        """Return the largest distance (m) of its sides from an upright line through x and y (m)."""
+
+    def reach(self, frame: Frame) -> float:
+        """Return the largest distance (m) of a corner, or of a side, from a probe's axis."""
+        return self.far_side(*frame.point[:2]) if frame.is_upright else frame.reach(self.corners)
+
+    def farthest(self, frame: Frame) -> float:
+        """Return the distance (m) of the farthest corner."""
+        low, high = self.heights
+        if not frame.is_upright:
+            return frame.farthest(self.corners)
+        return float((self.reach(frame) ** 2 + (high - low) ** 2) ** 0.5)
 
     @property
     def depth_of_tissue(self) -> float:

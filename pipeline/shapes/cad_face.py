@@ -5,7 +5,7 @@ import numpy as np
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.shapes.skin import Skin
 from pipeline.shapes.surface import Surface
-from pipeline.shapes.triangles import Triangles, half_edges
+from pipeline.shapes.triangles import Triangles, doubled_normals, edge_keys, half_edges
 
 
 class CadFace(Surface):
@@ -56,13 +56,11 @@ def _weights(points: FloatArray, corners: FloatArray) -> FloatArray:
 def plane_piece(triangles: Triangles, start: int, same: float = 1e-9) -> IntArray:
     """Return the ends (k, 2) of the edges round the plane piece of the surface to which the facet ``start`` belongs."""
     points, facets = triangles.points, triangles.facets
-    a, b, c = (points[facets[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
+    normals = doubled_normals(points, facets)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    off = np.abs((points[facets] - a[start]) @ normals[start]).max(axis=1)
+    off = np.abs((points[facets] - points[facets[start, 0]]) @ normals[start]).max(axis=1)
     (flat,) = np.nonzero((off < same * triangles.extent) & (normals @ normals[start] > 0))
     half = half_edges(facets[flat])
-    key = np.sort(half, axis=1) @ np.array([len(points), 1])
-    _, first, count = np.unique(key, return_index=True, return_counts=True)
+    _, first, count = np.unique(edge_keys(facets[flat], len(points)), return_index=True, return_counts=True)
     ends: IntArray = half[first[count == 1]]
     return ends

@@ -1,20 +1,9 @@
-"""Convex bodies: how far they reach from a probe, and where lines enter what bounds them."""
+"""Where lines enter and leave what bounds convex bodies."""
 
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.shapes.frame import Frame, Vector
-
-
-def reach_of(frame: Frame, points: FloatArray) -> float:
-    """Return the largest distance (m) of ``points`` (n, 3) from a probe's axis."""
-    local = frame.local(points)
-    return float(np.hypot(local[:, 0], local[:, 1]).max())
-
-
-def farthest_of(frame: Frame, points: FloatArray) -> float:
-    """Return the largest distance (m) of ``points`` (n, 3) from the point of contact."""
-    return float(np.linalg.norm(points - np.array(frame.point), axis=1).max())
+from pipeline.shapes.frame import Vector
 
 
 def slab(origins: FloatArray, direction: Vector, normal: Vector, low: float, high: float) -> tuple[FloatArray, ...]:

@@ -75,7 +75,7 @@ class Facetted(Body):
 
     def farthest(self, frame: Frame) -> float:
         """Return the largest distance (m) of a point from the contact."""
-        return float(np.linalg.norm(self.triangles.points - np.array(frame.point), axis=1).max())
+        return frame.farthest(self.triangles.points)
 
     def inside(self, points: FloatArray) -> FloatArray:
         """Return the distance (m) of points (n, 3) of the body to its surface, negative outside."""
@@ -127,5 +127,4 @@ def _thickness(triangles: Triangles, frame: Frame) -> float:
 
 @lru_cache(_MANY)
 def _reach(triangles: Triangles, frame: Frame) -> float:
-    local = frame.local(triangles.points)
-    return float(np.hypot(local[:, 0], local[:, 1]).max())
+    return frame.reach(triangles.points)

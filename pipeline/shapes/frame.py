@@ -171,6 +171,15 @@ class Frame:
         """Return points (n, 3), in m, of the probe's own coordinates in those of the body."""
         return np.array(self.point) + points @ np.array([self.along, self.across, self.outward])
 
+    def reach(self, points: FloatArray) -> float:
+        """Return the largest distance (m) of ``points`` (n, 3) from the probe's axis."""
+        local = self.local(points)
+        return float(np.hypot(local[:, 0], local[:, 1]).max())
+
+    def farthest(self, points: FloatArray) -> float:
+        """Return the largest distance (m) of ``points`` (n, 3) from the point of contact."""
+        return float(np.linalg.norm(points - np.array(self.point), axis=1).max())
+
     def expressions(self, unit: float) -> tuple[str, str, str]:
         """Write the probe's own coordinates, in units of 1/``unit`` m, as text of x, y and z for a mesh generator."""
         offsets = [f"({name}-({unit * c:.12g}))" for name, c in zip("xyz", self.point, strict=True)]

@@ -12,9 +12,7 @@ import numpy as np
 from pydantic import BeforeValidator
 from pydantic_core import PydanticCustomError
 
-from pipeline.arrays import FloatArray
-from pipeline.shapes.body import Body
-from pipeline.shapes.frame import Frame, Units, Vector
+from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.rounded import Rounded
 from pipeline.shapes.section import Problems, Words, in_mm
@@ -40,6 +38,16 @@ def _found(value: Any) -> Any:
         message = 'must be "unilateral": how much of this tool touches the tissue is found, not prescribed'
         raise PydanticCustomError("not_supported", message)
     return value
+
+
+class _OfFootprint:
+    """What a tool has from its footprint, by the same name."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, probe: "Indenter | None", owner: type) -> Any:
+        return self if probe is None else getattr(probe.footprint, self._name)
 
 
 class Indenter(Probe):
@@ -98,6 +106,22 @@ class Indenter(Probe):
     def contact_width(self) -> float:
         """Half the width (m) of contact that is expected: that on an elastic half-space."""
 
+    # ---- what is the footprint's ----------------------------------------------------------------------
+
+    lies_along: ClassVar[Any] = _OfFootprint()
+    circumradius: ClassVar[Any] = _OfFootprint()
+    half_width: ClassVar[Any] = _OfFootprint()
+    perimeter: ClassVar[Any] = _OfFootprint()
+    gap: ClassVar[Any] = _OfFootprint()
+    is_round: ClassVar[Any] = _OfFootprint()
+    is_mirrored: ClassVar[Any] = _OfFootprint()
+    draw: ClassVar[Any] = _OfFootprint()
+    is_curved: ClassVar[Any] = _OfFootprint()
+    inscribed: ClassVar[Any] = _OfFootprint()
+    edge_distance: ClassVar[Any] = _OfFootprint()
+    to_edge: ClassVar[Any] = _OfFootprint()
+    outline: ClassVar[Any] = _OfFootprint()
+
     # ---- what follows ---------------------------------------------------------------------------------
 
     @property
@@ -138,67 +162,9 @@ class Indenter(Probe):
         """How far (m) the candidates reach past where contact is expected to end."""
         return self.footprint.half_width - self.edge_band[1]
 
-    @property
-    def lies_along(self) -> Vector:
-        """The direction of the footprint's length."""
-        return self.footprint.lies_along
-
     def travel(self, frame: Frame) -> Vector:
         """Return the depth along the axis."""
         return frame.inward(self.depth)
-
-    @property
-    def circumradius(self) -> float:
-        """Radius of the smallest circle round the footprint (m)."""
-        return self.footprint.circumradius
-
-    @property
-    def half_width(self) -> float:
-        """Half of the footprint's smallest extent (m)."""
-        return self.footprint.half_width
-
-    @property
-    def perimeter(self) -> float:
-        """Length of the footprint's edge (m)."""
-        return self.footprint.perimeter
-
-    def gap(self, body: Body, frame: Frame) -> float:
-        """Return the distance (m) between the footprint and the edge of the face."""
-        return self.footprint.gap(body, frame)
-
-    @property
-    def is_round(self) -> bool:
-        """Whether the tool is the same all round its axis."""
-        return self.footprint.is_round
-
-    def is_mirrored(self, along: float, across: float) -> bool:
-        """Tell whether the tool is its own image."""
-        return self.footprint.is_mirrored(along, across)
-
-    def draw(self, kernel: Any, frame: Frame, units: Units) -> int:
-        """Add the footprint."""
-        return self.footprint.draw(kernel, frame, units)
-
-    @property
-    def is_curved(self) -> bool:
-        """Whether a part of the footprint's edge is curved."""
-        return self.footprint.is_curved
-
-    def inscribed(self, edges: int) -> Probe:
-        """Return the footprint in which the polygon has this one's area."""
-        return self.footprint.inscribed(edges)
-
-    def edge_distance(self, along: str, across: str, height: str, unit: float) -> str:
-        """Write the distance to the footprint's edge."""
-        return self.footprint.edge_distance(along, across, height, unit)
-
-    def to_edge(self, points: FloatArray) -> FloatArray:
-        """Return the nearest points of the footprint's edge."""
-        return self.footprint.to_edge(points)
-
-    def outline(self) -> FloatArray:
-        """Return the footprint's edge."""
-        return self.footprint.outline()
 
     def check(self, problems: Problems) -> None:
         """Report a depth that the mesh is not for, and warn of one at which strains are large."""

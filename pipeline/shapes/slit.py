@@ -97,13 +97,13 @@ class Slit:
     def edge_distance(self, along: str, across: str, height: str, unit: float) -> str:
         """Write the distance to the front and to the edge of the contact, in units of 1/``unit`` m."""
         half = self.tip / 2
-        touched = _to_rectangle(
+        touched = to_rectangle(
             f"(Fabs({along})-{unit * self.length / 2:.12g})", f"(Fabs({height}+{unit * half:.12g})-{unit * half:.12g})"
         )
         front = f"(Fabs({height})-{unit * self.depth:.12g})"
         if isfinite(self.reach):
             # Mirrored in the surface: a slit has no edge at its mouth.
-            front = _to_rectangle(f"(Fabs({along})-{unit * self.reach:.12g})", front)
+            front = to_rectangle(f"(Fabs({along})-{unit * self.reach:.12g})", front)
         return f"Sqrt(Min({touched}^2,{front}^2)+{across}^2)"
 
     def room(self, body: Body) -> float:
@@ -122,6 +122,6 @@ def _polygon(points: list[tuple[float, float]]) -> FloatArray:
     return np.array([(along, 0.0, height) for along, height in points])
 
 
-def _to_rectangle(p: str, q: str) -> str:
+def to_rectangle(p: str, q: str) -> str:
     """Write the distance to the sides of a rectangle in its plane, negative inside; p and q are beyond its sides."""
     return f"(Sqrt(Max({p},0)^2+Max({q},0)^2)+Min(Max({p},{q}),0))"

@@ -24,19 +24,15 @@ _LONGEST_NEEDLE = 200
 
 
 class Support(ABC):
-    """What is held of a body's boundary."""
+    """What is held of a body's boundary.
+
+    It is as symmetric as the body: a name stands for a face and for its image, and so does a height. Faces by names of
+    a file are of bodies in which no symmetry is looked for.
+    """
 
     @abstractmethod
     def holds(self, surfaces: Surfaces, points: FloatArray, tolerance: float) -> bool:
         """Tell whether a face of the body, of which ``points`` (n, 3), in m, are a sample, is held."""
-
-    @abstractmethod
-    def mirror_planes(self) -> tuple[str, ...]:
-        """Return the planes, of x = 0 ("x") and y = 0 ("y"), in which it is its own image if the body is."""
-
-    @abstractmethod
-    def is_round(self) -> bool:
-        """Tell whether it is the same all round the z axis if the body is."""
 
     @abstractmethod
     def on_half_plane(self) -> HeldOnHalfPlane:
@@ -54,13 +50,16 @@ class Support(ABC):
     def holds_column(self) -> bool:
         """Tell whether a column that is cut out of the middle of the body is still held."""
 
-    @abstractmethod
     def edges(self) -> tuple[float, ...]:
-        """Return the heights z (m) at which what is held ends in the middle of a face."""
+        """Return the heights z (m) at which what is held ends in the middle of a face; none where faces end."""
+        return ()
 
-    @abstractmethod
     def check(self, heights: tuple[float, float], fine: float, problems: Problems) -> None:
-        """Report what cannot work on a body between two ``heights`` (m), with elements of size ``fine`` (m)."""
+        """Report what cannot work on a body between two ``heights`` (m), with elements of size ``fine`` (m).
+
+        Names of faces are checked as they are read.
+        """
+        return
 
 
 @dataclass(frozen=True)
@@ -82,14 +81,6 @@ class Faces(Support):
             for surface in surfaces[name]
         )
 
-    def mirror_planes(self) -> tuple[str, ...]:
-        """Return both planes: a name stands for a face and for its image."""
-        return "x", "y"
-
-    def is_round(self) -> bool:
-        """Tell that it is: a name stands for the whole of a round side."""
-        return True
-
     def on_half_plane(self) -> HeldOnHalfPlane:
         """Return the names."""
         return self.fixed
@@ -106,13 +97,6 @@ class Faces(Support):
     def holds_column(self) -> bool:
         """Tell whether the bottom is held."""
         return "bottom" in self.names
-
-    def edges(self) -> tuple[float, ...]:
-        """Return none: it ends where faces do."""
-        return ()
-
-    def check(self, heights: tuple[float, float], fine: float, problems: Problems) -> None:
-        """Find nothing: names are checked as they are read."""
 
 
 class Below(BaseModel, Support):
@@ -131,14 +115,6 @@ class Below(BaseModel, Support):
     def holds(self, surfaces: Surfaces, points: FloatArray, tolerance: float) -> bool:
         """Tell whether all of the face is below the height."""
         return bool(np.all(points[:, 2] < self.below + tolerance))
-
-    def mirror_planes(self) -> tuple[str, ...]:
-        """Return both planes: the height is the same on either side."""
-        return "x", "y"
-
-    def is_round(self) -> bool:
-        """Tell that it is: the height is the same all round."""
-        return True
 
     def on_half_plane(self) -> HeldOnHalfPlane:
         """Return the height."""
@@ -187,14 +163,6 @@ class NamedFace(BaseModel, Support):
         """Tell whether the face, or what is left of it, is one of those: most points tell, at its edge any may err."""
         return any(bool(np.median(surface.distance(points)) < tolerance) for surface in surfaces[self.face])
 
-    def mirror_planes(self) -> tuple[str, ...]:
-        """Return none."""
-        return ()
-
-    def is_round(self) -> bool:
-        """Tell that it is not known to be."""
-        return False
-
     def on_half_plane(self) -> HeldOnHalfPlane:
         """Refuse: no body with such names has a half plane."""
         raise ValueError("a named face has no half plane")
@@ -211,13 +179,6 @@ class NamedFace(BaseModel, Support):
     def holds_column(self) -> bool:
         """Tell that it is not known: the face may lie anywhere."""
         return False
-
-    def edges(self) -> tuple[float, ...]:
-        """Return none: it ends where faces do."""
-        return ()
-
-    def check(self, heights: tuple[float, float], fine: float, problems: Problems) -> None:
-        """Find nothing: the name is looked for as the file is read."""
 
 
 def _fixed(value: Any) -> Any:

@@ -75,6 +75,13 @@ def half_edges(facets: IntArray) -> IntArray:
     return np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2)
 
 
+def edge_keys(facets: IntArray, count: int) -> IntArray:
+    """Return a number for each half edge (3m,) of facets of ``count`` points, the same for both directions."""
+    pairs = np.sort(half_edges(facets), axis=1)
+    keys: IntArray = pairs[:, 0] * count + pairs[:, 1]
+    return keys
+
+
 def closed_edges(facets: IntArray) -> tuple[IntArray, IntArray]:
     """Return the edges (k, 2) of a closed surface, lower number first, and the two facets (k, 2) of each."""
     pairs = np.sort(half_edges(facets), axis=1)

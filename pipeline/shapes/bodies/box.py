@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.shapes.body import Layered
-from pipeline.shapes.convex import farthest_of, reach_of, slab
+from pipeline.shapes.convex import slab
 from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.section import Words, in_mm
 from pipeline.shapes.surface import Plane, Surface
@@ -83,20 +83,11 @@ class Box(Layered):
         """Return the height (m), or how far the farthest corner lies along the axis."""
         if frame.is_upright and frame.point[2] == 0:
             return self.size[2]
-        return float(-frame.local(self._corners)[:, 2].min())
+        return float(-frame.local(self.corners)[:, 2].min())
 
-    def reach(self, frame: Frame) -> float:
-        """Return the distance (m) of the farthest corner, or vertical edge, from the axis."""
-        if not frame.is_upright:
-            return reach_of(frame, self._corners)
-        x, y, _ = frame.point
+    def far_side(self, x: float, y: float) -> float:
+        """Return the distance (m) of the farthest vertical edge."""
         return hypot(self.size[0] / 2 + abs(x), self.size[1] / 2 + abs(y))
-
-    def farthest(self, frame: Frame) -> float:
-        """Return the distance (m) of the farthest corner."""
-        if not frame.is_upright:
-            return farthest_of(frame, self._corners)
-        return float((self.reach(frame) ** 2 + self.size[2] ** 2) ** 0.5)
 
     def inside(self, points: FloatArray) -> FloatArray:
         """Return the distance (m) of points inside to the nearest face, negative outside."""
@@ -122,7 +113,8 @@ class Box(Layered):
         return (-x / 2, x / 2), (-y / 2, y / 2), (-z, 0.0)
 
     @property
-    def _corners(self) -> FloatArray:
+    def corners(self) -> FloatArray:
+        """The eight corners (m)."""
         return np.array(list(product(*self._sides)))
 
     def _nearest_face(self, point: Vector) -> tuple[int, int]:
@@ -134,10 +126,6 @@ class Box(Layered):
     def face(self) -> str:
         """Length and width of the top."""
         return f"{in_mm(self.size[0])} × {in_mm(self.size[1])}"
-
-    def mirror_planes(self) -> tuple[str, ...]:
-        """Return both planes."""
-        return "x", "y"
 
     @property
     def half_sides(self) -> tuple[float, float]:

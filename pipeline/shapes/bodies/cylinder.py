@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.shapes.body import Layered
-from pipeline.shapes.convex import ball, farthest_of, reach_of, slab
+from pipeline.shapes.convex import ball, slab
 from pipeline.shapes.frame import Frame, PlaceError, Units, Vector
 from pipeline.shapes.half_plane import Rectangle
 from pipeline.shapes.section import Words, in_mm
@@ -88,17 +88,9 @@ class Cylinder(Layered):
         (x, y, z), (a, b, c) = frame.point, frame.axis
         return self.radius * hypot(a, b) + self.height * (abs(c) - c) / 2 - (a * x + b * y + c * z)
 
-    def reach(self, frame: Frame) -> float:
-        """Return the distance (m) of the far side from the axis."""
-        if not frame.is_upright:
-            return reach_of(frame, self._rims)
-        return self.radius + hypot(frame.point[0], frame.point[1])
-
-    def farthest(self, frame: Frame) -> float:
-        """Return the distance (m) of the farthest point of the edges of top and bottom."""
-        if not frame.is_upright:
-            return farthest_of(frame, self._rims)
-        return float((self.reach(frame) ** 2 + self.height**2) ** 0.5)
+    def far_side(self, x: float, y: float) -> float:
+        """Return the distance (m) of the far side."""
+        return self.radius + hypot(x, y)
 
     def inside(self, points: FloatArray) -> FloatArray:
         """Return the distance (m) of points inside to the nearest face, negative outside."""
@@ -118,7 +110,7 @@ class Cylinder(Layered):
         return sqrt(inward**2 + self.radius**2 - x**2 - y**2) - inward
 
     @property
-    def _rims(self) -> FloatArray:
+    def corners(self) -> FloatArray:
         """Points (n, 3) in m on circles about the edges of top and bottom, by so little larger as to hold them."""
         angle = np.linspace(0.0, 2 * pi, _ROUND + 1)[1:]
         radius = self.radius / np.cos(pi / _ROUND)
@@ -134,10 +126,6 @@ class Cylinder(Layered):
     def face(self) -> str:
         """Radius of the top."""
         return f"radius {in_mm(self.radius)}"
-
-    def mirror_planes(self) -> tuple[str, ...]:
-        """Return both planes."""
-        return "x", "y"
 
     @property
     def half_sides(self) -> tuple[float, float]:

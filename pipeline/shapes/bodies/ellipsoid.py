@@ -141,10 +141,6 @@ class Ellipsoid(Drawn):
         """Its semi-axes."""
         return "semi-axes " + " × ".join(map(in_mm, self.axes))
 
-    def mirror_planes(self) -> tuple[str, ...]:
-        """Return both planes."""
-        return "x", "y"
-
     @property
     def is_round(self) -> bool:
         """Whether its semi-axes along x and y are equal, and its inclusions round."""

@@ -13,7 +13,7 @@ from pipeline.shapes.frame import Frame, Units, Vector
 from pipeline.shapes.probe import ON_EDGE
 from pipeline.shapes.punch import Punch
 from pipeline.shapes.section import Problems, Words, in_mm
-from pipeline.shapes.slit import Slit
+from pipeline.shapes.slit import Slit, to_rectangle
 from pipeline.units import Length, Travel
 
 _ALIGNED = 1e-12
@@ -130,9 +130,7 @@ class Blade(Punch):
             return self.slit.edge_distance(along, across, height, unit)
         p = f"(Fabs({along})-{unit * self.length / 2:.12g})"
         q = f"(Fabs({across})-{unit * self.width / 2:.12g})"
-        # Signed distance to a rectangle in its plane; its magnitude is the distance to the edge line.
-        in_plane = f"(Sqrt(Max({p},0)^2+Max({q},0)^2)+Min(Max({p},{q}),0))"
-        return f"Sqrt({in_plane}^2+{height}^2)"
+        return f"Sqrt({to_rectangle(p, q)}^2+{height}^2)"
 
     def to_edge(self, points: FloatArray) -> FloatArray:
         """Return the points: no edge of an element needs to be bent."""
