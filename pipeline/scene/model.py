@@ -14,9 +14,10 @@ import gmsh
 import numpy as np
 
 from pipeline import compat
+from pipeline.arrays import FloatArray
 from pipeline.scene.imprint import cut_out
 from pipeline.scene.regions import draw_inclusions, regions_of, remove_beyond
-from pipeline.scene.slit import draw_plane, draw_slit, mirror_of, singular_curves
+from pipeline.scene.slit import draw_plane, draw_slit, mirror_of, sample_curve, singular_curves
 from pipeline.scene.tessellate import NotASolid, read_solid
 from pipeline.shapes.bodies.cad import SIZES, FromCad
 from pipeline.shapes.body import Body, Drawn
@@ -147,7 +148,7 @@ def build(scene: Scene) -> list[int]:
         return singular_curves(slit, scene.frame, footprint + free, scene.scale)
     _name_groups(scene, footprint, regions)
     edge = gmsh.model.getBoundary([(2, tag) for tag in footprint], oriented=False)
-    return [abs(tag) for _, tag in edge if not _is_on_mirror(scene, abs(tag))]
+    return [abs(tag) for _, tag in edge if not _is_on_mirror(scene, sample_curve(abs(tag)))]
 
 
 def _add_body(scene: Scene) -> int:
@@ -179,15 +180,13 @@ def _add_footprint(scene: Scene, volumes: list[tuple[int, int]]) -> list[tuple[i
         return [(2, scene.footprint.draw(occ, frame, scene.units))]
 
     def is_mirror(face: int) -> bool:
-        points = _sample(face)
-        return any(bool(np.all(np.abs(points[:, "xy".index(plane)]) < _CLOSE)) for plane in scene.mirrors)
+        return _is_on_mirror(scene, _sample(face))
 
     return cut_out(scene.body, scene.footprint, frame, scene.units, volumes, is_mirror)
 
 
-def _is_on_mirror(scene: Scene, curve: int) -> bool:
-    (start,), (end,) = gmsh.model.getParametrizationBounds(1, curve)
-    points = np.array(gmsh.model.getValue(1, curve, [start, (start + end) / 2, end])).reshape(-1, 3)
+def _is_on_mirror(scene: Scene, points: FloatArray) -> bool:
+    """Tell whether points (n, 3), in the model's units, all lie in one of the planes of symmetry."""
     return any(bool(np.all(np.abs(points[:, "xy".index(plane)]) < _CLOSE)) for plane in scene.mirrors)
 
 
@@ -255,7 +254,7 @@ def _name_groups(scene: Scene, footprint: list[int], regions: dict[int, list[int
         model.setPhysicalName(3, model.addPhysicalGroup(3, tags), f"{TISSUE} {number}" if number else TISSUE)
 
 
-def _sample(face: int, is_trimmed: bool = False) -> Any:
+def _sample(face: int, is_trimmed: bool = False) -> FloatArray:
     """Points, shape (n, 3), on a face, or, of one that is not known to be trimmed at random, on what carries it."""
     (u0, v0), (u1, v1) = gmsh.model.getParametrizationBounds(2, face)
     steps = (0.25, 0.5, 0.75)

@@ -34,10 +34,11 @@ def mirror_of(frame: Frame, mirrors: tuple[str, ...]) -> str | None:
 def singular_curves(slit: Slit, frame: Frame, faces: list[int], scale: float) -> list[int]:
     """Return the curves round ``faces`` of a slit that are its front or where contact ends; the unit is ``scale`` m."""
     curves = {abs(tag) for _, tag in gmsh.model.getBoundary([(2, f) for f in faces], combined=False, oriented=False)}
-    return [curve for curve in sorted(curves) if slit.is_singular(frame.local(scale * _sample(curve)))]
+    return [curve for curve in sorted(curves) if slit.is_singular(frame.local(scale * sample_curve(curve)))]
 
 
-def _sample(curve: int) -> FloatArray:
+def sample_curve(curve: int) -> FloatArray:
+    """Return the ends of a curve and a point between, (3, 3), in the model's units."""
     (start,), (end,) = gmsh.model.getParametrizationBounds(1, curve)
     points = gmsh.model.getValue(1, curve, [start, (start + end) / 2, end])
     return np.array(points).reshape(-1, 3)

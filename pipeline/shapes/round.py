@@ -1,31 +1,69 @@
-"""An ellipse in its own plane, of which a disc is one: what round footprints share. ``axes`` are its semi-axes (m)."""
+"""What round flat footprints share: an ellipse in its own plane, of which a disc is one."""
 
+from abc import abstractmethod
 from math import pi
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from pipeline.arrays import FloatArray
+from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.frame import Frame, Units
+from pipeline.shapes.probe import ON_EDGE
+from pipeline.shapes.punch import Straight
+from pipeline.shapes.section import Problems
 
 
-def draw_ellipse(kernel: Any, axes: tuple[float, float], frame: Frame, units: Units) -> int:
-    """Add an ellipse, at its place, to a CAD ``kernel``; return the tag of the face."""
-    a, b = map(units, axes)
-    x, y, z = map(units, frame.point)
-    # The kernel wants the longer axis first.
-    tag = int(kernel.addDisk(x, y, z, max(a, b), min(a, b)))
-    if a < b:
-        kernel.rotate([(2, tag)], x, y, z, 0, 0, 1, pi / 2)
-    frame.place(kernel, [(2, tag)], units)
-    return tag
+class RoundPunch(Straight):
+    """A flat punch whose edge is an ellipse."""
 
+    is_curved: ClassVar[bool] = True
+    # Points of the edge in pictures.
+    OUTLINE: ClassVar[int] = 200
 
-def points_of_ellipse(axes: tuple[float, float], angle: FloatArray) -> FloatArray:
-    """Return the points (n, 2) of an ellipse at eccentric angles (n,)."""
-    return np.column_stack([axes[0] * np.cos(angle), axes[1] * np.sin(angle)])
+    @property
+    @abstractmethod
+    def semi_axes(self) -> tuple[float, float]:
+        """Its semi-axes (m), along and across."""
 
+    @property
+    def circumradius(self) -> float:
+        """The longer semi-axis (m)."""
+        return max(self.semi_axes)
 
-def closed_ellipse(axes: tuple[float, float], edges: int) -> FloatArray:
-    """Return the points of an ellipse at equal steps of its eccentric angle, the first one once more at the end."""
-    return points_of_ellipse(axes, np.linspace(0.0, 2 * pi, edges + 1))
+    @property
+    def half_width(self) -> float:
+        """The shorter semi-axis (m)."""
+        return min(self.semi_axes)
+
+    @property
+    def mean_square(self) -> float:
+        """A third of the sum of the squares of the semi-axes (m²)."""
+        return (self.semi_axes[0] ** 2 + self.semi_axes[1] ** 2) / 3
+
+    def draw(self, kernel: Any, frame: Frame, units: Units) -> int:
+        """Add the ellipse."""
+        a, b = map(units, self.semi_axes)
+        x, y, z = map(units, frame.point)
+        # The kernel wants the longer axis first.
+        tag = int(kernel.addDisk(x, y, z, max(a, b), min(a, b)))
+        if a < b:
+            kernel.rotate([(2, tag)], x, y, z, 0, 0, 1, pi / 2)
+        frame.place(kernel, [(2, tag)], units)
+        return tag
+
+    def points_at(self, angle: FloatArray) -> FloatArray:
+        """Return the points (n, 2) of the edge at eccentric angles (n,), in m."""
+        a, b = self.semi_axes
+        return np.column_stack([a * np.cos(angle), b * np.sin(angle)])
+
+    def outline(self) -> FloatArray:
+        """Return the ellipse at equal steps of its eccentric angle."""
+        return self.points_at(np.linspace(0.0, 2 * pi, self.OUTLINE + 1))
+
+    def covers(self, points: FloatArray) -> BoolArray:
+        """Tell which points are within the ellipse."""
+        within: BoolArray = np.linalg.norm(points / np.array(self.semi_axes), axis=1) <= 1 + ON_EDGE
+        return within
+
+    def check(self, problems: Problems) -> None:
+        """Find nothing: each key says what it takes."""

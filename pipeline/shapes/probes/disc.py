@@ -1,30 +1,24 @@
 """A disc."""
 
 from math import pi, sin, sqrt
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 
-from pipeline.arrays import BoolArray, FloatArray
+from pipeline.arrays import FloatArray
 from pipeline.shapes.body import Body
-from pipeline.shapes.frame import Frame, Units, Vector
-from pipeline.shapes.probe import ON_EDGE
-from pipeline.shapes.punch import Straight
-from pipeline.shapes.round import closed_ellipse, draw_ellipse
-from pipeline.shapes.section import Problems, Words
+from pipeline.shapes.frame import Frame, Vector
+from pipeline.shapes.round import RoundPunch
+from pipeline.shapes.section import Words
 from pipeline.units import Length
 
-# Points of the edge in pictures.
-_ROUND = 200
 
-
-class Disc(Straight):
+class Disc(RoundPunch):
     """A flat round punch, such as the tip of a blunt needle."""
 
     # Any direction is as good: that of x.
     lies_along: ClassVar[Vector] = 1.0, 0.0, 0.0
     is_round: ClassVar[bool] = True
-    is_curved: ClassVar[bool] = True
 
     REALTIME = ("frictionless", "bonded")
     EXPECTED_ERROR = 1.0
@@ -33,24 +27,14 @@ class Disc(Straight):
     radius: Annotated[Length, Words("Radius of the footprint.", '"2 mm"', is_used=True)]
 
     @property
-    def circumradius(self) -> float:
-        """The radius (m)."""
-        return self.radius
-
-    @property
-    def half_width(self) -> float:
-        """The radius (m)."""
-        return self.radius
+    def semi_axes(self) -> tuple[float, float]:
+        """The radius (m), twice."""
+        return self.radius, self.radius
 
     @property
     def perimeter(self) -> float:
         """Length of the circle (m)."""
         return 2 * pi * self.radius
-
-    @property
-    def mean_square(self) -> float:
-        """Two thirds of the square of the radius (m²): its pressure goes like 1 / (a² - r²)^½."""
-        return 2 / 3 * self.radius**2
 
     def gap(self, body: Body, frame: Frame) -> float:
         """Return the distance (m) from the circle to the edge of the face."""
@@ -59,10 +43,6 @@ class Disc(Straight):
     def is_mirrored(self, along: float, across: float) -> bool:
         """Tell that it is, in any line."""
         return True
-
-    def draw(self, kernel: Any, frame: Frame, units: Units) -> int:
-        """Add the disc."""
-        return draw_ellipse(kernel, (self.radius, self.radius), frame, units)
 
     def inscribed(self, edges: int) -> Self:
         """Return the larger disc whose regular polygon has this one's area."""
@@ -76,15 +56,3 @@ class Disc(Straight):
     def to_edge(self, points: FloatArray) -> FloatArray:
         """Return the points moved along their radii onto the circle."""
         return self.radius * points / np.linalg.norm(points, axis=1, keepdims=True)
-
-    def outline(self) -> FloatArray:
-        """Return the circle."""
-        return closed_ellipse((self.radius, self.radius), _ROUND)
-
-    def covers(self, points: FloatArray) -> BoolArray:
-        """Tell which points are within the circle."""
-        within: BoolArray = np.linalg.norm(points, axis=1) <= (1 + ON_EDGE) * self.radius
-        return within
-
-    def check(self, problems: Problems) -> None:
-        """Find nothing: each key says what it takes."""

@@ -1,33 +1,29 @@
 """An ellipse."""
 
 from math import pi, sqrt
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 
-from pipeline.arrays import BoolArray, FloatArray
+from pipeline.arrays import FloatArray
 from pipeline.shapes.body import Body
-from pipeline.shapes.frame import Frame, Units, Vector
-from pipeline.shapes.probe import ON_EDGE
-from pipeline.shapes.punch import Straight
-from pipeline.shapes.round import closed_ellipse, draw_ellipse, points_of_ellipse
-from pipeline.shapes.section import Problems, Words
+from pipeline.shapes.frame import Frame, Vector
+from pipeline.shapes.round import RoundPunch
+from pipeline.shapes.section import Words
 from pipeline.units import Length
 
 _ALIGNED = 1e-12
-# Points of the edge in pictures, and for the distance to the edge of a face: to 1e-6 of the ellipse's size.
-_ROUND = 2000
 # Points along the edge by which its length is divided into equal parts.
 _FINE = 20_000
 # Newton's iterations to the nearest point; it starts within a few degrees and doubles its digits.
 _ITERATIONS = 12
 
 
-class Ellipse(Straight):
+class Ellipse(RoundPunch):
     """A flat elliptical punch; its first semi-axis lies along ``direction``."""
 
-    is_curved: ClassVar[bool] = True
-
+    # For the distance to the edge of a face, too: to 1e-6 of the ellipse's size.
+    OUTLINE = 2000
     EXPECTED_ERROR = 0.9
 
     shape: Literal["ellipse"]
@@ -43,14 +39,9 @@ class Ellipse(Straight):
         return self.direction
 
     @property
-    def circumradius(self) -> float:
-        """The longer semi-axis (m)."""
-        return max(self.axes)
-
-    @property
-    def half_width(self) -> float:
-        """The shorter semi-axis (m)."""
-        return min(self.axes)
+    def semi_axes(self) -> tuple[float, float]:
+        """The two semi-axes (m)."""
+        return self.axes
 
     @property
     def perimeter(self) -> float:
@@ -58,11 +49,6 @@ class Ellipse(Straight):
         a, b = self.axes
         h = 3 * ((a - b) / (a + b)) ** 2
         return pi * (a + b) * (1 + h / (10 + sqrt(4 - h)))
-
-    @property
-    def mean_square(self) -> float:
-        """A third of the sum of the squares of the semi-axes (m²)."""
-        return (self.axes[0] ** 2 + self.axes[1] ** 2) / 3
 
     def gap(self, body: Body, frame: Frame) -> float:
         """Return the distance (m) from the nearest point of the ellipse to the edge of the face."""
@@ -77,16 +63,12 @@ class Ellipse(Straight):
         """Tell that it is in its two axes only."""
         return self.is_round or min(abs(along), abs(across)) < _ALIGNED
 
-    def draw(self, kernel: Any, frame: Frame, units: Units) -> int:
-        """Add the ellipse."""
-        return draw_ellipse(kernel, self.axes, frame, units)
-
     def inscribed(self, edges: int) -> Self:
         """Return the larger ellipse whose polygon of equal edges, from the end of an axis on, has this one's area."""
         angle = np.linspace(0.0, 2 * pi, _FINE + 1)
-        ellipse = points_of_ellipse(self.axes, angle)
+        ellipse = self.points_at(angle)
         length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ellipse, axis=0), axis=1))])
-        x, y = points_of_ellipse(self.axes, np.interp(np.linspace(0.0, length[-1], edges + 1), length, angle)).T
+        x, y = self.points_at(np.interp(np.linspace(0.0, length[-1], edges + 1), length, angle)).T
         polygon = float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])) / 2
         larger = sqrt(pi * self.axes[0] * self.axes[1] / polygon)
         return self.model_copy(update={"axes": (larger * self.axes[0], larger * self.axes[1])})
@@ -119,16 +101,4 @@ class Ellipse(Straight):
             slope = (x - a * cosine) * a * sine - (y - b * sine) * b * cosine
             curvature = a * cosine * x + b * sine * y + (a**2 - b**2) * (sine**2 - cosine**2)
             angle = angle - slope / curvature
-        return points_of_ellipse(self.axes, angle)
-
-    def outline(self) -> FloatArray:
-        """Return the ellipse."""
-        return closed_ellipse(self.axes, _ROUND)
-
-    def covers(self, points: FloatArray) -> BoolArray:
-        """Tell which points are within the ellipse."""
-        within: BoolArray = np.linalg.norm(points / np.array(self.axes), axis=1) <= 1 + ON_EDGE
-        return within
-
-    def check(self, problems: Problems) -> None:
-        """Find nothing: each key says what it takes."""
+        return self.points_at(angle)
