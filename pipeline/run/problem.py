@@ -19,7 +19,7 @@ from pipeline.solve.contact.active_set import ContactError
 from pipeline.solve.contact.search import Tool
 from pipeline.solve.crack import Front
 from pipeline.solve.far_field import FarField, Place, PointForce
-from pipeline.solve.krylov import SolveError, is_direct
+from pipeline.solve.krylov import DIRECT_LIMIT, SolveError, is_direct
 from pipeline.solve.meridian.contact import MeridianContact
 from pipeline.solve.meridian.problem import MeridianProblem
 from pipeline.solve.meridian.trials import RoundTool
@@ -54,7 +54,7 @@ def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: boo
 
 def memory_of(case: Case, dofs: int) -> tuple[float, float]:
     """Return the bytes that a solve of ``case`` with so many ``dofs`` takes, and its error bar."""
-    degree, direct = case.mesh.degree, is_direct(case.solve.method, dofs, case.mesh.degree)
+    degree, direct = case.mesh.degree, is_direct(case.solve.method, dofs, DIRECT_LIMIT[case.mesh.degree])
     return (
         estimate.solving_memory(dofs, degree, case.formulation, direct=direct),
         estimate.enriched_memory(dofs, degree, case.formulation),

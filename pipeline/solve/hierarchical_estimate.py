@@ -37,13 +37,10 @@ _ROUNDING = 1e-6
 _REASONS = PETSc.KSP.ConvergedReason
 
 
-def energy_decrements(
-    solver: LinearSolver, residuals: Sequence[PETSc.Vec], *, keep_solutions: bool = False
-) -> tuple[FloatArray, list[FloatArray], int]:
+def energy_decrements(solver: LinearSolver, residuals: Sequence[PETSc.Vec]) -> tuple[FloatArray, list[FloatArray], int]:
     """Return r_i·A⁻¹·r_j (J) of n ``residuals``, (n, n), each A⁻¹·r_i (owned dofs), and the iterations; collective.
 
-    On the diagonal it is from below; the error of any entry is at most the root of the two on the diagonal. There are
-    no solutions but for several residuals, or where they are to be kept.
+    On the diagonal it is from below; the error of any entry is at most the root of the two on the diagonal.
 
     Raises:
         SolveError: if the increments do not get small.
@@ -56,12 +53,12 @@ def energy_decrements(
         iterations = sum(count for _, count in found)
         corrections = [solution.array.copy() for solution in solutions]
         if len(found) == 1:
-            return np.array([[found[0][0]]]), corrections if keep_solutions else [], iterations
+            return np.array([[found[0][0]]]), corrections, iterations
         # x_i·r_j + x_j·r_i - x_i·A·x_j, whose error is that of both solutions.
         product = keep(stack, residuals[0].duplicate())
         local = np.empty((len(found), len(found)))
         for j, (solution, residual) in enumerate(zip(solutions, residuals, strict=True)):
-            solver.multiply(solution, product)
+            solver.matrix.mult(solution, product)
             for i, x in enumerate(corrections):
                 local[i, j] = x @ residual.array + corrections[j] @ residuals[i].array - x @ product.array
     total = global_sum(residuals[0].comm.tompi4py(), local)

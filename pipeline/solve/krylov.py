@@ -192,13 +192,13 @@ class Level:
         return compat.degree(self.space)
 
 
-def is_direct(method: str, dofs: int, degree: int) -> bool:
-    """Decide between Cholesky and conjugate gradients for a system of ``dofs`` unknowns."""
-    return method == "direct" or (method == "auto" and dofs <= DIRECT_LIMIT[degree])
+def is_direct(method: str, dofs: int, limit: int) -> bool:
+    """Decide between a factorisation, faster up to a ``limit`` of unknowns, and iterations."""
+    return method == "direct" or (method == "auto" and dofs <= limit)
 
 
 class LinearSolver:
-    """A KSP for one operator, with everything that it needs; ``close`` frees it.
+    """A KSP for one operator, with everything that it needs: a context manager, which frees it.
 
     ``levels`` are what it was made of, ``cycle`` is the multigrid cycle, None for a direct solver and for degree 1.
     """
@@ -222,6 +222,12 @@ class LinearSolver:
             self.ksp = solver_of(kind, self.matrix, stack, preconditioner)
             self.ksp.setUp()
             self._stack = stack.pop_all()
+
+    def __enter__(self) -> "LinearSolver":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def _preconditioner(self, below: "LinearSolver | None") -> "PETSc.PC | Cycle":
         levels = self.levels
@@ -325,10 +331,6 @@ class LinearSolver:
     def matrix(self) -> PETSc.Mat:
         """The operator."""
         return self.levels[-1].matrix
-
-    def multiply(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Write the operator's product with ``x`` into ``y``; collective."""
-        self.matrix.mult(x, y)
 
     def precondition(self, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Apply the preconditioner alone; collective. ``residual`` must be nought where dofs are prescribed.

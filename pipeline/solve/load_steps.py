@@ -84,8 +84,7 @@ class LoadSteps(Solver):
         law = walk.law
         self._space = elements.displacements
         self._levels = elements.levels(law, stack, direct=direct)
-        solver = LinearSolver(self._levels, direct=direct)
-        stack.callback(solver.close)
+        solver = stack.enter_context(LinearSolver(self._levels, direct=direct))
         self._forms = HyperelasticForms(self._space.space, self._space.forms, law.name)
         self._body = Equilibrium(self._space, self._forms, solver)
         stack.callback(self._body.close)

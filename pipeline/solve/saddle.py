@@ -64,8 +64,7 @@ class SaddleSolver:
         with ExitStack() as stack, stage("set-up"):
             if not direct:
                 known = None if below is None else below.multigrid
-                self._multigrid = LinearSolver(saddle.levels, direct=False, below=known)
-                stack.callback(self._multigrid.close)
+                self._multigrid = stack.enter_context(LinearSolver(saddle.levels, direct=False, below=known))
                 self._mass = self._mass_solver(stack)
             self._stack = stack.pop_all()
 

@@ -35,8 +35,6 @@ Unknowns = tuple[FloatArray, ...]
 # The share of the far field is found where it changes by less than this, in units of the solver's tolerance.
 _SETTLED = 10.0
 _MOST_ROUNDS = 20
-# The solver is made for any tolerance: each solve has its own.
-_ANY = 0.5
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.crack import Front, Release
-from pipeline.solve.krylov import Level, SolveError
+from pipeline.solve.krylov import Level, SolveError, is_direct
 from pipeline.solve.load_response import LoadResponse
 from pipeline.solve.loads import Applied
 from pipeline.solve.movement import Motion, Movement
@@ -180,7 +180,7 @@ class Elements(ABC):
 
     def is_direct(self, method: str) -> bool:
         """Decide between a factorisation and iterations."""
-        return method == "direct" or (method == "auto" and self.dofs <= self.direct_limit)
+        return is_direct(method, self.dofs, self.direct_limit)
 
     @abstractmethod
     def close(self) -> None:

@@ -15,9 +15,6 @@ from pipeline.solve.spaces import Conditions, Spaces
 from pipeline.solve.vectors import vector
 from pipeline.stages import recharge, recorded
 
-# A solver is made for any tolerance: each solve has its own.
-_ANY = 0.5
-
 
 class DisplacementElements(Elements):
     """Displacements alone."""
@@ -69,9 +66,7 @@ class DisplacementElements(Elements):
         if len(levels) == 1 and self.degree > 1:
             levels = self.levels(law, stack, direct=False)
         level = level_of(finer.displacements, law, stack)
-        solver = LinearSolver([*levels, level], direct=False, below=below)
-        stack.callback(solver.close)
-        return finer, solver
+        return finer, stack.enter_context(LinearSolver([*levels, level], direct=False, below=below))
 
 
 class DisplacementSolver(Solver):
@@ -90,8 +85,7 @@ class DisplacementSolver(Solver):
         self._tolerance = 1.0
         with ExitStack() as stack, recorded() as self.cost:
             self.levels = elements.levels(law, stack, direct=direct)
-            self.linear = LinearSolver(self.levels, direct=direct)
-            stack.callback(self.linear.close)
+            self.linear = stack.enter_context(LinearSolver(self.levels, direct=direct))
             self.owner = stack.pop_all()
 
     def solve(self, columns: Sequence[Column], tolerance: float) -> int:
@@ -124,7 +118,7 @@ class DisplacementSolver(Solver):
             if movement.loads is not None and column.applied is not None:
                 space.put(residual, space.applied(movement.loads))
             residuals.append(residual)
-        decrements, corrections, iterations = energy_decrements(solver, residuals, keep_solutions=keep)
+        decrements, corrections, iterations = energy_decrements(solver, residuals)
         kept = []
         for solution, correction in zip(solutions, corrections, strict=False):
             (values,) = fields = stack.enter_context(finer.fields())
