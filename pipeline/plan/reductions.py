@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
 from pipeline.plan import estimate
-from pipeline.plan.basis import use_reduced_basis
 from pipeline.plan.equivalent_places import EquivalentPlace, Matrix, from_place, image_key, moved_key
 from pipeline.plan.far_fields import far_regions
 from pipeline.plan.key import case_key, digest
@@ -13,9 +12,12 @@ from pipeline.plan.steps import MOST_DOFS, MeshStep, OperatorStep, Solve, mesh_s
 from pipeline.plan.symmetry import is_round, model_planes
 from pipeline.plan.work import Plan, Struck, reason_of
 from pipeline.shapes.body import Body
+from pipeline.study.capabilities import obstacle
 from pipeline.study.closure import FarRegion
 from pipeline.study.sweep import Case
 
+# Fewer Poisson's ratios than this are solved one by one: a basis needs about five solutions itself.
+_FEWEST_RATIOS = 8
 _LONE_DEPTHS = (
     "No start from neighbouring depths: each depth of this tool has a mesh of its own; probe.depth_range makes it one "
     "for all."
@@ -146,6 +148,46 @@ def reuse_solutions(plan: Plan) -> Plan:
     if not count and _has_lone_depths(operators) and not any(solve.goal for solve in plan.solves):
         return replace(plan, struck=(*plan.struck, Struck("reuse", 0, _LONE_DEPTHS)))
     return plan.struck_by("reuse", count, reason_of(reuse_solutions))
+
+
+def use_reduced_basis(plan: Plan) -> Plan:
+    """Many Poisson's ratios on one operator: a few are solved, and the rest follow with a bound on the error of F."""
+    if not plan.shared:
+        return plan
+    operators = [operator for step in plan.meshes for operator in step.operators if _sweeps_ratios(operator)]
+    obstacles = [obstacle("reduced basis", operator.case) for operator in operators]
+    tolerance = plan.study.planning.tolerance
+    many = {
+        solve.key
+        for operator, obstacle in zip(operators, obstacles, strict=True)
+        if not obstacle
+        for solve in operator.solves
+    }
+    if operators and not many:
+        reason = f"No reduced basis: {obstacles[0]}, and each is solved."
+        return replace(plan, struck=(*plan.struck, Struck("reduced", 0, reason)))
+    plan = plan.with_solves(
+        [
+            replace(s, key=digest(f"{s.key} reduced {tolerance!r}"), reduced=True) if s.key in many else s
+            for s in plan.solves
+        ]
+    )
+    return plan.struck_by("reduced", len(many), reason_of(use_reduced_basis))
+
+
+def _sweeps_ratios(operator: OperatorStep) -> bool:
+    """Tell whether an operator is solved for many materials, with displacement elements, whose operator depends on one
+    parameter, and for one force: the bound is on the work of one movement, not on forces that several take.
+    """
+    solve, case = operator.solves[0], operator.case
+    ratios = {solve.key if case.body.regions else solve.case.material.poisson for solve in operator.solves}
+    return (
+        len(ratios) >= _FEWEST_RATIOS
+        and case.element == "displacement"
+        and solve.goal is None
+        and not solve.axisymmetric
+        and case.movements == 1 + case.is_closed
+    )
 
 
 def condense_sweeps(plan: Plan) -> Plan:

@@ -160,11 +160,8 @@ def _vector_bars(solution: Solution, turn: FloatArray | None) -> Vector:
 
     Turned, those of a component are the sum of what all that it is made of may be off by.
     """
-    bars = [0.0 if f == 0 else bar for f, bar in zip(solution.reaction, solution.reaction_bars, strict=True)]
-    if turn is None:
-        return bars[0], bars[1], bars[2]
-    x, y, z = (sum(abs(t) * bar for t, bar in zip(column, bars, strict=True) if t) for column in turn.T)
-    return float(x), float(y), float(z)
+    x, y, z = (0.0 if f == 0 else bar for f, bar in zip(solution.reaction, solution.reaction_bars, strict=True))
+    return turned_back(None if turn is None else np.abs(turn), (x, y, z))
 
 
 def _rows(matrix: FloatArray | None, turn: FloatArray | None, *, bars: bool = False) -> tuple[tuple[float, ...], ...]:

@@ -4,6 +4,7 @@ import json
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache
 from math import isfinite, nan
+from typing import Any
 
 from pydantic import TypeAdapter
 
@@ -13,6 +14,17 @@ from pipeline.study.sweep import Scale
 
 # How the message of a case begins that failed for a reason that the program does not know.
 UNFORESEEN = "an error of the program: "
+
+# What of a record is proportional to Young's modulus, and to which power of the depth.
+_POWERS = {
+    "force": 1,
+    "force_vector": 1,
+    "force_vector_error": 1,
+    "stiffness": 0,
+    "stiffness_error": 0,
+    "energy": 2,
+    "energy_release": 2,
+}
 
 
 @dataclass(frozen=True)
@@ -114,30 +126,10 @@ class Record:
         if (young, depth) == (self.young, self.depth) or not self.is_ok:
             return self
         stiffer, deeper = young / self.young, depth / self.depth
-        (x, y, z), (bx, by, bz) = (
-            (stiffer * deeper * component for component in vector)
-            for vector in (self.force_vector, self.force_vector_error)
-        )
-        stiffness, bars = (
-            tuple(tuple(stiffer * entry for entry in row) for row in rows)
-            for rows in (self.stiffness, self.stiffness_error)
-        )
-        return replace(
-            self,
-            origin="scaled",
-            young=young,
-            depth=depth,
-            force=stiffer * deeper * self.force,
-            force_vector=(x, y, z),
-            force_vector_error=(bx, by, bz),
-            stiffness=stiffness,
-            stiffness_error=bars,
-            energy=stiffer * deeper**2 * self.energy,
-            energy_release=stiffer * deeper**2 * self.energy_release,
-            largest={
-                name: (stiffer if name in STRESSES else 1.0) * deeper * value for name, value in self.largest.items()
-            },
-        )
+        scaled = {name: _times(getattr(self, name), stiffer * deeper**power) for name, power in _POWERS.items()}
+        largest = {name: deeper * value for name, value in self.largest.items()}
+        largest |= {name: stiffer * deeper * self.largest[name] for name in STRESSES if name in largest}
+        return replace(self, origin="scaled", young=young, depth=depth, largest=largest, **scaled)
 
     def to_json(self) -> str:
         """Write as JSON text."""
@@ -159,3 +151,8 @@ class Record:
 @cache
 def _adapter() -> TypeAdapter[Record]:
     return TypeAdapter(Record)
+
+
+def _times(value: Any, factor: float) -> Any:
+    """Return a number, or all numbers in a tuple of them, times a factor."""
+    return tuple(_times(one, factor) for one in value) if isinstance(value, tuple) else factor * value

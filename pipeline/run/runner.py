@@ -1,7 +1,7 @@
 """Carry out the steps of a plan on one communicator: mesh, operators, solves, and a record of each."""
 
 import statistics
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from enum import Enum
@@ -39,7 +39,7 @@ from pipeline.run.progress import Progress
 from pipeline.run.provenance import provenance
 from pipeline.run.record import Record
 from pipeline.run.room import machine_load
-from pipeline.run.sweeping import in_order
+from pipeline.solve.contact.sweep import NEAR
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.stages import Times, recorded
@@ -152,7 +152,7 @@ class StepRunner:
         with problem:
             if first.reduced and isinstance(problem, QuasiStaticProblem):
                 self._reduce(step, problem, meshed)
-            for solve in in_order(step, condensed=condense) if reuse or condense else step.solves:
+            for solve in _in_order(step, condensed=condense) if reuse or condense else step.solves:
                 if solve.key not in self._records:
                     self._record(solve, partial(self._solve, solve, problem, meshed, _bar_of(solve)))
 
@@ -304,3 +304,26 @@ def _spread(seconds: list[float]) -> float:
 
 def _bar_of(solve: Solve) -> Bar:
     return Bar.IF_ROOM if solve.goal is None else Bar.NEEDED
+
+
+def _in_order(step: OperatorStep, *, condensed: bool) -> Iterator[Solve]:
+    """Yield the solves of an operator, by material and depth where contact is found, or displacements are large.
+
+    On a ``condensed`` surface a depth costs less than its error bar. Those come first of which others take theirs.
+    """
+    if not step.case.is_followed:
+        yield from step.solves
+        return
+    for sweep in step.sweeps:
+        first = _with_own_bars(sweep) if condensed else ()
+        yield from first
+        yield from (solve for solve in sweep if solve not in first)
+
+
+def _with_own_bars(sweep: tuple[Solve, ...]) -> tuple[Solve, ...]:
+    """Return the least and the largest depth, and in between as few as leave none alone with its bar."""
+    chosen = [sweep[0]]
+    for this, following in zip(sweep, (*sweep[1:], None), strict=True):
+        if following is None or following.case.probe.depth > NEAR * chosen[-1].case.probe.depth:
+            chosen.append(this)
+    return tuple(dict.fromkeys(chosen))
