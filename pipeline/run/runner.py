@@ -150,7 +150,7 @@ class StepRunner:
         if step.case.has_own_far_field:
             self._share_far_fields()
         with problem:
-            if first.reduced and isinstance(problem, QuasiStaticProblem):
+            if first.reduced:
                 self._reduce(step, problem, meshed)
             for solve in _in_order(step, condensed=condense) if reuse or condense else step.solves:
                 if solve.key not in self._records:

@@ -45,7 +45,7 @@ class ReducedBasis:
         """Begin without solutions for a ``movement`` of one motion, ``smallest`` the least t asked for. Collective."""
         self._problem, self._space = problem, problem.elements.displacements
         (motion,) = movement.motions
-        self._loads, self._mirrored = movement, self._space.body.mirrored
+        self._movement, self._mirrored = movement, self._space.body.mirrored
         self._stack = ExitStack()
         self._solver = self._stack.enter_context(problem.solver(MaterialLaw.of(smallest, 1.0), method))
         # What the residual is made of: first the loads, then two for each w.
@@ -109,7 +109,7 @@ class ReducedBasis:
         twice_energy = float(np.dot(self._held_energy, theta) - weights @ (movement @ theta))
         reactions = np.array(self._reactions)  # for each part, of the unmodified operator
         on_probe = reactions.T @ np.concatenate([theta, np.outer(weights, theta).reshape(-1)])
-        response = reaction(self._loads, np.array([[twice_energy]]), on_probe[None, :], self._mirrored)
+        response = reaction(self._movement, np.array([[twice_energy]]), on_probe[None, :], self._mirrored)
         bound = max(residual, 0.0) / self._least / twice_energy
         return Reduced(response, bound, weights)
 
@@ -121,7 +121,7 @@ class ReducedBasis:
         self._held.copy(self._result)
         for weight, solution in zip(reduced.weights, self._solutions, strict=True):
             self._result.axpy(float(weight), solution)
-        self._result.scale(self._loads.amounts[0])
+        self._result.scale(self._movement.amounts[0])
         return self._result
 
     def _add(self, values: PETSc.Vec, law: MaterialLaw, *, sign: float) -> float:

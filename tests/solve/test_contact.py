@@ -55,7 +55,11 @@ def pressed(tool=None, **changes):
 def test_nothing_pulls_and_nothing_comes_through(element):
     with pressed(material={"poisson": 0.45}, mesh=COARSE | {"element": element}) as (problem, law, movement):
         solution = problem.solve(law, movement)
-    state, active, obstacle = problem.contact.found.state, problem.contact.found.active, problem.contact.obstacle
+    state, active, obstacle = (
+        problem.constraint.found.state,
+        problem.constraint.found.active,
+        problem.constraint.obstacle,
+    )
     apart = obstacle.bounds - state.moved
     assert (state.reactions[active & ~obstacle.candidates.is_corner] < 0).all()
     assert np.abs(state.reactions[~active]).max() < 1e-6 * solution.reaction[2]
@@ -115,7 +119,7 @@ def test_face_that_is_inclined_lifts_off_on_one_side():
     inclined = Tool(lambda points: 0.15 * points[:, 0], lambda points: np.ones(len(points), dtype=bool))
     with pressed(inclined, probe=DISC) as (problem, law, movement):
         force = problem.solve(law, movement).reaction[2]
-    touching = problem.contact.obstacle.candidates.points[problem.contact.found.active, 0]
+    touching = problem.constraint.obstacle.candidates.points[problem.constraint.found.active, 0]
     assert touching.min() < -0.95e-3
     assert 0.0 < touching.max() < 0.9e-3
     assert force > record(probe=DISC).force

@@ -33,7 +33,7 @@ from pipeline.solve.rim import plain_share
 from pipeline.solve.solution import Contact, check_balance
 from pipeline.solve.spaces import Spaces
 from pipeline.solve.vectors import global_sum
-from pipeline.stages import recharge, recorded
+from pipeline.stages import recharge, recorded, stage
 
 # Energy norm of the error to which each set but the last one is solved, relative to that of the solution.
 _LOOSE = 1e-3
@@ -95,6 +95,7 @@ class ContactSearch:
             self._sweep.close()
             self._sweep = None
 
+    @stage("solve")
     def solve(
         self, law: MaterialLaw, movement: Movement, stack: ExitStack, *, method: str, tolerance: float
     ) -> Equilibrium:

@@ -16,7 +16,7 @@ from pipeline.solve.crack import Front, Release
 from pipeline.solve.krylov import Level, SolveError, is_direct
 from pipeline.solve.load_response import LoadResponse
 from pipeline.solve.loads import Applied
-from pipeline.solve.movement import Motion, Movement
+from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import Response
 from pipeline.solve.solution import Contact
@@ -107,14 +107,12 @@ class Solver(ABC):
     """A solver of ``elements`` for one ``law``.
 
     ``is_exact`` tells that nothing improves what it finds; ``stored`` is the energy (J) of the modelled part where that
-    is not half the work of the force. ``known`` are solutions for a unit of motions that may come again, less what is
-    prescribed.
+    is not half the work of the force.
     """
 
     def __init__(self, elements: "Elements", law: MaterialLaw, *, is_exact: bool):
         self.elements, self.law, self.is_exact = elements, law, is_exact
         self.stored: float | None = None
-        self.known: dict[Motion, FloatArray] = {}
 
     def lift(self, columns: Sequence[Column]) -> None:
         """Put what columns prescribe and their loads on their right-hand sides; collective."""

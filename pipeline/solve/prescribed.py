@@ -1,0 +1,169 @@
+"""The motion of a footprint is prescribed: a column for each motion, one for loads, and what their solutions do.
+
+Where loads f act, w with K w = f and w = 0 on footprint and support is one column more
+(:mod:`pipeline.solve.load_response`).
+Where the cut face moves with a far field (:mod:`pipeline.solve.far_field`), a unit of that field is one, too. With K
+the stiffness of a unit of the tool's movement (0) and a unit of the far field (1), that of what is beyond the cut added
+to K₁₁, the energy is stationary where the share s of the field is -K₁₀ / K₁₁. The work of the tool is then that of both
+sides of the cut together, F d = 2 (U within + U beyond).
+"""
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.arrays import FloatArray
+from pipeline.solve.elements.base import Column, Elements, Equilibrium, Products, Solver, close_far
+from pipeline.solve.elements.displacement import DisplacementElements
+from pipeline.solve.krylov import SolveError
+from pipeline.solve.load_response import LoadResponse, imbalance, load_response_of
+from pipeline.solve.load_steps import LoadSteps, Walk
+from pipeline.solve.movement import Motion, Movement
+from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.response import Response, reaction, sums
+from pipeline.solve.solution import MOST_ROUNDS, check_balance, rest
+from pipeline.solve.vectors import global_sum
+from pipeline.stages import stage
+
+# The work of both sides of a cut balances where each motion's does to this share of what is asked of it.
+TWO_SIDED = 0.1
+
+
+class PrescribedMotion:
+    """Solves for each motion of a footprint, by elements, with one set-up.
+
+    ``corrections`` are, by motion, the last solution for a unit of it less the prescribed displacements, owned dofs.
+    """
+
+    def __init__(self, elements: Elements, *, reuse: bool = False):
+        """``reuse`` begins each solve from the one before: depths of a nonlinear law share one walk."""
+        self._elements = elements
+        self._reuse = reuse and elements.element == "displacement"
+        self.corrections: dict[Motion, tuple[FloatArray, ...]] = {}
+        self._law: MaterialLaw | None = None  # of the corrections
+        self._walk: Walk | None = None  # to the last depth in a body of a law that is not linear
+
+    def close(self) -> None:
+        """Free what is kept from solve to solve."""
+        self.corrections.clear()
+
+    def solve(
+        self, law: MaterialLaw, movement: Movement, stack: ExitStack, *, method: str, tolerance: float
+    ) -> Equilibrium:
+        """Solve for each motion of ``movement`` and for its loads; collective. The ``stack`` frees what is made.
+
+        Raises:
+            SolveError: if the elements are not for the law, the solver did not converge, or the solution fails a check.
+        """
+        direct = self._elements.is_direct(method)
+        # A tool at many places: the same operator and the same motion, another far field each time.
+        keep = self._reuse and movement.far is not None and not direct
+        solver = self._set_up(law, movement, stack, direct=direct, keep=keep)
+        with stage("assembly"):
+            columns = self._elements.columns(movement, stack)
+            solver.lift(columns)
+        with stage("solve"):
+            guessed = self._guess(columns, movement)
+            todo = [column for column in columns if not (keep and self._law == law and column in guessed)]
+            iterations, response, load_response = self._iterate(solver, columns, todo, movement, tolerance)
+            self._law, self.corrections = (
+                law,
+                {
+                    motion: tuple(part.array.copy() for part in column.unknown)
+                    for motion, column in zip(movement.motions, columns, strict=False)
+                },
+            )
+            if movement.far is not None:
+                movement = close_far(columns, movement, -float(response.stiffness[1, 0] / response.stiffness[1, 1]))
+                response = _balanced(respond(solver.products(columns), columns, law, movement)[0])
+        return Equilibrium(solver, columns, movement, iterations, response, load_response)
+
+    def _iterate(
+        self, solver: Solver, columns: list[Column], todo: list[Column], movement: Movement, tolerance: float
+    ) -> tuple[int, Response, LoadResponse | None]:
+        """Solve ``todo`` of the ``columns`` until forces balance; return the iterations, and what the solutions do.
+
+        Raises:
+            SolveError: if they do not.
+        """
+        aim = tolerance * min(self._elements.stricter, TWO_SIDED if movement.far is not None else 1.0)
+        iterations = solver.solve(todo, aim)
+        for further in range(MOST_ROUNDS + 1):
+            response, load_response = respond(solver.products(columns), columns, solver.law, movement)
+            share = rest(response.balance, tolerance)
+            if solver.is_exact or share == 1.0 or further == MOST_ROUNDS:
+                break
+            iterations += solver.improve(columns, share)
+        check_balance(response.balance)
+        return iterations, response, load_response
+
+    def _guess(self, columns: Sequence[Column], movement: Movement) -> list[Column]:
+        """Begin with the last solution for each motion, if there is one; return the columns that do."""
+        guessed = []
+        for motion, column in zip(movement.motions, columns, strict=False):
+            if self._reuse and motion in self.corrections:
+                for part, values in zip(column.unknown, self.corrections[motion], strict=True):
+                    part.array[:] = values
+                guessed.append(column)
+        return guessed
+
+    def _set_up(self, law: MaterialLaw, movement: Movement, stack: ExitStack, *, direct: bool, keep: bool) -> Solver:
+        """Return a solver for a law, freed with the ``stack`` unless it is to ``keep``; collective.
+
+        Raises:
+            SolveError: if it cannot be set up, or the elements are not for the law.
+        """
+        if law.is_linear:
+            return self._elements.set_up(law, stack, direct=direct, keep=keep)
+        if not isinstance(self._elements, DisplacementElements):
+            raise SolveError(f"the law {law.name} is for displacement elements")
+        walk = self._walk
+        if walk is None or not walk.leads_to(law, movement):
+            walk = Walk(law, movement.motions[0], np.zeros(self._elements.displacements.owned))
+        self._walk = walk if self._reuse else None
+        return LoadSteps(self._elements, walk, stack, direct=direct)
+
+
+def respond(
+    found: Products, columns: Sequence[Column], law: MaterialLaw, movement: Movement
+) -> tuple[Response, LoadResponse | None]:
+    """Return the response to the motions, and what dead loads do, of which the last column is; collective."""
+    count, mirrored = len(movement.motions), found.space.body.mirrored
+    motions, loaded = columns[:count], columns[count:]
+    residuals = [
+        residual if column.applied is None else residual - column.applied.forces
+        for residual, column in zip(found.residuals, columns, strict=True)
+    ]
+    total = sums(found.space, residuals, [column.prescribed for column in motions])
+    beyond = _energy_beyond(movement, law.lame_mu[0], mirrored)
+    response = reaction(movement, found.stationary[:count, :count] + beyond, total.on_probe[:count], mirrored)
+    balance = total.imbalance(found.energies[:count], movement, mirrored)
+    if not loaded:
+        return replace(response, balance=balance), None
+    (applied,) = (column.applied for column in loaded)
+    assert applied is not None
+    works = global_sum(found.space.comm, np.array([u @ applied.forces for u in found.moved]))
+    balance = max(balance, imbalance(total, found.energies, works, applied, movement, mirrored))
+    load_response = load_response_of(found.stationary, works, total.on_probe[-1], mirrored, apart=movement.apart)
+    return replace(response, balance=balance), load_response
+
+
+def _energy_beyond(movement: Movement, mu: float, mirrored: Sequence[int]) -> FloatArray | float:
+    """Return twice the strain energies (n, n), by pairs of motions, beyond the cut face of the part modelled."""
+    if movement.far is None:
+        return 0.0
+    return np.outer(movement.shares, movement.shares) * movement.far.stiffness(mu) / 2.0 ** len(mirrored)
+
+
+def _balanced(response: Response) -> Response:
+    """Return the response of tool and far field together, its balance with F d = 2 (U within + U beyond).
+
+    Raises:
+        SolveError: if that does not hold.
+    """
+    force, taken = float(response.forces[0, 2]), float(response.stiffness[0, 0])
+    balance = max(response.balance, abs(force - taken) / taken)
+    check_balance(balance)
+    return replace(response, balance=balance)
