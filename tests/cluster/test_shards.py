@@ -113,11 +113,6 @@ def test_damaged_and_failed(whole, meshes, tmp_path):
     assert "pending" not in merged.output
 
 
-def test_help_has_examples():
-    assert "Example: epsmesh merge" in epsmesh("merge", "--help").stdout
-    assert "--shard 3/8" in epsmesh("run", "--help").stdout
-
-
 def test_wrong_input(whole, tmp_path):
     study, folder = whole
     for text in ("0/3", "4/3", "three", "3"):

@@ -13,7 +13,7 @@ from pipeline.report.figures.curves import positions
 from pipeline.report.figures.facets import arrange, rest
 from pipeline.report.figures.ratio import ratio_facets
 from pipeline.report.figures.style import COLOURS
-from pipeline.report.pareto import front, is_by_chance
+from pipeline.report.pareto import is_by_chance
 from pipeline.report.words import choice, heading, points
 from pipeline.study.problems import StudyError
 from tests.report.synthetic import EPSILONS, FIGURE, dataset
@@ -247,18 +247,6 @@ def test_an_error_that_a_finer_mesh_does_not_keep_is_one_of_chance():
         shuffled = error.isel(epsilon=order, rim=[1, 0])
         np.testing.assert_array_equal(is_by_chance(shuffled).sel(epsilon=error.epsilon, rim=error.rim), chance)
     assert not is_by_chance(error.where(error > 0.005)).any()
-
-
-def test_front_holds_what_nothing_beats():
-    generator = np.random.default_rng(1)
-    seconds, error = generator.uniform(size=(2, 200))
-    error[::9], seconds[::7] = np.nan, np.nan
-    best = front(seconds, error)
-    beaten = [i for i in range(200) if ((seconds < seconds[i]) & (error <= error[i])).any()]
-    known = np.isfinite(seconds) & np.isfinite(error)
-    assert set(best) == {*np.flatnonzero(known)} - {*beaten}
-    assert (np.diff(seconds[best]) > 0).all()
-    assert (np.diff(error[best]) < 0).all()
 
 
 def test_colours_are_told_apart_by_the_colour_blind():

@@ -37,15 +37,6 @@ MISTAKES = {
         ["material.poisson = 0.499", "lock", "at most 0.495"],
     ),
     "locking of degree 1": ({"material": {"poisson": 0.46}, "mesh": {"degree": 1}}, ["at most 0.45", "degree 2"]),
-    "mixed of degree 1": ({"mesh": {"element": "mixed", "degree": 1}}, ["mesh.element", "no stable mixed element"]),
-    "straight elements on an inclusion": (
-        {
-            "body": {"inclusion": [{"name": "a", "radius": "2 mm", "at": ["0 mm", "0 mm", "-9 mm"], "young": "9 kPa",
-                                    "poisson": 0.3}]},
-            "mesh": {"degree": 1},
-        },
-        ["mesh.degree = 1", "inclusions", "use 2 or 3"],
-    ),
     "mixed for low ratios": (
         {"mesh": {"element": "mixed"}, "material": {"poisson": 0.2}}, ["mesh.element", "above 0.25"],
     ),

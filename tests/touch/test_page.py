@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from pipeline.touch.page import render, write_touch_page
+from pipeline.touch.page import write_touch_page
 from pipeline.touch.server import HOST, PageServer
 from tests.realtime.synthetic import random_surface, write_random, write_surface
 from tests.report.browser import CHROMIUM, Browser
@@ -173,28 +173,6 @@ def test_fits_a_phone_and_the_dark(browser, tmp_path):
     assert browser.ask("document.getElementById('panel').open") is False
     assert told(browser, "force") in told(browser, "reading")
     browser.look_like(1000, 700)
-
-
-def test_the_server_gives_the_page_at_its_own_address_alone():
-    text = render(random_surface(), "page")
-    with PageServer(text) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        try:
-            assert server.server_address[0] == HOST == "127.0.0.1"
-            host = f"{HOST}:{server.server_port}"
-            assert answer(server, server.path, host) == (200, text)
-            wrong = [("/", host), ("/favicon.ico", host), (server.path + "x", host), (server.path, "evil.example")]
-            for path, named in [*wrong, ("/../../etc/passwd", host), (server.path[:-2] + "/", host)]:
-                status, body = answer(server, path, named)
-                assert status == 404
-                assert "<canvas" not in body
-        finally:
-            server.shutdown()
-            thread.join()
-    assert len(server.path) > 20
-    with PageServer(text) as other:
-        assert other.path != server.path
 
 
 def answer(server, path, host):

@@ -21,7 +21,7 @@ from pipeline.view.numbers import FACES, mesh_arrays
 from pipeline.view.page import render, write_page
 from pipeline.view.tool import tool_of
 from pipeline.view.viewpoint import Viewpoint
-from tests.cases import solve, study
+from tests.cases import study
 from tests.report.browser import CHROMIUM, Browser
 from tests.report.synthetic import dataset
 
@@ -101,12 +101,6 @@ def test_displacement_is_stored_to_a_share_of_the_largest(fields, numbers):
     on_probe = np.unique(arrays["cells"][arrays["faces"] // 4][arrays["groups"] == 1])
     assert np.abs(shift).max() == pytest.approx(0.2, rel=1e-4)
     assert shift[on_probe, 2].min() == pytest.approx(-0.2, rel=1e-4)
-
-
-def test_force_is_the_run_s(fields):
-    (record,) = solve(mesh={"epsilon": "8 mm"}).values()
-    assert fields.force == pytest.approx(record.force, rel=1e-6)
-    assert fields.force_error == pytest.approx(record.force_error, rel=1e-3)
 
 
 def test_mesh_alone_has_no_force_and_no_displacement():
