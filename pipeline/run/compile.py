@@ -12,7 +12,7 @@ from pipeline.solve.crack import compile_release
 from pipeline.solve.forms import compile_forms
 from pipeline.solve.kernels import native
 from pipeline.solve.meridian.problem import compile_axisymmetric
-from pipeline.solve.meridian.trials import TRIAL_DEGREE
+from pipeline.solve.meridian.punch import TRIAL_DEGREE
 from pipeline.solve.physics import LAWS
 from pipeline.solve.regular import compile_regular
 from pipeline.stages import stage

@@ -22,7 +22,7 @@ from pipeline.solve.far_field import FarField, Place, PointForce
 from pipeline.solve.krylov import DIRECT_LIMIT, SolveError, is_direct
 from pipeline.solve.meridian.contact import MeridianContact
 from pipeline.solve.meridian.problem import MeridianProblem
-from pipeline.solve.meridian.trials import RoundTool
+from pipeline.solve.meridian.punch import RoundTool
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.solve.quasi_static import QuasiStaticProblem

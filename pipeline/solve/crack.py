@@ -34,19 +34,18 @@ from mpi4py import MPI
 
 from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray
+from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve.compiled import form, scalar_space, vector_space
 from pipeline.solve.estimate import extrapolate_release, release_bar
 from pipeline.solve.forms import ElasticForms, dx, one_cell
 from pipeline.solve.movement import Vector
-from pipeline.solve.physics import strain
+from pipeline.solve.physics import pressurised, small_strain, strain
 
 # v is 1 up to the first of these shares of its radius, and nothing from the second on.
 _INNER, _OUTER = 0.4, 1.0
 # Nodes are moved by this share of that radius to see what becomes of the loads, and back.
 _STEP = 1e-4
-# The edges of a cell in the order of their nodes (basix).
-_EDGES = [(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)]
 
 
 @dataclass(frozen=True)
@@ -207,7 +206,7 @@ def moved_on(body: BodyMesh, front: Front, step: float) -> Iterator[None]:
     """Move the nodes of the mesh along with a ``front`` that goes on by a ``step`` (m), and back in the end."""
     advance, nodes, points = _advance(body, front), compat.geometry_dofs(body.mesh), body.mesh.geometry.x
     corners = advance.x.array[compat.cell_dofs(advance.function_space)]
-    middles = [(corners[:, i] + corners[:, j]) / 2 for i, j in _EDGES] if nodes.shape[1] > len(corners.T) else []
+    middles = [(corners[:, i] + corners[:, j]) / 2 for i, j in EDGES] if nodes.shape[1] > len(corners.T) else []
     moved, before = np.zeros(len(points)), points.copy()
     moved[nodes] = np.column_stack([corners, *middles])
     points[:, 2] -= step * moved
@@ -224,15 +223,9 @@ def _advance(body: BodyMesh, front: Front) -> Any:
 
 
 def _form(u: Any, advance: Any, lame: tuple[Any, Any], pressure: Any) -> Any:
-    lame_lambda, mu = lame
-    move = ufl.as_vector((0.0, 0.0, -advance))
-    stress = 2 * mu * strain(u) + lame_lambda * ufl.div(u) * ufl.Identity(3)
-    energy = ufl.inner(stress, strain(u)) / 2
-    if pressure is not None:
-        held, compliance = pressure
-        stress = stress + held * ufl.Identity(3)
-        energy = energy + held * ufl.div(u) - compliance * held**2 / 2
-    change = energy * ufl.div(move) - ufl.inner(stress, ufl.dot(ufl.grad(u), ufl.grad(move)))
+    move, small = ufl.as_vector((0.0, 0.0, -advance)), ufl.variable(strain(u))
+    energy = small_strain(small, *lame) if pressure is None else pressurised(small, *lame, *pressure)
+    change = energy * ufl.div(move) - ufl.inner(ufl.diff(energy, small), ufl.dot(ufl.grad(u), ufl.grad(move)))
     space = u.function_space
     return form(-change * dx(space))
 

@@ -129,10 +129,25 @@ def strain(u: Any) -> Any:
     return ufl.sym(ufl.grad(u))
 
 
+def axisymmetric_strain(u: Any, r: Any) -> Any:
+    """Return ε in the directions r, θ, z of a displacement (u_r, u_z) in the half plane of these r and z."""
+    slide = (u[0].dx(1) + u[1].dx(0)) / 2
+    return ufl.as_tensor([[u[0].dx(0), 0, slide], [0, u[0] / r, 0], [slide, 0, u[1].dx(1)]])
+
+
+def small_strain(strain: Any, lame_lambda: Any, lame_mu: Any) -> Any:
+    """Linear elasticity: λ/2 (tr ε)² + μ ε : ε."""
+    return lame_lambda / 2 * ufl.tr(strain) ** 2 + lame_mu * ufl.inner(strain, strain)
+
+
+def pressurised(strain: Any, lame_lambda: Any, lame_mu: Any, pressure: Any, compliance: Any) -> Any:
+    """Linear elasticity with λ₁ more than λ, by a pressure p = λ₁ tr ε and the compliance 1/λ₁: stationary in both."""
+    return small_strain(strain, lame_lambda, lame_mu) + pressure * ufl.tr(strain) - compliance * pressure**2 / 2
+
+
 def linear(gradient: Any, lame_lambda: Any, lame_mu: Any) -> Any:
-    """Linear elasticity: λ/2 (tr ε)² + μ ε : ε, ε the symmetric part of F − I."""
-    small = ufl.sym(gradient) - ufl.Identity(gradient.ufl_shape[0])
-    return lame_lambda / 2 * ufl.tr(small) ** 2 + lame_mu * ufl.inner(small, small)
+    """Linear elasticity, ε the symmetric part of F − I."""
+    return small_strain(ufl.sym(gradient) - ufl.Identity(gradient.ufl_shape[0]), lame_lambda, lame_mu)
 
 
 def neo_hookean(gradient: Any, lame_lambda: Any, lame_mu: Any) -> Any:

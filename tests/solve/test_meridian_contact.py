@@ -15,7 +15,7 @@ from pipeline.solve.compiled import compiling
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.meridian.contact import DEGREE, MeridianContact
 from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
-from pipeline.solve.meridian.trials import TRIAL_DEGREE, RoundTool
+from pipeline.solve.meridian.punch import TRIAL_DEGREE, RoundTool
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import Conditions

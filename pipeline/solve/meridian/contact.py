@@ -24,17 +24,13 @@ from pipeline.arrays import FloatArray
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Grading
 from pipeline.solve.krylov import SolveError
-from pipeline.solve.meridian.refine import DirectProblem, best_answer, error_bar, only_along_axis
+from pipeline.solve.meridian.punch import STEP, Punches, Rings, RoundTool
+from pipeline.solve.meridian.refine import DEGREE, Answer, MeridianSolver, error_bar
 from pipeline.solve.meridian.signs import LiftsOff, check_signs
 from pipeline.solve.meridian.system import HalfPlane, max_strain
-from pipeline.solve.meridian.trials import STEP, Rings, RoundTool, Trial, Trials
-from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.response import reaction
-from pipeline.solve.solution import Contact, Solution
-from pipeline.stages import recorded, stage
+from pipeline.stages import stage
 
-DEGREE = 5
 # A depth this near to the one asked for is near enough: F errs by its square.
 _NEAR, _MOST_TRIALS = 3e-4, 12
 # Powers of the radius that the depth may go like: 1 of a cone, 2 of a ball, more of flat tools with round edges.
@@ -45,62 +41,27 @@ _WIDEST = 0.999
 _ALONG, _BETWEEN = 20, 8
 
 
-class MeridianContact(DirectProblem):
+class MeridianContact(MeridianSolver):
     """The meridian of a round scene that a tool presses along its axis, in contact as far as that is pressed."""
 
     def __init__(self, meridian: HalfPlane, tool: RoundTool, *, accuracy: float = 1e-5, degree: int = DEGREE):
         """Prepare to refine until the error bar is at most ``accuracy``."""
-        self._meridian, self._tool = meridian, tool
-        self._accuracy, self._degree = accuracy, degree
+        super().__init__(meridian, accuracy=accuracy, degree=degree)
+        self._tool = tool
 
-    @stage("axisymmetric contact")
-    def solve(
-        self,
-        law: MaterialLaw,
-        movement: Movement,
-        *,
-        method: str = "auto",
-        tolerance: float = 0.0,
-        estimate: bool = True,
-    ) -> Solution:
-        """Find the contact at a depth, 0 <= ν <= 0.5, and its force.
+    def _answer(self, law: MaterialLaw, depth: float) -> Answer:
+        search = _Search(self._meridian, self._tool, law)
+        patch = search.find(depth)
+        try:
+            found = self._settled(search, patch, depth)
+        except LiftsOff:
+            if isinstance(self._meridian, EllipticMeridian):
+                raise
+            found = self._settled(search, search.find_rings(patch, depth), depth)
+        return replace(found, iterations=search.punches.count)
 
-        ``iterations`` counts the linear solves. Bars are there whether ``estimate`` asks for them or not.
-
-        Raises:
-            SolveError: if contact is no round patch, with rings lost or not, reaches the edge of the body, or is not
-                found; if a solve fails a check, or the error bar stays above 1e-3.
-        """
-        only_along_axis(movement)
-        (depth,) = movement.amounts
-        with recorded() as times:
-            search = _Search(self._meridian, self._tool, law)
-            patch = search.find(depth)
-            try:
-                best = self._settled(search, patch, depth)
-            except LiftsOff:
-                if isinstance(self._meridian, EllipticMeridian):
-                    raise
-                best = self._settled(search, search.find_rings(patch, depth), depth)
-        scale = law.lame_mu[0] * best.trial.unit
-        per_depth = scale * best.force / depth
-        response = reaction(
-            movement, np.array([[per_depth]]), np.array([[0.0, 0.0, -per_depth]]), balance=best.trial.balance
-        )
-        return Solution(
-            response=response,
-            largest={"max_strain": best.max_strain},
-            dofs=best.trial.forms.dofs,
-            cells=best.cells,
-            iterations=search.trials.count,
-            times=times,
-            bars=best.error * response.stiffness,
-            contact=Contact(best.area, best.error),
-            stored=scale * best.twice_energy / 2,
-        )
-
-    def _settled(self, search: "_Search", patch: "_Patch", depth: float) -> "_Found":
-        return best_answer(lambda grading: search.settle(patch, depth, grading, self._degree), self._accuracy)
+    def _settled(self, search: "_Search", patch: "_Patch", depth: float) -> Answer:
+        return self._best(lambda grading: search.settle(patch, depth, grading, self._degree))
 
 
 @dataclass(frozen=True)
@@ -121,19 +82,6 @@ class _Patch:
         return pi * (radius**2 - sum(outer**2 - inner**2 for inner, outer in self.lost))
 
 
-@dataclass(frozen=True, eq=False)
-class _Found:
-    """The contact at a depth: force and energy in units of μ a, area (m²), relative error."""
-
-    trial: Trial
-    area: float
-    force: float
-    twice_energy: float
-    error: float
-    max_strain: float
-    cells: int
-
-
 class _Search:
     """Looks for the radii of contact of a tool on the meridian of a body."""
 
@@ -145,21 +93,21 @@ class _Search:
         self._widest = kept if covers else _WIDEST * kept
         self._limit = min(tool.limit, self._widest)
         self._covers = covers
-        self.trials = Trials(meridian, tool, law)
+        self.punches = Punches(meridian, tool, law)
 
     def find(self, depth: float) -> _Patch:
         """Return the round patch of contact."""
         radius, power = self._on_half_space(depth)
         low, high, before = 0.0, self._limit, None
         for _ in range(_MOST_TRIALS):
-            trial = self.trials.at(radius)
-            if radius == self._limit and trial.depth <= depth:
+            punch = self.punches.at(radius)
+            if radius == self._limit and punch.depth <= depth:
                 if radius == self._widest < self._tool.limit and not self._covers:
                     raise SolveError("contact reaches the edge of what is kept of the body")
                 return _Patch(radius, inf)
-            if trial.depth <= 0:
+            if punch.depth <= 0:
                 raise SolveError("no area of contact was found: the tool does not touch on its axis first")
-            miss = log(trial.depth / depth)
+            miss = log(punch.depth / depth)
             if before is not None:
                 power = (miss - before[1]) / log(radius / before[0])
                 power = min(max(power, _POWERS[0]), _POWERS[1])
@@ -193,7 +141,7 @@ class _Search:
 
     def _lost(self, radius: float, depth: float, marks: FloatArray, before: Rings = ()) -> tuple[Rings, float]:
         """Return the rings that do not touch, and the widest distance (m) of nodes at their edges; from ``before``."""
-        radii, active = self.trials.touching(radius, depth, tuple(marks), before)
+        radii, active = self.punches.touching(radius, depth, tuple(marks), before)
         if not active[-1]:
             raise SolveError('contact on the meridian ends nearer to the axis than one round patch: use model = "3d"')
         (changes,) = np.nonzero(active[1:] != active[:-1])
@@ -205,21 +153,21 @@ class _Search:
         step = max((float(radii[i + 1] - radii[i]) for i in changes), default=0.0)
         return tuple(zip(edges[::2], edges[1::2], strict=True)), step
 
-    def settle(self, patch: _Patch, depth: float, grading: Grading, degree: int) -> _Found:
+    def settle(self, patch: _Patch, depth: float, grading: Grading, degree: int) -> Answer:
         """Return the contact at a depth, from solutions of two degrees with nearly the right radii.
 
         The error bar is that of :func:`error_bar`, and the squares of what the radii are off by.
         """
         radius = patch.radius
-        arrays, meshes = self.trials.mesh(radius, grading, patch.lost)
-        coarse = self.trials.solve(meshes, arrays, radius, degree - 1)
-        fine = self.trials.solve(meshes, arrays, radius, degree)
+        arrays, meshes = self.punches.mesh(radius, grading, patch.lost)
+        coarse = self.punches.solve(meshes, arrays, radius, degree - 1)
+        fine = self.punches.solve(meshes, arrays, radius, degree)
         force = fine.force(depth)
         if not force > 0:
             raise SolveError("the solution is not a number or takes no force")
         error = error_bar(coarse.force(depth), force, degree, max(coarse.balance, fine.balance))
         if patch.power < inf:
-            misses = [log(trial.depth / depth) for trial in (coarse, fine)]
+            misses = [log(punch.depth / depth) for punch in (coarse, fine)]
             error += max(np.square(misses)) * fine.stiffness * depth / force / patch.power
             radius *= exp(-misses[1] / patch.power)
         error += patch.off**2 * fine.stiffness * depth / force
@@ -228,8 +176,19 @@ class _Search:
             residual = fine.forms.residual(solution)
             check_signs(fine.forms, arrays, solution, residual, depth, self._tool.gap, self._tool.limit)
             strain = max_strain(fine.forms, arrays) / arrays.unit
-        twice_energy = 2 * pi * float(solution @ residual)
-        return _Found(fine, patch.area(radius), force, twice_energy, error, strain, len(arrays.cells))
+        return Answer(
+            stiffness=force / depth,
+            on_probe=-force / depth,
+            balance=fine.balance,
+            error=error,
+            unit=arrays.unit,
+            max_strain=strain,
+            dofs=fine.forms.dofs,
+            cells=len(arrays.cells),
+            iterations=self.punches.count,
+            area=patch.area(radius),
+            energy=pi * float(solution @ residual),
+        )
 
     def _on_half_space(self, depth: float) -> tuple[float, float]:
         """Return the radius on an elastic half-space, and the power of it that the depth goes like."""

@@ -5,96 +5,64 @@ nothing depends on the unit of anything. The force is the reaction: the residual
 probe's dofs, times 2π.
 """
 
-from dataclasses import dataclass, replace
-from math import inf, pi
+from math import pi
 
 import numpy as np
 
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
-from pipeline.mesh.meridian import (
-    AXIS,
-    Grading,
-    Meridian,
-    MeridianArrays,
-    meridian_mesh,
-)
-from pipeline.scene.model import FIXED, PROBE
+from pipeline.mesh.meridian import Grading, Meridian, meridian_mesh
 from pipeline.solve.krylov import SolveError
-from pipeline.solve.meridian.forms import JoinedForms, MeridianForms
-from pipeline.solve.meridian.refine import DirectProblem, best_answer, error_bar, meshes_of, only_along_axis, refined
-from pipeline.solve.meridian.system import (
-    HalfPlane,
-    Meshes,
-    factorised,
-    forms_of,
-    max_strain,
-)
-from pipeline.solve.movement import Movement
+from pipeline.solve.meridian.forms import MeridianForms
+from pipeline.solve.meridian.refine import DEGREE, Answer, MeridianSolver, error_bar
+from pipeline.solve.meridian.system import HalfPlane, Pressed, System, max_strain, meshes_of
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.response import reaction
-from pipeline.solve.solution import Solution
 from pipeline.solve.spaces import Conditions
-from pipeline.stages import recorded, stage
-
-DEGREE = 5
+from pipeline.stages import stage
 
 
-class MeridianProblem(DirectProblem):
+class MeridianProblem(MeridianSolver):
     """The meridian of a round scene, which a probe presses along its axis."""
 
     def __init__(self, meridian: HalfPlane, conditions: Conditions, *, accuracy: float = 1e-5, degree: int = DEGREE):
         """Prepare to refine until the error bar is at most ``accuracy``; ``degree`` is 3 at least."""
-        self._meridian, self._bonded = meridian, conditions.bonded
-        self._accuracy, self._degree = accuracy, degree
+        super().__init__(meridian, accuracy=accuracy, degree=degree)
+        self._bonded = conditions.bonded
 
-    @stage("axisymmetric")
-    def solve(
-        self,
-        law: MaterialLaw,
-        movement: Movement,
-        *,
-        method: str = "auto",
-        tolerance: float = 0.0,
-        estimate: bool = True,
-    ) -> Solution:
-        """Solve for 0 <= ν <= 0.5 and a movement along the axis; directly, refined until round-off stops it.
+    def _answer(self, law: MaterialLaw, depth: float) -> Answer:
+        return self._best(lambda grading: self._solve_on(grading, law, depth))
 
-        Takes the next mesh until the error bar is small enough, or there is no finer one; then takes the best. The
-        bars are there whether ``estimate`` asks for them or not; ``max_strain`` is that of cells at least a/10 away
-        from every singular point. ``dofs``, ``cells`` and ``iterations`` belong to the solve that gave F, the seconds
-        are of all; an iteration beyond the first refines what a slender body loses to round-off.
+    def _solve_on(self, grading: Grading, law: MaterialLaw, depth: float) -> Answer:
+        """Solve with degrees p - 1 and p on one mesh: the answer is that of p, its error bar comes from the difference.
 
         Raises:
-            SolveError: if the conditions contradict each other or nothing is held, if a solve fails a check, or if the
-                error bar stays above 1e-3.
+            SolveError: if a solve fails a check.
         """
-        only_along_axis(movement)
-        for tissue in law.parameters:
-            if not 0 <= tissue.poisson <= 0.5:
-                raise SolveError(f"Poisson's ratio is {tissue.poisson:g}, must be between 0 and 0.5")
-
-        def solve_on(grading: Grading) -> _Scaled:
-            with stage("meshing"):
-                arrays = self._meridian.mesh(grading)
-            return _solve_on(arrays, law, self._bonded, self._degree)
-
-        with recorded() as times:
-            best = best_answer(solve_on, self._accuracy)
-        a, mu, (amount,) = self._meridian.unit, law.lame_mu[0], movement.amounts
-        response = reaction(
-            movement,
-            np.array([[mu * a * best.stationary]]),
-            np.array([[0.0, 0.0, mu * a * best.on_probe]]),
-            balance=best.balance,
-        )
-        return Solution(
-            response=response,
-            largest={"max_strain": abs(amount) / a * best.max_strain},
-            dofs=best.forms.dofs,
-            cells=best.cells,
-            iterations=best.iterations,
-            times=times,
-            bars=best.error * response.stiffness,
+        with stage("meshing"):
+            arrays = self._meridian.mesh(grading)
+            meshes = meshes_of(arrays)
+        found: list[tuple[System, Pressed, float]] = []
+        for degree in (self._degree - 1, self._degree):
+            with stage("assembly"):
+                system = System(meshes, degree, law, bonded=self._bonded)
+            with system.factors(system.probe) as solve:
+                pressed = solve(np.full(len(system.probe), -1.0))
+            on_probe = 2 * pi * float(pressed.residual[system.probe].sum())
+            if on_probe >= 0:
+                raise SolveError("the tissue pulls at the probe that presses it")
+            found.append((system, pressed, on_probe))
+        (_, coarse, coarse_force), (system, fine, force) = found
+        with stage("solve"):
+            strain = max_strain(system.forms, arrays)
+        return Answer(
+            stiffness=fine.twice_energy,
+            on_probe=force,
+            balance=fine.balance,
+            error=error_bar(coarse_force, force, self._degree, max(coarse.balance, fine.balance)),
+            unit=arrays.unit,
+            max_strain=abs(depth) / arrays.unit * strain,
+            dofs=system.forms.dofs,
+            cells=len(arrays.cells),
+            iterations=fine.steps,
         )
 
 
@@ -104,54 +72,7 @@ def compile_axisymmetric(degree: int = DEGREE, *, curved: bool = False, lowest: 
     Those from the degree ``lowest`` on, if it is given.
     """
     example: HalfPlane = EllipticMeridian(2.0, 2.0, 1.0, 0.0) if curved else Meridian(2.0, 1.0, 1.0)
-    mesh, facets = meridian_mesh(example.mesh(Grading(1.0)))
-    for mixed in (False, True):
+    mesh = meridian_mesh(example.mesh(Grading(1.0)))
+    for poisson in (0.0, 0.5):
         for p in range(lowest or degree - 1, degree + 1):
-            MeridianForms(mesh, facets, p, mixed)
-
-
-@dataclass(frozen=True)
-class _Scaled:
-    """A solution for a = d = 1 and μ = 1 in region 0: the residual on the probe, and twice the energy.
-
-    ``error`` is relative.
-    """
-
-    on_probe: float
-    stationary: float
-    balance: float
-    forms: MeridianForms | JoinedForms
-    iterations: int
-    error: float = inf
-    max_strain: float = 0.0
-    cells: int = 0
-
-
-def _solve_on(arrays: MeridianArrays, law: MaterialLaw, bonded: bool, degree: int) -> _Scaled:
-    """Solve with degrees p - 1 and p on one mesh: the answer is that of p, its error bar comes from the difference."""
-    with stage("meshing"):
-        meshes = meshes_of(arrays)
-    coarse = _solve_degree(meshes, degree - 1, law, bonded)
-    fine = _solve_degree(meshes, degree, law, bonded)
-    error = error_bar(coarse.on_probe, fine.on_probe, degree, max(coarse.balance, fine.balance))
-    with stage("solve"):
-        return replace(fine, error=error, max_strain=max_strain(fine.forms, arrays), cells=len(arrays.cells))
-
-
-def _solve_degree(meshes: Meshes, degree: int, law: MaterialLaw, bonded: bool) -> _Scaled:
-    """Solve with one degree; refine the solution until round-off stops it."""
-    with stage("assembly"):
-        forms, definite = forms_of(meshes, degree, law)
-        stiffness = forms.stiffness()
-        probe, support = forms.locate(PROBE, 1), forms.locate(FIXED, 1)
-        zero = [support, forms.locate(FIXED, 0), forms.locate(AXIS, 0)]
-        if bonded:
-            zero.append(forms.locate(PROBE, 0))
-        free = np.setdiff1d(np.arange(forms.dofs), np.concatenate([probe, *zero]))
-        unknown = stiffness[free][:, free]
-    with factorised(unknown, definite=definite) as solve, stage("solve"):
-        solution, residual, balance, steps = refined(forms, solve, free, probe, support, np.full(len(probe), -1.0))
-    on_probe, twice_energy = (2 * pi * float(work) for work in (residual[probe].sum(), solution @ residual))
-    if on_probe >= 0:
-        raise SolveError("the tissue pulls at the probe that presses it")
-    return _Scaled(on_probe, twice_energy, balance, forms, steps)
+            MeridianForms({0: mesh}, p, MaterialLaw.of_moduli(1.0, poisson))

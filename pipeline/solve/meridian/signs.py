@@ -8,7 +8,7 @@ from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.meridian import MeridianArrays
 from pipeline.scene.model import FREE, PROBE
 from pipeline.solve.krylov import SolveError
-from pipeline.solve.meridian.forms import JoinedForms, MeridianForms
+from pipeline.solve.meridian.forms import MeridianForms
 
 # Tension below this share of the mean pressure, penetration below this share of the depth: what a radius that is off
 # by 1e-4 leaves.
@@ -25,7 +25,7 @@ class LiftsOff(SolveError):
 
 
 def check_signs(
-    forms: MeridianForms | JoinedForms, arrays: MeridianArrays, solution: FloatArray, residual: FloatArray,
+    forms: MeridianForms, arrays: MeridianArrays, solution: FloatArray, residual: FloatArray,
     depth: float, gap: Callable[[FloatArray], FloatArray], limit: float,
 ) -> None:  # fmt: skip
     """Check a ``solution`` (displacements in m, lengths of the mesh in units of ``arrays.unit``) and its ``residual``.

@@ -1,4 +1,4 @@
-"""What a round tool does that touches as far as is tried: linear scenes in the half plane (r, z).
+"""What a punch does, a round tool that touches up to a given radius: linear scenes in the half plane (r, z).
 
 See :mod:`pipeline.solve.meridian.contact`. Lengths are in units of the outer radius of contact, stresses in units of μ
 of region 0, displacements in metres.
@@ -13,12 +13,10 @@ import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
-from pipeline.mesh.meridian import AXIS, Grading, MeridianArrays
-from pipeline.scene.model import FIXED, PROBE
+from pipeline.mesh.meridian import Grading, MeridianArrays
 from pipeline.solve.krylov import SolveError
-from pipeline.solve.meridian.forms import JoinedForms, MeridianForms
-from pipeline.solve.meridian.refine import meshes_of, refined
-from pipeline.solve.meridian.system import HalfPlane, Meshes, factorised, forms_of
+from pipeline.solve.meridian.forms import MeridianForms, Meshes
+from pipeline.solve.meridian.system import HalfPlane, System, meshes_of
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
 
@@ -67,7 +65,7 @@ def _quarter_turn() -> tuple[FloatArray, FloatArray]:
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class PunchSolution:
     """What contact up to a radius gives, rings lost or not; ``punch`` is u₁ (per m of depth), ``pressed`` u₂ (m).
 
     ``depth`` (m) is that at which contact ends by itself at that radius, ``stiffness`` E₁₁ (per m) and ``preload`` E₁₂
@@ -82,21 +80,21 @@ class Trial:
     balance: float
     punch: FloatArray
     pressed: FloatArray
-    forms: MeridianForms | JoinedForms
+    forms: MeridianForms
 
     def force(self, depth: float) -> float:
         """Return F at a depth (m), in units of μ a times a metre."""
         return depth * self.stiffness + self.preload
 
 
-class Trials:
+class Punches:
     """Solves for contact of one tool on the meridian of one body; ``count`` says how often it did."""
 
     def __init__(self, meridian: HalfPlane, tool: RoundTool, law: MaterialLaw):
         self._meridian, self._tool, self._law = meridian, tool, law
         self.count = 0
 
-    def at(self, radius: float) -> Trial:
+    def at(self, radius: float) -> PunchSolution:
         """Return what contact up to a ``radius`` (m) gives, on a coarse mesh."""
         arrays, meshes = self.mesh(radius, _TRIAL)
         return self.solve(meshes, arrays, radius, TRIAL_DEGREE)
@@ -115,30 +113,30 @@ class Trials:
             arrays = meridian.mesh(grading)
             return arrays, meshes_of(arrays)
 
-    def solve(self, meshes: Meshes, arrays: MeridianArrays, radius: float, degree: int) -> Trial:
+    def solve(self, meshes: Meshes, arrays: MeridianArrays, radius: float, degree: int) -> PunchSolution:
         """Solve for a flat punch and for the gap, with one degree."""
         self.count += 1
         with stage("assembly"):
-            forms, definite = forms_of(meshes, degree, self._law)
-            stiffness = forms.stiffness()
-            dofs, places = forms.on(PROBE)
-            probe, support = dofs[:, 1], forms.locate(FIXED, 1)
-            zero = [support, forms.locate(FIXED, 0), forms.locate(AXIS, 0)]
-            free = np.setdiff1d(np.arange(forms.dofs), np.concatenate([probe, *zero]))
-            unknown = stiffness[free][:, free]
-            gap = self._tool.gap(np.minimum(places[:, 0] * arrays.unit, self._tool.limit))
-            edge = probe[np.argmax(places[:, 0])]
-        balance, solutions, residuals = 0.0, [], []
-        with factorised(unknown, definite=definite) as solve, stage("solve"):
-            for held in (np.full(len(probe), -1.0), gap):
-                solution, residual, off, _ = refined(forms, solve, free, probe, support, held)
-                solutions.append(solution)
-                residuals.append(residual)
-                balance = max(balance, off)
-        (punch, pressed), (by_punch, by_gap) = solutions, residuals
-        depth = -by_gap[edge] / by_punch[edge]
-        stiff, preload = (2 * pi * float(punch @ residual) for residual in (by_punch, by_gap))
-        return Trial(radius, arrays.unit, depth, stiff, preload, balance, punch, pressed, forms)
+            system = System(meshes, degree, self._law)
+            gap = self._gap(system, arrays)
+        with system.factors(system.probe) as solve:
+            flat, own = solve(np.full(len(gap), -1.0)), solve(gap)
+        edge = system.probe[-1]
+        return PunchSolution(
+            radius=radius,
+            unit=arrays.unit,
+            depth=-own.residual[edge] / flat.residual[edge],
+            stiffness=flat.twice_energy,
+            preload=2 * pi * float(flat.solution @ own.residual),
+            balance=max(flat.balance, own.balance),
+            punch=flat.solution,
+            pressed=own.solution,
+            forms=system.forms,
+        )
+
+    def _gap(self, system: System, arrays: MeridianArrays) -> FloatArray:
+        """Return the gap (m) at the tool's nodes."""
+        return self._tool.gap(np.minimum(system.radii * arrays.unit, self._tool.limit))
 
     def touching(
         self, radius: float, depth: float, marks: tuple[float, ...], lost: Rings
@@ -153,31 +151,19 @@ class Trials:
         """
         arrays, meshes = self.mesh(radius, _TRIAL, marks=marks)
         with stage("assembly"):
-            forms, definite = forms_of(meshes, TRIAL_DEGREE, self._law)
-            stiffness = forms.stiffness()
-            dofs, places = forms.on(PROBE)
-            order = np.argsort(places[:, 0])
-            probe, radii = dofs[order, 1], places[order, 0] * arrays.unit
-            zero = [forms.locate(FIXED, 1), forms.locate(FIXED, 0), forms.locate(AXIS, 0)]
-            others = np.setdiff1d(np.arange(forms.dofs), np.concatenate(zero))
-            bounds = self._tool.gap(np.minimum(radii, self._tool.limit)) - depth
+            system = System(meshes, TRIAL_DEGREE, self._law)
+            bounds = self._gap(system, arrays) - depth
+        radii = system.radii * arrays.unit
         active = bounds < 0
         for inner, outer in lost:
             active &= (radii < inner) | (radii > outer)
         for _ in range(_MOST_SETS):
             self.count += 1
-            free = np.setdiff1d(others, probe[active])
-            solution: FloatArray = np.zeros(forms.dofs)
-            solution[probe[active]] = bounds[active]
-            with (
-                factorised(stiffness[free][:, free], definite=definite) as solve,
-                stage("solve"),
-            ):
-                for _ in range(2):
-                    solution[free] -= solve(forms.residual(solution)[free])
-            reactions = forms.residual(solution)[probe]
+            with system.factors(system.probe[active]) as solve:
+                found = solve(bounds[active])
+            reactions, moved = found.residual[system.probe], found.solution[system.probe]
             slack = _SLACK * np.abs(reactions[active]).mean()
-            following = np.where(active, reactions < slack, solution[probe] - bounds > _SLACK * depth)
+            following = np.where(active, reactions < slack, moved - bounds > _SLACK * depth)
             if np.array_equal(following, active):
                 return radii, active
             active = following
