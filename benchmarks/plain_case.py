@@ -120,7 +120,7 @@ def make_mesh(case: Case) -> tuple[Any, dict[str, np.ndarray]]:
         if scene.is_cut or isfinite(case.body.bend):
             gmsh.model.mesh.setOrder(2)  # a column with flat sides is a thinner one: F would be 1 % low
         groups = {gmsh.model.getPhysicalName(2, tag): tag for _, tag in gmsh.model.getPhysicalGroups(2)}
-        mesh, tags = _model_to_mesh()
+        mesh, tags = model_to_mesh()
     mesh.geometry.x[:] *= scene.scale
     return mesh, {
         name: tags.find(tag) if hasattr(tags, "find") else tags.indices[tags.values == tag]
@@ -128,7 +128,7 @@ def make_mesh(case: Case) -> tuple[Any, dict[str, np.ndarray]]:
     }
 
 
-def _model_to_mesh() -> tuple[Any, Any]:
+def model_to_mesh() -> tuple[Any, Any]:
     """Return dolfinx's mesh of gmsh's current model, and its facets' tags."""
     try:
         from dolfinx.io.gmshio import model_to_mesh
