@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.printable import printable, printable_lines
-from pipeline.report.table import DatasetError
+from pipeline.report.table import DatasetError, warnings_of
 
 # What every dataset of a study has, and figures and report are made from.
 _NEEDED = (
@@ -63,7 +63,7 @@ def read(file: str | Path, output: str | Path = "results", warn: Callable[[str],
     dataset = _shown(load(path))
     if missing := [name for name in _NEEDED if name not in {*dataset.data_vars, *dataset.attrs}]:
         raise DatasetError(f"{path}: not a study's dataset: it has no {', '.join(missing)}")
-    for warning in filter(None, str(dataset.attrs.get("warnings", "")).split("\n")):
+    for warning in warnings_of(dataset):
         warn(warning)
     study = Path(file)
     if study != path and study.is_file() and _text_of(study) != dataset.attrs["study"]:

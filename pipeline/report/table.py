@@ -132,6 +132,11 @@ def study_of(dataset: xr.Dataset) -> Study | None:
     return _study(text, f"{folder}/{name}") or _study(text, name)
 
 
+def warnings_of(dataset: xr.Dataset) -> list[str]:
+    """Return the warnings of the dataset's study: what its forces leave out, which no error bar tells."""
+    return str(dataset.attrs.get("warnings", "")).splitlines()
+
+
 @lru_cache(8)  # figures, report and guide of a dataset ask for it again and again
 def _study(text: str, file: str) -> Study | None:
     try:

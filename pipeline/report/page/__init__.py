@@ -16,6 +16,7 @@ from pipeline.report.guide import guide_if_any
 from pipeline.report.page.cases import FIRST_ROWS, case_table
 from pipeline.report.page.facts import by_status, facts, origins, provenance, reproduce, struck, without_exact
 from pipeline.report.page.inline import inline_svg
+from pipeline.report.table import warnings_of
 
 # What the answer says of times, and the headlines need not say again.
 _TOLD = "speed-ups"
@@ -58,6 +59,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         facts=[fact for fact in facts(dataset) if not (guide and fact[0] == _TOLD)],
         failures=by_status(dataset, "failed"),
         without_exact=without_exact(dataset),
+        warnings=warnings_of(dataset),
         figures=_figures(dataset),
         guide=guide,
         table=table,

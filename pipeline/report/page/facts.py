@@ -54,7 +54,6 @@ def facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
             found.append((text, f"{np.nanmax(values):.2g}{unit}"))
     if any(name == "largest speed-up" for name, _ in found):
         found += [("speed-ups", text) for text in doubts(dataset)]
-    found += [("warning", text) for text in str(dataset.attrs.get("warnings", "")).split("\n") if text]
     if taken := _taken(dataset):
         found.append(("run", taken))
     return found
