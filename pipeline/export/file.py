@@ -52,49 +52,40 @@ from pipeline.arrays import FloatArray
 from pipeline.netcdf import write_netcdf
 from pipeline.realtime.model import Model
 from pipeline.realtime.pairs import Pairs
-from pipeline.realtime.read import FORMAT
+from pipeline.realtime.read import numbers_of
 from pipeline.realtime.surface import SurfaceTable
 
 Checks = Mapping[str, tuple[str, FloatArray]]
 Variable = tuple[tuple[str, ...], npt.NDArray[Any], dict[str, str]]
+
+# Of the numbers of a model: dimensions, of those that are no single one, and units, of those that have one.
+_DIMENSIONS: Mapping[str, tuple[str, ...]] = {
+    "reciprocal": ("poisson_node", "v", "u"),
+    "curvature": ("poisson_node", "v", "u"),
+    "tensors": ("tensor", "poisson_node", "v", "u"),
+    "height": ("face_v", "face_u"),
+    "bend": ("face_v", "face_u"),
+    "origin": ("component",),
+    "axes": ("row", "component"),
+    "bar": ("term",),
+    **dict.fromkeys(("even", "reach", "sides", "poisson_range"), ("pair",)),
+}
+_UNITS = {
+    **dict.fromkeys(("reciprocal", "height", "reach", "sides", "origin", "thickness", "off"), "m"),
+    **dict.fromkeys(("bend", "c_ref", "bend_error"), "1/m"),
+    "young": "Pa",
+    "aligned": "rad",
+}
 
 
 def write_model(
     path: Path, model: Model, checks: Checks, attributes: Mapping[str, str], surface: SurfaceTable | None = None
 ) -> None:
     """Write a model with its ``checks``, (unit, values) by name, in one piece or not at all."""
-    table = model.table
-    numbers = {
-        "format": FORMAT,
-        "c_ref": table.c_ref,
-        "is_round": float(table.is_round),
-        "thickness": model.thickness,
-        "young": model.young,
-        "poisson": model.poisson,
-        "largest": model.largest,
-        "leans": float(table.leans),
-        "off": model.off,
-        "aligned": model.aligned,
-        "bend_error": model.bend_error,
-    }
     variables: dict[str, Variable] = {
-        "reciprocal": (("poisson_node", "v", "u"), table.reciprocal, {"units": "m"}),
-        "curvature": (("poisson_node", "v", "u"), table.curvature, {"units": "1"}),
-        "even": (("pair",), np.array(table.even, dtype=float), {"units": "1"}),
-        "height": (("face_v", "face_u"), model.face.height, {"units": "m"}),
-        "bend": (("face_v", "face_u"), model.face.bend, {"units": "1/m"}),
-        "reach": (("pair",), np.array(table.reach), {"units": "m"}),
-        "sides": (("pair",), np.array(model.sides), {"units": "m"}),
-        "origin": (("component",), model.origin, {"units": "m"}),
-        "axes": (("row", "component"), model.axes, {"units": "1"}),
-        "poisson_range": (("pair",), np.array(table.poisson), {"units": "1"}),
-        "bar": (("term",), np.array(model.bar), {"units": "1"}),
+        name: (_DIMENSIONS.get(name, ()), values, {"units": _UNITS.get(name, "1")})
+        for name, values in numbers_of(model).items()
     }
-    if len(table.tensors):
-        variables["tensors"] = (("tensor", "poisson_node", "v", "u"), table.tensors, {"units": "1"})
-    units = {"c_ref": "1/m", "thickness": "m", "young": "Pa", "off": "m", "aligned": "rad", "bend_error": "1/m"}
-    for name, value in numbers.items():
-        variables[name] = ((), np.array(value), {"units": units.get(name, "1")})
     for name, (unit, values) in checks.items():
         variables[f"check_{name}"] = (("check",), np.asarray(values, dtype=float), {"units": unit})
     variables |= _of_surface(surface) if surface else {}

@@ -72,6 +72,16 @@ def model_of(data: bytes) -> Model:
     )
 
 
+def numbers_of(model: Model) -> dict[str, NDArray[np.float64]]:
+    """Return the numbers of a model as a file has them, by name; without what it knows of several tools."""
+    table, face = model.table, model.face
+    found = {name: getattr(model, name) for name in (*_NUMBERS, "bend_error", "sides", "origin", "axes", "bar")}
+    found |= {name: getattr(table, name) for name in ("reciprocal", "curvature", "c_ref", "reach", "even", "leans")}
+    found |= {"is_round": table.is_round, "poisson_range": table.poisson, "height": face.height, "bend": face.bend}
+    found |= {"format": FORMAT} | ({"tensors": table.tensors} if len(table.tensors) else {})
+    return {name: np.asarray(value, dtype=float) for name, value in found.items()}
+
+
 def _check(found: dict[str, NDArray[np.float64]]) -> None:
     """Hold the numbers of a file against what a model's can be."""
     shape, axes, (low, high) = found["reciprocal"].shape, found["axes"], found["poisson_range"]

@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.files import write_whole
 from pipeline.realtime.blade import RECTANGLE
+from pipeline.realtime.read import numbers_of
 from pipeline.realtime.surface import Surface
 from pipeline.realtime.touch import SENTENCES
 from pipeline.view import palette
@@ -100,25 +101,9 @@ def _told(surface: Surface) -> dict[str, Any]:
     """Return what the script is told besides the arrays; the camera's lengths are in mm, along the face's axes."""
     model, table = surface.model, surface.table
     low, high = table.points.min(axis=0), table.points.max(axis=0)
-    names = ("thickness", "young", "poisson", "largest", "sides", "bar", "off", "bend_error")
-    numbers = {name: getattr(model, name) for name in names} | {
-        "origin": model.origin.tolist(),
-        "axes": model.axes.tolist(),
-        "c_ref": model.table.c_ref,
-        "reach": model.table.reach,
-        "even": model.table.even,
-        "leans": model.table.leans,
-        "is_round": model.table.is_round,
-        "poisson_range": model.table.poisson,
-        "reciprocal": model.table.reciprocal.tolist(),
-        "curvature": model.table.curvature.tolist(),
-        "tensors": model.table.tensors.tolist(),
-        "height": model.face.height.tolist(),
-        "bend": model.face.bend.tolist(),
-        "rectangle": RECTANGLE.tolist(),
-    }
+    numbers = {name: values.tolist() for name, values in numbers_of(model).items()}
     return {
-        "model": numbers,
+        "model": {"tensors": [], "rectangle": RECTANGLE.tolist()} | numbers,
         "shape": table.amounts.shape,
         "eye": (np.array([-0.5, -0.75, 0.55]) / hypot(0.5, 0.75, 0.55)).tolist(),
         "centre": (_MM * (low + high) / 2).tolist(),

@@ -9,9 +9,10 @@ from scipy.special import ellipe, ellipk
 
 from pipeline.realtime import Model, ModelError
 from pipeline.realtime.blade import blade
+from pipeline.realtime.classic import read_doubles
 from pipeline.realtime.contact import Disc, ball, cone
 from pipeline.realtime.place import Place, Shape
-from pipeline.realtime.read import model_of
+from pipeline.realtime.read import model_of, numbers_of
 from tests.realtime.synthetic import random_model, write_random
 
 TOOLS = (
@@ -263,3 +264,13 @@ def test_a_model_and_a_touch_print_what_they_are_in_a_line():
 def test_a_query_with_a_word_that_there_is_not_is_refused():
     with pytest.raises(TypeError, match="raduis"):
         random_model().query("disc", at=(0.0, 0.0, 0.0), depth=1e-4, raduis=1e-3)
+
+
+def test_a_model_has_the_numbers_of_its_file(tmp_path):
+    write_random(tmp_path / "model.nc")
+    data = (tmp_path / "model.nc").read_bytes()
+    found = read_doubles(data)
+    numbers = numbers_of(model_of(data))
+    assert {"reciprocal", "tensors", "bar", "young"} <= set(numbers) <= {*found}
+    for name, values in numbers.items():
+        np.testing.assert_array_equal(values, found[name])
