@@ -26,9 +26,13 @@ _SOLVE = {1: (0.04, 0.75), 2: (0.165, 0.75), 3: (0.4, 0.8)}
 _BAR = {1: (0.03, 0.8), 2: (0.105, 0.8), 3: (0.3, 0.85)}
 # Of large strains: of steps, and of Newton's steps in them; their bar.
 _LARGE = {"solve": (9.7, 1.1), "bar": (0.48, 0.8)}
-# So many times as much: mixed elements, the search for what touches, several materials; meshes of curved bodies; the
-# proof of an accuracy.
-_MIXED, _SEARCH, _LAYERED, _CURVED, _PROOF = 1.4, 2.7, 1.8, 2.5, 1.6
+# Bodies of so many times the curvature of a ball of their volume have folds, whose elements cross at first; a liver has
+# 1.8, a folded brain 7, those on which meshing was timed 9 to 31.
+_FOLDED, _OF_BALL = 5.0, 15.6
+# So many times as much: mixed elements, the search for what touches, several materials; meshes of curved bodies
+# and of folded ones; the proof of an accuracy.
+_MIXED, _SEARCH, _LAYERED, _PROOF = 1.4, 2.7, 1.8, 1.6
+_MESHED = {"curved": 2.5, "folded": 18.0}
 _MERIDIAN, _MERIDIAN_BYTES = 0.27, 3.8e8
 # And one whose contact is to be found: so many times that.
 _FOUND, _TRIALS = "meridian contact", 1.7
@@ -126,7 +130,7 @@ def features(solve: Solve) -> tuple[str, float, float]:
     """Return what a solve's cost depends on: its kind, the tetrahedra (estimated) of the part modelled, ν.
 
     A kind is the element, its degree, the number of movements if there are several, whether contact is found,
-    whether there are several materials, and whether the body is curved.
+    whether there are several materials, and whether the body is curved, or folded.
     """
     case = solve.case
     if solve.axisymmetric:
@@ -135,7 +139,9 @@ def features(solve: Solve) -> tuple[str, float, float]:
     words += [str(case.movements)] if case.movements > 1 else []
     words += ["found"] if case.probe.is_unilateral else []
     words += ["regions"] if case.body.regions else []
-    words += [] if isinstance(case.body, Layered) else ["curved"]
+    if not isinstance(case.body, Layered):
+        folds = case.body.curvature > _FOLDED * _OF_BALL * case.body.volume ** (1 / 3)
+        words += ["folded" if folds else "curved"]
     return " ".join(words), estimate.cells(case) * 0.5 ** len(solve.mirrors), _poisson(case)
 
 
@@ -187,7 +193,7 @@ def _prior(stage: str, kind: str) -> _Numbers:
     element, degree, *words = kind.split()
     if stage == "mesh":
         seconds, power = _MESH
-        return log(seconds * (_CURVED if "curved" in words else 1.0)), power, 0.0
+        return log(seconds * _MESHED.get(words[-1] if words else "", 1.0)), power, 0.0
     if element not in ("displacement", "mixed"):  # the name of a law of large displacements
         seconds, power = _LARGE[stage]
         return log(seconds), power, _LOCKING

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
-from pipeline.shapes.triangles import half_edges
+from pipeline.shapes.files.edges import Edges
 
 # Points and facets that are looked at together: arrays of some ten megabytes.
 _AT_ONCE = 2_000_000
@@ -28,7 +28,8 @@ def facing(local: FloatArray, facets: IntArray, radius: float) -> IntArray:
     hit, _ = pierce(local, facets[chosen], np.zeros((1, 2)), nearest=True)
     if hit[0] < 0 or not len(chosen):
         return chosen[:0]
-    return chosen[_connected(facets[chosen], int(hit[0]))]
+    _, shell = Edges(facets[chosen]).shells
+    return chosen[shell == shell[hit[0]]]
 
 
 def pierce(
@@ -98,22 +99,3 @@ def _areas(corners: FloatArray) -> FloatArray:
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     area: Any = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     return area
-
-
-def _connected(facets: IntArray, start: int) -> IntArray:
-    """Return the numbers of the facets that are joined to one of them through edges."""
-    pairs = np.sort(half_edges(facets), axis=1)
-    order = np.lexsort((pairs[:, 1], pairs[:, 0]))
-    pairs, owner = pairs[order], order // 3
-    (same,) = np.nonzero((pairs[1:] == pairs[:-1]).all(axis=1))
-    one, other = owner[same], owner[same + 1]
-    reached = np.zeros(len(facets), dtype=bool)
-    reached[start] = True
-    while True:
-        grown = reached.copy()
-        grown[other[reached[one]]] = True
-        grown[one[reached[other]]] = True
-        if np.array_equal(grown, reached):
-            break
-        reached = grown
-    return np.flatnonzero(reached)

@@ -22,8 +22,8 @@ _STEEP = 1e-9
 _SAME = 1e-12
 # Normals are means over this share of a footprint's radius, to each side.
 _OF_FOOTPRINT, _MOST_CELLS = 0.1, 400
-# Of a folded brain the curvature is 9 times the area over the bend, of a liver 2; only steps of voxels have more.
-_MOST_CURVED = 10.0
+# Of folded surfaces the curvature is 9 to 38 times the area over the bend, of a liver 2. Steps of voxels have more.
+_MOST_CURVED = 40.0
 
 
 class Scanned(Facetted):

@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import pytest
 
+from benchmarks.folded import folded, study_of
 from pipeline.mesh.of_case import mesh_arrays
 from pipeline.plan import estimate
-from pipeline.plan.cost import CostModel
+from pipeline.plan.cost import CostModel, features
 from pipeline.plan.describe import summary
 from pipeline.plan.plan import make_plan
 from pipeline.plan.steps import MeshStep, OperatorStep, mesh_steps
+from pipeline.shapes.files.stl import written
 from tests.cases import BLADE, solve, study
 
 MESHES = {
@@ -97,3 +99,15 @@ def test_a_plan_says_that_large_displacements_may_not_be_followed_to_their_end()
     large, linear = (summary(make_plan(study(material={"law": law}))) for law in ("neo-hookean", "linear"))
     assert "is not known beforehand" in " ".join(large["notes"])
     assert linear["notes"] == []
+
+
+def test_a_folded_surface_takes_longer_to_mesh(tmp_path):
+    """Of one that is as large, and of a known mesh: its elements follow the folds, and are mended where they cross."""
+    _, points, facets = folded(307)
+    file = tmp_path / "folded.stl"
+    file.write_bytes(written(points, facets))
+    (solve,) = make_plan(study_of(file, points)).solves
+    kind, cells, poisson = features(solve)
+    plain = CostModel().seconds("mesh", kind.replace("folded", "curved"), cells, poisson)
+    assert kind.endswith("folded") and 0.5 < cells / 21_848 < 2.0
+    assert CostModel().seconds("mesh", kind, cells, poisson) > 5 * plain
