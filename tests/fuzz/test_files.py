@@ -80,17 +80,17 @@ def thrown_at(tmp_path_factory):
     return tmp_path_factory.mktemp("thrown")
 
 
-@given(data=st.data(), ending=st.sampled_from(["stl", "ply", "obj"]))
+@given(data=st.data(), ending=st.sampled_from(["stl", "ply", "obj"]), repair=st.booleans())
 @thrown(0.3)
-def test_surfaces(good, thrown_at, data, ending):
+def test_surfaces(good, thrown_at, data, ending, repair):
     file = thrown_at / f"box.{ending}"
     file.write_bytes(data.draw(damaged((good / file.name).read_bytes())))
     try:
-        loaded = load_surface(file, 1e-3)
+        loaded = load_surface(file, 1e-3, repair=repair)
     except SurfaceError as refused:
         readable(refused)
     else:
-        assert np.isfinite(loaded.triangles.points).all()
+        assert np.isfinite(loaded.triangles.points).all() and loaded.triangles.volume > 0
 
 
 @given(data=st.data(), ending=st.sampled_from(["nii", "nii.gz", "nrrd"]))
