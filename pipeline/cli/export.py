@@ -76,7 +76,7 @@ def export(
     from pipeline.export.export import write
     from pipeline.export.ranks import Ranks
     from pipeline.mesh.generate import MeshError
-    from pipeline.solve.krylov import SolveError
+    from pipeline.solve import SolveError
 
     comm = workflow.world()
     ranks = Ranks(comm, (lambda text: print(text, file=sys.stderr, flush=True)) if comm.rank == 0 else lambda _: None)

@@ -67,7 +67,7 @@ def fields_of(
     from pipeline.mesh.generate import MeshError
     from pipeline.run.mesh_cache import MeshCache
     from pipeline.run.problem import CaseFailure
-    from pipeline.solve.krylov import SolveError
+    from pipeline.solve import SolveError
     from pipeline.view.compute import compute_fields, solve_to_view
 
     if case.lost_contact:

@@ -9,6 +9,7 @@ from pipeline.run.measure import turned_back
 from pipeline.run.problem import law_of, movement_of
 from pipeline.run.record import Record
 from pipeline.shapes.frame import Vector
+from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.reduced_basis import Reduced, ReducedBasis
 
@@ -27,7 +28,11 @@ def reduced_records(
     solved: dict[float, Record] = {}
     found: dict[str, Reduced] = {}
     case = todo[0].case
-    with ReducedBasis(problem, movement_of(case), _ratio(todo[0]), case.solve.method) as basis:
+    least, space = MaterialLaw.of(_ratio(todo[0]), 1.0), problem.elements.displacements
+    with (
+        problem.solver(least, case.solve.method) as solver,
+        ReducedBasis(space, solver, movement_of(case)) as basis,
+    ):
         ends = [todo[0], todo[-1]]
         while todo:
             following = ends.pop() if ends else max(todo, key=lambda s: abs(found[s.key].bound) if found else inf)

@@ -15,7 +15,7 @@ from pipeline.mesh.generate import MeshError
 from pipeline.run.problem import CaseFailure
 from pipeline.run.record import UNFORESEEN
 from pipeline.run.store import StoreError
-from pipeline.solve.krylov import SolveError
+from pipeline.solve import SolveError
 
 T = TypeVar("T")
 

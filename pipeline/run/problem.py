@@ -15,11 +15,11 @@ from pipeline.run.memory import FreeMemory
 from pipeline.run.room import MEMORY_SHARE
 from pipeline.shapes.contact import first_touch
 from pipeline.shapes.probes._round import RoundIndenter
+from pipeline.solve import SolveError
 from pipeline.solve.contact.active_set import ContactError
 from pipeline.solve.contact.search import Tool
-from pipeline.solve.crack import Front
 from pipeline.solve.far_field import FarField, Place, PointForce
-from pipeline.solve.krylov import DIRECT_LIMIT, SolveError, is_direct
+from pipeline.solve.krylov import DIRECT_LIMIT, is_direct
 from pipeline.solve.meridian.contact import MeridianContact
 from pipeline.solve.meridian.problem import MeridianProblem
 from pipeline.solve.meridian.punch import RoundTool
@@ -28,7 +28,7 @@ from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.regular import BodyField
 from pipeline.solve.solution import Problem, Solution
-from pipeline.solve.spaces import Conditions, Spaces
+from pipeline.solve.spaces import Conditions, Front, Spaces
 from pipeline.study.sweep import Case
 
 # Unknowns up to which a direct solve is a way out where iterations do not converge.

@@ -3,3 +3,7 @@
 
 class CompilerError(Exception):
     """No C compiler works here; raised on every rank."""
+
+
+class SolveError(Exception):
+    """A solve that did not give a solution to rely on."""

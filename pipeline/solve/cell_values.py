@@ -18,10 +18,10 @@ from mpi4py import MPI
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve.compiled import cellwise_space, form, vector_space
-from pipeline.solve.crack import Front
 from pipeline.solve.forms import dx, one_cell
 from pipeline.solve.physics import MaterialLaw, of_regions
 from pipeline.solve.rim import clear_cells
+from pipeline.solve.spaces import Front
 from pipeline.stages import stage
 
 # Of each mesh, by the front of its slit: which cells are clear of singular edges.

@@ -24,7 +24,7 @@ It is quadratic in the amounts of the motions and of the loads: R_ij tells what 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from math import isfinite, nan
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -39,42 +39,11 @@ from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve.compiled import form, scalar_space, vector_space
 from pipeline.solve.estimate import extrapolate_release, release_bar
 from pipeline.solve.forms import ElasticForms, dx, one_cell
-from pipeline.solve.movement import Vector
 from pipeline.solve.physics import pressurised, small_strain, strain
+from pipeline.solve.spaces import Front
 
-# v is 1 up to the first of these shares of its radius, and nothing from the second on.
-_INNER, _OUTER = 0.4, 1.0
 # Nodes are moved by this share of that radius to see what becomes of the loads, and back.
 _STEP = 1e-4
-
-
-@dataclass(frozen=True)
-class Front:
-    """Where the front of a slit is, or a blade's tip in it, in a mesh whose probe presses along -z; lengths in m.
-
-    ``point`` is where the probe's axis meets the surface, ``along`` the unit vector along the front, which is ``depth``
-    below, from -``reach`` to ``reach`` or all through the body. Within ``radius`` of it nothing else is.
-    """
-
-    point: Vector
-    along: Vector
-    depth: float
-    reach: float
-    radius: float
-
-    @property
-    def normal(self) -> Vector:
-        """Unit vector across the slit."""
-        x, y, _ = self.along
-        return 0.0 - y, x, 0.0
-
-    def advance(self, x: FloatArray) -> FloatArray:
-        """Return by how much each of the points (3, n) goes along the axis (n,)."""
-        offset = x.T - np.array(self.point)
-        away = np.maximum(np.abs(offset @ np.array(self.normal)), np.abs(offset[:, 2] + self.depth))
-        if isfinite(self.reach):
-            away = np.maximum(away, np.abs(offset @ np.array(self.along)) - self.reach)
-        return np.asarray(np.clip((_OUTER - away / self.radius) / (_OUTER - _INNER), 0.0, 1.0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,7 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.arrays import FloatArray
+from pipeline.solve import SolveError
 from pipeline.solve.kernels.multigrid import Cycle, SmoothedLevel, free, interpolation
 from pipeline.solve.kernels.product import operator_of
 from pipeline.stages import stage
@@ -84,10 +85,6 @@ _ON_RANKS = {
 _prefixes = itertools.count()
 _NONE = np.empty(0, dtype=np.int32)
 INDEFINITE = PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC
-
-
-class SolveError(Exception):
-    """A solve that did not give a solution to rely on."""
 
 
 @contextmanager

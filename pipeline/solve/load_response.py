@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.arrays import FloatArray
+from pipeline.solve import SolveError
 from pipeline.solve.estimate import extrapolate
-from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Applied
 from pipeline.solve.movement import Movement, Vector
 from pipeline.solve.response import Sums, whole_force

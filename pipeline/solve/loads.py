@@ -18,7 +18,7 @@ from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.scene.model import FREE
-from pipeline.solve.krylov import SolveError
+from pipeline.solve import SolveError
 from pipeline.solve.vectors import add_from_ghosts, global_sum, vector
 
 Vector = tuple[float, float, float]

@@ -15,8 +15,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline import compat
+from pipeline.solve import SolveError
 from pipeline.solve.forms import HyperelasticForms
-from pipeline.solve.krylov import INDEFINITE, SOLVERS, LinearSolver, SolveError, configure, explain, keep, solver_of
+from pipeline.solve.krylov import INDEFINITE, SOLVERS, LinearSolver, configure, explain, keep, solver_of
 from pipeline.solve.spaces import ElasticSpace
 from pipeline.solve.vectors import assemble, fill, vector
 from pipeline.stages import stage

@@ -15,9 +15,9 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.arrays import FloatArray
+from pipeline.solve import SolveError
 from pipeline.solve.elements.base import Column, Elements, Equilibrium, Products, Solver, close_far
 from pipeline.solve.elements.displacement import DisplacementElements
-from pipeline.solve.krylov import SolveError
 from pipeline.solve.load_response import LoadResponse, imbalance, load_response_of
 from pipeline.solve.load_steps import LoadSteps, Walk
 from pipeline.solve.movement import Motion, Movement

@@ -21,7 +21,7 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray
 from pipeline.solve.cell_values import CellValues
 from pipeline.solve.contact.search import ContactSearch, Tool
-from pipeline.solve.crack import Advance, Front
+from pipeline.solve.crack import Advance
 from pipeline.solve.elements import elements_of
 from pipeline.solve.elements.base import Column, Elements, Equilibrium
 from pipeline.solve.elements.displacement import DisplacementElements, DisplacementSolver
@@ -34,7 +34,7 @@ from pipeline.solve.prescribed import PrescribedMotion, respond
 from pipeline.solve.response import Response
 from pipeline.solve.rim import plain_share
 from pipeline.solve.solution import TOLERANCE, Solution
-from pipeline.solve.spaces import Conditions, Spaces
+from pipeline.solve.spaces import Conditions, Front, Spaces
 from pipeline.stages import recorded, stage
 
 

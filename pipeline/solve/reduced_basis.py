@@ -20,8 +20,8 @@ from pipeline.arrays import FloatArray
 from pipeline.solve.krylov import LinearSolver, keep, solver_of
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.response import Response, reaction
+from pipeline.solve.spaces import ElasticSpace
 from pipeline.solve.vectors import global_sum, vector
 
 # λ_min is estimated from above, by Lanczos: its share that is relied on.
@@ -39,15 +39,17 @@ class Reduced:
 
 
 class ReducedBasis:
-    """Solutions of a problem for a few t, and what follows from them for others; a context manager."""
+    """Solutions in a space of displacements for a few t, and what follows from them for others; a context manager."""
 
-    def __init__(self, problem: QuasiStaticProblem, movement: Movement, smallest: float, method: str):
-        """Begin without solutions for a ``movement`` of one motion, ``smallest`` the least t asked for. Collective."""
-        self._problem, self._space = problem, problem.elements.displacements
+    def __init__(self, space: ElasticSpace, solver: LinearSolver, movement: Movement):
+        """Begin without solutions for a ``movement`` of one motion; collective.
+
+        The ``solver`` is that of the ``space`` for the least t that will be asked for, and must live as long.
+        """
+        self._space, self._solver = space, solver
         (motion,) = movement.motions
         self._movement, self._mirrored = movement, self._space.body.mirrored
         self._stack = ExitStack()
-        self._solver = self._stack.enter_context(problem.solver(MaterialLaw.of(smallest, 1.0), method))
         # What the residual is made of: first the loads, then two for each w.
         self._parts: list[PETSc.Vec] = []
         self._solutions: list[PETSc.Vec] = []

@@ -25,10 +25,11 @@ from mpi4py import MPI
 from pipeline import compat
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.distribute import BodyMesh, distribute
+from pipeline.solve import SolveError
 from pipeline.solve.compiled import form, vector_space
 from pipeline.solve.far_field import Place, PointForce
 from pipeline.solve.forms import compile_forms, one_cell
-from pipeline.solve.krylov import Level, LinearSolver, SolveError
+from pipeline.solve.krylov import Level, LinearSolver
 from pipeline.solve.movement import Motion
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.placed_force import PlacedForce, PlacedPull

@@ -13,7 +13,7 @@ from math import nan
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.krylov import SolveError
+from pipeline.solve import SolveError
 from pipeline.solve.movement import Movement, Vector
 from pipeline.solve.spaces import ElasticSpace
 from pipeline.solve.vectors import global_sum

@@ -14,7 +14,7 @@ from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.quantities import CLEAR
 from pipeline.scene.model import FIXED, MIRROR, PROBE
-from pipeline.solve.crack import Front
+from pipeline.solve.spaces import Front
 
 # A quarter point is at 0.25 of its edge, a mid node at 0.5, up to the bulge of a curved edge.
 _BETWEEN = 0.375

@@ -7,9 +7,9 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from pipeline.arrays import FloatArray
+from pipeline.solve import SolveError
 from pipeline.solve.crack import Advance
 from pipeline.solve.estimate import extrapolate, extrapolate_found
-from pipeline.solve.krylov import SolveError
 from pipeline.solve.load_response import LoadResponse, load_bars
 from pipeline.solve.movement import Movement, Vector
 from pipeline.solve.physics import MaterialLaw

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -18,22 +19,52 @@ from pipeline import compat
 from pipeline.arrays import FloatArray, Int32Array
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.scene.model import FIXED, MIRROR, PROBE
+from pipeline.solve import SolveError
 from pipeline.solve.compiled import vector_space
-from pipeline.solve.crack import Front
 from pipeline.solve.forms import ElasticForms, curved_cells, has_curved_cells
 from pipeline.solve.kernels.assembly import StraightStiffness
 from pipeline.solve.kernels.product import DEGREES, CellOperator, CellStiffness
-from pipeline.solve.krylov import SolveError
 from pipeline.solve.loads import Applied, Loads, apply_loads
-from pipeline.solve.movement import Motion
+from pipeline.solve.movement import Motion, Vector
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.vectors import assemble, fill
 from pipeline.stages import stage
 
+# v is 1 up to the first of these shares of its radius, and nothing from the second on.
+_INNER, _OUTER = 0.4, 1.0
 _ORIGIN = np.zeros((1, 3))
 _NO_DOFS = np.empty(0, dtype=np.int32)
 # A direction this near to an axis of coordinates is it.
 _SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class Front:
+    """Where the front of a slit is, or a blade's tip in it, in a mesh whose probe presses along -z; lengths in m.
+
+    ``point`` is where the probe's axis meets the surface, ``along`` the unit vector along the front, which is ``depth``
+    below, from -``reach`` to ``reach`` or all through the body. Within ``radius`` of it nothing else is.
+    """
+
+    point: Vector
+    along: Vector
+    depth: float
+    reach: float
+    radius: float
+
+    @property
+    def normal(self) -> Vector:
+        """Unit vector across the slit."""
+        x, y, _ = self.along
+        return 0.0 - y, x, 0.0
+
+    def advance(self, x: FloatArray) -> FloatArray:
+        """Return by how much each of the points (3, n) goes along the axis (n,)."""
+        offset = x.T - np.array(self.point)
+        away = np.maximum(np.abs(offset @ np.array(self.normal)), np.abs(offset[:, 2] + self.depth))
+        if isfinite(self.reach):
+            away = np.maximum(away, np.abs(offset @ np.array(self.along)) - self.reach)
+        return np.asarray(np.clip((_OUTER - away / self.radius) / (_OUTER - _INNER), 0.0, 1.0))
 
 
 @dataclass(frozen=True)

@@ -35,8 +35,8 @@ from pipeline.run.problem import (
     solve_problem,
 )
 from pipeline.run.record import Record
+from pipeline.solve import SolveError
 from pipeline.solve.compiled import vector_space
-from pipeline.solve.krylov import SolveError
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.study.sweep import Case, Study

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from pipeline.mesh.meridian import Grading, Meridian, generate_meridian
+from pipeline.solve import SolveError
 from pipeline.solve.compiled import compiling
-from pipeline.solve.krylov import SolveError
 from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw, Parameters

@@ -7,8 +7,8 @@ import pytest
 
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Grading
+from pipeline.solve import SolveError
 from pipeline.solve.compiled import compiling
-from pipeline.solve.krylov import SolveError
 from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw

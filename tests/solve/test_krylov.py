@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from petsc4py import PETSc
 
-from pipeline.solve import krylov
+from pipeline.solve import SolveError, krylov
 from pipeline.solve.hierarchical_estimate import energy_decrements
-from pipeline.solve.krylov import Level, LinearSolver, SolveError, keep
+from pipeline.solve.krylov import Level, LinearSolver, keep
 from pipeline.solve.movement import Movement
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import BALANCE_LIMIT, check_balance

@@ -11,8 +11,8 @@ from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build
 from pipeline.run.execute import compute
 from pipeline.shapes.rounded import Rounded
+from pipeline.solve import SolveError
 from pipeline.solve.compiled import compiling
-from pipeline.solve.krylov import SolveError
 from pipeline.solve.meridian.contact import DEGREE, MeridianContact
 from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
 from pipeline.solve.meridian.punch import TRIAL_DEGREE, RoundTool

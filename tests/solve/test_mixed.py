@@ -11,9 +11,9 @@ from petsc4py import PETSc
 
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.run.meshing import mesh_arrays, mesh_case
+from pipeline.solve import SolveError
 from pipeline.solve.elements.mixed import MixedElements
 from pipeline.solve.estimate import error_bar
-from pipeline.solve.krylov import SolveError
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from pipeline.solve import SolveError
 from pipeline.solve.kernels import multigrid
-from pipeline.solve.krylov import Level, LinearSolver, SolveError
+from pipeline.solve.krylov import Level, LinearSolver
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem

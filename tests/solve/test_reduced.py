@@ -30,7 +30,10 @@ def test_energy_falls_towards_that_of_a_solve_with_each_solution():
     with QuasiStaticProblem(Spaces(make_mesh(MPI.COMM_WORLD)), 2, Conditions()) as problem:
         wanted = problem.solve(law_of(0.4), PRESS).energy
         found = []
-        with ReducedBasis(problem, PRESS, t_of(0.0), "auto") as basis:
+        with (
+            problem.solver(law_of(0.0)) as solver,
+            ReducedBasis(problem.elements.displacements, solver, PRESS) as basis,
+        ):
             for poisson in RATIOS:
                 problem.solve(law_of(poisson), PRESS)
                 ((correction,),) = problem.corrections.values()
@@ -49,7 +52,8 @@ def test_many_evaluations_keep_no_memory():
     mesh = make_mesh(mesh={"fine": "2 mm", "rim": "0.5 mm"})
     with (
         QuasiStaticProblem(Spaces(mesh), 2, Conditions()) as problem,
-        ReducedBasis(problem, PRESS, t_of(0.0), "auto") as basis,
+        problem.solver(law_of(0.0)) as solver,
+        ReducedBasis(problem.elements.displacements, solver, PRESS) as basis,
     ):
         problem.solve(law_of(0.3), PRESS)
         ((correction,),) = problem.corrections.values()

@@ -18,8 +18,8 @@ from typing import Protocol
 import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
+from pipeline.solve import SolveError
 from pipeline.solve.contact.candidates import Candidates
-from pipeline.solve.krylov import SolveError
 from pipeline.stages import stage
 
 # A pull below this share of the mean reaction, and a way through below this share of the depth, are the solver's error.

@@ -11,12 +11,13 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
+from pipeline.solve import SolveError
 from pipeline.solve.contact.active_set import State
 from pipeline.solve.contact.candidates import Candidates, Surface
 from pipeline.solve.contact.elements import ContactDisplacement, FarShare, Unknowns
 from pipeline.solve.contact.levels import Hierarchy
 from pipeline.solve.elements.base import Elements
-from pipeline.solve.krylov import Level, LinearSolver, SolveError
+from pipeline.solve.krylov import Level, LinearSolver
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.vectors import vector
 from pipeline.stages import stage

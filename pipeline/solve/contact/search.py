@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
+from pipeline.solve import SolveError
 from pipeline.solve.contact.active_set import ContactError, Found, Obstacle, find_set
 from pipeline.solve.contact.area import Area, contact_area
 from pipeline.solve.contact.candidates import Candidates, Numbering, Surface
@@ -25,7 +26,6 @@ from pipeline.solve.contact.sweep import Sweep
 from pipeline.solve.contact.touch import Touch
 from pipeline.solve.elements.base import Column, Elements, Enriched, Equilibrium, close_far
 from pipeline.solve.estimate import error_bar, found_again_bar, found_bar
-from pipeline.solve.krylov import SolveError
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import Response, reaction

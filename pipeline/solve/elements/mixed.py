@@ -18,9 +18,10 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
+from pipeline.solve import SolveError
 from pipeline.solve.elements.base import Column, Elements, Enriched, Fields, Solver
 from pipeline.solve.elements.pressures import Pressures
-from pipeline.solve.krylov import Level, SolveError
+from pipeline.solve.krylov import Level
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw, SplitLaw
 from pipeline.solve.saddle import Saddle, SaddleSolver
