@@ -9,18 +9,17 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from shutil import copy
 from tempfile import TemporaryDirectory
-from types import SimpleNamespace
 from typing import Any
 
 import igl
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
+from benchmarks.one_run import stages_by
 from benchmarks.processor import processor_seconds
 from benchmarks.tables import markdown
 from pipeline import stages
@@ -28,7 +27,7 @@ from pipeline.plan.plan import make_plan
 from pipeline.run.compile import prepare
 from pipeline.run.execute import execute
 from pipeline.run.mesh_cache import MeshCache
-from pipeline.run.progress import Progress
+from pipeline.run.progress import MESHING, Progress
 from pipeline.run.record import Record
 from pipeline.shapes.files.stl import parse as read_stl
 from pipeline.shapes.files.stl import written
@@ -58,10 +57,10 @@ SCENES: dict[str, Scene] = {
 }
 # Parts of a place, by how the names of their stages begin; the rest is what none of them begins with.
 PARTS = {
-    "far surface": ("mesh cache / far surface",),
-    "mesh": ("surface", "gmsh", "curved", "dolfinx mesh", "mesh cache"),
-    "assembly": ("set-up", "spaces, forms"),
-    "iterations": ("iterations", "contact sets", "residuals", "strain"),
+    "far surface": ("meshing / mesh cache / far surface",),
+    "mesh": ("meshing",),
+    "assembly": ("set-up", "spaces, forms", "assembly"),
+    "iterations": ("solve", "contact sets", "strain"),
     "error bar": ("error bar",),
 }
 COLUMNS = {
@@ -81,33 +80,18 @@ _TIMES = 3
 
 
 class Meshes(Progress):
-    """Counts the meshes that were begun: a runner tells of each, of the operator on it, and of each solve."""
+    """Counts the meshes that were begun."""
 
     begun = 0
 
-    def begin(self, keys: Collection[str]) -> None:
+    def note(self, text: str) -> None:
         """Count."""
-        self.begun += 1
+        self.begun += text.startswith(MESHING)
 
     def taken(self) -> int:
         """Return how many meshes were begun since this was asked for."""
-        meshes, self.begun = self.begun // 3, 0
+        meshes, self.begun = self.begun, 0
         return meshes
-
-
-@contextmanager
-def stages_of_processors() -> Iterator[None]:
-    """Let stages count a processor's seconds instead of those of the clock, from nought."""
-    clock = stages.time
-    stages.table()
-    stages.seconds.clear()
-    stages.time = SimpleNamespace(perf_counter=processor_seconds)  # type: ignore[assignment]
-    stages._since[0] = processor_seconds()
-    try:
-        yield
-    finally:
-        stages.time, stages._since[0] = clock, clock.perf_counter()
-        stages.seconds.clear()
 
 
 def parts_of(seconds: Mapping[str, float]) -> dict[str, float]:
@@ -163,8 +147,8 @@ def measure(name: str, folder: Path) -> list[dict[str, Any]]:
         print(markdown(rows[-1:], COLUMNS).splitlines()[-1], flush=True)
 
     prepare(MPI.COMM_SELF, plan.solves)
-    with threadpool_limits(limits=1), stages_of_processors():
-        execute(plan, MPI.COMM_SELF, keep, meshes, None, MeshCache(folder))
+    with threadpool_limits(limits=1), stages_by(processor_seconds):
+        execute(plan, MPI.COMM_SELF, keep, meshes, cache=MeshCache(folder))
     return rows
 
 

@@ -232,7 +232,7 @@ def main() -> None:
     )
     asked = parser.parse_args()
     if asked.one:
-        measure(*json.movement(asked.one), repeats=asked.repeats)
+        measure(*json.loads(asked.one), repeats=asked.repeats)
         return
     table = Table(COLUMNS)
     for case in plan(asked.largest)[: asked.rows]:

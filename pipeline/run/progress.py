@@ -12,7 +12,8 @@ from pipeline.run.remaining import Remaining, format_seconds
 _SHARE, _SILENCE = 0.05, 30.0
 # Refreshes of the line on a terminal, per second: what is solved meanwhile should not notice.
 _REFRESH = 2
-_MESHING = "meshing: "
+# How a note of a mesh begins.
+MESHING = "meshing: "
 
 
 class Progress:
@@ -91,7 +92,7 @@ class Terminal(Progress):
 
     def note(self, text: str) -> None:
         """Show what is being worked on."""
-        step = self._remaining.step_of(text.removeprefix(_MESHING)) if self._remaining is not None else None
+        step = self._remaining.step_of(text.removeprefix(MESHING)) if self._remaining is not None else None
         self._step = self._step if step is None else step
         if self._bar is not None:
             self._bar.update(self._task, description=printable(text))

@@ -35,7 +35,7 @@ from pipeline.run.problem import (
     problem_of,
     solve_problem,
 )
-from pipeline.run.progress import Progress
+from pipeline.run.progress import MESHING, Progress
 from pipeline.run.provenance import provenance
 from pipeline.run.record import Record
 from pipeline.run.room import machine_load
@@ -243,7 +243,7 @@ class StepRunner:
     def _mesh(self, solve: Solve) -> BodyMesh:
         """Return the distributed mesh of a solve; collective. What is timed is made."""
         case = solve.meshed_case
-        self._progress.note(f"meshing: {solve.label}")
+        self._progress.note(f"{MESHING}{solve.label}")
         check_memory(self._free, estimate.case_memory(case, share=0.5 ** len(solve.mirrors)), "this case")
         return mesh_case(case, solve.mirrors, self._comm, None if case.solve.timing else self._cache)
 
