@@ -1,6 +1,7 @@
 """Contact whose area is found, on the meridian of round scenes: closed forms, work, and what is no round patch."""
 
 from math import log, pi, sqrt, tan
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,12 +11,14 @@ from pipeline.mesh.meridian import Meridian
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build
 from pipeline.run.execute import compute
+from pipeline.scene.model import PROBE
 from pipeline.shapes.rounded import Rounded
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import compiling
 from pipeline.solve.meridian.contact import DEGREE, MeridianContact
 from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
 from pipeline.solve.meridian.punch import TRIAL_DEGREE, RoundTool
+from pipeline.solve.meridian.signs import LiftsOff, check_signs
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import Conditions
@@ -152,3 +155,26 @@ def test_a_round_study_has_area_and_radius_of_contact():
     assert dataset["force"].values[1] == pytest.approx(2 * dataset["force"].values[0])
     assert dataset["contact_radius"].values == pytest.approx(1.28e-3, rel=0.05)
     assert dataset["contact_area"].values == pytest.approx(pi * dataset["contact_radius"].values ** 2)
+
+
+@pytest.mark.parametrize("scale", [0.01, 1.0, 100.0])
+@pytest.mark.parametrize(("steep", "pulls"), [(1.0, False), (1.016, False), (1.02, True)])
+def test_a_pull_is_judged_by_the_mean_pressure(scale, steep, pulls):
+    """Pressures 1 - c r² over a patch of radius 1, whose mean is 1 - c/2, of elements of degree 2."""
+    ends, radii = np.linspace(0.0, 1.0, 81), np.linspace(0.0, 1.0, 161)
+    place, weights = np.polynomial.legendre.leggauss(5)
+    shapes = np.stack([place * (place - 1) / 2, 1 - place**2, place * (place + 1) / 2])
+    residual = np.zeros(2 * len(radii))
+    for number, r in enumerate((ends[:-1, None] + ends[1:, None] + place / 80) / 2):
+        residual[4 * number + 1 : 4 * number + 7 : 2] -= shapes @ (weights / 160 * r * scale * (1 - steep * r**2))
+    here = np.arange(2 * len(radii)).reshape(-1, 2), np.column_stack([radii, 0 * radii])
+    nowhere = np.zeros((0, 2), dtype=int), np.zeros((0, 2))
+    forms = SimpleNamespace(on=lambda name: here if name == PROBE else nowhere)
+    edges = np.column_stack([np.arange(80), np.arange(1, 81)])
+    arrays = SimpleNamespace(points=np.column_stack([ends, 0 * ends]), facets={PROBE: edges}, unit=2e-3, order=1)
+    asked = forms, arrays, residual, residual, 1e-4, lambda r: r, 3e-3
+    if not pulls:
+        check_signs(*asked)
+        return
+    with pytest.raises(LiftsOff, match=r"1.99 mm from the axis the tool would pull with 1.5% of the mean"):
+        check_signs(*asked)
