@@ -14,8 +14,10 @@ from tests.report.chosen import TEXT, dataset
 
 ROOT = Path(__file__).parents[2]
 NOTEBOOK = ROOT / "notebooks" / "analysis.ipynb"
-EPSILONS = 'epsilon = ["3 mm", "5 mm", "7 mm", "10 mm", "15 mm", "20 mm", "full"]'
-MANY = TEXT.replace('epsilon = ["4 mm", "6 mm", "10 mm", "full"]', EPSILONS)
+EPSILONS = 'epsilon = ["3.5 mm", "5 mm", "7 mm", "10 mm", "15 mm", "20 mm", "full"]'
+MANY = TEXT.replace('epsilon = ["4 mm", "6 mm", "10 mm", "full"]', EPSILONS).replace(
+    'depth = "0.1 mm"', 'depth = "0.02 mm"'
+)
 ONE = MANY.split("[[probe]]")[0].replace("[0.3, 0.4]", "0.3") + "[probe]\n" + MANY.split('name = "needle"\n')[1]
 STUDIES = {
     "figure": MANY,
