@@ -27,7 +27,7 @@ from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.regular import BodyField
-from pipeline.solve.solution import Problem, Solution
+from pipeline.solve.solution import Problem, Request, Solution
 from pipeline.solve.spaces import Conditions, Front, Spaces
 from pipeline.study.sweep import Case
 
@@ -180,15 +180,15 @@ def solve_problem(case: Case, problem: Problem, *, estimate: bool, meshed: Case 
         SolveError: if that fails, too, or what is found cannot be.
     """
     law, movement = law_of(case), movement_of(case, meshed)
-    method, tolerance = case.solve.method, case.solve.tolerance
+    asked = Request(law, movement, case.solve.method, case.solve.tolerance, estimate)
     try:
-        solution = problem.solve(law, movement, method=method, tolerance=tolerance, estimate=estimate)
+        solution = problem.answer(asked)
     except ContactError:
         raise
     except SolveError:
-        if method != "auto" or not law.is_linear or not 0 < problem.dofs <= _MOST_DIRECT:
+        if asked.method != "auto" or not law.is_linear or not 0 < problem.dofs <= _MOST_DIRECT:
             raise
-        solution = problem.solve(law, movement, method="direct", tolerance=tolerance, estimate=estimate)
+        solution = problem.answer(replace(asked, method="direct"))
     if movement.far is not None:
         solution.times.setup += movement.far.seconds
     if solution.is_shut:

@@ -23,7 +23,7 @@ from pipeline.solve.load_steps import LoadSteps, Walk
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import Response, reaction, sums
-from pipeline.solve.solution import MOST_ROUNDS, check_balance, rest
+from pipeline.solve.solution import MOST_ROUNDS, Request, check_balance, rest
 from pipeline.solve.vectors import global_sum
 from pipeline.stages import stage
 
@@ -49,15 +49,13 @@ class PrescribedMotion:
         """Free what is kept from solve to solve."""
         self.corrections.clear()
 
-    def solve(
-        self, law: MaterialLaw, movement: Movement, stack: ExitStack, *, method: str, tolerance: float
-    ) -> Equilibrium:
-        """Solve for each motion of ``movement`` and for its loads; collective. The ``stack`` frees what is made.
+    def solve(self, asked: Request, stack: ExitStack) -> Equilibrium:
+        """Solve for each motion of the movement and for its loads; collective. The ``stack`` frees what is made.
 
         Raises:
             SolveError: if the elements are not for the law, the solver did not converge, or the solution fails a check.
         """
-        direct = self._elements.is_direct(method)
+        law, movement, direct = asked.law, asked.movement, self._elements.is_direct(asked.method)
         # A tool at many places: the same operator and the same motion, another far field each time.
         keep = self._reuse and movement.far is not None and not direct
         solver = self._set_up(law, movement, stack, direct=direct, keep=keep)
@@ -67,7 +65,7 @@ class PrescribedMotion:
         with stage("solve"):
             guessed = self._guess(columns, movement)
             todo = [column for column in columns if not (keep and self._law == law and column in guessed)]
-            iterations, response, load_response = self._iterate(solver, columns, todo, movement, tolerance)
+            iterations, response, load_response = self._iterate(solver, columns, todo, movement, asked.tolerance)
             self._law, self.corrections = (
                 law,
                 {

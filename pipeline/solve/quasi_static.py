@@ -13,7 +13,7 @@ cent on the same solution.
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
-from typing import Any, Protocol, Self
+from typing import Any, Protocol
 
 import numpy as np
 from petsc4py import PETSc
@@ -33,7 +33,7 @@ from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.prescribed import PrescribedMotion, respond
 from pipeline.solve.response import Response
 from pipeline.solve.rim import plain_share
-from pipeline.solve.solution import TOLERANCE, Solution
+from pipeline.solve.solution import Problem, Request, Solution
 from pipeline.solve.spaces import Conditions, Front, Spaces
 from pipeline.stages import recorded, stage
 
@@ -41,10 +41,8 @@ from pipeline.stages import recorded, stage
 class Constraint(Protocol):
     """What is asked of the surface that a tool touches."""
 
-    def solve(
-        self, law: MaterialLaw, movement: Movement, stack: ExitStack, *, method: str, tolerance: float
-    ) -> Equilibrium:
-        """Find the equilibrium for a ``movement`` of the tool; collective. The ``stack`` frees what is made.
+    def solve(self, asked: Request, stack: ExitStack) -> Equilibrium:
+        """Find the equilibrium for a movement of the tool; collective. The ``stack`` frees what is made.
 
         Raises:
             SolveError: if there is none, or what is found fails a check.
@@ -54,7 +52,7 @@ class Constraint(Protocol):
         """Free what is kept from solve to solve."""
 
 
-class QuasiStaticProblem:
+class QuasiStaticProblem(Problem):
     """Elements on a mesh with conditions: solves for any material and movement. A context manager."""
 
     def __init__(
@@ -84,10 +82,8 @@ class QuasiStaticProblem:
         self._values = CellValues(self._body, self.elements.displacements.forms.displacement)
         self._law: MaterialLaw | None = None  # of the last solution
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
+        """Free what is kept from solve to solve."""
         self.constraint.close()
         self.elements.close()
 
@@ -101,27 +97,19 @@ class QuasiStaticProblem:
         """Unknowns of the modelled part."""
         return self.elements.dofs
 
-    def solve(
-        self,
-        law: MaterialLaw,
-        movement: Movement,
-        *,
-        method: str = "auto",
-        tolerance: float = TOLERANCE,
-        estimate: bool = False,
-    ) -> Solution:
-        """Solve for each motion of ``movement``, with one set-up, and return forces and checks; collective.
+    def answer(self, asked: Request) -> Solution:
+        """Solve for each motion of the movement, with one set-up, and return forces and checks; collective.
 
-        ``tolerance`` is that of the energy norm of the solver's error. ``estimate`` goes on in elements of one degree
-        more, for the solution's ``decrements``, which may be negative for mixed ones, and ``bars``.
+        An estimate goes on in elements of one degree more, for the solution's ``decrements``, which may be negative for
+        mixed ones, and ``bars``.
 
         Raises:
             SolveError: if the elements are not for the law, the solver did not converge, or the solution fails a check;
                 a ContactError, if contact is not found.
         """
-        self._law = law
+        self._law = law = asked.law
         with recorded() as times, ExitStack() as stack:
-            found = self.constraint.solve(law, movement, stack, method=method, tolerance=tolerance)
+            found = self.constraint.solve(asked, stack)
             front, tip = self._released(self.elements, found.columns, law, found.movement)
             self.elements.show(found.columns)
             stored = found.solver.stored
@@ -138,7 +126,7 @@ class QuasiStaticProblem:
                 tip=tip,
                 stored=None if stored is None else 2.0 ** len(self._body.mirrored) * stored,
             )
-            if estimate:
+            if asked.estimate:
                 solution = self._estimated(solution, found, law)
                 self.elements.show(found.columns)
         return solution

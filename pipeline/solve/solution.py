@@ -1,8 +1,9 @@
 """What one solve gives, whatever the elements, and how well it must have been solved."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from math import isfinite, isnan, nan, pi
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -247,27 +248,50 @@ class Solution:
         )
 
 
-class Problem(Protocol):
+@dataclass(frozen=True)
+class Request:
+    """What is asked of a problem: what tissue of a ``law`` does in a ``movement`` of the probe, and its loads.
+
+    ``method`` is "auto", "direct" or "iterative"; ``tolerance`` is that of the energy norm of the solver's error,
+    relative. ``estimate`` asks for error bars.
+    """
+
+    law: MaterialLaw
+    movement: Movement
+    method: str = "auto"
+    tolerance: float = TOLERANCE
+    estimate: bool = False
+
+
+class Problem(ABC):
     """A body, conditions and elements, ready to be solved for any material and loads; a context manager."""
 
     @property
+    @abstractmethod
     def dofs(self) -> int:
         """Unknowns of the modelled part."""
 
-    def __enter__(self) -> Self: ...
+    def __enter__(self) -> Self:
+        return self
 
-    def __exit__(self, *_: object) -> None: ...
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
-    def solve(
-        self,
-        law: MaterialLaw,
-        movement: Movement,
-        *,
-        method: str = "auto",
-        tolerance: float = TOLERANCE,
-        estimate: bool = False,
-    ) -> Solution:
-        """Solve; ``estimate`` adds error bars. Collective.
+    @abstractmethod
+    def close(self) -> None:
+        """Free what is kept from solve to solve."""
+
+    def solve(self, law: MaterialLaw, movement: Movement, **how: Any) -> Solution:
+        """Solve for a ``law`` and a ``movement``; ``how`` is the rest of a :class:`Request`. Collective.
+
+        Raises:
+            SolveError: see :meth:`answer`.
+        """
+        return self.answer(Request(law, movement, **how))
+
+    @abstractmethod
+    def answer(self, asked: Request) -> Solution:
+        """Solve for what is asked; collective.
 
         Raises:
             SolveError: if the solver did not converge, or the solution fails a check.

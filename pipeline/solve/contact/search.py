@@ -30,7 +30,7 @@ from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import Response, reaction
 from pipeline.solve.rim import plain_share
-from pipeline.solve.solution import Contact, check_balance
+from pipeline.solve.solution import Contact, Request, check_balance
 from pipeline.solve.spaces import Spaces
 from pipeline.solve.vectors import global_sum
 from pipeline.stages import recharge, recorded, stage
@@ -96,19 +96,17 @@ class ContactSearch:
             self._sweep = None
 
     @stage("solve")
-    def solve(
-        self, law: MaterialLaw, movement: Movement, stack: ExitStack, *, method: str, tolerance: float
-    ) -> Equilibrium:
-        """Find the contact at the depth of ``movement``, and the force; collective. The ``stack`` frees what is made.
+    def solve(self, asked: Request, stack: ExitStack) -> Equilibrium:
+        """Find the contact at the depth of the movement, and the force; collective. The ``stack`` frees what is made.
 
         Raises:
             SolveError: if a linear solver fails, or the solution a check.
             ContactError: if the contact does not settle, reaches the candidates' edge where the probe does not end, or
                 what is held of the body.
         """
-        strict = _STRICTER * tolerance
+        law, movement, strict = asked.law, asked.movement, _STRICTER * asked.tolerance
         columns = self._elements.columns(movement, stack)
-        sweep = self._sweep_of(law, method, stack)
+        sweep = self._sweep_of(law, asked.method, stack)
         elements = sweep.elements
         self._couple(elements, movement, columns, law.lame_mu[0], strict)
         loaded = None if movement.loads is None else elements.free_response(columns[-1], strict)

@@ -1,20 +1,18 @@
 """How a problem on the meridian is made exact, and what is told of it: meshes are refined until the bar is small."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import nan
-from typing import Self
 
 import numpy as np
 
 from pipeline.mesh.meridian import Grading
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.meridian.system import HalfPlane, Unbalanced
-from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import reaction
-from pipeline.solve.solution import Contact, Solution
+from pipeline.solve.solution import Contact, Problem, Request, Solution
 from pipeline.stages import recorded, stage
 
 DEGREE = 5
@@ -45,17 +43,14 @@ class Answer:
     energy: float | None = None
 
 
-class MeridianSolver(ABC):
+class MeridianSolver(Problem):
     """A problem on this process alone, which holds nothing between solves: each makes meshes of its own."""
 
     def __init__(self, meridian: HalfPlane, *, accuracy: float = 1e-5, degree: int = DEGREE):
         """Prepare to refine until the error bar is at most ``accuracy``; ``degree`` is 3 at least."""
         self._meridian, self._accuracy, self._degree = meridian, accuracy, degree
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:  # noqa: B027
+    def close(self) -> None:
         """There is nothing to free."""
 
     @property
@@ -64,19 +59,11 @@ class MeridianSolver(ABC):
         return 0
 
     @stage("axisymmetric")
-    def solve(
-        self,
-        law: MaterialLaw,
-        movement: Movement,
-        *,
-        method: str = "auto",
-        tolerance: float = 0.0,
-        estimate: bool = True,
-    ) -> Solution:
+    def answer(self, asked: Request) -> Solution:
         """Solve for 0 <= ν <= 0.5 and a movement along the axis; directly, refined until round-off stops it.
 
         Takes the next mesh until the error bar is small enough, or there is no finer one; then takes the best. The
-        bars are there whether ``estimate`` asks for them or not; ``max_strain`` is that of cells at least a/10 away
+        bars are there whether they are asked for or not; ``max_strain`` is that of cells at least a/10 away
         from every singular point. ``dofs`` and ``cells`` belong to the solve that gave F, the seconds are of all.
         ``iterations`` are those of that solve, more than one where round-off was refined; where contact is found, they
         count the linear solves.
@@ -86,6 +73,7 @@ class MeridianSolver(ABC):
                 patch, with rings lost or not, or reaches the edge of the body; if a solve fails a check, or the error
                 bar stays above 1e-3.
         """
+        law, movement = asked.law, asked.movement
         if len(movement.motions) > 1 or movement.motions[0].is_rotation or any(movement.motions[0].direction[:2]):
             raise SolveError("the meridian serves movements along its axis only")
         for tissue in law.parameters:
