@@ -49,15 +49,16 @@ def median_seconds(ways: Mapping[str, Callable[[], Any]], repeats: int) -> dict[
     return {name: statistics.median(seconds) for name, seconds in found.items()}
 
 
-def ask(words: Sequence[str], ranks: int = 1, tree: Path = ROOT, launcher: Sequence[str] = ()) -> Any:
-    """Run Python with ``words`` in a process, or on ``ranks``, of its own; return the last line, JSON, that it prints.
+def ask(words: Sequence[str], ranks: int = 0, tree: Path = ROOT, launcher: Sequence[str] = ()) -> Any:
+    """Run Python with ``words`` in a process of its own, or on ``ranks``; return the last line, JSON, that it prints.
 
-    It has one thread, and imports what it needs from the checkout ``tree``. ``launcher`` are more words for mpirun.
+    It has one thread, and imports what it needs from the checkout ``tree``. mpirun, of which ``launcher`` are more
+    words, binds each rank to a core: what is compared with two ranks runs on one rank, too, not on none.
 
     Raises:
         RuntimeError: with what it said, if it fails.
     """
-    many = [*MPIRUN, str(ranks), *launcher] if ranks > 1 or launcher else []
+    many = [*MPIRUN, str(ranks), *launcher] if ranks else []
     paths = os.environ | MPI_ENVIRONMENT | {"PYTHONPATH": str(tree)}
     done = subprocess.run(
         [*many, sys.executable, "-m", "mpi4py", *words],
@@ -72,7 +73,7 @@ def ask(words: Sequence[str], ranks: int = 1, tree: Path = ROOT, launcher: Seque
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def run(study: dict[str, Any], ranks: int = 1, tree: Path = ROOT, **how: Any) -> dict[str, Any]:
+def run(study: dict[str, Any], ranks: int = 0, tree: Path = ROOT, **how: Any) -> dict[str, Any]:
     """Return what a run of ``study`` takes and gives in a process of its own: see :mod:`benchmarks.one_run`.
 
     Raises:
