@@ -9,6 +9,7 @@ import copy
 import itertools
 import json
 import math
+import subprocess
 import sys
 import tempfile
 import time
@@ -125,6 +126,11 @@ def _accuracy(study: Study) -> None:
     study["mesh"]["accuracy"] = "5 %"
 
 
+_DRAW = """
+import sys, gmsh
+gmsh.initialize(); gmsh.option.setNumber("General.Terminal", 0)
+gmsh.model.occ.addBox(-20, -20, -20, 40, 40, 20); gmsh.model.occ.synchronize(); gmsh.write(sys.argv[1])
+"""
 _BLADE = {"shape": "blade", "length": "8 mm", "width": "2 mm"}
 _CUT = _BLADE | {"action": "cut", "slice": "0.3 mm"}
 _SLIT = _BLADE | {"action": "cut", "width": "1 mm", "incision": "8 mm", "ahead": "3 mm"}
@@ -190,7 +196,6 @@ def study_of(features: tuple[Feature, ...]) -> Study:
 
 def write_bodies(folder: Path) -> None:
     """Write the box of the base study as a CAD file, as a surface and as an image, a bit rounded there."""
-    import gmsh
     import nrrd
     import numpy as np
 
@@ -205,14 +210,8 @@ def write_bodies(folder: Path) -> None:
         "space units": ["mm"] * 3,
     }
     nrrd.write(str(folder / "box.nrrd"), label, header | {"space origin": np.array([-23.0, -23.0, -23.0])})
-    gmsh.initialize([""], readConfigFiles=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.model.occ.addBox(-20, -20, -20, 40, 40, 20)
-        gmsh.model.occ.synchronize()
-        gmsh.write(str(folder / "box.brep"))
-    finally:
-        gmsh.finalize()
+    # In a process of its own: in this one the mesher may have begun.
+    subprocess.run([sys.executable, "-c", _DRAW, str(folder / "box.brep")], check=True, capture_output=True)
 
 
 def run(features: tuple[Feature, ...], folder: Path, *, solved: bool = True) -> Result:

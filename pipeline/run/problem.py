@@ -82,9 +82,8 @@ def meridian_problem(case: Case) -> Problem:
 
 def conditions_of(case: Case) -> Conditions:
     """Return what the probe of ``case`` prescribes."""
-    bonded, unilateral = case.probe.contact == "bonded", case.probe.is_unilateral
-    tip = None if bonded else _tip_of(case)
-    return Conditions(bonded=bonded, unilateral=unilateral, front=_front_of(case), tip=tip)
+    front, tip = _fronts_of(case)
+    return Conditions(bonded=case.probe.contact == "bonded", unilateral=case.probe.is_unilateral, front=front, tip=tip)
 
 
 def tool_of(case: Case) -> Tool:
@@ -100,22 +99,15 @@ def tool_of(case: Case) -> Tool:
     return Tool(height, lambda points: probe.ends_at(frame.local(points)[:, :2]), first)
 
 
-def _front_of(case: Case) -> Front | None:
-    """Return the front of the slit that the probe of ``case`` stands in, if it does."""
+def _fronts_of(case: Case) -> tuple[Front | None, Front | None]:
+    """Return the front of the slit that the probe of ``case`` stands in, and the tip of a blade that slides there."""
     slit, frame = case.probe.slit, case.frame.upright
     if slit is None:
-        return None
-    radius = _CLEAR * slit.room(case.body)
-    return Front(frame.point, frame.along, slit.depth, slit.reach, radius)
-
-
-def _tip_of(case: Case) -> Front | None:
-    """Return the tip of the blade of ``case`` that stands in a slit, if it does."""
-    slit, frame = case.probe.slit, case.frame.upright
-    if slit is None:
-        return None
-    radius = _CLEAR * slit.room_at_tip(case.body)
-    return Front(frame.point, frame.along, slit.tip, slit.length / 2, radius)
+        return None, None
+    front = Front(frame.point, frame.along, slit.depth, slit.reach, _CLEAR * slit.room(case.body))
+    if case.probe.contact == "bonded":
+        return front, None
+    return front, Front(frame.point, frame.along, slit.tip, slit.length / 2, _CLEAR * slit.room_at_tip(case.body))
 
 
 def round_tool_of(case: Case) -> RoundTool:
