@@ -11,9 +11,10 @@ import pytest
 from benchmarks.folded import folded, study_of
 from pipeline.mesh.curve import curve
 from pipeline.mesh.generate import MeshError, flat_cells
-from pipeline.mesh.of_case import mesh_arrays
+from pipeline.mesh.of_case import mesh_arrays, sizes_of
 from pipeline.mesh.organ import make
 from pipeline.mesh.organ.base import far_surface
+from pipeline.mesh.organ.contact import set_in
 from pipeline.mesh.organ.make import mesh_organ, mesh_scanned
 from pipeline.mesh.organ.remesh import _closed
 from pipeline.mesh.organ.sheet import FREE, PROBE, Sheet, edges_of
@@ -264,6 +265,22 @@ def test_a_folded_surface_is_meshed(tmp_path, seed):
     assert np.quantile(qualities(mesh), 0.01) > 0.1
     assert np.quantile(off, 0.9) < 1e-9
     assert mesh.deviation == pytest.approx(off.max())
+
+
+def test_a_footprint_next_to_a_fold_is_set_in_with_a_narrower_collar(tmp_path):
+    """What lies a quarter of the radius beside the disc is folded; the disc itself fits."""
+    _, points, facets = folded(402)
+    file = tmp_path / "folded.stl"
+    file.write_bytes(written(points, facets))
+    case = make_plan(study_of(file, points)).solves[0].case
+
+    def lift(places):
+        return case.body.lift(case.frame, places)[0]
+
+    contact = set_in(far_surface(case.body).sheet, case.frame, case.probe, sizes_of(case), lift)
+    edges_of(contact.sheet.facets)
+    rim = case.frame.local(contact.sheet.points[contact.rim])
+    np.testing.assert_allclose(np.hypot(*rim[:, :2].T), 1.5e-3, rtol=1e-9)
 
 
 def test_a_tangle_that_nothing_mends_is_told_by_its_place(file, monkeypatch):

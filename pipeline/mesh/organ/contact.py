@@ -21,8 +21,9 @@ from pipeline.shapes.rays import facing
 from pipeline.shapes.triangles import half_edges
 
 Lift = Callable[[FloatArray], FloatArray]
-# What is meshed anew reaches this far past the footprint, in units of its radius, if facets are small.
-_COLLAR = 1.25
+# What is meshed anew reaches this far past the footprint, in units of its radius, if facets are small; less far where a
+# fold is next to it.
+_COLLARS = (1.25, 1.1, 1.0)
 # Corners of an outline turn by more than this (cosine).
 _CORNER = 0.9
 # A round outline is followed this many times closer than its elements.
@@ -92,12 +93,15 @@ def set_in(sheet: Sheet, frame: Frame, probe: Probe, sizes: Sizes, lift: Lift) -
     if not (np.isfinite(lifted).all() and np.isfinite(followed).all()):
         raise GeometryError("a part of the footprint's edge has no tissue below it that is joined to the contact")
     local = frame.local(sheet.points)
-    patch = _patch(sheet, local, _COLLAR * probe.circumradius + sizes.rim)
+    for collar in _COLLARS:
+        patch = _patch(sheet, local, collar * probe.circumradius + sizes.rim)
+        loops = _loops(sheet.facets[patch])
+        if not _lines_cross(local[:, :2], loops, rim):
+            break
+    else:
+        raise FoldedError(f"{_FOLDED}; for a rough surface, `smooth` takes lengths that are taken off")
     if (sheet.group[patch] == FIXED).any():
         raise GeometryError("the footprint lies on, or next to, what is held of the body")
-    loops = _loops(sheet.facets[patch])
-    if _lines_cross(local[:, :2], loops, rim):
-        raise FoldedError(f"{_FOLDED}; for a rough surface, `smooth` takes lengths that are taken off")
     plane = _mesh_plane(local[:, :2], loops, rim, probe, sizes)
     return _joined(sheet, patch, plane, lift, lifted, followed)
 
