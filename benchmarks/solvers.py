@@ -105,9 +105,9 @@ def case_of(degree: int, size: tuple[float, float]) -> Any:
 
 def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[Any, Callable[[], Any]]:
     """Return the operator, and what assembles, sets up and solves once."""
+    from pipeline.solve.balance import TOLERANCE
+    from pipeline.solve.compiled import vector
     from pipeline.solve.krylov import LinearSolver
-    from pipeline.solve.solution import TOLERANCE
-    from pipeline.solve.vectors import vector
 
     space = problem.elements.displacements
     lend = space.lend_product if space.degree > 1 else space.lend
@@ -135,9 +135,9 @@ def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple
 
 def _mixed_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[Any, Callable[[], Any]]:
     """The same for mixed elements; a set-up that serves all ratios counts for one."""
+    from pipeline.solve.balance import TOLERANCE
     from pipeline.solve.elements.mixed import LAME
     from pipeline.solve.saddle import SaddleSolver
-    from pipeline.solve.solution import TOLERANCE
 
     direct, elements, c = method == "direct", problem.elements, 1 / (law.parameters[0].ratio - LAME.lame_lambda[0])
     start = time.process_time()

@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.surface import Surface
-from pipeline.solve.loads import Loads, SurfaceLoad
+from pipeline.solve.movement import Loads, SurfaceLoad
 from pipeline.study.loads import FREE, Cap, Traction
 from pipeline.study.sweep import Case
 

@@ -16,7 +16,8 @@ from pipeline.shapes.contact import first_touch
 from pipeline.shapes.frame import Vector
 from pipeline.shapes.indenter import Indenter
 from pipeline.solve.estimate import is_graded
-from pipeline.solve.solution import Contact, Solution
+from pipeline.solve.response import Contact
+from pipeline.solve.solution import Solution
 from pipeline.study.sweep import Case
 
 _ROUNDING = 1e-9
@@ -91,7 +92,7 @@ def _of_contact(contact: Contact | None) -> dict[str, Any]:
 
 def _of_loads(case: Case, solution: Solution) -> dict[str, Any]:
     """Return what a record holds of loads, nothing where there are none."""
-    loaded, movement, contact = solution.load_response, solution.response.movement, solution.contact
+    loaded, contact = solution.load_response, solution.contact
     if contact and not isnan(contact.sag):  # loads bend the surface, and the depth counts from the first touch
         none = (0.0, 0.0, 0.0)
         touching = {"load_force": 0.0, "load_force_error": 0.0, "load_force_vector": none}
@@ -105,7 +106,7 @@ def _of_loads(case: Case, solution: Solution) -> dict[str, Any]:
         "load_force_vector": turned_back(case.frame.turn, _known_of(case, force)),
         "load_energy": loaded.energy,
         # Where the probe bears no force along its axis: held at a depth d it bears k d + load_force.
-        "sag": -force[2] / loaded.stiffness_along(movement, axis),
+        "sag": -force[2] / loaded.stiffness_along(axis),
     }
 
 

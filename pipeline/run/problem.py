@@ -18,12 +18,12 @@ from pipeline.shapes.probes._round import RoundIndenter
 from pipeline.solve import SolveError
 from pipeline.solve.contact.active_set import ContactError
 from pipeline.solve.contact.search import Tool
-from pipeline.solve.far_field import FarField, Place, PointForce
+from pipeline.solve.far_field import PointForce
 from pipeline.solve.krylov import DIRECT_LIMIT, is_direct
 from pipeline.solve.meridian.contact import MeridianContact
 from pipeline.solve.meridian.problem import MeridianProblem
 from pipeline.solve.meridian.punch import RoundTool
-from pipeline.solve.movement import Movement
+from pipeline.solve.movement import FarField, Movement, Place
 from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.regular import BodyField

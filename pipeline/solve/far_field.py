@@ -9,33 +9,14 @@ energy of what the far field leaves out: of the order (a/ε)³ (small, bonded) a
 
 from dataclasses import dataclass, replace
 from math import log, pi
-from typing import Protocol, Self
 
 import numpy as np
 
 from pipeline.arrays import FloatArray
+from pipeline.solve.movement import Place
 
 # Below the centre there is no direction aside; a point this near to it, in units of the radius, is it.
 _TINY, _AT_CENTRE = 1e-14, 1e-9
-
-Place = tuple[float, float, float]
-
-
-class FarField(Protocol):
-    """A displacement of what is beyond the cut face, free of loads but there; hashable."""
-
-    @property
-    def seconds(self) -> float:
-        """What it took to find."""
-
-    def at(self, points: FloatArray) -> FloatArray:
-        """Return the displacement (n, 3) of a unit, in m, at points (n, 3), in m, on the cut face."""
-
-    def stiffness(self, mu: float) -> float:
-        """Return twice the strain energy (N/m) of a unit beyond the cut face, for the shear modulus ``mu`` (Pa)."""
-
-    def moved(self, centre: Place) -> Self:
-        """Return it as it is seen from a half ball of the same size round another ``centre`` (m)."""
 
 
 @dataclass(frozen=True)

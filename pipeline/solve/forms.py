@@ -5,7 +5,7 @@ ever compiled in. Each form is made when it is first asked for, which is collect
 """
 
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -18,10 +18,15 @@ from pipeline.arrays import BoolArray, Int32Array
 from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import distribute
 from pipeline.mesh.generate import MeshArrays
-from pipeline.solve.compiled import cellwise_space, form, scalar_space, vector_space
-from pipeline.solve.kernels.assembly import cell_kernel
-from pipeline.solve.kernels.cells import quadrature_degree
+from pipeline.solve.compiled import cellwise_space, form, quadrature_degree, scalar_space, vector_space
 from pipeline.solve.physics import LAWS, MaterialLaw, of_regions, strain
+
+
+class CellKernel(Protocol):
+    """Gives the address of a kernel for the stiffness of straight cells, as dolfinx calls them."""
+
+    def __call__(self, degree: int, *, of_regions: bool) -> int: ...  # noqa: D102
+
 
 # Marks of cells, and the bulge of an edge, in units of its length, that rounding may leave.
 _NEITHER, _STRAIGHT, _CURVED = 0, 1, 2
@@ -35,11 +40,12 @@ class ElasticForms:
     """Forms of linear elasticity, K = λ ∫ div u div v + μ ∫ 2 ε(u) : ε(v), on one space.
 
     ``lame`` are λ and μ in them: constants, or, on a mesh of several ``regions`` (of the local cells, ghosts too),
-    functions that are constant on each cell. ``displacement`` is the function that ``action``, K u, acts on.
+    functions that are constant on each cell. ``displacement`` is the function that ``action``, K u, acts on. K of
+    straight cells is integrated by the ``cell_kernel``, if there is one.
     """
 
-    def __init__(self, space: Any, regions: Int32Array | None = None):
-        self._space, self._regions = space, regions
+    def __init__(self, space: Any, regions: Int32Array | None = None, cell_kernel: CellKernel | None = None):
+        self._space, self._regions, self._cell_kernel = space, regions, cell_kernel
         self.displacement = fem.Function(space)
         self.lame = self._coefficient(), self._coefficient()
 
@@ -87,8 +93,10 @@ class ElasticForms:
         return self._form(self.displacement, dx(self._space))
 
     def _kernels(self) -> dict[int, int]:
-        """Return a kernel for the straight cells, which takes a twelfth of the time of the generated one."""
-        kernel = cell_kernel(compat.degree(self._space), of_regions=self._regions is not None)
+        """Return our kernel for the straight cells: it takes a twelfth of the time of the generated one."""
+        if self._cell_kernel is None:
+            return {}
+        kernel = self._cell_kernel(compat.degree(self._space), of_regions=self._regions is not None)
         return {compat.EVERYWHERE if curved_cells(self._space.mesh) is None else _STRAIGHT: kernel}
 
     def _form(self, u: Any, measure: Any, kernels: dict[int, int] | None = None) -> Any:

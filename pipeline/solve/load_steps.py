@@ -22,6 +22,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
+from pipeline.solve.compiled import assemble, global_sum, vector
 from pipeline.solve.elements.base import Column, Enriched, Products, Solver
 from pipeline.solve.elements.displacement import DisplacementElements
 from pipeline.solve.forms import HyperelasticForms
@@ -30,7 +31,6 @@ from pipeline.solve.krylov import LinearSolver
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.newton import Equilibrium, LargeError, tangent_product
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.vectors import assemble, global_sum, vector
 
 # The depth is reached in so many steps at least; smaller ones than this share of it are not tried.
 _FEWEST, _SMALLEST = 3, 1 / 50

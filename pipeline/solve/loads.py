@@ -6,7 +6,6 @@ Tractions act on what is free: not under the probe, nor where the body is held. 
 are cut into small pieces there, so that the resultant is that of the cap and not that of whole facets.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -15,13 +14,12 @@ import basix
 import numpy as np
 
 from pipeline import compat
-from pipeline.arrays import BoolArray, FloatArray, Int32Array
+from pipeline.arrays import FloatArray, Int32Array
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.scene.model import FREE
 from pipeline.solve import SolveError
-from pipeline.solve.vectors import add_from_ghosts, global_sum, vector
-
-Vector = tuple[float, float, float]
+from pipeline.solve.compiled import add_from_ghosts, global_sum, vector
+from pipeline.solve.movement import Loads, SurfaceLoad, Vector
 
 _CORNERS = np.vstack([np.zeros(3), np.eye(3)])  # of the reference cell
 _FACETS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])  # corners of its facets, in the order of dolfinx
@@ -34,28 +32,6 @@ _CHUNK = 20_000
 
 
 @dataclass(frozen=True, eq=False)
-class SurfaceLoad:
-    """A ``traction`` (Pa), or a ``pressure`` (Pa) against the outward normal, on part of the free boundary.
-
-    ``on_facets`` tells of facets, by their corners (n, 3, 3) and outward unit normals (n, 3), whether they may carry
-    it; ``within``, None for all, is the centre (m) and the radius (m) of the ball that bounds it.
-    """
-
-    on_facets: Callable[[FloatArray, FloatArray], BoolArray]
-    traction: Vector = (0.0, 0.0, 0.0)
-    pressure: float = 0.0
-    within: tuple[Vector, float] | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Loads:
-    """Weights (N/m³) of each region of the body, and loads on its surface, on the mesh as it is solved."""
-
-    weights: tuple[Vector, ...] = ()
-    surface: tuple[SurfaceLoad, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
 class Applied:
     """Loads on the dofs of a space: ``forces`` (N) on those that this rank owns, as they act on the modelled part.
 
@@ -65,10 +41,6 @@ class Applied:
     forces: FloatArray
     size: float
     resultant: FloatArray
-
-    def times(self, factor: float) -> "Applied":
-        """Return ``factor`` times the loads."""
-        return Applied(factor * self.forces, factor * self.size, factor * self.resultant)
 
 
 def apply_loads(loads: Loads, body: BodyMesh, space: Any) -> Applied:

@@ -1,17 +1,60 @@
-"""What the probe does: a rigid movement, put together of a few that are each solved for once."""
+"""What is asked of a body: the movement of the probe, dead loads, and a far field on a cut face.
 
+A movement is the sum of a few motions, each of which is solved for once.
+"""
+
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import hypot
+from typing import Protocol, Self
 
 import numpy as np
 
-from pipeline.arrays import FloatArray
-from pipeline.solve.far_field import FarField
-from pipeline.solve.loads import Loads
+from pipeline.arrays import BoolArray, FloatArray
 
 Vector = tuple[float, float, float]
+Place = Vector
 
 _ZERO: Vector = (0.0, 0.0, 0.0)
+
+
+class FarField(Protocol):
+    """A displacement of what is beyond the cut face, free of loads but there; hashable."""
+
+    @property
+    def seconds(self) -> float:
+        """What it took to find."""
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return the displacement (n, 3) of a unit, in m, at points (n, 3), in m, on the cut face."""
+
+    def stiffness(self, mu: float) -> float:
+        """Return twice the strain energy (N/m) of a unit beyond the cut face, for the shear modulus ``mu`` (Pa)."""
+
+    def moved(self, centre: Place) -> Self:
+        """Return it as it is seen from a half ball of the same size round another ``centre`` (m)."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceLoad:
+    """A ``traction`` (Pa), or a ``pressure`` (Pa) against the outward normal, on part of the free boundary.
+
+    ``on_facets`` tells of facets, by their corners (n, 3, 3) and outward unit normals (n, 3), whether they may carry
+    it; ``within``, None for all, is the centre (m) and the radius (m) of the ball that bounds it.
+    """
+
+    on_facets: Callable[[FloatArray, FloatArray], BoolArray]
+    traction: Vector = (0.0, 0.0, 0.0)
+    pressure: float = 0.0
+    within: tuple[Vector, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """Weights (N/m³) of each region of the body, and loads on its surface, on the mesh as it is solved."""
+
+    weights: tuple[Vector, ...] = ()
+    surface: tuple[SurfaceLoad, ...] = ()
 
 
 @dataclass(frozen=True)

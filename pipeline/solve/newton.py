@@ -16,10 +16,10 @@ from petsc4py import PETSc
 
 from pipeline import compat
 from pipeline.solve import SolveError
+from pipeline.solve.compiled import assemble, fill, vector
 from pipeline.solve.forms import HyperelasticForms
 from pipeline.solve.krylov import INDEFINITE, SOLVERS, LinearSolver, configure, explain, keep, solver_of
 from pipeline.solve.spaces import ElasticSpace
-from pipeline.solve.vectors import assemble, fill, vector
 from pipeline.stages import stage
 
 # Residual that is left, relative to the forces on what is prescribed, and the most steps to get there.

@@ -16,15 +16,15 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.solve import SolveError
+from pipeline.solve.balance import MOST_ROUNDS, check_balance, rest, sums
+from pipeline.solve.compiled import global_sum
 from pipeline.solve.elements.base import Column, Elements, Equilibrium, Products, Solver, close_far
 from pipeline.solve.elements.displacement import DisplacementElements
-from pipeline.solve.load_response import LoadResponse, imbalance, load_response_of
 from pipeline.solve.load_steps import LoadSteps, Walk
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.response import Response, reaction, sums
-from pipeline.solve.solution import MOST_ROUNDS, Request, check_balance, rest
-from pipeline.solve.vectors import global_sum
+from pipeline.solve.response import LoadResponse, Response, load_response_of, reaction
+from pipeline.solve.solution import Request
 from pipeline.stages import stage
 
 # The work of both sides of a cut balances where each motion's does to this share of what is asked of it.
@@ -143,8 +143,8 @@ def respond(
     (applied,) = (column.applied for column in loaded)
     assert applied is not None
     works = global_sum(found.space.comm, np.array([u @ applied.forces for u in found.moved]))
-    balance = max(balance, imbalance(total, found.energies, works, applied, movement, mirrored))
-    load_response = load_response_of(found.stationary, works, total.on_probe[-1], mirrored, apart=movement.apart)
+    balance = max(balance, total.imbalance_of_loads(found.energies, works, applied, movement, mirrored))
+    load_response = load_response_of(movement, found.stationary, works, total.on_probe[-1], mirrored)
     return replace(response, balance=balance), load_response
 
 

@@ -27,11 +27,10 @@ from pipeline.solve.elements.base import Column, Elements, Equilibrium
 from pipeline.solve.elements.displacement import DisplacementElements, DisplacementSolver
 from pipeline.solve.estimate import error_bar, stiffness_bars
 from pipeline.solve.krylov import LinearSolver
-from pipeline.solve.load_response import LoadResponse, shares
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.prescribed import PrescribedMotion, respond
-from pipeline.solve.response import Response
+from pipeline.solve.response import LoadResponse, Response, shares
 from pipeline.solve.rim import plain_share
 from pipeline.solve.solution import Problem, Request, Solution
 from pipeline.solve.spaces import Conditions, Front, Spaces

@@ -17,12 +17,12 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
+from pipeline.solve.compiled import global_sum, vector
 from pipeline.solve.krylov import LinearSolver, keep, solver_of
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import Response, reaction
 from pipeline.solve.spaces import ElasticSpace
-from pipeline.solve.vectors import global_sum, vector
 
 # λ_min is estimated from above, by Lanczos: its share that is relied on.
 _TRUST = 0.5

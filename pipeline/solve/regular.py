@@ -26,15 +26,14 @@ from pipeline import compat
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve import SolveError
-from pipeline.solve.compiled import form, vector_space
-from pipeline.solve.far_field import Place, PointForce
+from pipeline.solve.compiled import form, vector, vector_space
+from pipeline.solve.far_field import PointForce
 from pipeline.solve.forms import compile_forms, one_cell
 from pipeline.solve.krylov import Level, LinearSolver
-from pipeline.solve.movement import Motion
+from pipeline.solve.movement import Motion, Place
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.placed_force import PlacedForce, PlacedPull
 from pipeline.solve.spaces import Conditions, ElasticSpace, Spaces
-from pipeline.solve.vectors import vector
 
 # Of the elements that R is found with, and of the polynomials that it is kept as.
 DEGREE, _POWER = 2, 5

@@ -1,70 +1,20 @@
-"""What one solve gives, whatever the elements, and how well it must have been solved."""
+"""What is asked of a problem, and what one solve gives, whatever the elements."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from math import isfinite, isnan, nan, pi
+from math import nan
 from typing import Any, Self
 
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.solve import SolveError
+from pipeline.solve.balance import TOLERANCE
 from pipeline.solve.crack import Advance
 from pipeline.solve.estimate import extrapolate, extrapolate_found
-from pipeline.solve.load_response import LoadResponse, load_bars
 from pipeline.solve.movement import Movement, Vector
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.response import Response
+from pipeline.solve.response import Contact, LoadResponse, Response, load_bars
 from pipeline.stages import Times
-
-# F·d = 2U and F_probe + F_support = 0 hold for the exact solution of the discrete system, and are linear in the
-# solver's error: what misses them by this much has not been solved.
-BALANCE_LIMIT = 1e-6
-# The energy norm of the solver's error, relative: F, which is quadratic in it, then has no error above 1e-9 up to
-# ν = 0.49, and 1e-11 as a rule (docs/solvers.md).
-TOLERANCE = 1e-6
-# Rounds of further iterations where forces do not balance, what each aims at as a share of the limit, and the most by
-# which it lowers the error.
-MOST_ROUNDS = 3
-_AIM, _MOST = 0.3, 1e-2
-
-
-def rest(balance: float, tolerance: float) -> float:
-    """Return the share of the solver's error that may remain where forces do not balance, 1 if it is small enough.
-
-    It is, too, at a ``tolerance`` that was chosen loosely: that the forces do not balance is then no wonder.
-    """
-    if balance <= BALANCE_LIMIT or tolerance > TOLERANCE or not isfinite(balance):
-        return 1.0
-    return max(_AIM * BALANCE_LIMIT / balance, _MOST)
-
-
-def check_balance(balance: float) -> None:
-    """See that forces balance.
-
-    Raises:
-        SolveError: if they do not.
-    """
-    if isnan(balance) or balance > BALANCE_LIMIT:
-        raise SolveError(f"forces do not balance: relative error {balance:.1e}, allowed {BALANCE_LIMIT:.0e}")
-
-
-@dataclass(frozen=True)
-class Contact:
-    """Contact that was found: its area (m²), with a relative 95 % bar where one was asked for.
-
-    ``sag`` (m) is how far loads have moved the first touch, ``load_energy`` (J) their strain energy without the probe.
-    """
-
-    area: float
-    bar: float = nan
-    sag: float = nan
-    load_energy: float = nan
-
-    @property
-    def radius(self) -> float:
-        """Radius (m) of a disc of that area."""
-        return float(self.area / pi) ** 0.5
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -110,7 +60,7 @@ class Solution:
         """Force of the tissue on the probe (N) that loads add; not a number if there are none."""
         if self.load_response is None:
             return nan, nan, nan
-        x, y, z = self.load_response.force(self.response.movement)
+        x, y, z = self.load_response.force
         return x, y, z if self.tip is None else -self.tip.of_loads().released
 
     @property
@@ -120,7 +70,7 @@ class Solution:
             return nan
         if self.tip is not None:
             return self.tip.of_loads().error
-        return self.load_response.bar_along(self.response.movement, (0.0, 0.0, -1.0))
+        return self.load_response.bar_along((0.0, 0.0, -1.0))
 
     @property
     def energy(self) -> float:

@@ -20,14 +20,13 @@ from pipeline.arrays import FloatArray, Int32Array
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.scene.model import FIXED, MIRROR, PROBE
 from pipeline.solve import SolveError
-from pipeline.solve.compiled import vector_space
+from pipeline.solve.compiled import assemble, fill, vector_space
 from pipeline.solve.forms import ElasticForms, curved_cells, has_curved_cells
-from pipeline.solve.kernels.assembly import StraightStiffness
+from pipeline.solve.kernels.assembly import StraightStiffness, cell_kernel
 from pipeline.solve.kernels.product import DEGREES, CellOperator, CellStiffness
-from pipeline.solve.loads import Applied, Loads, apply_loads
-from pipeline.solve.movement import Motion, Vector
+from pipeline.solve.loads import Applied, apply_loads
+from pipeline.solve.movement import Loads, Motion, Vector
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.vectors import assemble, fill
 from pipeline.stages import stage
 
 # v is 1 up to the first of these shares of its radius, and nothing from the second on.
@@ -134,7 +133,7 @@ class ElasticSpace:
         self.prescribed = np.unique(np.concatenate([*(d for d, _ in single), *(3 * fixed + c for c in range(3))]))
         self.prescribed_owned = self.prescribed[self.prescribed < self.owned]
         self.probe_owned, self.fixed_owned = (dofs[dofs < index_map.size_local] for dofs in (probe, fixed))
-        self.forms = ElasticForms(space, body.regions)
+        self.forms = ElasticForms(space, body.regions, cell_kernel)
 
     @property
     def whole_dofs(self) -> int:

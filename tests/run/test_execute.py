@@ -20,7 +20,7 @@ from pipeline.run.execute import compute, execute
 from pipeline.run.mesh_cache import MeshCache
 from pipeline.run.progress import Progress
 from pipeline.solve import SolveError
-from pipeline.solve.solution import BALANCE_LIMIT
+from pipeline.solve.balance import BALANCE_LIMIT
 from pipeline.stages import Times, recharge
 from tests.cases import BLADE, solve, study
 

@@ -10,11 +10,11 @@ from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.run.loads import loads_of
 from pipeline.run.meshing import mesh_case
-from pipeline.solve.load_response import load_bars
+from pipeline.solve.compiled import global_sum, vector
 from pipeline.solve.loads import apply_loads
 from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.response import load_bars
 from pipeline.solve.spaces import Conditions, ElasticSpace, Spaces
-from pipeline.solve.vectors import global_sum, vector
 from tests.cases import solve, study
 
 YOUNG, HEIGHT = 10e3, 20e-3

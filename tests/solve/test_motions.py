@@ -11,10 +11,10 @@ from pipeline.plan.plan import make_plan
 from pipeline.report import accessor  # noqa: F401 (registers dataset.epsmesh)
 from pipeline.report.dataset import build
 from pipeline.run.execute import compute
+from pipeline.solve.balance import Sums
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.response import Sums
 from pipeline.solve.spaces import Conditions, Spaces
 from pipeline.study.sweep import Scale
 from tests.cases import BLADE, solve, study

@@ -15,11 +15,11 @@ from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.scene.model import PROBE
+from pipeline.solve.compiled import global_sum
 from pipeline.solve.contact.facet import FACET_CORNERS, FacetNodes, facet_nodes
 from pipeline.solve.elements import elements_of
 from pipeline.solve.elements.base import Elements
 from pipeline.solve.spaces import Conditions, Spaces
-from pipeline.solve.vectors import global_sum
 
 # What is held is the contact set's alone; of the footprint as such nothing is.
 CONDITIONS = Conditions(bonded=False, unilateral=True)

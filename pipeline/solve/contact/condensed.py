@@ -12,6 +12,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
 from pipeline.solve import SolveError
+from pipeline.solve.compiled import vector
 from pipeline.solve.contact.active_set import State
 from pipeline.solve.contact.candidates import Candidates, Surface
 from pipeline.solve.contact.elements import ContactDisplacement, FarShare, Unknowns
@@ -19,7 +20,6 @@ from pipeline.solve.contact.levels import Hierarchy
 from pipeline.solve.elements.base import Elements
 from pipeline.solve.krylov import Level, LinearSolver
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.vectors import vector
 from pipeline.stages import stage
 
 # Surfaces up to which it pays for ten depths, measured: docs/solvers.md.

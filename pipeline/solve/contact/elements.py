@@ -15,19 +15,19 @@ from petsc4py import PETSc
 
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
 from pipeline.solve import SolveError
+from pipeline.solve.balance import check_balance
+from pipeline.solve.compiled import global_sum
 from pipeline.solve.contact.active_set import State
 from pipeline.solve.contact.candidates import Candidates, Numbering, Surface
 from pipeline.solve.contact.levels import Hierarchy, normal_dofs
 from pipeline.solve.elements.base import Column, Elements, Fields
 from pipeline.solve.elements.mixed import MixedElements
-from pipeline.solve.far_field import FarField
 from pipeline.solve.krylov import Level, LinearSolver
 from pipeline.solve.loads import Applied
+from pipeline.solve.movement import FarField
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.saddle import SaddleSolver
-from pipeline.solve.solution import check_balance
 from pipeline.solve.spaces import ElasticSpace
-from pipeline.solve.vectors import global_sum
 from pipeline.stages import stage
 
 # What is solved for, owned dofs: displacement (m), and of mixed elements pressure (in the law's unit).

@@ -13,13 +13,13 @@ from contextlib import ExitStack
 import numpy as np
 
 from pipeline.arrays import Int32Array
+from pipeline.solve.compiled import vector
 from pipeline.solve.contact.active_set import Found, Obstacle, find_set
 from pipeline.solve.contact.candidates import CONDITIONS
 from pipeline.solve.contact.elements import ContactDisplacement, ContactElements, ContactMixed
 from pipeline.solve.contact.levels import mask, normal_dofs
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.krylov import LinearSolver
-from pipeline.solve.vectors import vector
 
 # Relative energy norm of the error to which the solution of the next degree is found for the error bar.
 _ESTIMATE_TOLERANCE = 0.1

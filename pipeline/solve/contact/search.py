@@ -16,6 +16,8 @@ import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.solve import SolveError
+from pipeline.solve.balance import check_balance
+from pipeline.solve.compiled import global_sum
 from pipeline.solve.contact.active_set import ContactError, Found, Obstacle, find_set
 from pipeline.solve.contact.area import Area, contact_area
 from pipeline.solve.contact.candidates import Candidates, Numbering, Surface
@@ -28,11 +30,10 @@ from pipeline.solve.elements.base import Column, Elements, Enriched, Equilibrium
 from pipeline.solve.estimate import error_bar, found_again_bar, found_bar
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.response import Response, reaction
+from pipeline.solve.response import Contact, Response, reaction
 from pipeline.solve.rim import plain_share
-from pipeline.solve.solution import Contact, Request, check_balance
+from pipeline.solve.solution import Request
 from pipeline.solve.spaces import Spaces
-from pipeline.solve.vectors import global_sum
 from pipeline.stages import recharge, recorded, stage
 
 # Energy norm of the error to which each set but the last one is solved, relative to that of the solution.

@@ -8,7 +8,7 @@ import numpy as np
 from pipeline.arrays import BoolArray
 from pipeline.solve.contact.active_set import Found, Obstacle, find_set
 from pipeline.solve.contact.elements import ContactElements, Unknowns
-from pipeline.solve.far_field import FarField
+from pipeline.solve.movement import FarField
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import Times
 

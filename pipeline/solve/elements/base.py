@@ -13,16 +13,14 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve import SolveError
+from pipeline.solve.compiled import global_sum, vector
 from pipeline.solve.crack import Release
 from pipeline.solve.krylov import Level, is_direct
-from pipeline.solve.load_response import LoadResponse
 from pipeline.solve.loads import Applied
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.response import Response
-from pipeline.solve.solution import Contact
+from pipeline.solve.response import Contact, LoadResponse, Response
 from pipeline.solve.spaces import Conditions, ElasticSpace, Front, Spaces
-from pipeline.solve.vectors import global_sum, vector
 
 # A displacement, and for mixed elements a pressure.
 Fields = tuple[PETSc.Vec, ...]

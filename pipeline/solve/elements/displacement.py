@@ -6,13 +6,13 @@ from contextlib import ExitStack
 import numpy as np
 
 from pipeline.arrays import FloatArray
+from pipeline.solve.compiled import vector
 from pipeline.solve.elements.base import Column, Elements, Enriched, Solver, level_of
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.krylov import DIRECT_LIMIT, Level, LinearSolver
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import Conditions, Spaces
-from pipeline.solve.vectors import vector
 from pipeline.stages import recharge, recorded
 
 

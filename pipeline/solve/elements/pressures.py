@@ -16,12 +16,11 @@ from petsc4py import PETSc
 from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pipeline.mesh.distribute import BodyMesh
-from pipeline.solve.compiled import scalar_space
+from pipeline.solve.compiled import add_from_ghosts, assemble, fill, scalar_space, vector
 from pipeline.solve.forms import MixedForms
 from pipeline.solve.kernels.pressure import CellPressures, Coupling, Mass
 from pipeline.solve.krylov import keep
 from pipeline.solve.spaces import ElasticSpace, whole_points
-from pipeline.solve.vectors import add_from_ghosts, assemble, fill, vector
 from pipeline.stages import stage
 
 

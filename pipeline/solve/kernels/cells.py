@@ -13,6 +13,7 @@ from mpi4py import MPI
 
 from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
+from pipeline.solve.compiled import quadrature_degree
 from pipeline.solve.kernels.native import call
 from pipeline.solve.physics import MaterialLaw, of_regions
 
@@ -127,15 +128,6 @@ class Ghosts:
         if key not in self._vectors:
             self._vectors[key] = compat.ghosted_vector(self._index_map, size, kind)
         return self._vectors[key]
-
-
-def quadrature_degree(degree: int) -> int:
-    """Return up to which degree polynomials are integrated on curved cells of a space of ``degree``.
-
-    The map of a quarter-point element varies within the cell, and 2p reads F up to 0.07 % low there; at p = 2, degree 4
-    has points at which the map is singular.
-    """
-    return max(6, 2 * degree)
 
 
 def straight_cells(curved: BoolArray | None, count: int) -> Int32Array:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from math import inf, isnan, pi
+from math import inf, pi
 
 import numpy as np
 from mpi4py import MPI
@@ -14,10 +14,10 @@ from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import AXIS, Meridian, MeridianArrays, meridian_mesh, split_regions
 from pipeline.quantities import CLEAR
 from pipeline.scene.model import FIXED, PROBE
+from pipeline.solve.balance import check_balance
 from pipeline.solve.krylov import SolveError, check_converged, explained, keep, solver_of
 from pipeline.solve.meridian.forms import MeridianForms, Meshes
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.solution import BALANCE_LIMIT
 from pipeline.stages import stage
 
 # Each refinement gains the digits that the factors hold; a balance below the second number has nothing to gain.
@@ -118,11 +118,7 @@ class System:
             balance = max(abs(on_probe + on_support) / abs(on_probe), abs(work / twice_energy - 1))
             if balance < _BALANCED or balance > before / 2:
                 break
-        if isnan(balance) or balance > BALANCE_LIMIT:
-            raise Unbalanced(
-                f"forces do not balance: relative error {balance:.1e}, allowed {BALANCE_LIMIT:.0e}; "
-                "the body is so slender that its stiffness drowns in round-off"
-            )
+        check_balance(balance, Unbalanced, "; the body is so slender that its stiffness drowns in round-off")
         return Pressed(solution, residual, balance, step)
 
 
