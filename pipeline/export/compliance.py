@@ -11,6 +11,7 @@ from mpi4py import MPI
 from pipeline.arrays import FloatArray
 from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region
+from pipeline.export.side_force import SideForce
 from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.mesh.generate import MeshArrays
@@ -18,9 +19,8 @@ from pipeline.mesh.of_case import mesh_arrays
 from pipeline.shapes.probes.blade import Blade
 from pipeline.shapes.probes.disc import Disc
 from pipeline.solve.far_field import PointForce
+from pipeline.solve.greens_function import regular_parts
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.regular import regular_parts
-from pipeline.solve.side_force import SideForce
 from pipeline.stages import stage
 from pipeline.study.schema import Mesh
 from pipeline.study.sweep import Case

@@ -18,8 +18,8 @@ from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.far_field import PointForce
+from pipeline.solve.greens_function import OnBoundary, regular_on_boundary
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.regular import OnBoundary, regular_on_boundary
 from pipeline.stages import stage
 
 # Intervals between the places from the middle to the end of the region; of Poisson's ratios; held-out places.

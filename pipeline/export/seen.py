@@ -9,6 +9,7 @@ from mpi4py import MPI
 from pipeline.export.compliance import coarse_mesh
 from pipeline.export.curved import curved_region
 from pipeline.export.far import Pressed
+from pipeline.export.placed_force import PlacedForce
 from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region
 from pipeline.export.scope import ExportError, Scope
@@ -18,7 +19,6 @@ from pipeline.realtime.model import Model
 from pipeline.shapes.body import Layered
 from pipeline.solve.far_field import PointForce
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.placed_force import PlacedForce
 from pipeline.study.schema import Mesh
 
 Law = Callable[[float], MaterialLaw | None]

@@ -10,11 +10,11 @@ from pipeline.solve.cell_values import compile_cell_values
 from pipeline.solve.compiled import compiling
 from pipeline.solve.crack import compile_release
 from pipeline.solve.forms import compile_forms
+from pipeline.solve.greens_function import compile_regular
 from pipeline.solve.kernels import native
 from pipeline.solve.meridian.problem import compile_axisymmetric
 from pipeline.solve.meridian.punch import TRIAL_DEGREE
 from pipeline.solve.physics import LAWS
-from pipeline.solve.regular import compile_regular
 from pipeline.stages import stage
 
 # What the regular part of a Green's function takes, whatever the elements of the case.

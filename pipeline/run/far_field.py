@@ -11,9 +11,9 @@ from pipeline.mesh.of_case import mesh_arrays
 from pipeline.plan.far_fields import far_mesh
 from pipeline.plan.symmetry import mirror_planes
 from pipeline.shapes.body import Body
-from pipeline.solve.far_field import PointForce
+from pipeline.solve.far_field import BodyField, PointForce, Smooth
+from pipeline.solve.greens_function import regular_parts
 from pipeline.solve.movement import Place
-from pipeline.solve.regular import BodyField, Smooth, regular_parts
 from pipeline.stages import stage
 from pipeline.study.closure import FarRegion, room
 from pipeline.study.sweep import Case

@@ -18,7 +18,7 @@ from pipeline.shapes.probes._round import RoundIndenter
 from pipeline.solve import SolveError
 from pipeline.solve.contact.active_set import ContactError
 from pipeline.solve.contact.search import Tool
-from pipeline.solve.far_field import PointForce
+from pipeline.solve.far_field import BodyField, PointForce
 from pipeline.solve.krylov import DIRECT_LIMIT, is_direct
 from pipeline.solve.meridian.contact import MeridianContact
 from pipeline.solve.meridian.problem import MeridianProblem
@@ -26,7 +26,6 @@ from pipeline.solve.meridian.punch import RoundTool
 from pipeline.solve.movement import FarField, Movement, Place
 from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.regular import BodyField
 from pipeline.solve.solution import Problem, Request, Solution
 from pipeline.solve.spaces import Conditions, Front, Spaces
 from pipeline.study.sweep import Case

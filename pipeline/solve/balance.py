@@ -15,6 +15,7 @@ from pipeline.solve import SolveError
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.loads import Applied
 from pipeline.solve.movement import Movement
+from pipeline.solve.response import whole_force
 from pipeline.solve.spaces import ElasticSpace
 
 # A solution whose forces miss their balance by more than this share has not been solved.
@@ -120,13 +121,6 @@ def sums(space: ElasticSpace, residuals: Sequence[FloatArray], held: Sequence[Fl
         works=np.diag(total[:count, 6:]).copy(),
         crossed=crossed,
     )
-
-
-def whole_force(forces: FloatArray, mirrored: Sequence[int]) -> FloatArray:
-    """Return forces on the whole body: images double what lies in a plane of symmetry and cancel what is across it."""
-    whole = np.full(3, 2.0 ** len(mirrored))
-    whole[list(mirrored)] = 0.0
-    return np.asarray(whole * forces)
 
 
 def _stiffest(movement: Movement, twice_energies: FloatArray) -> tuple[BoolArray, float]:

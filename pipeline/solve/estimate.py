@@ -3,8 +3,8 @@
 With s = (F_p - F_{p+1}) / F_p (:mod:`pipeline.solve.hierarchical_estimate`), and an error that falls like p⁻², as it
 does at an edge where u ~ r^½ (I. Babuška and M. Suri, SIAM J. Numer. Anal. 24, 750, 1987), what degree p + 1 leaves is
 θ s with θ = p² / (2 p + 1). How much of θ s it is depends on the elements at the probe's edge: less with quarter
-points, more without (:mod:`pipeline.solve.rim`). The multiples below are measured, with the coverage that they reach,
-in docs/accuracy.md.
+points, more without (:mod:`pipeline.solve.cell_values`). The multiples below are measured, with the coverage that they
+reach, in docs/accuracy.md.
 
 Shares are of F_p, bars relative to the exact force, too: where F_p is a third too high, F_exact is within 25 % of it,
 but F_p errs by 33 %.

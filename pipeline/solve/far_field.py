@@ -5,18 +5,38 @@ bonded tool, which also pulls sideways) or (a/r)². A *unit* of the far field is
 the radius of the half ball: displacements of about a metre on the cut face. What is cut away then takes one unknown,
 how much of the far field there is, and is a part of the energy that is made stationary. The force is from above, by the
 energy of what the far field leaves out: of the order (a/ε)³ (small, bonded) and (a/ε)⁵.
+
+On a body of its own kind a point force has its half-space's field u, and a regular part R that is smooth where it acts
+(:mod:`pipeline.solve.greens_function`), kept as polynomials. Beyond a half sphere of radius ε, n outwards,
+
+    twice the energy of u + R = that of u - 2 ∫ R·σ(u) n - R(0)·P - ∫ R·σ(R) n,
+
+by Betti's theorem within, where the force P of u acts and R has none.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
 from math import log, pi
+from typing import Any, Protocol
 
 import numpy as np
+import ufl
+from dolfinx import fem
 
-from pipeline.arrays import FloatArray
+from pipeline import compat
+from pipeline.arrays import FloatArray, IntArray
+from pipeline.solve import SolveError
+from pipeline.solve.compiled import form
 from pipeline.solve.movement import Place
 
 # Below the centre there is no direction aside; a point this near to it, in units of the radius, is it.
 _TINY, _AT_CENTRE = 1e-14, 1e-9
+# Of the polynomials that the regular part is kept as.
+_POWER = 5
+_EXPONENTS = np.array([e for e in product(range(_POWER + 1), repeat=3) if sum(e) <= _POWER])
+# Points of quadrature on the half sphere, from pole to rim and round it.
+_UP, _ROUND = 16, 24
 
 
 @dataclass(frozen=True)
@@ -31,6 +51,11 @@ class PointForce:
     def seconds(self) -> float:
         """It is a closed form."""
         return 0.0
+
+    @property
+    def ratio(self) -> float:
+        """λ/μ of the half-space."""
+        return 2 * self.poisson / (1 - 2 * self.poisson)
 
     def at(self, points: FloatArray) -> FloatArray:
         """Return the displacement (n, 3) of a unit, in m: ε/ρ times what depends on the direction alone."""
@@ -78,6 +103,10 @@ class PointForce:
         """Return that of a force at another ``centre`` (m)."""
         return replace(self, centre=centre)
 
+    def pull(self, space: Any, places: FloatArray) -> "Pull":
+        """Return what integrates such forces' stresses on the boundary of ``space``, its points at ``places``."""
+        return StressPull(space, places)
+
     def _directions(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return unit vectors (n, 3) from the centre, and distances (n), in m."""
         offsets = points - np.array(self.centre)
@@ -85,5 +114,150 @@ class PointForce:
         return offsets / distances[:, None], distances
 
 
+class Pull(Protocol):
+    """What pulls at the boundary of a body for the field of a force's half-space."""
+
+    def of(self, force: Any) -> FloatArray:
+        """Return ∫ σn·v on the whole boundary, on all dofs of this process, in units of μ."""
+
+
+class StressPull:
+    """∫ σn·v on the whole boundary for the stress of a force's half-space: the rows of σ as functions of a space."""
+
+    def __init__(self, space: Any, places: FloatArray):
+        self._rows, normal = [fem.Function(space) for _ in range(3)], ufl.FacetNormal(space.mesh)
+        test = ufl.TestFunction(space)
+        measure = ufl.ds(domain=space.mesh, metadata={"quadrature_degree": 2 * compat.degree(space) + 2})
+        self._form = form(sum(ufl.inner(row, normal) * test[i] for i, row in enumerate(self._rows)) * measure)
+        self._outer = np.unique(outer_triangles(compat.cell_dofs(space), places))
+        self._points = places[self._outer]
+
+    def of(self, force: PointForce) -> FloatArray:
+        """Return it on all dofs."""
+        for row, values in zip(self._rows, force.stress(self._points).transpose(1, 0, 2), strict=True):
+            row.x.array.reshape(-1, 3)[self._outer] = values
+        return np.asarray(fem.assemble_vector(self._form).array)
+
+
+@dataclass(frozen=True, eq=False)
+class Smooth:
+    """A displacement as polynomials of (x - ``centre``) / ``unit``, whose ``coefficients`` are (terms, 3), in m."""
+
+    centre: tuple[float, float, float]
+    unit: float
+    coefficients: FloatArray
+
+    @staticmethod
+    def fit(centre: tuple[float, float, float], unit: float, points: FloatArray, values: FloatArray) -> "Smooth":
+        """Return what fits ``values`` (n, 3) at ``points`` best in the mean square.
+
+        Raises:
+            SolveError: if the points are fewer than the coefficients.
+        """
+        if len(points) < len(_EXPONENTS):
+            raise SolveError(f"{len(points)} nodes of the mesh are too few for the regular part at {centre}")
+        found, *_ = np.linalg.lstsq(_terms((points - np.array(centre)) / unit), values, rcond=None)
+        return Smooth(centre, unit, found)
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return the displacement (n, 3), in m."""
+        return np.asarray(_terms((points - np.array(self.centre)) / self.unit) @ self.coefficients)
+
+    def at_centre(self) -> tuple[FloatArray, FloatArray]:
+        """Return the displacement (3,), in m, at the centre, and ∂²/∂x² + ∂²/∂y² of it (3,), in 1/m."""
+        places = {tuple(exponents): number for number, exponents in enumerate(_EXPONENTS.tolist())}
+        flat, bent = places[0, 0, 0], [places[2, 0, 0], places[0, 2, 0]]
+        return self.coefficients[flat], 2 * self.coefficients[bent].sum(axis=0) / self.unit**2
+
+    def bends(self) -> tuple[FloatArray, FloatArray]:
+        """Return (∂²/∂x² - ∂²/∂y²)/2 of the displacement (3,), in 1/m, at the centre, and ∂²/∂x∂y."""
+        places = {tuple(exponents): number for number, exponents in enumerate(_EXPONENTS.tolist())}
+        xx, yy, xy = (self.coefficients[places[powers]] for powers in ((2, 0, 0), (0, 2, 0), (1, 1, 0)))
+        return (xx - yy) / self.unit**2, xy / self.unit**2
+
+    def traction(self, points: FloatArray, normals: FloatArray, ratio: float) -> FloatArray:
+        """Return σn (n, 3) in units of μ, for a ``ratio`` λ/μ."""
+        local = (points - np.array(self.centre)) / self.unit
+        gradient = np.stack([_terms(local, axis) @ self.coefficients for axis in range(3)], axis=-1) / self.unit
+        strain = gradient + gradient.transpose(0, 2, 1)
+        dilation = np.trace(gradient, axis1=1, axis2=2)
+        return np.asarray(np.einsum("nij,nj->ni", strain, normals) + ratio * dilation[:, None] * normals)
+
+
+@dataclass(frozen=True, eq=False)
+class BodyField:
+    """The far field of a body: that of a point force on a half-space, a unit, and what goes with it of ``regular``.
+
+    ``seconds`` is what the regular part took.
+    """
+
+    near: PointForce
+    regular: Smooth
+    seconds: float
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return the displacement (n, 3) of a unit, in m, within the half ball that ``regular`` was fitted in."""
+        return self.near.at(points) + self._scale * self.regular.at(points)
+
+    def stiffness(self, mu: float) -> float:
+        """Return twice the strain energy (N/m) of a unit beyond the half ball."""
+        return self.near.stiffness(mu) + mu * self._of_regular
+
+    def moved(self, centre: Place) -> "BodyField":
+        """Return the same field about another ``centre`` (m): as on the mesh of a half ball that stands there."""
+        return replace(self, near=self.near.moved(centre), regular=replace(self.regular, centre=centre))
+
+    @property
+    def _scale(self) -> float:
+        return self.near.radius / self.regular.unit
+
+    @cached_property
+    def _of_regular(self) -> float:
+        near, normals, weights = self.near, *_half_sphere()
+        points = np.array(near.centre) + near.radius * normals
+        weights = near.radius**2 * weights
+        inside = self._scale * self.regular.at(points)
+        pulled = self._scale * self.regular.traction(points, normals, near.ratio)
+        ((_, _, up),) = self._scale * self.regular.at(np.array([near.centre]))
+        mixed = weights @ (inside * near.traction(points)).sum(axis=1)
+        return float(near.force(1.0) * up - 2 * mixed - weights @ (inside * pulled).sum(axis=1))
+
+
 def _outer(vectors: FloatArray) -> FloatArray:
     return np.asarray(vectors[:, :, None] * vectors[:, None, :])
+
+
+def _half_sphere() -> tuple[FloatArray, FloatArray]:
+    """Return points (n, 3) of the lower unit half sphere and the weights of a quadrature on it."""
+    nodes, weights = np.polynomial.legendre.leggauss(_UP)
+    cosine, angle = np.meshgrid((nodes + 1) / 2, 2 * np.pi * (np.arange(_ROUND) + 0.5) / _ROUND, indexing="ij")
+    sine = np.sqrt(1 - cosine**2)
+    points = np.stack([sine * np.cos(angle), sine * np.sin(angle), -cosine], axis=-1).reshape(-1, 3)
+    return points, np.repeat(weights / 2 * 2 * np.pi / _ROUND, _ROUND)
+
+
+def _terms(local: FloatArray, axis: int | None = None) -> FloatArray:
+    """Return the monomials (n, terms) at points (n, 3), or their derivatives along an ``axis``."""
+    powers = local[:, :, None] ** np.arange(_POWER + 1)
+    exponents, factor = _EXPONENTS, np.ones(len(_EXPONENTS))
+    if axis is not None:
+        factor = _EXPONENTS[:, axis]
+        exponents = np.maximum(_EXPONENTS - (np.arange(3) == axis), 0)
+    return np.asarray(factor * np.prod([powers[:, i, exponents[:, i]] for i in range(3)], axis=0))
+
+
+def outer_triangles(cells: IntArray, places: FloatArray) -> IntArray:
+    """Return the triangles (m, 6) that belong to one cell (k, 10) alone."""
+    # In a tetrahedron the edge of the corners i < j is numbered from the last pair on (basix).
+    middle = {pair: 4 + number for number, pair in enumerate([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])}
+    faces = [(1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)]
+    columns = [[i, j, k, middle[j, k], middle[i, k], middle[i, j]] for i, j, k in faces]
+    triangles = cells[:, columns].reshape(-1, 6)
+    _, first, times = np.unique(np.sort(triangles[:, :3], axis=1), axis=0, return_index=True, return_counts=True)
+    outer = first[times == 1]
+    found = triangles[outer]
+    a, b, c = (places[found[:, i]] for i in range(3))
+    inner = places[np.take_along_axis(cells[outer // 4], (outer % 4)[:, None], axis=1)[:, 0]]
+    turned = np.einsum("ni,ni->n", np.cross(b - a, c - a), inner - a) > 0
+    found[turned] = found[turned][:, [0, 2, 1, 3, 5, 4]]
+    return np.asarray(found)

@@ -92,10 +92,10 @@ class LoadSteps(Solver):
     def lift(self, columns: Sequence[Column]) -> None:
         """Do nothing: what is prescribed is moved step by step."""
 
-    def solve(self, columns: Sequence[Column], tolerance: float) -> int:
+    def solve(self, columns: Sequence[Column], tolerance: float, target: float | None = None) -> int:
         """Press from where the walk has come to the depth of the one column; return the iterations; collective.
 
-        ``tolerance`` has no part in it: Newton's method ends where what it gains is rounding.
+        ``tolerance`` and ``target`` have no part in it: Newton's method ends where what it gains is rounding.
 
         Raises:
             LargeError: if Newton's method does not get there, or what it finds fails a check.

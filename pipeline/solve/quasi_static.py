@@ -19,19 +19,18 @@ import numpy as np
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.cell_values import CellValues
+from pipeline.solve.cell_values import CellValues, plain_share
 from pipeline.solve.contact.search import ContactSearch, Tool
 from pipeline.solve.crack import Advance
 from pipeline.solve.elements import elements_of
 from pipeline.solve.elements.base import Column, Elements, Equilibrium
-from pipeline.solve.elements.displacement import DisplacementElements, DisplacementSolver
+from pipeline.solve.elements.displacement import DisplacementElements
 from pipeline.solve.estimate import error_bar, stiffness_bars
 from pipeline.solve.krylov import LinearSolver
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.prescribed import PrescribedMotion, respond
 from pipeline.solve.response import LoadResponse, Response, shares
-from pipeline.solve.rim import plain_share
 from pipeline.solve.solution import Problem, Request, Solution
 from pipeline.solve.spaces import Conditions, Front, Spaces
 from pipeline.stages import recorded, stage
@@ -199,11 +198,11 @@ class QuasiStaticProblem(Problem):
         """
         elements = self.elements
         assert isinstance(elements, DisplacementElements)
-        found = DisplacementSolver(elements, law, direct=elements.is_direct(method))
+        found = elements.solver(law, direct=elements.is_direct(method))
         try:
             yield found.linear
         finally:
-            found.owner.close()
+            found.close()
 
     def fields(self) -> tuple[Any, FloatArray]:
         """Return the last solution's displacement (m) and the principal strains of each owned cell; collective."""

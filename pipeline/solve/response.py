@@ -21,7 +21,6 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.solve import SolveError
-from pipeline.solve.balance import whole_force
 from pipeline.solve.estimate import extrapolate
 from pipeline.solve.movement import Movement, Vector
 
@@ -186,6 +185,13 @@ def load_bars(bars: FloatArray, decrements: FloatArray, element: str) -> FloatAr
     found[:-1, -1] *= np.minimum(1.0, _SEEN[element] * cosine + _UNSEEN[element])
     found[-1, :-1] = found[:-1, -1]
     return found
+
+
+def whole_force(forces: FloatArray, mirrored: Sequence[int]) -> FloatArray:
+    """Return forces on the whole body: images double what lies in a plane of symmetry and cancel what is across it."""
+    whole = np.full(3, 2.0 ** len(mirrored))
+    whole[list(mirrored)] = 0.0
+    return np.asarray(whole * forces)
 
 
 def _along_motions(movement: Movement, force: FloatArray, conjugate: FloatArray) -> Vector:

@@ -215,6 +215,16 @@ class ElasticSpace:
         else:
             result.array[:] = CellOperator(self.cells, law).whole(self.forms.displacement.x.array[: self.owned])
 
+    def residual_of(self, other: "ElasticSpace", law: MaterialLaw, result: PETSc.Vec) -> None:
+        """Write -K u (N), nought where u is prescribed, of the displacement of an ``other`` space's forms; collective.
+
+        It is the displacement of the own forms then.
+        """
+        self.forms.displacement.interpolate(other.forms.displacement)
+        self.apply(result, law, checked=False)
+        result.scale(-1.0)
+        result.array[self.prescribed_owned] = 0.0
+
     def lift(self, rhs: PETSc.Vec, held: FloatArray, law: MaterialLaw, *, checked: bool = True) -> None:
         """Put the loads of the prescribed displacements ``held`` into ``rhs``; collective.
 

@@ -10,13 +10,13 @@ from pipeline.export import compliance, far
 from pipeline.export.compliance import compliances
 from pipeline.export.curved import curved_model
 from pipeline.export.far import far_fields
+from pipeline.export.placed_force import PlacedForce
 from pipeline.export.scope import scope_of
 from pipeline.export.seen import seen_body
 from pipeline.export.surface import tabulate_surface
 from pipeline.mesh.curve import EDGES
 from pipeline.realtime.near import boussinesq
 from pipeline.realtime.surface import SurfaceTable
-from pipeline.solve.placed_force import PlacedForce
 from tests.export.test_export import CYLINDER, DISC, DOME, SKIN, Known, study
 
 POISSON = 0.4

@@ -141,7 +141,7 @@ def test_error_bar_holds_the_truth(seed, monkeypatch):
     support = [-height * random.uniform(0.05, 1), "bottom", "sides", "bottom+sides"][seed % 4]
     meridian, poisson = Meridian(radius, height, 1, support), [0.0, 0.3, 0.45, 0.49, 0.4999, 0.5][seed]
     exact = solve_axisymmetric(meridian, poisson, seed % 2 == 0)
-    monkeypatch.setattr("pipeline.solve.meridian.refine.GRADINGS", (Grading(1e-4, 1.4, 4.0),))
+    monkeypatch.setattr("pipeline.solve.meridian.problem.GRADINGS", (Grading(1e-4, 1.4, 4.0),))
     rough = solve_axisymmetric(meridian, poisson, seed % 2 == 0, degree=4)
     assert exact.bar < rough.bar
     assert rough.reaction[2] == pytest.approx(exact.reaction[2], rel=rough.bar + exact.bar)
@@ -191,7 +191,7 @@ def test_error_bar_of_layers_holds_the_truth(number, monkeypatch):
     meridian, moduli = LAYERED[number]
     exact = solve_layers(meridian, moduli, number % 2 == 0)
     assert exact.bar < 1e-5
-    monkeypatch.setattr("pipeline.solve.meridian.refine.GRADINGS", (Grading(1e-4, 1.4, 4.0),))
+    monkeypatch.setattr("pipeline.solve.meridian.problem.GRADINGS", (Grading(1e-4, 1.4, 4.0),))
     rough = solve_layers(meridian, moduli, number % 2 == 0, degree=4)
     assert exact.bar < rough.bar < 1e-2
     assert rough.reaction[2] == pytest.approx(exact.reaction[2], rel=rough.bar + exact.bar)

@@ -53,7 +53,7 @@ def test_error_bar_holds_the_truth(name, bonded, poisson, monkeypatch):
     exact = solve(SCENES[name], poisson, bonded)
     assert exact.bar < 1e-5
     assert exact.balance < 1e-9
-    monkeypatch.setattr("pipeline.solve.meridian.refine.GRADINGS", (Grading(1e-4, 1.4, 4.0),))
+    monkeypatch.setattr("pipeline.solve.meridian.problem.GRADINGS", (Grading(1e-4, 1.4, 4.0),))
     rough = solve(SCENES[name], poisson, bonded, degree=4)
     assert rough.reaction[2] == pytest.approx(exact.reaction[2], rel=rough.bar + exact.bar)
 

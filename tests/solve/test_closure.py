@@ -8,8 +8,7 @@ from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import build
 from pipeline.run import far_field
 from pipeline.run.execute import compute
-from pipeline.solve import regular
-from pipeline.solve.far_field import PointForce
+from pipeline.solve.far_field import _EXPONENTS, PointForce, Smooth
 from tests.cases import solve, study
 
 MESH = {"epsilon": "6 mm", "fine": "3 mm", "rim": "0.3 mm", "outside": "halfspace"}
@@ -30,8 +29,8 @@ def test_energy_and_force_beyond_a_half_ball(poisson):
 
 def smooth(poisson):
     """Return polynomials that stand for what a body adds to the field."""
-    values = np.random.default_rng(2).uniform(-1, 1, (len(regular._EXPONENTS), 3))
-    field = regular.Smooth((0.1, -0.2, 0.0), 1.5, values)
+    values = np.random.default_rng(2).uniform(-1, 1, (len(_EXPONENTS), 3))
+    field = Smooth((0.1, -0.2, 0.0), 1.5, values)
     return field, lambda at, normal: field.traction(at, normal, 2 * poisson / (1 - 2 * poisson))
 
 

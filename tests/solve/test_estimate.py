@@ -7,8 +7,8 @@ from mpi4py import MPI
 from pipeline.plan.plan import make_plan
 from pipeline.run.execute import compute
 from pipeline.run.meshing import mesh_case
+from pipeline.solve.cell_values import plain_share
 from pipeline.solve.estimate import error_bar, extrapolate, is_graded
-from pipeline.solve.rim import plain_share
 from pipeline.study.load import parse
 from tests.cases import BLADE, solve, study
 from tests.sampling import sampled

@@ -9,9 +9,9 @@ from mpi4py import MPI
 from pipeline import compat
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import conditions_of, movement_of
+from pipeline.solve.cell_values import clear_cells
 from pipeline.solve.crack import Release, moved_on
 from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.rim import clear_cells
 from pipeline.solve.spaces import Spaces
 from tests.cases import BLADE, solve, study
 from tests.solve.test_mixed import law

@@ -19,7 +19,7 @@ import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.solve import SolveError
-from pipeline.solve.contact.candidates import Candidates
+from pipeline.solve.contact.surface import Candidates
 from pipeline.stages import stage
 
 # A pull below this share of the mean reaction, and a way through below this share of the depth, are the solver's error.

@@ -14,9 +14,9 @@ from pipeline.arrays import BoolArray, FloatArray, Int32Array
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import vector
 from pipeline.solve.contact.active_set import State
-from pipeline.solve.contact.candidates import Candidates, Surface
-from pipeline.solve.contact.elements import ContactDisplacement, FarShare, Unknowns
-from pipeline.solve.contact.levels import Hierarchy
+from pipeline.solve.contact.elements import ContactElements, FarShare, Unknowns
+from pipeline.solve.contact.levels import Hierarchy, Surface
+from pipeline.solve.contact.surface import Candidates
 from pipeline.solve.elements.base import Elements
 from pipeline.solve.krylov import Level, LinearSolver
 from pipeline.solve.physics import MaterialLaw
@@ -34,7 +34,7 @@ def suits(elements: Elements, candidates: Candidates, method: str) -> bool:
     return method != "iterative" and elements.element == "displacement" and small
 
 
-class CondensedElements(ContactDisplacement):
+class CondensedElements(ContactElements):
     """Displacements on one process, with the compliance of the candidates. Freed with the stack."""
 
     is_exact = True

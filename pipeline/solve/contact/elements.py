@@ -6,27 +6,23 @@ displacement is v + s φ + w, v that of the reactions r alone. As v vanishes on 
 the far field follows from the reactions, k s = φ·r, with k twice the energy of a unit on both sides of the cut.
 """
 
-from abc import ABC, abstractmethod
 from contextlib import ExitStack
 from dataclasses import dataclass
 
 import numpy as np
-from petsc4py import PETSc
 
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
 from pipeline.solve import SolveError
 from pipeline.solve.balance import check_balance
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.contact.active_set import State
-from pipeline.solve.contact.candidates import Candidates, Numbering, Surface
-from pipeline.solve.contact.levels import Hierarchy, normal_dofs
-from pipeline.solve.elements.base import Column, Elements, Fields
-from pipeline.solve.elements.mixed import MixedElements
-from pipeline.solve.krylov import Level, LinearSolver
+from pipeline.solve.contact.levels import Hierarchy, Numbering, Surface, normal_dofs
+from pipeline.solve.contact.surface import Candidates
+from pipeline.solve.elements.base import Column, Elements, Fields, Solver
+from pipeline.solve.krylov import Level
 from pipeline.solve.loads import Applied
 from pipeline.solve.movement import FarField
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.saddle import SaddleSolver
 from pipeline.solve.spaces import ElasticSpace
 from pipeline.stages import stage
 
@@ -72,7 +68,7 @@ class FarShare:
         self.share += (wanted - self.share) / (1 - self._slope)
 
 
-class ContactElements(ABC):
+class ContactElements:
     """Elements of one ``degree`` with one operator for every set; they keep the solution found last.
 
     What they make is freed with the stack. ``load`` is a right-hand side besides the probe, ``far`` the far field on
@@ -81,8 +77,6 @@ class ContactElements(ABC):
 
     # Whether every solve is, to rounding.
     is_exact = False
-    # Whether the solver can do with dofs that are held by the cycle's smoothers alone.
-    _masks = True
 
     def __init__(self, elements: Elements, surface: Surface, law: MaterialLaw, method: str, stack: ExitStack):
         """Assemble; collective."""
@@ -93,34 +87,21 @@ class ContactElements(ABC):
         self._direct = elements.is_direct(method)
         self.hierarchy = self.hierarchy_of(stack, direct=self._direct)
         self.numbering: Numbering = self.hierarchy.numbering
+        self._multiply = elements.operator(self.hierarchy.finest, law, entries=self._direct)
         self.fields: Fields = stack.enter_context(elements.fields())
         self.load: Unknowns | None = None
         self.far: FarShare | None = None
         self._active: BoolArray = np.zeros(len(self.candidates), dtype=bool)
         self._held: Int32Array = np.empty(0, dtype=np.int32)
-        self._solving = ExitStack()
+        self.solver: Solver | None = None
         stack.callback(self.close)
 
     def finer(self, stack: ExitStack) -> "ContactElements":
         """Return elements of one degree more, which begin with the fields of the forms; collective."""
         elements = self.surface.elements(self.plug.degree + 1, self.plug.element, stack)
-        found = contact_elements(elements, self.surface, self.law, "iterative", stack)
+        found = ContactElements(elements, self.surface, self.law, "iterative", stack)
         found.start_from(self)
         return found
-
-    # ---- what displacement and mixed elements have each of their own ----------------------------------
-
-    @abstractmethod
-    def use(self, levels: list[Level]) -> None:
-        """Solve with these ``levels`` from now on; collective."""
-
-    @abstractmethod
-    def correct(self, rest: Fields, correction: Fields, tolerance: float, target: float | None) -> int:
-        """Solve for a ``correction`` to an error of ``target``, or ``tolerance``, relative; return the iterations."""
-
-    @abstractmethod
-    def product(self, result: Fields) -> None:
-        """Write the operator, without a contact set, times the fields into ``result``; collective."""
 
     def couple(self, far: FarShare | None) -> None:
         """Let a far field act on the cut face from now on, or none."""
@@ -129,13 +110,15 @@ class ContactElements(ABC):
     def hierarchy_of(self, stack: ExitStack, *, direct: bool) -> Hierarchy:
         """Return the operators in which nodes may be held, given back with the ``stack``; collective."""
         law, degree = self.plug.elastic(self.law), self.plug.degree
-        return Hierarchy(self.surface, degree, law, stack, direct=direct, masks=self._masks)
+        return Hierarchy(self.surface, degree, law, stack, direct=direct, masks=self.plug.masks)
 
     # ---- sets -----------------------------------------------------------------------------------------
 
     def close(self) -> None:
         """Free the solver."""
-        self._solving.close()
+        if self.solver is not None:
+            self.solver.close()
+        self.solver = None
 
     @stage("set-up")
     def hold(self, active: BoolArray) -> None:
@@ -145,7 +128,7 @@ class ContactElements(ABC):
             SolveError: if the solver cannot be set up.
         """
         self._active, self._held = active, self.numbering.normal_dofs(active, owned=True)
-        self.use(self.hierarchy.hold(active))
+        self._use(self.hierarchy.hold(active))
 
     @stage("set-up")
     def hold_facets(self, facets: Int32Array) -> None:
@@ -156,7 +139,16 @@ class ContactElements(ABC):
         """
         dofs = normal_dofs(self.space, facets)
         self._active, self._held = np.zeros(len(self.candidates), dtype=bool), dofs[dofs < self.space.owned]
-        self.use(self.hierarchy.hold_facets(facets))
+        self._use(self.hierarchy.hold_facets(facets))
+
+    def _use(self, levels: list[Level]) -> None:
+        self.solver = self.plug.solver_on(levels, self.law, self._held, direct=self._direct, earlier=self.solver)
+
+    def held_levels(self, facets: Int32Array, stack: ExitStack) -> list[Level]:
+        """Return the levels of multigrid with the local ``facets`` held, in the place of any set; collective."""
+        self.close()
+        hierarchy = self.hierarchy_of(stack, direct=False) if self._direct else self.hierarchy
+        return hierarchy.hold_facets(facets)
 
     def improve(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
         """Move what is held to ``bounds`` (n, m), and then the rest; return the iterations. Collective.
@@ -185,7 +177,7 @@ class ContactElements(ABC):
         """Move what is held to ``bounds`` (n, m), and then the rest, far field aside: see ``improve``."""
         self.numbering.put(self.fields[0].array, bounds, self._active)
         with self.plug.fields() as rest, self.plug.fields() as correction:
-            self.product(rest)
+            self._multiply(self.fields, rest)
             for number, part in enumerate(rest):
                 part.scale(-1.0)
                 if self.load is not None:
@@ -193,7 +185,9 @@ class ContactElements(ABC):
             rest[0].array[self.space.prescribed_owned] = 0.0
             rest[0].array[self._held] = 0.0
             target = None if energy is None else tolerance * (energy / self.unit) ** 0.5
-            iterations = self.correct(rest, correction, tolerance, target)
+            column = Column(prescribed=np.empty(0), applied=None, right=rest, unknown=correction)
+            assert self.solver is not None
+            iterations = self.solver.solve([column], tolerance, target)
             for whole, part in zip(self.fields, correction, strict=True):
                 whole.axpy(1.0, part)
         return iterations
@@ -201,7 +195,7 @@ class ContactElements(ABC):
     def near_state(self) -> State:
         """Return what the candidates do, far field aside; collective."""
         with self.plug.fields() as forces:
-            self.product(forces)
+            self._multiply(self.fields, forces)
             moved, reactions = (self.numbering.gather(part.array) for part in (self.fields[0], forces[0]))
             return State(moved, self.unit * reactions, self._work(forces))
 
@@ -219,7 +213,7 @@ class ContactElements(ABC):
         The constant is that of what is prescribed, if that is not nothing; collective.
         """
         with self.plug.fields() as forces:
-            self.product(forces)
+            self._multiply(self.fields, forces)
             if self.load is not None:
                 for part, values in zip(forces, self.load, strict=True):
                     part.array[:] -= 2 * values
@@ -301,102 +295,3 @@ class ContactElements(ABC):
         found, self.load = self.unknowns(), None
         self.start_at(nothing)
         return found
-
-
-class ContactDisplacement(ContactElements):
-    """Displacements of degree 1 or more."""
-
-    _solver: LinearSolver | None = None
-
-    def close(self) -> None:
-        """Free the solver."""
-        super().close()
-        self._solver = None
-
-    def use(self, levels: list[Level]) -> None:
-        """Solve with these ``levels`` from now on; collective."""
-        if self._solver is not None and self._solver.cycle is not None:
-            self._solver.hold(levels)
-            return
-        self.close()
-        self._solver = LinearSolver(levels, direct=self._direct)
-        self._solving.callback(self._solver.close)
-
-    def correct(self, rest: Fields, correction: Fields, tolerance: float, target: float | None) -> int:
-        """Solve for a ``correction`` to an error of ``target``, or ``tolerance``, relative; return the iterations."""
-        assert self._solver is not None
-        return self._solver.solve(rest[0], correction[0], tolerance, target)
-
-    def product(self, result: Fields) -> None:
-        """Write K u into ``result``; collective."""
-        self.hierarchy.finest.mult(self.fields[0], result[0])
-
-    def held_levels(self, facets: Int32Array, stack: ExitStack) -> list[Level]:
-        """Return the levels of multigrid with the local ``facets`` held, in the place of any set; collective."""
-        self.close()
-        hierarchy = self.hierarchy_of(stack, direct=False) if self._direct else self.hierarchy
-        return hierarchy.hold_facets(facets)
-
-
-class ContactMixed(ContactElements):
-    """Displacements of degree 2 or more and pressures of one less: reactions are those of K₀ u + Bᵀ p."""
-
-    # The residual of held displacements must vanish: it is part of the norm that is made small.
-    _masks = False
-
-    def __init__(self, elements: MixedElements, surface: Surface, law: MaterialLaw, method: str, stack: ExitStack):
-        """Assemble; collective."""
-        super().__init__(elements, surface, law, method, stack)
-        self._mixed, self._compliance = elements, elements.compliance(law)
-        self._coupling, self._mass = elements.pressures.blocks(entries=self._direct)
-        # The energy norm squared of the last correction (J): what is taken away from the energy may vanish by chance.
-        self.first_energy = 0.0
-
-    def use(self, levels: list[Level]) -> None:
-        """Solve with these ``levels`` from now on; collective."""
-        self.close()
-        saddle = self._mixed.saddle_of(levels, self._mixed.elastic(self.law), self._holding(), self._mass)
-        self._solver = self._solving.enter_context(SaddleSolver(saddle, direct=self._direct))
-
-    def _holding(self) -> PETSc.Mat:
-        """Return B with columns of zeros for what is held, freed with the solver."""
-        if self._coupling.getType() == "python":
-            coupling = self._coupling.getPythonContext().holding(self._held).matrix()
-            self._solving.callback(coupling.destroy)
-            return coupling
-        coupling = self._coupling.copy()
-        self._solving.callback(coupling.destroy)
-        free = coupling.createVecRight()
-        free.set(1.0)
-        free.array[self._held] = 0.0
-        coupling.diagonalScale(None, free)
-        free.destroy()
-        return coupling
-
-    def correct(self, rest: Fields, correction: Fields, tolerance: float, target: float | None) -> int:
-        """Solve for a ``correction`` to an error of ``target``, or ``tolerance``, relative; return the iterations."""
-        pairs = [(rest[0], rest[1])], [(correction[0], correction[1])]
-        iterations = self._solver.solve(self._compliance, *pairs, tolerance, target)
-        self.first_energy = self.unit * self._solver.first_energies[0]
-        return iterations
-
-    def product(self, result: Fields) -> None:
-        """Write K₀ u + Bᵀ p and B u − c M p into ``result``; collective."""
-        displacement, pressure = self.fields
-        with self.plug.fields() as (pull, dilation):
-            self.hierarchy.finest.mult(displacement, result[0])
-            self._coupling.multTranspose(pressure, pull)
-            result[0].axpy(1.0, pull)
-            self._coupling.mult(displacement, dilation)
-            self._mass.mult(pressure, result[1])
-            result[1].array[:] *= -self._compliance
-            result[1].axpy(1.0, dilation)
-
-
-def contact_elements(
-    elements: Elements, surface: Surface, law: MaterialLaw, method: str, stack: ExitStack
-) -> ContactElements:
-    """Return ``elements`` with operators in which candidates may be held; collective. The ``stack`` frees them."""
-    if isinstance(elements, MixedElements):
-        return ContactMixed(elements, surface, law, method, stack)
-    return ContactDisplacement(elements, surface, law, method, stack)

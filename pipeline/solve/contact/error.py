@@ -15,9 +15,10 @@ import numpy as np
 from pipeline.arrays import Int32Array
 from pipeline.solve.compiled import vector
 from pipeline.solve.contact.active_set import Found, Obstacle, find_set
-from pipeline.solve.contact.candidates import CONDITIONS
-from pipeline.solve.contact.elements import ContactDisplacement, ContactElements, ContactMixed
+from pipeline.solve.contact.elements import ContactElements
 from pipeline.solve.contact.levels import mask, normal_dofs
+from pipeline.solve.contact.surface import CONDITIONS
+from pipeline.solve.elements.mixed import MixedSolver
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.krylov import LinearSolver
 
@@ -36,14 +37,13 @@ def decrement(elements: ContactElements, facets: Int32Array) -> tuple[float, flo
     Raises:
         SolveError: if the solver does not converge.
     """
-    if isinstance(elements, ContactMixed):
+    if elements.plug.element == "mixed":
         return _mixed_decrement(elements, facets)
-    assert isinstance(elements, ContactDisplacement)
     taken, iterations = _displacement_decrement(elements, facets)
     return taken, 0.0, iterations
 
 
-def _displacement_decrement(elements: ContactDisplacement, facets: Int32Array) -> tuple[float, int]:
+def _displacement_decrement(elements: ContactElements, facets: Int32Array) -> tuple[float, int]:
     finer, law = elements.surface.spaces.get(elements.space.degree + 1, CONDITIONS), elements.law
     with ExitStack() as stack, vector(finer.space) as residual:
         levels = elements.held_levels(facets, stack)
@@ -51,24 +51,22 @@ def _displacement_decrement(elements: ContactDisplacement, facets: Int32Array) -
         levels.append(mask(finer, matrix, law, normal_dofs(finer, facets)))
         solver = LinearSolver(levels, direct=False)
         stack.callback(solver.close)
-        finer.forms.displacement.interpolate(elements.space.forms.displacement)
-        finer.apply(residual, law, checked=False)
-        residual.scale(-1.0)
+        finer.residual_of(elements.space, law, residual)
         held = levels[-1].prescribed
         residual.array[held[held < finer.owned]] = 0.0
         decrements, _, iterations = energy_decrements(solver, [residual])
     return float(decrements[0, 0]), iterations
 
 
-def _mixed_decrement(elements: ContactMixed, facets: Int32Array) -> tuple[float, float, int]:
+def _mixed_decrement(elements: ContactElements, facets: Int32Array) -> tuple[float, float, int]:
     elements.close()
     with ExitStack() as stack:
         finer = elements.finer(stack)
-        assert isinstance(finer, ContactMixed)
         finer.hold_facets(facets)
         before = finer.energy()
         iterations = finer.approach(np.zeros(len(finer.candidates)), _ESTIMATE_TOLERANCE, None)  # nothing held moves
-        return before - finer.energy(), finer.first_energy, iterations
+        assert isinstance(finer.solver, MixedSolver)
+        return before - finer.energy(), float(finer.solver.first_energies[0]), iterations
 
 
 def found_again(elements: ContactElements, obstacle: Obstacle, found: Found) -> tuple[float, int]:

@@ -1,19 +1,83 @@
 """Operators of multigrid with candidates held along the probe's axis, other ones for each contact set."""
 
 from contextlib import ExitStack
+from typing import Any
 
 import numpy as np
 from dolfinx import fem
+from mpi4py import MPI
 from petsc4py import PETSc
 
-from pipeline.arrays import BoolArray, Int32Array
-from pipeline.solve.contact.candidates import CONDITIONS, Numbering, Surface
+from pipeline.arrays import BoolArray, FloatArray, Int32Array, IntArray
+from pipeline.solve.compiled import global_sum
+from pipeline.solve.contact.surface import CONDITIONS, Candidates, find_candidates
+from pipeline.solve.elements import elements_of
+from pipeline.solve.elements.base import Elements
 from pipeline.solve.kernels.product import is_product
 from pipeline.solve.krylov import Level
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.spaces import ElasticSpace
+from pipeline.solve.spaces import ElasticSpace, Spaces
 
 _SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
+
+
+class Surface:
+    """The elements of a mesh, of which nodes may touch, and the candidates by their degree, found when first asked for.
+
+    ``spaces`` are those of the mesh.
+    """
+
+    def __init__(self, spaces: Spaces):
+        self.spaces = spaces
+        self._found: dict[int, Candidates] = {}
+
+    def of(self, degree: int) -> Candidates:
+        """Return the candidates of a ``degree``; collective."""
+        if degree not in self._found:
+            space = self.spaces.get(degree, CONDITIONS).space
+            self._found[degree] = find_candidates(self.spaces.body, space)
+        return self._found[degree]
+
+    def elements(self, degree: int, element: str, stack: ExitStack) -> Elements:
+        """Return elements of a ``degree`` and a kind, which the ``stack`` closes; collective."""
+        found = elements_of(self.spaces, degree, CONDITIONS, element)
+        stack.callback(found.close)
+        return found
+
+
+class Numbering:
+    """Where candidates are among the local dofs of a space; takes values from there to all ranks.
+
+    ``local`` (n) are the blocks of this rank, −1 where it has none.
+    """
+
+    def __init__(self, space: Any, numbers: IntArray):
+        """Find nodes with global ``numbers`` (n) in ``space``."""
+        index_map = space.dofmap.index_map
+        self._comm: MPI.Comm = space.mesh.comm
+        local = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
+        known = np.asarray(index_map.local_to_global(local), dtype=np.int64)
+        order = np.argsort(known)
+        place = np.searchsorted(known, numbers, sorter=order)
+        at = np.append(order, -1)[place]
+        self.local = np.where(np.append(known, -2)[at] == numbers, at, -1)
+        self._is_owned = (self.local >= 0) & (self.local < index_map.size_local)
+
+    def normal_dofs(self, chosen: BoolArray, *, owned: bool = False) -> Int32Array:
+        """Return the local dofs (unrolled) along z of the ``chosen`` (n) that are on this rank, or only its own."""
+        here = chosen & self._is_owned if owned else chosen & (self.local >= 0)
+        return np.sort(3 * self.local[here] + 2).astype(np.int32)
+
+    def put(self, into: FloatArray, values: FloatArray, chosen: BoolArray) -> None:
+        """Write ``values`` (n) of the ``chosen`` (n) along z into an array of owned dofs (unrolled)."""
+        here = chosen & self._is_owned
+        into[3 * self.local[here] + 2] = values[here]
+
+    def gather(self, values: FloatArray) -> FloatArray:
+        """Return the entries along z, (n), of ``values`` on owned dofs (unrolled), on every rank; collective."""
+        found = np.zeros(len(self.local))
+        found[self._is_owned] = values[3 * self.local[self._is_owned] + 2]
+        return global_sum(self._comm, found)
 
 
 class Hierarchy:

@@ -17,21 +17,21 @@ import numpy as np
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.solve import SolveError
 from pipeline.solve.balance import check_balance
+from pipeline.solve.cell_values import plain_share
 from pipeline.solve.compiled import global_sum
 from pipeline.solve.contact.active_set import ContactError, Found, Obstacle, find_set
-from pipeline.solve.contact.area import Area, contact_area
-from pipeline.solve.contact.candidates import Candidates, Numbering, Surface
 from pipeline.solve.contact.condensed import CondensedElements, suits
-from pipeline.solve.contact.elements import ContactElements, FarShare, FreeResponse, contact_elements
+from pipeline.solve.contact.elements import ContactElements, FarShare, FreeResponse
 from pipeline.solve.contact.error import decrement, found_again
+from pipeline.solve.contact.geometry import Area, Touch, contact_area
+from pipeline.solve.contact.levels import Numbering, Surface
+from pipeline.solve.contact.surface import Candidates
 from pipeline.solve.contact.sweep import Sweep
-from pipeline.solve.contact.touch import Touch
 from pipeline.solve.elements.base import Column, Elements, Enriched, Equilibrium, close_far
 from pipeline.solve.estimate import error_bar, found_again_bar, found_bar
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import Contact, Response, reaction
-from pipeline.solve.rim import plain_share
 from pipeline.solve.solution import Request
 from pipeline.solve.spaces import Spaces
 from pipeline.stages import recharge, recorded, stage
@@ -180,7 +180,7 @@ class ContactSearch:
             kind = self._elements.element if degree > 1 else "displacement"
             law = sweep.law if kind == "mixed" else _softer(sweep.law)
             plain = self._surface.elements(degree, kind, stack)
-            lower = contact_elements(plain, self._surface, law, sweep.method, stack)
+            lower = ContactElements(plain, self._surface, law, sweep.method, stack)
             obstacle = self._obstacle_of(lower.candidates, loaded)
             if elements is None or found is None:
                 active = obstacle.bounds < 0
@@ -216,7 +216,7 @@ class ContactSearch:
             if self._condense and suits(self._elements, self.candidates, method):
                 elements: ContactElements = CondensedElements(self._elements, self._surface, law, "direct", inner)
             else:
-                elements = contact_elements(self._elements, self._surface, law, method, inner)
+                elements = ContactElements(self._elements, self._surface, law, method, inner)
             sweep = Sweep(law, method, elements, inner.pop_all(), cost)
         if self._reuse:
             self._sweep = sweep

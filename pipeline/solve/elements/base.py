@@ -1,7 +1,7 @@
 """What all elements have in common: unknown fields, load cases, and what solutions do."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from math import nan
@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from petsc4py import PETSc
 
-from pipeline.arrays import FloatArray
+from pipeline.arrays import FloatArray, Int32Array
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import global_sum, vector
@@ -103,7 +103,7 @@ class Equilibrium:
 
 
 class Solver(ABC):
-    """A solver of ``elements`` for one ``law``.
+    """A solver of ``elements`` for one ``law``; ``close`` frees what it owns.
 
     ``is_exact`` tells that nothing improves what it finds; ``stored`` is the energy (J) of the modelled part where that
     is not half the work of the force.
@@ -112,6 +112,11 @@ class Solver(ABC):
     def __init__(self, elements: "Elements", law: MaterialLaw, *, is_exact: bool):
         self.elements, self.law, self.is_exact = elements, law, is_exact
         self.stored: float | None = None
+        self.owner = ExitStack()
+
+    def close(self) -> None:
+        """Free what it owns."""
+        self.owner.close()
 
     def lift(self, columns: Sequence[Column]) -> None:
         """Put what columns prescribe and their loads on their right-hand sides; collective."""
@@ -123,8 +128,14 @@ class Solver(ABC):
         return self.elements.products(self.law, columns)
 
     @abstractmethod
-    def solve(self, columns: Sequence[Column], tolerance: float) -> int:
-        """Lower the energy norm of the error of each solution to a ``tolerance``; return the iterations; collective."""
+    def solve(self, columns: Sequence[Column], tolerance: float, target: float | None = None) -> int:
+        """Lower the energy norm of the error of each solution to a ``tolerance``; return the iterations; collective.
+
+        A ``target`` is for that norm itself (J^½ in the law's unit), and takes the tolerance's place.
+
+        Raises:
+            SolveError: if the solver does not converge.
+        """
 
     @abstractmethod
     def improve(self, columns: Sequence[Column], share: float) -> int:
@@ -148,6 +159,8 @@ class Elements(ABC):
     element: str
     # Solutions are found to this share of the tolerance that is asked for.
     stricter: float
+    # Whether the solver can do with dofs that are held by the cycle's smoothers alone.
+    masks: bool
 
     def __init__(self, spaces: Spaces, degree: int, conditions: Conditions):
         """Prepare the space of displacements; collective.
@@ -189,6 +202,25 @@ class Elements(ABC):
 
         Raises:
             SolveError: if it cannot be set up, or the elements are not for the law.
+        """
+
+    @abstractmethod
+    def solver_on(
+        self, levels: list[Level], law: MaterialLaw, held: Int32Array, *, direct: bool, earlier: Solver | None
+    ) -> Solver:
+        """Return a solver of operators in which more dofs are held, of which this rank owns ``held``; collective.
+
+        An ``earlier`` one is changed, or closed.
+
+        Raises:
+            SolveError: if it cannot be set up.
+        """
+
+    @abstractmethod
+    def operator(self, stiffness: PETSc.Mat, law: MaterialLaw, *, entries: bool) -> Callable[[Fields, Fields], None]:
+        """Return what writes the operator times fields into other fields; collective.
+
+        The ``stiffness`` is that of displacements, ``entries`` that of a direct solve.
         """
 
     def levels(self, law: MaterialLaw, stack: ExitStack, *, direct: bool) -> list[Level]:

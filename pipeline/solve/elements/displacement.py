@@ -1,25 +1,26 @@
 """Displacement elements: u with a(u, v) = ∫ λ div u div v + 2μ ε(u) : ε(v), solved directly or by multigrid."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 
 import numpy as np
+from petsc4py import PETSc
 
-from pipeline.arrays import FloatArray
+from pipeline.arrays import FloatArray, Int32Array
 from pipeline.solve.compiled import vector
-from pipeline.solve.elements.base import Column, Elements, Enriched, Solver, level_of
+from pipeline.solve.elements.base import Column, Elements, Enriched, Fields, Solver, level_of
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.krylov import DIRECT_LIMIT, Level, LinearSolver
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import Conditions, Spaces
-from pipeline.stages import recharge, recorded
+from pipeline.stages import Times, recharge, recorded
 
 
 class DisplacementElements(Elements):
     """Displacements alone."""
 
-    element, stricter = "displacement", 1.0
+    element, stricter, masks = "displacement", 1.0, True
 
     def __init__(self, spaces: Spaces, degree: int, conditions: Conditions):
         """Prepare; collective."""
@@ -34,7 +35,7 @@ class DisplacementElements(Elements):
     def close(self) -> None:
         """Free what is kept from solve to solve."""
         if self._kept is not None:
-            self._kept.owner.close()
+            self._kept.close()
         self._kept = None
 
     def set_up(self, law: MaterialLaw, stack: ExitStack, *, direct: bool, keep: bool) -> "DisplacementSolver":
@@ -47,13 +48,44 @@ class DisplacementElements(Elements):
             recharge(self._kept.cost)
             return self._kept
         self.close()
-        found = DisplacementSolver(self, law, direct=direct)
+        found = self.solver(law, direct=direct)
         if keep and not direct:
             found.linear.recycle()
             self._kept = found
         else:
-            stack.callback(found.owner.close)
+            stack.callback(found.close)
         return found
+
+    def solver(self, law: MaterialLaw, *, direct: bool) -> "DisplacementSolver":
+        """Return a solver with levels of its own; collective.
+
+        Raises:
+            SolveError: if it cannot be set up.
+        """
+        with ExitStack() as stack, recorded() as cost:
+            found = DisplacementSolver(self, law, self.levels(law, stack, direct=direct), direct=direct)
+            found.owner.push(stack.pop_all())
+        found.cost = cost
+        return found
+
+    def solver_on(
+        self, levels: list[Level], law: MaterialLaw, held: Int32Array, *, direct: bool, earlier: Solver | None
+    ) -> "DisplacementSolver":
+        """Return a solver of operators in which more dofs are held; collective.
+
+        Raises:
+            SolveError: if it cannot be set up.
+        """
+        if isinstance(earlier, DisplacementSolver) and earlier.linear.cycle is not None:
+            earlier.linear.hold(levels)
+            return earlier
+        if earlier is not None:
+            earlier.close()
+        return DisplacementSolver(self, law, levels, direct=direct)
+
+    def operator(self, stiffness: PETSc.Mat, law: MaterialLaw, *, entries: bool) -> Callable[[Fields, Fields], None]:
+        """Return what writes K u into other fields."""
+        return lambda fields, result: stiffness.mult(fields[0], result[0])
 
     def finer(
         self, law: MaterialLaw, levels: list[Level], stack: ExitStack, below: LinearSolver | None = None
@@ -72,26 +104,23 @@ class DisplacementElements(Elements):
 class DisplacementSolver(Solver):
     """A solver of displacement elements for a law, by its ``levels``, and the one above it, once it was made.
 
-    ``owner`` frees it, and ``cost`` is what it took to make.
+    ``cost`` is what it took to make.
     """
 
     elements: DisplacementElements
+    cost: Times
 
-    def __init__(self, elements: DisplacementElements, law: MaterialLaw, *, direct: bool):
-        """Set up; collective."""
+    def __init__(self, elements: DisplacementElements, law: MaterialLaw, levels: list[Level], *, direct: bool):
+        """Set up; collective. The ``levels`` must live as long."""
         super().__init__(elements, law, is_exact=direct)
-        self.owner = ExitStack()
         self._above: tuple[DisplacementElements, LinearSolver] | None = None
-        self._tolerance = 1.0
-        with ExitStack() as stack, recorded() as self.cost:
-            self.levels = elements.levels(law, stack, direct=direct)
-            self.linear = stack.enter_context(LinearSolver(self.levels, direct=direct))
-            self.owner = stack.pop_all()
+        self._tolerance, self.levels = 1.0, levels
+        self.linear = self.owner.enter_context(LinearSolver(levels, direct=direct))
 
-    def solve(self, columns: Sequence[Column], tolerance: float) -> int:
-        """Lower the energy norm of each error to a ``tolerance``; return the iterations; collective."""
+    def solve(self, columns: Sequence[Column], tolerance: float, target: float | None = None) -> int:
+        """Lower the energy norm of each error to a ``tolerance``, or a ``target``; return iterations; collective."""
         self._tolerance = tolerance
-        return sum(self.linear.solve(column.right[0], column.unknown[0], tolerance) for column in columns)
+        return sum(self.linear.solve(column.right[0], column.unknown[0], tolerance, target) for column in columns)
 
     def improve(self, columns: Sequence[Column], share: float) -> int:
         """Lower it to that ``share`` of what the last solve left; return the iterations; collective."""
@@ -109,12 +138,9 @@ class DisplacementSolver(Solver):
         for column in columns:
             residual = stack.enter_context(vector(space.space))
             coarse.show([column], [1.0])
-            space.forms.displacement.interpolate(coarse.displacements.forms.displacement)
+            space.residual_of(coarse.displacements, self.law, residual)
             if keep:
                 solutions.append(space.forms.displacement.x.array[: space.owned].copy())
-            space.apply(residual, self.law, checked=False)
-            residual.scale(-1.0)
-            residual.array[space.prescribed_owned] = 0.0
             if movement.loads is not None and column.applied is not None:
                 space.put(residual, space.applied(movement.loads))
             residuals.append(residual)

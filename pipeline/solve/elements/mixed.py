@@ -10,19 +10,19 @@ those of each region; pressures jump from one to the next. F is no upper bound, 
 N, the energy norm squared of the correction that degree k + 1 asks for, is told, too.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
 
-from pipeline.arrays import FloatArray
+from pipeline.arrays import FloatArray, Int32Array
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import vector
 from pipeline.solve.elements.base import Column, Elements, Enriched, Fields, Solver
 from pipeline.solve.elements.pressures import Pressures
-from pipeline.solve.krylov import Level
+from pipeline.solve.krylov import Level, keep
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw, SplitLaw
 from pipeline.solve.saddle import Saddle, SaddleSolver
@@ -42,7 +42,7 @@ class MixedElements(Elements):
     """
 
     # Forces balance at a tenth of the tolerance that F needs: three iterations more, less than to find out and go on.
-    element, stricter = "mixed", 0.1
+    element, stricter, masks = "mixed", 0.1, False
     # Measured for degrees 2 and 3 (docs/solvers.md).
     direct_limit = 1_500
 
@@ -138,6 +138,40 @@ class MixedElements(Elements):
             raise SolveError("mixed elements are for Poisson's ratios above 0.25; use displacement elements")
         return MixedSolver(self, law, self._solver(self.elastic(law), direct=direct), is_exact=direct)
 
+    def solver_on(
+        self, levels: list[Level], law: MaterialLaw, held: Int32Array, *, direct: bool, earlier: Solver | None
+    ) -> "MixedSolver":
+        """Return a solver of operators in which more dofs are held, of which this rank owns ``held``; collective.
+
+        Raises:
+            SolveError: if it cannot be set up.
+        """
+        if earlier is not None:
+            earlier.close()
+        with ExitStack() as stack:
+            coupling = keep(stack, self.pressures.holding(held, entries=direct))
+            _, mass = self.pressures.blocks(entries=direct)
+            saddle = self.saddle_of(levels, self.elastic(law), coupling, mass)
+            found = MixedSolver(self, law, stack.enter_context(SaddleSolver(saddle, direct=direct)), is_exact=direct)
+            found.owner.push(stack.pop_all())
+        return found
+
+    def operator(self, stiffness: PETSc.Mat, law: MaterialLaw, *, entries: bool) -> Callable[[Fields, Fields], None]:
+        """Return what writes K₀ u + Bᵀ p and B u − M p / λ₁, in the law's unit, into other fields; collective."""
+        (coupling, mass), compliance = self.pressures.blocks(entries=entries), self.compliance(law)
+
+        def multiply(fields: Fields, result: Fields) -> None:
+            with self.fields() as (pull, dilation):
+                stiffness.mult(fields[0], result[0])
+                coupling.multTranspose(fields[1], pull)
+                result[0].axpy(1.0, pull)
+                coupling.mult(fields[0], dilation)
+                mass.mult(fields[1], result[1])
+                result[1].array[:] *= -compliance
+                result[1].axpy(1.0, dilation)
+
+        return multiply
+
     def finer(self) -> "MixedElements":
         """Return the elements of one degree more, made when first asked for; collective."""
         if self._finer is None:
@@ -180,11 +214,16 @@ class MixedSolver(Solver):
         super().__init__(elements, law, is_exact=is_exact)
         self.saddle = saddle
 
-    def solve(self, columns: Sequence[Column], tolerance: float) -> int:
-        """Lower the energy norm of each error by a ``tolerance``; return the iterations; collective."""
+    def solve(self, columns: Sequence[Column], tolerance: float, target: float | None = None) -> int:
+        """Lower the energy norm of each error by a ``tolerance``, or to a ``target``; return iterations; collective."""
         right, unknown = [column.right for column in columns], [column.unknown for column in columns]
         with stage("iterations"):
-            return self.saddle.solve(self.elements.compliance(self.law), right, unknown, tolerance)
+            return self.saddle.solve(self.elements.compliance(self.law), right, unknown, tolerance, target)
+
+    @property
+    def first_energies(self) -> FloatArray:
+        """N (J) of each column: the energy norm squared of what the last solve began with, as far as it was seen."""
+        return self.elements.unit(self.law) * np.array(self.saddle.first_energies)
 
     def improve(self, columns: Sequence[Column], share: float) -> int:
         """Lower it to that ``share`` of what the last solve left; return the iterations; collective."""
@@ -202,5 +241,4 @@ class MixedSolver(Solver):
             finer.start_from(coarse, fine.unknown, fine.prescribed)
             finer.lift(fine, self.law, checked=False)
         iterations = above.solve(found, _ESTIMATE_TOLERANCE)
-        unseen = coarse.unit(self.law) * np.array(saddle.first_energies)
-        return Enriched(finer, found, iterations, unseen=unseen)
+        return Enriched(finer, found, iterations, unseen=above.first_energies)

@@ -58,6 +58,15 @@ class Pressures:
         """
         return self._assembled if entries else self._shells
 
+    def holding(self, held: Int32Array, *, entries: bool) -> PETSc.Mat:
+        """Return B with columns of zeros for the owned dofs ``held``, too; the caller destroys it; collective."""
+        coupling, _ = self.blocks(entries=entries)
+        if not entries:
+            return coupling.getPythonContext().holding(held).matrix()
+        coupling = coupling.copy()
+        _without_columns(coupling, held)
+        return coupling
+
     def by_region(self, values: tuple[float, ...]) -> float | FloatArray:
         """Return what a pressure dof has of a value by region: one for all, or an array for this rank's dofs."""
         return np.array(values)[self._region] if self._has_regions else values[0]
@@ -104,11 +113,7 @@ class Pressures:
         coupling, mass = (
             keep(self._stack, compat.assemble_matrix(form, [], 1.0)) for form in (self.forms.coupling, self.forms.mass)
         )
-        free = coupling.createVecRight()
-        free.set(1.0)
-        free.array[self._displacements.prescribed_owned] = 0.0
-        coupling.diagonalScale(None, free)
-        free.destroy()
+        _without_columns(coupling, self._displacements.prescribed_owned)
         coupling.scale(self.unit)
         mass.scale(self.unit**2)
         return coupling, mass
@@ -135,6 +140,15 @@ def region_wise_space(body: BodyMesh, degree: int) -> tuple[Any, Int32Array]:
     dofs = number[compat.cell_dofs(space), body.regions[:, None]]
     renumbered = compat.renumbered_space(space, dofs, copies, ghosts, owners)
     return renumbered, np.nonzero(has_copy[:owned])[1].astype(np.int32)
+
+
+def _without_columns(matrix: PETSc.Mat, dofs: Int32Array) -> None:
+    """Make the columns of owned ``dofs`` zero; collective."""
+    free = matrix.createVecRight()
+    free.set(1.0)
+    free.array[dofs] = 0.0
+    matrix.diagonalScale(None, free)
+    free.destroy()
 
 
 def _copies(space: Any, regions: Int32Array, count: int) -> BoolArray:

@@ -3,9 +3,14 @@
 Lengths are in units of the footprint's radius a, stresses in units of μ and displacements in units of the depth d:
 nothing depends on the unit of anything. The force is the reaction: the residual of the unmodified operator on the
 probe's dofs, times 2π.
+
+Meshes are refined until the error bar is small enough.
 """
 
-from math import pi
+from abc import abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import nan, pi
 
 import numpy as np
 
@@ -13,11 +18,132 @@ from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Grading, Meridian, meridian_mesh
 from pipeline.solve.krylov import SolveError
 from pipeline.solve.meridian.forms import MeridianForms
-from pipeline.solve.meridian.refine import DEGREE, Answer, MeridianSolver, error_bar
-from pipeline.solve.meridian.system import HalfPlane, Pressed, System, max_strain, meshes_of
+from pipeline.solve.meridian.system import HalfPlane, Pressed, System, Unbalanced, max_strain, meshes_of
 from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.response import Contact, reaction
+from pipeline.solve.solution import Problem, Request, Solution
 from pipeline.solve.spaces import Conditions
-from pipeline.stages import stage
+from pipeline.stages import recorded, stage
+
+DEGREE = 5
+# Meshes in the order in which they are tried, until the error bar is below the accuracy asked for.
+GRADINGS = (Grading(1e-6, 1.0, 4.0), Grading(1e-7, 0.7, 2.0), Grading(1e-8, 0.5, 1.0))
+# An error bar above this is no answer.
+_WORST_ERROR = 1e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """What one mesh gives at a depth: F/d by energy and as the reaction, in units of μ a, and the rest of a solution.
+
+    ``error`` is the relative error bar of the force. Of contact that is found there are its area (m²) and the strain
+    energy, in units of μ a times m².
+    """
+
+    stiffness: float
+    on_probe: float
+    balance: float
+    error: float
+    unit: float
+    max_strain: float
+    dofs: int
+    cells: int
+    iterations: int
+    area: float = nan
+    energy: float | None = None
+
+
+class MeridianSolver(Problem):
+    """A problem on this process alone, which holds nothing between solves: each makes meshes of its own."""
+
+    def __init__(self, meridian: HalfPlane, *, accuracy: float = 1e-5, degree: int = DEGREE):
+        """Prepare to refine until the error bar is at most ``accuracy``; ``degree`` is 3 at least."""
+        self._meridian, self._accuracy, self._degree = meridian, accuracy, degree
+
+    def close(self) -> None:
+        """There is nothing to free."""
+
+    @property
+    def dofs(self) -> int:
+        """None: unknowns are counted in each solve, which is direct."""
+        return 0
+
+    @stage("axisymmetric")
+    def answer(self, asked: Request) -> Solution:
+        """Solve for 0 <= ν <= 0.5 and a movement along the axis; directly, refined until round-off stops it.
+
+        Takes the next mesh until the error bar is small enough, or there is no finer one; then takes the best. The
+        bars are there whether they are asked for or not; ``max_strain`` is that of cells at least a/10 away
+        from every singular point. ``dofs`` and ``cells`` belong to the solve that gave F, the seconds are of all.
+        ``iterations`` are those of that solve, more than one where round-off was refined; where contact is found, they
+        count the linear solves.
+
+        Raises:
+            SolveError: if the conditions contradict each other or nothing is held, if contact is not found or no round
+                patch, with rings lost or not, or reaches the edge of the body; if a solve fails a check, or the error
+                bar stays above 1e-3.
+        """
+        law, movement = asked.law, asked.movement
+        if len(movement.motions) > 1 or movement.motions[0].is_rotation or any(movement.motions[0].direction[:2]):
+            raise SolveError("the meridian serves movements along its axis only")
+        for tissue in law.parameters:
+            if not 0 <= tissue.poisson <= 0.5:
+                raise SolveError(f"Poisson's ratio is {tissue.poisson:g}, must be between 0 and 0.5")
+        (depth,) = movement.amounts
+        with recorded() as times:
+            found = self._answer(law, depth)
+        scale = law.lame_mu[0] * found.unit
+        stiffness, on_probe = np.array([[scale * found.stiffness]]), np.array([[0.0, 0.0, scale * found.on_probe]])
+        return Solution(
+            response=reaction(movement, stiffness, on_probe, balance=found.balance),
+            largest={"max_strain": found.max_strain},
+            dofs=found.dofs,
+            cells=found.cells,
+            iterations=found.iterations,
+            times=times,
+            bars=found.error * stiffness,
+            contact=None if found.energy is None else Contact(found.area, found.error),
+            stored=None if found.energy is None else scale * found.energy,
+        )
+
+    @abstractmethod
+    def _answer(self, law: MaterialLaw, depth: float) -> Answer:
+        """Return the best answer at a ``depth`` (m)."""
+
+    def _best(self, solve_on: Callable[[Grading], Answer]) -> Answer:
+        """Return the best of what meshes give, the next one taken until the error bar is small enough.
+
+        Raises:
+            SolveError: if a solve fails a check, or the error bar stays above 1e-3.
+        """
+        best: Answer | None = None
+        for grading in GRADINGS:
+            try:
+                found = solve_on(grading)
+            except Unbalanced:
+                # Round-off grows with refinement: a finer mesh would do no better.
+                if best is None:
+                    raise
+                break
+            if best is None or found.error < best.error:
+                best = found
+            if best.error <= self._accuracy:
+                break
+        assert best is not None
+        if best.error > _WORST_ERROR:
+            raise SolveError(f"the force is known to {best.error:.0e} only, allowed {_WORST_ERROR:.0e}")
+        return best
+
+
+def error_bar(coarse: float, fine: float, degree: int, balance: float) -> float:
+    """Return the relative error bar of ``fine``, of a degree p, from what degree p - 1 gives on the same mesh.
+
+    At an edge where the displacement goes like r^½, the error falls like p⁻² if nothing else is left (the mesh's
+    smallest cell), faster elsewhere: what is left is at most θ = p²/(2p + 1) times the last step, p counted before
+    it. The safety of 1.25 on it is measured, and so is that round-off errs by less than 3 times the ``balance``.
+    """
+    theta = (degree - 1) ** 2 / (2 * degree - 1)
+    return 1.25 * theta * abs(coarse / fine - 1) + 3 * balance
 
 
 class MeridianProblem(MeridianSolver):

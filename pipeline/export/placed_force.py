@@ -42,6 +42,10 @@ class PlacedForce(PointForce):
         distance = np.linalg.norm(local, axis=1)
         return float((local[:, 2] / np.where(distance > max(self.blunt, 1e-12 * self.radius), distance, np.inf)).max())
 
+    def pull(self, space: Any, places: FloatArray) -> "PlacedPull":
+        """Return what integrates the stresses of such forces over the boundary of ``space``."""
+        return PlacedPull(space)
+
     def _local(self, points: FloatArray) -> FloatArray:
         return np.asarray((points - np.array(self.centre)) @ self._rows.T)
 

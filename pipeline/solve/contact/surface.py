@@ -3,23 +3,88 @@
 Contact is decided node by node for all ranks at once: they are a few thousand at most, and each rank holds them all.
 """
 
-from contextlib import ExitStack
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
+import basix
 import numpy as np
-from mpi4py import MPI
 
 from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.scene.model import PROBE
-from pipeline.solve.compiled import global_sum
-from pipeline.solve.contact.facet import FACET_CORNERS, FacetNodes, facet_nodes
-from pipeline.solve.elements import elements_of
-from pipeline.solve.elements.base import Elements
-from pipeline.solve.spaces import Conditions, Spaces
+from pipeline.solve.spaces import Conditions
+
+FACET_CORNERS = 3
+# The corners of a reference tetrahedron's facet that is opposite to each of its own, and an equilateral facet.
+_OPPOSITE = [[j for j in range(4) if j != i] for i in range(4)]
+_EQUILATERAL = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.75**0.5]])
+
+
+@dataclass(frozen=True, eq=False)
+class FacetNodes:
+    """The k nodes of a facet, corners first.
+
+    ``places`` (4, k) are their numbers in a cell, for each of its facets, ``corners`` (k, 3) their barycentric
+    coordinates. ``boundary`` are the nodes on the edges, once round; ``edges`` (3, ·) those of each edge, its two ends
+    first. ``weights`` (k) are the shares of an even pressure.
+    """
+
+    degree: int
+    places: IntArray
+    corners: FloatArray
+    boundary: IntArray
+    edges: IntArray
+    weights: FloatArray
+
+    @property
+    def facets_per_node(self) -> FloatArray:
+        """How many facets have each node (k): inside one, two beside an edge, and six round a corner or so."""
+        found = np.ones(len(self.corners))
+        found[self.boundary] = 2.0
+        found[:FACET_CORNERS] = 6.0
+        return found
+
+    def distances(self, other: "FacetNodes") -> FloatArray:
+        """Return the distances (k, l) to the nodes of another degree, in lengths of an edge of an even facet."""
+        here, there = self.corners @ _EQUILATERAL, other.corners @ _EQUILATERAL
+        return np.asarray(np.linalg.norm(here[:, None] - there[None], axis=2))
+
+    def values(self, points: FloatArray) -> FloatArray:
+        """Return the nodes' functions at points (q, 3) in barycentric coordinates, (q, k)."""
+        return np.asarray(np.linalg.solve(_monomials(self.degree, self.corners).T, _monomials(self.degree, points).T).T)
+
+
+def _monomials(degree: int, points: FloatArray) -> FloatArray:
+    """Return all monomials of ``degree`` in barycentric coordinates at points (q, 3)."""
+    powers = [(i, j, degree - i - j) for i in range(degree + 1) for j in range(degree + 1 - i)]
+    return np.prod(points[:, None, :] ** np.array(powers)[None], axis=2)
+
+
+@cache
+def facet_nodes(degree: int) -> FacetNodes:
+    """Return the nodes of ``degree``."""
+    element = compat.reference_element(degree)
+    points = np.column_stack([1 - element.points.sum(axis=1), element.points])  # barycentric
+    found = [np.array(element.entity_closure_dofs[2][side]) for side in range(4)]
+    first = points[found[0]][:, _OPPOSITE[0]]
+    first = first[np.lexsort([*first.T, -first.max(axis=1)])]
+    first[:FACET_CORNERS] = np.eye(FACET_CORNERS)
+    places = np.empty((4, len(first)), dtype=np.int64)
+    for side, (dofs, corners) in enumerate(zip(found, _OPPOSITE, strict=True)):
+        away = np.abs(points[dofs][:, corners][:, None] - first[None]).max(axis=2)
+        places[side] = dofs[away.argmin(axis=0)]
+    angle = np.arctan2(*((first - 1 / 3) @ _EQUILATERAL).T[::-1])
+    on_edge = np.flatnonzero(first.min(axis=1) < 1e-9)
+    edges = [np.flatnonzero(first[:, opposite] < 1e-9) for opposite in range(FACET_CORNERS)]
+    rule, shares = basix.make_quadrature(basix.CellType.triangle, 2 * degree)
+    inside = np.column_stack([rule, np.zeros(len(rule))])  # the facet opposite to the last corner
+    values = np.asarray(element.tabulate(0, inside)[0, :, :, 0])
+    weights = 2 * shares @ values[:, places[3]]
+    weights[np.abs(weights) < 1e-12] = 0.0
+    return FacetNodes(degree, places, first, on_edge[np.argsort(angle[on_edge])], np.array(edges), weights)
+
 
 # What is held is the contact set's alone; of the footprint as such nothing is.
 CONDITIONS = Conditions(bonded=False, unilateral=True)
@@ -171,65 +236,6 @@ def _edge(body: BodyMesh, points: FloatArray, facets: IntArray, shape: FacetNode
         single = single[np.abs(points[single, axis]).max(axis=1) > _IN_PLANE * extent]
     is_edge[single] = True
     return is_edge
-
-
-class Surface:
-    """The elements of a mesh, of which nodes may touch, and the candidates by their degree, found when first asked for.
-
-    ``spaces`` are those of the mesh.
-    """
-
-    def __init__(self, spaces: Spaces):
-        self.spaces = spaces
-        self._found: dict[int, Candidates] = {}
-
-    def of(self, degree: int) -> Candidates:
-        """Return the candidates of a ``degree``; collective."""
-        if degree not in self._found:
-            space = self.spaces.get(degree, CONDITIONS).space
-            self._found[degree] = find_candidates(self.spaces.body, space)
-        return self._found[degree]
-
-    def elements(self, degree: int, element: str, stack: ExitStack) -> Elements:
-        """Return elements of a ``degree`` and a kind, which the ``stack`` closes; collective."""
-        found = elements_of(self.spaces, degree, CONDITIONS, element)
-        stack.callback(found.close)
-        return found
-
-
-class Numbering:
-    """Where candidates are among the local dofs of a space; takes values from there to all ranks.
-
-    ``local`` (n) are the blocks of this rank, −1 where it has none.
-    """
-
-    def __init__(self, space: Any, numbers: IntArray):
-        """Find nodes with global ``numbers`` (n) in ``space``."""
-        index_map = space.dofmap.index_map
-        self._comm: MPI.Comm = space.mesh.comm
-        local = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
-        known = np.asarray(index_map.local_to_global(local), dtype=np.int64)
-        order = np.argsort(known)
-        place = np.searchsorted(known, numbers, sorter=order)
-        at = np.append(order, -1)[place]
-        self.local = np.where(np.append(known, -2)[at] == numbers, at, -1)
-        self._is_owned = (self.local >= 0) & (self.local < index_map.size_local)
-
-    def normal_dofs(self, chosen: BoolArray, *, owned: bool = False) -> Int32Array:
-        """Return the local dofs (unrolled) along z of the ``chosen`` (n) that are on this rank, or only its own."""
-        here = chosen & self._is_owned if owned else chosen & (self.local >= 0)
-        return np.sort(3 * self.local[here] + 2).astype(np.int32)
-
-    def put(self, into: FloatArray, values: FloatArray, chosen: BoolArray) -> None:
-        """Write ``values`` (n) of the ``chosen`` (n) along z into an array of owned dofs (unrolled)."""
-        here = chosen & self._is_owned
-        into[3 * self.local[here] + 2] = values[here]
-
-    def gather(self, values: FloatArray) -> FloatArray:
-        """Return the entries along z, (n), of ``values`` on owned dofs (unrolled), on every rank; collective."""
-        found = np.zeros(len(self.local))
-        found[self._is_owned] = values[3 * self.local[self._is_owned] + 2]
-        return global_sum(self._comm, found)
 
 
 def _global(space: Any, dofs: IntArray) -> IntArray:

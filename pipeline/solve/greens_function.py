@@ -1,0 +1,172 @@
+"""The regular part of a body's Green's function: what its sides and its support make of a point force on its top.
+
+    G = u + R, u the half-space's field; R has no loads in the body, -σ(u) n on what is free, -u on what is held.
+
+R is smooth where the force acts: a coarse mesh gives it, once for all tools, ε, and moduli. Within the largest half
+ball that the body holds it is kept as polynomials, by least squares (:class:`~pipeline.solve.far_field.Smooth`).
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from pipeline import compat
+from pipeline.arrays import FloatArray, IntArray
+from pipeline.mesh.distribute import BodyMesh, distribute
+from pipeline.solve import SolveError
+from pipeline.solve.compiled import vector, vector_space
+from pipeline.solve.far_field import PointForce, Smooth, StressPull, outer_triangles
+from pipeline.solve.forms import compile_forms, one_cell
+from pipeline.solve.krylov import Level, LinearSolver
+from pipeline.solve.movement import Motion
+from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.spaces import Conditions, ElasticSpace, Spaces
+
+# Of the elements that R is found with.
+DEGREE = 2
+# A node this near to a force, in units of the radius, is where it acts.
+_AT_CENTRE = 1e-9
+# From so many forces on an operator without conditions is assembled: its products take a tenth of an integration.
+_MANY = 8
+# Right-hand sides that are solved for together.
+_TOGETHER = 24
+
+
+def regular_parts(body: BodyMesh, forces: Sequence[PointForce], law: MaterialLaw | None = None) -> Iterator[Smooth]:
+    """Yield R for a unit of the field of each of ``forces``, as it is within its radius: one factorisation for all.
+
+    The mesh is of this process alone; it may be the half or the quarter of which planes through the centre of one force
+    make the whole. All forces have one Poisson's ratio.
+    A ``law`` of several regions is in units of μ where the forces act: the half-space is of that material, and R has
+    what other regions make of its field as loads.
+
+    Raises:
+        SolveError: if that cannot be solved, or if the mesh is too coarse for the radius of a force.
+    """
+    with Spaces(body) as spaces:
+        space = spaces.get(DEGREE, Conditions(unilateral=True))
+        places = np.asarray(space.space.tabulate_dof_coordinates())
+        for force, values in zip(forces, _solved(space, forces, places, law), strict=True):
+            yield _fitted(body, force, places, values.reshape(-1, 3))
+
+
+def _fitted(body: BodyMesh, force: PointForce, places: FloatArray, values: FloatArray) -> Smooth:
+    near = np.linalg.norm(places - np.array(force.centre), axis=1) <= force.radius
+    points, values = places[near], values[near]
+    for axis in body.mirrored:
+        sign = np.where(np.arange(3) == axis, -1.0, 1.0)
+        points, values = np.vstack([points, sign * points]), np.vstack([values, sign * values])
+    return Smooth.fit(force.centre, force.radius, points, values)
+
+
+def _solved(
+    space: ElasticSpace, forces: Sequence[PointForce], places: FloatArray, law: MaterialLaw | None = None
+) -> Iterator[FloatArray]:
+    own = MaterialLaw.of(forces[0].ratio, 1.0)
+    others = None if law is None else _beyond(law, own)
+    law = law or own
+    pull = forces[0].pull(space.space, places)
+    free = np.ones(len(places) * 3)
+    free[space.prescribed] = 0.0
+    with space.lend(law) as matrix, _products(space, len(forces)) as product:
+        level = Level(space.space, matrix, space.prescribed)
+        solver = LinearSolver([level], direct=True)
+        try:
+            for first in range(0, len(forces), _TOGETHER):
+                some = forces[first : first + _TOGETHER]
+                held = np.array([space.held(Motion(far=force, share=-1.0)) for force in some])
+                loads = np.zeros((len(free), len(some)), order="F")
+                for column, (force, values) in enumerate(zip(some, held, strict=True)):
+                    load = product(values, law) + pull.of(force)
+                    if others is not None:
+                        load += product(_field(force, places), others)
+                    loads[:, column] = -free * load
+                found = solver.solve_many(loads).T + held
+                if not np.isfinite(found).all():
+                    raise SolveError(f"the regular parts at {[force.centre for force in some]} are not finite")
+                yield from found
+        finally:
+            solver.close()
+
+
+def _beyond(law: MaterialLaw, own: MaterialLaw) -> MaterialLaw:
+    """Return by how much Lamé's constants of each region are more than a half-space's ``own``."""
+    (within,) = own.parameters
+    return MaterialLaw.of(
+        [region.lame_lambda - within.lame_lambda for region in law.parameters],
+        [region.lame_mu - within.lame_mu for region in law.parameters],
+    )
+
+
+def _field(force: PointForce, places: FloatArray) -> FloatArray:
+    """Return the half-space's field at all places, 0 where the force acts."""
+    away = np.linalg.norm(places - np.array(force.centre), axis=1) > _AT_CENTRE * force.radius
+    found = np.zeros_like(places)
+    found[away] = force.at(places[away])
+    return found.reshape(-1)
+
+
+@contextmanager
+def _products(space: ElasticSpace, forces: int) -> Iterator[Callable[[FloatArray, MaterialLaw], FloatArray]]:
+    """Lend what makes K u of u on all dofs, none held, for any law: if it is for many forces, by a matrix for each."""
+    with vector(space.space) as result, ExitStack() as stack:
+        if forces < _MANY:
+
+            def by_form(values: FloatArray, law: MaterialLaw) -> FloatArray:
+                space.forms.displacement.x.array[:] = values
+                space.apply(result, law)
+                return np.array(result.array)
+
+            yield by_form
+            return
+        whole = stack.enter_context(vector(space.space))
+        made: dict[MaterialLaw, Any] = {}
+
+        def by_matrix(values: FloatArray, law: MaterialLaw) -> FloatArray:
+            if law not in made:
+                made[law] = stack.enter_context(space.lend(law, whole=True))
+            whole.array[:] = values
+            made[law].mult(whole, result)
+            return np.array(result.array)
+
+        yield by_matrix
+
+
+def compile_regular() -> None:
+    """Compile the forms that the regular part takes."""
+    compile_forms(DEGREE)
+    space = vector_space(distribute(MPI.COMM_SELF, one_cell(straight=False)).mesh, DEGREE)
+    StressPull(space, np.asarray(space.tabulate_dof_coordinates()))
+
+
+@dataclass(frozen=True, eq=False)
+class OnBoundary:
+    """R on a body's boundary, by quadratic triangles: their ``nodes`` (n, 3) in m, ``triangles`` (m, 6) of them.
+
+    Corners run round the outward normal; behind them come the middles of the sides opposite to each. ``values``
+    (forces, n, 3), in m, belong to a unit of the field of each force.
+    """
+
+    nodes: FloatArray
+    triangles: IntArray
+    values: FloatArray
+
+
+def regular_on_boundary(body: BodyMesh, forces: Sequence[PointForce], law: MaterialLaw | None = None) -> OnBoundary:
+    """Return R on the whole boundary for each of ``forces``, of one Poisson's ratio, as ``regular_parts`` finds it.
+
+    On a curved boundary, where all are ``PlacedForce``, R grows like the logarithm of the distance towards the force.
+
+    Raises:
+        SolveError: if that cannot be solved.
+    """
+    with Spaces(body) as spaces:
+        space = spaces.get(DEGREE, Conditions(unilateral=True))
+        places = np.asarray(space.space.tabulate_dof_coordinates())
+        used, triangles = np.unique(outer_triangles(compat.cell_dofs(space.space), places), return_inverse=True)
+        values = [found.reshape(-1, 3)[used] for found in _solved(space, forces, places, law)]
+    return OnBoundary(places[used], triangles.reshape(-1, 6), np.array(values))
