@@ -1,6 +1,7 @@
 """Compile every form that solves need, once, before any rank waits for one."""
 
 from collections.abc import Collection
+from dataclasses import dataclass
 
 from mpi4py import MPI
 
@@ -17,10 +18,21 @@ from pipeline.solve.meridian.punch import TRIAL_DEGREE
 from pipeline.solve.physics import LAWS
 from pipeline.stages import stage
 
+
+@dataclass(frozen=True, order=True)
+class _Forms:
+    """What tells the forms of a solve from others."""
+
+    element: str
+    degree: int = 0
+    of_regions: bool = False
+    of_slit: bool = False
+
+
 # What the regular part of a Green's function takes, whatever the elements of the case.
-_REGULAR = "regular", 0, False, False
+_REGULAR = _Forms("regular")
 # What this process has seen to.
-_compiled: set[tuple[str, int, bool, bool]] = set()
+_compiled: set[_Forms] = set()
 
 
 @stage("compiler")
@@ -38,8 +50,8 @@ def prepare(comm: MPI.Comm, solves: Collection[Solve]) -> None:
             try:
                 with compiling():
                     native.library()
-                    for element, degree, of_regions, of_slit in sorted(missing):
-                        _compile(element, degree, of_regions=of_regions, of_slit=of_slit)
+                    for forms in sorted(missing):
+                        _compile(forms)
                 _compiled.update(missing)
             except CompilerError as error:
                 message = str(error)
@@ -47,25 +59,26 @@ def prepare(comm: MPI.Comm, solves: Collection[Solve]) -> None:
         raise CompilerError(message)
 
 
-def _forms(solve: Solve) -> tuple[str, int, bool, bool]:
-    """Return what tells the forms of a solve from others: element, degree, whether there are regions, and a slit."""
+def _forms(solve: Solve) -> _Forms:
     body, mesh = solve.case.body, solve.case.mesh
     if solve.axisymmetric:
         half_plane = body.half_plane()
         kind = "elliptic" if half_plane and half_plane.is_curved else "axisymmetric"
-        return kind, TRIAL_DEGREE if solve.case.probe.is_unilateral else 0, False, False
-    return solve.case.formulation, mesh.degree, bool(body.regions), solve.case.probe.slit is not None
+        return _Forms(kind, TRIAL_DEGREE if solve.case.probe.is_unilateral else 0)
+    has_slit = solve.case.probe.slit is not None
+    return _Forms(solve.case.formulation, mesh.degree, of_regions=bool(body.regions), of_slit=has_slit)
 
 
-def _compile(element: str, degree: int, *, of_regions: bool, of_slit: bool) -> None:
+def _compile(forms: _Forms) -> None:
+    element, degree, of_regions = forms.element, forms.degree, forms.of_regions
     if element in ("axisymmetric", "elliptic"):
         compile_axisymmetric(curved=element == "elliptic", lowest=degree)
         return
-    if element == _REGULAR[0]:
+    if forms == _REGULAR:
         compile_regular()
         return
     law = element if element in LAWS else "linear"
     compile_forms(degree, element, law, straight=degree == 1, of_regions=of_regions)
     compile_cell_values(degree, straight=degree == 1)
-    if of_slit:
+    if forms.of_slit:
         compile_release(degree, mixed=element == "mixed", of_regions=of_regions)

@@ -128,19 +128,19 @@ class Release:
         self,
         body: BodyMesh,
         front: Front,
-        displacement: Any,
-        lame: tuple[Any, Any],
+        forms: ElasticForms,
         pressure: Any = None,
         *,
         unit: float = 1.0,
     ):
         """Compile; collective.
 
-        ``pressure`` and the λ₀ and μ of ``lame`` are those of mixed elements, moduli are in a ``unit`` (Pa).
+        Of mixed elements there is a ``pressure`` with its compliance, and the ``forms`` have λ₀ and μ. Moduli are in a
+        ``unit`` (Pa).
         """
         self._body, self._front, self._unit = body, front, unit
         self._step = _STEP * front.radius
-        self._form = _form(displacement, _advance(body, front), lame, pressure)
+        self._form = _form(forms, _advance(body, front), pressure)
 
     def __call__(self) -> float:
         """Return −dU (J/m) for the present fields, of the modelled part; collective."""
@@ -191,7 +191,8 @@ def _advance(body: BodyMesh, front: Front) -> Any:
     return found
 
 
-def _form(u: Any, advance: Any, lame: tuple[Any, Any], pressure: Any) -> Any:
+def _form(forms: ElasticForms, advance: Any, pressure: Any) -> Any:
+    u, lame = forms.displacement, (forms.coefficients["lame_lambda"], forms.coefficients["lame_mu"])
     move, small = ufl.as_vector((0.0, 0.0, -advance)), ufl.variable(strain(u))
     energy = small_strain(small, *lame) if pressure is None else pressurised(small, *lame, *pressure)
     change = energy * ufl.div(move) - ufl.inner(ufl.diff(energy, small), ufl.dot(ufl.grad(u), ufl.grad(move)))
@@ -209,4 +210,4 @@ def compile_release(degree: int, *, mixed: bool, of_regions: bool) -> None:
         pressure = None
         if mixed:
             pressure = fem.Function(scalar_space(body.mesh, level - 1)), forms.by_region((1.0,))
-        Release(body, front, forms.displacement, forms.lame, pressure)
+        Release(body, front, forms, pressure)

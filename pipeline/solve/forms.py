@@ -19,7 +19,7 @@ from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import distribute
 from pipeline.mesh.generate import MeshArrays
 from pipeline.solve.compiled import cellwise_space, form, quadrature_degree, scalar_space, vector_space
-from pipeline.solve.physics import LAWS, MaterialLaw, of_regions, strain
+from pipeline.solve.physics import COEFFICIENTS, LAWS, MaterialLaw, of_regions, strain
 
 
 class CellKernel(Protocol):
@@ -39,20 +39,20 @@ _MORE = 2
 class ElasticForms:
     """Forms of linear elasticity, K = λ ∫ div u div v + μ ∫ 2 ε(u) : ε(v), on one space.
 
-    ``lame`` are λ and μ in them: constants, or, on a mesh of several ``regions`` (of the local cells, ghosts too),
-    functions that are constant on each cell. ``displacement`` is the function that ``action``, K u, acts on. K of
-    straight cells is integrated by the ``cell_kernel``, if there is one.
+    ``coefficients`` are the law's parameters in them, by name: constants, or, on a mesh of several ``regions`` (of the
+    local cells, ghosts too), functions that are constant on each cell. ``displacement`` is the function that
+    ``action``, K u, acts on. K of straight cells is integrated by the ``cell_kernel``, if there is one.
     """
 
     def __init__(self, space: Any, regions: Int32Array | None = None, cell_kernel: CellKernel | None = None):
         self._space, self._regions, self._cell_kernel = space, regions, cell_kernel
         self.displacement = fem.Function(space)
-        self.lame = self._coefficient(), self._coefficient()
+        self.coefficients = {name: self._coefficient() for name in COEFFICIENTS}
 
     def set_law(self, law: MaterialLaw) -> None:
-        """Set λ and μ (Pa) for the next assembly."""
-        for place, values in zip(self.lame, (law.lame_lambda, law.lame_mu), strict=True):
-            self._put(place, values)
+        """Set the parameters of ``law`` for the next assembly."""
+        for name, coefficient in self.coefficients.items():
+            self._put(coefficient, law.values(name))
 
     def by_region(self, values: tuple[float, ...]) -> Any:
         """Return a constant of forms, or a function, that has one of ``values`` in each region."""
@@ -100,9 +100,9 @@ class ElasticForms:
         return {compat.EVERYWHERE if curved_cells(self._space.mesh) is None else _STRAIGHT: kernel}
 
     def _form(self, u: Any, measure: Any, kernels: dict[int, int] | None = None) -> Any:
-        v, (lame_lambda, lame_mu) = ufl.TestFunction(self._space), self.lame
-        energy = lame_lambda * ufl.div(u) * ufl.div(v) + 2 * lame_mu * ufl.inner(strain(u), strain(v))
-        return form(energy * measure, kernels)
+        v, of = ufl.TestFunction(self._space), self.coefficients
+        work = of["lame_lambda"] * ufl.div(u) * ufl.div(v) + 2 * of["lame_mu"] * ufl.inner(strain(u), strain(v))
+        return form(work * measure, kernels)
 
 
 class MixedForms:
@@ -142,20 +142,20 @@ class MixedForms:
 
 
 class HyperelasticForms:
-    """Derivatives of the energy of a law, on the space of some ``elastic`` forms, with their λ, μ and displacement u.
+    """Derivatives of the energy of a law, with the coefficients and the displacement u of some ``elastic`` forms.
 
     ``direction`` is the function w that ``product`` acts on.
     """
 
     def __init__(self, space: Any, elastic: ElasticForms, law: str):
         self._space, self._law = space, law
-        self._displacement, self._lame = elastic.displacement, elastic.lame
+        self._displacement, self._coefficients = elastic.displacement, elastic.coefficients
         self.direction = fem.Function(space)
 
     @property
     def _energy(self) -> Any:
         gradient = ufl.Identity(3) + ufl.grad(self._displacement)
-        return LAWS[self._law](gradient, *self._lame) * dx(self._space, more=_MORE)
+        return LAWS[self._law](gradient, self._coefficients) * dx(self._space, more=_MORE)
 
     @property
     def _residual(self) -> Any:

@@ -1,11 +1,13 @@
 """What tissue is made of: parameters of each region, and laws, each of which is a strain energy in UFL.
 
-A law gives the energy ψ (J/m³) of the undeformed body as a function of F = I + ∇u. To second order in ∇u each law is
-linear elasticity with the same λ and μ. To add one, write ψ as a function and enter it in :data:`LAWS`; the study file
-takes it once its name is in the list of ``pipeline/study/schema.py``.
+A law gives the energy ψ (J/m³) of the undeformed body as a function of F = I + ∇u, and of parameters by their name in
+:class:`Parameters`. To second order in ∇u each law is linear elasticity with the same λ and μ. To add one, write ψ as a
+function and enter it in :data:`LAWS`; the study file takes it once its name is in the list of
+``pipeline/study/schema.py``. A parameter that λ and μ do not tell is a field of :class:`Parameters`, named in
+:data:`COEFFICIENTS`: forms then have it in each region.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
@@ -17,6 +19,8 @@ import ufl
 from pipeline.arrays import FloatArray, Int32Array
 from pipeline.shapes.tissue import lame
 
+# The parameters that forms have as coefficients; those that an energy does not use are not compiled in.
+COEFFICIENTS = ("lame_lambda", "lame_mu")
 # λ₁ in units of μ, at least: λ₀ may then be −μ/4, and K₀ is definite as long as it is above −2μ/3.
 _LEAST_REST = 0.25
 
@@ -77,15 +81,19 @@ class MaterialLaw:
         """Whether forces are proportional to displacements."""
         return self.name == "linear"
 
+    def values(self, name: str) -> tuple[float, ...]:
+        """Return one of the parameters, by its name, of each region."""
+        return tuple(getattr(each, name) for each in self.parameters)
+
     @cached_property
     def lame_lambda(self) -> tuple[float, ...]:
         """Lamé's λ (Pa) of each region."""
-        return tuple(each.lame_lambda for each in self.parameters)
+        return self.values("lame_lambda")
 
     @cached_property
     def lame_mu(self) -> tuple[float, ...]:
         """Lamé's μ (Pa) of each region."""
-        return tuple(each.lame_mu for each in self.parameters)
+        return self.values("lame_mu")
 
     @property
     def is_uniform(self) -> bool:
@@ -145,20 +153,20 @@ def pressurised(strain: Any, lame_lambda: Any, lame_mu: Any, pressure: Any, comp
     return small_strain(strain, lame_lambda, lame_mu) + pressure * ufl.tr(strain) - compliance * pressure**2 / 2
 
 
-def linear(gradient: Any, lame_lambda: Any, lame_mu: Any) -> Any:
+def linear(gradient: Any, of: Mapping[str, Any]) -> Any:
     """Linear elasticity, ε the symmetric part of F − I."""
-    return small_strain(ufl.sym(gradient) - ufl.Identity(gradient.ufl_shape[0]), lame_lambda, lame_mu)
+    return small_strain(ufl.sym(gradient) - ufl.Identity(gradient.ufl_shape[0]), of["lame_lambda"], of["lame_mu"])
 
 
-def neo_hookean(gradient: Any, lame_lambda: Any, lame_mu: Any) -> Any:
+def neo_hookean(gradient: Any, of: Mapping[str, Any]) -> Any:
     """A compressible neo-Hookean body: μ/2 (F : F − 3) − μ ln J + λ/2 (J − 1)², J = det F.
 
     It is polyconvex (J. M. Ball, Arch. Rational Mech. Anal. 63, 1977), and infinite where tissue has no volume left.
     """
-    volume = ufl.det(gradient)
+    volume, lame_lambda, lame_mu = ufl.det(gradient), of["lame_lambda"], of["lame_mu"]
     stretched = lame_mu / 2 * (ufl.inner(gradient, gradient) - 3) - lame_mu * ufl.ln(volume)
     return stretched + lame_lambda / 2 * (volume - 1) ** 2
 
 
-# ψ(F, λ, μ) by the name that a study file has.
-LAWS: dict[str, Callable[[Any, Any, Any], Any]] = {"linear": linear, "neo-hookean": neo_hookean}
+# ψ of F and of parameters by name, by the name that a study file has.
+LAWS: dict[str, Callable[[Any, Mapping[str, Any]], Any]] = {"linear": linear, "neo-hookean": neo_hookean}

@@ -278,7 +278,7 @@ class Elements(ABC):
         """Return what tells the energy that the present fields of the forms release at a ``line``; collective."""
         forms = self.displacements.forms
         forms.set_law(self.elastic(law))
-        return Release(self.body, line, forms.displacement, forms.lame, self._pressure(law), unit=self.unit(law))
+        return Release(self.body, line, forms, self._pressure(law), unit=self.unit(law))
 
     def _pressure(self, law: MaterialLaw) -> tuple[Any, Any] | None:
         """Return a pressure of forms and its compliance, if there is one."""
