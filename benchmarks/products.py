@@ -58,7 +58,7 @@ def _row(space: Any, law: Any) -> dict[str, Any]:
     library()
     with ExitStack() as stack:
         start = time.process_time()
-        operator = stack.enter_context(space.lend_product(law))
+        operator = stack.enter_context(space.lend(law, entries=False))
         laid_out = time.process_time()
         matrix = stack.enter_context(space.lend(law))
         assembled = time.process_time()

@@ -144,7 +144,7 @@ def _mixed_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[A
     saddle = elements.saddle(LAME, stack, direct=direct)
     assemble = time.process_time() - start
     # Neither a product without entries nor the matrix of a direct solve is what others multiply with.
-    unit = stack.enter_context(elements.displacements.lend_product(LAME))
+    unit = stack.enter_context(elements.displacements.lend(LAME, entries=False))
     press = Movement((PRESS,), (1.0,))
 
     def once() -> tuple[float, float, float, int]:

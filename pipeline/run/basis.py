@@ -73,13 +73,13 @@ def _vector_bars(record: Record, bar: float) -> Vector:
 
 
 def _ratio(solve: Solve) -> float:
-    lame_lambda, mu = solve.case.material.lame
-    return lame_lambda / mu
+    return law_of(solve.case).parameters[0].ratio
 
 
 def _record(solve: Solve, reduced: Reduced, source: Record, problem: QuasiStaticProblem, basis: ReducedBasis) -> Record:
     """Return the record of an evaluation, which is for μ = 1."""
-    scale, (_, mu) = solve.case.scale, solve.case.material.lame
+    scale, law = solve.case.scale, law_of(solve.case)
+    (mu,) = law.lame_mu
     x, y, z = (mu * component for component in reduced.response.force)
     bar = source.force_error + reduced.bound
     return replace(
@@ -93,7 +93,7 @@ def _record(solve: Solve, reduced: Reduced, source: Record, problem: QuasiStatic
         force_error=bar,
         force_vector_error=_vector_bars(source, bar * abs(z)),
         energy=mu * reduced.response.energy,
-        largest=problem.largest(law_of(solve.case), basis.displacement(reduced)),
+        largest=problem.largest(law, basis.displacement(reduced)),
         balance=reduced.bound,
         iterations=0,
     )

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import ufl
 
-from pipeline.arrays import FloatArray, Int32Array
+from pipeline.arrays import FloatArray, Int32Array, IntArray
 from pipeline.shapes.tissue import lame
 
 # The parameters that forms have as coefficients; those that an energy does not use are not compiled in.
@@ -52,6 +52,11 @@ class Parameters:
     def ratio(self) -> float:
         """λ/μ: all that F/μ depends on."""
         return self.lame_lambda / self.lame_mu
+
+    @property
+    def plane_modulus(self) -> float:
+        """E / (1 - ν²) (Pa)."""
+        return 4 * self.lame_mu * (1 - self.lame_mu / (self.lame_lambda + 2 * self.lame_mu))
 
 
 @dataclass(frozen=True)
@@ -95,13 +100,17 @@ class MaterialLaw:
         """Lamé's μ (Pa) of each region."""
         return self.values("lame_mu")
 
+    def softened(self, ratio: float) -> "MaterialLaw":
+        """Return linear elasticity of the same μ, with λ/μ of each region at most ``ratio``."""
+        return MaterialLaw.of([min(each.lame_lambda, ratio * each.lame_mu) for each in self.parameters], self.lame_mu)
+
     @property
     def is_uniform(self) -> bool:
         """Whether there is one material."""
         return len(self.parameters) == 1
 
 
-def of_regions(values: Sequence[float], regions: Int32Array | None, count: int) -> FloatArray:
+def of_regions(values: Sequence[float], regions: Int32Array | IntArray | None, count: int) -> FloatArray:
     """Return which of ``values`` by region each of ``count`` cells has, in ``regions``; one value is that of all."""
     if regions is None or len(values) == 1:
         return np.full(count, values[0], dtype=np.float64)

@@ -148,10 +148,12 @@ class QuasiStaticProblem(Problem):
         relative = finer.relative
         if relative is None:
             rests = np.zeros(len(form)) if unseen is None else unseen
-            relative = np.array([
-                error_bar(share, elements.degree, elements.element, plain=plain, unseen=rest)
-                for share, rest in zip(shares(decrements, form), rests, strict=True)
-            ])  # fmt: skip
+            relative = np.array(
+                [
+                    error_bar(share, elements.degree, elements.element, plain=plain, unseen=rest)
+                    for share, rest in zip(shares(decrements, form), rests, strict=True)
+                ]
+            )
         solution = solution.with_bars(
             decrements, stiffness_bars(form, relative), elements.element, apart=movement.apart
         )

@@ -156,25 +156,13 @@ class ElasticSpace:
     # ---- operators -------------------------------------------------------------------------------------
 
     @contextmanager
-    def lend(self, law: MaterialLaw, *, whole: bool = False) -> Iterator[PETSc.Mat]:
-        """Lend K with entries, of type aij; its borrower may change it; collective.
+    def lend(self, law: MaterialLaw, *, whole: bool = False, entries: bool = True) -> Iterator[PETSc.Mat]:
+        """Lend K, which its borrower may change; collective.
 
-        The diagonal of prescribed dofs is the first region's μ; as a ``whole`` K is without any conditions.
+        With ``entries``, or of degree 1, it is of type aij, the diagonal of prescribed dofs being the first region's μ.
+        As a ``whole`` it has no conditions. Without entries it is a product, prescribed rows being the identity's.
         """
-        matrix = self._assemble(law, whole=whole)
-        try:
-            yield matrix
-        finally:
-            matrix.destroy()
-
-    @contextmanager
-    def lend_product(self, law: MaterialLaw) -> Iterator[PETSc.Mat]:
-        """Lend K as a product, without entries; of degree 2 or more; collective.
-
-        Rows of prescribed dofs are those of the identity.
-        """
-        with stage("assembly"):
-            matrix = CellOperator(self.cells, law).matrix()
+        matrix = self._assemble(law, whole=whole) if entries or self.degree == 1 else self._product(law)
         try:
             yield matrix
         finally:
@@ -188,6 +176,10 @@ class ElasticSpace:
     @cached_property
     def _straight(self) -> StraightStiffness:
         return StraightStiffness(self.space, curved_cells(self.body.mesh), self.body.regions)
+
+    @stage("assembly")
+    def _product(self, law: MaterialLaw) -> PETSc.Mat:
+        return CellOperator(self.cells, law).matrix()
 
     @stage("assembly")
     def _assemble(self, law: MaterialLaw, *, whole: bool) -> PETSc.Mat:

@@ -29,7 +29,7 @@ def test_it_is_the_product_of_the_matrix(degree, material, changes):
     free = np.setdiff1d(np.arange(space.owned), space.prescribed)
     with (
         space.lend(material) as matrix,
-        space.lend_product(material) as operator,
+        space.lend(material, entries=False) as operator,
     ):
         x, y = matrix.createVecs()
         z = y.duplicate()

@@ -13,12 +13,12 @@ corner on its edges are held, it is held with them.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
 from pipeline.solve import SolveError
+from pipeline.solve.contact.elements import ContactElements, State
 from pipeline.solve.contact.surface import Candidates
 from pipeline.stages import stage
 
@@ -30,35 +30,6 @@ _MOST_SETS = 60
 
 class ContactError(SolveError):
     """Contact that was not found, or is not one: no other linear solver mends that."""
-
-
-@dataclass(frozen=True, eq=False)
-class State:
-    """Of one solution: the candidates' displacement along z (n, m), and the reactions there (n, N).
-
-    ``energy`` (J) is twice that of the part that is modelled.
-    """
-
-    moved: FloatArray
-    reactions: FloatArray
-    energy: float
-
-
-class Elements(Protocol):
-    """Elements whose nodes may be held where they touch; they keep the solution found last."""
-
-    def hold(self, active: BoolArray) -> None:
-        """Hold the ``active`` candidates (n) from now on; collective."""
-
-    def improve(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
-        """Move what is held to ``bounds`` (n, m), and then the rest; return the iterations. Collective.
-
-        They end when the energy norm of the error is ``tolerance`` times the root of ``energy`` (J), or without one
-        times that of the error in the beginning.
-        """
-
-    def state(self) -> State:
-        """Return what the candidates do; collective."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,9 +53,14 @@ class Obstacle:
 
 @stage("contact sets")
 def find_set(
-    elements: Elements, obstacle: Obstacle, active: BoolArray, tolerances: Sequence[float],
-    energy: float | None = None, *, roughly: bool = False,
-) -> Found:  # fmt: skip
+    elements: ContactElements,
+    obstacle: Obstacle,
+    active: BoolArray,
+    tolerances: Sequence[float],
+    energy: float | None = None,
+    *,
+    roughly: bool = False,
+) -> Found:
     """Return the set that ``active`` (n) leads to, solved to the last of the ``tolerances``; collective.
 
     Each of them is of the energy norm, relative to the root of an ``energy`` (J), known roughly. A set that is wanted

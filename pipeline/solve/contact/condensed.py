@@ -13,8 +13,7 @@ from scipy.linalg import cho_factor, cho_solve
 from pipeline.arrays import BoolArray, FloatArray, Int32Array
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import vector
-from pipeline.solve.contact.active_set import State
-from pipeline.solve.contact.elements import ContactElements, FarShare, Unknowns
+from pipeline.solve.contact.elements import ContactElements, FarShare, State, Unknowns
 from pipeline.solve.contact.levels import Hierarchy, Surface
 from pipeline.solve.contact.surface import Candidates
 from pipeline.solve.elements.base import Elements
@@ -133,7 +132,7 @@ class CondensedElements(ContactElements):
             return (np.array(found.array),)
 
     def held_levels(self, facets: Int32Array, stack: ExitStack) -> list[Level]:
-        """Return the levels of multigrid, which are kept for the next depth, with the local ``facets`` held."""
+        """Return the levels of multigrid with the local ``facets`` held; they are kept for the next depth."""
         if self._multigrid is None:
             self._multigrid = self.hierarchy_of(self._stack, direct=False)
         return self._multigrid.hold_facets(facets)

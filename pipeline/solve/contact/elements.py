@@ -15,7 +15,6 @@ from pipeline.arrays import BoolArray, FloatArray, Int32Array
 from pipeline.solve import SolveError
 from pipeline.solve.balance import check_balance
 from pipeline.solve.compiled import global_sum
-from pipeline.solve.contact.active_set import State
 from pipeline.solve.contact.levels import Hierarchy, Numbering, Surface, normal_dofs
 from pipeline.solve.contact.surface import Candidates
 from pipeline.solve.elements.base import Column, Elements, Fields, Solver
@@ -32,6 +31,18 @@ Unknowns = tuple[FloatArray, ...]
 # The share of the far field is found where it changes by less than this, in units of the solver's tolerance.
 _SETTLED = 10.0
 _MOST_ROUNDS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Of one solution: the candidates' displacement along z (n, m), and the reactions there (n, N).
+
+    ``energy`` (J) is twice that of the part that is modelled.
+    """
+
+    moved: FloatArray
+    reactions: FloatArray
+    energy: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +80,7 @@ class FarShare:
 
 
 class ContactElements:
-    """Elements of one ``degree`` with one operator for every set; they keep the solution found last.
+    """Elements with one operator for every set; they keep the solution found last. Methods are collective.
 
     What they make is freed with the stack. ``load`` is a right-hand side besides the probe, ``far`` the far field on
     the cut face, None without. ``unit`` (Pa) is that of the law's moduli: energies and forces are in J and N.
@@ -79,7 +90,7 @@ class ContactElements:
     is_exact = False
 
     def __init__(self, elements: Elements, surface: Surface, law: MaterialLaw, method: str, stack: ExitStack):
-        """Assemble; collective."""
+        """Assemble."""
         self.plug, self.surface, self.law = elements, surface, law
         self.unit = elements.unit(law)
         self.space: ElasticSpace = elements.displacements
@@ -97,7 +108,7 @@ class ContactElements:
         stack.callback(self.close)
 
     def finer(self, stack: ExitStack) -> "ContactElements":
-        """Return elements of one degree more, which begin with the fields of the forms; collective."""
+        """Return elements of one degree more, which begin with the fields of the forms."""
         elements = self.surface.elements(self.plug.degree + 1, self.plug.element, stack)
         found = ContactElements(elements, self.surface, self.law, "iterative", stack)
         found.start_from(self)
@@ -122,7 +133,7 @@ class ContactElements:
 
     @stage("set-up")
     def hold(self, active: BoolArray) -> None:
-        """Hold the ``active`` candidates (n) from now on; collective.
+        """Hold the ``active`` candidates (n) from now on.
 
         Raises:
             SolveError: if the solver cannot be set up.
@@ -132,11 +143,7 @@ class ContactElements:
 
     @stage("set-up")
     def hold_facets(self, facets: Int32Array) -> None:
-        """Hold all of the local ``facets`` where they are, in the place of any set; collective.
-
-        Raises:
-            SolveError: if the solver cannot be set up.
-        """
+        """Hold all of the local ``facets`` where they are, in the place of any set."""
         dofs = normal_dofs(self.space, facets)
         self._active, self._held = np.zeros(len(self.candidates), dtype=bool), dofs[dofs < self.space.owned]
         self._use(self.hierarchy.hold_facets(facets))
@@ -145,13 +152,13 @@ class ContactElements:
         self.solver = self.plug.solver_on(levels, self.law, self._held, direct=self._direct, earlier=self.solver)
 
     def held_levels(self, facets: Int32Array, stack: ExitStack) -> list[Level]:
-        """Return the levels of multigrid with the local ``facets`` held, in the place of any set; collective."""
+        """Return the levels of multigrid with the local ``facets`` held, in the place of any set."""
         self.close()
         hierarchy = self.hierarchy_of(stack, direct=False) if self._direct else self.hierarchy
         return hierarchy.hold_facets(facets)
 
     def improve(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
-        """Move what is held to ``bounds`` (n, m), and then the rest; return the iterations. Collective.
+        """Move what is held to ``bounds`` (n, m), and then the rest; return the iterations.
 
         They end when the energy norm of the error is ``tolerance`` times the root of ``energy`` (J), or without one
         times that of the error in the beginning.
@@ -193,14 +200,14 @@ class ContactElements:
         return iterations
 
     def near_state(self) -> State:
-        """Return what the candidates do, far field aside; collective."""
+        """Return what the candidates do, far field aside."""
         with self.plug.fields() as forces:
             self._multiply(self.fields, forces)
             moved, reactions = (self.numbering.gather(part.array) for part in (self.fields[0], forces[0]))
             return State(moved, self.unit * reactions, self._work(forces))
 
     def state(self) -> State:
-        """Return what the candidates do; collective."""
+        """Return what the candidates do."""
         state = self.near_state()
         if (far := self.far) is None:
             return state
@@ -210,7 +217,7 @@ class ContactElements:
     def energy(self) -> float:
         """Return twice the energy (J) of the part that is modelled, stationary at the solution, less a constant.
 
-        The constant is that of what is prescribed, if that is not nothing; collective.
+        The constant is that of what is prescribed, if that is not nothing.
         """
         with self.plug.fields() as forces:
             self._multiply(self.fields, forces)
@@ -234,10 +241,7 @@ class ContactElements:
             field.array[:] = values
 
     def start_from(self, coarse: "ContactElements") -> None:
-        """Take over the fields of the forms of elements of a lower degree; collective.
-
-        Of displacement elements there is no pressure. What is prescribed becomes a part of the right-hand side.
-        """
+        """Begin with the fields of elements of a lower degree; what is prescribed goes to the right-hand side."""
         displacement = self.space.forms.displacement
         self.plug.start_from(coarse.plug, self.fields, np.zeros_like(displacement.x.array))
         if coarse.far is not None:
@@ -247,18 +251,18 @@ class ContactElements:
                 self.load = self.right_side(Column(prescribed=held, applied=None, right=right, unknown=unknown))
 
     def show(self) -> None:
-        """Make what is solved for, far field aside, the fields of the forms; collective."""
+        """Make what is solved for, far field aside, the fields of the forms."""
         self.plug.set_fields(self.fields)
 
     # ---- without a probe ------------------------------------------------------------------------------
 
     def right_side(self, column: Column) -> Unknowns:
-        """Return the right-hand side of what a ``column`` prescribes, or of its loads; collective."""
+        """Return the right-hand side of what a ``column`` prescribes, or of its loads."""
         self.plug.lift(column, self.law)
         return tuple(np.array(part.array) for part in column.right)
 
     def free_response(self, column: Column, tolerance: float) -> FreeResponse:
-        """Return what a unit of a ``column`` does without a probe, and make it the column's solution; collective.
+        """Return what a unit of a ``column`` does without a probe, and make it the column's solution.
 
         Raises:
             SolveError: if the solver does not converge, or forces do not balance.
@@ -273,20 +277,15 @@ class ContactElements:
         return FreeResponse((moved, *found[1:]), self.numbering.gather(moved), energy)
 
     def _imbalance(self, applied: Applied, moved: FloatArray, residual: FloatArray, energy: float) -> float:
-        """Return the relative error of work and forces of loads; collective."""
+        """Return the relative error of work and forces of loads."""
         space, mirrored = self.space, self.plug.body.mirrored
         on_support = (residual - applied.forces).reshape(-1, 3)[space.fixed_owned].sum(axis=0)
         *support, work = global_sum(space.comm, np.array([*on_support, moved @ applied.forces]))
-        rest = [s + f for axis, (s, f) in enumerate(zip(support, applied.resultant, strict=True))
-                if axis not in mirrored]  # fmt: skip
+        rest = np.delete(support + applied.resultant, mirrored)
         return max(float(np.linalg.norm(rest)) / applied.size, abs(energy / work - 1) if work else 0.0)
 
     def relax(self, tolerance: float, load: Unknowns) -> Unknowns:
-        """Return the solution for a ``load`` with nothing held by the probe; collective.
-
-        Raises:
-            SolveError: if the solver does not converge.
-        """
+        """Return the solution for a ``load`` with nothing held by the probe."""
         nothing, count = tuple(np.zeros_like(part) for part in load), len(self.candidates)
         self.start_at(nothing)
         self.load = load

@@ -47,7 +47,7 @@ def _displacement_decrement(elements: ContactElements, facets: Int32Array) -> tu
     finer, law = elements.surface.spaces.get(elements.space.degree + 1, CONDITIONS), elements.law
     with ExitStack() as stack, vector(finer.space) as residual:
         levels = elements.held_levels(facets, stack)
-        matrix = stack.enter_context(finer.lend_product(law))
+        matrix = stack.enter_context(finer.lend(law, entries=False))
         levels.append(mask(finer, matrix, law, normal_dofs(finer, facets)))
         solver = LinearSolver(levels, direct=False)
         stack.callback(solver.close)

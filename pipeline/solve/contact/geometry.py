@@ -15,8 +15,8 @@ from functools import cache
 import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
-from pipeline.solve.contact.active_set import Obstacle, State
-from pipeline.solve.contact.elements import FreeResponse
+from pipeline.solve.contact.active_set import Obstacle
+from pipeline.solve.contact.elements import FreeResponse, State
 from pipeline.solve.contact.surface import FACET_CORNERS, Candidates
 
 # Points on each facet where the first touch is looked for, along an edge; and then, so many times, nearer to the best

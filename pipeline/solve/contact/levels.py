@@ -93,12 +93,9 @@ class Hierarchy:
         """Assemble; collective. What is made is given back with the ``stack``."""
         degrees = [degree] if direct else range(1, degree + 1)
         found = [surface.spaces.get(d, CONDITIONS) for d in degrees]
-        lent = [s.lend_product(law) if s.degree > 1 and not direct else s.lend(law) for s in found]
-        matrices = [stack.enter_context(matrix) for matrix in lent]
-        is_masked = masks and not direct
         self._operators = [
-            HeldOperator(space, matrix, law, stack, masked=is_masked and space.degree > 1)
-            for space, matrix in zip(found, matrices, strict=True)
+            HeldOperator(space, law, stack, direct=direct, masked=masks and not direct and space.degree > 1)
+            for space in found
         ]
         self._candidates = [surface.of(d) for d in degrees]
         self._numberings = [Numbering(s.space, c.numbers) for s, c in zip(found, self._candidates, strict=True)]
@@ -133,8 +130,9 @@ class HeldOperator:
     ``free`` has the conditions of the space alone. ``masked`` leaves the holding to who smooths.
     """
 
-    def __init__(self, space: ElasticSpace, matrix: PETSc.Mat, law: MaterialLaw, stack: ExitStack, *, masked: bool):
-        """Take over a ``matrix``, which is changed; collective. What is made is freed with the ``stack``."""
+    def __init__(self, space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, direct: bool, masked: bool):
+        """Assemble; collective. What is made is freed with the ``stack``."""
+        matrix = stack.enter_context(space.lend(law, entries=direct))
         self.space, self._matrix, self._law, self._is_masked = space, matrix, law, masked
         self.free, self._is_held, self._stack = matrix, False, stack
         if not masked and not is_product(matrix):

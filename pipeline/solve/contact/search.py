@@ -30,7 +30,7 @@ from pipeline.solve.contact.sweep import Sweep
 from pipeline.solve.elements.base import Column, Elements, Enriched, Equilibrium, close_far
 from pipeline.solve.estimate import error_bar, found_again_bar, found_bar
 from pipeline.solve.movement import Movement
-from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.physics import MaterialLaw, of_regions
 from pipeline.solve.response import Contact, Response, reaction
 from pipeline.solve.solution import Request
 from pipeline.solve.spaces import Spaces
@@ -178,7 +178,7 @@ class ContactSearch:
         elements: ContactElements | None = None
         for degree in range(1, self._elements.degree):
             kind = self._elements.element if degree > 1 else "displacement"
-            law = sweep.law if kind == "mixed" else _softer(sweep.law)
+            law = sweep.law if kind == "mixed" else sweep.law.softened(_FIRST_RATIO)
             plain = self._surface.elements(degree, kind, stack)
             lower = ContactElements(plain, self._surface, law, sweep.method, stack)
             obstacle = self._obstacle_of(lower.candidates, loaded)
@@ -291,10 +291,9 @@ class ContactSearch:
 
     def _modulus(self, law: MaterialLaw) -> FloatArray:
         """Return E / (1 - ν²) (Pa) of the tissue below each candidate (n)."""
-        plane = [4 * mu * (1 - mu / (lame + 2 * mu)) for lame, mu in zip(law.lame_lambda, law.lame_mu, strict=True)]
-        regions = np.zeros_like(self.candidates.regions) if law.is_uniform else self.candidates.regions
+        of_facets = of_regions(law.values("plane_modulus"), self.candidates.regions, len(self.candidates.facets))
         found = np.empty(len(self.candidates))
-        found[self.candidates.facets] = np.array(plane)[regions][:, None]
+        found[self.candidates.facets] = of_facets[:, None]
         return found
 
     def _held_by_support(self) -> BoolArray:
@@ -325,8 +324,3 @@ class ContactSearch:
         return reaction(
             movement, np.array([[per_depth]]), np.array([[0.0, 0.0, -per_depth]]), self._body.mirrored, balance
         )
-
-
-def _softer(law: MaterialLaw) -> MaterialLaw:
-    softer = [min(region.lame_lambda, _FIRST_RATIO * region.lame_mu) for region in law.parameters]
-    return MaterialLaw.of(softer, law.lame_mu)

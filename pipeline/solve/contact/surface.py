@@ -202,9 +202,8 @@ def find_candidates(body: BodyMesh, space: Any) -> Candidates:
     dofs = np.take_along_axis(compat.cell_dofs(space)[cell], shape.places[side], axis=1)
     x = np.asarray(space.tabulate_dof_coordinates())[dofs]
     regions = np.zeros(len(cell), dtype=np.int64) if body.regions is None else body.regions[cell]
-    numbers, points, regions = (
-        np.concatenate(body.comm.allgather(part)) for part in (_global(space, dofs), x, regions)
-    )  # fmt: skip
+    of_all = (np.concatenate(body.comm.allgather(part)) for part in (_global(space, dofs), x, regions))
+    numbers, points, regions = of_all
     local = np.full(len(numbers), -1, dtype=np.int32)
     first = body.mesh.comm.scan(len(facets)) - len(facets)
     local[first : first + len(facets)] = facets

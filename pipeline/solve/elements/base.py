@@ -75,10 +75,7 @@ class Enriched:
 
 
 class Enriching(Protocol):
-    """What can go on in one degree more from the solutions that it found.
-
-    ``stored`` is the energy (J) of the modelled part where that is not half the work of the force.
-    """
+    """What goes on in one degree more; ``stored`` (J) is the modelled energy where that is not half of F d."""
 
     stored: float | None
 
@@ -91,7 +88,7 @@ class Enriching(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """What a ``solver`` found for ``movement``: a column for each motion, one more for dead loads, and what they do."""
+    """What a ``solver`` found for a ``movement``: columns of its motions and loads, and the response."""
 
     solver: Enriching
     columns: list[Column]
@@ -103,10 +100,9 @@ class Equilibrium:
 
 
 class Solver(ABC):
-    """A solver of ``elements`` for one ``law``; ``close`` frees what it owns.
+    """A solver of ``elements`` for one ``law``; ``close`` frees what it owns. Methods are collective.
 
-    ``is_exact`` tells that nothing improves what it finds; ``stored`` is the energy (J) of the modelled part where that
-    is not half the work of the force.
+    ``is_exact`` tells that nothing improves what it finds; for ``stored`` see :class:`Enriching`.
     """
 
     def __init__(self, elements: "Elements", law: MaterialLaw, *, is_exact: bool):
@@ -119,17 +115,17 @@ class Solver(ABC):
         self.owner.close()
 
     def lift(self, columns: Sequence[Column]) -> None:
-        """Put what columns prescribe and their loads on their right-hand sides; collective."""
+        """Put what columns prescribe and their loads on their right-hand sides."""
         for column in columns:
             self.elements.lift(column, self.law)
 
     def products(self, columns: Sequence[Column]) -> Products:
-        """Return residuals and energies of solutions; collective."""
+        """Return residuals and energies of solutions."""
         return self.elements.products(self.law, columns)
 
     @abstractmethod
     def solve(self, columns: Sequence[Column], tolerance: float, target: float | None = None) -> int:
-        """Lower the energy norm of the error of each solution to a ``tolerance``; return the iterations; collective.
+        """Lower the energy norm of the error of each solution to a relative ``tolerance``; return the iterations.
 
         A ``target`` is for that norm itself (J^½ in the law's unit), and takes the tolerance's place.
 
@@ -139,20 +135,17 @@ class Solver(ABC):
 
     @abstractmethod
     def improve(self, columns: Sequence[Column], share: float) -> int:
-        """Lower it to that ``share`` of what the last solve left; return the iterations; collective."""
+        """Lower it to that ``share`` of what the last solve left; return the iterations."""
 
     @abstractmethod
     def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
-        """Solve on in one degree more; what is made is freed with the ``stack``; collective.
-
-        ``keep`` asks for the solutions, too.
-        """
+        """Solve on in one degree more: see :class:`Enriching`."""
 
 
 class Elements(ABC):
-    """Elements of one degree on a mesh, with their conditions. Made with ``elements_of``; ``close`` frees them.
+    """Elements of one degree on a mesh, with their conditions; ``close`` frees them. Methods are collective.
 
-    What is written here is for displacements alone; fields that come on top of them add what is theirs.
+    What is written here is for displacements; pressures add what is theirs.
     """
 
     # As the study has it.
@@ -163,7 +156,7 @@ class Elements(ABC):
     masks: bool
 
     def __init__(self, spaces: Spaces, degree: int, conditions: Conditions):
-        """Prepare the space of displacements; collective.
+        """Prepare the space of displacements.
 
         Raises:
             SolveError: if footprint and support share a point: no displacement satisfies both.
@@ -180,7 +173,7 @@ class Elements(ABC):
 
     @property
     def whole_dofs(self) -> int:
-        """Unknowns of the whole body; collective."""
+        """Unknowns of the whole body."""
         return self.displacements.whole_dofs
 
     @property
@@ -198,7 +191,7 @@ class Elements(ABC):
 
     @abstractmethod
     def set_up(self, law: MaterialLaw, stack: ExitStack, *, direct: bool, keep: bool) -> Solver:
-        """Return a solver, freed with the ``stack`` unless it is to ``keep``; collective.
+        """Return a solver, freed with the ``stack`` unless it is to ``keep``.
 
         Raises:
             SolveError: if it cannot be set up, or the elements are not for the law.
@@ -208,9 +201,7 @@ class Elements(ABC):
     def solver_on(
         self, levels: list[Level], law: MaterialLaw, held: Int32Array, *, direct: bool, earlier: Solver | None
     ) -> Solver:
-        """Return a solver of operators in which more dofs are held, of which this rank owns ``held``; collective.
-
-        An ``earlier`` one is changed, or closed.
+        """Return a solver of operators in which the owned dofs ``held`` are held, too; an ``earlier`` one ends.
 
         Raises:
             SolveError: if it cannot be set up.
@@ -218,13 +209,13 @@ class Elements(ABC):
 
     @abstractmethod
     def operator(self, stiffness: PETSc.Mat, law: MaterialLaw, *, entries: bool) -> Callable[[Fields, Fields], None]:
-        """Return what writes the operator times fields into other fields; collective.
+        """Return what writes the operator times fields into other fields, K being the ``stiffness``.
 
-        The ``stiffness`` is that of displacements, ``entries`` that of a direct solve.
+        With ``entries`` the other blocks have them, too, as for a direct solve.
         """
 
     def levels(self, law: MaterialLaw, stack: ExitStack, *, direct: bool) -> list[Level]:
-        """Return the levels of multigrid, or the one of a direct solve, given back with the ``stack``; collective."""
+        """Return the levels of multigrid, or the one of a direct solve, given back with the ``stack``."""
         degrees = [self.degree] if direct else range(1, self.degree + 1)
         spaces = [self._spaces.get(degree, self._conditions) for degree in degrees]
         return [level_of(space, law, stack, direct=direct) for space in spaces]
@@ -240,21 +231,18 @@ class Elements(ABC):
         return 1.0
 
     def apply(self, result: Fields, law: MaterialLaw, *, checked: bool = True) -> None:
-        """Write the unmodified operator times the forms' fields into ``result``, N for displacements; collective.
-
-        ``checked``: see :meth:`ElasticSpace.apply`.
-        """
+        """Write the unmodified operator times the forms' fields into ``result`` (N): see :meth:`ElasticSpace.apply`."""
         self.displacements.apply(result[0], self.elastic(law), checked=checked)
 
     def lift(self, column: Column, law: MaterialLaw, *, checked: bool = True) -> None:
-        """Put what a column prescribes and its loads, in the law's unit, on its right-hand side; collective."""
+        """Put what a column prescribes and its loads, in the law's unit, on its right-hand side."""
         if column.applied is None:
             self.displacements.lift(column.right[0], column.prescribed, self.elastic(law), checked=checked)
         else:
             self.displacements.put(column.right[0], column.applied, 1 / self.unit(law))
 
     def products(self, law: MaterialLaw, columns: Sequence[Column], *, checked: bool = True) -> Products:
-        """Return residuals and energies of solutions; collective. ``checked``: see :meth:`ElasticSpace.apply`."""
+        """Return residuals and energies of solutions. ``checked``: see :meth:`ElasticSpace.apply`."""
         found, images = [], []
         for column in columns:
             with self.fields() as image, self.fields() as total:
@@ -275,7 +263,7 @@ class Elements(ABC):
         )
 
     def release(self, law: MaterialLaw, line: Front) -> Release:
-        """Return what tells the energy that the present fields of the forms release at a ``line``; collective."""
+        """Return what tells the energy that the forms' fields release at a ``line``."""
         forms = self.displacements.forms
         forms.set_law(self.elastic(law))
         return Release(self.body, line, forms, self._pressure(law), unit=self.unit(law))
@@ -288,29 +276,23 @@ class Elements(ABC):
 
     @contextmanager
     def fields(self) -> Iterator[Fields]:
-        """Lend fields of zeros; collective."""
+        """Lend fields of zeros."""
         with vector(self.displacements.space) as u:
             yield (u,)
 
     def set_fields(self, fields: Fields) -> None:
-        """Make ``fields`` those of the forms; collective."""
+        """Make ``fields`` those of the forms."""
         self.displacements.set_displacement(fields[0])
 
     def start_from(self, coarse: "Elements", unknown: Fields, prescribed: FloatArray) -> None:
-        """Put the fields of the forms of ``coarse``, less what is ``prescribed`` (m), into ``unknown``; collective.
-
-        They are the fields of the own forms then.
-        """
+        """Interpolate the fields of ``coarse`` to the own forms, and, less what is ``prescribed`` (m), ``unknown``."""
         displacement, space = self.displacements.forms.displacement, self.displacements
         displacement.interpolate(coarse.displacements.forms.displacement)
         unknown[0].array[:] = displacement.x.array[: space.owned] - prescribed[: space.owned]
         unknown[0].array[space.prescribed_owned] = 0.0
 
     def columns(self, movement: Movement, stack: ExitStack) -> list[Column]:
-        """Return a column for each motion, and one more for dead loads, if there are any; collective.
-
-        They have no solution yet, and are freed with the ``stack``.
-        """
+        """Return a column for each motion, and a last one for dead loads, not solved yet; the ``stack`` frees them."""
         prescribed = [self.displacements.held(motion) for motion in movement.motions]
         amounts = [*movement.amounts]
         applied: list[Applied | None] = [None for _ in prescribed]
@@ -330,7 +312,7 @@ class Elements(ABC):
         ]
 
     def show(self, columns: Sequence[Column], amounts: Sequence[float] | None = None) -> None:
-        """Make the sum of solutions, each times its amount or another one, the fields of the forms; collective."""
+        """Make the sum of solutions, each times its amount or another one, the fields of the forms."""
         with self.fields() as total:
             for column, amount in zip(columns, amounts or [column.amount for column in columns], strict=True):
                 for whole, part in zip(total, column.unknown, strict=True):
@@ -351,7 +333,7 @@ class Elements(ABC):
         result[0].array[:] += column.prescribed[: self.displacements.owned]
 
     def works(self, columns: Sequence[Column], forces: FloatArray) -> FloatArray:
-        """Return the work (J) of nodal ``forces`` (N), owned dofs, in each solution; collective."""
+        """Return the work (J) of nodal ``forces`` (N), owned dofs, in each solution."""
         found = []
         for column in columns:
             with self.fields() as total:
@@ -377,5 +359,5 @@ def close_far(columns: list[Column], movement: Movement, share: float) -> Moveme
 
 def level_of(space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, direct: bool = False) -> Level:
     """Return a level of multigrid, or of a direct solve; its operator is given back with the ``stack``; collective."""
-    matrix = stack.enter_context(space.lend(law) if direct or space.degree == 1 else space.lend_product(law))
+    matrix = stack.enter_context(space.lend(law, entries=direct))
     return Level(space.space, matrix, space.prescribed, not law.is_uniform)

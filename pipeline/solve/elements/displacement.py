@@ -23,7 +23,6 @@ class DisplacementElements(Elements):
     element, stricter, masks = "displacement", 1.0, True
 
     def __init__(self, spaces: Spaces, degree: int, conditions: Conditions):
-        """Prepare; collective."""
         super().__init__(spaces, degree, conditions)
         self._kept: DisplacementSolver | None = None
 
@@ -39,7 +38,7 @@ class DisplacementElements(Elements):
         self._kept = None
 
     def set_up(self, law: MaterialLaw, stack: ExitStack, *, direct: bool, keep: bool) -> "DisplacementSolver":
-        """Return a solver, freed with the ``stack`` unless it is to ``keep``; collective.
+        """Return a solver.
 
         What is kept begins each solve from the best sum of earlier solutions. A factorisation is not kept: it takes
         much memory beside the next degree.
@@ -57,11 +56,7 @@ class DisplacementElements(Elements):
         return found
 
     def solver(self, law: MaterialLaw, *, direct: bool) -> "DisplacementSolver":
-        """Return a solver with levels of its own; collective.
-
-        Raises:
-            SolveError: if it cannot be set up.
-        """
+        """Return a solver with levels of its own."""
         with ExitStack() as stack, recorded() as cost:
             found = DisplacementSolver(self, law, self.levels(law, stack, direct=direct), direct=direct)
             found.owner.push(stack.pop_all())
@@ -71,11 +66,7 @@ class DisplacementElements(Elements):
     def solver_on(
         self, levels: list[Level], law: MaterialLaw, held: Int32Array, *, direct: bool, earlier: Solver | None
     ) -> "DisplacementSolver":
-        """Return a solver of operators in which more dofs are held; collective.
-
-        Raises:
-            SolveError: if it cannot be set up.
-        """
+        """Return a solver of operators in which more dofs are held."""
         if isinstance(earlier, DisplacementSolver) and earlier.linear.cycle is not None:
             earlier.linear.hold(levels)
             return earlier
@@ -90,7 +81,7 @@ class DisplacementElements(Elements):
     def finer(
         self, law: MaterialLaw, levels: list[Level], stack: ExitStack, below: LinearSolver | None = None
     ) -> tuple["DisplacementElements", LinearSolver]:
-        """Return elements of one degree more and a solver above ``levels``, freed with the stack; collective.
+        """Return elements of one degree more and a solver above ``levels``, freed with the stack.
 
         ``below`` is the solver of ``levels``, if it is still there.
         """
@@ -111,23 +102,23 @@ class DisplacementSolver(Solver):
     cost: Times
 
     def __init__(self, elements: DisplacementElements, law: MaterialLaw, levels: list[Level], *, direct: bool):
-        """Set up; collective. The ``levels`` must live as long."""
+        """Set up. The ``levels`` must live as long."""
         super().__init__(elements, law, is_exact=direct)
         self._above: tuple[DisplacementElements, LinearSolver] | None = None
         self._tolerance, self.levels = 1.0, levels
         self.linear = self.owner.enter_context(LinearSolver(levels, direct=direct))
 
     def solve(self, columns: Sequence[Column], tolerance: float, target: float | None = None) -> int:
-        """Lower the energy norm of each error to a ``tolerance``, or a ``target``; return iterations; collective."""
+        """Lower the energy norm of each error, relative to that of the solution; return the iterations."""
         self._tolerance = tolerance
         return sum(self.linear.solve(column.right[0], column.unknown[0], tolerance, target) for column in columns)
 
     def improve(self, columns: Sequence[Column], share: float) -> int:
-        """Lower it to that ``share`` of what the last solve left; return the iterations; collective."""
+        """Lower it to that ``share`` of what the last solve left; return the iterations."""
         return self.solve(columns, share * self._tolerance)
 
     def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
-        """Solve on in one degree more, from the residuals there; collective."""
+        """Solve on in one degree more, from the residuals there."""
         coarse = self.elements
         if self.linear.cycle is None and coarse.degree > 1:
             self.linear.close()  # what the next degree takes is the most memory of all

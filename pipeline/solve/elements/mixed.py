@@ -47,7 +47,6 @@ class MixedElements(Elements):
     direct_limit = 1_500
 
     def __init__(self, spaces: Spaces, degree: int, conditions: Conditions):
-        """Prepare; collective."""
         super().__init__(spaces, degree, conditions)
         self._stack, self._set_up = ExitStack(), ExitStack()
         self._elastic = LAME
@@ -64,7 +63,7 @@ class MixedElements(Elements):
 
     @property
     def whole_dofs(self) -> int:
-        """Unknowns of the whole body; collective."""
+        """Unknowns of the whole body."""
         return super().whole_dofs + self.pressures.whole_dofs
 
     def close(self) -> None:
@@ -88,27 +87,24 @@ class MixedElements(Elements):
 
     @contextmanager
     def fields(self) -> Iterator[Fields]:
-        """Lend displacement and pressure of zeros; collective."""
+        """Lend displacement and pressure of zeros."""
         with super().fields() as (u,), vector(self.pressures.space) as p:
             yield u, p
 
     def set_fields(self, fields: Fields) -> None:
-        """Make ``fields`` those of the forms; collective."""
+        """Make ``fields`` those of the forms."""
         super().set_fields(fields)
         self.pressures.set(fields[1])
 
     def start_from(self, coarse: Elements, unknown: Fields, prescribed: FloatArray) -> None:
-        """Put the fields of the forms of ``coarse``, less what is ``prescribed`` (m), into ``unknown``; collective.
-
-        Of displacement elements there is no pressure.
-        """
+        """Begin with the fields of ``coarse``; of displacement elements there is no pressure."""
         super().start_from(coarse, unknown, prescribed)
         if isinstance(coarse, MixedElements):
             self.pressures.forms.pressure.interpolate(coarse.pressures.forms.pressure)
             unknown[1].array[:] = self.pressures.values
 
     def apply(self, result: Fields, law: MaterialLaw, *, checked: bool = True) -> None:
-        """Write K₀ u + Bᵀ p (N) and B u − M p / λ₁ of the forms' fields into ``result``; collective."""
+        """Write K₀ u + Bᵀ p (N) and B u − M p / λ₁ of the forms' fields into ``result``."""
         forces, rates = result
         super().apply(result, law, checked=checked)
         self.pressures.pull(forces, checked=checked)
@@ -118,7 +114,7 @@ class MixedElements(Elements):
             part.scale(self.unit(law))
 
     def lift(self, column: Column, law: MaterialLaw, *, checked: bool = True) -> None:
-        """Put what a column prescribes and its loads, in the law's unit, on its right-hand side; collective."""
+        """Put what a column prescribes and its loads, in the law's unit, on its right-hand side."""
         super().lift(column, law, checked=checked)
         if column.applied is None:
             self.pressures.dilate(column.right[1], checked=checked)
@@ -129,7 +125,7 @@ class MixedElements(Elements):
         return self.pressures.forms.pressure, compliance
 
     def set_up(self, law: MaterialLaw, stack: ExitStack, *, direct: bool, keep: bool) -> "MixedSolver":
-        """Return a solver; it is kept for all laws of the same λ₀ and μ, in their units; collective.
+        """Return a solver; it is kept for all laws of the same λ₀ and μ, in their units.
 
         Raises:
             SolveError: if λ <= μ everywhere, or it cannot be set up.
@@ -141,11 +137,7 @@ class MixedElements(Elements):
     def solver_on(
         self, levels: list[Level], law: MaterialLaw, held: Int32Array, *, direct: bool, earlier: Solver | None
     ) -> "MixedSolver":
-        """Return a solver of operators in which more dofs are held, of which this rank owns ``held``; collective.
-
-        Raises:
-            SolveError: if it cannot be set up.
-        """
+        """Return a solver of operators in which the owned dofs ``held`` are held, too."""
         if earlier is not None:
             earlier.close()
         with ExitStack() as stack:
@@ -157,7 +149,7 @@ class MixedElements(Elements):
         return found
 
     def operator(self, stiffness: PETSc.Mat, law: MaterialLaw, *, entries: bool) -> Callable[[Fields, Fields], None]:
-        """Return what writes K₀ u + Bᵀ p and B u − M p / λ₁, in the law's unit, into other fields; collective."""
+        """Return what writes K₀ u + Bᵀ p and B u − M p / λ₁, in the law's unit, into other fields."""
         (coupling, mass), compliance = self.pressures.blocks(entries=entries), self.compliance(law)
 
         def multiply(fields: Fields, result: Fields) -> None:
@@ -173,13 +165,13 @@ class MixedElements(Elements):
         return multiply
 
     def finer(self) -> "MixedElements":
-        """Return the elements of one degree more, made when first asked for; collective."""
+        """Return the elements of one degree more, made when first asked for."""
         if self._finer is None:
             self._finer = MixedElements(self._spaces, self.degree + 1, self._conditions)
         return self._finer
 
     def saddle(self, elastic: MaterialLaw, stack: ExitStack, *, direct: bool) -> Saddle:
-        """Return the blocks for λ₀ and μ of the law ``elastic``, given back with the ``stack``; collective."""
+        """Return the blocks for λ₀ and μ of the law ``elastic``, given back with the ``stack``."""
         levels = self.levels(elastic, stack, direct=direct)
         return self.saddle_of(levels, elastic, *self.pressures.blocks(entries=direct))
 
@@ -215,7 +207,7 @@ class MixedSolver(Solver):
         self.saddle = saddle
 
     def solve(self, columns: Sequence[Column], tolerance: float, target: float | None = None) -> int:
-        """Lower the energy norm of each error by a ``tolerance``, or to a ``target``; return iterations; collective."""
+        """Lower the energy norm of each error, relative to what it is in the beginning; return the iterations."""
         right, unknown = [column.right for column in columns], [column.unknown for column in columns]
         with stage("iterations"):
             return self.saddle.solve(self.elements.compliance(self.law), right, unknown, tolerance, target)
@@ -226,11 +218,11 @@ class MixedSolver(Solver):
         return self.elements.unit(self.law) * np.array(self.saddle.first_energies)
 
     def improve(self, columns: Sequence[Column], share: float) -> int:
-        """Lower it to that ``share`` of what the last solve left; return the iterations; collective."""
+        """Lower it to that ``share`` of what the last solve left; return the iterations."""
         return self.solve(columns, share)
 
     def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
-        """Solve on in elements of one degree more; collective."""
+        """Solve on in elements of one degree more."""
         coarse, finer = self.elements, self.elements.finer()
         below = coarse._solvers.get(False, (None, None))[0]
         saddle = finer._solver(coarse.elastic(self.law), direct=False, below=below)

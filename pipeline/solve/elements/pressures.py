@@ -25,7 +25,7 @@ from pipeline.stages import stage
 
 
 class Pressures:
-    """Pressures on a mesh, with B(q, u) = ∫ q div u and M(p, q) = ∫ p q.
+    """Pressures on a mesh, with B(q, u) = ∫ q div u and M(p, q) = ∫ p q. Methods are collective.
 
     They are counted in units of ``unit`` × μ, ``unit`` (1/m) being about one over the element size: the blocks of the
     saddle point are then of like magnitude in any unit of length. B and M are multiplied cell by cell (:meth:`blocks`),
@@ -34,7 +34,7 @@ class Pressures:
     """
 
     def __init__(self, body: BodyMesh, displacements: ElasticSpace):
-        """Add pressures to ``displacements`` on a mesh; collective."""
+        """Add pressures to ``displacements`` on a mesh."""
         self._displacements = displacements
         self.space, self._region = region_wise_space(body, displacements.degree - 1)
         self._has_regions = body.regions is not None
@@ -52,14 +52,14 @@ class Pressures:
         self._stack.close()
 
     def blocks(self, *, entries: bool) -> tuple[PETSc.Mat, PETSc.Mat]:
-        """Return B and M: with ``entries``, or as products; collective.
+        """Return B and M: with ``entries``, or as products.
 
         B has columns of zeros for prescribed displacements. Both are kept here, and freed with the pressures.
         """
         return self._assembled if entries else self._shells
 
     def holding(self, held: Int32Array, *, entries: bool) -> PETSc.Mat:
-        """Return B with columns of zeros for the owned dofs ``held``, too; the caller destroys it; collective."""
+        """Return B with columns of zeros for the owned dofs ``held``, too; the caller destroys it."""
         coupling, _ = self.blocks(entries=entries)
         if not entries:
             return coupling.getPythonContext().holding(held).matrix()
@@ -77,15 +77,15 @@ class Pressures:
         return np.asarray(self.forms.pressure.x.array[: self._owned] / self.unit)
 
     def set(self, pressure: PETSc.Vec) -> None:
-        """Make ``pressure`` that of the forms; collective."""
+        """Make ``pressure`` that of the forms."""
         fill(self.forms.pressure, pressure, self.unit)
 
     def weighed(self) -> FloatArray:
-        """Return M p for the pressure of the forms, owned dofs; collective."""
+        """Return M p for the pressure of the forms, owned dofs."""
         return self._products.weigh(self.values)
 
     def pull(self, result: PETSc.Vec, *, checked: bool) -> None:
-        """Add Bᵀ p, for all displacements, to ``result``; collective. ``checked``: see :meth:`ElasticSpace.apply`."""
+        """Add Bᵀ p, for all displacements, to ``result``. ``checked``: see :meth:`ElasticSpace.apply`."""
         if not checked:
             result.array[:] += self._products.pull(self.values, whole=True)
             return
@@ -94,7 +94,7 @@ class Pressures:
             result.axpy(1.0, pull)
 
     def dilate(self, result: PETSc.Vec, *, checked: bool) -> None:
-        """Write B u, of all displacements, into ``result``; collective. ``checked``: see :meth:`ElasticSpace.apply`."""
+        """Write B u, of all displacements, into ``result``. ``checked``: see :meth:`ElasticSpace.apply`."""
         if not checked:
             displacement = self._displacements.forms.displacement.x.array[: self._displacements.owned]
             result.array[:] = self._products.dilation(displacement, whole=True)

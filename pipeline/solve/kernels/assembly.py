@@ -41,11 +41,9 @@ class StraightStiffness:
         free[prescribed] = 0.0
         regions = np.zeros_like(self._regions) if law.is_uniform else self._regions
         blocks = np.zeros((len(self._columns), 9))
-        call(
-            "add_stiffness", len(self._which), self._which, self._dofs.shape[1], self._corners, self._dofs,
-            self._places, self._tensors, free, regions, np.array(law.lame_lambda, dtype=float),
-            np.array(law.lame_mu, dtype=float), blocks,
-        )  # fmt: skip
+        cells = len(self._which), self._which, self._dofs.shape[1], self._corners, self._dofs, self._places
+        lame = (np.array(values, dtype=float) for values in (law.lame_lambda, law.lame_mu))
+        call("add_stiffness", *cells, self._tensors, free, regions, *lame, blocks)
         row = np.repeat(np.arange(len(self._offsets) - 1, dtype=np.int32), np.diff(self._offsets))
         on_diagonal = np.flatnonzero(self._columns == row)
         blocks[on_diagonal[prescribed // 3], 4 * (prescribed % 3)] = diagonal
@@ -78,10 +76,8 @@ def _pattern(dofs: Int32Array, points: int) -> tuple[Int32Array, Int32Array, Int
     visited.data = np.arange(dofs.size, dtype=np.int32)
     visits = visited.T.tocsr()
     places = np.empty((count, width, width), dtype=np.int32)
-    call(
-        "find_entries", points, width, dofs, graph.indptr, graph.indices, visits.indptr, visits.data,
-        np.empty(points, dtype=np.int32), places,
-    )  # fmt: skip
+    rows = graph.indptr, graph.indices, visits.indptr, visits.data
+    call("find_entries", points, width, dofs, *rows, np.empty(points, dtype=np.int32), places)
     return graph.indptr, graph.indices, places
 
 

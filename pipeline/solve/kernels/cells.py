@@ -60,8 +60,8 @@ class CurvedCells:
         nodes = space.mesh.geometry.x[compat.geometry_dofs(space.mesh)[which]]
         self.roots = np.zeros((self.lanes.batches, len(weights), LANES))
         maps = np.zeros((self.lanes.batches, len(weights), 9, LANES))
-        call("map_curved", len(which), nodes.shape[1], len(weights), nodes, _by_points(of_geometry), weights,
-                  maps, self.roots)  # fmt: skip
+        sizes = len(which), nodes.shape[1], len(weights)
+        call("map_curved", *sizes, nodes, _by_points(of_geometry), weights, maps, self.roots)
         self.maps = _in_both(maps)
         self.signs = _in_both(np.sign(weights))  # not all weights are positive
         self.gradients = _in_both(_by_points(reference(degree, self._quadrature)[2]))
@@ -77,15 +77,15 @@ class CurvedCells:
 
     def add_product(self, lame: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:
         """Add A x to ``y``, all in one precision; ``lame`` is of the lanes, what is prescribed is as any other."""
-        end, kind = "_double" if x.dtype == np.float64 else "", x.dtype.name
-        call(f"add_curved{end}", *self.sizes, self.lanes.dofs, self.maps[kind], lame, self.signs[kind],
-                  self.gradients[kind], x, y)  # fmt: skip
+        end = "_double" if x.dtype == np.float64 else ""
+        call(f"add_curved{end}", *self._arguments(lame, x.dtype.name), x, y)
 
     def add_diagonal(self, lame: FloatArray, blocks: np.ndarray) -> None:
         """Add the blocks on the diagonal to ``blocks`` (local, 9)."""
-        kind = "float64"
-        call("add_curved_diagonal", *self.sizes, self.lanes.dofs, self.maps[kind], lame, self.signs[kind],
-                  self.gradients[kind], blocks)  # fmt: skip
+        call("add_curved_diagonal", *self._arguments(lame, "float64"), blocks)
+
+    def _arguments(self, lame: np.ndarray, kind: str) -> tuple[Any, ...]:
+        return *self.sizes, self.lanes.dofs, self.maps[kind], lame, self.signs[kind], self.gradients[kind]
 
     @property
     def sizes(self) -> tuple[int, int, int]:

@@ -82,27 +82,22 @@ class CellPressures:
         call("add_mass", count, batches, self._dofs, self._roots, self._mass, given, found)
         if curved is not None:
             _, quadrature, batches = curved.sizes
-            call("add_curved_mass", count, quadrature, batches, self._bent, curved.roots, curved.signs["float64"],
-                      self._values, given, found)  # fmt: skip
+            tables = self._bent, curved.roots, curved.signs["float64"], self._values
+            call("add_curved_mass", count, quadrature, batches, *tables, given, found)
         return self.unit**2 * self.ghosts.folded(found, 1)
 
     def _couple(self, which: str, x: FloatArray, y: FloatArray) -> None:
         """Add B x or Bᵀ x, of local points, to ``y``."""
         cells, kind = self.cells, "float64"
-        table, pressures = bernstein(cells.degree, kind), bernstein(self.degree, kind).transform
-        there, back = (table.transform, pressures) if which == "dilation" else (pressures, table.transform)
-        points, count = cells.lanes.dofs.shape[1], len(self._mass)
-        call(
-            f"add_{which}", points, count, cells.lanes.batches, cells.lanes.dofs, self._dofs, cells.maps[kind],
-            self._roots, there.first, there.column, there.weight, back.first_back, back.column_back, back.weight_back,
-            table.raised, self._coupled, x, y,
-        )  # fmt: skip
+        table, pressures = bernstein(cells.degree, kind), bernstein(self.degree, kind)
+        there, back = (table, pressures) if which == "dilation" else (pressures, table)
+        sizes = cells.lanes.dofs.shape[1], len(self._mass)
+        laid_out = cells.lanes.batches, cells.lanes.dofs, self._dofs, cells.maps[kind], self._roots
+        call(f"add_{which}", *sizes, *laid_out, *there.forward, *back.back, table.raised, self._coupled, x, y)
         if (curved := cells.curved) is not None:
             _, quadrature, batches = curved.sizes
-            call(
-                f"add_curved_{which}", points, count, quadrature, batches, curved.lanes.dofs, self._bent,
-                curved.maps[kind], curved.roots, curved.signs[kind], curved.gradients[kind], self._values, x, y,
-            )  # fmt: skip
+            bent = quadrature, batches, curved.lanes.dofs, self._bent, curved.maps[kind], curved.roots
+            call(f"add_curved_{which}", *sizes, *bent, curved.signs[kind], curved.gradients[kind], self._values, x, y)
 
 
 class Coupling:

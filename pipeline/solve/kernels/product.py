@@ -9,7 +9,7 @@ from copy import copy
 from dataclasses import dataclass
 from functools import cache
 from math import factorial, prod
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -35,23 +35,24 @@ DEGREES = (2, 3, 4)
 _NOTHING = 1e-12
 
 
-@dataclass(frozen=True)
-class Transform:
-    """A sparse matrix and its transpose, by rows: offsets, columns, weights, and again."""
+class Rows(NamedTuple):
+    """A sparse matrix by rows."""
 
-    first: Int32Array
-    column: Int32Array
-    weight: np.ndarray
-    first_back: Int32Array
-    column_back: Int32Array
-    weight_back: np.ndarray
+    offsets: Int32Array
+    columns: Int32Array
+    weights: np.ndarray
 
 
 @dataclass(frozen=True)
 class Bernstein:
-    """What a degree has on the reference cell: values at points to coefficients, places of b + e_a, mass times p²."""
+    """What a degree has on the reference cell.
 
-    transform: Transform
+    ``forward`` takes values at points to coefficients, ``back`` is its transpose; ``raised`` are the places of b + e_a,
+    ``mass`` is times p².
+    """
+
+    forward: Rows
+    back: Rows
     raised: Int32Array
     mass: np.ndarray
 
@@ -71,9 +72,11 @@ def bernstein(degree: int, kind: str) -> Bernstein:
     mass = [[_multinomial(b) * _multinomial(c) * _factorials(tuple(np.add(b, c))) for c in low] for b in low]
     scale = degree**2 / factorial(2 * degree + 1)
     return Bernstein(
-        Transform(*_rows(matrix, kind), *_rows(matrix.T, kind)), np.array(raised, dtype=np.int32),
-        (scale * np.array(mass)).astype(kind),
-    )  # fmt: skip
+        forward=_rows(matrix, kind),
+        back=_rows(matrix.T, kind),
+        raised=np.array(raised, dtype=np.int32),
+        mass=(scale * np.array(mass)).astype(kind),
+    )
 
 
 class CellStiffness:
@@ -110,11 +113,8 @@ class CellStiffness:
         """Add the product with the ``x`` of the local points to ``y``, all in one precision."""
         kind = x.dtype.name
         end, table = "_double" if kind == "float64" else "", bernstein(self.degree, kind)
-        by = table.transform
-        call(
-            f"add_product{end}", self.degree, self.lanes.batches, self.lanes.dofs, self.maps[kind], lame[0], by.first,
-            by.column, by.weight, by.first_back, by.column_back, by.weight_back, table.raised, table.mass, x, y,
-        )  # fmt: skip
+        cells = self.degree, self.lanes.batches, self.lanes.dofs, self.maps[kind], lame[0]
+        call(f"add_product{end}", *cells, *table.forward, *table.back, table.raised, table.mass, x, y)
         if self.curved is not None:
             self.curved.add_product(lame[1], x, y)
 
@@ -122,9 +122,9 @@ class CellStiffness:
         """Return the blocks on the diagonal, shape (local, 9), that the cells of this rank make."""
         blocks = np.zeros((self.ghosts.local, 9), dtype=np.float32)
         weights, _, gradients = reference(self.degree, 2 * self.degree - 2)
-        tensors = np.einsum("q,aqi,bqi->abi", weights, gradients, gradients)
-        call("add_diagonal", len(self.lanes.which), self.lanes.dofs.shape[1], self.lanes.dofs,
-                  self.maps["float64"], lame[0], np.ascontiguousarray(tensors), blocks)  # fmt: skip
+        tensors = np.ascontiguousarray(np.einsum("q,aqi,bqi->abi", weights, gradients, gradients))
+        sizes = len(self.lanes.which), self.lanes.dofs.shape[1]
+        call("add_diagonal", *sizes, self.lanes.dofs, self.maps["float64"], lame[0], tensors, blocks)
         if self.curved is not None:
             self.curved.add_diagonal(lame[1], blocks)
         return blocks
@@ -220,6 +220,6 @@ def _multinomial(b: tuple[int, ...]) -> float:
     return factorial(sum(b)) / _factorials(b)
 
 
-def _rows(matrix: FloatArray, kind: str) -> tuple[Int32Array, Int32Array, np.ndarray]:
+def _rows(matrix: FloatArray, kind: str) -> Rows:
     sparse = sp.csr_matrix(matrix)
-    return sparse.indptr.astype(np.int32), sparse.indices.astype(np.int32), sparse.data.astype(kind)
+    return Rows(sparse.indptr.astype(np.int32), sparse.indices.astype(np.int32), sparse.data.astype(kind))

@@ -25,9 +25,14 @@ class LiftsOff(SolveError):
 
 
 def check_signs(
-    forms: MeridianForms, arrays: MeridianArrays, solution: FloatArray, residual: FloatArray,
-    depth: float, gap: Callable[[FloatArray], FloatArray], limit: float,
-) -> None:  # fmt: skip
+    forms: MeridianForms,
+    arrays: MeridianArrays,
+    solution: FloatArray,
+    residual: FloatArray,
+    depth: float,
+    gap: Callable[[FloatArray], FloatArray],
+    limit: float,
+) -> None:
     """Check a ``solution`` (displacements in m, lengths of the mesh in units of ``arrays.unit``) and its ``residual``.
 
     ``gap`` is that between tool and surface at radii up to ``limit`` (m) when its lowest point touches.
