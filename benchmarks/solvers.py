@@ -110,8 +110,7 @@ def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple
     from pipeline.solve.krylov import LinearSolver
 
     space = problem.elements.displacements
-    lend = space.lend_product if space.degree > 1 else space.lend
-    unit = stack.enter_context(lend(law))
+    unit = stack.enter_context(space.lend(law, entries=False))
     held = space.held(PRESS)
 
     def once() -> tuple[float, float, float, int]:

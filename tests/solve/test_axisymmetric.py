@@ -35,15 +35,6 @@ def solve_layers(meridian, moduli, bonded, *, depth=1.0, **options):
         return problem.solve(law, Movement.along((0.0, 0.0, -depth)))
 
 
-@sampled("contact, poisson", known.CYLINDER, by_day=3)
-def test_reference_cylinder(contact, poisson):
-    solution = solve_axisymmetric(Meridian(50e-3, 50e-3, 3e-3), poisson, contact == "bonded")
-    error = solution.reaction[2] / 1e-3 / known.CYLINDER[contact, poisson] - 1
-    assert abs(error) < known.CYLINDER_ERROR
-    assert solution.bar < 1e-5
-    assert solution.balance < 1e-9
-
-
 @sampled("bonded, poisson", product((True, False), (0.0, 0.3, 0.45, 0.49, 0.4999, 0.5)), by_day=4)
 def test_half_space(bonded, poisson):
     """In a body a million times as wide as the disc F is that of a half-space (closed forms), to 1e-6."""

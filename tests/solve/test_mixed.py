@@ -3,16 +3,13 @@
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import pytest
-from dolfinx import fem, mesh
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.run.meshing import mesh_arrays, mesh_case
 from pipeline.solve import SolveError
-from pipeline.solve.elements.mixed import MixedElements
 from pipeline.solve.estimate import error_bar
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
@@ -45,32 +42,6 @@ def make_mesh(comm: MPI.Comm = MPI.COMM_SELF, mirrors: tuple[str, ...] = QUARTER
 def solve(body: BodyMesh, poisson: float, degree: int = 2, *, bonded: bool = True, **options: Any) -> Solution:
     with QuasiStaticProblem(Spaces(body), degree, Conditions(bonded), "mixed") as mixed:
         return mixed.solve(law(poisson), PRESS, **options)
-
-
-@pytest.mark.parametrize("degree", [2, 3])
-def test_patch(degree):
-    """A linear displacement with its constant pressure is in equilibrium, on curved, quarter-point elements."""
-    body = make_mesh()
-    elements = MixedElements(Spaces(body), degree, Conditions())
-    gradient = np.array([[0.3, -0.2, 0.1], [0.4, 0.1, -0.5], [0.2, 0.6, -0.1]])
-    space = elements.displacements
-    u = space.forms.displacement
-    u.interpolate(lambda x: gradient @ x)
-    c = 0.01  # in units of μ, beside λ₀ = μ
-    with elements.fields() as result, elements.fields() as unknown:
-        unknown[0].array[:] = u.x.array
-        unknown[1].set(np.trace(gradient) / c / elements.pressures.unit)
-        elements.set_fields(unknown)
-        elements.apply(result, MaterialLaw.of(1 + 1 / c, 1.0))
-        compression = c * elements.pressures.weighed()
-        assert np.abs(result[1].array).max() < 1e-12 * np.abs(compression).max()
-        surface = mesh.exterior_facet_indices(body.mesh.topology)
-        outer = fem.locate_dofs_topological(space.space, 2, surface)
-        forces = result[0].array.reshape(-1, 3)
-        inner = np.setdiff1d(np.arange(len(forces)), outer)
-        assert len(inner)
-        assert np.abs(forces[inner]).max() < 1e-10 * np.abs(forces).max()
-    elements.close()
 
 
 @sampled("name, poisson", EXACT, by_day=2)

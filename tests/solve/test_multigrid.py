@@ -82,7 +82,7 @@ def test_an_operator_that_is_not_positive_is_refused():
     ):
         coarse, fine = solver.levels
         with (
-            problem.elements.displacements.lend_product(MaterialLaw.of(-1.0, -1.0)) as turned,
+            problem.elements.displacements.lend(MaterialLaw.of(-1.0, -1.0), entries=False) as turned,
             pytest.raises(SolveError, match="not positive definite"),
         ):
             LinearSolver([coarse, Level(fine.space, turned, fine.prescribed)], direct=False)

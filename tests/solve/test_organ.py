@@ -1,5 +1,6 @@
-"""Forces on bodies of triangles are those on the bodies that they stand for."""
+"""Forces on bodies of triangles are those on the bodies that they stand for, inclusions too."""
 
+from dataclasses import replace
 from math import isnan
 from pathlib import Path
 
@@ -7,8 +8,15 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from tests.cases import solve
+from pipeline.mesh.distribute import BodyMesh
+from pipeline.run.meshing import mesh_case
+from pipeline.solve.movement import Movement
+from pipeline.solve.physics import MaterialLaw
+from pipeline.solve.quasi_static import QuasiStaticProblem
+from pipeline.solve.spaces import Conditions, Spaces
+from tests.cases import solve, study
 from tests.organs import box, ellipsoid, write_stl
+from tests.solve.test_regions import moduli
 
 MESH = {"accuracy": "0.5 %", "epsilon": None, "fine": None, "coarse": None, "rim": None, "growth": None, "degree": None}
 NATIVE = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": {"below": "-15 mm"}}
@@ -57,3 +65,35 @@ def test_an_ellipsoid_given_as_triangles_is_an_ellipsoid_wherever_it_is_touched(
     assert abs(one.force / other.force - 1) < max(one.force_error, other.force_error)
     np.testing.assert_allclose(one.force_vector, other.force_vector, atol=0.01 * other.force)
     assert one.balance < 1e-5 and one.energy == pytest.approx(one.force * 0.2e-3 / 2, rel=1e-5)
+
+
+TUMOUR = {
+    "name": "tumour",
+    "at": ["-30 mm", "2 mm", "15 mm"],
+    "axes": ["8 mm", "6 mm", "5 mm"],
+    "young": "50 kPa",
+    "poisson": 0.3,
+}
+PROBE = {"shape": "disc", "radius": "4 mm", "depth": "0.2 mm", "at": ["-36 mm", "0 mm", "24 mm"]}
+COARSE = {"epsilon": "full", "fine": "15 mm", "coarse": "60 mm", "rim": "1.5 mm", "growth": 1.0}
+PRESS = Movement.along((0.0, 0.0, -0.2e-3))
+ELLIPSOID = {"shape": "ellipsoid", "axes": ["60 mm", "45 mm", "30 mm"], "fixed": {"below": "-10 mm"}}
+
+
+def meshed(body) -> BodyMesh:
+    return mesh_case(study(body=body | {"inclusion": [TUMOUR]}, probe=PROBE, mesh=COARSE).case(()), (), MPI.COMM_SELF)
+
+
+def force(mesh: BodyMesh, law: MaterialLaw, method: str = "iterative") -> float:
+    with Spaces(mesh) as spaces, QuasiStaticProblem(spaces, 2, Conditions()) as problem:
+        return problem.solve(law, PRESS, method=method).reaction[2]
+
+
+def test_a_tumour_in_a_file_of_an_ellipsoid_is_one_in_the_ellipsoid(tmp_path):
+    path = write_stl(tmp_path / "ellipsoid.stl", *ellipsoid(24))
+    given = meshed({"shape": "surface", "file": str(path), "unit": "mm", "fixed": {"below": "-10 mm"}})
+    none = force(replace(given, regions=None), moduli((10e3, 0.3)), "direct")
+    assert force(given, moduli((10e3, 0.3), (10e3, 0.3)), "direct") == pytest.approx(none, rel=1e-8)
+    stiff = moduli((10e3, 0.3), (100e3, 0.3))
+    assert force(given, moduli((10e3, 0.3), (1e3, 0.3))) < 0.9 * none < 1.1 * none < force(given, stiff)
+    assert force(given, stiff) == pytest.approx(force(meshed(ELLIPSOID), stiff), rel=0.01)
