@@ -25,11 +25,12 @@ from benchmarks.scenes import LARGE
 from benchmarks.tables import markdown, options, write
 from pipeline import stages
 from pipeline.run.meshing import mesh_case
-from pipeline.solve.krylov import LinearSolver
+from pipeline.solve.conditions import Conditions
+from pipeline.solve.linear_solver import LinearSolver
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Conditions, Spaces
+from pipeline.solve.spaces import Spaces
 from pipeline.study.load import parse
 from pipeline.verify.machine import machine
 

@@ -24,9 +24,10 @@ from pipeline.plan.symmetry import model_planes
 from pipeline.run.execute import compute
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of, movement_of, problem_of
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Solution
-from pipeline.solve.spaces import Conditions, Spaces
+from pipeline.solve.spaces import Spaces
 from pipeline.study.load import parse
 from pipeline.study.sweep import Case
 

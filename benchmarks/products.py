@@ -39,8 +39,9 @@ def measure(size: tuple[float, float], degrees: list[int]) -> list[dict[str, Any
     from threadpoolctl import threadpool_limits
 
     from pipeline.run.meshing import mesh_case
+    from pipeline.solve.conditions import Conditions
     from pipeline.solve.physics import MaterialLaw
-    from pipeline.solve.spaces import Conditions, Spaces
+    from pipeline.solve.spaces import Spaces
 
     law = MaterialLaw.of_moduli(YOUNG, 0.3)
     with threadpool_limits(limits=1):

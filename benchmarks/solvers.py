@@ -56,9 +56,10 @@ def measure(element: str, degree: int, poisson: float, size: tuple[float, float]
 
     from pipeline.run.memory import PeakMemory
     from pipeline.run.meshing import mesh_case
+    from pipeline.solve.conditions import Conditions
     from pipeline.solve.physics import MaterialLaw
     from pipeline.solve.quasi_static import QuasiStaticProblem
-    from pipeline.solve.spaces import Conditions, Spaces
+    from pipeline.solve.spaces import Spaces
 
     with threadpool_limits(limits=1), ExitStack() as stack:
         mesh = mesh_case(case_of(degree, size), ("x", "y"), MPI.COMM_SELF)
@@ -107,7 +108,7 @@ def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple
     """Return the operator, and what assembles, sets up and solves once."""
     from pipeline.solve.balance import TOLERANCE
     from pipeline.solve.compiled import vector
-    from pipeline.solve.krylov import LinearSolver
+    from pipeline.solve.linear_solver import LinearSolver
 
     space = problem.elements.displacements
     unit = stack.enter_context(space.lend(law, entries=False))

@@ -16,6 +16,7 @@ from pipeline.run.room import MEMORY_SHARE
 from pipeline.shapes.contact import first_touch
 from pipeline.shapes.probes._round import RoundIndenter
 from pipeline.solve import SolveError
+from pipeline.solve.conditions import Conditions, Front
 from pipeline.solve.contact.active_set import ContactError
 from pipeline.solve.contact.search import Tool
 from pipeline.solve.far_field import BodyField, PointForce
@@ -27,7 +28,7 @@ from pipeline.solve.movement import FarField, Movement, Place
 from pipeline.solve.physics import MaterialLaw, Parameters
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Problem, Request, Solution
-from pipeline.solve.spaces import Conditions, Front, Spaces
+from pipeline.solve.spaces import Spaces
 from pipeline.study.sweep import Case
 
 # Unknowns up to which a direct solve is a way out where iterations do not converge.

@@ -23,9 +23,9 @@ from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.quantities import CLEAR
 from pipeline.scene.model import FIXED, MIRROR, PROBE
 from pipeline.solve.compiled import cellwise_space, form, vector_space
+from pipeline.solve.conditions import Front
 from pipeline.solve.forms import dx, one_cell
 from pipeline.solve.physics import MaterialLaw, of_regions
-from pipeline.solve.spaces import Front
 from pipeline.stages import stage
 
 # A quarter point is at 0.25 of its edge, a mid node at 0.5, up to the bulge of a curved edge.

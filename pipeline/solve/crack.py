@@ -37,10 +37,10 @@ from pipeline.arrays import BoolArray, FloatArray
 from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve.compiled import form, scalar_space, vector_space
+from pipeline.solve.conditions import Front
 from pipeline.solve.estimate import extrapolate_release, release_bar
 from pipeline.solve.forms import ElasticForms, dx, one_cell
 from pipeline.solve.physics import pressurised, small_strain, strain
-from pipeline.solve.spaces import Front
 
 # Nodes are moved by this share of that radius to see what becomes of the loads, and back.
 _STEP = 1e-4

@@ -19,12 +19,13 @@ from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import vector, vector_space
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.far_field import PointForce, Smooth, StressPull, outer_triangles
 from pipeline.solve.forms import compile_forms, one_cell
-from pipeline.solve.krylov import Level, LinearSolver
+from pipeline.solve.linear_solver import Level, LinearSolver
 from pipeline.solve.movement import Motion
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.spaces import Conditions, ElasticSpace, Spaces
+from pipeline.solve.spaces import ElasticSpace, Spaces
 
 # Of the elements that R is found with.
 DEGREE = 2

@@ -19,7 +19,8 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import global_sum
-from pipeline.solve.krylov import INDEFINITE, SOLVERS, LinearSolver, check_converged, explained, keep, solver_of
+from pipeline.solve.krylov import INDEFINITE, SOLVERS, check_converged, explained, keep, solver_of
+from pipeline.solve.linear_solver import LinearSolver
 
 # Iterations end when one adds less than this share of the sum; the first few may be short by chance.
 _SMALL = 0.02

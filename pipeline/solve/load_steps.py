@@ -27,7 +27,7 @@ from pipeline.solve.elements.base import Column, Enriched, Products, Solver
 from pipeline.solve.elements.displacement import DisplacementElements
 from pipeline.solve.forms import HyperelasticForms
 from pipeline.solve.hierarchical_estimate import energy_decrements
-from pipeline.solve.krylov import LinearSolver
+from pipeline.solve.linear_solver import LinearSolver
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.newton import Equilibrium, LargeError, tangent_product
 from pipeline.solve.physics import MaterialLaw

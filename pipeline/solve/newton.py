@@ -18,7 +18,8 @@ from pipeline import compat
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import assemble, fill, vector
 from pipeline.solve.forms import HyperelasticForms
-from pipeline.solve.krylov import INDEFINITE, SOLVERS, LinearSolver, configure, explain, keep, solver_of
+from pipeline.solve.krylov import INDEFINITE, SOLVERS, configure, explain, keep, solver_of
+from pipeline.solve.linear_solver import LinearSolver
 from pipeline.solve.spaces import ElasticSpace
 from pipeline.stages import stage
 

@@ -20,19 +20,20 @@ from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.cell_values import CellValues, plain_share
+from pipeline.solve.conditions import Conditions, Front
 from pipeline.solve.contact.search import ContactSearch, Tool
 from pipeline.solve.crack import Advance
 from pipeline.solve.elements import elements_of
 from pipeline.solve.elements.base import Column, Elements, Equilibrium
 from pipeline.solve.elements.displacement import DisplacementElements
 from pipeline.solve.estimate import error_bar, stiffness_bars
-from pipeline.solve.krylov import LinearSolver
+from pipeline.solve.linear_solver import LinearSolver
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.prescribed import PrescribedMotion, respond
 from pipeline.solve.response import LoadResponse, Response, shares
 from pipeline.solve.solution import Problem, Request, Solution
-from pipeline.solve.spaces import Conditions, Front, Spaces
+from pipeline.solve.spaces import Spaces
 from pipeline.stages import recorded, stage
 
 

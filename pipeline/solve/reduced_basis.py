@@ -18,7 +18,8 @@ from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
 from pipeline.solve.compiled import global_sum, vector
-from pipeline.solve.krylov import LinearSolver, keep, solver_of
+from pipeline.solve.krylov import keep, solver_of
+from pipeline.solve.linear_solver import LinearSolver
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import Response, reaction

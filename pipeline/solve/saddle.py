@@ -16,7 +16,8 @@ from dataclasses import dataclass
 from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray
-from pipeline.solve.krylov import SOLVERS, Level, LinearSolver, check_converged, explained, keep, solver_of
+from pipeline.solve.krylov import SOLVERS, check_converged, explained, keep, solver_of
+from pipeline.solve.linear_solver import Level, LinearSolver
 from pipeline.stages import stage
 
 Pair = tuple[PETSc.Vec, PETSc.Vec]

@@ -13,9 +13,10 @@ from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of
 from pipeline.run.record import Record
 from pipeline.solve.compiled import global_sum, vector
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.loads import apply_loads
 from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Conditions, Spaces
+from pipeline.solve.spaces import Spaces
 from pipeline.study.load import parse
 from pipeline.verify.forces import FAR
 from pipeline.verify.row import Row

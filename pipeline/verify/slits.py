@@ -15,10 +15,11 @@ from pipeline.run.meshing import on_first_rank
 from pipeline.run.problem import conditions_of
 from pipeline.run.record import Record
 from pipeline.scene.model import FIXED, FREE, PROBE, SLIT
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Conditions, Spaces
+from pipeline.solve.spaces import Spaces
 from pipeline.study.load import parse
 from pipeline.verify.row import Row
 

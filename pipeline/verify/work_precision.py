@@ -23,10 +23,10 @@ from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import write
 from pipeline.run.execute import compute
 from pipeline.run.record import Record
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.meridian.problem import MeridianProblem
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.spaces import Conditions
 from pipeline.study.load import parse
 from pipeline.verify import known
 from pipeline.verify.machine import machine

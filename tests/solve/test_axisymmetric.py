@@ -9,10 +9,10 @@ import pytest
 from pipeline.mesh.meridian import Grading, Meridian, generate_meridian
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import compiling
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw, Parameters
-from pipeline.solve.spaces import Conditions
 from pipeline.verify import known
 from tests.sampling import sampled
 

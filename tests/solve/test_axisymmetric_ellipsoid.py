@@ -9,10 +9,10 @@ from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Grading
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import compiling
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.spaces import Conditions
 from pipeline.verify import known
 from tests.sampling import sampled
 

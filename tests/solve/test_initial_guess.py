@@ -7,8 +7,9 @@ from mpi4py import MPI
 from pipeline.plan.plan import make_plan
 from pipeline.run import far_field
 from pipeline.run.execute import compute
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Conditions, Spaces
+from pipeline.solve.spaces import Spaces
 from tests.cases import study
 from tests.solve.test_mixed import law, make_mesh
 

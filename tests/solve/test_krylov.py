@@ -6,11 +6,13 @@ from petsc4py import PETSc
 
 from pipeline.solve import SolveError, krylov
 from pipeline.solve.balance import BALANCE_LIMIT, check_balance
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.hierarchical_estimate import energy_decrements
-from pipeline.solve.krylov import Level, LinearSolver, keep
+from pipeline.solve.krylov import keep
+from pipeline.solve.linear_solver import Level, LinearSolver
 from pipeline.solve.movement import Movement
 from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Conditions, Spaces
+from pipeline.solve.spaces import Spaces
 from tests.solve.test_mixed import DEPTH, PRESS, law, make_mesh
 
 

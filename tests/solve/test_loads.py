@@ -11,10 +11,11 @@ from pipeline.mesh.distribute import BodyMesh
 from pipeline.run.loads import loads_of
 from pipeline.run.meshing import mesh_case
 from pipeline.solve.compiled import global_sum, vector
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.loads import apply_loads
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import load_bars
-from pipeline.solve.spaces import Conditions, ElasticSpace, Spaces
+from pipeline.solve.spaces import ElasticSpace, Spaces
 from tests.cases import solve, study
 
 YOUNG, HEIGHT = 10e3, 20e-3

@@ -15,13 +15,13 @@ from pipeline.scene.model import PROBE
 from pipeline.shapes.rounded import Rounded
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import compiling
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.meridian.contact import DEGREE, MeridianContact
 from pipeline.solve.meridian.problem import MeridianProblem, compile_axisymmetric
 from pipeline.solve.meridian.punch import TRIAL_DEGREE, RoundTool
 from pipeline.solve.meridian.signs import LiftsOff, check_signs
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.spaces import Conditions
 from tests.cases import study
 
 LAW = MaterialLaw.of(0.3 / 1.3 / 0.4, 0.5 / 1.3)  # E = 1, ν = 0.3

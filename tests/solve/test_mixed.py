@@ -10,12 +10,13 @@ from petsc4py import PETSc
 from pipeline.mesh.distribute import BodyMesh, distribute
 from pipeline.run.meshing import mesh_arrays, mesh_case
 from pipeline.solve import SolveError
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.estimate import error_bar
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Solution
-from pipeline.solve.spaces import Conditions, Spaces
+from pipeline.solve.spaces import Spaces
 from pipeline.verify import known
 from tests.cases import study
 from tests.sampling import sampled

@@ -12,10 +12,11 @@ from pipeline.report import accessor  # noqa: F401 (registers dataset.epsmesh)
 from pipeline.report.dataset import build
 from pipeline.run.execute import compute
 from pipeline.solve.balance import Sums
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Conditions, Spaces
+from pipeline.solve.spaces import Spaces
 from pipeline.study.sweep import Scale
 from tests.cases import BLADE, solve, study
 from tests.solve.test_mixed import law, make_mesh

@@ -5,12 +5,13 @@ import pytest
 from mpi4py import MPI
 
 from pipeline.solve import SolveError
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.kernels import multigrid
-from pipeline.solve.krylov import Level, LinearSolver
+from pipeline.solve.linear_solver import Level, LinearSolver
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Conditions, Spaces
+from pipeline.solve.spaces import Spaces
 from tests.solve.test_mixed import PRESS, law, make_mesh
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="for one process")

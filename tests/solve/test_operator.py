@@ -10,11 +10,12 @@ from pipeline import compat
 from pipeline.mesh.distribute import distribute
 from pipeline.mesh.generate import MeshArrays
 from pipeline.solve.compiled import vector, vector_space
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.forms import ElasticForms
 from pipeline.solve.kernels.assembly import StraightStiffness
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
-from pipeline.solve.spaces import Conditions, ElasticSpace, Spaces
+from pipeline.solve.spaces import ElasticSpace, Spaces
 from tests.sampling import sampled
 from tests.solve.test_mixed import PRESS, law, make_mesh
 from tests.solve.test_regions import SKIN

@@ -5,9 +5,10 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.elements.pressures import Pressures
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.spaces import Conditions, ElasticSpace, Spaces
+from pipeline.solve.spaces import ElasticSpace, Spaces
 from tests.solve.test_mixed import make_mesh
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="for one process")

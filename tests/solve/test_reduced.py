@@ -5,10 +5,11 @@ import psutil
 import pytest
 from mpi4py import MPI
 
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.reduced_basis import ReducedBasis
-from pipeline.solve.spaces import Conditions, Spaces
+from pipeline.solve.spaces import Spaces
 from tests.solve.test_mixed import DEPTH, PRESS, make_mesh
 
 RATIOS = (0.1, 0.3, 0.45)

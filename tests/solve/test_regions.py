@@ -10,11 +10,12 @@ from mpi4py import MPI
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import law_of
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw, SplitLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.solution import Solution
-from pipeline.solve.spaces import Conditions, Spaces
+from pipeline.solve.spaces import Spaces
 from tests.cases import solve as solve_study
 from tests.cases import study
 

@@ -17,7 +17,7 @@ from pipeline.solve.contact.elements import ContactElements, FarShare, State, Un
 from pipeline.solve.contact.levels import Hierarchy, Surface
 from pipeline.solve.contact.surface import Candidates
 from pipeline.solve.elements.base import Elements
-from pipeline.solve.krylov import Level, LinearSolver
+from pipeline.solve.linear_solver import Level, LinearSolver
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
 

@@ -18,7 +18,7 @@ from pipeline.solve.compiled import global_sum
 from pipeline.solve.contact.levels import Hierarchy, Numbering, Surface, normal_dofs
 from pipeline.solve.contact.surface import Candidates
 from pipeline.solve.elements.base import Column, Elements, Fields, Solver
-from pipeline.solve.krylov import Level
+from pipeline.solve.linear_solver import Level
 from pipeline.solve.loads import Applied
 from pipeline.solve.movement import FarField
 from pipeline.solve.physics import MaterialLaw

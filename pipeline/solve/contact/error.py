@@ -20,7 +20,7 @@ from pipeline.solve.contact.levels import mask, normal_dofs
 from pipeline.solve.contact.surface import CONDITIONS
 from pipeline.solve.elements.mixed import MixedSolver
 from pipeline.solve.hierarchical_estimate import energy_decrements
-from pipeline.solve.krylov import LinearSolver
+from pipeline.solve.linear_solver import LinearSolver
 
 # Relative energy norm of the error to which the solution of the next degree is found for the error bar.
 _ESTIMATE_TOLERANCE = 0.1

@@ -14,7 +14,7 @@ from pipeline.solve.contact.surface import CONDITIONS, Candidates, find_candidat
 from pipeline.solve.elements import elements_of
 from pipeline.solve.elements.base import Elements
 from pipeline.solve.kernels.product import is_product
-from pipeline.solve.krylov import Level
+from pipeline.solve.linear_solver import Level
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import ElasticSpace, Spaces
 

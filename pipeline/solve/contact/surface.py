@@ -14,7 +14,7 @@ from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.scene.model import PROBE
-from pipeline.solve.spaces import Conditions
+from pipeline.solve.conditions import Conditions
 
 FACET_CORNERS = 3
 # The corners of a reference tetrahedron's facet that is opposite to each of its own, and an equilateral facet.

@@ -1,9 +1,10 @@
 """The elements of a body, by their kind: displacements alone, or displacements and pressures (mixed)."""
 
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.elements.base import Elements
 from pipeline.solve.elements.displacement import DisplacementElements
 from pipeline.solve.elements.mixed import MixedElements
-from pipeline.solve.spaces import Conditions, Spaces
+from pipeline.solve.spaces import Spaces
 
 
 def elements_of(spaces: Spaces, degree: int, conditions: Conditions, element: str = "displacement") -> Elements:

@@ -14,13 +14,15 @@ from pipeline.arrays import FloatArray, Int32Array
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import global_sum, vector
+from pipeline.solve.conditions import Conditions, Front
 from pipeline.solve.crack import Release
-from pipeline.solve.krylov import Level, is_direct
+from pipeline.solve.krylov import is_direct
+from pipeline.solve.linear_solver import Level
 from pipeline.solve.loads import Applied
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import Contact, LoadResponse, Response
-from pipeline.solve.spaces import Conditions, ElasticSpace, Front, Spaces
+from pipeline.solve.spaces import ElasticSpace, Spaces
 
 # A displacement, and for mixed elements a pressure.
 Fields = tuple[PETSc.Vec, ...]

@@ -8,12 +8,14 @@ from petsc4py import PETSc
 
 from pipeline.arrays import FloatArray, Int32Array
 from pipeline.solve.compiled import vector
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.elements.base import Column, Elements, Enriched, Fields, Solver, level_of
 from pipeline.solve.hierarchical_estimate import energy_decrements
-from pipeline.solve.krylov import DIRECT_LIMIT, Level, LinearSolver
+from pipeline.solve.krylov import DIRECT_LIMIT
+from pipeline.solve.linear_solver import Level, LinearSolver
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
-from pipeline.solve.spaces import Conditions, Spaces
+from pipeline.solve.spaces import Spaces
 from pipeline.stages import Times, recharge, recorded
 
 

@@ -20,13 +20,15 @@ from petsc4py import PETSc
 from pipeline.arrays import FloatArray, Int32Array
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import vector
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.elements.base import Column, Elements, Enriched, Fields, Solver
 from pipeline.solve.elements.pressures import Pressures
-from pipeline.solve.krylov import Level, keep
+from pipeline.solve.krylov import keep
+from pipeline.solve.linear_solver import Level
 from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw, SplitLaw
 from pipeline.solve.saddle import Saddle, SaddleSolver
-from pipeline.solve.spaces import Conditions, Spaces
+from pipeline.solve.spaces import Spaces
 from pipeline.stages import Times, recharge, recorded, stage
 
 # λ₀/μ = 1 (ν = ¼): small enough for the multigrid, large enough for the pressure's mass to be a good preconditioner.

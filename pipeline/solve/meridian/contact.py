@@ -23,7 +23,7 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Grading
-from pipeline.solve.krylov import SolveError
+from pipeline.solve import SolveError
 from pipeline.solve.meridian.problem import DEGREE, Answer, MeridianSolver, error_bar
 from pipeline.solve.meridian.punch import STEP, Punches, Rings, RoundTool
 from pipeline.solve.meridian.signs import LiftsOff, check_signs

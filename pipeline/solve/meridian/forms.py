@@ -20,8 +20,8 @@ from scipy.spatial import cKDTree
 from pipeline import compat
 from pipeline.arrays import FloatArray, Int32Array, IntArray
 from pipeline.mesh.meridian import JOINT, mesh_order
+from pipeline.solve import SolveError
 from pipeline.solve.compiled import cellwise_space, form, taylor_hood_space, vector_space
-from pipeline.solve.krylov import SolveError
 from pipeline.solve.physics import MaterialLaw, Parameters, axisymmetric_strain, pressurised, small_strain
 
 # Later than in three dimensions (Mesh.MIXED_FROM, 0.45), since elements of degree 5 lock later than those of degree 2:

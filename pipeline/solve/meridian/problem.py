@@ -16,13 +16,13 @@ import numpy as np
 
 from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import Grading, Meridian, meridian_mesh
-from pipeline.solve.krylov import SolveError
+from pipeline.solve import SolveError
+from pipeline.solve.conditions import Conditions
 from pipeline.solve.meridian.forms import MeridianForms
 from pipeline.solve.meridian.system import HalfPlane, Pressed, System, Unbalanced, max_strain, meshes_of
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import Contact, reaction
 from pipeline.solve.solution import Problem, Request, Solution
-from pipeline.solve.spaces import Conditions
 from pipeline.stages import recorded, stage
 
 DEGREE = 5

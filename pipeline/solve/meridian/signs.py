@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.mesh.meridian import MeridianArrays
 from pipeline.scene.model import FREE, PROBE
-from pipeline.solve.krylov import SolveError
+from pipeline.solve import SolveError
 from pipeline.solve.meridian.forms import MeridianForms
 
 # Tension below this share of the mean pressure, penetration below this share of the depth: what a radius that is off

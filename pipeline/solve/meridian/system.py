@@ -14,8 +14,9 @@ from pipeline.mesh.elliptic_meridian import EllipticMeridian
 from pipeline.mesh.meridian import AXIS, Meridian, MeridianArrays, meridian_mesh, split_regions
 from pipeline.quantities import CLEAR
 from pipeline.scene.model import FIXED, PROBE
+from pipeline.solve import SolveError
 from pipeline.solve.balance import check_balance
-from pipeline.solve.krylov import SolveError, check_converged, explained, keep, solver_of
+from pipeline.solve.krylov import check_converged, explained, keep, solver_of
 from pipeline.solve.meridian.forms import MeridianForms, Meshes
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
