@@ -1,9 +1,8 @@
-"""Spaces and forms of dolfinx, made of compiled code that is looked up once, and vectors on their dofs.
+"""Spaces, forms and vectors of dolfinx, made of compiled code that is looked up once.
 
-``fem.form`` asks the folder of compiled code each time, which takes 5 ms, and knows no kernels but the generated ones.
-Here the same compiler is called, what it gives is remembered by the form's signature, and the C++ objects are made of
-it: of the compiled form, or, with kernels of our own, of the addresses of kernels, as dolfinx offers it for kernels
-that users write. The folder of compiled code is the project's own.
+``fem.form`` looks into the folder of compiled code at every call (5 ms) and takes generated kernels only. Here the same
+compiler is called, its code is kept by the form's signature, and the C++ objects are made of it, or of the addresses of
+our own kernels, as dolfinx allows. The folder of compiled code is the project's own.
 """
 
 import fcntl

@@ -1,24 +1,20 @@
-"""The energy that a slit's front releases where it advances, by virtual extension.
+"""The energy release rate of a slit's front, by virtual extension.
 
-Let a field v move the points of the body: along the probe's axis by 1 on the slit's front, by nothing on what the probe
-touches, and along the surface where there is one. For the solution u the strain energy then changes by
+A field v moves the points of the body along the probe's axis: by 1 on the front, by nothing on what the probe touches,
+and along the surface where there is one. Prescribed displacements do not change. The strain energy changes by
 
-    dU = ∫ w div v − σ(u) : (∇u ∇v),    w = ½ λ (div u)² + μ ε(u) : ε(u),
+    dU = ∫ w div v − σ(u) : (∇u ∇v),    w = ½ λ (div u)² + μ ε(u) : ε(u)
 
-as prescribed displacements do not (P. Destuynder and M. Djaoua, Math. Methods Appl. Sci. 3, 70, 1981; it is the J
-integral over a domain, with Eshelby's tensor). −dU is what a unit of advance releases, ∫ G along the front. With mixed
-elements p div u − p²/(2 λ₁) takes the place of ½ λ₁ (div u)². In it v is piecewise linear on the mesh: of the discrete
-energy −dU is then the exact derivative as nodes move along.
+(P. Destuynder and M. Djaoua, Math. Methods Appl. Sci. 3, 70, 1981: the J integral over a domain). A unit of advance
+releases −dU = ∫ G along the front. In mixed elements p div u − p²/(2 λ₁) replaces ½ λ₁ (div u)². As v is piecewise
+linear on the mesh, −dU is the exact derivative of the discrete energy by the movement of its nodes.
 
-Where tissue slides along a blade, what it touches of the slit's faces goes on with its tip: v is then 1 on that edge
-and nothing on the front, and along the faces everywhere, so that what is prescribed, the displacement across them,
-stays as it is. dU is what it takes to push the blade on: at its tip the pressure is singular, and leaves a
-configurational force along the blade (D. Bigoni, F. Dal Corso, F. Bosi and D. Misseroni, Mech. Mater. 80, 368, 2015).
+If tissue slides along a blade, v is 1 on the blade's tip, nothing on the front, and along the faces everywhere. dU is
+then the force that pushes the blade on: a configurational force of the singular pressure at its tip (D. Bigoni,
+F. Dal Corso, F. Bosi and D. Misseroni, Mech. Mater. 80, 368, 2015).
 
-With dead loads f the potential energy takes the place of the strain energy: −dU + df·u is released, df what becomes of
-the nodal forces as the nodes move along.
-
-It is quadratic in the amounts of the motions and of the loads: R_ij tells what each pair of them releases.
+With dead loads f the potential energy replaces the strain energy: −dU + df·u is released, df the change of the nodal
+forces. All of it is quadratic in the amounts of motions and loads: R_ij is what a pair of them releases.
 """
 
 from collections.abc import Callable, Iterator

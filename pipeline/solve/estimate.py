@@ -1,18 +1,16 @@
-"""From what one degree more changes to an error bar, and to the value that the degrees tend to.
+"""Error bars, and the value that the degrees tend to, from what one degree more changes.
 
-With s = (F_p - F_{p+1}) / F_p (:mod:`pipeline.solve.hierarchical_estimate`), and an error that falls like p⁻², as it
-does at an edge where u ~ r^½ (I. Babuška and M. Suri, SIAM J. Numer. Anal. 24, 750, 1987), what degree p + 1 leaves is
-θ s with θ = p² / (2 p + 1). How much of θ s it is depends on the elements at the probe's edge: less with quarter
-points, more without (:mod:`pipeline.solve.cell_values`). The multiples below are measured, with the coverage that they
-reach, in docs/accuracy.md.
+With s = (F_p - F_{p+1}) / F_p (:mod:`pipeline.solve.hierarchical_estimate`), and an error that falls like p⁻², as at an
+edge where u ~ r^½ (I. Babuška and M. Suri, SIAM J. Numer. Anal. 24, 750, 1987), degree p + 1 leaves θ s with
+θ = p² / (2 p + 1), less with quarter points at the probe's edge, more without (:mod:`pipeline.solve.cell_values`). The
+multiples below are measured, and their coverage is in docs/accuracy.md.
 
-Shares are of F_p, bars relative to the exact force, too: where F_p is a third too high, F_exact is within 25 % of it,
+Shares are of F_p. Bars are relative to the exact force, too: where F_p is a third too high, F_exact is 25 % below it,
 but F_p errs by 33 %.
 
-A probe that moves in several ways has a stiffness matrix K, and S = K_p - K_{p+1}. What the scalars above say of each
-motion they say of every sum of motions, by its own energy: the error that is left is a symmetric form that lies, for
-every movement c, within ± c'Bc, where B grows with the energy of the error. By polarisation its entries are at most
-(B_ii B_jj)^½: energies of motions bound the diagonal, and those of sums of motions the rest.
+With several motions, K is a matrix and S = K_p - K_{p+1}. The rules above hold for every sum of motions, by its own
+energy: the error is a symmetric form within ± c'Bc for every movement c. By polarisation the entries of B are at most
+(B_ii B_jj)^½.
 """
 
 import numpy as np

@@ -1,13 +1,13 @@
-"""The field far from a tool that presses on a plane face: what closes a half ball that is cut out round the contact.
+"""The far field of a tool on a plane face: it closes a half ball that is cut out round the contact.
 
-Far away only the net force of a tool tells: its field is that of a point force, but for terms of the order a/r (of a
-bonded tool, which also pulls sideways) or (a/r)². A *unit* of the far field is what 4πμε newtons a metre make of it, ε
-the radius of the half ball: displacements of about a metre on the cut face. What is cut away then takes one unknown,
-how much of the far field there is, and is a part of the energy that is made stationary. The force is from above, by the
-energy of what the far field leaves out: of the order (a/ε)³ (small, bonded) and (a/ε)⁵.
+Far away a tool acts as a point force, but for terms of the order a/r (bonded: it also pulls sideways) or (a/r)². A
+*unit* of the far field belongs to 4πμε newtons a metre, ε the radius of the half ball: displacements of about a metre
+on the cut face. The body beyond the cut is one unknown, the share of the far field, in the energy that is made
+stationary. The force is from above: the energy that the far field leaves out is of the order (a/ε)³ (small, bonded) and
+(a/ε)⁵.
 
-On a body of its own kind a point force has its half-space's field u, and a regular part R that is smooth where it acts
-(:mod:`pipeline.solve.greens_function`), kept as polynomials. Beyond a half sphere of radius ε, n outwards,
+On a finite body the field of a point force is its half-space's u and a regular part R, smooth where the force acts
+(:mod:`pipeline.solve.greens_function`) and kept as polynomials. Beyond a half sphere of radius ε, n outwards,
 
     twice the energy of u + R = that of u - 2 ∫ R·σ(u) n - R(0)·P - ∫ R·σ(R) n,
 

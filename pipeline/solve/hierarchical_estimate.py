@@ -1,12 +1,10 @@
-"""How far the force of a displacement element is from the truth: solve on in the space of one degree more.
+"""The hierarchical estimate of a displacement element's error: solve on in the space of one degree more.
 
-For conforming displacement elements F_p·d - F·d is the energy of the error: F_p is too high, never too low. The part of
-it that degree p + 1 can see,
+F_p·d - F·d is the energy of the error: F_p is too high, never too low. The part that degree p + 1 sees,
 
     s = F_p - F_{p+1},    s·d = a(u_p - u_{p+1}, u_p - u_{p+1}),
 
-is summed by conjugate gradients that start from u_p: each iteration adds α (r, z) to the energy found, so that a few
-of them give s to a few per cent, always from below.
+is summed by conjugate gradients from u_p on: each iteration adds α (r, z). A few give s to a few per cent, from below.
 """
 
 from collections.abc import Sequence

@@ -1,16 +1,16 @@
-"""Large displacements: a probe is pressed to its depth in steps, each solved by Newton's method.
+"""Large displacements: load steps to the depth, each solved by Newton's method.
 
-The force is the reaction. It must be the derivative of the stored energy by the depth, whose integral over the steps is
-compared with the energy itself.
+The force is the reaction. It must be the derivative of the stored energy by the depth: its integral over the steps is
+compared with the energy.
 
-The error bar is made as that of linear elasticity, by one degree more. With the residual r of the solution u there,
-and r' that of v = ∂u/∂d under the tangent K,
+The error bar comes of one degree more, as in linear elasticity. With the residual r of the solution u there, and r'
+that of v = ∂u/∂d under the tangent K,
 
     F_p - F_{p+1} = r'·K⁻¹ r,    of second order in what degree p + 1 changes.
 
-(r'·K⁻¹ r' · r·K⁻¹ r)^½ is at least that, and takes its place: it does not vanish by chance. For K stands the operator
-of linear elasticity: at moderate depths the result is the same to a few per cent, and at larger ones elements of one
-degree more give way at the probe's edge, where the tangent is not definite.
+(r'·K⁻¹ r' · r·K⁻¹ r)^½ is at least that, and cannot vanish by chance: it is used instead. K is taken to be the operator
+of linear elasticity. At moderate depths the result agrees to a few per cent; at larger ones the tangent of one degree
+more is not definite at the probe's edge.
 """
 
 from collections.abc import Sequence

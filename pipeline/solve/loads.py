@@ -1,9 +1,9 @@
-"""Dead loads: weights and tractions that keep their size and direction while the body deforms.
+"""Nodal forces of dead loads, weights and tractions that keep size and direction while the body deforms:
 
-    f_i = ∫ ρ g · φ_i dx + ∫ t · φ_i ds
+    f_i = ∫ ρ g · φ_i dx + ∫ t · φ_i ds.
 
-Tractions act on what is free: not under the probe, nor where the body is held. Those on a cap end within facets, which
-are cut into small pieces there, so that the resultant is that of the cap and not that of whole facets.
+Tractions act on the free surface. A cap ends within facets: these are cut into small pieces, so that the resultant is
+that of the cap.
 """
 
 from dataclasses import dataclass

@@ -1,10 +1,9 @@
-"""What tissue is made of: parameters of each region, and laws, each of which is a strain energy in UFL.
+"""What tissue is made of: parameters of each region, and laws, each a strain energy in UFL.
 
-A law gives the energy ψ (J/m³) of the undeformed body as a function of F = I + ∇u, and of parameters by their name in
-:class:`Parameters`. To second order in ∇u each law is linear elasticity with the same λ and μ. To add one, write ψ as a
-function and enter it in :data:`LAWS`; the study file takes it once its name is in the list of
-``pipeline/study/schema.py``. A parameter that λ and μ do not tell is a field of :class:`Parameters`, named in
-:data:`COEFFICIENTS`: forms then have it in each region.
+A law gives the energy ψ (J/m³) of the undeformed body by F = I + ∇u and by parameters, named as in :class:`Parameters`.
+To second order in ∇u it is linear elasticity with the same λ and μ. To add one, write ψ and enter it in :data:`LAWS`;
+the study file takes it once its name is in the list of ``pipeline/study/schema.py``. A further parameter is a field of
+:class:`Parameters`, named in :data:`COEFFICIENTS`: forms then have it in each region.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -1,11 +1,9 @@
-"""The motion of a footprint is prescribed: a column for each motion, one for loads, and what their solutions do.
+"""Prescribed motion of a footprint: a column for each motion, one for loads, and what their solutions do.
 
-Where loads f act, w with K w = f and w = 0 on footprint and support is one column more
-(:mod:`pipeline.solve.load_response`).
-Where the cut face moves with a far field (:mod:`pipeline.solve.far_field`), a unit of that field is one, too. With K
-the stiffness of a unit of the tool's movement (0) and a unit of the far field (1), that of what is beyond the cut added
-to K₁₁, the energy is stationary where the share s of the field is -K₁₀ / K₁₁. The work of the tool is then that of both
-sides of the cut together, F d = 2 (U within + U beyond).
+Loads f add the column w with K w = f, w = 0 on footprint and support (:mod:`pipeline.solve.response`). A far field on
+the cut face (:mod:`pipeline.solve.far_field`) adds that of one unit. With K the stiffness of the tool's movement (0)
+and that unit (1), the body beyond the cut added to K₁₁, the energy is stationary for the share -K₁₀ / K₁₁. The work of
+the tool is that of both sides of the cut, F d = 2 (U within + U beyond).
 """
 
 from collections.abc import Sequence

@@ -3,11 +3,9 @@
     Find u with K u = 0 inside, u = the probe's motion on its footprint (bonded) or its normal part only
     (frictionless), u = 0 on the support.
 
-What a tool does to the surface is a constraint: its motion is prescribed (:mod:`pipeline.solve.prescribed`), or where
-it touches is found (:mod:`pipeline.solve.contact.search`). Both give an equilibrium; all else follows from that.
-
-The force is the reaction (:mod:`pipeline.solve.response`). Stress integrated under the probe is wrong by tens of per
-cent on the same solution.
+The tool is a constraint: its motion is prescribed (:mod:`pipeline.solve.prescribed`), or its contact is found
+(:mod:`pipeline.solve.contact.search`). Both give an equilibrium. The force is the reaction
+(:mod:`pipeline.solve.response`): stress integrated under the probe is wrong by tens of per cent.
 """
 
 from collections.abc import Iterator, Sequence

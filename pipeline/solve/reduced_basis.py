@@ -1,13 +1,12 @@
-"""Many Poisson's ratios on one mesh from few solves: a reduced basis with a bound on what it costs F.
+"""A reduced basis: many Poisson's ratios on one mesh from few solves, with a bound on the error of F.
 
-Divided by μ the operator is K(t) = A_μ + t A_λ, t = λ/μ: one parameter. With solutions w_i for a few t, the Galerkin
-solution among their combinations has the smallest energy of them all, so that F from it is too high, and by
+Divided by μ the operator is K(t) = A_μ + t A_λ, t = λ/μ. Among the combinations of solutions for a few t the Galerkin
+solution has the smallest energy: F is too high, by
 
     F_rb·d - F_h·d = r K(t)⁻¹ r <= r K(t₀)⁻¹ r <= r P r / λ_min(P K(t₀))        for t >= t₀,
 
-r being its residual, P the preconditioner for the smallest t. As r is a combination of a few vectors, the bound costs
-one application of P for another t (A. K. Noor and J. M. Peters, AIAA J. 18, 455, 1980; G. Rozza, D. B. P. Huynh and
-A. T. Patera, Arch. Comput. Methods Eng. 15, 229, 2008, for the bound).
+r the residual, P the preconditioner for the smallest t: one application of P for each t (A. K. Noor and J. M. Peters,
+AIAA J. 18, 455, 1980; G. Rozza, D. B. P. Huynh and A. T. Patera, Arch. Comput. Methods Eng. 15, 229, 2008).
 """
 
 from contextlib import ExitStack

@@ -1,16 +1,16 @@
-"""How a body answers a movement of the probe, and loads, by quadratic forms; for every kind of element.
+"""The response of a body to a movement of the probe and to loads, as quadratic forms; for every kind of element.
 
-With r_j = K u_j for the solution of a unit of motion j, the probe's stiffness is K_ij = u_i·r_j, an energy: it is
-symmetric and stationary, its error the product of the solver's errors of both solutions. Forces summed over the
-probe's dofs are linear in that error, so that along a motion that was solved for the stiffness tells the force.
+With r_j = K u_j for a unit of motion j, the stiffness is K_ij = u_i·r_j: symmetric and stationary, its error the
+product of two solver errors. Forces summed over the probe's dofs are linear in that error: along a motion that was
+solved for, the stiffness gives the force.
 
 Loads add a row. With w their solution while the probe is held, twice the potential energy is a'K a + 2 a'g - a(w, w),
-g_i = -f·u_i (E. Betti) the force that the probe needs along motion i to stand still. Written as a(u_i, w) - f·u_i, g is
-stationary in both solutions; one degree more changes the whole form by minus the products of its corrections.
+g_i = -f·u_i (E. Betti) the force that holds the probe along motion i. Written as a(u_i, w) - f·u_i it is stationary,
+too; one degree more changes the whole form by minus the products of its corrections.
 
-By Cauchy and Schwarz the bar on g_i is the root of those on K_ii and a(w, w), as if the errors of u_i and w were at the
-same places. How far they are is told by their corrections: |S_ij| / (S_ii S_jj)^½, the cosine of the angle between them
-in energy, where S is what one degree more takes away. It may be none by chance, so that a share of the root remains.
+By Cauchy and Schwarz the bar on g_i is the root of those on K_ii and a(w, w), if the errors of u_i and w are at the
+same places. The cosine of their corrections in energy, |S_ij| / (S_ii S_jj)^½ with S what one degree more takes away,
+says how far they are. It may vanish by chance: a share of the root remains.
 """
 
 from collections.abc import Sequence

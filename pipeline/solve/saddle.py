@@ -3,10 +3,9 @@
     [ K₀   Bᵀ ] [u]   [f]
     [ B  −c M ] [p] = [g],
 
-by LDLᵀ (MUMPS), or by generalised conjugate residuals (GCR) with a block-triangular preconditioner: multigrid for K₀
-and a multiple of the pressure's mass M for the Schur complement (D. Silvester and A. Wathen, SIAM J. Numer. Anal. 31,
-1352, 1994). K₀ is far from incompressible, so that neither c, 0 for an incompressible material, nor the size of the
-mesh changes the iterations much.
+by LDLᵀ (MUMPS), or by generalised conjugate residuals (GCR) with a block-triangular preconditioner: multigrid for K₀,
+a multiple of the mass M for the Schur complement (D. Silvester and A. Wathen, SIAM J. Numer. Anal. 31, 1352, 1994). K₀
+is far from incompressible: neither c (0 if incompressible) nor the mesh size changes the iterations much.
 """
 
 from collections.abc import Sequence

@@ -1,14 +1,13 @@
-"""Which nodes touch: the primal-dual active set method.
+"""The active set of found contact: which nodes touch, by the primal-dual method.
 
     u_z <= b,    r <= 0,    r (u_z - b) = 0    at each candidate,
 
-with b the height above the node of the probe's surface, pushed in, and r the reaction, K u along z: what holds the
-tissue down. Nodes that touch are held at b; those that are pulled are let go, those that have come through the probe's
-surface are held, until nothing changes (M. Hintermüller, K. Ito and K. Kunisch, SIAM J. Optim. 13, 865, 2002).
+with b the height of the pressed-in probe above the node, and r the reaction (K u along z). Active nodes are held at b.
+Nodes with a tensile reaction leave the set, nodes that penetrate the probe enter it, until the set does not change
+(M. Hintermüller, K. Ito and K. Kunisch, SIAM J. Optim. 13, 865, 2002).
 
-An even pressure on quadratic facets acts on their mid nodes alone, and on cubic ones hardly on their corners. The
-reaction of a corner, of either sign, comes of the pressure's slope: within the contact, where all nodes beside a
-corner on its edges are held, it is held with them.
+An even pressure on quadratic facets loads their mid nodes alone, on cubic ones hardly their corners. The sign of a
+corner's reaction then means nothing: a corner is active if all nodes beside it on its edges are.
 """
 
 from collections.abc import Sequence

@@ -1,9 +1,8 @@
-"""Elements whose nodes may be held where the probe touches them, and what the body does while nothing touches it.
+"""Elements of which candidate nodes may be held, other ones in each active set, and the body without a tool.
 
-They are those of :mod:`pipeline.solve.elements`, with operators in which other nodes are held each time. Loads f, and a
-unit φ of the far field on a cut face, act on the body without a tool: K w = f, K φ = 0 inside. By linearity the
-displacement is v + s φ + w, v that of the reactions r alone. As v vanishes on the cut face, a(v, φ) = 0: the share s of
-the far field follows from the reactions, k s = φ·r, with k twice the energy of a unit on both sides of the cut.
+Loads f and a unit φ of the far field act on the body without a tool: K w = f, K φ = 0 inside. By linearity the
+displacement is v + s φ + w, where v belongs to the reactions r alone. Since v vanishes on the cut face, a(v, φ) = 0:
+the share s of the far field follows from k s = φ·r, with k twice the energy of a unit on both sides of the cut.
 """
 
 from contextlib import ExitStack

@@ -1,11 +1,11 @@
-"""How far the force of found contact is from the truth: solve on in one degree more.
+"""The error bar of found contact: solve on in one degree more.
 
-The area of contact is held: where all nodes of a facet but its corners touch, the facet is held along the axis at the
-displacement found, and other facets are free. The force of that problem is wrong, since its area is; but the share s
-of the energy that it takes away tells how much F errs by. F is no bound: the bar is on both sides.
+The contact area is held: a facet whose nodes, corners aside, all touch is held along the axis at its displacement. The
+force of that problem is wrong, since its area is; the share of the energy that it takes away estimates the error of F.
+F is no bound: the bar is on both sides.
 
-Where too little of the area is made of such facets, the elements are as large as the contact: then the contact is
-found again in one degree more, and the bar is on both sides of the force by what that changes.
+If such facets cover too little of the area, elements are as large as the contact. Contact is then found again in one
+degree more, and the bar is the change of the force.
 """
 
 from contextlib import ExitStack

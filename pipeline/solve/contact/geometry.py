@@ -1,11 +1,10 @@
-"""Where a probe first touches the surface, and how large the area of contact is: between nodes as well.
+"""The first touch of probe and surface, and the area of contact, also between nodes.
 
 Depths count from the first touch of the surface as it is, or as loads have bent it.
 
-Near the edge of contact, at a distance x from it, the pressure is p = K x^½ and the gap beside it o = (4 K / 3 E*)
-x^{3/2}, wherever the probe's surface is smooth there (K. L. Johnson, Contact Mechanics, 1985, ch. 4 and 5). A node on
-either side of the edge tells thus how far it is from the edge. It counts as in contact by the share of its own area
-that the edge leaves within: area and radius vary smoothly as the edge passes nodes.
+At a distance x from the edge of contact the pressure is K x^½ and the gap beside it (4 K / 3 E*) x^{3/2}, wherever the
+probe's surface is smooth (K. L. Johnson, Contact Mechanics, 1985, ch. 4 and 5). Nodes beside the edge thus give their
+distance from it, and count by the share of their own area within the edge: area and radius vary smoothly.
 """
 
 from collections.abc import Callable

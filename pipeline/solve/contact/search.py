@@ -1,11 +1,10 @@
-"""Finds where a probe touches, as a quasi-static problem asks for it: frictionless, without tension or penetration.
+"""Found contact: where a probe touches, without friction, tension or penetration.
 
-The set of nodes that touch is found on elements of degree 1, which costs little, and from there on those of higher
-degrees: their reactions are forces of K u on single nodes. F is their sum. As a function of the mesh it is no bound: a
-coarse contact area may be too large or too small.
+The active set is found on elements of degree 1 first, which costs little, then on those of higher degrees. F is the sum
+of the reactions K u on its nodes. It is no bound: a coarse contact area may be too large or too small.
 
-Loads bend the surface before the probe touches it. The depth counts from the first touch of the surface as loads leave
-it, along the axis.
+Loads bend the surface before the probe touches it: the depth counts from the first touch of that surface, along the
+axis.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,13 +1,13 @@
-"""Nearly and fully incompressible bodies: Taylor–Hood elements P_k / P_{k-1} find u and a pressure p, up to ν = ½.
+"""Mixed elements for nearly and fully incompressible tissue: Taylor–Hood, P_k / P_{k-1}, u and a pressure p, to ν = ½.
 
-λ is split into λ₀ = μ, which stays with the displacement, and λ₁ = λ − λ₀. The energy is
-½ ∫ λ₀ (div u)² + 2μ ε(u) : ε(u) + λ₁ (Π div u)², where Π is the projection onto the pressures, p = λ₁ Π div u, and
+λ = λ₀ + λ₁ is split, λ₀ = μ. The energy is ½ ∫ λ₀ (div u)² + 2μ ε(u) : ε(u) + λ₁ (Π div u)², with Π the projection onto
+the pressures and p = λ₁ Π div u:
 
     a₀(u, v) + b(v, p) = 0,    b(u, q) − (1/λ₁) (p, q) = 0,    b(v, q) = ∫ q div v.
 
-Divided by μ, all but 1/λ₁ is the same for every material, and is assembled once. Of several materials λ₀, λ₁ and μ are
-those of each region; pressures jump from one to the next. F is no upper bound, and F_k − F_{k+1} may have either sign:
-N, the energy norm squared of the correction that degree k + 1 asks for, is told, too.
+Divided by μ, all but 1/λ₁ is the same for every material, and is set up once. In several materials λ₀, λ₁ and μ belong
+to the region, and pressures jump between regions. F is no upper bound, and F_k − F_{k+1} may have either sign: N, the
+energy norm squared of the correction in degree k + 1, is given, too.
 """
 
 from collections.abc import Callable, Iterator, Sequence

@@ -1,11 +1,8 @@
-"""A multigrid cycle over degrees p, …, 2 in single precision, above a solver of degree 1 in double.
+"""A multigrid cycle over degrees p, …, 2 in single precision, above a solver of degree 1 in double precision.
 
-Between two degrees on one mesh goes interpolation, and back its transpose.
-
-The smoother is Chebyshev's iteration with the blocks of the diagonal, the same as PETSc's; operators multiply cell by
-cell. The residual is brought to magnitude 1 first, so that nothing runs out of the exponents of a float.
-
-On several ranks each smooths the rows that it owns; what it needs of others' points is sent in single precision, too.
+Interpolation goes up, its transpose down. The smoother is Chebyshev's iteration with the diagonal's blocks, as PETSc's;
+operators multiply cell by cell. The residual is scaled to magnitude 1 first, so that no float overflows. On several
+ranks each smooths its own rows; ghosts are exchanged in single precision.
 """
 
 from dataclasses import dataclass, replace

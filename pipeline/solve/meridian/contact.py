@@ -1,15 +1,13 @@
-"""Unilateral contact of round scenes in the half plane (r, z): how much of a tool touches, and F to about 1e-6.
+"""Found contact of round scenes in the half plane (r, z): the radius of contact as an unknown, and F to about 1e-6.
 
-With a trial radius a of contact the scene is linear: below the tool u_z = -(d - g(r)) for r < a, with the gap g before
-anything moves, all else free; the solution is d u₁ + u₂, of a flat punch and of the gap alone. Both have stresses like
-(a - r)^-½ at the edge of contact. Where contact ends by itself these cancel, which tells the depth that belongs to a:
-d(a) = -k₂/k₁, the k being the reactions of the one node at the edge. A few trials on coarse meshes find the radius that
-belongs to the depth asked for. At a given depth F is stationary in the radius, being the largest of
-F(a) = d E₁₁(a) + E₁₂(a), E the work of one solution on the other: what the radius is off by, F is by its square.
+For a trial radius a of contact the scene is linear: u_z = -(d - g(r)) for r < a, g the gap before anything moves. The
+solution is d u₁ + u₂, of a flat punch and of the gap alone. Both have stresses like (a - r)^-½ at the edge, which
+cancel where contact ends by itself: d(a) = -k₂/k₁, k the reactions of the node at the edge. A few trials on coarse
+meshes find the radius for a depth. F(a) = d E₁₁(a) + E₁₂(a), E the work of one solution on the other, is largest at the
+true radius: an error of the radius changes F by its square.
 
-A tool may lift off within its outline, as a blunt one does from a stiff skin on soft tissue. Which rings are lost an
-active set finds on the meridian's nodes, twice, the second time with many more of them where contact ends. F is
-stationary in the radii of their edges, too.
+A blunt tool on a stiff skin may lift off within its outline. An active set on the meridian's nodes finds the rings, the
+second time with many more nodes at their edges. F is stationary in these radii, too.
 
 Lengths are in units of a, stresses in units of μ of region 0, displacements in metres.
 """

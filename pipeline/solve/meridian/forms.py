@@ -1,11 +1,8 @@
-"""Linear elasticity in the half plane (r, z) of a round scene: one space, its operator, its residual, its strain.
+"""Linear elasticity in the half plane (r, z) of a round scene: space, operator, residual, strain.
 
 The energy of :mod:`pipeline.solve.physics`, with axisymmetric strains, is integrated over r dr dz. Mixed elements
-(Taylor–Hood, p one degree lower) have all of λ in the pressure, by its inverse, which is 0 for ν = 0.5. On the axis
-u_r = 0. Stresses are in units of the μ of region 0.
-
-A body of several materials has a mesh and a space for each, joined where they meet: displacements are the same on
-either side, pressures are not. Where the material jumps so does the pressure, and a continuous one would err there.
+(Taylor–Hood) have all of λ in the pressure, by its inverse, 0 for ν = 0.5. On the axis u_r = 0. Stresses are in units
+of the μ of region 0. Each material has a mesh and a space of its own: displacements are joined, pressures jump.
 """
 
 from functools import cached_property

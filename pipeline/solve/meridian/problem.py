@@ -1,10 +1,7 @@
-"""Round scenes in the half plane (r, z): the same elasticity, two dimensions, and F to about 1e-7.
+"""Round scenes in the half plane (r, z): linear elasticity in two dimensions, and F to about 1e-7.
 
-Lengths are in units of the footprint's radius a, stresses in units of μ and displacements in units of the depth d:
-nothing depends on the unit of anything. The force is the reaction: the residual of the unmodified operator on the
-probe's dofs, times 2π.
-
-Meshes are refined until the error bar is small enough.
+Lengths are in units of the footprint's radius a, stresses in units of μ, displacements in units of the depth d. The
+force is the reaction, times 2π. Meshes are refined until the error bar is small enough.
 """
 
 from abc import abstractmethod
