@@ -77,9 +77,11 @@ class Enriched:
 
 
 class Enriching(Protocol):
-    """What goes on in one degree more; ``stored`` (J) is the modelled energy where that is not half of F d."""
+    """What goes on in one degree more."""
 
-    stored: float | None
+    @property
+    def stored(self) -> float | None:
+        """The energy (J) of the modelled part where that is not half the work of the force."""
 
     def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
         """Solve on in one degree more; what is made is freed with the ``stack``; collective.

@@ -1,0 +1,201 @@
+"""What was found of a contact: the force, the area, and how far F is from the truth, by one degree more.
+
+The contact area is held: a facet whose nodes, corners aside, all touch is held along the axis at its displacement. The
+force of that problem is wrong, since its area is; the share of the energy that it takes away estimates the error of F.
+F is no bound: the bar is on both sides.
+
+If such facets cover too little of the area, elements are as large as the contact. Contact is then found again in one
+degree more, and the bar is the change of the force.
+"""
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from math import nan
+
+import numpy as np
+
+from pipeline.arrays import Int32Array
+from pipeline.solve.cell_values import plain_share
+from pipeline.solve.compiled import global_sum, vector
+from pipeline.solve.contact.active_set import Found, Obstacle, find_set
+from pipeline.solve.contact.elements import ContactElements, FreeResponse
+from pipeline.solve.contact.geometry import Area, contact_area
+from pipeline.solve.contact.levels import mask, normal_dofs
+from pipeline.solve.contact.surface import CONDITIONS
+from pipeline.solve.contact.sweep import Sweep
+from pipeline.solve.elements.base import Column, Elements, Enriched
+from pipeline.solve.elements.mixed import MixedSolver
+from pipeline.solve.estimate import error_bar, found_again_bar, found_bar
+from pipeline.solve.hierarchical_estimate import energy_decrements
+from pipeline.solve.linear_solver import LinearSolver
+from pipeline.solve.movement import Movement
+from pipeline.solve.physics import of_regions
+from pipeline.solve.response import Contact, Response, reaction
+
+# Bounds that differ by no more than this share of the depth are the same.
+_SAME = 1e-9
+# Where facets with all nodes in contact cover less than this share of its area, contact is found again for the bar.
+_COVERED = 0.3
+# Relative energy norm of the error to which the solution of the next degree is found for the error bar.
+_ESTIMATE_TOLERANCE = 0.1
+# And to which contact is found again in it: loosely first.
+_AGAIN = (1e-3, 1e-5)
+
+
+@dataclass(frozen=True, eq=False)
+class FoundContact:
+    """What was ``found`` by the elements of a ``sweep``, where an ``obstacle`` is in the way; methods are collective.
+
+    ``loaded`` is what loads did before, None without; ``obstacle_above`` is the obstacle of one degree more.
+    """
+
+    sweep: Sweep
+    obstacle: Obstacle
+    found: Found
+    loaded: FreeResponse | None
+    obstacle_above: Callable[[], Obstacle]
+
+    @property
+    def _plug(self) -> Elements:
+        return self.sweep.elements.plug
+
+    @property
+    def stored(self) -> float | None:
+        """The energy (J) of the modelled part; None where all of a face touches and moves by the depth.
+
+        Then the area of contact was no question, and the energy is half the work of the force.
+        """
+        is_flat = np.ptp(self.obstacle.bounds) <= _SAME * self.obstacle.depth
+        return None if self.found.active.all() and is_flat else self.found.state.energy / 2
+
+    @property
+    def force(self) -> float:
+        """The force (N) on the part of the tool that is modelled."""
+        return _force(self.found)
+
+    def summary(self, sag: float) -> Contact:
+        """Return the area of the whole contact, and what loads do; ``sag`` (m) is that of the first touch."""
+        whole = 2.0 ** len(self._plug.body.mirrored)
+        energy = nan if self.loaded is None else whole * self.loaded.energy / 2
+        return Contact(whole * self._area().value, sag=sag, load_energy=energy)
+
+    def response(self, column: Column, movement: Movement) -> Response:
+        """Return the force for the depth, as if it were proportional to it; its balance is that of all checks."""
+        space, state, (depth,) = self._plug.displacements, self.found.state, movement.amounts
+        (residual,) = self._plug.products(self.sweep.law, [column]).residuals
+        local = depth * residual.reshape(-1, 3)[space.fixed_owned, 2].sum()
+        support = float(global_sum(space.comm, np.array([local]))[0])
+        work = float(state.reactions[self.found.active] @ state.moved[self.found.active])
+        balance = max(abs(support / self.force - 1), abs(work / state.energy - 1))
+        per_depth = self.force / depth
+        on_probe = np.array([[0.0, 0.0, -per_depth]])
+        return reaction(movement, np.array([[per_depth]]), on_probe, self._plug.body.mirrored, balance)
+
+    def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
+        """Return what one degree more makes of the force, and its bar.
+
+        Where loads act each depth has its own, as it has where the surface is not condensed.
+        """
+        sweep, depth, iterations, at_edge = self.sweep, self.obstacle.depth, 0, self._area().bar
+        known = sweep.bar(depth, movement.far) if self.loaded is None else None
+        if known is None:
+            self._plug.show(columns[:1])
+            taken, share, iterations = self._estimated(at_edge)
+            if self.loaded is None:
+                sweep.keep_bar(depth, taken, share, movement.far)
+        else:
+            taken, share = known
+        return Enriched(
+            self._plug,
+            [],
+            iterations,
+            decrements=np.array([[taken * self.force / depth]]),
+            relative=np.array([share]),
+            area_bar=at_edge + share,
+        )
+
+    def _estimated(self, area_bar: float) -> tuple[float, float, int]:
+        """Return the share of the energy that one degree more takes away, that of the bar, and the iterations."""
+        candidates, found, elements = self.obstacle.candidates, self.found, self.sweep.elements
+        touching = float(candidates.weights[found.active].sum())
+        covered = float(candidates.areas[candidates.closed(found.active)].sum())
+        if covered < _COVERED * touching:
+            share, more = _found_again(elements, self.obstacle_above(), found)
+            return *found_again_bar(share, area_bar), more
+        taken, unseen, more = _decrement(elements, candidates.held_facets(found.active))
+        share, unseen = taken / found.state.energy, unseen / found.state.energy
+        if (found.active & candidates.is_edge).any():  # the probe ends there, and the pressure is singular
+            degree, element, plain = self._plug.degree, self._plug.element, plain_share(self._plug.body)
+            return share, error_bar(share, degree, element, plain=plain, unseen=unseen), more
+        return share, found_bar(share, unseen, area_bar), more
+
+    def _area(self) -> Area:
+        """Return the area of contact of the part that is modelled."""
+        candidates, law = self.obstacle.candidates, self.sweep.law
+        modulus = np.empty(len(candidates))
+        of_facets = of_regions(law.values("plane_modulus"), candidates.regions, len(candidates.facets))
+        modulus[candidates.facets] = of_facets[:, None]
+        return contact_area(self.obstacle, self.found.active, self.found.state, modulus, self._plug.body.mirrored)
+
+
+def _force(found: Found) -> float:
+    return float(-found.state.reactions[found.active].sum())
+
+
+def _decrement(elements: ContactElements, facets: Int32Array) -> tuple[float, float, int]:
+    """Return what one degree more takes away of twice the energy (J) of the modelled part, and the iterations.
+
+    In between is N (J) of mixed elements, none of others. Collective. The local ``facets`` are held; the fields are
+    those of the forms of ``elements``.
+
+    Raises:
+        SolveError: if the solver does not converge.
+    """
+    if elements.plug.element == "mixed":
+        return _mixed_decrement(elements, facets)
+    taken, iterations = _displacement_decrement(elements, facets)
+    return taken, 0.0, iterations
+
+
+def _displacement_decrement(elements: ContactElements, facets: Int32Array) -> tuple[float, int]:
+    finer, law = elements.surface.spaces.get(elements.space.degree + 1, CONDITIONS), elements.law
+    with ExitStack() as stack, vector(finer.space) as residual:
+        levels = elements.held_levels(facets, stack)
+        matrix = stack.enter_context(finer.lend(law, entries=False))
+        levels.append(mask(finer, matrix, law, normal_dofs(finer, facets)))
+        solver = LinearSolver(levels, direct=False)
+        stack.callback(solver.close)
+        finer.residual_of(elements.space, law, residual)
+        held = levels[-1].prescribed
+        residual.array[held[held < finer.owned]] = 0.0
+        decrements, _, iterations = energy_decrements(solver, [residual])
+    return float(decrements[0, 0]), iterations
+
+
+def _mixed_decrement(elements: ContactElements, facets: Int32Array) -> tuple[float, float, int]:
+    elements.close()
+    with ExitStack() as stack:
+        finer = elements.finer(stack)
+        finer.hold_facets(facets)
+        before = finer.energy()
+        iterations = finer.approach(np.zeros(len(finer.candidates)), _ESTIMATE_TOLERANCE, None)  # nothing held moves
+        assert isinstance(finer.solver, MixedSolver)
+        return before - finer.energy(), float(finer.solver.first_energies[0]), iterations
+
+
+def _found_again(elements: ContactElements, obstacle: Obstacle, found: Found) -> tuple[float, int]:
+    """Return the share of the force that one degree more takes away, contact found again, and the sets; collective.
+
+    ``obstacle`` is what is in the way of the nodes of that degree, far field aside.
+
+    Raises:
+        SolveError: if the solver does not converge.
+        ContactError: if the contact does not settle.
+    """
+    elements.close()
+    with ExitStack() as stack:
+        finer = elements.finer(stack)
+        active = elements.candidates.raised(found.active, finer.candidates)
+        again = find_set(finer, obstacle, active, _AGAIN, found.state.energy)
+    return 1 - _force(again) / _force(found), again.sets
