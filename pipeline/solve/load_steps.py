@@ -29,7 +29,7 @@ from pipeline.solve.forms import HyperelasticForms
 from pipeline.solve.hierarchical_estimate import energy_decrements
 from pipeline.solve.linear_solver import LinearSolver
 from pipeline.solve.movement import Motion, Movement
-from pipeline.solve.newton import Equilibrium, LargeError, tangent_product
+from pipeline.solve.newton import HyperelasticBody, LargeError, tangent_product
 from pipeline.solve.physics import MaterialLaw
 
 # The depth is reached in so many steps at least; smaller ones than this share of it are not tried.
@@ -86,7 +86,7 @@ class LoadSteps(Solver):
         self._levels = elements.levels(law, stack, direct=direct)
         solver = stack.enter_context(LinearSolver(self._levels, direct=direct))
         self._forms = HyperelasticForms(self._space.space, self._space.forms, law.name)
-        self._body = Equilibrium(self._space, self._forms, solver)
+        self._body = HyperelasticBody(self._space, self._forms, solver)
         stack.callback(self._body.close)
 
     def lift(self, columns: Sequence[Column]) -> None:

@@ -148,7 +148,3 @@ class Movement:
         """Return that of one motion and a far field as that of one motion, with that ``share`` of the field."""
         press, far = self.motions
         return Movement((replace(press, far=far.far, share=share),), self.amounts[:1])
-
-    def times(self, factor: float) -> "Movement":
-        """Return ``factor`` times the movement."""
-        return replace(self, amounts=tuple(factor * amount for amount in self.amounts))

@@ -35,7 +35,7 @@ class LargeError(SolveError):
     """Newton's method does not get to where the probe is to be."""
 
 
-class Equilibrium:
+class HyperelasticBody:
     """A hyperelastic body in the spaces of linear elasticity, and Newton's method for it; ``close`` frees it."""
 
     def __init__(self, space: ElasticSpace, forms: HyperelasticForms, solver: LinearSolver):

@@ -128,7 +128,7 @@ def test_units_do_not_matter(method):
     for young, size in ((1e-3, 1.0), (YOUNG, 1.0), (1e12, 1.0), (YOUNG, 0.025), (YOUNG, 250.0)):
         body = distribute(MPI.COMM_SELF, replace(arrays, points=size * arrays.points))
         with QuasiStaticProblem(Spaces(body), 2, Conditions(), "mixed") as mixed:
-            s = mixed.solve(law(0.4999, young), PRESS.times(size), method=method, estimate=True)
+            s = mixed.solve(law(0.4999, young), Movement.along((0.0, 0.0, -DEPTH * size)), method=method, estimate=True)
         unit = young * (DEPTH * size) * size
         numbers.append((s.reaction[2] / unit, s.energy / unit / (DEPTH * size), s.max_strain, s.decrement, s.bar))
     for other in numbers[1:]:

@@ -21,7 +21,7 @@ from pipeline.solve.compiled import global_sum, vector
 from pipeline.solve.contact.active_set import Found, Obstacle, find_set
 from pipeline.solve.contact.elements import ContactElements, FreeResponse
 from pipeline.solve.contact.geometry import Area, contact_area
-from pipeline.solve.contact.levels import mask, normal_dofs
+from pipeline.solve.contact.levels import HeldOperator, normal_dofs
 from pipeline.solve.contact.surface import CONDITIONS
 from pipeline.solve.contact.sweep import Sweep
 from pipeline.solve.elements.base import Column, Elements, Enriched
@@ -162,8 +162,8 @@ def _displacement_decrement(elements: ContactElements, facets: Int32Array) -> tu
     finer, law = elements.surface.spaces.get(elements.space.degree + 1, CONDITIONS), elements.law
     with ExitStack() as stack, vector(finer.space) as residual:
         levels = elements.held_levels(facets, stack)
-        matrix = stack.enter_context(finer.lend(law, entries=False))
-        levels.append(mask(finer, matrix, law, normal_dofs(finer, facets)))
+        operator = HeldOperator(finer, law, stack, direct=False, masked=True)
+        levels.append(operator.hold(normal_dofs(finer, facets)))
         solver = LinearSolver(levels, direct=False)
         stack.callback(solver.close)
         finer.residual_of(elements.space, law, residual)

@@ -145,29 +145,23 @@ class HeldOperator:
 
         It is good until the next call.
         """
-        if self._is_masked:
-            return mask(self.space, self._matrix, self._law, dofs)
-        if is_product(self._matrix):
-            matrix = self._matrix.getPythonContext().holding(dofs).matrix()
+        space, matrix, is_uniform = self.space, self._matrix, self._law.is_uniform
+        if not self._is_masked and is_product(matrix):
+            matrix = matrix.getPythonContext().holding(dofs).matrix()
             self._stack.callback(matrix.destroy)
-            held = np.union1d(self.space.prescribed, dofs)
-            return Level(self.space.space, matrix, held, not self._law.is_uniform)
-        if self._is_held:
-            self.free.copy(self._matrix, structure=_SAME)
-        self._is_held = True
-        return hold(self.space, self._matrix, self._law, dofs)
-
-
-def mask(space: ElasticSpace, matrix: PETSc.Mat, law: MaterialLaw, dofs: Int32Array) -> Level:
-    """Return the level of a ``matrix`` of one process that stays as it is; ``dofs`` (unrolled) are held by its user."""
-    return Level(space.space, matrix, np.union1d(space.prescribed, dofs), not law.is_uniform, dofs)
-
-
-def hold(space: ElasticSpace, matrix: PETSc.Mat, law: MaterialLaw, dofs: Int32Array) -> Level:
-    """Return the level of a ``matrix`` after zeroing rows and columns of ``dofs`` (local, unrolled); collective."""
-    first, _ = matrix.getOwnershipRange()
-    matrix.zeroRowsColumns((first + dofs[dofs < space.owned]).astype(PETSc.IntType), diag=law.lame_mu[0])
-    return Level(space.space, matrix, np.union1d(space.prescribed, dofs), not law.is_uniform)
+        elif not self._is_masked:
+            if self._is_held:
+                self.free.copy(matrix, structure=_SAME)
+            self._is_held = True
+            first, _ = matrix.getOwnershipRange()
+            matrix.zeroRowsColumns((first + dofs[dofs < space.owned]).astype(PETSc.IntType), diag=self._law.lame_mu[0])
+        return Level(
+            space=space.space,
+            matrix=matrix,
+            prescribed=np.union1d(space.prescribed, dofs),
+            jumps=not is_uniform,
+            held=dofs if self._is_masked else None,
+        )
 
 
 def normal_dofs(space: ElasticSpace, facets: Int32Array) -> Int32Array:
