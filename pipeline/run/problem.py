@@ -9,7 +9,7 @@ from pipeline.arrays import FloatArray
 from pipeline.mesh.of_case import meridian_of
 from pipeline.plan import estimate
 from pipeline.plan.symmetry import mirror_planes, movement_planes
-from pipeline.run.far_field import far_field_of
+from pipeline.run.far_field import far_field_of, far_field_seconds
 from pipeline.run.loads import loads_of
 from pipeline.run.memory import FreeMemory
 from pipeline.run.room import MEMORY_SHARE
@@ -182,7 +182,7 @@ def solve_problem(case: Case, problem: Problem, *, estimate: bool, meshed: Case 
             raise
         solution = problem.answer(replace(asked, method="direct"))
     if movement.far is not None:
-        solution.times.setup += movement.far.seconds
+        solution.times.setup += far_field_seconds(case)
     if solution.is_shut:
         cause = "the blade's travel presses" if movement.loads is None else "the blade's travel and the loads press"
         raise SolveError(f"{cause} the slit shut at its front, where its faces would pass each other")

@@ -48,11 +48,6 @@ class PointForce:
     radius: float
 
     @property
-    def seconds(self) -> float:
-        """It is a closed form."""
-        return 0.0
-
-    @property
     def ratio(self) -> float:
         """λ/μ of the half-space."""
         return 2 * self.poisson / (1 - 2 * self.poisson)
@@ -186,14 +181,10 @@ class Smooth:
 
 @dataclass(frozen=True, eq=False)
 class BodyField:
-    """The far field of a body: that of a point force on a half-space, a unit, and what goes with it of ``regular``.
-
-    ``seconds`` is what the regular part took.
-    """
+    """The far field of a body: that of a point force on a half-space, a unit, and what goes with it of ``regular``."""
 
     near: PointForce
     regular: Smooth
-    seconds: float
 
     def at(self, points: FloatArray) -> FloatArray:
         """Return the displacement (n, 3) of a unit, in m, within the half ball that ``regular`` was fitted in."""

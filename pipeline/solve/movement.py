@@ -21,10 +21,6 @@ _ZERO: Vector = (0.0, 0.0, 0.0)
 class FarField(Protocol):
     """A displacement of what is beyond the cut face, free of loads but there; hashable."""
 
-    @property
-    def seconds(self) -> float:
-        """What it took to find."""
-
     def at(self, points: FloatArray) -> FloatArray:
         """Return the displacement (n, 3) of a unit, in m, at points (n, 3), in m, on the cut face."""
 
