@@ -172,9 +172,9 @@ def test_a_pull_is_judged_by_the_mean_pressure(scale, steep, pulls):
     forms = SimpleNamespace(on=lambda name: here if name == PROBE else nowhere)
     edges = np.column_stack([np.arange(80), np.arange(1, 81)])
     arrays = SimpleNamespace(points=np.column_stack([ends, 0 * ends]), facets={PROBE: edges}, unit=2e-3, order=1)
-    asked = forms, arrays, residual, residual, 1e-4, lambda r: r, 3e-3
+    asked, tool = (forms, arrays, residual, residual), RoundTool(lambda r: r, 3e-3)
     if not pulls:
-        check_signs(*asked)
+        check_signs(*asked, tool=tool, depth=1e-4)
         return
     with pytest.raises(LiftsOff, match=r"1.99 mm from the axis the tool would pull with 1.5% of the mean"):
-        check_signs(*asked)
+        check_signs(*asked, tool=tool, depth=1e-4)

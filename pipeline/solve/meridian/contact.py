@@ -172,7 +172,7 @@ class _Search:
         with stage("solve"):
             solution = depth * fine.punch + fine.pressed
             residual = fine.forms.residual(solution)
-            check_signs(fine.forms, arrays, solution, residual, depth, self._tool.gap, self._tool.limit)
+            check_signs(fine.forms, arrays, solution, residual, tool=self._tool, depth=depth)
             strain = max_strain(fine.forms, arrays) / arrays.unit
         return Answer(
             stiffness=force / depth,

@@ -1,7 +1,5 @@
 """Whether contact on the meridian, one round patch or one ring, is one: pressed all over, clear of the tool beside."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from pipeline.arrays import FloatArray, IntArray
@@ -9,6 +7,7 @@ from pipeline.mesh.meridian import MeridianArrays
 from pipeline.scene.model import FREE, PROBE
 from pipeline.solve import SolveError
 from pipeline.solve.meridian.forms import MeridianForms
+from pipeline.solve.meridian.punch import RoundTool
 
 # Tension below this share of the mean pressure, penetration below this share of the depth: what a radius that is off
 # by 1e-4 leaves.
@@ -29,13 +28,13 @@ def check_signs(
     arrays: MeridianArrays,
     solution: FloatArray,
     residual: FloatArray,
+    *,
+    tool: RoundTool,
     depth: float,
-    gap: Callable[[FloatArray], FloatArray],
-    limit: float,
 ) -> None:
     """Check a ``solution`` (displacements in m, lengths of the mesh in units of ``arrays.unit``) and its ``residual``.
 
-    ``gap`` is that between tool and surface at radii up to ``limit`` (m) when its lowest point touches.
+    The ``tool`` is pushed in by a ``depth`` (m).
 
     Raises:
         LiftsOff: if the tool pulls somewhere.
@@ -62,8 +61,8 @@ def check_signs(
     dofs, places = forms.on(FREE)
     # What can be seen along the axis: of a cylinder its top, of an ellipsoid its upper half.
     top = -_LEVEL if arrays.order == 1 else arrays.points[:, 1].min() / 2
-    beside = (places[:, 1] > top) & (places[:, 0] * arrays.unit < limit)
-    clear = gap(places[beside, 0] * arrays.unit) - depth - solution[dofs[beside, 1]]
+    beside = (places[:, 1] > top) & (places[:, 0] * arrays.unit < tool.limit)
+    clear = tool.gap(places[beside, 0] * arrays.unit) - depth - solution[dofs[beside, 1]]
     if (through := -clear.min(initial=0.0) / depth) > _PENETRATION:
         at = places[beside, 0][np.argmin(clear)] * arrays.unit
         raise SolveError(
