@@ -99,7 +99,7 @@ benchmark: setup ## every table of docs/performance.md, into results/ (an idle m
 	$(PYTHON) -m benchmarks.organs
 	$(PYTHON) -m benchmarks.paths
 	$(PYTHON) -m benchmarks.scaling
-	$(EPSMESH) benchmark
+	$(PYTHON) -m pipeline.verify.work_precision
 	$(EPSMESH) run studies/speedup.toml --fresh
 
 peers: setup ## NGSolve and scikit-fem against this program, time to a true error (an idle machine): results/peers.md

@@ -156,7 +156,7 @@ def command(*arguments: str, folder: Path) -> float:
     """Return the processor's seconds of a command of the program, which works in ``folder``."""
     start = processor_seconds()
     surroundings = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": str(MESHES.parent)}
-    if arguments[0] == "validate":  # a large file is known to be whole by a cache, which is to be empty
+    if "--check" in arguments:  # a large file is known to be whole by a cache, which is to be empty
         surroundings["EPSMESH_CACHE"] = str(folder / "cache")
     whole = [sys.executable, "-m", "pipeline", *arguments]
     subprocess.run(whole, check=True, stdout=subprocess.DEVNULL, cwd=folder, env=surroundings)
@@ -176,13 +176,13 @@ def whole_commands(folder: Path) -> list[dict[str, Any]]:
         study["body"]["file"] = f"{name}.stl"
         (folder / f"{name}.toml").write_text(to_toml(study, name))
     run = ("run", "liver.toml", "--output", "results", "--meshes", "meshes")
-    check = ("validate", "large.toml")
+    check = ("plan", "--check", "large.toml")
     told = {
         "one place of the liver: file, force, bar, dataset, figures": run,
         "the same, stored": run,
-        f"validate, {len(facets):,} facets, first time": check,
+        f"check, {len(facets):,} facets, first time": check,
         "again": check,
-        f"validate, {len(found.facets):,} facets": ("validate", "liver.toml"),
+        f"check, {len(found.facets):,} facets": ("plan", "--check", "liver.toml"),
     }
     return [{"what": what, "seconds": command(*arguments, folder=folder)} for what, arguments in told.items()]
 

@@ -74,7 +74,7 @@ def run_program(study: Study, folder: Path, *, exact: bool = True, parts: int = 
         _epsmesh("run", file, "--quiet", "--fresh", *places)
     seconds, used = time.perf_counter() - start, processor_seconds() - used
     if parts:
-        _epsmesh("merge", file, *whole, *places[:2])
+        _epsmesh("status", file, "--merge", *whole, *places[:2])
     often = max(parts, 1)
     return {"seconds": often * seconds, "cpu": often * used, "dataset": folder / f"{study.name}.nc"}
 

@@ -22,8 +22,6 @@ from benchmarks.tables import options, write
 COMMANDS = {
     "--help": ["--help"],
     "new": ["new", "mine"],
-    "validate": ["validate", "studies/quick.toml"],
-    "validate figure3": ["validate", "studies/figure3.toml"],
     "plan": ["plan", "studies/quick.toml"],
     "plan figure3": ["plan", "studies/figure3.toml"],
     "status": ["status", "studies/quick.toml"],

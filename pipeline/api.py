@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -68,14 +68,11 @@ class RunnableStudy:
             StoreError: if the store cannot be read.
             ValueError: if ``without`` holds an unknown name.
         """
-        bare = make_plan(self.declared, without=without)
-        if store is None or not Path(store).is_file():
-            return bare
-        from pipeline.run.reading import known_of  # noqa: PLC0415 (only where there is a store)
+        if store is None:
+            return make_plan(self.declared, without=without)
+        from pipeline.run.reading import plan_the_rest  # noqa: PLC0415 (only where there is a store)
 
-        records, cost = known_of(Path(store), bare)
-        keys = [key for key, record in records.items() if record.is_ok]
-        return replace(make_plan(self.declared, keys, without), cost=cost)
+        return plan_the_rest(self.declared, Path(store), without)[0]
 
     def summary(self, **options: Any) -> dict[str, Any]:
         """Return the plan as plain data with estimates of time and memory: what ``epsmesh plan --json`` prints."""

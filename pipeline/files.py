@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-# Bytes that a disk must have left for a file: less than a dataset and its figure take.
-LEAST_ROOM = 200_000
+# Bytes that are written to see whether a file can be: a full disk makes empty ones.
+_TRIED = 4096
 # Of a study, in the folder of its results.
 STORE_NAME = "cases.sqlite"
 FIGURE_FORMATS = ("png", "svg")
@@ -91,8 +91,8 @@ def is_utf8(name: str) -> bool:
     return True
 
 
-def why_not_writable(path: Path, room: int = LEAST_ROOM) -> str:
-    """Say why no file of ``room`` bytes can be written at ``path``, "" if one can.
+def why_not_writable(path: Path) -> str:
+    """Say why no file can be written at ``path``, "" if one can.
 
     That is tried beside it; the folders that it takes are made, and nothing else is left.
     """
@@ -108,8 +108,8 @@ def why_not_writable(path: Path, room: int = LEAST_ROOM) -> str:
                 return f"{path}: cannot be written: {folder} is a file, not a folder"
             break
     try:
-        with _beside(path) as temporary, temporary.open("wb") as file:
-            os.posix_fallocate(file.fileno(), 0, room)
+        with _beside(path) as temporary:
+            temporary.write_bytes(bytes(_TRIED))
     except OSError as error:
         return f"{path}: cannot be written: {error.strerror or error}"
     return ""

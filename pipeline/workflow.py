@@ -4,7 +4,7 @@ import signal
 import threading
 import time
 import traceback
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -18,6 +18,7 @@ from pipeline.plan.plan import Plan, make_plan
 from pipeline.plan.shard import Shard
 from pipeline.report.publish import ResultsError, publish
 from pipeline.run.begun import ENDING, Begun, fail_begun
+from pipeline.run.merge import merge
 from pipeline.run.outcome import count_states, failures
 from pipeline.run.progress import Progress, Terminal
 from pipeline.run.reading import read_rows
@@ -68,14 +69,14 @@ def prepare(
     without: Collection[str] = (),
     meshes: Path | None = None,
     shard: Shard | None = None,
-    beside: Path | None = None,
+    beside: Sequence[Path] = (),
 ) -> tuple[Plan, Opened]:
     """Open the case store and plan, on every rank alike, what is not on record; collective.
 
     ``fresh`` computes again what is stored; a timing study always does, but for F_exact. ``without`` names reductions
-    that are not to be used. A ``shard`` plans its own part only, and reads, but never writes, the store ``beside``
-    its own, too. Cases with which the process of an earlier run ended have failed, unless their force is read back:
-    this run leaves them out, and the next one tries them again.
+    that are not to be used. A ``shard`` plans its own part only, and reads the stores ``beside`` its own, too; a whole
+    study takes the records of those, its shards', into its store. Cases with which the process of an earlier run ended
+    have failed, unless their force is read back: this run leaves them out, and the next one tries them again.
 
     Raises:
         StoreError: on every rank, if the store cannot be used.
@@ -84,6 +85,7 @@ def prepare(
     if comm.rank == 0:
         try:
             opened.store = Store(store_path)
+            merged = merge(beside, opened.store) if beside and not (shard or fresh) else ()
             cost = opened.store.cost_model()
             declared = make_plan(study, without=without, shard=shard)
             if not fresh:
@@ -91,12 +93,13 @@ def prepare(
                 wanted = {*keys, *declared.reference_keys}
                 found = opened.store.get(wanted)
                 opened.records = {key: record for key, record in found.items() if record.is_ok}
-                if shard is not None:
-                    opened.records = _known_beside(beside, wanted) | opened.records
+                for path in beside if shard else ():
+                    opened.records = _known_beside(path, wanted) | opened.records
             ended = fail_begun(opened.store, {*declared.keys, *declared.reference_keys})
             left_out = _what_ended(len(ended.keys() - opened.records.keys()))
             opened.records = ended | opened.records
-            opened.notices = tuple(filter(None, (opened.store.notice, left_out)))
+            problems = [problem for source in merged for problem in source.problems]
+            opened.notices = tuple(filter(None, (opened.store.notice, *problems, left_out)))
         except StoreError as error:
             message = str(error)
     message, stored, cost = comm.bcast((message, sorted(opened.records), cost))
@@ -246,10 +249,10 @@ def _what_ended(count: int) -> str:
     return f"the process of an earlier run ended: {what}, and the others go on; the next run tries again"
 
 
-def _known_beside(path: Path | None, keys: Collection[str]) -> dict[str, Record]:
+def _known_beside(path: Path, keys: Collection[str]) -> dict[str, Record]:
     """Return the forces on record in another store; without a readable one the work is done again, no more."""
     try:
-        rows = read_rows(path) if path and path.exists() else []
+        rows = read_rows(path) if path.exists() else []
         records = (Record.from_json(text) for key, text, _ in rows if key in keys)
         return {record.key: record for record in records if record.is_ok}
     except (StoreError, ValueError):

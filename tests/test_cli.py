@@ -168,7 +168,7 @@ def test_run_killed_at_random_moments_yields_the_same_dataset(spawn, epsmesh, sm
         assert last.returncode == 1
         last = spawn("run", small, "--output", tmp_path / "killed")
     assert last.returncode == 0, last.stderr
-    assert epsmesh("store", "--store", tmp_path / "killed" / "cases.sqlite").exit_code == 0
+    assert epsmesh("status", "--store", tmp_path / "killed" / "cases.sqlite").exit_code == 0
     assert_same(*(folder / "small.nc" for folder in (tmp_path / "killed", whole)), alike=False)
 
 
@@ -189,18 +189,18 @@ def test_plan_story_and_store(epsmesh, spawn, small, whole, tmp_path):
     assert "proportional" in told
     assert epsmesh("plan", small, "poisson=0.31", "--output", tmp_path).exit_code == 2
     store = tmp_path / "cases.sqlite"
-    listed = json.loads(epsmesh("store", "--store", store, "--json").stdout)
+    listed = json.loads(epsmesh("status", "--store", store, "--json").stdout)
     assert listed["records"] == planned["solves"]
-    assert epsmesh("store", "--store", store).exit_code == 0
-    assert "would be removed: --yes does it" in epsmesh("store", "--prune", "--days", "0", "--store", store).stdout
-    assert json.loads(epsmesh("store", "--store", store, "--json").stdout)["records"] == planned["solves"]
-    assert "kB: removed" in epsmesh("store", "--prune", "--days", "0", "--store", store, "--yes").stdout
-    assert json.loads(epsmesh("store", "--store", store, "--json").stdout)["records"] == 0
+    assert epsmesh("status", "--store", store).exit_code == 0
+    assert "would be removed: --yes does it" in epsmesh("status", "--prune", "--days", "0", "--store", store).stdout
+    assert json.loads(epsmesh("status", "--store", store, "--json").stdout)["records"] == planned["solves"]
+    assert "kB: removed" in epsmesh("status", "--prune", "--days", "0", "--store", store, "--yes").stdout
+    assert json.loads(epsmesh("status", "--store", store, "--json").stdout)["records"] == 0
 
 
-def test_validate_status_and_plot(epsmesh, small, tmp_path):
-    assert "small.toml: fine; 12 cases (2 poisson × 3 epsilon × 2 outside)" in epsmesh("validate", small).stdout
+def test_a_check_status_and_figures(epsmesh, small, tmp_path):
+    assert "small.toml: fine; 12 cases (2 poisson × 3 epsilon × 2 outside)" in epsmesh("plan", "--check", small).stdout
     assert "12 pending" in epsmesh("status", small, "--output", tmp_path).stdout
-    assert epsmesh("plot", small, "--output", tmp_path).exit_code == 2
-    report = json.loads(epsmesh("validate", small, "--json").stdout)
+    assert epsmesh("report", small, "--figures", "--output", tmp_path).exit_code == 2
+    report = json.loads(epsmesh("plan", "--check", small, "--json").stdout)
     assert report == [{"file": str(small), "errors": [], "warnings": [], "cases": 12}]

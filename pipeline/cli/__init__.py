@@ -8,11 +8,10 @@ from typing import Annotated
 import typer
 
 from pipeline import __version__
-from pipeline.cli import checks, compare, evaluator, export, guide, merge, new, plan, report, store, study, touch, view
-from pipeline.cli.console import error, make_patient, what_was_not_written
-from pipeline.cli.faults import BAD_INPUT
+from pipeline.cli import compare, export, guide, new, plan, report, run, status, touch, verify, view
+from pipeline.cli.console import error, make_patient, print_json, what_was_not_written
+from pipeline.cli.faults import BAD_INPUT, fail
 from pipeline.cli.group import Commands
-from pipeline.cli.libraries import how_to_get
 
 _HELP = """How fine must a mesh be, and where, for the reaction force of a surgical tool?
 
@@ -22,55 +21,66 @@ Exit status: 0 done, 1 some cases failed, 2 the input is wrong, 130 interrupted.
 
 # Set by a shell that asks how a word may be completed.
 _COMPLETING = "_EPSMESH_COMPLETE"
+# Libraries that pip alone does not install, and how to get them.
+_FENICS = "on Debian `make setup` installs it, elsewhere `conda env create -f environment.yml`"
+_ORGANS = "`pip install 'epsmesh[organs]'` installs it (on Debian: `make setup`)"
+_REMEDIES = {
+    **dict.fromkeys(("dolfinx", "ufl", "basix", "ffcx", "petsc4py", "mpi4py", "gmsh"), _FENICS),
+    **dict.fromkeys(("igl", "nibabel", "nrrd"), _ORGANS),
+}
 
 app = typer.Typer(
     cls=Commands,
     context_settings={"help_option_names": ["-h", "--help"]},
     help=_HELP,
     no_args_is_help=True,
+    invoke_without_command=True,
     add_completion=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
 _COMMANDS: tuple[Callable[..., None], ...] = (
     new.new,
-    study.validate,
     plan.plan,
-    study.run,
-    merge.merge,
-    study.status,
-    report.plot,
+    run.run,
+    status.status,
     report.report,
     guide.guide,
     compare.compare,
     view.view,
     export.export,
-    evaluator.evaluator,
     touch.touch,
-    checks.verify,
-    checks.benchmark,
-    store.store,
-    study.version,
+    verify.verify,
 )
 for _command in _COMMANDS:
     app.command()(_command)
 
 
-def _print_version(is_wanted: bool) -> None:
-    if is_wanted:
-        print(f"epsmesh {__version__}")
-        raise typer.Exit
-
-
 @app.callback()
 def _options(
-    version: Annotated[
-        bool,
-        typer.Option(
-            "--version", is_eager=True, callback=_print_version, help="Print the version; `epsmesh version` prints all."
-        ),
+    ctx: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="With --version: all versions that a force depends on.")
     ] = False,
-) -> None: ...
+    as_json: Annotated[bool, typer.Option("--json", help="With --version: those, as JSON.")] = False,
+) -> None:
+    if not version:
+        if verbose or as_json:
+            fail("before a command, --verbose and --json are of --version; a command's own options follow it")
+        return
+    if not (verbose or as_json):
+        print(f"epsmesh {__version__}")
+        raise typer.Exit
+    from pipeline.run.provenance import provenance
+
+    known = {"version_epsmesh": __version__, **provenance(ranks=1)}
+    versions = {k.removeprefix("version_"): v for k, v in known.items() if k.startswith("version_")}
+    if as_json:
+        print_json(versions)
+    else:
+        print("\n".join(f"{name:10} {value}" for name, value in versions.items()))
+    raise typer.Exit
 
 
 def main() -> None:
@@ -80,9 +90,10 @@ def main() -> None:
     try:
         app(prog_name="epsmesh")
     except ModuleNotFoundError as missing:
-        if (remedy := how_to_get(missing.name)) is None:
+        library = (missing.name or "").partition(".")[0]
+        if library not in _REMEDIES:
             raise
-        error(remedy)
+        error(f"the library {library} is missing: {_REMEDIES[library]}")
         sys.exit(BAD_INPUT)
     finally:
         if why := what_was_not_written():

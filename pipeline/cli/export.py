@@ -1,4 +1,4 @@
-"""The command that makes a real-time model of a study's body."""
+"""The command that makes a real-time model of a study's body, and copies the evaluator in C that answers from it."""
 
 import sys
 from pathlib import Path
@@ -9,8 +9,8 @@ import typer
 from pipeline import __version__
 from pipeline.cli.console import load_solvers, print_json, warning
 from pipeline.cli.faults import BAD_INPUT, DONE, SOME_FAILED, Fault, fail, of_file, of_option, of_unwritten, refusing
-from pipeline.cli.words import DEFAULT_OUTPUT, File, Json, check_machine, check_output, load_all
-from pipeline.files import LEAST_ROOM
+from pipeline.cli.words import DEFAULT_OUTPUT, Json, by_name, check_machine, check_output, load_all
+from pipeline.files import write_new
 from pipeline.printable import counted
 
 if TYPE_CHECKING:
@@ -21,13 +21,15 @@ _HOWTO = "docs/realtime.md"
 # Of --accuracy: less than the tables and the formulas are good for; more than is of use.
 _ACCURACIES = (0.002, 0.2)
 _MOST_CHECKS = 1000
-_WITH_SURFACE = 5_000_000  # bytes that a model may take
 # The share of the judged touches whose errors the bars must hold.
 _HELD = 0.95
 
 
 def export(
-    file: File,
+    file: Annotated[
+        Path | None,
+        typer.Argument(metavar="FILE", help="A study file (TOML), or a name in studies/.", show_default=False),
+    ] = None,
     accuracy: Annotated[str, typer.Option(help='How near forces must be to those of full solves: "1%".')] = "1%",
     output: Annotated[
         Path | None,
@@ -41,6 +43,14 @@ def export(
     surface: Annotated[
         bool, typer.Option("--surface/--no-surface", help="With what `epsmesh touch` shows of the body: megabytes.")
     ] = True,
+    evaluator: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Copy the evaluator in C, and its examples for simulators, to a folder of yours; make no model.",
+            show_default=False,
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Make a model that answers 1,000 times a second: forces of small tools on a box, a cylinder, or part of an organ.
@@ -51,7 +61,14 @@ def export(
     Example: epsmesh export studies/quick.toml --accuracy 1% -o box.epsm.nc
 
     Example: mpirun -n 2 epsmesh export studies/quick.toml -o box.epsm.nc
+
+    Example: epsmesh export --evaluator simulator/epsmesh
     """
+    if evaluator is not None:
+        _copy_evaluator(evaluator, as_json=as_json)
+        return
+    if file is None:
+        fail(Fault("name the study whose body a model is made of, or --evaluator FOLDER", key="FILE", howto=_HOWTO))
     from pipeline.export.scope import ExportError, scope_of
     from pipeline.units import parse_quantity
 
@@ -62,9 +79,10 @@ def export(
     if not _ACCURACIES[0] <= wanted <= _ACCURACIES[1]:
         least, most = (f"{100 * share:g}%" for share in _ACCURACIES)
         fail(of_option("--accuracy", accuracy, f"must be between {least} and {most}"))
+    file = by_name(file)
     (study,) = load_all([file])
     path = output or DEFAULT_OUTPUT / f"{study.name}.epsm.nc"
-    check_output(path, room=_WITH_SURFACE if surface else LEAST_ROOM)
+    check_output(path)
     check_machine()
     with refusing(ExportError, file=file, howto=_HOWTO):
         scope = scope_of(study)
@@ -114,3 +132,23 @@ def _tell(exported: "Exported", wanted: float, path: Path, *, as_json: bool) -> 
         f"judged on {found['judged']} touches: {100 * found['held']:.0f} % held by their bars, largest error "
         f"{100 * found['largest_error']:.2g} %, median bar {100 * found['median_bar']:.2g} %"
     )
+
+
+def _copy_evaluator(folder: Path, *, as_json: bool) -> None:
+    """Copy the sources of the evaluator to a folder, unless one of them is there already."""
+    from pipeline.realtime.sources import source_files, sources
+
+    names = source_files()
+    for name in names:
+        if (folder / name).exists():
+            fail(of_file(folder / name, "exists already, and is left alone; give another folder", _HOWTO))
+    check_output(folder=folder)
+    try:
+        for name in names:
+            write_new(folder / name, (sources() / name).read_text(encoding="utf-8"))
+    except OSError as problem:
+        fail(of_file(folder, problem.strerror or str(problem), _HOWTO))
+    if as_json:
+        print_json({"folder": str(folder), "files": [str(name) for name in names]})
+    else:
+        print(f"{folder}: {', '.join(map(str, names))}")

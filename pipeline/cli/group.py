@@ -28,6 +28,17 @@ from pipeline.printable import printable
 _UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 # What is said of a file, or of a folder, that can be neither read nor written.
 _UNUSABLE = (errno.EACCES, errno.EPERM, errno.EISDIR, errno.ENOTDIR, errno.ENAMETOOLONG, errno.EIO)
+# What has become of commands that there were.
+_NOW = {
+    "validate": "epsmesh plan --check FILE...",
+    "explain": "epsmesh plan FILE CASE",
+    "merge": "epsmesh status FILE --merge",
+    "plot": "epsmesh report DATASET --figures",
+    "store": "epsmesh status --store FILE",
+    "version": "epsmesh --version --verbose",
+    "evaluator": "epsmesh export --evaluator FOLDER",
+    "benchmark": "python -m pipeline.verify.work_precision",
+}
 
 
 class Commands(TyperGroup):
@@ -47,6 +58,12 @@ class Commands(TyperGroup):
         except Exception as wrong:
             _tell(wrong, self.words)
             raise
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the command that the first word names; of one that has another name now, that is told."""
+        if (now := _NOW.get(args[0])) is not None:
+            fail(Fault(f"`epsmesh {args[0]}` is now `{now}`", key="COMMAND", value=args[0], allowed=now))
+        return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command that was asked for; what it raises goes on from here."""

@@ -1,15 +1,13 @@
 """The command that tells what a run would do, before it is begun; and what a case is by its labels."""
 
-import re
-import sys
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
+from pipeline.cli.cases import find_case
 from pipeline.cli.console import print_json, warning
-from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, is_first_rank
+from pipeline.cli.faults import BAD_INPUT, DONE, SOME_FAILED, as_data, fail, of_study, refusing, tell
 from pipeline.cli.words import (
     DEFAULT_OUTPUT,
     File,
@@ -20,9 +18,11 @@ from pipeline.cli.words import (
     Verbose,
     Without,
     axes_of,
+    by_name,
     check_names,
+    check_store,
     load_all,
-    stored_records,
+    meant,
     warn,
 )
 from pipeline.files import STORE_NAME
@@ -43,13 +43,14 @@ _MOST_STEPS = 20
 def plan(
     file: File,
     case: Annotated[
-        str | None,
+        list[str] | None,
         typer.Argument(
             metavar="[CASE]",
-            help='Of one case alone: "poisson=0.3, epsilon=10 mm", or its number.',
+            help='Of one case alone: "poisson=0.3, epsilon=10 mm", or its number. With --check: more study files.',
             show_default=False,
         ),
     ] = None,
+    check: Annotated[bool, typer.Option("--check", help="Say what is wrong with study files, and no more.")] = False,
     output: Output = DEFAULT_OUTPUT,
     store: StoreFile = None,
     without: Without = None,
@@ -62,23 +63,31 @@ def plan(
     verbose: Verbose = False,
     as_json: Json = False,
 ) -> None:
-    """Show what a study needs done, and what is struck out.
+    """Check a study, and show what it needs done, and what is struck out.
 
-    With the reasons, and an estimate of time and memory. Ends with 1 if no case would fit into memory. Of one case: its
-    steps, where its force is from, what it shares with others, and what a change would cost.
+    With the reasons, and an estimate of time and memory. Ends with 1 if no case would fit into memory, and with 2 if
+    the study is wrong: everything that is wrong with it is told at once. Of one case: its steps, where its force is
+    from, what it shares with others, and what a change would cost.
 
     Example: epsmesh plan studies/figure3.toml
 
     Example: epsmesh plan studies/figure3.toml --without symmetry
 
     Example: epsmesh plan studies/figure3.toml "poisson=0.3, epsilon=10 mm, outside=free"
+
+    Example: epsmesh plan --check studies/*.toml
     """
+    more = case or []
+    if check:
+        _check([file, *(by_name(Path(word)) for word in more)], as_json=as_json)
+    if len(more) > 1:
+        fail("a plan is of one study, or of one case of it; with --check several files are looked at")
     from pipeline.plan.describe import summary
     from pipeline.run.room import MEMORY_SHARE, machine_room
 
     (study,) = load_all([file])
-    chosen = None if case is None else find_case(study, case)
-    made, records = _planned(study, output, store, check_names(without))
+    chosen = find_case(study, more[0]) if more else None
+    made, records = _planned(study, store or output / STORE_NAME, check_names(without))
     if chosen is not None:
         _tell(made, records, chosen, as_json=as_json)
         return
@@ -97,6 +106,45 @@ def plan(
             "a smaller epsilon, or a larger machine (--memory)"
         )
     raise typer.Exit(SOME_FAILED if nothing_fits else DONE)
+
+
+def _check(files: list[Path], *, as_json: bool) -> NoReturn:
+    """Say of each study file everything that is wrong with it, and exit."""
+    from pipeline.plan.plan import make_plan
+    from pipeline.study.load import load
+    from pipeline.study.problems import StudyError
+
+    report: list[dict[str, Any]] = []
+    for file in files:
+        try:
+            study = load(file)
+        except StudyError as wrong:
+            faults = of_study(wrong, meant(file))
+            report.append({"file": str(file), "errors": as_data(faults, BAD_INPUT)["errors"], "warnings": []})
+            tell(faults)
+            continue
+        cases = len(make_plan(study).keys)
+        report.append({"file": str(file), "errors": [], "warnings": list(study.warnings), "cases": cases})
+        if not as_json:
+            warn(study)
+            print(f"{file}: fine; {counted(cases, 'case')}{axes_of(study)}")
+    if as_json:
+        print_json(report)
+    raise typer.Exit(BAD_INPUT if any(one["errors"] for one in report) else DONE)
+
+
+def _planned(study: "Study", path: Path, without: tuple[str, ...]) -> "tuple[Plan, dict[str, Record]]":
+    """Return the plan of what is not on record, and the records that are."""
+    if not path.exists():
+        from pipeline.plan.plan import make_plan
+
+        return make_plan(study, without=without), {}
+    from pipeline.run.reading import plan_the_rest
+    from pipeline.run.store import StoreError
+
+    check_store(path)
+    with refusing(StoreError, file=path):
+        return plan_the_rest(study, path, without)
 
 
 def _show(study: "Study", found: dict[str, Any], *, quiet: bool, verbose: bool, as_json: bool) -> None:
@@ -174,79 +222,6 @@ def _written(name: str, value: Any) -> Any:
     if not isinstance(value, float):
         return value
     return f"{value:.3g}" if name == "seconds" else write(name, value)
-
-
-def _planned(
-    study: "Study", output: Path, store: Path | None, without: tuple[str, ...]
-) -> "tuple[Plan, dict[str, Record]]":
-    """Return the plan of what is not on record, and the records that are."""
-    from pipeline.plan.plan import make_plan
-
-    bare = make_plan(study, without=without)
-    records, cost = stored_records(store or output / STORE_NAME, bare)
-    done = [key for key, record in records.items() if record.is_ok]
-    return replace(make_plan(study, done, without) if done else bare, cost=cost), records
-
-
-def find_case(study: "Study", text: str, word: str = "CASE") -> "Case":
-    """Return the case of a number, or of labels, the first of several; fail with what there is to choose from.
-
-    ``word`` is what names the case on the command line.
-    """
-    cases = list(study.cases())
-    if text.strip().isdecimal():
-        number = int(text)
-        if number >= len(cases):
-            fail(_of_case(word, text, f"there are {counted(len(cases), 'case')}, counted from 0"))
-        return cases[number]
-    wanted: dict[str, str] = {}
-    names = [axis.name for axis in study.axes]
-    # A label may hold commas itself: what separates is a comma before a name.
-    for part in re.split(r",(?=\s*\w+\s*=)", text):
-        name, _, value = (word.strip() for word in part.partition("="))
-        if name not in names:
-            fail(_of_case(word, text, f"nothing called {name!r} is swept; swept are {', '.join(names) or 'no keys'}"))
-        wanted[name] = value
-    found = [case for case in cases if _matches(case, wanted)]
-    if not found:
-        choices = {axis.name: [axis.write(label) for label in axis.labels] for axis in study.axes}
-        listed = "; ".join(f"{name} = {', '.join(choices[name])}" for name in wanted)
-        fail(_of_case(word, text, f"there is none; there are {listed}"))
-    if len(found) > 1 and is_first_rank():
-        left = ", ".join(axis.name for axis in study.axes if axis.name not in wanted and len(axis) > 1)
-        print(f"{found[0]}: the first of {len(found)} such cases, which differ in {left}", file=sys.stderr)
-    return found[0]
-
-
-def _of_case(word: str, text: str, allowed: str) -> Fault:
-    shown = text if text.strip().isdecimal() else repr(text)
-    return Fault(f"case {shown}: {allowed}", key=word, value=text, allowed=allowed)
-
-
-def _matches(case: "Case", wanted: dict[str, str]) -> bool:
-    written, labels, units = case.words, dict(case.labels), {axis.name: axis.unit for axis in case.axes}
-    return all(
-        _squeezed(written[name]) == _squeezed(text) or _is(labels[name], text, units[name])
-        for name, text in wanted.items()
-    )
-
-
-def _is(label: float | int | str, text: str, unit: str) -> bool:
-    """Tell whether ``text`` is the quantity of a label, in whatever unit: 0.4 cm is 4 mm."""
-    from pipeline.units import canonical, parse_quantity
-
-    try:
-        return not isinstance(label, str) and canonical(label) == parse_quantity(text, "" if unit == "1" else unit)
-    except ValueError:
-        return False
-
-
-def _squeezed(text: Any) -> str:
-    number = str(text).replace(" ", "").lower()
-    try:
-        return f"{float(number):g}"
-    except ValueError:
-        return number
 
 
 def _line(step: dict[str, Any]) -> str:

@@ -1,60 +1,34 @@
-"""The commands that show a dataset: figures, report."""
+"""The command that shows a dataset: a page, with a case to turn round on it, or figures."""
 
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipeline.cli.console import print_json
-from pipeline.cli.faults import Fault, fail, of_option
-from pipeline.cli.words import DEFAULT_OUTPUT, Dataset, Found, Json, check_machine, check_output, read_dataset
+from pipeline.cli.cases import find_case
+from pipeline.cli.console import load_solvers, print_json
+from pipeline.cli.faults import Fault, fail, of_file, of_option
+from pipeline.cli.words import (
+    DEFAULT_MESHES,
+    DEFAULT_OUTPUT,
+    Dataset,
+    Found,
+    Json,
+    check_machine,
+    check_output,
+    faults_of_machine,
+    read_dataset,
+)
 
-# Bytes that a page may take: figures, parts of the first one and some thousand cases; a scene besides.
-_PAGE, _PAGE_WITH_SCENE = 6_000_000, 12_000_000
+if TYPE_CHECKING:
+    import xarray as xr
 
-# No scene at all.
-_NONE = "none"
+    from pipeline.study.sweep import Case, Study
 
-
-def plot(
-    file: Dataset,
-    output: Found = DEFAULT_OUTPUT,
-    kind: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="A figure to draw; may be repeated: ratio, error, force, map, compliance. Default: all that suit.",
-            show_default=False,
-        ),
-    ] = None,
-    rest: Annotated[
-        bool, typer.Option("--rest", help="Draw what a figure of a large study leaves out, too: <study>_<kind>_2.png …")
-    ] = False,
-    as_json: Json = False,
-) -> None:
-    """Draw the figures of a dataset, as PNG and SVG, beside it.
-
-    The study's main figure is <study>.png, the others <study>_<kind>.png.
-
-    Example: epsmesh plot results/figure3.nc
-
-    Example: epsmesh plot studies/figure3.toml --kind error --kind force
-    """
-    path, dataset = read_dataset(file, output)
-    from pipeline.report.figures import KINDS, choose, draw, files, lacks
-
-    for name in kind or ():
-        if name not in KINDS:
-            fail(of_option("--kind", name, f"no figure is called so; there are {', '.join(KINDS)}"))
-        if lack := lacks(dataset, name):
-            allowed = f"{lack}; its figures are {', '.join(choose(dataset))}"
-            fail(Fault(f"{path}: --kind {name} {allowed}", str(path), "--kind", name, allowed))
-    stem, kinds = path.with_suffix(""), kind or choose(dataset)
-    check_output(*(picture for some in files(dataset, stem, kinds=kinds).values() for picture in some))
-    pictures = draw(dataset, stem, kinds=kinds, rest=rest)
-    if as_json:
-        print_json({"file": str(path), "files": [str(picture) for picture in pictures]})
-        return
-    for picture in pictures:
-        print(picture)
+# What `--scene` takes besides a case: no scene at all, and the case of the report's answer.
+_NONE, _ANSWER = "none", "answer"
+# Elements that a case has at most that is meshed without being asked for: some seconds.
+_MOST_CELLS = 100_000
 
 
 def report(
@@ -68,30 +42,145 @@ def report(
             show_default=False,
         ),
     ] = None,
+    figures: Annotated[
+        bool,
+        typer.Option("--figures", help="Draw figures alone, as PNG and SVG: <study>.png, others <study>_<kind>.png."),
+    ] = False,
+    kind: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="With --figures: one to draw; may be repeated: ratio, error, force, map, compliance. "
+            "Default: all that suit.",
+            show_default=False,
+        ),
+    ] = None,
+    rest: Annotated[
+        bool,
+        typer.Option(
+            "--rest",
+            help="With --figures: what a figure of a large study leaves out, too: <study>_<kind>_2.png …",
+        ),
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Write the report of a dataset, one HTML page that needs nothing else, beside it: <study>.html.
 
     It holds the figures, a table of the cases to sort and filter, what failed or was skipped and why, the study file,
-    and how to run it again.
+    and how to run it again. With --figures those are drawn instead, as files.
 
     Example: epsmesh report results/figure3.nc
 
     Example: epsmesh report results/figure3.nc --scene "epsilon=10 mm"
 
-    Example: epsmesh report results/figure3.nc --scene none
+    Example: epsmesh report studies/figure3.toml --figures --kind error --kind force
     """
+    if not figures and (kind or rest):
+        fail("--kind and --rest say which figures are drawn: give --figures, too")
     path, dataset = read_dataset(file, output)
+    if figures:
+        _draw(path, dataset, kind, rest=rest, as_json=as_json)
+        return
     wanted = (scene or "").strip()
-    check_output(path.with_suffix(".html"), room=_PAGE if wanted in ("", _NONE) else _PAGE_WITH_SCENE)
+    check_output(path.with_suffix(".html"))
     if wanted not in ("", _NONE):
         check_machine()
-    from pipeline.cli.scene import scene_at_hand, scene_of
     from pipeline.report.page import write_page
 
-    shown = "" if wanted == _NONE else scene_of(path, dataset, wanted) if wanted else scene_at_hand(dataset)
+    shown = "" if wanted == _NONE else _scene_of(path, dataset, wanted) if wanted else _scene_at_hand(dataset)
     page = write_page(dataset, path.with_suffix(".html"), shown)
     if as_json:
         print_json({"file": str(path), "page": str(page)})
     else:
         print(page)
+
+
+def _draw(path: Path, dataset: "xr.Dataset", kind: list[str] | None, *, rest: bool, as_json: bool) -> None:
+    """Draw the figures of a dataset beside it."""
+    from pipeline.report.figures import KINDS, choose, draw, files, lacks
+
+    for name in kind or ():
+        if name not in KINDS:
+            fail(of_option("--kind", name, f"no figure is called so; there are {', '.join(KINDS)}"))
+        if lack := lacks(dataset, name):
+            allowed = f"{lack}; its figures are {', '.join(choose(dataset))}"
+            fail(Fault(f"{path}: --kind {name} {allowed}", str(path), "--kind", name, allowed))
+    stem, kinds = path.with_suffix(""), kind or choose(dataset)
+    check_output(*(picture for some in files(dataset, stem, kinds=kinds).values() for picture in some))
+    pictures = draw(dataset, stem, kinds=kinds, rest=rest)
+    if as_json:
+        print_json({"file": str(path), "files": [str(picture) for picture in pictures]})
+    else:
+        print("\n".join(map(str, pictures)))
+
+
+def _scene_of(path: Path, dataset: "xr.Dataset", text: str) -> str:
+    """Return the page of a case of ``dataset``, as its mesh; exit if there is none."""
+    from pipeline.cli.view import fields_of
+    from pipeline.report.table import DatasetError, study_of
+    from pipeline.view.page import render
+    from pipeline.workflow import world
+
+    study = study_of(dataset)
+    if study is None:
+        fail(of_file(path, "--scene needs the study's text, as this version reads it"))
+    if text == _ANSWER:
+        try:
+            chosen = _of_answer(dataset, study)
+        except DatasetError as wrong:
+            fail(of_file(path, f"--scene {_ANSWER} needs an answer: {wrong}; name a case by its number"))
+    else:
+        chosen = find_case(study, text, "--scene")
+    fields = fields_of(study, chosen, world(), mesh_only=True, bar=False, meshes=DEFAULT_MESHES)
+    assert fields is not None  # one process
+    return render(fields, study.title)
+
+
+def _scene_at_hand(dataset: "xr.Dataset") -> str:
+    """Return the page of the case that limits the answer, as its mesh; "" where it is not to be had in seconds."""
+    from pipeline.plan.estimate import cells
+    from pipeline.report.table import DatasetError, study_of
+
+    study = study_of(dataset)
+    if study is None or faults_of_machine():
+        return ""
+    try:
+        case = _of_answer(dataset, study)
+    except DatasetError:
+        return ""
+    if case.lost_contact:
+        return ""
+    load_solvers()
+    from mpi4py import MPI
+
+    from pipeline.mesh.generate import MeshError
+    from pipeline.run.mesh_cache import MeshCache
+    from pipeline.run.problem import CaseFailure
+    from pipeline.view.compute import compute_fields, solve_to_view
+    from pipeline.view.page import render
+
+    solve = solve_to_view(study, case)
+    if cells(solve.case) > _MOST_CELLS:
+        return ""
+    kept = MeshCache(DEFAULT_MESHES) if DEFAULT_MESHES.is_dir() else None
+    try:
+        fields = compute_fields(solve, MPI.COMM_SELF, mesh_only=True, cache=kept)
+    except (CaseFailure, MeshError, MemoryError, RuntimeError, OSError):
+        return ""
+    return render(fields, study.title) if fields is not None else ""
+
+
+def _of_answer(dataset: "xr.Dataset", study: "Study") -> "Case":
+    """Return the case that limits the answer of the report.
+
+    Raises:
+        DatasetError: if there is no answer.
+    """
+    from pipeline.report.guide import USUAL_ACCURACY, guide
+    from pipeline.report.table import DatasetError, case_at
+
+    found = guide(dataset, USUAL_ACCURACY)
+    verdict = found.answer or found.best
+    case = case_at(dataset, study, verdict.labels | (verdict.limit or {})) if verdict else None
+    if case is None:
+        raise DatasetError("no setting was judged")
+    return case

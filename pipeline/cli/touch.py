@@ -12,7 +12,6 @@ from pipeline.cli.faults import fail, of_file
 from pipeline.cli.words import Json, check_output
 
 MODEL = ".epsm.nc"  # what `export` writes
-_PAGE = 4_000_000  # bytes that it may take
 
 
 def touch(
@@ -42,7 +41,7 @@ def touch(
     from pipeline.touch.page import render, write_touch_page
 
     if output is not None:
-        check_output(output, room=_PAGE)
+        check_output(output)
     try:
         surface = load_surface(model)
         if output is not None:

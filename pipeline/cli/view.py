@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from pipeline.cli.cases import find_case
 from pipeline.cli.console import error, load_solvers, print_json
 from pipeline.cli.faults import SOME_FAILED, Fault, fail
-from pipeline.cli.plan import find_case
 from pipeline.cli.words import DEFAULT_MESHES, DEFAULT_OUTPUT, File, Json, Output, check_machine, check_output, load_all
 
 if TYPE_CHECKING:
@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from pipeline.study.sweep import Case, Study
     from pipeline.view.fields import Fields
-
-_ROOM = 2_000_000  # bytes that a page or a picture may take
 
 
 def view(
@@ -44,10 +42,11 @@ def view(
     """
     (study,) = load_all([file])
     chosen = find_case(study, case)
-    stem = output / f"{study.name}_{_number(study, chosen)}"
+    number = next(n for n, other in enumerate(study.cases()) if other.index == chosen.index)
+    stem = output / f"{study.name}_{number}"
     missing = "" if export else _missing()
     endings = [f".{export or 'html'}"] if export or missing else ["_mesh.png", "_deformed.png"]
-    check_output(*(stem.with_name(f"{stem.name}{ending}") for ending in endings), room=_ROOM)
+    check_output(*(stem.with_name(f"{stem.name}{ending}") for ending in endings))
     check_machine()
     from pipeline.workflow import abort_on_exception, ended_soon, world
 
@@ -71,16 +70,9 @@ def fields_of(
     from pipeline.view.compute import compute_fields, solve_to_view
 
     if case.lost_contact:
-        fail(
-            Fault(
-                f"{case}: {case.lost_contact}",
-                key="CASE",
-                value=str(case),
-                allowed=case.lost_contact,
-                howto="docs/howto/path.md",
-            )
-        )
-    note = error if comm.rank == 0 else _say_nothing
+        why, howto = case.lost_contact, "docs/howto/path.md"
+        fail(Fault(f"{case}: {why}", key="CASE", value=str(case), allowed=why, howto=howto))
+    note = error if comm.rank == 0 else lambda _: None
     note(str(case))
     try:
         solve = solve_to_view(study, case)
@@ -129,14 +121,6 @@ def _written(study: "Study", fields: "Fields", stem: Path, export: str | None) -
     return files
 
 
-def _number(study: "Study", case: "Case") -> int:
-    """Return the case's number, counted from 0, the last axis fastest."""
-    number = 0
-    for position, length in zip(case.index, study.shape, strict=True):
-        number = number * length + position
-    return number
-
-
 def _missing() -> str:
     """Return what pictures need and this machine lacks, and how to install it, or nothing."""
     import ctypes
@@ -152,6 +136,3 @@ def _missing() -> str:
         except OSError:
             return "libEGL installed (`make setup EXTRAS=view`, or `apt-get install libegl1`)"
     return ""
-
-
-def _say_nothing(_: str) -> None: ...

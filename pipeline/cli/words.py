@@ -9,52 +9,46 @@ import typer
 
 from pipeline.cli.console import warning
 from pipeline.cli.faults import Fault, fail, of_file, of_option, of_study, refusing
-from pipeline.files import LEAST_ROOM, STORE_NAME, cache_folder, why_not_writable
+from pipeline.files import STORE_NAME, cache_folder, why_not_writable
 from pipeline.study.vocabulary import REDUCTIONS
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.plan.cost import CostModel
-    from pipeline.plan.plan import Plan
     from pipeline.plan.shard import Shard
-    from pipeline.run.record import Record
     from pipeline.study.sweep import Study
 
 _SKIPPING, CLUSTER = "docs/skipping.md", "docs/cluster.md"  # what tells more
 _SQLITE = b"SQLite format 3\0"
 _UNWRITABLE = ": cannot be written: "
-_COMPILED = 5_000_000  # bytes that compiled forms may take
 DEFAULT_OUTPUT, DEFAULT_MESHES = Path("results"), Path("meshes/cache")
 
 STUDIES = Path("studies")
 
 
-def _by_name(given: "Path | list[Path]") -> "Path | list[Path]":
-    """Return study files, those that `epsmesh new NAME` has made by their names, too."""
-    if isinstance(given, list | tuple):
-        return [_of_name(file) for file in given]
-    return _of_name(given)
-
-
-def _of_name(file: Path) -> Path:
+def by_name(file: Path) -> Path:
+    """Return a study file, one that `epsmesh new NAME` has made by its name, too."""
     made = STUDIES / f"{file}.toml"
     return made if file.name == str(file) and not file.exists() and made.is_file() else file
+
+
+def _all_by_name(files: list[Path]) -> list[Path]:
+    return [by_name(file) for file in files]
 
 
 Files = Annotated[
     list[Path],
     typer.Argument(
-        metavar="FILE...", help="Study files (TOML), or names in studies/.", show_default=False, callback=_by_name
+        metavar="FILE...", help="Study files (TOML), or names in studies/.", show_default=False, callback=_all_by_name
     ),
 ]
 File = Annotated[
     Path,
     typer.Argument(
-        metavar="FILE", help="A study file (TOML), or a name in studies/.", show_default=False, callback=_by_name
+        metavar="FILE", help="A study file (TOML), or a name in studies/.", show_default=False, callback=by_name
     ),
 ]
-Dataset = Annotated[Path, typer.Argument(help="A dataset (.nc), or a study whose dataset exists.", callback=_by_name)]
+Dataset = Annotated[Path, typer.Argument(help="A dataset (.nc), or a study whose dataset exists.", callback=by_name)]
 Output = Annotated[Path, typer.Option(metavar="DIR", help="Folder of the results.")]
 Found = Annotated[
     Path, typer.Option("--output", metavar="DIR", help="Folder in which the dataset of a study is looked for.")
@@ -108,7 +102,7 @@ def load_all(files: list[Path]) -> "list[Study]":
 def meant(file: Path) -> str:
     """Return ``; did you mean …?`` for a study file that is not there; of a folder or a .nc, what to give."""
     if file.suffix == ".nc":
-        return "; a study file ends in .toml: a dataset is for `report`, `plot` and `guide`, a model for `touch`"
+        return "; a study file ends in .toml: a dataset is for `report` and `guide`, a model for `touch`"
     if file.is_dir():
         return f": give its files, such as {file / '*.toml'}"
     if file.exists():
@@ -116,20 +110,6 @@ def meant(file: Path) -> str:
     known = {path.stem: path for path in (*file.parent.glob("*.toml"), *STUDIES.glob("*.toml"))}
     close = difflib.get_close_matches(file.stem, known, n=1, cutoff=0.5)
     return f"; did you mean {known[close[0]]}?" if close else ""
-
-
-def stored_records(path: Path, plan: "Plan") -> "tuple[dict[str, Record], CostModel]":
-    """Return what the store at ``path`` has of a plan's cases and of their F_exact, and what cases cost."""
-    from pipeline.plan.cost import CostModel
-
-    if not path.exists():
-        return {}, CostModel()
-    from pipeline.run.reading import known_of
-    from pipeline.run.store import StoreError
-
-    check_store(path)
-    with refusing(StoreError, file=path):
-        return known_of(path, plan)
 
 
 def read_dataset(file: Path, output: Path) -> "tuple[Path, xr.Dataset]":
@@ -152,14 +132,14 @@ def check_store(path: Path) -> None:
             fail(of_option("--store", path, "is not a case store"))
 
 
-def check_output(*files: Path, folder: Path | None = None, room: int = LEAST_ROOM) -> None:
+def check_output(*files: Path, folder: Path | None = None) -> None:
     """Exit if one of the files, or any file in a ``folder``, could not be written: before anything is computed.
 
-    Each may take ``room`` bytes. What holds for several, a full disk, is told of the first one.
+    What holds for several, a full disk, is told of the first one.
     """
     found = dict[str, Fault]()
     for file in files:
-        if why := why_not_writable(file, room):
+        if why := why_not_writable(file):
             reason = why.removeprefix(str(file)) if _UNWRITABLE in why else why
             found.setdefault(reason, Fault(why, file=str(file)))
     if folder and (why := _why_no_files(folder)):
@@ -176,20 +156,20 @@ def check_machine() -> None:
 
 def faults_of_machine() -> list[Fault]:
     """Return what keeps code from being compiled, or MPI from being started: folders that cannot be written."""
-    tried = {"EPSMESH_CACHE": (cache_folder(), _COMPILED)}
+    tried = {"EPSMESH_CACHE": cache_folder()}
     if given := os.environ.get("TMPDIR"):
-        tried["TMPDIR"] = (Path(given), 1)
+        tried["TMPDIR"] = Path(given)
     return [
         Fault(f"{why}; {name} may name another folder", file=str(folder), key=name)
-        for name, (folder, room) in tried.items()
-        if (why := _why_no_files(folder, room))
+        for name, folder in tried.items()
+        if (why := _why_no_files(folder))
     ]
 
 
-def _why_no_files(folder: Path, room: int = LEAST_ROOM) -> str:
-    """Say why no file of ``room`` bytes can be written in a folder, "" if one can."""
+def _why_no_files(folder: Path) -> str:
+    """Say why no file can be written in a folder, "" if one can."""
     tried = folder / "tried"
-    return why_not_writable(tried, room).replace(str(tried), str(folder), 1)
+    return why_not_writable(tried).replace(str(tried), str(folder), 1)
 
 
 def axes_of(study: "Study") -> str:

@@ -2,15 +2,17 @@
 
 import shutil
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import closing, contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from pipeline.plan.cost import CostModel
-from pipeline.plan.work import Plan
+from pipeline.plan.plan import Plan, make_plan
 from pipeline.run.record import Record
 from pipeline.run.store import PATIENCE, SCHEMA, DamagedStoreError, Records, Row, StoreError, damaged, guard, reason
+from pipeline.study.sweep import Study
 
 
 @contextmanager
@@ -33,13 +35,28 @@ def open_to_read(path: Path) -> Iterator[Records]:
 
 
 def known_of(path: Path, plan: Plan) -> tuple[dict[str, Record], CostModel]:
-    """Return what the store at ``path`` has of a plan's cases and of their F_exact, and what cases cost.
+    """Return what the store at ``path``, if there is one, has of a plan's cases and F_exact, and what cases cost.
 
     Raises:
         StoreError: as :func:`open_to_read`, or if a record cannot be read.
     """
+    if not path.exists():
+        return {}, CostModel()
     with open_to_read(path) as store:
         return store.get({*plan.keys, *plan.reference_keys}), store.cost_model()
+
+
+def plan_the_rest(study: Study, path: Path, without: Collection[str] = ()) -> tuple[Plan, dict[str, Record]]:
+    """Return the plan of what the store at ``path``, if there is one, does not have, and the records that it has.
+
+    Raises:
+        StoreError: as :func:`known_of`.
+        ValueError: if ``without`` holds an unknown name.
+    """
+    bare = make_plan(study, without=without)
+    records, cost = known_of(path, bare)
+    done = [key for key, record in records.items() if record.is_ok]
+    return replace(make_plan(study, done, without) if done else bare, cost=cost), records
 
 
 def read_rows(path: Path) -> list[Row]:

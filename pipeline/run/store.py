@@ -262,7 +262,7 @@ def reason(error: Exception) -> str:
 
 
 def _mend(path: Path) -> str:
-    return f"`epsmesh store --prune --yes --store {quote(str(path))}`"
+    return f"`epsmesh status --prune --yes --store {quote(str(path))}`"
 
 
 def _readable(text: str) -> Record | None:

@@ -1,11 +1,13 @@
 """Work against precision: the error of F over run time and unknowns, for every kind of element and mesh.
 
 The scene is one of which F is known to 1e-7, a disc of 3 mm on a cylinder of R = H = 50 mm, bonded. Runs are warm
-(forms compiled, libraries loaded), alone, on one core; times are medians. ``epsmesh benchmark`` runs it.
+(forms compiled, libraries loaded), alone, on one core; times are medians. Wants an idle machine, and takes ten minutes.
 """
 
+import argparse
 import itertools
 import statistics
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isfinite
@@ -17,7 +19,7 @@ import xarray as xr
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
-from pipeline.files import result_files
+from pipeline.files import result_files, why_not_writable
 from pipeline.mesh.meridian import Meridian
 from pipeline.plan.plan import make_plan
 from pipeline.report.dataset import write
@@ -30,6 +32,7 @@ from pipeline.solve.physics import MaterialLaw
 from pipeline.study.load import parse
 from pipeline.verify import known
 from pipeline.verify.machine import machine
+from pipeline.verify.running import ended_soon
 from pipeline.verify.work_precision_figure import draw
 
 NAME = "work_precision"
@@ -201,3 +204,20 @@ def main(output: Path, repeats: int, *, quick: bool = False) -> list[Path]:
     path = outputs(output)[0]
     write(found, path)
     return [path, *draw(found, path.with_suffix(""))]
+
+
+def command(arguments: list[str]) -> None:
+    """Run from the command line."""
+    parser = argparse.ArgumentParser(prog="python -m pipeline.verify.work_precision", description=__doc__)
+    parser.add_argument("--output", type=Path, default=Path("results"), metavar="DIR")
+    parser.add_argument("--repeats", type=int, default=3, metavar="N", help="runs of each point; the median counts")
+    parser.add_argument("--quick", action="store_true", help="a few points")
+    options = parser.parse_args(arguments)
+    if wrong := [why for path in outputs(options.output) if (why := why_not_writable(path))]:
+        parser.error(wrong[0])
+    with ended_soon():
+        print(*main(options.output, max(options.repeats, 1), quick=options.quick), sep="\n")
+
+
+if __name__ == "__main__":
+    command(sys.argv[1:])

@@ -59,18 +59,36 @@ def test_every_command_has_help_with_an_example(epsmesh, command):
 
 def test_version_and_short_help(epsmesh):
     assert epsmesh("--version").stdout == f"epsmesh {__version__}\n"
+    assert {"dolfinx", "petsc", "gmsh"} <= {line.split()[0] for line in epsmesh("--version", "-v").stdout.splitlines()}
+    assert json.loads(epsmesh("--version", "--json").stdout)["epsmesh"] == __version__
+    assert epsmesh("--verbose", "plan", "x").exit_code == 2
     assert epsmesh("plan", "-h").stdout == epsmesh("plan", "--help").stdout
 
 
-def test_help_of_plot_names_every_figure(epsmesh):
-    shown = set(re.findall(r"\w+", epsmesh("plot", "--help").stdout))
+@pytest.mark.parametrize(
+    "words",
+    ["validate", "merge", "plot x.nc", "store --prune", "version --json", "evaluator c", "benchmark", "explain"],
+)
+def test_a_command_of_another_name_is_told_by_its_new_one(epsmesh, words):
+    done = epsmesh(*words.split())
+    assert (done.exit_code, done.stderr.count("\n")) == (2, 1)
+    assert f"`epsmesh {words.split()[0]}` is now `" in done.stderr
+    assert "--json" not in words or json.loads(done.stdout)["errors"][0]["allowed"] == "epsmesh --version --verbose"
+
+
+def test_there_are_twelve_commands_at_most():
+    assert len(COMMANDS) <= 12
+
+
+def test_help_of_report_names_every_figure(epsmesh):
+    shown = set(re.findall(r"\w+", epsmesh("report", "--help").stdout))
     assert set(KINDS) - {"nothing"} <= shown
 
 
 def test_misspelt_commands_options_and_reductions_get_the_nearest(epsmesh, small, tmp_path):
     assert "'plan'" in epsmesh("pln").stderr
     assert "--json" in epsmesh("plan", "x.toml", "--jsn").stderr
-    for command in ("validate", "plan", "run", "status"):
+    for command in ("plan", "run", "status"):
         absent = epsmesh(command, tmp_path / "smal.toml")
         assert (absent.exit_code, f"did you mean {small}?" in absent.stderr) == (2, True)
     refused = epsmesh("plan", small, "--without", "symetry")
@@ -80,10 +98,10 @@ def test_misspelt_commands_options_and_reductions_get_the_nearest(epsmesh, small
 def test_colour_on_terminals_only_and_not_where_it_is_unwanted(spawn, tmp_path):
     file = tmp_path / "bad.toml"
     file.write_text("[body]\n")
-    assert "\033[31m" in on_terminal("validate", str(file))
-    assert "\033[" not in on_terminal("validate", str(file), NO_COLOR="1")
-    assert "\033[" not in on_terminal("validate", str(file), TERM="dumb")
-    assert "\033[" not in spawn("validate", file).stderr
+    assert "\033[31m" in on_terminal("plan", str(file))
+    assert "\033[" not in on_terminal("plan", str(file), NO_COLOR="1")
+    assert "\033[" not in on_terminal("plan", str(file), TERM="dumb")
+    assert "\033[" not in spawn("plan", file).stderr
 
 
 def test_json_of_a_run_is_one_object_with_what_failed_and_why(epsmesh, tmp_path):
@@ -137,30 +155,30 @@ def test_shell_completes_commands_and_names_and_leaves_files_to_the_shell():
                        "COMP_CWORD": str(len(words))}  # fmt: skip
         return CliRunner().invoke(app, prog_name="epsmesh", env=environment).stdout.split()
 
-    assert completed("val") == ["validate"]
+    assert completed("com") == ["compare"]
     assert "symmetry" in completed("plan", "--without", "sy")
     assert "figure3" in completed("new", "mine", "--like", "fig")
     assert completed("run", "stud") == []
 
 
 def test_fish_gets_a_tab_between_a_command_and_its_help():
-    asked = {"_EPSMESH_COMPLETE": "complete_fish", "_TYPER_COMPLETE_ARGS": "epsmesh val",
+    asked = {"_EPSMESH_COMPLETE": "complete_fish", "_TYPER_COMPLETE_ARGS": "epsmesh pla",
              "_TYPER_COMPLETE_FISH_ACTION": "get-args"}  # fmt: skip
     words, environment = [sys.executable, "-m", "pipeline"], ENVIRONMENT | asked
     done = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
-    assert done.stdout.startswith("validate\tCheck study files")
+    assert done.stdout.startswith("plan\tCheck a study")
 
 
 def test_what_is_no_store_is_left_alone(epsmesh, tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
     letter = tmp_path / "letter.txt"
     letter.write_text("Dear reader")
-    for command in (["store"], ["store", "--prune"], ["status", "studies/quick.toml"]):
+    for command in (["status"], ["status", "--prune"], ["status", "studies/quick.toml"]):
         refused = epsmesh(*command, "--store", letter)
         assert refused.exit_code == 2
         assert "is not a case store" in refused.stderr
     assert letter.read_text() == "Dear reader"
-    assert epsmesh("plot", letter.rename(tmp_path / "letter.nc")).exit_code == 2
+    assert epsmesh("report", letter.rename(tmp_path / "letter.nc"), "--figures").exit_code == 2
 
 
 def test_several_ranks_have_one_voice_for_words_that_make_no_command(spawn):
@@ -174,8 +192,8 @@ def test_one_of_a_thing_is_called_so_and_letters_that_are_seen_are_written_as_th
     file = tmp_path / "µm.toml"
     one = {"mesh": {"epsilon": "4000 µm"}, "solve": {"exact": False}}
     file.write_text(small_text(title="Breadth in µm", **one))
-    for words in (("validate", file), ("plan", file), ("plan", file, "--json"), ("run", file), ("status", file)):
-        done = epsmesh(*words, *(() if words[0] == "validate" else ("--output", tmp_path / "out")))
+    for words in (("plan", "--check", file), ("plan", file), ("plan", file, "--json"), ("run", file), ("status", file)):
+        done = epsmesh(*words, "--output", tmp_path / "out")
         told = done.stdout + done.stderr
         assert done.exit_code == 0, told
         assert "µm" in told

@@ -57,13 +57,13 @@ def test_unknown_commands_and_missing_words_are_told(epsmesh):
     assert "pln" in error["message"]
     (error,) = failed(epsmesh("plan", "--json"))
     assert error["key"] == "FILE"
-    (error,) = failed(epsmesh("benchmark", "--repeats", "many", "--json"))
-    assert (error["key"], error["value"], bool(error["allowed"])) == ("--repeats", "many", True)
+    (error,) = failed(epsmesh("export", "a.toml", "--checks", "many", "--json"))
+    assert (error["key"], error["value"], bool(error["allowed"])) == ("--checks", "many", True)
     (error,) = failed(epsmesh("plan", "a.toml", "--memory=-1", "--json"))
     assert (error["key"], error["value"], "0.1" in error["allowed"]) == ("--memory", "-1", True)
 
 
-@pytest.mark.parametrize("command", ["plan", "run", "status", "merge", "view", "export"])
+@pytest.mark.parametrize("command", ["plan", "run", "status", "view", "export"])
 def test_a_bad_study_is_told_problem_by_problem(epsmesh, small, command):
     small.write_text(small.read_text().replace('"2 mm"', "2").replace("0.4", "0.9"))
     done = epsmesh(command, small, "--json")
@@ -74,7 +74,7 @@ def test_a_bad_study_is_told_problem_by_problem(epsmesh, small, command):
     assert {error["file"] for error in errors.values()} == {str(small)}
     assert "material.poisson = 0.9: must be at most 0.5" in done.stderr
     assert done.stderr.splitlines()[-1] == "how to: docs/howto/own-study.md"
-    (report,) = json.loads(epsmesh("validate", small, "--json").stdout)
+    (report,) = json.loads(epsmesh("plan", "--check", small, "--json").stdout)
     assert report["errors"] == list(errors.values())
 
 
@@ -83,7 +83,7 @@ def test_a_bad_study_is_told_problem_by_problem(epsmesh, small, command):
     [
         ("guide known.nc --json", "--accuracy"),
         ("guide known.nc --accuracy 5 --json", "--accuracy"),
-        ("plot known.nc --kind pie --json", "--kind"),
+        ("report known.nc --figures --kind pie --json", "--kind"),
         ("report absent.nc --json", None),
         ("new ../x --json", "NAME"),
         ("new x --like nothing --json", "--like"),
@@ -91,8 +91,9 @@ def test_a_bad_study_is_told_problem_by_problem(epsmesh, small, command):
         ("plan SMALL --without magic --json", "--without"),
         ("run SMALL --shard 9/3 --json", "--shard"),
         ("run SMALL --output known.nc --json", None),
-        ("store --store absent --json", None),
-        ("store --prune --store known.nc --json", "--store"),
+        ("status --store absent --json", None),
+        ("status --prune --store known.nc --json", "--store"),
+        ("export --json", "FILE"),
         ("touch known.nc --json", None),
         ("export SMALL --accuracy 90% --json", "--accuracy"),
     ],
@@ -107,7 +108,7 @@ def test_what_else_is_wrong_is_told(epsmesh, small, here, words, key):
 
 def test_warnings_of_a_study_are_told(epsmesh, small, tmp_path):
     small.write_text(small.read_text().replace('"0.1 mm"', '"0.5 mm"'))
-    (told,) = json.loads(epsmesh("validate", small, "--json").stdout)[0]["warnings"]
+    (told,) = json.loads(epsmesh("plan", "--check", small, "--json").stdout)[0]["warnings"]
     assert "probe.depth" in told
     assert json.loads(epsmesh("plan", small, "--json").stdout)["warnings"] == [told]
     assert "warnings" not in json.loads(epsmesh("status", small, "--json").stdout)
@@ -124,7 +125,7 @@ def test_an_exception_is_told_and_goes_on(epsmesh, small, monkeypatch):
 
 def test_what_is_written_is_told(epsmesh, small, here):
     assert json.loads(epsmesh("new", "mine", "--json").stdout) == {"file": "studies/mine.toml"}
-    assert json.loads(epsmesh("plot", "known.nc", "--kind", "error", "--json").stdout)["files"] != []
+    assert json.loads(epsmesh("report", "known.nc", "--figures", "--kind", "error", "--json").stdout)["files"] != []
     page = json.loads(epsmesh("report", "known.nc", "--json").stdout)["page"]
     assert (here / page).is_file()
     seen = json.loads(epsmesh("view", small, "--mesh-only", "--export", "html", "--output", here, "--json").stdout)
@@ -139,14 +140,14 @@ def test_pruning_says_first_what_would_go(epsmesh, tmp_path):
         opened.put(Record(f"k{number}", "failed" if number < 2 else "ok", force=1.0))
     opened.close()
     before = path.read_bytes()
-    words = ("store", "--prune", "--store", path, "--failed", "--json")
+    words = ("status", "--prune", "--store", path, "--failed", "--json")
     told = json.loads(epsmesh(*words).stdout)
     assert (told["remove"], told["records"], told["reasons"], told["done"]) == (2, 5, {"failed": 2}, False)
     assert 500 < told["bytes"] < 10_000
     assert path.read_bytes() == before
     assert json.loads(epsmesh(*words, "--yes").stdout)["done"]
-    assert json.loads(epsmesh("store", "--store", path, "--json").stdout)["sound"]
-    assert json.loads(epsmesh("store", "--store", path, "--json").stdout)["records"] == 3
+    assert json.loads(epsmesh("status", "--store", path, "--json").stdout)["sound"]
+    assert json.loads(epsmesh("status", "--store", path, "--json").stdout)["records"] == 3
     assert "none of 3 records would be removed" in epsmesh(*words[:-1]).stdout
 
 

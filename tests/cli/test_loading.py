@@ -59,7 +59,7 @@ def test_help_loads_no_study_no_plan_and_no_shape():
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("command", ["validate", "plan", "status"])
+@pytest.mark.parametrize("command", ["plan", "status"])
 def test_a_study_loads_the_shapes_that_it_names_alone(command, study, tmp_path):
     modules = loaded(command, study, within=tmp_path)
     assert not libraries(modules) & (_SLOW | _ELSEWHERE - ({"sqlite3"} if command == "status" else set()))
@@ -69,7 +69,7 @@ def test_a_study_loads_the_shapes_that_it_names_alone(command, study, tmp_path):
 
 def test_a_unit_that_few_people_write_is_asked_after(study, tmp_path):
     study.write_text(study.read_text().replace("kPa", "kN/m^2"))
-    assert "pint" in loaded("validate", study, within=tmp_path)
+    assert "pint" in loaded("plan", study, within=tmp_path)
 
 
 def test_a_study_begun_like_another_loads_no_shape(tmp_path):

@@ -3,7 +3,7 @@
 import pytest
 
 
-@pytest.mark.parametrize("words", [("validate",), ("plan",), ("status",)])
+@pytest.mark.parametrize("words", [("plan", "--check"), ("plan",), ("status",)])
 def test_a_study_is_found_by_its_name(epsmesh, tmp_path, monkeypatch, words):
     monkeypatch.chdir(tmp_path)
     assert epsmesh("new", "mine").exit_code == 0
@@ -17,13 +17,13 @@ def test_a_file_of_that_name_comes_first(epsmesh, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert epsmesh("new", "mine").exit_code == 0
     (tmp_path / "mine").write_text("title = 1")
-    assert epsmesh("validate", "mine").exit_code == 2
+    assert epsmesh("plan", "--check", "mine").exit_code == 2
 
 
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("run", "known.nc"), "a dataset is for `report`, `plot` and `guide`, a model for `touch`"),
+        (("run", "known.nc"), "a dataset is for `report` and `guide`, a model for `touch`"),
         (("touch", "small.toml"), "a model ends in .epsm.nc: `epsmesh export small.toml` makes one"),
         (("touch", "known.nc"), "a model ends in .epsm.nc: `epsmesh export known.toml` makes one"),
     ],

@@ -105,13 +105,13 @@ def test_the_file_of_a_body_is_taken_along_within_the_project(elsewhere):
 
 
 def test_the_evaluator_in_c_is_copied_and_nothing_overwritten(elsewhere):
-    done = epsmesh("evaluator", "mine/c", "--json")
+    done = epsmesh("export", "--evaluator", "mine/c", "--json")
     names = json.loads(done.stdout)["files"]
     assert {"epsmesh.h", "epsmesh.c", "epsmesh_patch.c", "examples/hand.h", "examples/unity.c"} <= {*names}
     for name in names:
         assert (elsewhere / "mine" / "c" / name).read_text() == (STUDIES.parent / "realtime" / name).read_text()
     (elsewhere / "mine" / "c" / "epsmesh.h").unlink()
-    again = epsmesh("evaluator", "mine/c")
+    again = epsmesh("export", "--evaluator", "mine/c")
     assert (again.exit_code, "exists already" in again.stderr) == (2, True)
     assert not (elsewhere / "mine" / "c" / "epsmesh.h").exists()
 

@@ -47,7 +47,11 @@ def test_a_full_standard_output_is_told(tmp_path):
     (tmp_path / "small.toml").write_text(small_text(), encoding="utf-8")
     with open("/dev/full", "w") as full:  # noqa: PTH123
         done = subprocess.run(
-            command("validate", tmp_path / "small.toml"), stdout=full, stderr=subprocess.PIPE, text=True, check=False
+            command("plan", "--check", tmp_path / "small.toml"),
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
         )
     assert (done.returncode, done.stderr) == (2, "standard output: No space left on device\n")
 
@@ -92,15 +96,14 @@ def results(tmp_path_factory):
 
 # What stands in the way of which command, of those that write other files than `run` does.
 COMMANDS = {
-    "plot": ("out/small.svg", ("plot", "out/small.nc")),
+    "figures": ("out/small.svg", ("report", "out/small.nc", "--figures")),
     "report": ("out/small.html", ("report", "out/small.nc")),
     "report of a scene": ("out/small.html", ("report", "out/small.nc", "--scene", "0")),
-    "merge": ("more/small.png", ("merge", "small.toml", "out/cases.sqlite", "--output", "more")),
+    "merge": ("more/small.png", ("status", "small.toml", "out/cases.sqlite", "--merge", "--output", "more")),
     "view as a page": ("more/small_0.html", ("view", "small.toml", "0", "--export", "html", "--output", "more")),
     "view for ParaView": ("more/small_0.vtu", ("view", "small.toml", "0", "--export", "vtu", "--output", "more")),
     "touch": ("more/page.html", ("touch", "none.epsm.nc", "--output", "more/page.html")),
     "export": ("more/m.epsm.nc", ("export", "small.toml", "--output", "more/m.epsm.nc")),
-    "benchmark": ("more/work_precision.nc", ("benchmark", "--quick", "--output", "more")),
 }
 
 
@@ -119,7 +122,7 @@ def test_every_command_finds_first_what_it_cannot_write(name, epsmesh, results, 
     assert sorted(tmp_path.rglob("*")) == before
 
 
-@pytest.mark.parametrize("arguments", [("new", "small.toml/x.toml"), ("evaluator", "small.toml/x")])
+@pytest.mark.parametrize("arguments", [("new", "small.toml/x.toml"), ("export", "--evaluator", "small.toml/x")])
 def test_a_file_in_the_place_of_a_folder_is_told(epsmesh, results, monkeypatch, arguments):
     monkeypatch.chdir(results)
     done = epsmesh(*arguments)
@@ -155,8 +158,8 @@ def test_a_store_that_cannot_be_changed_is_told(epsmesh, results, tmp_path, monk
     with sqlite3.connect(path) as database:
         database.execute("UPDATE records SET record = ''")
     monkeypatch.setattr("pipeline.run.store._open", lambda path: sqlite3.connect(f"file:{path}?mode=ro", uri=True))
-    assert epsmesh("store", "--prune", "--store", path).exit_code == 0
-    done = epsmesh("store", "--prune", "--store", path, "--yes")
+    assert epsmesh("status", "--prune", "--store", path).exit_code == 0
+    done = epsmesh("status", "--prune", "--store", path, "--yes")
     assert done.exit_code == 2
     assert "readonly" in done.stderr
 
@@ -179,10 +182,10 @@ def test_streams_that_are_closed_are_none_of_a_commands_files(results, tmp_path,
     done = subprocess.run(f"{run} {closed}", shell=True, cwd=tmp_path, env=ENVIRONMENT, check=False)
     assert done.returncode == 0
     assert (tmp_path / "out" / "small.nc").is_file()
-    assert epsmesh_here("store", "--store", tmp_path / "out" / "cases.sqlite").exit_code == 0
+    assert epsmesh_here("status", "--store", tmp_path / "out" / "cases.sqlite").exit_code == 0
 
 
-@pytest.mark.parametrize("command", ["validate", "plot", "touch"])
+@pytest.mark.parametrize("command", ["plan", "report", "touch"])
 def test_a_name_that_no_file_can_have_is_told_without_a_word_of_writing(epsmesh, command):
     done = epsmesh(command, f"{'a' * 300}.nc")
     assert done.exit_code == 2

@@ -32,7 +32,7 @@ def fill(path, plan, **states):
     store.close()
 
 
-@pytest.mark.parametrize("words", [*((name, "FILE") for name in LOOKING), ("plan", "FILE", "0"), ("store",)])
+@pytest.mark.parametrize("words", [*((name, "FILE") for name in LOOKING), ("plan", "FILE", "0"), ("status",)])
 def test_a_damaged_store_is_named_and_left_where_it_is(epsmesh, small, tmp_path, words):
     store = tmp_path / "kept" / "cases.sqlite"
     store.parent.mkdir()
@@ -41,11 +41,11 @@ def test_a_damaged_store_is_named_and_left_where_it_is(epsmesh, small, tmp_path,
     done = epsmesh(*(small if word == "FILE" else word for word in words), "--store", store)
     assert done.exit_code == 2
     assert f"the case store {store} is damaged" in done.stderr
-    assert f"`epsmesh store --prune --yes --store {store}` moves it aside" in done.stderr
-    preview = epsmesh("store", "--prune", "--store", store)
+    assert f"`epsmesh status --prune --yes --store {store}` moves it aside" in done.stderr
+    preview = epsmesh("status", "--prune", "--store", store)
     assert "is damaged as a whole" in preview.stdout
     assert contents(tmp_path) == before
-    mended = epsmesh("store", "--prune", "--store", store, "--yes")
+    mended = epsmesh("status", "--prune", "--store", store, "--yes")
     assert mended.exit_code == 0
     assert "it was moved to" in mended.stderr
     assert epsmesh(*(small if word == "FILE" else word for word in words), "--store", store).exit_code == 0
@@ -64,15 +64,15 @@ def test_an_unreadable_record_is_told_with_what_removes_it(epsmesh, small, tmp_p
     done = epsmesh(command, small, "--store", store)
     assert (done.exit_code, done.exception is None or isinstance(done.exception, SystemExit)) == (2, True)
     assert f"record {plan.keys[0]} cannot be read" in done.stderr
-    assert f"`epsmesh store --prune --yes --store {store}` removes it" in done.stderr
-    preview = json.loads(epsmesh("store", "--prune", "--store", store, "--json").stdout)
+    assert f"`epsmesh status --prune --yes --store {store}` removes it" in done.stderr
+    preview = json.loads(epsmesh("status", "--prune", "--store", store, "--json").stdout)
     assert (preview["remove"], preview["reasons"], preview["done"]) == (1, {"cannot be read": 1}, False)
     assert contents(tmp_path) == before
-    assert epsmesh("store", "--prune", "--store", store, "--yes").exit_code == 0
+    assert epsmesh("status", "--prune", "--store", store, "--yes").exit_code == 0
     assert epsmesh(command, small, "--store", store).exit_code == 0
 
 
-@pytest.mark.parametrize("command", [*LOOKING, "validate"])
+@pytest.mark.parametrize("command", LOOKING)
 def test_looking_makes_no_files(epsmesh, small, tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
     assert epsmesh(command, small).exit_code == 0

@@ -52,7 +52,7 @@ def test_an_interrupt_of_which_an_import_made_another_exception_is_one(monkeypat
             raise ImportError("initialization failed") from interrupt
 
     monkeypatch.setattr("pipeline.run.provenance.provenance", interrupted)
-    done = epsmesh("version", "--json")
+    done = epsmesh("--version", "--json")
     assert (done.exit_code, done.stderr) == (130, "")
     assert json.loads(done.stdout)["status"] == 130
 

@@ -72,7 +72,7 @@ def test_what_the_jobs_start(tmp_path):
     _, calls = start("shards.sbatch", tmp_path, "s.toml", SHARDS="8", **array)
     assert calls[-1] == "epsmesh run s.toml --shard 3/8"
     status, calls = start("merge.sbatch", tmp_path, "s.toml", STATUS="1")
-    assert calls == ["epsmesh merge s.toml"]
+    assert calls == ["epsmesh status s.toml --merge"]
     assert status == 1
     for script in JOBS:
         status, calls = start(script.name, tmp_path)

@@ -48,21 +48,21 @@ def test_a_lost_shard_is_told_and_completed(whole, meshes, tmp_path):
         done = run(study, tmp_path, meshes, "--shard", f"{number}/3")
         assert done.exit_code == 0, done.output
         assert f"shard {number}/3" in done.stdout
-        assert "epsmesh merge" in done.stdout
+        assert "--merge" in done.stdout
     assert not (tmp_path / "small.nc").exists()
-    partial = epsmesh("merge", study, "--output", tmp_path, "--json")
+    partial = epsmesh("status", study, "--merge", "--output", tmp_path, "--json")
     assert partial.exit_code == 1
     found = json.loads(partial.stdout)
     assert found["pending"] > 0
     assert found["again"][0] == f"epsmesh run {study} --shard 2/3"
     assert found["again"][1] == f"SHARDS=3 sbatch --array=2 scripts/slurm/shards.sbatch {study}"
     assert int((xr.load_dataset(tmp_path / "small.nc")["status"] == "pending").sum()) == found["pending"]
-    told = epsmesh("merge", study, "--output", tmp_path)
+    told = epsmesh("status", study, "--merge", "--output", tmp_path)
     assert f"{found['pending']} pending" in told.output
     assert "--shard 2/3" in told.output
     assert run(study, tmp_path, meshes, "--shard", "2/3").exit_code == 0
     for _ in range(2):
-        assert epsmesh("merge", study, "--output", tmp_path).exit_code == 0
+        assert epsmesh("status", study, "--merge", "--output", tmp_path).exit_code == 0
         assert all_done(tmp_path / "small.nc")
         assert_same(tmp_path / "small.nc", folder / "small.nc")
     # What is merged is not computed again, by no other deal.
@@ -71,13 +71,16 @@ def test_a_lost_shard_is_told_and_completed(whole, meshes, tmp_path):
     assert "stored" in again.stdout
 
 
-def test_more_shards_than_steps(whole, meshes, tmp_path):
+def test_more_shards_than_steps_and_a_run_of_the_whole_that_takes_them_in(whole, meshes, tmp_path):
     study, folder = whole
     outputs = [run(study, tmp_path, meshes, "--shard", f"{number}/12").stdout for number in range(1, 13)]
     assert sum("nothing to do" in output for output in outputs) >= 3
-    merged = epsmesh("merge", study, "--output", tmp_path)
-    assert merged.exit_code == 0, merged.output
-    assert_same(tmp_path / "small.nc", folder / "small.nc")
+    told = epsmesh("status", study, "--output", tmp_path).stdout
+    assert "12 shards in" in told and "--merge" in told
+    whole_run = run(study, tmp_path, meshes)
+    assert (whole_run.exit_code, "to do" in whole_run.stdout) == (0, False), whole_run.output
+    assert_same(tmp_path / "small.nc", folder / "small.nc", alike=False)
+    assert "12 shards" not in epsmesh("status", study, "--output", tmp_path).stdout
 
 
 def test_early_stop_in_shards(whole, meshes, tmp_path):
@@ -86,7 +89,7 @@ def test_early_stop_in_shards(whole, meshes, tmp_path):
     study.write_text(SMALL.replace("exact = false", '[plan]\nstop_when = "40 %"'))
     outputs = [run(study, tmp_path, meshes, "--shard", f"{number}/2") for number in (1, 2)]
     assert [output.exit_code for output in outputs] == [0, 0]
-    assert epsmesh("merge", study, "--output", tmp_path).exit_code == 0
+    assert epsmesh("status", study, "--merge", "--output", tmp_path).exit_code == 0
     assert run(study, tmp_path / "whole", meshes).exit_code == 0
     assert_same(tmp_path / "small.nc", tmp_path / "whole" / "small.nc")
     assert "skipped" in np.unique(xr.load_dataset(tmp_path / "small.nc")["status"])
@@ -98,7 +101,7 @@ def test_damaged_and_failed(whole, meshes, tmp_path):
     shutil.copy(folder / "cases.sqlite", copy)
     damaged = tmp_path / "damaged.sqlite"
     damaged.write_bytes(b"no database at all" * 99)
-    found = epsmesh("merge", study, copy, damaged, "--output", tmp_path)
+    found = epsmesh("status", study, copy, damaged, "--merge", "--output", tmp_path)
     assert found.exit_code == 1
     assert f"{damaged}: damaged, left out" in found.output
     assert damaged.read_bytes().startswith(b"no database")
@@ -107,7 +110,7 @@ def test_damaged_and_failed(whole, meshes, tmp_path):
     study = tmp_path / "failing.toml"
     study.write_text(SMALL.replace('["coarse", "free"]', '"coarse"').replace('"0.5 mm"', '["1e-9 mm", "0.5 mm"]'))
     assert 1 in {run(study, tmp_path, meshes, "--shard", f"{number}/2").exit_code for number in (1, 2)}
-    merged = epsmesh("merge", study, "--output", tmp_path)
+    merged = epsmesh("status", study, "--merge", "--output", tmp_path)
     assert merged.exit_code == 1
     assert "GB of memory" in merged.output
     assert "pending" not in merged.output
@@ -129,7 +132,7 @@ def test_wrong_input(whole, tmp_path):
         ([tmp_path / "absent.sqlite"], "there is no such store"),
         ([folder / "cases.sqlite", "--store", folder / "cases.sqlite"], "cannot be one of them"),
     ):
-        wrong = epsmesh("merge", study, "--output", tmp_path, *stores)
+        wrong = epsmesh("status", study, "--merge", "--output", tmp_path, *stores)
         assert wrong.exit_code == 2
         assert message in wrong.output
     assert {path.name for path in tmp_path.iterdir()} == {"timed.toml"}

@@ -202,7 +202,7 @@ def test_commands_take_a_study_file(tmp_path):
     assert "has changed since" in done.stderr
     study.write_text("title = 'x'", encoding="utf-8-sig")  # the mark of some editors is no part of it
     assert "changed since" not in epsmesh("report", study, "--output", tmp_path).stderr
-    done = epsmesh("plot", study, "--output", tmp_path)
+    done = epsmesh("report", study, "--figures", "--output", tmp_path)
     assert done.stdout.split() == [str(tmp_path / f"small.{suffix}") for suffix in ("png", "svg")]
 
 
@@ -213,9 +213,9 @@ def test_commands_take_a_study_file(tmp_path):
         (["report", "none.nc"], "no such dataset; make it with `epsmesh run none.toml`"),
         (["report", "pyproject.toml", "--output", "/nowhere"], "no such dataset"),
         (["report", "{bad}"], "cannot be read as netCDF"),
-        (["plot", "{other}"], "not a study's dataset: it has no force"),
-        (["plot", "{good}", "--kind", "pie"], "no figure is called so; there are ratio"),
-        (["plot", "{good}", "--kind", "map"], "needs a raster of places"),
+        (["report", "{other}", "--figures"], "not a study's dataset: it has no force"),
+        (["report", "{good}", "--figures", "--kind", "pie"], "no figure is called so; there are ratio"),
+        (["report", "{good}", "--figures", "--kind", "map"], "needs a raster of places"),
     ],
 )
 def test_bad_input_is_told(arguments, words, tmp_path):

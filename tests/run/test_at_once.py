@@ -35,7 +35,7 @@ def test_runs_of_one_study_and_of_another_share_a_store(epsmesh, tmp_path):
     for process in processes:
         _, errors = process.communicate(timeout=200)
         assert process.returncode == 0, errors
-    assert epsmesh("store", "--store", tmp_path / "out" / "cases.sqlite").exit_code == 0
+    assert epsmesh("status", "--store", tmp_path / "out" / "cases.sqlite").exit_code == 0
     for name in studies:
         assert epsmesh("run", tmp_path / f"{name}.toml", "--output", tmp_path / "alone", "-q").exit_code == 0
         assert_same(tmp_path / "out" / f"{name}.nc", tmp_path / "alone" / f"{name}.nc", alike=False)

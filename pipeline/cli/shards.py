@@ -1,28 +1,16 @@
-"""The command that brings the shards of a study together."""
+"""`status --merge`: the shards of a study are brought together, and what is missing is told with what computes it."""
 
 from datetime import UTC, datetime
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from pipeline.cli.console import error, print_json
 from pipeline.cli.faults import DONE, SOME_FAILED, fail, of_file, of_results, refusing
-from pipeline.cli.words import (
-    CLUSTER,
-    DEFAULT_OUTPUT,
-    File,
-    Json,
-    Output,
-    StoreFile,
-    Without,
-    check_names,
-    check_output,
-    check_store,
-    load_all,
-)
-from pipeline.files import STORE_NAME, result_files
+from pipeline.cli.words import CLUSTER, check_names, check_output, check_store, load_all
+from pipeline.files import result_files
 from pipeline.printable import counted
 
 if TYPE_CHECKING:
@@ -35,28 +23,20 @@ if TYPE_CHECKING:
 _MOST_CASES = 10
 
 
-def merge(
-    file: File,
-    stores: Annotated[
-        list[Path] | None, typer.Argument(help="Stores of shards [default: OUTPUT/shards/<study>.*.sqlite].")
-    ] = None,
-    output: Output = DEFAULT_OUTPUT,
-    store: StoreFile = None,
-    without: Without = None,
-    as_json: Json = False,
+def merge_shards(
+    file: Path,
+    stores: list[Path] | None,
+    output: Path,
+    target: Path,
+    without: list[str] | None,
+    *,
+    as_json: bool,
 ) -> None:
-    """Bring the shards of a study together in the case store, and write its dataset and figure.
-
-    Of two records of one case that with a force is kept, else the one stored last; merging again changes nothing. The
-    shards' files stay as they are. Exit status 1 if cases failed or are pending, or if a shard's store is damaged.
-
-    Example: epsmesh merge studies/figure3.toml
-    """
+    """Merge the ``stores`` of a study's shards into the store ``target``, write its results to ``output``, and exit."""
     from pipeline.plan.plan import make_plan
 
     (study,) = load_all([file])
     paths = _stores(study, stores, output)
-    target = store or output / STORE_NAME
     check_store(target)
     check_output(target, *result_files(output, study.name))
     plan = make_plan(study, without=check_names(without))

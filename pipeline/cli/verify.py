@@ -1,4 +1,4 @@
-"""The commands that put the program itself to the test: verify and benchmark."""
+"""The command that puts the program itself to the test."""
 
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
@@ -7,16 +7,17 @@ import typer
 
 from pipeline.cli.console import load_solvers, print_json
 from pipeline.cli.faults import DONE, SOME_FAILED
-from pipeline.cli.words import DEFAULT_OUTPUT, Json, Output, check_output
+from pipeline.cli.words import Json
 
 if TYPE_CHECKING:
     from pipeline.verify.row import Row
 
-Quick = Annotated[bool, typer.Option("--quick", help="A few rows of each kind.")]
 _ROW = "{:4} {:58} {:24} {:>12} {:>12} {:>9} {:>9}  {}"
 
 
-def verify(quick: Quick = False, as_json: Json = False) -> None:
+def verify(
+    quick: Annotated[bool, typer.Option("--quick", help="A few rows of each kind.")] = False, as_json: Json = False
+) -> None:
     """Compare forces with closed forms and published tables.
 
     Manufactured solutions too, and the program's other paths. Exit status 1 if any row is out.
@@ -43,33 +44,6 @@ def verify(quick: Quick = False, as_json: Json = False) -> None:
     elif speaks:
         print(f"{len(table)} rows, {out} out" if out else f"{len(table)} rows, all right")
     raise typer.Exit(SOME_FAILED if out else DONE)
-
-
-def benchmark(
-    output: Output = DEFAULT_OUTPUT,
-    repeats: Annotated[int, typer.Option(metavar="N", help="Runs of each point; the median counts.", min=1)] = 3,
-    quick: Quick = False,
-    as_json: Json = False,
-) -> None:
-    """Measure the error of F against run time and unknowns.
-
-    For every kind of element and mesh. Writes work_precision.nc and its figure. Wants an idle machine, and takes ten
-    minutes.
-
-    Example: epsmesh benchmark
-    """
-    from pipeline.verify.work_precision import main, outputs
-    from pipeline.workflow import ended_soon
-
-    check_output(*outputs(output))
-    load_solvers()
-    with ended_soon():
-        files = main(output, repeats, quick=quick)
-    if as_json:
-        print_json({"files": [str(path) for path in files]})
-        return
-    for path in files:
-        print(path)
 
 
 def _line(row: "Row") -> str:

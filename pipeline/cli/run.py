@@ -1,0 +1,237 @@
+"""The command that runs studies: what is to be done, progress, and what came of it."""
+
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+from shlex import quote
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
+
+import typer
+
+from pipeline.cli.console import error, print_json
+from pipeline.cli.faults import DONE, INTERRUPTED, SOME_FAILED, Fault, fail, of_results
+from pipeline.cli.words import (
+    DEFAULT_MESHES,
+    DEFAULT_OUTPUT,
+    Files,
+    Json,
+    Output,
+    Quiet,
+    StoreFile,
+    Verbose,
+    Without,
+    axes_of,
+    check_machine,
+    check_names,
+    check_output,
+    check_shard,
+    check_store,
+    load_all,
+    warn,
+)
+from pipeline.files import STORE_NAME, result_files
+from pipeline.printable import counted
+
+if TYPE_CHECKING:
+    from pipeline.plan.plan import Plan
+    from pipeline.plan.shard import Shard
+    from pipeline.run.progress import Terminal
+    from pipeline.workflow import Opened, Outcome
+
+# Failed cases beyond these are counted only: `status` lists them all.
+_MOST_FAILURES = 20
+# Reasons beyond these are left out of a line.
+_MOST_REASONS = 2
+
+
+def run(
+    files: Files,
+    output: Output = DEFAULT_OUTPUT,
+    store: StoreFile = None,
+    meshes: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the meshes that are kept.")] = DEFAULT_MESHES,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Compute again what is stored.")] = False,
+    without: Without = None,
+    shard: Annotated[
+        str | None, typer.Option(metavar="I/N", help="Do part I of N only; it is kept in OUTPUT/shards.")
+    ] = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    as_json: Json = False,
+    profile: Annotated[bool, typer.Option("--profile", help="Print where the time went (on the first rank).")] = False,
+) -> None:
+    """Run studies: forces, timings, dataset and figure. Under mpirun, on all ranks.
+
+    Cases that are stored already are read back, so an interrupted run goes on where it was. With --json standard
+    output holds one object, at the end; progress goes to standard error.
+
+    With --shard I/N no dataset is written: N such runs, which need not know of each other, do the study.
+    `epsmesh status FILE --merge` brings them together; a run of the whole study does so, too, and computes the rest.
+
+    Example: epsmesh run studies/figure3.toml
+
+    Example: mpirun -n 4 epsmesh run studies/figure3.toml
+
+    Example: epsmesh run studies/figure3.toml --shard 3/8
+    """
+    studies, left_out = load_all(files), check_names(without)
+    if store:
+        check_store(store)
+    part = check_shard(shard, studies)
+    # Where nothing was said, meshes that cannot be kept are made again: that stops nobody.
+    check_output(store or output / STORE_NAME, folder=None if meshes == DEFAULT_MESHES else meshes)
+    for study in () if part else studies:
+        check_output(*result_files(output, study.name))
+    check_machine()
+    from pipeline import workflow
+    from pipeline.plan.shard import stores_of
+    from pipeline.run.store import StoreError
+    from pipeline.solve import CompilerError
+
+    comm, found = workflow.world(), list[dict[str, Any]]()
+    speaks, failed = comm.rank == 0, False
+    for study in studies:
+        start = time.monotonic()
+        main = output / STORE_NAME
+        try:
+            plan, opened = workflow.prepare(
+                study,
+                comm,
+                store or (part.store(output, study) if part else main),
+                fresh=fresh,
+                without=left_out,
+                meshes=meshes,
+                shard=part,
+                beside=[main] if part else stores_of(output, study),
+            )
+            if speaks:
+                _announce(plan, opened, quiet=quiet or as_json, verbose=verbose)
+                if as_json and not quiet:
+                    warn(study)
+            progress = _progress(plan, verbose=verbose) if speaks and not quiet else None
+            with workflow.abort_on_exception(comm):
+                outcome = workflow.run(plan, opened, comm, output, progress)
+        except (StoreError, CompilerError) as wrong:
+            fail(Fault(str(wrong), file=study.file), on_all_ranks=True)
+        except workflow.ResultsError as wrong:
+            fault, status = of_results(wrong, study.file)
+            fail(fault, status=status, on_all_ranks=True)
+        if speaks:
+            seconds = time.monotonic() - start
+            _conclude(plan, opened, outcome, seconds, part, quiet=quiet or as_json)
+            found.append(_as_data(plan, opened, outcome, seconds))
+        failed = failed or outcome.counts["failed"] > 0
+        if outcome.interrupted:
+            break
+    ended = INTERRUPTED if outcome.interrupted else SOME_FAILED if failed else DONE
+    if speaks and profile:
+        _print_stages(sys.stderr if as_json else sys.stdout)
+    if speaks and as_json:
+        print_json({"status": ended, "studies": found})
+    if outcome.interrupted:
+        workflow.end_ranks(comm, INTERRUPTED)
+    raise typer.Exit(ended)
+
+
+def _progress(plan: "Plan", *, verbose: bool) -> "Terminal":
+    from pipeline.run.progress import Terminal
+    from pipeline.run.remaining import Remaining, expectations
+
+    return Terminal(len(plan.solves), Remaining(expectations(plan)), verbose=verbose)
+
+
+def _announce(plan: "Plan", opened: "Opened", *, quiet: bool, verbose: bool) -> None:
+    """Say, before the run, what is to be done and what is not, and why."""
+    for notice in opened.notices:
+        error(notice)
+    if quiet:
+        return
+    study = plan.study
+    warn(study)
+    print(f"{study.title}: {counted(len(plan.keys), 'case')}{axes_of(study)}")
+    for struck in plan.struck:
+        print(f"  {struck.name:13} {struck.count:6}  {struck.reason}")
+    if study.solve.timing:
+        print(f"  timing: every case afresh and alone, median of {study.solve.repeats}; nothing is struck out")
+    if plan.solves:
+        steps = plan.meshes
+        print(f"  to do: {counted(len(steps), 'mesh')}, {counted(len(plan.solves), 'solve')}", flush=True)
+        for number, step in enumerate(steps if verbose else (), start=1):
+            print(f"    step {number}: {counted(len(step.solves), 'solve')}: {step.solves[0].label}", flush=True)
+
+
+def _as_data(plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float) -> dict[str, Any]:
+    """Return what came of a study as plain data."""
+    return {
+        "study": plan.study.file,
+        "warnings": list(plan.study.warnings),
+        "cases": len(plan.keys),
+        **outcome.counts,
+        "stored": _read_back(plan),
+        "failures": [{"case": case, "message": message} for case, message in outcome.failures],
+        "skipped_because": list(_reasons(plan, opened, "skipped")),
+        "files": [str(file) for file in outcome.files],
+        "seconds": round(seconds, 3),
+        "interrupted": outcome.interrupted,
+    }
+
+
+def _conclude(
+    plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float, shard: "Shard | None", *, quiet: bool
+) -> None:
+    """Say, after the run, what came of it and where it is."""
+    for case, message in outcome.failures[:_MOST_FAILURES]:
+        error(f"failed: {case}: {message}")
+    file = quote(plan.study.file)
+    if len(outcome.failures) > _MOST_FAILURES:
+        error(f"… and {len(outcome.failures) - _MOST_FAILURES} more: `epsmesh status {file}` lists them")
+    if not quiet:
+        print(_line(plan, opened, outcome, seconds, shard), flush=True)
+    if outcome.interrupted:
+        cases = sum(outcome.counts.values())
+        done = cases - outcome.counts["pending"]
+        again = f"`epsmesh run {file}{f' --shard {shard}' if shard else ''}` goes on from there"
+        error(f"interrupted: {done} of {cases} cases are on record; {again}")
+
+
+def _line(plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float, shard: "Shard | None") -> str:
+    """Return one line: cases done, failed, skipped and why, where the files are, and how long it took."""
+    from pipeline.run.remaining import format_seconds
+
+    counts = []
+    for state, count in outcome.counts.items():
+        if not count and state != "failed":
+            continue
+        reasons = _reasons(plan, opened, state)
+        why = "; ".join(text for text, _ in reasons.most_common(_MOST_REASONS) if text)
+        more = "; …" if len(reasons) > _MOST_REASONS else ""
+        counts.append(f"{count} {state}{f' ({why}{more})' if why and state in ('failed', 'skipped') else ''}")
+    stored = _read_back(plan)
+    read_back = f" ({stored} read back)" if stored else ""
+    found, name = ", ".join(counts), plan.study.file
+    if shard:
+        # A shard may hold F_exact and no case, or nothing where there are fewer steps than shards.
+        found = found if sum(outcome.counts.values()) else "F_exact" if plan.part else "nothing to do"
+        name = f"{name}, shard {shard}"
+        where = f"kept for `epsmesh status {quote(plan.study.file)} --merge`, when all shards are done"
+    else:
+        where = f"wrote {', '.join(map(str, outcome.files))}"
+    return f"{name}: {found}{read_back}; {where}; {format_seconds(seconds)}"
+
+
+def _print_stages(stream: TextIO) -> None:
+    """Print where the time of this process went."""
+    from pipeline.stages import table
+
+    for name, spent, share in table():
+        print(f"{spent:10.2f} s  {100 * share:5.1f} %  {name}", file=stream)
+
+
+def _read_back(plan: "Plan") -> int:
+    return sum(key in plan.stored for key in plan.keys)
+
+
+def _reasons(plan: "Plan", opened: "Opened", status: str) -> Counter[str]:
+    """Count the messages of the cases with a status."""
+    found = (opened.records[key] for key in plan.keys if key in opened.records)
+    return Counter(record.message for record in found if record.status == status)
