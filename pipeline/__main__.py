@@ -3,7 +3,6 @@
 import os
 import signal
 import sys
-from pathlib import Path
 from typing import Any, NoReturn
 
 INTERRUPTED = 130
@@ -13,7 +12,6 @@ _LAST_STANDARD = 2  # number of standard error
 def main() -> None:
     """Run the command ``epsmesh``; Ctrl-C ends it quietly, even while it loads or is on its way out."""
     _open_standard_streams()
-    _have_a_home()
     listens = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # else it is ignored: nohup, or `&`
     if listens:
         signal.signal(signal.SIGINT, _leave)
@@ -39,17 +37,6 @@ def _open_standard_streams() -> None:
     for number, name, mode in ((0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(number, mode, encoding="utf-8", closefd=False))
-
-
-def _have_a_home() -> None:
-    """Give a user whom the system does not know, and whose environment names no home, that of a container's: ``/``.
-
-    MPI would end with a fault of memory.
-    """
-    try:
-        Path.home()
-    except RuntimeError:
-        os.environ["HOME"] = "/"
 
 
 def _leave(*_: Any) -> NoReturn:

@@ -29,11 +29,6 @@ def is_interrupt(error: BaseException) -> bool:
     return cause is not None and (isinstance(cause, KeyboardInterrupt) or is_interrupt(cause))
 
 
-def environment_alone() -> dict[str, str]:
-    """Return the environment for a process that is none of the launcher's."""
-    return {key: value for key, value in os.environ.items() if not key.startswith(_PREFIXES)}
-
-
 def run_alone(
     program: str, *arguments: str, timeout: float, variables: Mapping[str, str] | None = None
 ) -> "subprocess.CompletedProcess[str]":
@@ -42,7 +37,8 @@ def run_alone(
     Raises:
         subprocess.TimeoutExpired: after ``timeout`` seconds.
     """
-    environment = environment_alone() | dict(variables or {})
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(_PREFIXES)}
+    environment |= variables or {}
     root = str(Path(__file__).resolve().parents[1])
     environment["PYTHONPATH"] = os.pathsep.join(filter(None, [root, environment.get("PYTHONPATH")]))
     # -P: nothing is imported from the folder that one happens to be in.

@@ -117,11 +117,8 @@ def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Term
         ResultsError: if the results cannot be written.
     """
     start, interrupted = _now(), False
-    # dolfinx loads only when something is solved, and before signals are handled: gmsh resets Ctrl-C as it loads.
     if plan.solves:
-        import pipeline.run.execute  # noqa: F401, PLC0415
-
-        leave_broken_pipes()
+        load_solvers()  # before signals are handled
     try:
         with _interruptible() as signals:
             _execute(plan, opened, comm, progress, signals)
@@ -145,9 +142,16 @@ def run(plan: Plan, opened: Opened, comm: MPI.Comm, output: Path, progress: Term
     return Outcome(counts, failures(plan, opened.records), files, interrupted)
 
 
-def leave_broken_pipes() -> None:
-    """Leave it to Python that nobody reads what is printed: PETSc, as it loads, takes that for a crash."""
+def load_solvers() -> None:
+    """Load what solves, which takes seconds, and leave signals to Python.
+
+    As they load, gmsh takes Ctrl-C for itself, and PETSc a reader that goes away for a crash.
+    """
+    before = signal.getsignal(signal.SIGINT)
+    import pipeline.run.execute  # noqa: F401, PLC0415
+
     if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.default_int_handler if before is signal.SIG_DFL else before)
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)
 
 

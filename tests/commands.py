@@ -3,11 +3,14 @@
 import os
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
+from unittest.mock import patch
 
 from typer.testing import CliRunner, Result
 
-from pipeline.cli import app
+from pipeline.cli import app, main
 
 ROOT = Path(__file__).parents[1]
 # Under pytest, mpi4py may have marked this process's environment as a running MPI job.
@@ -21,6 +24,21 @@ ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_",
 def epsmesh(*arguments: object) -> Result:
     """Run ``epsmesh`` in this process."""
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def talk(*arguments: object, encoding: str = "utf-8") -> tuple[int, str, str]:
+    """Run ``epsmesh`` in this process, streams and all: return its exit status, and what went to both of them."""
+    out, errors = (TextIOWrapper(BytesIO(), encoding=encoding) for _ in range(2))
+    with patch.object(sys, "argv", ["epsmesh", *map(str, arguments)]), redirect_stdout(out), redirect_stderr(errors):
+        try:
+            main()
+        except SystemExit as ended:
+            status = int(ended.code or 0)
+    said = []
+    for stream in (out, errors):
+        stream.seek(0)
+        said.append(stream.read())
+    return status, *said
 
 
 def command(*arguments: object, ranks: int = 1) -> list[str]:

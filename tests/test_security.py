@@ -6,7 +6,6 @@ import json
 import os
 import re
 import sqlite3
-import subprocess
 from pathlib import Path
 from struct import pack
 
@@ -28,7 +27,7 @@ from pipeline.shapes.triangles import SurfaceError
 from pipeline.study.load import load
 from pipeline.study.problems import StudyError
 from tests.cases import raw, study
-from tests.commands import ENVIRONMENT, ROOT, command, spawn
+from tests.commands import ROOT, talk
 from tests.organs import box, write_stl
 from tests.realtime.synthetic import write_random
 from tests.report.synthetic import dataset
@@ -246,23 +245,20 @@ def test_no_file_writes_on_a_terminal_what_it_does_not_say(tmp_path):
     model.write_bytes(data)
     commands = [("plan", "--check", mine), ("status", "--store", store), ("touch", model), ("touch", mine)]
     for words in (*commands, *((*words, "--json") for words in commands)):
-        done = spawn(*words)
-        text = done.stdout + done.stderr
-        assert done.returncode in (1, 2)
+        status, said, errors = talk(*words)
+        text = said + errors
+        assert status in (1, 2)
         assert all(line.isprintable() for line in text.split("\n")), text
         assert "\\x1b" in text or "\\u001b" in text
         if "--json" in words and "status" not in words:
-            (fault, *_) = at[0]["errors"] if isinstance(at := json.loads(done.stdout), list) else at["errors"]
+            (fault, *_) = at[0]["errors"] if isinstance(at := json.loads(said), list) else at["errors"]
             assert mine not in words or fault["file"] == str(mine)
 
 
 def test_what_a_stream_has_no_sign_for_is_written_out(tmp_path):
-    done = subprocess.run(
-        command("plan", "studies/quick.toml", "--output", tmp_path), capture_output=True, check=False, cwd=ROOT,
-        env=ENVIRONMENT | {"PYTHONIOENCODING": "ascii"},
-    )  # fmt: skip
-    assert done.returncode == 0
-    assert rb"2 poisson \xd7 5 epsilon" in done.stdout
+    status, said, _ = talk("plan", ROOT / "studies" / "quick.toml", "--output", tmp_path, encoding="ascii")
+    assert status == 0
+    assert r"2 poisson \xd7 5 epsilon" in said
 
 
 def test_commands_that_messages_name_hold_one_command_each(tmp_path, epsmesh):
@@ -271,7 +267,7 @@ def test_commands_that_messages_name_hold_one_command_each(tmp_path, epsmesh):
     told = epsmesh("status", "studies/quick.toml", "--store", store).stderr
     assert f"`epsmesh status --prune --yes --store '{store}'`" in told
     (tmp_path / "$(reboot).toml").write_text("")
-    told = epsmesh("report", tmp_path, "--figures" / "$(reboot).toml").stderr
+    told = epsmesh("report", tmp_path / "$(reboot).toml").stderr
     assert f"`epsmesh run '{tmp_path}/$(reboot).toml'`" in told
 
 

@@ -2,9 +2,7 @@
 
 import json
 import os
-import signal
 import sys
-from contextlib import suppress
 from contextvars import ContextVar
 from io import TextIOWrapper
 from math import inf, isfinite
@@ -15,14 +13,6 @@ from pipeline.printable import printable_json, printable_lines
 # Of the command that runs: whether JSON was asked for, and whether any has been printed.
 JSON: ContextVar[dict[str, bool]] = ContextVar("JSON")
 _COLOURS = {"red": "31", "yellow": "33"}
-
-
-def load_solvers() -> None:
-    """Load what solves, and leave Ctrl-C to Python: gmsh takes it for itself as it loads."""
-    import pipeline.run.execute  # noqa: F401
-
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # PETSc takes it for a crash
 
 
 def paint(text: str, colour: str, stream: TextIO) -> str:
@@ -85,7 +75,6 @@ class Patient:
     def write(self, text: str) -> int:
         """Write ``text``, or drop it."""
         text = printable_lines(text)
-        _leave_broken_pipes()
         try:
             self._stream.write(text)
         except OSError as error:
@@ -94,7 +83,6 @@ class Patient:
 
     def flush(self) -> None:
         """Flush, or drop what is left."""
-        _leave_broken_pipes()
         try:
             self._stream.flush()
         except OSError as error:
@@ -108,12 +96,6 @@ class Patient:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
-
-
-def _leave_broken_pipes() -> None:
-    """Let a write to a pipe that nobody reads fail: PETSc takes it for a crash, whenever it was loaded."""
-    with suppress(ValueError):  # another thread than the main one
-        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
 
 
 def make_patient() -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipeline import __version__
-from pipeline.cli.console import load_solvers, print_json, warning
+from pipeline.cli.console import print_json, warning
 from pipeline.cli.faults import BAD_INPUT, DONE, SOME_FAILED, Fault, fail, of_file, of_option, of_unwritten, refusing
 from pipeline.cli.words import DEFAULT_OUTPUT, Json, by_name, check_machine, check_output, load_all
 from pipeline.files import write_new
@@ -86,10 +86,11 @@ def export(
     check_machine()
     with refusing(ExportError, file=file, howto=_HOWTO):
         scope = scope_of(study)
-    load_solvers()
     from threadpoolctl import threadpool_limits
 
     from pipeline import workflow
+
+    workflow.load_solvers()
     from pipeline.export.export import export as make_model
     from pipeline.export.export import write
     from pipeline.export.ranks import Ranks

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipeline.cli.cases import find_case
-from pipeline.cli.console import load_solvers, print_json
+from pipeline.cli.console import print_json
 from pipeline.cli.faults import Fault, fail, of_file, of_option
 from pipeline.cli.words import (
     DEFAULT_MESHES,
@@ -149,9 +149,11 @@ def _scene_at_hand(dataset: "xr.Dataset") -> str:
         return ""
     if case.lost_contact:
         return ""
-    load_solvers()
     from mpi4py import MPI
 
+    from pipeline import workflow
+
+    workflow.load_solvers()
     from pipeline.mesh.generate import MeshError
     from pipeline.run.mesh_cache import MeshCache
     from pipeline.run.problem import CaseFailure

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipeline.cli.console import load_solvers, print_json
+from pipeline.cli.console import print_json
 from pipeline.cli.faults import DONE, SOME_FAILED
 from pipeline.cli.words import Json
 
@@ -25,7 +25,7 @@ def verify(
     Example: epsmesh verify
     """
     from pipeline.verify import rows
-    from pipeline.workflow import ended_soon, world
+    from pipeline.workflow import ended_soon, load_solvers, world
 
     comm = world()
     speaks = comm.rank == 0

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from pipeline.cli.cases import find_case
-from pipeline.cli.console import error, load_solvers, print_json
+from pipeline.cli.console import error, print_json
 from pipeline.cli.faults import SOME_FAILED, Fault, fail
 from pipeline.cli.words import DEFAULT_MESHES, DEFAULT_OUTPUT, File, Json, Output, check_machine, check_output, load_all
 
@@ -48,7 +48,7 @@ def view(
     endings = [f".{export or 'html'}"] if export or missing else ["_mesh.png", "_deformed.png"]
     check_output(*(stem.with_name(f"{stem.name}{ending}") for ending in endings))
     check_machine()
-    from pipeline.workflow import abort_on_exception, ended_soon, world
+    from pipeline.workflow import abort_on_exception, ended_soon, load_solvers, world
 
     comm = world()
     export = "html" if missing else export

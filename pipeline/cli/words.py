@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 _SKIPPING, CLUSTER = "docs/skipping.md", "docs/cluster.md"  # what tells more
 _SQLITE = b"SQLite format 3\0"
-_UNWRITABLE = ": cannot be written: "
 DEFAULT_OUTPUT, DEFAULT_MESHES = Path("results"), Path("meshes/cache")
 
 STUDIES = Path("studies")
@@ -133,19 +132,12 @@ def check_store(path: Path) -> None:
 
 
 def check_output(*files: Path, folder: Path | None = None) -> None:
-    """Exit if one of the files, or any file in a ``folder``, could not be written: before anything is computed.
-
-    What holds for several, a full disk, is told of the first one.
-    """
-    found = dict[str, Fault]()
+    """Exit if one of the files, or any file in a ``folder``, could not be written: before anything is computed."""
     for file in files:
         if why := why_not_writable(file):
-            reason = why.removeprefix(str(file)) if _UNWRITABLE in why else why
-            found.setdefault(reason, Fault(why, file=str(file)))
+            fail(Fault(why, file=str(file)))
     if folder and (why := _why_no_files(folder)):
-        found[why] = Fault(why, file=str(folder))
-    if found:
-        fail(*found.values())
+        fail(Fault(why, file=str(folder)))
 
 
 def check_machine() -> None:

@@ -36,27 +36,20 @@ class MeshCache:
 
     @stage("mesh cache")
     def get(self, path: Path) -> MeshArrays | None:
-        """Return the mesh in ``path``; a file that cannot be read is removed."""
-        try:
-            content = read_npz(path)
-            facets = {name.removeprefix("facets_"): content[name] for name in content if name.startswith("facets_")}
-            mesh = MeshArrays(
-                content["points"],
-                content["cells"],
-                facets,
-                content["rim"],
-                float(content["seconds"]),
-                content.get("regions"),
-                deviation=float(content["deviation"]),
-            )
-            _touch(path)
-        except FileNotFoundError:
+        """Return the mesh in ``path``, None if there is none that can be read."""
+        content = _read(path)
+        if content is None:
             return None
-        except (OSError, ValueError, KeyError):
-            with suppress(OSError):
-                path.unlink()
-            return None
-        return mesh
+        facets = {name.removeprefix("facets_"): content[name] for name in content if name.startswith("facets_")}
+        return MeshArrays(
+            content["points"],
+            content["cells"],
+            facets,
+            content["rim"],
+            float(content["seconds"]),
+            content.get("regions"),
+            deviation=float(content["deviation"]),
+        )
 
     @stage("mesh cache")
     def put(self, path: Path, mesh: MeshArrays) -> None:
@@ -72,15 +65,11 @@ class MeshCache:
     def arrays(self, key: str, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         """Return the arrays kept under ``key``, or those that ``make`` returns, which are then kept."""
         path = self._folder / f"{digest(key)}.npz"
-        try:
-            found = read_npz(path)
-            _touch(path)
-            return found
-        except (OSError, ValueError):
-            pass
-        made = make()
-        self._keep(path, made)
-        return made
+        found = _read(path)
+        if found is None:
+            found = make()
+            self._keep(path, found)
+        return found
 
     def _keep(self, path: Path, arrays: dict[str, Any]) -> None:
         """Write arrays to a file, if it can be written."""
@@ -100,6 +89,16 @@ class MeshCache:
             total += size
             if total > self._limit:
                 file.unlink(missing_ok=True)
+
+
+def _read(path: Path) -> dict[str, Any] | None:
+    """Return the arrays in a file, which is marked as used; None if there is none that can be read."""
+    try:
+        found = read_npz(path)
+        _touch(path)
+        return found
+    except (OSError, ValueError):
+        return None
 
 
 def _touch(path: Path) -> None:

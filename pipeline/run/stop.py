@@ -3,6 +3,8 @@
 from collections.abc import Callable, Collection, Mapping
 from math import inf
 
+import numpy as np
+
 from pipeline.plan.plan import Plan
 from pipeline.plan.steps import Solve
 from pipeline.quantities import write
@@ -76,13 +78,10 @@ def _rows(plan: Plan, solve: Solve) -> list[list[tuple[float, str, str]]]:
         least[row] = min(labels[index[position]], least.get(row, inf))
     found = []
     for (before, after), most in least.items():
-        flats = [(epsilon, _flat(plan, (*before, i, *after))) for i, epsilon in enumerate(labels) if epsilon < most]
+        flats = [
+            (epsilon, int(np.ravel_multi_index((*before, i, *after), plan.study.shape)))
+            for i, epsilon in enumerate(labels)
+            if epsilon < most
+        ]
         found.append([(epsilon, plan.keys[flat], plan.reference_keys[flat]) for epsilon, flat in flats])
     return found
-
-
-def _flat(plan: Plan, index: tuple[int, ...]) -> int:
-    flat = 0
-    for i, length in zip(index, plan.study.shape, strict=True):
-        flat = flat * length + i
-    return flat

@@ -6,7 +6,6 @@ from contextlib import contextmanager
 from math import isfinite
 from typing import Any, TypeVar
 
-import pipeline.run.execute  # noqa: F401 (gmsh takes Ctrl-C for itself as it loads: before it is answered)
 from pipeline import workflow
 from pipeline.workflow import world
 
@@ -19,7 +18,7 @@ _INTERRUPTED = 130
 @contextmanager
 def ended_soon() -> Iterator[None]:
     """End with status 130, on all ranks, if the program is asked to end."""
-    workflow.leave_broken_pipes()
+    workflow.load_solvers()
     try:
         with workflow.abort_on_exception(world()), workflow.ended_soon():
             yield

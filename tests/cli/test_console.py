@@ -10,13 +10,14 @@ from math import inf, nan
 from pathlib import Path
 
 import pytest
+import xarray as xr
 from typer.testing import CliRunner
 
 from pipeline import __version__
 from pipeline.cli import app
-from pipeline.cli.console import print_json
+from pipeline.cli.console import paint, print_json
 from pipeline.report.figures import KINDS
-from tests.commands import ENVIRONMENT, ROOT
+from tests.commands import ENVIRONMENT, ROOT, talk
 from tests.conftest import SMALL
 from tests.studies import small_text
 
@@ -95,13 +96,17 @@ def test_misspelt_commands_options_and_reductions_get_the_nearest(epsmesh, small
     assert (refused.exit_code, "did you mean `symmetry`?" in refused.stderr) == (2, True)
 
 
-def test_colour_on_terminals_only_and_not_where_it_is_unwanted(spawn, tmp_path):
+def test_colour_on_terminals_only_and_not_where_it_is_unwanted(epsmesh, tmp_path, monkeypatch):
     file = tmp_path / "bad.toml"
     file.write_text("[body]\n")
     assert "\033[31m" in on_terminal("plan", str(file))
-    assert "\033[" not in on_terminal("plan", str(file), NO_COLOR="1")
-    assert "\033[" not in on_terminal("plan", str(file), TERM="dumb")
-    assert "\033[" not in spawn("plan", file).stderr
+    assert "\033[" not in epsmesh("plan", file).stderr
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    assert "\033[31m" in paint("x", "red", sys.stderr)
+    for name, value in (("NO_COLOR", "1"), ("TERM", "dumb")):
+        with monkeypatch.context() as patched:
+            patched.setenv(name, value)
+            assert paint("x", "red", sys.stderr) == "x"
 
 
 def test_json_of_a_run_is_one_object_with_what_failed_and_why(epsmesh, tmp_path):
@@ -117,6 +122,10 @@ def test_json_of_a_run_is_one_object_with_what_failed_and_why(epsmesh, tmp_path)
     assert {"GB of memory" in failure["message"] for failure in study["failures"]} == {True}
     assert all(Path(name).exists() for name in study["files"])
     assert study["seconds"] > 0
+    states = xr.load_dataset(tmp_path / "small.nc")["status"]
+    assert (states.sel(rim=1e-12) == "failed").all() and (states.sel(rim=0.5e-3) == "ok").all()
+    status = json.loads(epsmesh("status", file, "--output", tmp_path, "--json").stdout)
+    assert (status["ok"], status["failed"], status["pending"]) == (2, 2, 0)
     again = epsmesh("run", file, "--output", tmp_path, "--meshes", tmp_path / "meshes")
     line = again.stdout.splitlines()[-1]
     assert "2 ok, 2 failed (" in line
@@ -161,12 +170,15 @@ def test_shell_completes_commands_and_names_and_leaves_files_to_the_shell():
     assert completed("run", "stud") == []
 
 
-def test_fish_gets_a_tab_between_a_command_and_its_help():
-    asked = {"_EPSMESH_COMPLETE": "complete_fish", "_TYPER_COMPLETE_ARGS": "epsmesh pla",
-             "_TYPER_COMPLETE_FISH_ACTION": "get-args"}  # fmt: skip
-    words, environment = [sys.executable, "-m", "pipeline"], ENVIRONMENT | asked
-    done = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
-    assert done.stdout.startswith("plan\tCheck a study")
+def test_fish_gets_a_tab_between_a_command_and_its_help(monkeypatch):
+    asked = {
+        "_EPSMESH_COMPLETE": "complete_fish",
+        "_TYPER_COMPLETE_ARGS": "epsmesh pla",
+        "_TYPER_COMPLETE_FISH_ACTION": "get-args",
+    }
+    for name, value in asked.items():
+        monkeypatch.setenv(name, value)
+    assert talk()[1].startswith("plan\tCheck a study")
 
 
 def test_what_is_no_store_is_left_alone(epsmesh, tmp_path, monkeypatch):

@@ -78,7 +78,7 @@ def lives(process):
         return False
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.nightly)])
 def test_an_export_ends_with_any_of_its_ranks(tmp_path, number):
     """The others wait for it in a call that would never be answered."""
     (tmp_path / "mine.toml").write_text(STUDY.format(contact="frictionless"))

@@ -67,11 +67,6 @@ def test_a_study_loads_the_shapes_that_it_names_alone(command, study, tmp_path):
     assert "psutil" not in modules or command == "plan"
 
 
-def test_a_unit_that_few_people_write_is_asked_after(study, tmp_path):
-    study.write_text(study.read_text().replace("kPa", "kN/m^2"))
-    assert "pint" in loaded("plan", study, within=tmp_path)
-
-
 def test_a_study_begun_like_another_loads_no_shape(tmp_path):
     modules = loaded("new", "mine", "--like", ROOT / "studies" / "quick.toml", within=tmp_path)
     assert (tmp_path / "studies" / "mine.toml").exists()

@@ -1,16 +1,11 @@
 """Ctrl-C ends the command quietly while it loads, and whoever starts it."""
 
 import json
-import os
-import pwd
 import signal
 import subprocess
 import sys
 import time
 
-import pytest
-
-from pipeline.__main__ import _have_a_home
 from tests.commands import ENVIRONMENT, ROOT, epsmesh
 
 # The command, which says when what answers Ctrl-C is in place: as it begins to load the rest.
@@ -27,15 +22,14 @@ main()
 """
 
 
-@pytest.mark.parametrize("after", [0.0, 0.2])
-def test_an_interrupt_ends_it_with_130_and_without_a_word(after):
+def test_an_interrupt_ends_it_with_130_and_without_a_word():
     command = subprocess.Popen(
         [sys.executable, "-c", COMMAND, "plan", "studies/quick.toml"], cwd=ROOT, text=True,
         env=ENVIRONMENT | {"PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )  # fmt: skip
     assert command.stdout is not None
     assert command.stdout.readline() == "ready\n"
-    time.sleep(after)
+    time.sleep(0.1)
     command.send_signal(signal.SIGINT)
     said, errors = command.communicate(timeout=60)
     assert errors == ""
@@ -76,16 +70,6 @@ def test_a_rank_that_is_interrupted_while_mpi_loads_ends_the_others():
     assert done.returncode == 130
 
 
-def test_a_user_without_a_name_and_a_home_has_that_of_a_container(monkeypatch):
-    """MPI ends with a fault of memory where there is none."""
-    monkeypatch.delenv("HOME")
-    _have_a_home()
-    assert "HOME" not in os.environ  # the system knows
-    monkeypatch.setattr(pwd, "getpwuid", {}.__getitem__)
-    _have_a_home()
-    assert os.environ["HOME"] == "/"
-
-
 WITHOUT = """
 import sys
 sys.modules[sys.argv.pop(1)] = None  # as if it were not installed
@@ -94,13 +78,10 @@ main()
 """
 
 
-@pytest.mark.parametrize(
-    ("library", "remedy"), [("dolfinx", "environment.yml"), ("gmsh", "make setup"), ("mpi4py", "make setup")]
-)
-def test_a_library_that_is_missing_is_named_with_what_installs_it(library, remedy, small, tmp_path):
+def test_a_library_that_is_missing_is_named_with_what_installs_it(small, tmp_path):
     words = ["run", str(small), "--output", str(tmp_path / "results")]
     done = subprocess.run(
-        [sys.executable, "-c", WITHOUT, library, *words],
+        [sys.executable, "-c", WITHOUT, "gmsh", *words],
         cwd=ROOT,
         env=ENVIRONMENT | {"PYTHONPATH": str(ROOT)},
         capture_output=True,
@@ -108,6 +89,6 @@ def test_a_library_that_is_missing_is_named_with_what_installs_it(library, remed
         check=False,
     )
     assert done.returncode == 2, done.stderr
-    assert f"the library {library} is missing" in done.stderr
-    assert remedy in done.stderr
+    assert "the library gmsh is missing" in done.stderr
+    assert "make setup" in done.stderr and "environment.yml" in done.stderr
     assert "Traceback" not in done.stderr

@@ -40,9 +40,9 @@ from pathlib import Path
 from pipeline.run.begun import Begun
 signal.signal(signal.SIGTERM, lambda *_: None)
 begun = Begun(Path(sys.argv[1]))
+begun.name(["c"])
 begun.name(["a", "b"])
 os.kill(os.getpid(), signal.{asked})
-begun.name(["b"]) if {goes_on} else None
 os.kill(os.getpid(), signal.SIGKILL)
 """
 
@@ -62,20 +62,22 @@ def store(tmp_path: Path):
     opened.close()
 
 
-def test_the_cases_of_a_process_that_was_killed_have_failed(store: Store):
-    run(BEGIN.format(asked="SIGCONT", goes_on=True), store.path)
-    assert fail_begun(store, {"a", "c"}) == {}  # another study's
-    failed = fail_begun(store, {"b", "c"})
-    assert list(failed) == ["b"]
+def test_the_cases_of_a_process_that_was_killed_have_failed_but_forces_on_record_stay(store: Store):
+    store.put(Record("a", "ok", force=1.0))
+    run(BEGIN.format(asked="SIGCONT"), store.path)
+    assert fail_begun(store, {"c"}) == {}  # done by then
+    failed = fail_begun(store, {"a", "b", "c"})
+    assert sorted(failed) == ["a", "b"]
     assert "the process ended while it computed this case" in failed["b"].message
-    assert store.get({"a", "b"})["b"].status == "failed"
+    found = store.get({"a", "b"})
+    assert (found["a"].is_ok, found["b"].status) == (True, "failed")
     assert fail_begun(store, {"b"}) == {}
     assert [path.name for path in store.path.parent.iterdir()] == ["cases.sqlite"]
 
 
 def test_a_process_that_was_asked_to_end_blames_no_case(store: Store):
     """Also where C code computes, and Python cannot answer: Slurm then sends SIGKILL."""
-    run(BEGIN.format(asked="SIGTERM", goes_on=False), store.path)
+    run(BEGIN.format(asked="SIGTERM"), store.path)
     assert fail_begun(store, {"a", "b"}) == {}
     assert [path.name for path in store.path.parent.iterdir()] == ["cases.sqlite"]
 
@@ -93,14 +95,6 @@ def test_a_reason_that_was_written_is_that_of_the_failure(store: Store):
     with Begun(store.path) as begun:
         begun.name(["a"], "MemoryError: on rank 1")
     assert fail_begun(store, {"a"})["a"].message == "MemoryError: on rank 1"
-
-
-def test_a_force_that_is_on_record_stays(store: Store):
-    store.put(Record("a", "ok", force=1.0))
-    run(BEGIN.format(asked="SIGCONT", goes_on=False), store.path)
-    assert sorted(fail_begun(store, {"a", "b"})) == ["a", "b"]
-    found = store.get({"a", "b"})
-    assert (found["a"].is_ok, found["b"].status) == (True, "failed")
 
 
 @pytest.mark.parametrize("fresh", [False, True])
@@ -125,25 +119,27 @@ def test_a_damaged_file_blames_no_case(store: Store):
     assert fail_begun(store, {"a"}) == {}
 
 
-def test_a_case_that_ends_its_process_fails_in_the_next_run_alone(tmp_path: Path):
+def test_a_case_that_ends_its_process_fails_in_the_next_run_alone(epsmesh, tmp_path: Path):
     """The third run tries it again."""
     file = tmp_path / "small.toml"
     file.write_text(small_text(mesh={"epsilon": ["4 mm", "6 mm", "full"], "degree": 1}, solve={"exact": False}))
     words = ("run", file, "--output", tmp_path, "--meshes", tmp_path / "meshes")
     killed = run(COMMAND.format(ends="os.abort()"), *words, ranks=2)
     assert killed.returncode not in (0, 1, 2)
-    following = run(COMMAND.format(ends="os.abort()"), *words)
-    assert following.returncode == 1, following.stderr
+    following = epsmesh(*words)
+    assert following.exit_code == 1, following.stderr
     assert "the process of an earlier run ended: the case that it was at has failed" in following.stderr
     assert "2 ok, 1 failed (the process ended while it computed this case" in following.stdout
     data = xr.load_dataset(tmp_path / "small.nc").squeeze()
     assert list(data["status"].values) == ["failed", "ok", "ok"]
     assert np.isfinite(data["force"].values).tolist() == [False, True, True]
-    again = run(COMMAND.format(ends="pass"), *words)
-    assert (again.returncode, "3 ok" in again.stdout) == (0, True), again.stderr
+    again = epsmesh(*words)
+    assert (again.exit_code, "3 ok" in again.stdout) == (0, True), again.stderr
 
 
-def test_a_rank_that_fails_where_the_others_cannot_know_ends_the_run_and_the_next_one_knows_why(tmp_path: Path):
+def test_a_rank_that_fails_alone_ends_the_run_and_the_next_one_knows_why(
+    epsmesh, tmp_path: Path
+):
     ends = "\n        ".join(
         (
             "from pipeline.run import failure; failure.PATIENCE = 1.0",
@@ -158,8 +154,8 @@ def test_a_rank_that_fails_where_the_others_cannot_know_ends_the_run_and_the_nex
     words = ("run", file, "--output", tmp_path, "--meshes", tmp_path / "meshes")
     ended = run(together + COMMAND.format(ends=ends), *words, ranks=2)
     assert ended.returncode not in (0, 2)
-    following = run(COMMAND.format(ends="os.abort()"), *words)
-    assert following.returncode == 1, following.stderr
+    following = epsmesh(*words)
+    assert following.exit_code == 1, following.stderr
     assert "1 failed (MemoryError: no room" in following.stdout
 
 

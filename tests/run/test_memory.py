@@ -1,14 +1,15 @@
-"""How much memory there is: the tightest limit of the control groups counts, in both of their versions."""
+"""How much memory there is: the tightest limit counts, and a case that needs more is refused, not killed."""
 
-import subprocess
-import sys
+import resource
 from math import inf
 
+import psutil
 import pytest
 from mpi4py import MPI
 
 from pipeline.run.memory import FreeMemory
-from pipeline.run.room import container_room
+from pipeline.run.room import container_room, process_room
+from tests.cases import solve
 
 V2 = ("memory.max", "memory.current", "inactive_file", "")
 V1 = ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file", "memory")
@@ -47,14 +48,13 @@ def test_in_a_container_its_own_group_is_what_is_mounted(tmp_path, names):
 
 
 def test_limit_of_the_process():
-    limit = 3_000_000_000
-    code = (
-        f"import resource; resource.setrlimit(resource.RLIMIT_AS, ({limit}, {limit}));"
-        "from mpi4py import MPI; from pipeline.run.memory import FreeMemory;"
-        "print(FreeMemory(MPI.COMM_SELF).available())"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert 0 < float(done.stdout) < min(limit, FreeMemory(MPI.COMM_SELF).available() + 1e9)
+    before, limit = resource.getrlimit(resource.RLIMIT_AS), psutil.Process().memory_info().vms + 10**9
+    resource.setrlimit(resource.RLIMIT_AS, (limit, before[1]))
+    try:
+        assert 0.5e9 < process_room() <= 1e9
+        assert FreeMemory(MPI.COMM_SELF).available() <= 1e9
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
 
 
 @pytest.mark.mpi
@@ -62,3 +62,34 @@ def test_ranks_agree():
     found = MPI.COMM_WORLD.allgather(FreeMemory(MPI.COMM_WORLD).available())
     assert len(set(found)) == 1
     assert found[0] > 0
+
+
+@pytest.fixture
+def outside_slurm(monkeypatch):
+    for name in ("SLURM_MEM_PER_NODE", "SLURM_MEM_PER_CPU", "SLURM_CPUS_ON_NODE"):
+        monkeypatch.delenv(name, raising=False)
+
+
+def test_what_slurm_grants(outside_slurm, monkeypatch):
+    free = FreeMemory(MPI.COMM_SELF).available()
+    resident = psutil.Process().memory_info().rss
+    granted = resident / 1e6 + 100
+    monkeypatch.setenv("SLURM_MEM_PER_NODE", str(granted))
+    assert FreeMemory(MPI.COMM_SELF).available() == pytest.approx(100e6, rel=0.5)
+    monkeypatch.setenv("SLURM_MEM_PER_NODE", "0")
+    assert FreeMemory(MPI.COMM_SELF).available() > 0.5 * free
+    monkeypatch.setenv("SLURM_MEM_PER_CPU", str(granted / 2))
+    monkeypatch.setenv("SLURM_CPUS_ON_NODE", "2")
+    assert FreeMemory(MPI.COMM_SELF).available() == pytest.approx(100e6, rel=0.5)
+    monkeypatch.setenv("SLURM_MEM_PER_CPU", "1")
+    assert FreeMemory(MPI.COMM_SELF).available() == 0.0
+    for nothing in ("4G", "lots", "nan", "-1", "inf"):
+        monkeypatch.setenv("SLURM_MEM_PER_CPU", nothing)
+        assert FreeMemory(MPI.COMM_SELF).available() > 0.5 * free
+
+
+def test_a_case_that_needs_more_than_granted_fails_with_its_reason(outside_slurm, monkeypatch):
+    monkeypatch.setenv("SLURM_MEM_PER_NODE", "50")
+    (record,) = solve().values()
+    assert record.status == "failed"
+    assert "GB of memory" in record.message
