@@ -9,7 +9,7 @@ import typer
 
 from pipeline import __version__
 from pipeline.cli import compare, export, guide, new, plan, report, run, status, touch, verify, view
-from pipeline.cli.console import error, make_patient, print_json, what_was_not_written
+from pipeline.cli.console import error, make_patient, say, what_was_not_written
 from pipeline.cli.faults import BAD_INPUT, fail
 from pipeline.cli.group import Commands
 
@@ -76,10 +76,7 @@ def _options(
 
     known = {"version_epsmesh": __version__, **provenance(ranks=1)}
     versions = {k.removeprefix("version_"): v for k, v in known.items() if k.startswith("version_")}
-    if as_json:
-        print_json(versions)
-    else:
-        print("\n".join(f"{name:10} {value}" for name, value in versions.items()))
+    say(versions, *(f"{name:10} {value}" for name, value in versions.items()))
     raise typer.Exit
 
 

@@ -2,7 +2,7 @@
 
 import typer
 
-from pipeline.cli.console import print_json, warning
+from pipeline.cli.console import say, warning
 from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail
 from pipeline.cli.words import DEFAULT_OUTPUT, Dataset, Found, Json
 
@@ -42,8 +42,5 @@ def compare(a: Dataset, b: Dataset, output: Found = DEFAULT_OUTPUT, as_json: Jso
     except DatasetError as wrong:
         fail(Fault(f"{a} and {b} cannot be compared: {wrong}", file=str(b), allowed=str(wrong), howto=_HOWTO))
     names, doubtful = (paths[0], paths[1]), {x: doubts(data) for x, data in zip("AB", datasets, strict=True)}
-    if as_json:
-        print_json(to_dict(found, names, doubtful))
-    else:
-        print(text(found, names, doubtful))
+    say(to_dict(found, names, doubtful), text(found, names, doubtful))
     raise typer.Exit(DONE if found.agrees else SOME_FAILED)

@@ -48,6 +48,14 @@ def print_json(value: Any) -> None:
     print(printable_json(json.dumps(plain(value), indent=2, ensure_ascii=False, allow_nan=False)), flush=True)
 
 
+def say(data: Any, *lines: str) -> None:
+    """Print what a command has found: ``data`` if JSON was asked for, ``lines`` for people if not."""
+    if is_json_wanted():
+        print_json(data)
+    elif lines:
+        print("\n".join(lines), flush=True)
+
+
 def plain(value: Any, key: str = "") -> Any:
     """Return ``value``, which stands under ``key``, as JSON takes it."""
     if isinstance(value, dict):

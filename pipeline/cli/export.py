@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipeline import __version__
-from pipeline.cli.console import print_json, warning
+from pipeline.cli.console import say, warning
 from pipeline.cli.faults import BAD_INPUT, DONE, SOME_FAILED, Fault, fail, of_file, of_option, of_unwritten, refusing
 from pipeline.cli.words import DEFAULT_OUTPUT, Json, by_name, check_machine, check_output, load_all
 from pipeline.files import write_new
@@ -65,7 +65,7 @@ def export(
     Example: epsmesh export --evaluator simulator/epsmesh
     """
     if evaluator is not None:
-        _copy_evaluator(evaluator, as_json=as_json)
+        _copy_evaluator(evaluator)
         return
     if file is None:
         fail(Fault("name the study whose body a model is made of, or --evaluator FOLDER", key="FILE", howto=_HOWTO))
@@ -115,27 +115,25 @@ def export(
     if status != DONE:
         fail(fault, status=status)
     if comm.rank == 0:
-        _tell(exported, wanted, path, as_json=as_json)
+        _tell(exported, wanted, path)
     raise typer.Exit(DONE if exported.held >= _HELD else SOME_FAILED)
 
 
-def _tell(exported: "Exported", wanted: float, path: Path, *, as_json: bool) -> None:
+def _tell(exported: "Exported", wanted: float, path: Path) -> None:
     """Say what a model holds."""
     if exported.unseen:
         warning(f"{path} holds no visible surface: {exported.unseen}")
     found = exported.summary(wanted) | {"file": str(path)}
-    if as_json:
-        print_json(found)
-        return
-    print(repr(exported.model))
-    print(f"wrote {path}: {counted(int(found['places']), 'place')} solved for, {found['coefficients']} coefficients")
-    print(
+    say(
+        found,
+        repr(exported.model),
+        f"wrote {path}: {counted(int(found['places']), 'place')} solved for, {found['coefficients']} coefficients",
         f"judged on {found['judged']} touches: {100 * found['held']:.0f} % held by their bars, largest error "
-        f"{100 * found['largest_error']:.2g} %, median bar {100 * found['median_bar']:.2g} %"
+        f"{100 * found['largest_error']:.2g} %, median bar {100 * found['median_bar']:.2g} %",
     )
 
 
-def _copy_evaluator(folder: Path, *, as_json: bool) -> None:
+def _copy_evaluator(folder: Path) -> None:
     """Copy the sources of the evaluator to a folder, unless one of them is there already."""
     from pipeline.realtime.sources import source_files, sources
 
@@ -149,7 +147,5 @@ def _copy_evaluator(folder: Path, *, as_json: bool) -> None:
             write_new(folder / name, (sources() / name).read_text(encoding="utf-8"))
     except OSError as problem:
         fail(of_file(folder, problem.strerror or str(problem), _HOWTO))
-    if as_json:
-        print_json({"folder": str(folder), "files": [str(name) for name in names]})
-    else:
-        print(f"{folder}: {', '.join(map(str, names))}")
+    files = [str(name) for name in names]
+    say({"folder": str(folder), "files": files}, f"{folder}: {', '.join(files)}")

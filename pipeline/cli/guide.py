@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from pipeline.cli.console import print_json
+from pipeline.cli.console import say
 from pipeline.cli.faults import DONE, SOME_FAILED, Fault, fail, of_file
 from pipeline.cli.words import DEFAULT_OUTPUT, Dataset, Found, Json, read_dataset
 
@@ -44,8 +44,5 @@ def guide(
         found = make_guide(dataset, accuracy, budget)
     except DatasetError as wrong:
         fail(of_file(file, str(wrong), _HOWTO))
-    if as_json:
-        print_json(found.to_dict())
-    else:
-        print(found)
+    say(found.to_dict(), str(found))
     raise typer.Exit(DONE if found.answer else SOME_FAILED)

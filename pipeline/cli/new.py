@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from pipeline.cli.console import print_json
+from pipeline.cli.console import say
 from pipeline.cli.faults import Fault, fail, of_file, of_option
 from pipeline.cli.words import Json
 from pipeline.files import atomic, write_new
@@ -56,12 +56,11 @@ def new(
         fail(of_file(path, "exists already, and is left alone; give another name"))
     except OSError as problem:
         fail(of_file(path, problem.strerror or str(problem)))
-    if as_json:
-        print_json({"file": str(path)} | ({"carried": [str(file) for file in carried]} if carried else {}))
-    else:
-        for file in carried:
-            print(f"{file}: the body's, which the study names")
-        print(f"{path}: edit it, then `epsmesh plan {path}` and `epsmesh run {path}`")
+    say(
+        {"file": str(path)} | ({"carried": [str(file) for file in carried]} if carried else {}),
+        *(f"{file}: the body's, which the study names" for file in carried),
+        f"{path}: edit it, then `epsmesh plan {path}` and `epsmesh run {path}`",
+    )
 
 
 def _of_name(name: str, allowed: str) -> Fault:

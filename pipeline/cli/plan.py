@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 from pipeline.cli.cases import find_case
-from pipeline.cli.console import print_json, warning
+from pipeline.cli.console import is_json_wanted, say, warning
 from pipeline.cli.faults import BAD_INPUT, DONE, SOME_FAILED, as_data, fail, of_study, refusing, tell
 from pipeline.cli.words import (
     DEFAULT_OUTPUT,
@@ -79,7 +79,7 @@ def plan(
     """
     more = case or []
     if check:
-        _check([file, *(by_name(Path(word)) for word in more)], as_json=as_json)
+        _check([file, *(by_name(Path(word)) for word in more)])
     if len(more) > 1:
         fail("a plan is of one study, or of one case of it; with --check several files are looked at")
     from pipeline.plan.describe import summary
@@ -89,13 +89,13 @@ def plan(
     chosen = find_case(study, more[0]) if more else None
     made, records = _planned(study, store or output / STORE_NAME, check_names(without))
     if chosen is not None:
-        _tell(made, records, chosen, as_json=as_json)
+        _tell(made, records, chosen)
         return
     found = summary(made, ranks)
     room = machine_room() if memory is None else 1e9 * memory
     most = MEMORY_SHARE * room
     found |= {"memory_available": room, "too_large": sum(step["memory"] > most for step in found["steps"])}
-    _show(study, found, quiet=quiet, verbose=verbose, as_json=as_json)
+    _show(study, found, quiet=quiet, verbose=verbose)
     # Where all cases are too large, that of F_exact may still be solved: for nothing.
     asked = [step for step in found["steps"] if not step["exact"]] or found["steps"]
     nothing_fits = bool(asked) and all(step["memory"] > most for step in asked)
@@ -108,7 +108,7 @@ def plan(
     raise typer.Exit(SOME_FAILED if nothing_fits else DONE)
 
 
-def _check(files: list[Path], *, as_json: bool) -> NoReturn:
+def _check(files: list[Path]) -> NoReturn:
     """Say of each study file everything that is wrong with it, and exit."""
     from pipeline.plan.plan import make_plan
     from pipeline.study.load import load
@@ -125,11 +125,10 @@ def _check(files: list[Path], *, as_json: bool) -> NoReturn:
             continue
         cases = len(make_plan(study).keys)
         report.append({"file": str(file), "errors": [], "warnings": list(study.warnings), "cases": cases})
-        if not as_json:
+        if not is_json_wanted():
             warn(study)
             print(f"{file}: fine; {counted(cases, 'case')}{axes_of(study)}")
-    if as_json:
-        print_json(report)
+    say(report)
     raise typer.Exit(BAD_INPUT if any(one["errors"] for one in report) else DONE)
 
 
@@ -147,10 +146,10 @@ def _planned(study: "Study", path: Path, without: tuple[str, ...]) -> "tuple[Pla
         return plan_the_rest(study, path, without)
 
 
-def _show(study: "Study", found: dict[str, Any], *, quiet: bool, verbose: bool, as_json: bool) -> None:
+def _show(study: "Study", found: dict[str, Any], *, quiet: bool, verbose: bool) -> None:
     """Print the summary of a plan."""
-    if as_json:
-        print_json(found)
+    if is_json_wanted():
+        say(found)
         return
     exact = f" ({found['exact']} of them for F_exact)" if found["exact"] else ""
     to_do = f"{', '.join(counted(found[name], noun) for name, noun in _TO_DO.items())}{exact}"
@@ -184,7 +183,7 @@ def _list_steps(steps: list[dict[str, Any]], most: int | None) -> None:
         print(f"    … and {len(steps) - most} smaller steps: --verbose lists them")
 
 
-def _tell(made: "Plan", records: "dict[str, Record]", case: "Case", *, as_json: bool) -> None:
+def _tell(made: "Plan", records: "dict[str, Record]", case: "Case") -> None:
     """Print one case's story."""
     from pipeline.plan.describe import story
 
@@ -199,20 +198,15 @@ def _tell(made: "Plan", records: "dict[str, Record]", case: "Case", *, as_json: 
             "seconds": record.time_total,
             **record.provenance,
         }
-    if as_json:
-        print_json(found)
-        return
-    print(found["case"])
+    lines = [found["case"]]
     for name, value in found.items():
         if name == "case" or not value:
             continue
-        lines = [f"{k}: {_written(k, v)}" for k, v in value.items()] if isinstance(value, dict) else value
-        if isinstance(lines, list):
-            print(f"  {name.replace('_', ' ')}:")
-            for line in lines:
-                print(f"    {line}")
-        else:
-            print(f"  {name.replace('_', ' ')}: {value}")
+        parts = [f"{k}: {_written(k, v)}" for k, v in value.items()] if isinstance(value, dict) else value
+        several = isinstance(parts, list)
+        lines.append(f"  {name.replace('_', ' ')}:{'' if several else f' {value}'}")
+        lines += [f"    {part}" for part in parts] if several else []
+    say(found, *lines)
 
 
 def _written(name: str, value: Any) -> Any:

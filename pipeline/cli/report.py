@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipeline.cli.cases import find_case
-from pipeline.cli.console import print_json
+from pipeline.cli.console import say
 from pipeline.cli.faults import Fault, fail, of_file, of_option
 from pipeline.cli.words import (
     DEFAULT_MESHES,
@@ -78,7 +78,7 @@ def report(
         fail("--kind and --rest say which figures are drawn: give --figures, too")
     path, dataset = read_dataset(file, output)
     if figures:
-        _draw(path, dataset, kind, rest=rest, as_json=as_json)
+        _draw(path, dataset, kind, rest=rest)
         return
     wanted = (scene or "").strip()
     check_output(path.with_suffix(".html"))
@@ -88,13 +88,10 @@ def report(
 
     shown = "" if wanted == _NONE else _scene_of(path, dataset, wanted) if wanted else _scene_at_hand(dataset)
     page = write_page(dataset, path.with_suffix(".html"), shown)
-    if as_json:
-        print_json({"file": str(path), "page": str(page)})
-    else:
-        print(page)
+    say({"file": str(path), "page": str(page)}, str(page))
 
 
-def _draw(path: Path, dataset: "xr.Dataset", kind: list[str] | None, *, rest: bool, as_json: bool) -> None:
+def _draw(path: Path, dataset: "xr.Dataset", kind: list[str] | None, *, rest: bool) -> None:
     """Draw the figures of a dataset beside it."""
     from pipeline.report.figures import KINDS, choose, draw, files, lacks
 
@@ -106,11 +103,8 @@ def _draw(path: Path, dataset: "xr.Dataset", kind: list[str] | None, *, rest: bo
             fail(Fault(f"{path}: --kind {name} {allowed}", str(path), "--kind", name, allowed))
     stem, kinds = path.with_suffix(""), kind or choose(dataset)
     check_output(*(picture for some in files(dataset, stem, kinds=kinds).values() for picture in some))
-    pictures = draw(dataset, stem, kinds=kinds, rest=rest)
-    if as_json:
-        print_json({"file": str(path), "files": [str(picture) for picture in pictures]})
-    else:
-        print("\n".join(map(str, pictures)))
+    pictures = [str(picture) for picture in draw(dataset, stem, kinds=kinds, rest=rest)]
+    say({"file": str(path), "files": pictures}, *pictures)
 
 
 def _scene_of(path: Path, dataset: "xr.Dataset", text: str) -> str:

@@ -3,11 +3,11 @@
 from datetime import UTC, datetime
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NoReturn
 
 import typer
 
-from pipeline.cli.console import error, print_json
+from pipeline.cli.console import error, is_json_wanted, say
 from pipeline.cli.faults import DONE, SOME_FAILED, fail, of_file, of_results, refusing
 from pipeline.cli.words import CLUSTER, check_names, check_output, check_store, load_all
 from pipeline.files import result_files
@@ -24,14 +24,8 @@ _MOST_CASES = 10
 
 
 def merge_shards(
-    file: Path,
-    stores: list[Path] | None,
-    output: Path,
-    target: Path,
-    without: list[str] | None,
-    *,
-    as_json: bool,
-) -> None:
+    file: Path, stores: list[Path] | None, output: Path, target: Path, without: list[str] | None
+) -> NoReturn:
     """Merge the ``stores`` of a study's shards into the store ``target``, write its results to ``output``, and exit."""
     from pipeline.plan.plan import make_plan
 
@@ -56,8 +50,9 @@ def merge_shards(
         fail(fault, status=status)
     missing = frozenset(solve.key for solve in plan.solves if solve.key not in records)
     again = _completing(plan, missing, paths, [word for name in without or () for word in ("--without", name)])
-    if as_json:
-        found: dict[str, Any] = {
+    told = ", ".join(f"{count} {state}" for state, count in counts.items() if count)
+    say(
+        {
             "file": str(file),
             **counts,
             "shards": [{"file": str(s.path), "records": s.records, "taken": s.taken} for s in sources],
@@ -65,15 +60,13 @@ def merge_shards(
             "failures": [{"case": case, "message": message} for case, message in failed],
             "again": again,
             "files": [str(path) for path in files],
-        }
-        print_json(found)
-    else:
-        for source in sources:
-            print(f"{source.path}: {counted(source.records, 'record')}, {source.taken} of them new")
+        },
+        *(f"{source.path}: {counted(source.records, 'record')}, {source.taken} of them new" for source in sources),
+        f"{file}: {told}; wrote {', '.join(map(str, files))}",
+    )
+    if not is_json_wanted():
         for case, message in failed:
             error(f"failed: {case}: {message}")
-        told = ", ".join(f"{count} {state}" for state, count in counts.items() if count)
-        print(f"{file}: {told}; wrote {', '.join(map(str, files))}", flush=True)
         _tell_pending(plan, missing, again)
     raise typer.Exit(SOME_FAILED if problems or missing or counts["failed"] else DONE)
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from pipeline.cli.console import print_json, warning
+from pipeline.cli.console import say, warning
 from pipeline.cli.faults import DONE, SOME_FAILED, fail, of_file, refusing
 from pipeline.cli.words import (
     DEFAULT_OUTPUT,
@@ -95,14 +95,14 @@ def status(
     if file and merge:
         from pipeline.cli.shards import merge_shards
 
-        merge_shards(by_name(file), stores, output, path, without, as_json=as_json)
+        merge_shards(by_name(file), stores, output, path, without)
     elif file:
-        _of_study(by_name(file), output, path, check_names(without), as_json=as_json)
+        _of_study(by_name(file), output, path, check_names(without))
     else:
-        _of_store(path, prune, days, failed=failed, yes=yes, as_json=as_json)
+        _of_store(path, prune, days, failed=failed, yes=yes)
 
 
-def _of_study(file: Path, output: Path, path: Path, without: tuple[str, ...], *, as_json: bool) -> None:
+def _of_study(file: Path, output: Path, path: Path, without: tuple[str, ...]) -> None:
     """Say which cases of a study are in which state."""
     from pipeline.plan.plan import make_plan
     from pipeline.plan.shard import stores_of
@@ -121,25 +121,24 @@ def _of_study(file: Path, output: Path, path: Path, without: tuple[str, ...], *,
             records, _ = known_of(path, plan)
     records |= skipped(plan, records)
     counts, failed = count_states(plan, records), failures(plan, records)
-    if as_json:
-        print_json({"file": str(file), **counts, "failures": [{"case": c, "message": m} for c, m in failed]})
-        return
     told = f"{counts['ok']} done, {counts['failed']} failed"
     told += "".join(f", {counts[state]} {state}" for state in ("skipped", "lost") if counts.get(state))
-    print(f"{file}: {told}, {counts['pending']} pending{axes_of(study)}")
-    for case, message in failed:
-        print(f"  failed: {case}: {message}")
+    lines = [f"{file}: {told}, {counts['pending']} pending{axes_of(study)}"]
+    lines += [f"  failed: {case}: {message}" for case, message in failed]
     if counts["pending"] and (shards := len(stores_of(output, study))):
-        print(f"  {counted(shards, 'shard')} in {output / 'shards'}, not looked at: --merge brings them together")
+        lines.append(
+            f"  {counted(shards, 'shard')} in {output / 'shards'}, not looked at: --merge brings them together"
+        )
+    say({"file": str(file), **counts, "failures": [{"case": c, "message": m} for c, m in failed]}, *lines)
 
 
-def _of_store(path: Path, prune: bool, days: float | None, *, failed: bool, yes: bool, as_json: bool) -> None:
+def _of_store(path: Path, prune: bool, days: float | None, *, failed: bool, yes: bool) -> None:
     """Count the records of the case store, and check each; or remove some."""
     if not path.exists():
         fail(of_file(path, "there is no such store; `epsmesh run` makes one in its results"))
     check_store(path)
     if not prune:
-        _check(path, as_json=as_json)
+        _check(path)
     from pipeline.run.store import Store, StoreError
 
     older_than, moved = None if days is None else 86400 * days, ""
@@ -152,13 +151,10 @@ def _of_store(path: Path, prune: bool, days: float | None, *, failed: bool, yes:
             opened.close()
     if moved:
         warning(moved)
-    if as_json:
-        print_json(found | {"done": yes, "notice": moved})
-    else:
-        print(f"{path}: {_said(found, done=yes)}")
+    say(found | {"done": yes, "notice": moved}, f"{path}: {_said(found, done=yes)}")
 
 
-def _check(path: Path, *, as_json: bool) -> NoReturn:
+def _check(path: Path) -> NoReturn:
     """Say what the store holds and what is wrong with it, and exit."""
     from pipeline.run.reading import open_to_read
     from pipeline.run.store import StoreError
@@ -176,19 +172,15 @@ def _check(path: Path, *, as_json: bool) -> NoReturn:
         "sound": not problems,
         "problems": problems,
     }
-    if as_json:
-        print_json(content)
-    else:
-        size, work = f"{content['bytes'] / 1e6:.2g} MB", f"{content['seconds']:.0f} s of work"
-        state = counted(len(problems), "problem") if problems else "sound"
-        print(f"{path}: {counted(len(rows), 'record')}, {size}, {work}; {state}")
-        for name in ("status", "origin", "versions"):
-            for value, count in content[name].items():
-                print(f"  {count:6} {value}")
-        for problem in problems[:_MOST_PROBLEMS]:
-            print(problem)
-        if len(problems) > _MOST_PROBLEMS:
-            print(f"… and {len(problems) - _MOST_PROBLEMS} more: --json lists them")
+    size, work = f"{content['bytes'] / 1e6:.2g} MB", f"{content['seconds']:.0f} s of work"
+    state = counted(len(problems), "problem") if problems else "sound"
+    lines = [f"{path}: {counted(len(rows), 'record')}, {size}, {work}; {state}"]
+    for name in ("status", "origin", "versions"):
+        lines += [f"  {count:6} {value}" for value, count in content[name].items()]
+    lines += problems[:_MOST_PROBLEMS]
+    if len(problems) > _MOST_PROBLEMS:
+        lines.append(f"… and {len(problems) - _MOST_PROBLEMS} more: --json lists them")
+    say(content, *lines)
     raise typer.Exit(SOME_FAILED if problems else DONE)
 
 

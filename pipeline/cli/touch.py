@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from pipeline.cli.console import print_json
+from pipeline.cli.console import say
 from pipeline.cli.faults import fail, of_file
 from pipeline.cli.words import Json, check_output
 
@@ -47,16 +47,13 @@ def touch(
         if output is not None:
             path = write_touch_page(surface, output, model.name)
             size = path.stat().st_size
-            if as_json:
-                print_json({"file": str(path), "bytes": size})
-            else:
-                print(f"wrote {path} ({size / 1e6:.1f} MB), to be opened in a browser")
+            say({"file": str(path), "bytes": size}, f"wrote {path} ({size / 1e6:.1f} MB), to be opened in a browser")
             return
         text = render(surface, model.name)
     except (ModelError, OSError) as problem:
         why = getattr(problem, "strerror", None) or str(problem)
         fail(of_file(model, f"{why}{_meant(model)}", "docs/howto/touch.md"))
-    _serve(text, open_it=open_it, as_json=as_json)
+    _serve(text, open_it=open_it)
 
 
 def _meant(file: Path) -> str:
@@ -65,17 +62,14 @@ def _meant(file: Path) -> str:
     return "" if file.name.endswith(MODEL) else f"; a model ends in {MODEL}: `epsmesh export {study}` makes one"
 
 
-def _serve(text: str, *, open_it: bool, as_json: bool) -> None:
+def _serve(text: str, *, open_it: bool) -> None:
     """Serve the page until Ctrl-C."""
     import webbrowser
 
     from pipeline.touch.server import PageServer
 
     with PageServer(text) as server:
-        if as_json:
-            print_json({"address": server.address})
-        else:
-            print(f"{server.address} (Ctrl-C ends it)", flush=True)
+        say({"address": server.address}, f"{server.address} (Ctrl-C ends it)")
         if open_it:
             webbrowser.open(server.address)
         try:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipeline.cli.console import print_json
+from pipeline.cli.console import say
 from pipeline.cli.faults import DONE, SOME_FAILED
 from pipeline.cli.words import Json
 
@@ -28,21 +28,20 @@ def verify(
     from pipeline.workflow import ended_soon, load_solvers, world
 
     comm = world()
-    speaks = comm.rank == 0
+    speaks, lists = comm.rank == 0, comm.rank == 0 and not as_json
     load_solvers()
-    if speaks and not as_json:
+    if lists:
         print(_ROW.format("", "scene", "path", "reference", "value", "error", "bar", "source"))
     table = []
     with ended_soon():
         for row in rows(comm, quick=quick):
             table.append(row)
-            if speaks and not as_json:
+            if lists:
                 print(_line(row), flush=True)
     out = sum(not row.is_right for row in table)
-    if speaks and as_json:
-        print_json([{**asdict(r), "error": r.error, "right": r.is_right} for r in table])
-    elif speaks:
-        print(f"{len(table)} rows, {out} out" if out else f"{len(table)} rows, all right")
+    if speaks:
+        verdict = f"{len(table)} rows, {out} out" if out else f"{len(table)} rows, all right"
+        say([{**asdict(r), "error": r.error, "right": r.is_right} for r in table], verdict)
     raise typer.Exit(SOME_FAILED if out else DONE)
 
 

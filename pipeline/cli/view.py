@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from pipeline.cli.cases import find_case
-from pipeline.cli.console import error, print_json
+from pipeline.cli.console import error, say
 from pipeline.cli.faults import SOME_FAILED, Fault, fail
 from pipeline.cli.words import DEFAULT_MESHES, DEFAULT_OUTPUT, File, Json, Output, check_machine, check_output, load_all
 
@@ -56,7 +56,7 @@ def view(
     with abort_on_exception(comm), ended_soon():
         fields = fields_of(study, chosen, comm, mesh_only, export == "html", meshes)
         if fields is not None:
-            _write(study, fields, stem, export, missing, as_json=as_json)
+            _write(study, fields, stem, export, missing)
 
 
 def fields_of(
@@ -86,18 +86,16 @@ def fields_of(
     fail(Fault(why, file=study.file, key="CASE", value=str(case)), status=SOME_FAILED, on_all_ranks=True)
 
 
-def _write(study: "Study", fields: "Fields", stem: Path, export: str | None, missing: str, *, as_json: bool) -> None:
+def _write(study: "Study", fields: "Fields", stem: Path, export: str | None, missing: str) -> None:
     """Write what was asked for, and say what is in it, and what pictures would need."""
     written = _written(study, fields, stem, export)
-    if as_json:
-        print_json({"cells": len(fields.cells), "dofs": fields.dofs, "files": [str(path) for path in written]})
-        return
     unknowns = f", {fields.dofs:,} unknowns" if fields.dofs else ""
-    print(f"{len(fields.cells):,} elements{unknowns}")
-    for path, remark in written.items():
-        print(f"wrote {path}{remark}")
-    if missing:
-        print(f"Optional: with {missing}, this command draws PNG pictures.")
+    say(
+        {"cells": len(fields.cells), "dofs": fields.dofs, "files": [str(path) for path in written]},
+        f"{len(fields.cells):,} elements{unknowns}",
+        *(f"wrote {path}{remark}" for path, remark in written.items()),
+        *([f"Optional: with {missing}, this command draws PNG pictures."] if missing else []),
+    )
 
 
 def _written(study: "Study", fields: "Fields", stem: Path, export: str | None) -> dict[Path, str]:

@@ -55,6 +55,7 @@ Found = Annotated[
 StoreFile = Annotated[
     Path | None, typer.Option("--store", metavar="FILE", help=f"Case store [default: DIR/{STORE_NAME}].")
 ]
+# What it asks for is known before a command begins: see `console.say`.
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts, and nothing else on standard output.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the least: errors, and what was asked for.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print more: every step, every case.")]

@@ -66,13 +66,12 @@ def read_rows(path: Path) -> list[Row]:
         StoreError: if it is no store, or a damaged one.
     """
     try:
-        with _connection(path) as database:
-            records = Records(path, database)
+        with open_to_read(path) as records:
             if wrong := records.unsound():
                 raise sqlite3.DatabaseError(wrong)
             return records.rows()
-    except (sqlite3.Error, UnicodeDecodeError, OSError) as error:
-        raise StoreError(f"{path}: damaged, left out: {reason(error)}") from error
+    except StoreError as told:
+        raise StoreError(f"{path}: damaged, left out: {reason(told.__cause__)}") from told
 
 
 @contextmanager

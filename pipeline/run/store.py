@@ -1,6 +1,6 @@
 """The case store: every record on disk, in one SQLite file, the moment it exists."""
 
-import itertools
+import os
 import re
 import sqlite3
 import time
@@ -243,12 +243,7 @@ def _open(path: Path) -> sqlite3.Connection:
 
 def _move_aside(path: Path) -> Path:
     """Give a damaged store a name of its own."""
-    name, number = f"{path.name}.damaged-{time.strftime('%Y%m%d-%H%M%S')}", itertools.count(2)
-    aside = path.with_name(name)
-    while aside.exists():
-        aside = path.with_name(f"{name}-{next(number)}")
-    path.rename(aside)
-    return aside
+    return path.rename(f"{path}.damaged-{time.strftime('%Y%m%d-%H%M%S')}-{os.urandom(2).hex()}")
 
 
 def damaged(path: Path, error: Exception) -> str:
@@ -256,7 +251,7 @@ def damaged(path: Path, error: Exception) -> str:
     return f"the case store {path} is damaged ({reason(error)}); {_mend(path)} moves it aside and begins a new one"
 
 
-def reason(error: Exception) -> str:
+def reason(error: BaseException | None) -> str:
     """Return what is wrong with a store on one short line: names in a damaged file may be of any length."""
     return shorten(printable(str(error)), _LONGEST_REASON, placeholder=" …")
 

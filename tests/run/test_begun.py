@@ -137,9 +137,7 @@ def test_a_case_that_ends_its_process_fails_in_the_next_run_alone(epsmesh, tmp_p
     assert (again.exit_code, "3 ok" in again.stdout) == (0, True), again.stderr
 
 
-def test_a_rank_that_fails_alone_ends_the_run_and_the_next_one_knows_why(
-    epsmesh, tmp_path: Path
-):
+def test_a_rank_that_fails_alone_ends_the_run_and_the_next_one_knows_why(epsmesh, tmp_path: Path):
     ends = "\n        ".join(
         (
             "from pipeline.run import failure; failure.PATIENCE = 1.0",

@@ -1,7 +1,6 @@
 """A run: failures are recorded and the rest goes on, ranks agree, and nothing that is made stays."""
 
 import itertools
-import os
 import re
 import subprocess
 import sys
@@ -23,40 +22,38 @@ from pipeline.solve import SolveError
 from pipeline.solve.balance import BALANCE_LIMIT
 from pipeline.stages import Times, recharge
 from tests.cases import BLADE, solve, study
+from tests.commands import ENVIRONMENT
 
 WORLD = MPI.COMM_WORLD
+SCENE = {"probe": BLADE, "material": {"poisson": [0.3, 0.49]}, "mesh": {"rim": "0.5 mm", "fine": "4 mm"}}
 SCRIPT = """
 from mpi4py import MPI
 from pipeline.plan import schedule
-from tests.cases import BLADE, solve
+from tests.cases import solve
+from tests.run.test_execute import SCENE
 schedule._FEWEST_CELLS = 1
 for method in ("iterative", "direct"):
-    for key, record in solve(MPI.COMM_WORLD, probe=BLADE, material={"poisson": [0.3, 0.49]},
-                             mesh={"rim": "0.5 mm", "fine": "4 mm"}, solve={"method": method}).items():
+    for key, record in solve(MPI.COMM_WORLD, **SCENE, solve={"method": method}).items():
         assert record.is_ok, record.message
         if MPI.COMM_WORLD.rank == 0:
             print("force", repr(record.force), record.cells)
 """
 
 
-def forces(ranks: int) -> list[tuple[float, int]]:
-    environment = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_"))}
-    environment |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMP_NUM_THREADS": "1"}
-    command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, "-c", SCRIPT]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=300)
-    assert done.returncode == 0, done.stderr
-    found = re.findall(r"force (\S+) (\d+)", done.stdout)
-    return [(float(force), int(cells)) for force, cells in found]
-
-
 @pytest.mark.skipif(WORLD.size > 1, reason="starts mpirun itself")
 def test_one_and_three_ranks_agree():
     """What two ranks compute, the tests with the mark mpi hold against one."""
-    serial, three = forces(1), forces(3)
-    assert len(serial) == 4
-    for (force, cells), (other, count) in zip(serial, three, strict=True):
-        assert count == cells
-        assert other == pytest.approx(force, rel=1e-8)
+    command = ["mpirun", "--oversubscribe", "-n", "3", sys.executable, "-c", SCRIPT]
+    done = subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stderr
+    three = [(float(force), int(cells)) for force, cells in re.findall(r"force (\S+) (\d+)", done.stdout)]
+    alone = [
+        record for method in ("iterative", "direct") for record in solve(**SCENE, solve={"method": method}).values()
+    ]
+    assert len(alone) == 4
+    for record, (force, cells) in zip(alone, three, strict=True):
+        assert cells == record.cells
+        assert force == pytest.approx(record.force, rel=1e-8)
 
 
 @pytest.fixture
