@@ -80,7 +80,7 @@ def plan(
     more = case or []
     if check:
         _check([file, *(by_name(Path(word)) for word in more)])
-    if len(more) > 1:
+    if len(more) > 1 or any(word.endswith(".toml") for word in more):
         fail("a plan is of one study, or of one case of it; with --check several files are looked at")
     from pipeline.plan.describe import summary
     from pipeline.run.room import MEMORY_SHARE, machine_room

@@ -4,7 +4,6 @@ import statistics
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from enum import Enum
 from functools import partial
 from math import nan
 from typing import TypeVar
@@ -48,14 +47,6 @@ T = TypeVar("T")
 Keep = Callable[[Record], None]
 
 
-class Bar(Enum):
-    """Whether a solve tells its error, too."""
-
-    NONE = "no: the solve is timed"
-    IF_ROOM = "if there is memory for it: the force is worth having without"
-    NEEDED = "yes: it alone proves the accuracy that was asked for"
-
-
 @dataclass(frozen=True)
 class Meshed:
     """A mesh that solves share: its spaces, the times of its making, and the memory since that was begun."""
@@ -63,11 +54,6 @@ class Meshed:
     spaces: Spaces
     times: Times
     memory: PeakMemory
-
-    @property
-    def mesh(self) -> BodyMesh:
-        """The mesh."""
-        return self.spaces.body
 
 
 class StepRunner:
@@ -142,7 +128,7 @@ class StepRunner:
         """Solve every material of an operator, or a few of them and the rest from these."""
         self._begin(*step.solves)
         first = step.solves[0]
-        condense, reuse = self._condenses(step, meshed.mesh), self._plan.reuse
+        condense, reuse = self._condenses(step, meshed.spaces.body), self._plan.reuse
         problem = self._caught(lambda: problem_of(meshed.spaces, first.meshed_case, reuse=reuse, condense=condense))
         if isinstance(problem, Failure):
             self._fail(step.solves, problem)
@@ -154,7 +140,7 @@ class StepRunner:
                 self._reduce(step, problem, meshed)
             for solve in _in_order(step, condensed=condense) if reuse or condense else step.solves:
                 if solve.key not in self._records:
-                    self._record(solve, partial(self._solve, solve, problem, meshed, _bar_of(solve)))
+                    self._record(solve, partial(self._solve, solve, problem, meshed))
 
     def _share_far_fields(self) -> None:
         """Find the far fields of all places of the plan at once; if that fails, each finds its own. Collective."""
@@ -167,7 +153,7 @@ class StepRunner:
         """Solve a few and finish the rest from their basis; without a basis those are left to be solved, too."""
 
         def compute(solve: Solve) -> Record | None:
-            self._record(solve, partial(self._solve, solve, problem, meshed, _bar_of(solve)))
+            self._record(solve, partial(self._solve, solve, problem, meshed))
             record = self._records[solve.key]
             return record if record.is_ok else None
 
@@ -193,47 +179,42 @@ class StepRunner:
 
         Where an accuracy is asked for, the bar is part of the work.
         """
-        bar = Bar.NONE if solve.goal is None else Bar.NEEDED
-        records = [self._afresh(solve, memory, bar) for _ in range(solve.case.solve.repeats)]
+        has_goal = solve.goal is not None
+        records = [self._afresh(solve, memory, has_bar=has_goal) for _ in range(solve.case.solve.repeats)]
         medians = {n: statistics.median(getattr(r, n) for r in records) for n in (*TIMES, "time_error")}
         record = replace(records[-1], **medians, time_spread=_spread([r.time_total for r in records]))
-        if bar is Bar.NEEDED:
+        if has_goal:
             return record
-        told = self._afresh(replace(solve, mirrors=model_planes(solve.case)), memory, Bar.IF_ROOM)
+        told = self._afresh(replace(solve, mirrors=model_planes(solve.case)), memory)
         seconds = told.time_total + told.time_error
         return replace(record, **{name: getattr(told, name) for name in BARS}, time_error=seconds, message=told.message)
 
-    def _afresh(self, solve: Solve, memory: PeakMemory, bar: Bar) -> Record:
+    def _afresh(self, solve: Solve, memory: PeakMemory, *, has_bar: bool = True) -> Record:
         """Compute one case, mesh and all; collective."""
         with recorded() as times:
             mesh = self._mesh(solve)
         with Spaces(mesh) as spaces, problem_of(spaces, solve.meshed_case) as problem:
-            record = self._solve(solve, problem, Meshed(spaces, times, memory), bar)
+            record = self._solve(solve, problem, Meshed(spaces, times, memory), has_bar=has_bar)
         del mesh, spaces, problem
         give_back(self._comm)
         return record
 
-    def _solve(self, solve: Solve, problem: QuasiStaticProblem, meshed: Meshed, bar: Bar) -> Record:
-        needed, with_bar = memory_of(solve.case, problem.dofs)
-        check_memory(self._free, needed, "solving")
-        missing = self._lacks_room(bar, with_bar)
-        estimate_it = bar is not Bar.NONE and not missing
-        solution = solve_problem(solve.case, problem, estimate=estimate_it, meshed=solve.meshed_case)
-        record = record_of(solve, solution, meshed.times.mesh)
-        stamped = self._stamp(record, meshed.memory)
-        return replace(stamped, message=missing, surface_deviation=meshed.mesh.deviation)
-
-    def _lacks_room(self, bar: Bar, needed: float) -> str:
-        """Return what to say if there is no memory for an error bar that may be left out; collective.
+    def _solve(self, solve: Solve, problem: QuasiStaticProblem, meshed: Meshed, *, has_bar: bool = True) -> Record:
+        """Return the record of a solve, with its error bar if there is memory for that; collective.
 
         Raises:
-            CaseFailure: if it may not: a finer mesh would need more.
+            CaseFailure: if there is none for the solve, or for the bar that alone proves an accuracy.
         """
-        if bar is Bar.NONE:
-            return ""
-        if bar is Bar.NEEDED:
-            check_memory(self._free, needed, "the error bar that proves the accuracy")
-        return lacks_memory(self._free, needed, "the error bar")
+        needed, with_bar = memory_of(solve.case, problem.dofs)
+        check_memory(self._free, needed, "solving")
+        if has_bar and solve.goal is not None:
+            check_memory(self._free, with_bar, "the error bar that proves the accuracy")
+        missing = lacks_memory(self._free, with_bar, "the error bar") if has_bar else ""
+        has_bar = has_bar and not missing
+        solution = solve_problem(solve.case, problem, estimate=has_bar, meshed=solve.meshed_case)
+        record = record_of(solve, solution, meshed.times.mesh)
+        stamped = self._stamp(record, meshed.memory)
+        return replace(stamped, message=missing, surface_deviation=meshed.spaces.body.deviation)
 
     def _solve_meridian(self, solve: Solve, memory: PeakMemory) -> Record:
         problem = meridian_problem(solve.case)
@@ -300,10 +281,6 @@ class StepRunner:
 def _spread(seconds: list[float]) -> float:
     """Return how far times are apart, relative to their median; not a number of one."""
     return (max(seconds) - min(seconds)) / statistics.median(seconds) if len(seconds) > 1 else nan
-
-
-def _bar_of(solve: Solve) -> Bar:
-    return Bar.IF_ROOM if solve.goal is None else Bar.NEEDED
 
 
 def _in_order(step: OperatorStep, *, condensed: bool) -> Iterator[Solve]:

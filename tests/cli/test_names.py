@@ -24,6 +24,7 @@ def test_a_file_of_that_name_comes_first(epsmesh, tmp_path, monkeypatch):
     ("words", "told"),
     [
         (("run", "known.nc"), "a dataset is for `report` and `guide`, a model for `touch`"),
+        (("plan", "small.toml", "small.toml"), "with --check several files are looked at"),
         (("touch", "small.toml"), "a model ends in .epsm.nc: `epsmesh export small.toml` makes one"),
         (("touch", "known.nc"), "a model ends in .epsm.nc: `epsmesh export known.toml` makes one"),
     ],
