@@ -21,7 +21,7 @@ from pipeline.run.begun import ENDING, Begun, fail_begun
 from pipeline.run.merge import merge
 from pipeline.run.outcome import count_states, failures
 from pipeline.run.progress import Progress, Terminal
-from pipeline.run.reading import read_rows
+from pipeline.run.reading import open_to_read
 from pipeline.run.record import Record
 from pipeline.run.store import Store, StoreError
 from pipeline.solve import CompilerError
@@ -256,10 +256,9 @@ def _what_ended(count: int) -> str:
 def _known_beside(path: Path, keys: Collection[str]) -> dict[str, Record]:
     """Return the forces on record in another store; without a readable one the work is done again, no more."""
     try:
-        rows = read_rows(path) if path.exists() else []
-        records = (Record.from_json(text) for key, text, _ in rows if key in keys)
-        return {record.key: record for record in records if record.is_ok}
-    except (StoreError, ValueError):
+        with open_to_read(path) as other:
+            return {key: record for key, record in other.get(keys).items() if record.is_ok}
+    except StoreError:
         return {}
 
 

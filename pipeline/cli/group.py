@@ -26,8 +26,6 @@ from pipeline.printable import printable
 
 # What a disk says that cannot be written to, be it only found when all is done.
 _UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
-# What is said of a file, or of a folder, that can be neither read nor written.
-_UNUSABLE = (errno.EACCES, errno.EPERM, errno.EISDIR, errno.ENOTDIR, errno.ENAMETOOLONG, errno.EIO)
 # What has become of commands that there were.
 _NOW = {
     "validate": "epsmesh plan --check FILE...",
@@ -72,7 +70,7 @@ class Commands(TyperGroup):
         except OSError as wrong:
             if wrong.errno in _UNWRITABLE:
                 fail(of_unwritten(wrong))
-            if wrong.errno in _UNUSABLE and wrong.filename is not None:
+            if wrong.strerror and wrong.filename is not None:
                 fail(of_file(wrong.filename, f"cannot be used: {wrong.strerror}"))
             _tell(wrong, self.words)
             raise
