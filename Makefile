@@ -99,7 +99,7 @@ benchmark: setup ## every table of docs/performance.md, into results/ (an idle m
 	$(PYTHON) -m benchmarks.organs
 	$(PYTHON) -m benchmarks.paths
 	$(PYTHON) -m benchmarks.scaling
-	$(PYTHON) -m pipeline.verify.work_precision
+	$(PYTHON) -m benchmarks.work_precision
 	$(EPSMESH) run studies/speedup.toml --fresh
 
 peers: setup ## NGSolve and scikit-fem against this program, time to a true error (an idle machine): results/peers.md
@@ -118,10 +118,10 @@ resolution: setup ## what a file's resolution, noise and voxels change of F (a q
 	$(MPI_ENV) $(PYTHON) -m benchmarks.resolution
 
 stress: setup ## numerical stability: a matrix of extremes (10 minutes; STRESS_ARGS="poisson layer": rows of these names)
-	$(PYTHON) -m pipeline.verify.stress $(STRESS_ARGS)
+	$(PYTHON) -m benchmarks.stress $(STRESS_ARGS)
 
 coverage: setup ## do the error bars hold on 160 random scenes? COVERAGE_ARGS="--family tools --count 60 --seed 7": others
-	$(PYTHON) -m pipeline.verify.coverage $(COVERAGE_ARGS)
+	$(PYTHON) -m benchmarks.coverage $(COVERAGE_ARGS)
 
 fuzz: setup ## ten thousand study files, and damaged surfaces, datasets, stores and models (minutes)
 	EPSMESH_FUZZ=$(FUZZ) $(MPI_ENV) $(PYTHON) -m pytest tests/fuzz -q $(PYTEST_ARGS)

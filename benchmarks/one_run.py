@@ -80,6 +80,7 @@ def measure(
         "solved": len(plan.solves),
         "message": next((record.message for record in records.values() if not record.is_ok), ""),
         "force_error": max(record.force_error for record in records.values()),
+        "record": first.to_json(),
         **{name: getattr(first, name) for name in _OF_A_CASE},
     }
 

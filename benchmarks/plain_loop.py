@@ -31,7 +31,7 @@ from pipeline.arrays import FloatArray
 from pipeline.plan import estimate
 from pipeline.study.load import load
 from pipeline.study.sweep import Case, Study
-from pipeline.verify.machine import machine
+from benchmarks.machine import machine
 
 # Compiles what a run of the program needs, in seconds.
 _WARM_UP = ROOT / "studies" / "quick.toml"

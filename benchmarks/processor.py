@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pipeline.verify.machine import MPI_ENVIRONMENT
+from benchmarks.machine import MPI_ENVIRONMENT
 
 ROOT = Path(__file__).parents[1]
 # Debian's own mpirun: another one on PATH would not fit Debian's mpi4py.
@@ -49,38 +49,55 @@ def median_seconds(ways: Mapping[str, Callable[[], Any]], repeats: int) -> dict[
     return {name: statistics.median(seconds) for name, seconds in found.items()}
 
 
-def ask(words: Sequence[str], ranks: int = 0, tree: Path = ROOT, launcher: Sequence[str] = ()) -> Any:
+def ask(
+    words: Sequence[str],
+    ranks: int = 0,
+    tree: Path = ROOT,
+    launcher: Sequence[str] = (),
+    longest: float | None = None,
+) -> Any:
     """Run Python with ``words`` in a process of its own, or on ``ranks``; return the last line, JSON, that it prints.
 
     It has one thread, and imports what it needs from the checkout ``tree``. mpirun, of which ``launcher`` are more
     words, binds each rank to a core: what is compared with two ranks runs on one rank, too, not on none.
 
     Raises:
-        RuntimeError: with what it said, if it fails.
+        RuntimeError: with what it said, if it fails, or takes more than ``longest`` seconds.
     """
     many = [*MPIRUN, str(ranks), *launcher] if ranks else []
     paths = os.environ | MPI_ENVIRONMENT | {"PYTHONPATH": str(tree)}
-    done = subprocess.run(
-        [*many, sys.executable, "-m", "mpi4py", *words],
-        cwd=tree,
-        env=paths,
-        check=False,
-        capture_output=True,
-        text=True,
-    )
+    command = [*many, sys.executable, "-m", "mpi4py", *words]
+    try:
+        done = subprocess.run(
+            command, cwd=tree, env=paths, check=False, capture_output=True, text=True, timeout=longest
+        )
+    except subprocess.TimeoutExpired:
+        raise RuntimeError(f"no answer in {longest} s") from None
     if done.returncode:
         raise RuntimeError(f"{' '.join(words)[:200]}: status {done.returncode}\n{done.stdout}{done.stderr}")
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def run(study: dict[str, Any], ranks: int = 0, tree: Path = ROOT, **how: Any) -> dict[str, Any]:
+def alone(
+    study: dict[str, Any], ranks: int = 0, tree: Path = ROOT, *, longest: float | None = None, **how: Any
+) -> dict[str, Any]:
     """Return what a run of ``study`` takes and gives in a process of its own: see :mod:`benchmarks.one_run`.
+
+    Raises:
+        RuntimeError: as :func:`ask` does.
+    """
+    worker = str(Path(__file__).with_name("one_run.py"))
+    found: dict[str, Any] = ask([worker, json.dumps(study), json.dumps(how)], ranks, tree, longest=longest)
+    return found
+
+
+def run(study: dict[str, Any], ranks: int = 0, tree: Path = ROOT, **how: Any) -> dict[str, Any]:
+    """Return the same of a study whose cases are all solved.
 
     Raises:
         RuntimeError: if a case fails.
     """
-    worker = str(Path(__file__).with_name("one_run.py"))
-    found: dict[str, Any] = ask([worker, json.dumps(study), json.dumps(how)], ranks, tree)
+    found = alone(study, ranks, tree, **how)
     if found["message"]:
         raise RuntimeError(found["message"])
     return found

@@ -42,8 +42,9 @@ class Table:
         write(name, output, self.rows, markdown(self.rows, self.columns))
 
 
-def options(description: str | None) -> argparse.ArgumentParser:
-    """Return what reads the options of a benchmark: ``--output``, to which each adds its own."""
+def options(description: str | None, *, writes: bool = True) -> argparse.ArgumentParser:
+    """Return what reads the options of a benchmark: ``--output`` of one that ``writes``, to which each adds its own."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--output", type=Path, default=RESULTS, help="folder of what is written")
+    if writes:
+        parser.add_argument("--output", type=Path, default=RESULTS, help="folder of what is written")
     return parser

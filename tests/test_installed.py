@@ -59,18 +59,6 @@ def test_the_command_is_installed_beside_its_packages(installed):
     assert "dolfinx" in done.stdout
 
 
-def test_what_measures_the_program_is_part_of_it(installed):
-    script = "import pipeline.verify.work_precision, pipeline.verify.stress, sys; print('benchmarks' in sys.modules)"
-    done = installed("-c", script)
-    assert done.stdout.strip() == "False", done.stderr
-
-
-def test_stress_runs(installed):
-    done = installed("-m", "pipeline.verify.stress", "gap to the body's edge / a", "--quick")
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "no wrong numbers" in done.stdout
-
-
 def test_examples_and_templates_come_along(installed):
     done = installed("-m", "pipeline", "new", "mine", "--like", "quick")
     assert done.returncode == 0, done.stderr

@@ -17,7 +17,7 @@ from benchmarks.peers.settings import CONTACT_GRID, GRIDS, LADDERS, MERIDIAN, PR
 from benchmarks.peers.tasks import TASKS
 from benchmarks.peers.truth import Truth, converge, known
 from benchmarks.tables import options, write
-from pipeline.verify.machine import machine
+from benchmarks.machine import machine
 
 # Runs of more processor seconds vary too little to be repeated.
 _LONG = 3.0

@@ -35,7 +35,7 @@ _NOW = {
     "store": "epsmesh status --store FILE",
     "version": "epsmesh --version --verbose",
     "evaluator": "epsmesh export --evaluator FOLDER",
-    "benchmark": "python -m pipeline.verify.work_precision",
+    "benchmark": "python -m benchmarks.work_precision, in a checkout",
 }
 
 

@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 from mpi4py import MPI
 
-from pipeline.verify import work_precision, work_precision_figure
+from benchmarks import work_precision, work_precision_figure
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="times one process")
 

@@ -1,4 +1,4 @@
-"""What campaigns share: the ranks, an end by Ctrl-C, and a line for each result as soon as it exists."""
+"""What campaigns share: an end by Ctrl-C, a line for each result as soon as it exists, and data for JSON."""
 
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -6,10 +6,9 @@ from contextlib import contextmanager
 from math import isfinite
 from typing import Any, TypeVar
 
-from pipeline import workflow
-from pipeline.workflow import world
+from mpi4py import MPI
 
-__all__ = ["each", "ended_soon", "finite", "world"]
+from pipeline import workflow
 
 T = TypeVar("T")
 _INTERRUPTED = 130
@@ -20,10 +19,10 @@ def ended_soon() -> Iterator[None]:
     """End with status 130, on all ranks, if the program is asked to end."""
     workflow.load_solvers()
     try:
-        with workflow.abort_on_exception(world()), workflow.ended_soon():
+        with workflow.abort_on_exception(MPI.COMM_WORLD), workflow.ended_soon():
             yield
     except KeyboardInterrupt:
-        workflow.end_ranks(world(), _INTERRUPTED)
+        workflow.end_ranks(MPI.COMM_WORLD, _INTERRUPTED)
         sys.exit(_INTERRUPTED)
 
 

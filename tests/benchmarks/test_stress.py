@@ -7,9 +7,10 @@ from math import inf, isnan, nan
 import pytest
 from mpi4py import MPI
 
+from benchmarks import stress
+from benchmarks.stress import Result, judge, run, summary, table, to_json
+from benchmarks.stress_cells import Cell, cells
 from pipeline.run.record import UNFORESEEN, Record
-from pipeline.verify.stress import Cell, Result, cells, judge, run, summary, table, to_json
-from pipeline.verify.stress import runner as stress_runner
 
 WORLD = MPI.COMM_WORLD
 CELL = Cell("row", "value", {})
@@ -28,7 +29,7 @@ def test_quick_cells_pass():
 
 @pytest.mark.mpi
 def test_a_wrong_force_with_a_good_status_fails(monkeypatch):
-    right = stress_runner.compute
+    right = stress.compute
 
     def wrong(plan, comm):
         """Return forces that are 10 % off, but for those of the references."""
@@ -36,7 +37,7 @@ def test_a_wrong_force_with_a_good_status_fails(monkeypatch):
         factor = 1.0 if all(solve.goal for solve in plan.solves) else 1.1
         return {key: replace(record, force=factor * record.force) for key, record in found.items()}
 
-    monkeypatch.setattr(stress_runner, "compute", wrong)
+    monkeypatch.setattr(stress, "compute", wrong)
     results = [result for result in run(WORLD, ["Poisson's ratio"], quick=True) if result.value == "0.44"]
     (result,) = results
     assert result.status == "FAIL"
@@ -101,3 +102,9 @@ def test_json_and_table_hold_every_result():
 def test_unknown_rows_are_refused():
     with pytest.raises(ValueError, match="there are: Poisson's ratio"):
         next(run(MPI.COMM_SELF, ["nonsense"]))
+
+
+@pytest.mark.skipif(WORLD.size > 1, reason="serial")
+def test_a_row_is_told_with_its_verdict(capsys):
+    assert stress.main(["gap to the body's edge / a", "--quick"]) == 0
+    assert "no wrong numbers" in capsys.readouterr().out

@@ -19,6 +19,8 @@ import xarray as xr
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
+from benchmarks.campaigns import ended_soon
+from benchmarks.work_precision_figure import draw
 from pipeline.files import result_files, why_not_writable
 from pipeline.mesh.meridian import Meridian
 from pipeline.plan.plan import make_plan
@@ -31,9 +33,7 @@ from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.study.load import parse
 from pipeline.verify import known
-from pipeline.verify.machine import machine
-from pipeline.verify.running import ended_soon
-from pipeline.verify.work_precision_figure import draw
+from benchmarks.machine import machine
 
 NAME = "work_precision"
 POISSON = (0.3, 0.49)
@@ -208,7 +208,7 @@ def main(output: Path, repeats: int, *, quick: bool = False) -> list[Path]:
 
 def command(arguments: list[str]) -> None:
     """Run from the command line."""
-    parser = argparse.ArgumentParser(prog="python -m pipeline.verify.work_precision", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.work_precision", description=__doc__)
     parser.add_argument("--output", type=Path, default=Path("results"), metavar="DIR")
     parser.add_argument("--repeats", type=int, default=3, metavar="N", help="runs of each point; the median counts")
     parser.add_argument("--quick", action="store_true", help="a few points")
