@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from benchmarks.machine import machine
 from benchmarks.one_run import stages_by
 from benchmarks.processor import ask
 from benchmarks.scenes import LARGE
@@ -32,7 +33,6 @@ from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.quasi_static import QuasiStaticProblem
 from pipeline.solve.spaces import Spaces
 from pipeline.study.load import parse
-from benchmarks.machine import machine
 
 _TOLERANCE = 1e-8
 _MPI = ("messages", "bytes", "reductions")

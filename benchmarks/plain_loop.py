@@ -24,6 +24,7 @@ import numpy as np
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
+from benchmarks.machine import machine
 from benchmarks.plain_case import MOST_DIRECT, SOLVERS, Solved, solve
 from benchmarks.processor import ROOT, processor_seconds
 from benchmarks.tables import markdown, options, write
@@ -31,7 +32,6 @@ from pipeline.arrays import FloatArray
 from pipeline.plan import estimate
 from pipeline.study.load import load
 from pipeline.study.sweep import Case, Study
-from benchmarks.machine import machine
 
 # Compiles what a run of the program needs, in seconds.
 _WARM_UP = ROOT / "studies" / "quick.toml"

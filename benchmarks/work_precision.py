@@ -20,6 +20,7 @@ from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
 from benchmarks.campaigns import ended_soon
+from benchmarks.machine import machine
 from benchmarks.work_precision_figure import draw
 from pipeline.files import result_files, why_not_writable
 from pipeline.mesh.meridian import Meridian
@@ -33,7 +34,6 @@ from pipeline.solve.movement import Movement
 from pipeline.solve.physics import MaterialLaw
 from pipeline.study.load import parse
 from pipeline.verify import known
-from benchmarks.machine import machine
 
 NAME = "work_precision"
 POISSON = (0.3, 0.49)

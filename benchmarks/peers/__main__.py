@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from itertools import product
 from typing import Any
 
+from benchmarks.machine import machine
 from benchmarks.peers.figure import draw
 from benchmarks.peers.processes import MODULES, ask
 from benchmarks.peers.results import TARGETS, Run, breakdown, medians, standings, table, to_json, truths_table
@@ -17,7 +18,6 @@ from benchmarks.peers.settings import CONTACT_GRID, GRIDS, LADDERS, MERIDIAN, PR
 from benchmarks.peers.tasks import TASKS
 from benchmarks.peers.truth import Truth, converge, known
 from benchmarks.tables import options, write
-from benchmarks.machine import machine
 
 # Runs of more processor seconds vary too little to be repeated.
 _LONG = 3.0
