@@ -1,7 +1,7 @@
 """Contact whose area is found, where force, depth and radius are known: half-spaces, finite bodies, thin layers."""
 
 from collections.abc import Iterator
-from math import pi, radians, tan
+from math import radians
 from typing import Any
 
 from mpi4py import MPI
@@ -52,34 +52,36 @@ def contact_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
 
 def _half_space(comm: MPI.Comm) -> Iterator[Row]:
     """F of the depth, and of the radius found, of tools of about 1 mm of contact."""
-    plane = _YOUNG / (1 - _POISSON**2)
     ball, cone = Rounded(0.0, _BALL * 1e-3), Rounded(radians(_ANGLE))
     shallow, deep = 1e-6 / ball.tip, 1e-3
-    a = ball.contact_radius(shallow)
+    force_of_ball = _of_contact(ball, ball.contact_radius(shallow))
     tools = (
-        ("sphere", {"shape": "sphere", "radius": f"{_BALL} mm"}, shallow, plane * _ball_force(ball.tip, a), ball),
+        ("sphere", {"shape": "sphere", "radius": f"{_BALL} mm"}, shallow, force_of_ball, ball),
         (
             "cone",
             {"shape": "cone", "angle": f"{_ANGLE} deg", "radius": "8 mm"},
             deep,
-            2 / pi * plane * tan(cone.angle) * deep**2,
+            known.half_space_cone(_YOUNG, _POISSON, cone.angle, deep),
             cone,
         ),
     )
     for name, tool, depth, force, section in tools:
         record = _solved(comm, "2D", _cylinder(_FAR, _FAR), tool, depth)
         yield _row(f"half-space, {name}, F of depth", "2D", force, known.SNEDDON, record, 1e-4)
-        radius = record.contact_radius
-        by_radius = _ball_force(section.tip, radius) if section.tip else pi / 2 * radius**2 / tan(section.angle)
-        yield _row(f"half-space, {name}, F of radius", "2D", plane * by_radius, known.SNEDDON, record, 1e-6)
+        by_radius = _of_contact(section, record.contact_radius)
+        yield _row(f"half-space, {name}, F of radius", "2D", by_radius, known.SNEDDON, record, 1e-6)
+
+
+def _of_contact(section: Rounded, radius: float) -> float:
+    return known.half_space_contact(_YOUNG, _POISSON, section.slope, radius)
 
 
 def _finite(comm: MPI.Comm) -> Iterator[Row]:
     """A body of 200 radii of contact is not a half-space: its surface sinks less."""
-    ball, plane = Rounded(0.0, 1.0), _YOUNG / (1 - _POISSON**2)
+    ball = Rounded(0.0, 1.0)
     depth = 1e-6 / ball.tip
     record = _solved(comm, "2D", _cylinder(200, 200), {"shape": "sphere", "radius": f"{1e3 * ball.tip} mm"}, depth)
-    force = (1 + _FINITE) * plane * _ball_force(ball.tip, ball.contact_radius(depth))
+    force = (1 + _FINITE) * _of_contact(ball, ball.contact_radius(depth))
     yield _row("body of 200 radii of contact, sphere", "2D", force, "meridian, by hand", record, _FINITE_ERROR)
 
 
@@ -140,15 +142,6 @@ def _layers(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
             record = _solved(comm, "2D", body, {"shape": "sphere", "radius": f"{_BALL} mm"}, depth, nu)
             name = f"layer on a rigid base, sphere, a/h = {1 / thick:.2g}, ν = {nu:g}"
             yield _row(name, "2D", force * _YOUNG / (1 - nu**2), _LAYER_SOURCE, record, 1e-6)
-
-
-def _ball_force(radius: float, contact: float) -> float:
-    """Return F / E* (m²) of a ball, not a paraboloid, whose contact on a half-space has a small radius (m).
-
-    The series of (a² + R²)/2 ln((R + a)/(R - a)) - a R, without its cancellation.
-    """
-    square = (contact / radius) ** 2
-    return 4 / 3 * contact**3 / radius * (1 + square * (2 / 5 + square * (9 / 35 + square * 4 / 21)))
 
 
 def _row(name: str, path: str, force: float, source: str, record: Record, reference_bar: float) -> Row:

@@ -4,9 +4,13 @@ What compares forces with the truth asks here: ``epsmesh verify``, the benchmark
 says otherwise.
 """
 
-from math import log, pi
+from collections.abc import Callable
+from math import log, pi, sqrt, tan
 
+import numpy as np
 from scipy.special import ellipk
+
+from pipeline.arrays import FloatArray
 
 # F / (E d) in mm, by contact and Poisson's ratio, of the cylinder R = H = 50 mm that is held at its bottom, under a
 # disc of 3 mm: axisymmetric, Taylor–Hood elements of degree 4 graded to 1e-5 of the radius at the rim.
@@ -81,6 +85,29 @@ def half_space_ellipse(young: float, poisson: float, axes: tuple[float, float], 
     """
     short, long = sorted(axes)
     return pi * young / (1 - poisson**2) * long * depth / float(ellipk(1 - (short / long) ** 2)), GALIN
+
+
+def half_space_ball(young: float, poisson: float, radius: float, depth: float) -> float:
+    """Return F of a frictionless paraboloid, as a ball is where it touches little, on a half-space: 4/3 E* √R d^1.5.
+
+    H. Hertz, J. reine angew. Math. 92, 156 (1882).
+    """
+    return 4 / 3 * young / (1 - poisson**2) * sqrt(radius * depth**3)
+
+
+def half_space_cone(young: float, poisson: float, angle: float, depth: float) -> float:
+    """Return F of a frictionless cone, its half angle to the axis ``angle``, on a half-space (Sneddon)."""
+    return 2 / pi * young / (1 - poisson**2) * tan(angle) * depth**2
+
+
+def half_space_contact(young: float, poisson: float, slope: Callable[[FloatArray], FloatArray], radius: float) -> float:
+    """Return F of a frictionless round tool, f' its ``slope``, that touches a ``radius`` a of a half-space (Sneddon).
+
+    2 E* ∫ f'(r) r² / (a² - r²)^½ dr for 0 < r < a.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    sine = np.sin(pi / 4 * (nodes + 1))
+    return 2 * young / (1 - poisson**2) * radius**2 * float(pi / 4 * weights @ (sine**2 * slope(radius * sine)))
 
 
 def rectangle(stiffness: float, young: float, poisson: float, width: float, depth: float) -> float:

@@ -13,6 +13,7 @@ from pipeline.realtime.classic import read_doubles
 from pipeline.realtime.contact import Disc, ball, cone
 from pipeline.realtime.place import Place, Shape
 from pipeline.realtime.read import model_of, numbers_of
+from pipeline.verify import known
 from tests.realtime.synthetic import random_model, write_random
 
 TOOLS = (
@@ -72,10 +73,12 @@ def test_a_round_tool_is_that_of_an_integral_equation(tool, profile, h):
 def test_a_body_that_is_a_half_space_gives_the_closed_forms():
     none, stiff = np.zeros(2), 1 / (1 - 0.3**2)
     place = Place(0.0, 0.0, 0.0, none, none, none, stiff)
-    assert Disc(2e-3).press(1e-4, place, 1.0).force == pytest.approx(2 * stiff * 2e-3 * 1e-4)
-    hertz = 4 / 3 * stiff * 1.0**0.5 * 1e-6**1.5
+    assert Disc(2e-3).press(1e-4, place, 1.0).force == pytest.approx(
+        known.half_space_disc(1.0, 0.3, 2e-3, 1e-4, "frictionless")[0]
+    )
+    hertz = known.half_space_ball(1.0, 0.3, 1.0, 1e-6)
     assert ball(1.0).press(1e-6, place, 1.0).force == pytest.approx(hertz, rel=1e-6)
-    love = 2 / pi * stiff * 1e-4**2 * tan(1.2)
+    love = known.half_space_cone(1.0, 0.3, 1.2, 1e-4)
     assert cone(1.2, 5e-3).press(1e-4, place, 1.0).force == pytest.approx(love)
 
 
@@ -133,7 +136,7 @@ def test_a_slender_blade_is_a_strip():
     place = Place(0.0, 0.0, 0.0, none, none, none, stiff, shape=flat)
     contact = blade(2 * long, 2 * short, 0.3).press(1e-4, place, 1.0)
     # It is more than the ellipse within, and less than the one round it (A. E. Green and I. N. Sneddon, 1950).
-    ellipse = pi * stiff * long * 1e-4 / ellipk(1 - (short / long) ** 2)
+    ellipse, _ = known.half_space_ellipse(1.0, 0.3, (long, short), 1e-4)
     assert ellipse < contact.force < 2**0.5 * ellipse
     # Pressure falls towards the ends from what it is on a segment, where it is the same all along.
     assert long**2 / 3 < contact.mean_square < long**2 / 2

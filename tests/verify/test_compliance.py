@@ -1,10 +1,11 @@
 """Compliances of a layer on a rigid base, from three integral equations, and what tools say of themselves by them."""
 
-from math import inf, pi, radians, tan
+from math import inf, radians, tan
 
 import pytest
 
 from pipeline.study.load import parse
+from pipeline.verify import known
 from pipeline.verify.layer_contact import layer_contact
 from pipeline.verify.layered import Solid, added_compliance, layered_disc
 from tests.cases import raw
@@ -26,10 +27,11 @@ def added(force, half_space, depth, exponent):
 
 def test_a_small_disc_finds_the_compliance_of_the_layer():
     disc = probe(shape="disc", radius="1 mm", depth="0.01 mm")
+    alone, _ = known.half_space_disc(YOUNG, NU, 1e-3, 1e-5, "frictionless")
     for thickness, rest in ((20e-3, 1e-5), (10e-3, 1e-4)):
         c, g = added_compliance(LAYER, thickness, RIGID)
         force = layered_disc(LAYER, thickness, RIGID, 1e-3, 1e-5)
-        found = added(force, 2 * PLANE * 1e-3 * 1e-5, 1e-5, disc.force_exponent)
+        found = added(force, alone, 1e-5, disc.force_exponent)
         assert found == pytest.approx(c + g * disc.mean_square, rel=rest)
         assert abs(found / c - 1) > 20 * rest
 
@@ -47,8 +49,11 @@ def test_tools_of_which_more_touches_with_depth_find_the_same(shape):
     keys = {"radius": "1 m"} if shape == "sphere" else {"angle": "89 deg", "radius": "1 m"}
     tool = probe(shape=shape, depth=f"{depth!r} m", **keys)
     n = tool.force_exponent
-    half_space = {"sphere": 4 / 3 * radius**0.5 * depth**1.5, "cone": 2 / pi * tan(angle) * depth**2}[shape]
-    found = added(PLANE * force, PLANE * half_space, depth, n)
+    half_space = {
+        "sphere": known.half_space_ball(YOUNG, NU, radius, depth),
+        "cone": known.half_space_cone(YOUNG, NU, angle, depth),
+    }[shape]
+    found = added(PLANE * force, half_space, depth, n)
     assert found == pytest.approx(c + g * tool.mean_square, rel=2e-4)
     assert abs(found / c - 1) > 1e-3
 
