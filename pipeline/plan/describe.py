@@ -10,11 +10,16 @@ from pipeline.plan.plan import Plan
 from pipeline.plan.proportional_depths import depth_key
 from pipeline.plan.schedule import schedule
 from pipeline.plan.steps import MeshStep, Solve, mesh_steps
+from pipeline.printable import counted
+from pipeline.shapes.section import in_mm
+from pipeline.study.capabilities import obstacle
 from pipeline.study.sweep import Case
 
+# Depth over half width at which tissue at the edge of a bonded punch folds, and large displacements end; on finer
+# meshes somewhat less.
+_FOLDS = 0.3
 _MAY_END = (
-    "How deep a probe can be followed at large displacements is not known beforehand. A depth that is not reached "
-    "fails, and tells how far it came. Smaller depths of the same sweep keep their forces."
+    "A depth that is not reached fails, and tells how far it came. Smaller depths of the same sweep keep their forces."
 )
 
 
@@ -46,7 +51,7 @@ def summary(plan: Plan, ranks: int = 1) -> dict[str, Any]:
         "exact": sum(solve.is_reference for solve in plan.solves),
         "exact_unasked": _unasked(plan),
         "struck": [{"name": s.name, "count": s.count, "reason": s.reason} for s in plan.struck],
-        "notes": [_MAY_END] if any(solve.case.material.is_large for solve in plan.solves) else [],
+        "notes": _notes(plan),
         "seconds": seconds,
         "memory": max((step["memory"] for step in steps), default=0.0),
         "ranks": ranks,
@@ -54,6 +59,20 @@ def summary(plan: Plan, ranks: int = 1) -> dict[str, Any]:
         "factor": plan.cost.error,
         "steps": steps,
     }
+
+
+def _notes(plan: Plan) -> list[str]:
+    """Return up to which depth large displacements are expected to be computed, and which cases ask for more."""
+    large = [solve.case for solve in plan.solves if solve.case.material.is_large]
+    if not large:
+        return []
+    ends = sorted({_FOLDS * case.probe.half_width for case in large})
+    deeper = sum(case.probe.depth > _FOLDS * case.probe.half_width for case in large)
+    return [
+        f"Large displacements: tissue folds at the edge of a bonded punch near a depth of {_FOLDS:g} of its half "
+        f"width, here {' to '.join(in_mm(end) for end in dict.fromkeys((ends[0], ends[-1])))}, earlier on finer "
+        f"meshes. {counted(deeper, 'case')} of {len(large)} {'is' if deeper == 1 else 'are'} deeper. {_MAY_END}"
+    ]
 
 
 def _unasked(plan: Plan) -> dict[str, float]:
@@ -104,7 +123,7 @@ def _changes(plan: Plan, case: Case, solve: Solve | None) -> dict[str, str]:
     deeper = {"depth": all_of_it if is_found else contact} if case.probe.is_unilateral else {}
     if depth_key(case) and "scaling" in plan.used:
         deeper = {"depth": f"nothing: F {'is proportional' if case.probe.is_unilateral else 'does not depend on it'}"}
-    if case.load.acts:
+    if obstacle("scaling", case):
         proportional = {"young, load": material, "depth": contact}
     else:
         nothing = "nothing: F is proportional" if "scaling" in plan.used else material

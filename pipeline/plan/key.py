@@ -11,6 +11,7 @@ from pipeline.plan.symmetry import mirror_planes, movement_planes
 from pipeline.shapes.body import Body
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
+from pipeline.study.capabilities import obstacle
 from pipeline.study.loads import Load
 from pipeline.study.schema import Mesh
 from pipeline.study.sweep import Case
@@ -32,7 +33,7 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
     ``folded`` takes every ε past the body for the full order; ``scaled`` leaves out what the force is proportional to.
     Timed cases are records of their own, each: they are never shared.
     """
-    scaled = scaled and not case.load.acts
+    scaled = scaled and not obstacle("scaling", case)
     parts = [
         str(PHYSICS_VERSION),
         _body_text(case.body, case.scale.stress if scaled else 1.0),

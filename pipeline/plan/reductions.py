@@ -281,11 +281,8 @@ def _is_small(step: MeshStep) -> bool:
 
 
 def _asks_for_accuracy_or_truncation(plan: Plan) -> bool:
-    """Tell whether a study varies scenes and truncation, but not the mesh: sizes, elements, or ε with all outside.
-
-    Half balls and neo-Hookean bodies are solved in three dimensions, and what they are compared with, too.
-    """
-    if any(solve.case.is_closed or solve.case.material.is_large for solve in plan.solves):
+    """Tell whether a study varies scenes and truncation, but not the mesh: sizes, elements, or ε with all outside."""
+    if any(obstacle("meridian of a comparison", solve.case) for solve in plan.solves):
         return False
     swept = {axis.key for axis in plan.study.axes if axis.section == "mesh"}
     if swept - {"epsilon", "outside", "accuracy"}:

@@ -68,13 +68,7 @@ def memory_of_basis(case: Case, dofs: int) -> float:
 
 
 def meridian_problem(case: Case) -> Problem:
-    """Return what solves a round ``case`` on its meridian.
-
-    Raises:
-        CaseFailure: if loads act: they are computed in three dimensions only.
-    """
-    if case.load.acts:
-        raise CaseFailure("loads are computed in three dimensions only")
+    """Return what solves a round ``case``, which no loads act on, on its meridian."""
     if case.probe.is_unilateral:
         return MeridianContact(meridian_of(case), round_tool_of(case))
     return MeridianProblem(meridian_of(case), conditions_of(case))

@@ -24,6 +24,8 @@ from pipeline.study.schema import Material, Mesh
 
 # Poisson's ratio beyond which displacement elements of degree 2, which find a body's own far field, lock.
 MOST_OF_GREEN = 0.49
+# A slit whose blade tissue slides along lies along x or y to this.
+_ALIGNED = 1e-9
 
 
 class Scene(Protocol):
@@ -89,6 +91,11 @@ def _is_level(scene: Scene) -> bool:
     return is_level(scene.body, scene.probe.frame_on(scene.body))
 
 
+def _is_oblique(scene: Scene) -> bool:
+    along = scene.probe.frame_on(scene.body).along
+    return scene.probe.slit is not None and max(map(abs, along)) < 1 - _ALIGNED
+
+
 def _is_flat(scene: Scene) -> bool:
     return is_flat(scene.body, scene.probe, scene.probe.frame_on(scene.body))
 
@@ -98,6 +105,9 @@ FEATURES: dict[str, Feature] = {
     "inclusion": Feature("body.inclusion", lambda s: bool(s.body.inclusion)),
     "curved body": Feature("body.shape", lambda s: not isinstance(s.body, Layered)),
     "large strains": Feature("material.law", lambda s: s.material.is_large),
+    "ν < 0.2 or > 0.45": Feature(
+        "material.poisson", lambda s: not s.material.OF_LARGE[0] <= s.material.poisson <= s.material.OF_LARGE[1]
+    ),
     "ν > 0.49": Feature("material.poisson", lambda s: s.material.poisson > MOST_OF_GREEN),
     "tool that is not flat": Feature("probe.shape", lambda s: isinstance(s.probe, Indenter)),
     "found contact": Feature("probe.contact", lambda s: s.probe.is_unilateral),
@@ -106,6 +116,7 @@ FEATURES: dict[str, Feature] = {
     "slice": Feature("probe.slice", lambda s: getattr(s.probe, "slice", 0.0) != 0, write=in_mm),
     "slit": Feature("probe.incision", lambda s: s.probe.slit is not None, write=in_mm),
     "open slit": Feature("probe.ends", lambda s: bool(s.probe.slit and s.probe.slit.is_open)),
+    "oblique slit": Feature("probe.direction", _is_oblique, ("body",), list),
     "six motions": Feature("probe.motion", lambda s: s.probe.motion == "all"),
     "range of depths": Feature(
         "probe.depth_range",
@@ -115,6 +126,9 @@ FEATURES: dict[str, Feature] = {
     "curved or inclined surface": Feature("probe.axis", lambda s: not _is_flat(s), ("body",)),
     "no flat top": Feature("body.shape", lambda s: not (isinstance(s.body, Layered) and _is_level(s)), ("probe",)),
     "body of triangles": Feature("body.shape", lambda s: isinstance(s.body, FromFile) and not s.body.HAS_NAMES),
+    "held at its sides": Feature("body.fixed", lambda s: s.body.support.gap(0.0) == 0.0),
+    "held at its sides alone": Feature("body.fixed", lambda s: not s.body.support.holds_column()),
+    "cut free": Feature("mesh.outside", lambda s: s.mesh.outside == "free" and isfinite(s.mesh.epsilon)),
     "kept column": Feature("mesh.outside", _is_column, _PLACE),
     "fixed column": Feature("mesh.outside", lambda s: s.mesh.outside == "fixed" and _is_column(s), _PLACE),
     "half ball": Feature("mesh.outside", _is_ball, _PLACE),
@@ -162,6 +176,15 @@ REFUSALS: tuple[Refusal, ...] = (
         f"a column is cut out of bodies that are drawn and of CAD files, and not out of triangles: {_COARSE}",
     ),
     Refusal("fixed column", "open slit", 'is what an open slit would run into: use ends = "blade"'),
+    Refusal(
+        "cut free",
+        "held at its sides alone",
+        "the column round the probe does not touch the fixed sides and would float: "
+        'use `outside = "coarse"` or "fixed", or fix the bottom',
+    ),
+    Refusal(
+        "open slit", "held at its sides", 'the slit would go through the sides, which are held: use ends = "blade"'
+    ),
     # Degrees of elements.
     Refusal(
         "degree 1",
@@ -188,6 +211,11 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal("slit", "no flat top", "a slit goes straight down from the flat top of a box or a cylinder only"),
     Refusal(
+        "oblique slit",
+        "frictionless contact",
+        "tissue slides along a blade in a slit that lies along x or y only: turn the body, or use contact = 'bonded'",
+    ),
+    Refusal(
         "range of depths",
         "accuracy",
         "is for meshes with sizes of your own: where an accuracy is asked for, each depth has one that is chosen for "
@@ -201,6 +229,12 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal("large strains", "loads", 'loads are computed with law = "linear" only: leave [load] out'),
     # Large strains.
+    Refusal(
+        "ν < 0.2 or > 0.45",
+        "large strains",
+        f"must be {Material.OF_LARGE[0]} to {Material.OF_LARGE[1]} {_OF_LAW}: below, tissue gives way at the probe's "
+        "edge, and elements of displacements alone lock above",
+    ),
     Refusal("large strains", "layers", "takes bodies of one material: no layers, no inclusions"),
     Refusal("large strains", "inclusion", "takes bodies of one material: no layers, no inclusions"),
     Refusal("found contact", "large strains", f'must be "bonded" {_OF_LAW}: where a tool touches is not found there'),
@@ -221,6 +255,11 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "six motions": "most of the six motions are not the same all round",
         "half ball": "a half ball is closed in three dimensions",
         "loads": "loads are computed in three dimensions",
+    },
+    # Taken if no case of the study is in the way: what is compared is computed alike.
+    "meridian of a comparison": {
+        "large strains": "what large strains are compared with is solved in three dimensions, too",
+        "half ball": "what a half ball is compared with is solved in three dimensions, too",
     },
     "reduced basis": {
         "layers": "a body of several materials has more parameters than one",

@@ -57,7 +57,6 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         for check in (check_column, check_ball, check_gap, check_slit_in):
             problems.each(check, body=(body,), probe=(probe,), mesh=meshes)
     check_features(sections, placed, problems)
-    problems.each(_check_law, material=materials)
     problems.each(_check_softness, body=bodies, material=materials)
     problems.each(check_locking, body=bodies, material=linear, mesh=meshes)
     check_reference(meshes, axes, problems)
@@ -115,18 +114,6 @@ def _check_softness(body: Body, material: Material, problems: Problems) -> None:
                 f"{tissue.young:g} Pa",
                 "is softer than any tissue; mPa are thousandths of a pascal, MPa are millions",
             )
-
-
-def _check_law(material: Material, problems: Problems) -> None:
-    """Refuse Poisson's ratios for which large strains are not computed."""
-    least, most = material.OF_LARGE
-    if material.is_large and not least <= material.poisson <= most:
-        problems.error(
-            "material.poisson",
-            material.poisson,
-            f'must be {least} to {most} with law = "{material.law}": below, tissue gives way at the probe\'s edge, and '
-            "elements of displacements alone lock above",
-        )
 
 
 def _check_thickness(body: Body, probe: Probe, problems: Problems) -> bool:

@@ -122,15 +122,8 @@ def check_epsilon(mesh: Mesh, probe: Probe, problems: Problems) -> None:
 
 
 def check_support(body: Body, mesh: Mesh, problems: Problems) -> None:
-    """Refuse a support that elements cannot follow, and a column that nothing holds."""
+    """Refuse a support that elements cannot follow."""
     body.support.check(body.heights, mesh.fine, problems)
-    if mesh.outside == "free" and not body.support.holds_column() and isfinite(mesh.epsilon):
-        problems.error(
-            "mesh.outside",
-            mesh.outside,
-            "the column round the probe does not touch the fixed sides and would float: "
-            'use `outside = "coarse"` or "fixed", or fix the bottom',
-        )
 
 
 def check_locking(body: Body, material: Material, mesh: Mesh, problems: Problems) -> None:

@@ -16,7 +16,6 @@ from pipeline.study.schema import Mesh
 
 # Between a slit's front and what ends below or above it there must be this share of what it runs ahead of the blade.
 _LEAST_ROOM = 0.25
-_ALIGNED = 1e-9
 # Points along a slit and down whose distance to an inclusion is looked at, and how often again near the nearest.
 _POINTS, _ROUNDS = 21, 8
 
@@ -30,7 +29,7 @@ def check_slit(body: Body, probe: Probe, problems: Problems) -> bool:
     if not isinstance(body, Layered) or not is_level(body, frame):
         return True  # the table of features tells why it has no room
     if probe.contact == "frictionless":
-        _check_sliding(body, slit, frame, problems)
+        _check_tip(body, slit, problems)
     _check_depth(body, slit, problems)
     if len(problems.errors) == before:
         _check_support(body, slit, problems)
@@ -56,15 +55,8 @@ def check_slit_in(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> N
         )
 
 
-def _check_sliding(body: Body, slit: Slit, frame: Frame, problems: Problems) -> None:
-    """Report a blade that tissue slides along where its faces, or what its tip moves in, do not allow for it."""
-    if max(map(abs, frame.along)) < 1 - _ALIGNED:
-        problems.error(
-            "probe.direction",
-            list(frame.along),
-            "tissue slides along a blade in a slit that lies along x or y only: "
-            "turn the body, or use contact = 'bonded'",
-        )
+def _check_tip(body: Body, slit: Slit, problems: Problems) -> None:
+    """Report a blade that tissue slides along where what its tip moves in does not allow for it."""
     least = _LEAST_ROOM * slit.ahead
     if slit.tip > 0 and (room := slit.room_at_tip(body)) < least:
         problems.error(
@@ -94,8 +86,6 @@ def _check_support(body: Body, slit: Slit, problems: Problems) -> None:
                 in_mm(slit.depth),
                 f"goes through what is held of the body: must be below {in_mm(high - level)}",
             )
-    if slit.is_open and support.gap(0.0) == 0.0:
-        problems.error("probe.ends", "open", 'the slit would go through the sides, which are held: use ends = "blade"')
 
 
 def _check_room(body: Body, slit: Slit, problems: Problems) -> None:

@@ -14,7 +14,7 @@ from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.shapes.tissue import Tissue
-from pipeline.study.capabilities import features_of
+from pipeline.study.capabilities import features_of, obstacle
 from pipeline.study.closure import FarRegion
 from pipeline.study.loads import Load
 from pipeline.study.place import CLEAR, is_clear, place_error
@@ -152,7 +152,7 @@ class Case:
     @property
     def proportional_to(self) -> tuple[str, ...]:
         """The keys that F is proportional to, those of one section, or of all materials, changing together."""
-        if self.load.acts:
+        if obstacle("scaling", self):
             return ()
         first = ("young of all materials together",) if self.body.regions else self.material.PROPORTIONAL_TO
         return *first, *self.moves_in_proportion

@@ -95,9 +95,11 @@ def test_the_bar_of_a_timed_case_is_found_on_what_symmetry_leaves():
     assert memory[0] < 0.8 * memory[1]
 
 
-def test_a_plan_says_that_large_displacements_may_not_be_followed_to_their_end():
-    large, linear = (summary(make_plan(study(material={"law": law}))) for law in ("neo-hookean", "linear"))
-    assert "is not known beforehand" in " ".join(large["notes"])
+def test_a_plan_says_from_which_depth_on_tissue_is_expected_to_fold():
+    probe = {"radius": "3 mm", "depth": ["0.6 mm", "1.2 mm"]}
+    large, linear = (summary(make_plan(study(material={"law": law}, probe=probe))) for law in ("neo-hookean", "linear"))
+    (note,) = large["notes"]
+    assert "here 0.9 mm" in note and "1 case of 2 is deeper" in note
     assert linear["notes"] == []
 
 

@@ -11,8 +11,9 @@ from tests.cases import BLADE, raw, study
 from tests.studies import changed
 
 SPHERE = {"shape": "sphere", "radius": "6 mm", "depth": "0.2 mm", "contact": "unilateral"}
-# A tilted tool touches beside its axis, and an ellipsoid has no layers: these are refused before the table is asked.
-_BEFORE = ("would touch the body", "an ellipsoid has no layers")
+# A tilted tool touches beside its axis, an ellipsoid has no layers, and mixed elements are for larger ν: these are
+# refused before the table is asked.
+_BEFORE = ("would touch the body", "an ellipsoid has no layers", "mixed elements are for")
 TISSUE = {"young": "20 kPa", "poisson": 0.3, "density": "1 g/cm^3"}
 HAVING = {
     "found contact": {"probe": SPHERE},
@@ -34,6 +35,11 @@ HAVING = {
     "frictionless contact": {"probe": {"contact": "frictionless"}},
     "range of depths": {"probe": SPHERE | {"depth_range": ["0.1 mm", "0.3 mm"]}},
     "open slit": {"probe": BLADE | {"incision": "6 mm", "ends": "open"}},
+    "oblique slit": {"probe": BLADE | {"incision": "6 mm", "direction": [1, 1, 0]}},
+    "held at its sides": {"body": {"fixed": "bottom+sides"}},
+    "held at its sides alone": {"body": {"fixed": "sides"}},
+    "cut free": {"mesh": {"epsilon": "9 mm", "outside": "free"}},
+    "ν < 0.2 or > 0.45": {"material": {"poisson": 0.1}},
     "layers": {"body": {"layers": [{"name": "skin", "thickness": "3 mm", **TISSUE}]}},
     "inclusion": {"body": {"inclusion": [{"name": "a", "at": ["9 mm", "9 mm", "-9 mm"], "radius": "2 mm", **TISSUE}]}},
     "curved body": {"body": {"shape": "ellipsoid", "axes": ["30 mm"] * 3, "fixed": {"below": "-5 mm"}}},
