@@ -27,7 +27,7 @@ from pipeline.shapes.scanned import Scanned
 _PASSES = 2
 # Where the surface crosses itself, the file's own facets are kept there: attempts, each with those of all before.
 _ATTEMPTS = 5
-# Where anything else fails, elements are this many times smaller everywhere.
+# Where that does not help, or anything else fails, elements of the whole surface are at most so many times smaller.
 _FINER = (1, 2, 4)
 # The file's own facets are not kept where they are larger than elements by this factor.
 _TOO_LARGE = 2
@@ -70,8 +70,7 @@ def mesh_scanned(scene: Scene, body: Scanned, sizes: Sizes, kept: Kept | None = 
             except MeshError as error:
                 failure = error
                 break
-        else:
-            break
+        tangles = []
     raise failure
 
 
