@@ -115,7 +115,8 @@ def _sizes(rim: float, growth: float, fine: float, coarse: float = _FAR, degree:
 def _drawn_sizes(dice: Dice, graded: Mapping[str, Range], naive: Mapping[str, Range], far: float) -> Section:
     """Return a mesh, graded (six of ten) or naive, whose sizes are in those ranges."""
     ranges = graded if dice.chance(0.6) else naive
-    return _sizes(**({"fine": far} | {name: dice.between(*range_) for name, range_ in ranges.items()}), coarse=far)
+    drawn: dict[str, Any] = {name: dice.between(*range_) for name, range_ in ranges.items()}
+    return _sizes(**{"fine": far, "coarse": far} | drawn)
 
 
 def _mesh_of_design(dice: Dice, scene: Section) -> Section:

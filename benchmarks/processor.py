@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -45,7 +46,7 @@ def median_seconds(ways: Mapping[str, Callable[[], Any]], repeats: int) -> dict[
         way()
         return time.process_time() - start
 
-    found = by_turns({name: lambda way=way: timed(way) for name, way in ways.items()}, repeats)
+    found = by_turns({name: partial(timed, way) for name, way in ways.items()}, repeats)
     return {name: statistics.median(seconds) for name, seconds in found.items()}
 
 
