@@ -12,7 +12,6 @@ import numpy as np
 from pydantic import BeforeValidator
 from pydantic_core import PydanticCustomError
 
-from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.rounded import Rounded
 from pipeline.shapes.section import Problems, Words, in_mm
@@ -108,7 +107,6 @@ class Indenter(Probe):
 
     # ---- what is the footprint's ----------------------------------------------------------------------
 
-    lies_along: ClassVar[Any] = _OfFootprint()
     circumradius: ClassVar[Any] = _OfFootprint()
     half_width: ClassVar[Any] = _OfFootprint()
     perimeter: ClassVar[Any] = _OfFootprint()
@@ -161,10 +159,6 @@ class Indenter(Probe):
     def rim_offset(self) -> float:
         """How far (m) the candidates reach past where contact is expected to end."""
         return self.footprint.half_width - self.edge_band[1]
-
-    def travel(self, frame: Frame) -> Vector:
-        """Return the depth along the axis."""
-        return frame.inward(self.depth)
 
     def check(self, problems: Problems) -> None:
         """Report a depth that the mesh is not for, and warn of one at which strains are large."""

@@ -109,13 +109,14 @@ class Probe(Section, ABC):
         return _frame_on(self, body)
 
     @property
-    @abstractmethod
     def lies_along(self) -> Vector:
-        """Direction of its length."""
+        """Direction of its length: its key ``direction``, or x for a tool without that key."""
+        along: Vector = getattr(self, "direction", (1.0, 0.0, 0.0))
+        return along
 
-    @abstractmethod
     def travel(self, frame: Frame) -> Vector:
-        """Return the prescribed displacement (m) of the footprint."""
+        """Return the prescribed displacement (m) of the footprint: the depth along the axis, unless it slices, too."""
+        return frame.inward(self.depth)
 
     @property
     def not_drawn(self) -> tuple[str, ...]:
@@ -279,9 +280,8 @@ class Probe(Section, ABC):
 
     # ---- sense ----------------------------------------------------------------------------------------
 
-    @abstractmethod
     def check(self, problems: Problems) -> None:
-        """Report what makes no sense in its keys."""
+        """Report what makes no sense in its keys taken together; what each may be alone its annotation says."""
 
 
 @lru_cache(_MANY)

@@ -7,8 +7,12 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from pipeline.arrays import BoolArray, FloatArray
-from pipeline.shapes.frame import Frame, Vector
+from pipeline.shapes.body import Body
+from pipeline.shapes.frame import Frame
 from pipeline.shapes.probe import Probe
+
+# A line this near to an axis of the footprint, in parts of a unit vector, is that axis.
+_ALIGNED = 1e-12
 
 
 class Punch(Probe):
@@ -24,6 +28,14 @@ class Punch(Probe):
     def force_exponent(self) -> float | None:
         """F is proportional to the depth, unless it holds a slit's faces apart, too."""
         return None if self.slit else 1.0
+
+    def is_mirrored(self, along: float, across: float) -> bool:
+        """Tell that the footprint is its own image in its two axes, and in any line if it is round."""
+        return self.is_round or min(abs(along), abs(across)) < _ALIGNED
+
+    def gap(self, body: Body, frame: Frame) -> float:
+        """Return the distance (m) from the nearest point of the outline to the edge of the convex face."""
+        return min(body.gap(frame.at(float(x), float(y))) for x, y in self.outline())
 
     @abstractmethod
     def covers(self, points: FloatArray) -> BoolArray:
@@ -53,7 +65,3 @@ class Straight(Punch):
     PROPORTIONAL_TO = ("depth",)
 
     action: Literal["pierce"] = "pierce"
-
-    def travel(self, frame: Frame) -> Vector:
-        """Return the depth along the axis."""
-        return frame.inward(self.depth)

@@ -10,7 +10,6 @@ from pipeline.arrays import BoolArray, FloatArray
 from pipeline.shapes.frame import Frame, Units
 from pipeline.shapes.probe import ON_EDGE
 from pipeline.shapes.punch import Straight
-from pipeline.shapes.section import Problems
 
 
 class RoundPunch(Straight):
@@ -24,6 +23,11 @@ class RoundPunch(Straight):
     @abstractmethod
     def semi_axes(self) -> tuple[float, float]:
         """Its semi-axes (m), along and across."""
+
+    @property
+    def is_round(self) -> bool:
+        """Whether the semi-axes are equal."""
+        return self.semi_axes[0] == self.semi_axes[1]
 
     @property
     def circumradius(self) -> float:
@@ -64,6 +68,3 @@ class RoundPunch(Straight):
         """Tell which points are within the ellipse."""
         within: BoolArray = np.linalg.norm(points / np.array(self.semi_axes), axis=1) <= 1 + ON_EDGE
         return within
-
-    def check(self, problems: Problems) -> None:
-        """Find nothing: each key says what it takes."""

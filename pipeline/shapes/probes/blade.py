@@ -16,7 +16,6 @@ from pipeline.shapes.section import Problems, Words, in_mm
 from pipeline.shapes.slit import Slit, to_rectangle
 from pipeline.units import Length, Travel
 
-_ALIGNED = 1e-12
 _CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 
 
@@ -60,11 +59,6 @@ class Blade(Punch):
         Words("Where the slit ends: with the blade, or, open, at the sides of the body.", '"blade"'),
     ] = "blade"
 
-    @property
-    def lies_along(self) -> Vector:
-        """The direction of its edge."""
-        return self.direction
-
     def travel(self, frame: Frame) -> Vector:
         """Return depth along the axis and slice along the edge (m)."""
         x, y, z = (self.slice * t + self.depth * a for t, a in zip(frame.along, frame.axis, strict=True))
@@ -104,14 +98,9 @@ class Blade(Punch):
 
     def gap(self, body: Body, frame: Frame) -> float:
         """Return the distance (m) from the nearest corner, or end of the slit, to the edge of the convex face."""
-        corners = [(i * self.length / 2, j * self.width / 2) for i, j in _CORNERS]
-        if self.slit:
-            corners = [(side * self.slit.on_surface, 0.0) for side in (-1, 1)]
-        return min(body.gap(frame.at(*corner)) for corner in corners)
-
-    def is_mirrored(self, along: float, across: float) -> bool:
-        """Tell that it is in its two middle lines only."""
-        return min(abs(along), abs(across)) < _ALIGNED
+        if self.slit is None:
+            return super().gap(body, frame)
+        return min(body.gap(frame.at(side * self.slit.on_surface, 0.0)) for side in (-1, 1))
 
     def draw(self, kernel: Any, frame: Frame, units: Units) -> int:
         """Add the rectangle."""

@@ -1,13 +1,13 @@
 """A disc."""
 
 from math import pi, sin, sqrt
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.shapes.body import Body
-from pipeline.shapes.frame import Frame, Vector
+from pipeline.shapes.frame import Frame
 from pipeline.shapes.round import RoundPunch
 from pipeline.shapes.section import Words
 from pipeline.units import Length
@@ -15,10 +15,6 @@ from pipeline.units import Length
 
 class Disc(RoundPunch):
     """A flat round punch, such as the tip of a blunt needle."""
-
-    # Any direction is as good: that of x.
-    lies_along: ClassVar[Vector] = 1.0, 0.0, 0.0
-    is_round: ClassVar[bool] = True
 
     REALTIME = ("frictionless", "bonded")
     EXPECTED_ERROR = 1.0
@@ -39,10 +35,6 @@ class Disc(RoundPunch):
     def gap(self, body: Body, frame: Frame) -> float:
         """Return the distance (m) from the circle to the edge of the face."""
         return body.gap(frame.point) - self.radius
-
-    def is_mirrored(self, along: float, across: float) -> bool:
-        """Tell that it is, in any line."""
-        return True
 
     def inscribed(self, edges: int) -> Self:
         """Return the larger disc whose regular polygon has this one's area."""

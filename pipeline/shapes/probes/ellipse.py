@@ -6,13 +6,10 @@ from typing import Annotated, Literal, Self
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.shapes.body import Body
-from pipeline.shapes.frame import Frame, Vector
 from pipeline.shapes.round import RoundPunch
 from pipeline.shapes.section import Words
 from pipeline.units import Length
 
-_ALIGNED = 1e-12
 # Points along the edge by which its length is divided into equal parts.
 _FINE = 20_000
 # Newton's iterations to the nearest point; it starts within a few degrees and doubles its digits.
@@ -34,11 +31,6 @@ class Ellipse(RoundPunch):
     ] = (1.0, 0.0, 0.0)
 
     @property
-    def lies_along(self) -> Vector:
-        """The direction of the first axis."""
-        return self.direction
-
-    @property
     def semi_axes(self) -> tuple[float, float]:
         """The two semi-axes (m)."""
         return self.axes
@@ -49,19 +41,6 @@ class Ellipse(RoundPunch):
         a, b = self.axes
         h = 3 * ((a - b) / (a + b)) ** 2
         return pi * (a + b) * (1 + h / (10 + sqrt(4 - h)))
-
-    def gap(self, body: Body, frame: Frame) -> float:
-        """Return the distance (m) from the nearest point of the ellipse to the edge of the face."""
-        return min(body.gap(frame.at(float(x), float(y))) for x, y in self.outline())
-
-    @property
-    def is_round(self) -> bool:
-        """It is if its axes are equal."""
-        return self.axes[0] == self.axes[1]
-
-    def is_mirrored(self, along: float, across: float) -> bool:
-        """Tell that it is in its two axes only."""
-        return self.is_round or min(abs(along), abs(across)) < _ALIGNED
 
     def inscribed(self, edges: int) -> Self:
         """Return the larger ellipse whose polygon of equal edges, from the end of an axis on, has this one's area."""
