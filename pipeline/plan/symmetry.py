@@ -63,7 +63,7 @@ def _is_held_below_stiffer(case: Case) -> bool:
 
 def body_planes(body: Body) -> tuple[str, ...]:
     """Return the planes in which a body, its support and what is in it are their own mirror images."""
-    own = body.mirror_planes()
+    own = body.mirror_planes
     # An inclusion is its own image, or there is no symmetry: pairs of images are not looked for.
     return tuple(
         plane

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from functools import cached_property
 from itertools import accumulate
 from math import inf
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from pipeline.arrays import FloatArray
 from pipeline.shapes.frame import Frame, Units, Vector
@@ -141,9 +141,8 @@ class Body(Section, ABC):
 
     # ---- symmetry -------------------------------------------------------------------------------------
 
-    @abstractmethod
-    def mirror_planes(self) -> tuple[str, ...]:
-        """Return the planes, of x = 0 ("x") and y = 0 ("y"), in which its shape is its own image."""
+    # The planes, of x = 0 ("x") and y = 0 ("y"), in which its shape is its own image.
+    mirror_planes: ClassVar[tuple[str, ...]] = ()
 
     @property
     @abstractmethod
@@ -163,9 +162,9 @@ class Body(Section, ABC):
     def half_sides(self) -> tuple[float, float] | None:
         """Half extents (m) along x and y of a body whose middle is the z axis, of a round one its radius twice."""
 
-    @abstractmethod
     def half_plane(self) -> HalfPlane | None:
         """Return its half plane if it and its regions are the same all round the z axis, None if they are not."""
+        return None
 
     # ---- geometry -------------------------------------------------------------------------------------
 
@@ -191,9 +190,7 @@ class Body(Section, ABC):
 class Drawn(Body):
     """A body that a CAD kernel draws, its middle on the z axis."""
 
-    def mirror_planes(self) -> tuple[str, ...]:
-        """Return both planes."""
-        return "x", "y"
+    mirror_planes: ClassVar[tuple[str, ...]] = ("x", "y")
 
     @abstractmethod
     def draw(self, kernel: Any, units: Units, frame: Frame | None = None) -> int:

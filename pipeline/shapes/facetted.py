@@ -93,17 +93,11 @@ class Facetted(Body):
 
     # ---- symmetry -------------------------------------------------------------------------------------
 
-    def mirror_planes(self) -> tuple[str, ...]:
-        """Return none: what was measured or modelled is not looked at for symmetry."""
-        return ()
-
+    # What was measured or modelled is not looked at for symmetry: it has no mirror planes and no half plane.
     @property
     def half_sides(self) -> None:
         """None: nothing is known of an axis."""
         return
-
-    def half_plane(self) -> None:
-        """Return none: see there."""
 
 
 @lru_cache(_MANY)

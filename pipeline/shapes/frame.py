@@ -171,6 +171,10 @@ class Frame:
         """Return points (n, 3), in m, of the probe's own coordinates in those of the body."""
         return np.array(self.point) + points @ np.array([self.along, self.across, self.outward])
 
+    def in_plane(self, points: FloatArray) -> FloatArray:
+        """Return points (n, 2), in m, of the probe's own plane in the coordinates of the body, (n, 3)."""
+        return self.world(np.column_stack([points, np.zeros(len(points))]))
+
     def reach(self, points: FloatArray) -> float:
         """Return the largest distance (m) of ``points`` (n, 3) from the probe's axis."""
         local = self.local(points)

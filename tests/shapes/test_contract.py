@@ -140,7 +140,7 @@ def test_mirror_planes_and_half_plane_are_true(shape, fixed):
     """Images of points of the boundary are on it, too, and held where the points are."""
     found, random = body(shape, fixed), np.random.default_rng(2)
     surfaces = found.surfaces()
-    images = [np.diag(1 - 2 * np.array(PLANES[plane])) for plane in found.mirror_planes()]
+    images = [np.diag(1 - 2 * np.array(PLANES[plane])) for plane in found.mirror_planes]
     if found.half_plane() is not None:
         images += [np.array([[cos(t), -sin(t), 0], [sin(t), cos(t), 0], [0, 0, 1]]) for t in random.uniform(0, 7, 5)]
     for surface in (surface for group in surfaces.values() for surface in group):

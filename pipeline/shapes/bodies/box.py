@@ -68,7 +68,7 @@ class Box(Layered):
 
     def lift(self, frame: Frame, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return where lines along the axis enter the first face."""
-        origins = frame.world(np.column_stack([points, np.zeros(len(points))]))
+        origins = frame.in_plane(points)
         units = np.eye(3)
         spans = [slab(origins, frame.axis, tuple(unit), *sides) for unit, sides in zip(units, self._sides, strict=True)]
         enter, leave = (np.array(ends) for ends in zip(*spans, strict=True))
@@ -131,9 +131,6 @@ class Box(Layered):
     def half_sides(self) -> tuple[float, float]:
         """Half the extents along x and y (m)."""
         return self.size[0] / 2, self.size[1] / 2
-
-    def half_plane(self) -> None:
-        """Return none: it has corners."""
 
     def draw(self, kernel: Any, units: Units, frame: Frame | None = None) -> int:
         """Add the box."""

@@ -67,7 +67,7 @@ class Cylinder(Layered):
 
     def lift(self, frame: Frame, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return where lines along the axis enter top, bottom or side."""
-        origins, axis = frame.world(np.column_stack([points, np.zeros(len(points))])), np.array(frame.axis)
+        origins, axis = frame.in_plane(points), np.array(frame.axis)
         end_in, end_out = slab(origins, frame.axis, (0.0, 0.0, 1.0), -self.height, 0.0)
         if np.hypot(axis[0], axis[1]) > 0:
             side_in, side_out = ball(origins[:, :2] / self.radius, axis[:2] / self.radius)

@@ -87,7 +87,7 @@ class Ellipsoid(Drawn):
 
     def lift(self, frame: Frame, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return where lines along the axis enter the ellipsoid."""
-        origins = frame.world(np.column_stack([points, np.zeros(len(points))]))
+        origins = frame.in_plane(points)
         axis, axes = np.array(frame.axis), np.array(self.axes)
         found = origins + ball(origins / axes, axis / axes)[0][:, None] * axis
         steepest = found / axes**2
