@@ -11,6 +11,7 @@ from mpi4py import MPI
 from pipeline.arrays import FloatArray
 from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region
+from pipeline.export.scope import Scope
 from pipeline.export.side_force import SideForce
 from pipeline.mesh.curve import EDGES
 from pipeline.mesh.distribute import BodyMesh, distribute
@@ -69,6 +70,20 @@ def _without_quarter_points(arrays: MeshArrays) -> MeshArrays:
     return arrays
 
 
+def law_of(scope: Scope, poisson: float) -> MaterialLaw | None:
+    """Return the tissues of a body in units of μ at its face, where they are several, for a Poisson's ratio there."""
+    tissues = scope.tissues_at(poisson)
+    return MaterialLaw.of(*tissues) if tissues else None
+
+
+def per_newton(force: PointForce) -> float:
+    """Return the number of units of a force's field that make one newton, for E = 1.
+
+    A unit is 4πμ times the radius newtons, and E = 2 (1 + ν) μ.
+    """
+    return 2 * (1 + force.poisson) / (4 * pi * force.radius)
+
+
 @stage("regular parts")
 def compliances(
     body: BodyMesh,
@@ -91,8 +106,7 @@ def compliances(
     parts = list(regular_parts(body, [*down, *aside], law))
     found = []
     for number, force in enumerate(down):
-        # Of a unit of the field, 4πμ times the radius newtons, and E = 2 (1 + ν) μ.
-        scale = 2 * (1 + poisson) / (4 * pi * force.radius)
+        scale = per_newton(force)
         pressed, *pulled = parts[number], *parts[len(down) + 2 * number : len(down) + 2 * number + 2]
         at, bent = pressed.at_centre()
         apart, twist = pressed.bends()

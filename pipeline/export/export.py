@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 from pipeline.export.checks import TOOLS, Check, check_touches, columns, needed, random_touches, told, with_bar
-from pipeline.export.compliance import coarse_mesh, compliances
+from pipeline.export.compliance import coarse_mesh, compliances, law_of
 from pipeline.export.curved import curved_model
 from pipeline.export.far import far_fields
 from pipeline.export.file import write_model
@@ -22,7 +22,6 @@ from pipeline.export.tabulate import Places, tabulate
 from pipeline.realtime.model import Model
 from pipeline.realtime.surface import SurfaceTable
 from pipeline.shapes.body import Layered
-from pipeline.solve.physics import MaterialLaw
 
 # What is left out beside the sides, of the smaller of half the width and the thickness; how large contact may be, in
 # units of the way to the nearest side or the bottom.
@@ -140,8 +139,7 @@ def _flat(
     def counted(places: Places, poisson: float) -> FloatArray:
         solved.extend(places)
         ranks.note(f"places solved for: {len(solved)}, ν = {poisson:.3g}")
-        tissues = scope.tissues_at(poisson)
-        law = MaterialLaw.of(*tissues) if tissues else None
+        law = law_of(scope, poisson)
         return np.array(ranks.together(places, lambda some: list(compliances(mesh, region, some, poisson, law))))
 
     table, missed = tabulate(region, scope.poissons, counted, _SHARE * accuracy)

@@ -14,16 +14,18 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.arrays import FloatArray, IntArray
+from pipeline.export.compliance import per_newton
 from pipeline.export.ranks import ALONE, Ranks
 from pipeline.export.region import Region
+from pipeline.export.tabulate import extrema, ratios_of
 from pipeline.mesh.distribute import BodyMesh
 from pipeline.solve.far_field import PointForce
 from pipeline.solve.greens_function import OnBoundary, regular_on_boundary
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
 
-# Intervals between the places from the middle to the end of the region; of Poisson's ratios; held-out places.
-_SIZE, _POISSONS, _HELD_OUT = 6, 3, 4
+# Intervals between the places from the middle to the end of the region; held-out places.
+_SIZE, _HELD_OUT = 6, 4
 # Triangles that are looked through for the one a point lies in, steps that find its place on a bent one.
 _NEAREST, _STEPS = 24, 6
 
@@ -66,8 +68,7 @@ class Pressed:
         def solve(some: Sequence[Place]) -> list[FloatArray]:
             forces = [self.force(place, poisson) for place in some]
             boundary.append(regular_on_boundary(self.mesh, forces, self.law(poisson)))
-            # Of a unit of the field, 4πμ times the radius newtons, and E = 2 (1 + ν) μ.
-            scales = np.array([2 * (1 + poisson) / (4 * pi * force.radius) for force in forces])
+            scales = np.array([per_newton(force) for force in forces])
             return list(scales[:, None, None] * boundary[0].values)
 
         values = np.array(self.ranks.together(places, solve))
@@ -128,7 +129,7 @@ class FarFields:
     def over_ratios(self, values: FloatArray) -> FloatArray:
         """Return the Chebyshev coefficients over ν of ``values`` (ν, ...) at the ratios."""
         count = len(self.ratios)
-        nodes = _ends(count - 1) if count > 1 else np.zeros(1)
+        nodes = extrema(count - 1) if count > 1 else np.zeros(1)
         return np.tensordot(np.linalg.inv(np.polynomial.chebyshev.chebvander(nodes, count - 1)), values, 1)
 
 
@@ -139,8 +140,7 @@ def far_fields(body: Pressed, poissons: tuple[float, float]) -> FarFields:
     Raises:
         SolveError: if it cannot be solved for.
     """
-    region, (low, high) = body.region, poissons
-    ratios = (low + high) / 2 + (high - low) / 2 * (_ends(_POISSONS - 1) if low < high else np.zeros(1))
+    region, ratios = body.region, ratios_of(poissons)
     sources, held_out, middle = _sources(region), _held_out(region), len(ratios) // 2
     # Places held out are solved for with the others: a factorisation takes much longer than what it serves for.
     asked = [[*sources, *held_out] if number == middle else sources for number in range(len(ratios))]
@@ -151,18 +151,13 @@ def far_fields(body: Pressed, poissons: tuple[float, float]) -> FarFields:
 def _sources(region: Region) -> list[Place]:
     """Return the places that are solved for: the others are their images."""
     lines = [
-        reach * _ends(2 * _SIZE)[: _SIZE + 1 if even else None]
+        reach * extrema(2 * _SIZE)[: _SIZE + 1 if even else None]
         for reach, even in zip(region.reach, region.even, strict=True)
     ]
     if region.is_round:
         return [(float(r), 0.0) for r in lines[0]]
     pairs = [(float(a), float(b)) for a, b in product(*lines)]
     return [(a, b) for a, b in pairs if a >= b] if region.is_square else pairs
-
-
-def _ends(size: int) -> FloatArray:
-    """Return the extrema of T_size, from 1 to -1."""
-    return np.asarray(np.cos(pi * np.arange(size + 1) / size))
 
 
 def _motions(region: Region) -> list[FloatArray]:

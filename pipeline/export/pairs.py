@@ -4,6 +4,7 @@ The regular part R of the normal displacement at one Chebyshev place for a force
 for the mesh. Its range is cut where it misses what is asked; modes are the polynomials through what is left of it.
 """
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -36,7 +37,7 @@ def tabulate_pairs(far: FarFields) -> Pairs:
     region = far.body.region
     pairs = Pairs(modes, links, 0.0, _aside(far), region.reach, far.poissons)
     mesh = float(np.abs(solved - even).max())
-    return Pairs(modes, links, max(_missed(pairs, far), mesh), pairs.aside, region.reach, far.poissons)
+    return replace(pairs, error=max(_missed(pairs, far), mesh))
 
 
 def _between(far: FarFields) -> FloatArray:

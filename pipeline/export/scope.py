@@ -43,15 +43,10 @@ class Scope:
         """Whether the face is a plane: its regular part then gives the model, else full solves do."""
         return isinstance(self.body, Layered)
 
-    @property
-    def tissues(self) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
-        """λ and μ of all regions in units of μ at the face, or nothing if there is one material."""
-        return self.tissues_at(self.poisson)
-
     def tissues_at(self, poisson: float) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
-        """Return the same with another Poisson's ratio at the face: all else is as the study has it.
+        """Return λ and μ of all regions in units of μ at the face, or nothing if there is one material.
 
-        Below layers there is none but the study's own.
+        The face has that Poisson's ratio; all else is as the study has it, and so is the face of layers.
         """
         if not self.body.regions:
             return None

@@ -1,12 +1,12 @@
 """The meshed body of a model, with the forces that its visible surface is tabulated for."""
 
-from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from mpi4py import MPI
 
-from pipeline.export.compliance import coarse_mesh
+from pipeline.export.compliance import coarse_mesh, law_of
 from pipeline.export.curved import curved_region
 from pipeline.export.far import Pressed
 from pipeline.export.placed_force import PlacedForce
@@ -18,10 +18,8 @@ from pipeline.mesh.of_case import mesh_arrays
 from pipeline.realtime.model import Model
 from pipeline.shapes.body import Layered
 from pipeline.solve.far_field import PointForce
-from pipeline.solve.physics import MaterialLaw
 from pipeline.study.schema import Mesh
 
-Law = Callable[[float], MaterialLaw | None]
 # Elements of a curved body: in the region, in units of the study's radius, and elsewhere, of the cube root of the
 # volume; how far round the region's middle they are small, in units of half the region, and how they grow.
 _IN_REGION, _ELSEWHERE, _AROUND, _GROWTH = 0.9, 0.095, 1.2, 0.4
@@ -38,11 +36,7 @@ def seen_body(scope: Scope, model: Model, margin: float, ranks: Ranks = ALONE) -
         ExportError: if part of it lies above its own region.
         MeshError: if it cannot be meshed.
     """
-
-    def law(poisson: float) -> MaterialLaw | None:
-        tissues = scope.tissues_at(poisson)
-        return MaterialLaw.of(*tissues) if tissues else None
-
+    law = partial(law_of, scope)
     if isinstance(scope.body, Layered):
         region = Region.of(scope.body, margin)
 
@@ -50,10 +44,10 @@ def seen_body(scope: Scope, model: Model, margin: float, ranks: Ranks = ALONE) -
             return PointForce(poisson, (*place, 0.0), region.room(*place))
 
         return Pressed(coarse_mesh(scope.case, region, ranks=ranks), region, on_plane, law, ranks=ranks)
-    return _curved(scope, model, law, ranks)
+    return _curved(scope, model, ranks)
 
 
-def _curved(scope: Scope, model: Model, law: Law, ranks: Ranks) -> Pressed:
+def _curved(scope: Scope, model: Model, ranks: Ranks) -> Pressed:
     radius = scope.case.probe.circumradius
     region = curved_region(scope, model.thickness)
 
@@ -68,7 +62,7 @@ def _curved(scope: Scope, model: Model, law: Law, ranks: Ranks) -> Pressed:
     corners = [(x * region.reach[0], y * region.reach[1]) for x in (-0.7, 0.0, 0.7) for y in (-0.7, 0.0, 0.7)]
     if max(on_face(place, scope.poisson).above(points) for place in corners) > _STRAIGHT_ABOVE:
         raise ExportError("part of the body lies above its own region, so that what is seen of it is not known")
-    return Pressed(mesh, region, on_face, law, _NEXT * radius, ranks)
+    return Pressed(mesh, region, on_face, partial(law_of, scope), _NEXT * radius, ranks)
 
 
 def _mesh(scope: Scope, region: Region, radius: float, ranks: Ranks) -> BodyMesh:

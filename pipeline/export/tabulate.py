@@ -71,7 +71,7 @@ def tabulate(
 def ratios_of(poissons: tuple[float, float]) -> FloatArray:
     """Return the Poisson's ratios of the nodes of a range, one if it is one."""
     low, high = poissons
-    return np.asarray((low + high) / 2 + (high - low) / 2 * (_nodes(_POISSONS - 1) if low < high else np.zeros(1)))
+    return np.asarray((low + high) / 2 + (high - low) / 2 * (extrema(_POISSONS - 1) if low < high else np.zeros(1)))
 
 
 def _missed(table: Table, place: tuple[float, float], poisson: float, c: float) -> float:
@@ -126,7 +126,7 @@ def _filled(values: FloatArray) -> FloatArray:
         return values
     size = values.shape[-1] - 1
     middle = size // 2
-    of_few = np.polynomial.chebyshev.chebvander(_nodes(size), middle) @ _inverse(middle)
+    of_few = np.polynomial.chebyshev.chebvander(extrema(size), middle) @ _inverse(middle)
     few = values[:, ::2, ::2]
     few_u, few_v = few[:, middle // 2] @ of_few.T, few[:, :, middle // 2] @ of_few.T
     both = of_few @ few @ of_few.T - few_u[:, None, :] - few_v[:, :, None]
@@ -162,10 +162,10 @@ def _turned(region: Region, place: tuple[float, float], found: Mapping[tuple[flo
 
 def shares(size: int, even: bool) -> FloatArray:
     """Return the nodes along a direction, in units of the reach."""
-    return np.asarray(np.sqrt((_nodes(size) + 1) / 2)) if even else _nodes(size)
+    return np.asarray(np.sqrt((extrema(size) + 1) / 2)) if even else extrema(size)
 
 
-def _nodes(size: int) -> FloatArray:
+def extrema(size: int) -> FloatArray:
     """Return the extrema of T_size, from 1 to -1."""
     return np.asarray(np.cos(np.pi * np.arange(size + 1) / size))
 
@@ -181,4 +181,4 @@ def _coefficients(values: FloatArray, nodes: tuple[int, ...] | None = None) -> F
 def _inverse(size: int, count: int | None = None) -> FloatArray:
     """Return what makes coefficients of values at the first ``count`` nodes, or at all."""
     count = size + 1 if count is None else count
-    return np.asarray(np.linalg.inv(np.polynomial.chebyshev.chebvander(_nodes(size)[:count], count - 1)))
+    return np.asarray(np.linalg.inv(np.polynomial.chebyshev.chebvander(extrema(size)[:count], count - 1)))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.two_discs import forces, meshed
-from pipeline.export import far
+from pipeline.export import far, tabulate
 from pipeline.export.compliance import compliances
 from pipeline.export.far import FarFields, far_fields
 from pipeline.export.pairs import tabulate_pairs
@@ -26,7 +26,7 @@ def fields(body: dict, poissons: tuple[float, float], margin: float) -> FarField
     [(CYLINDER, 0.004), (CYLINDER | {"layers": [SKIN | {"thickness": "6 mm"}]}, 0.012)],
 )
 def test_a_table_of_two_places_is_reciprocal_and_knows_each_by_itself(body, most, monkeypatch):
-    monkeypatch.setattr(far, "_POISSONS", 2)
+    monkeypatch.setattr(tabulate, "_POISSONS", 2)
     is_layered = "layers" in body  # whose skin has ν = 0.45
     known = fields(body, (0.45, 0.45) if is_layered else (0.35, 0.45), 0.3)
     pairs, region = tabulate_pairs(known), known.body.region

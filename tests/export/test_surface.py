@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.compat import geometry_dofs
-from pipeline.export import compliance, far
+from pipeline.export import compliance, far, tabulate
 from pipeline.export.compliance import compliances
 from pipeline.export.curved import curved_model
 from pipeline.export.far import far_fields
@@ -28,7 +28,7 @@ def few(monkeypatch):
     """Few places are solved for."""
     monkeypatch.setattr(far, "_SIZE", 2)
     monkeypatch.setattr(far, "_HELD_OUT", 1)
-    monkeypatch.setattr(far, "_POISSONS", 2)
+    monkeypatch.setattr(tabulate, "_POISSONS", 2)
 
 
 def volume_within(table: SurfaceTable) -> float:
