@@ -66,20 +66,24 @@ def _find_regions(comm: MPI.Comm, mesh: Any, arrays: MeshArrays | None) -> Int32
     return None if regions is None else regions[compat.original_cells(mesh)].astype(np.int32)
 
 
-def _find_facets(mesh: Any, surface: dict[str, IntArray]) -> dict[str, Int32Array]:
-    """Find the local facets of each group of triangles, given by the input numbers of their corners."""
+def exterior_facets(mesh: Any) -> tuple[Int32Array, IntArray]:
+    """Return the local facets of the boundary of a mesh, and the input numbers of their corners, lowest first."""
     topology = mesh.topology
     tdim = topology.dim
-    topology.create_connectivity(tdim - 1, tdim)
-    topology.create_connectivity(tdim - 1, 0)
-    topology.create_connectivity(tdim, 0)
+    for dims in ((tdim - 1, tdim), (tdim - 1, 0), (tdim, 0)):
+        topology.create_connectivity(*dims)
     exterior = np.asarray(dolfinx.mesh.exterior_facet_indices(topology), dtype=np.int32)
-    corner_of_vertex = np.empty(topology.index_map(0).size_local + topology.index_map(0).num_ghosts, dtype=np.int64)
+    node_of_vertex = np.empty(topology.index_map(0).size_local + topology.index_map(0).num_ghosts, dtype=np.int64)
     vertices = topology.connectivity(tdim, 0).array
-    corner_of_vertex[vertices] = compat.geometry_dofs(mesh)[:, : tdim + 1].reshape(-1)
-    input_number = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)[corner_of_vertex]
+    node_of_vertex[vertices] = compat.geometry_dofs(mesh)[:, : tdim + 1].reshape(-1)
+    input_number = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)[node_of_vertex]
     corners = topology.connectivity(tdim - 1, 0).array.reshape(-1, tdim)[exterior]
-    local = np.sort(input_number[corners], axis=1)
+    return exterior, np.sort(input_number[corners], axis=1)
+
+
+def _find_facets(mesh: Any, surface: dict[str, IntArray]) -> dict[str, Int32Array]:
+    """Find the local facets of each group of triangles, given by the input numbers of their corners."""
+    exterior, local = exterior_facets(mesh)
     # Boundary points numbered among themselves: three of their numbers fit one integer.
     boundary = np.unique(np.concatenate([triangles.reshape(-1) for triangles in surface.values()]))
     base = len(boundary)

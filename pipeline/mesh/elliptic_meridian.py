@@ -16,7 +16,7 @@ import numpy as np
 from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.mesh.boxes import halve_boxes, triangulate
-from pipeline.mesh.meridian import AXIS, KINK, Grading, MeridianArrays, name_edges, ratio
+from pipeline.mesh.meridian import AXIS, KINK, Grading, MeridianArrays, mildness, name_edges, ratio
 from pipeline.scene.model import FIXED, FREE, PROBE
 
 # Degree of the sides on the surface.
@@ -109,8 +109,7 @@ class _Outline:
         points = [(self.probe, rim, 1.0)]
         if self.probe < self.support < pi:
             edge = self.place(np.array([[self.support, 0.0]]))[0]
-            distance = min(hypot(*(edge - rim)), self.radius)
-            points.append((self.support, edge, min(max(1.0, distance**2), max(1.0, 100 * smallest))))
+            points.append((self.support, edge, mildness(hypot(*(edge - rim)), self.radius, smallest)))
         return points + [(kink, self.place(np.array([[kink, 0.0]]))[0], KINK) for kink in self.kinks]
 
     def place(self, points: FloatArray) -> FloatArray:
@@ -134,7 +133,7 @@ def _boxes(outline: _Outline, grading: Grading) -> FloatArray:
         for angle, place, factor in outline.singular:
             nearest = np.column_stack([np.clip(angle, low, high), outer])
             distance = np.linalg.norm(outline.place(nearest) - place, axis=1)
-            size = np.minimum(size, min(grading.floor * factor, least) + grading.growth * distance)
+            size = np.minimum(size, grading.near(distance, factor, least))
         sine, cosine = np.sin((low + high) / 2), np.cos((low + high) / 2)
         wide = (high - low) * (1 + outer) * np.hypot(outline.radius * cosine, outline.height * sine)
         deep = (outer - inner) * np.hypot(outline.radius * sine, outline.height * cosine)

@@ -16,13 +16,13 @@ from itertools import pairwise
 from math import hypot, inf, isqrt
 from typing import Any, Literal
 
-import dolfinx
 import numpy as np
 from mpi4py import MPI
 
 from pipeline import compat
 from pipeline.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pipeline.mesh.boxes import halve_boxes, triangulate
+from pipeline.mesh.distribute import exterior_facets
 from pipeline.scene.model import CUT, FIXED, FREE, PROBE
 
 Corner = tuple[float, float]
@@ -50,6 +50,18 @@ class Grading:
     floor: float = 1e-6
     growth: float = 1.0
     cap: float = 4.0
+
+    def near(self, distance: FloatArray, factor: float, least: float) -> FloatArray:
+        """Return sizes at distances (n,) from a singular point where the floor is ``factor`` larger, or ``least``."""
+        return min(self.floor * factor, least) + self.growth * distance
+
+
+def mildness(distance: float, radius: float, smallest: float) -> float:
+    """Return how much larger than at the rim elements may be at an edge of the support at a ``distance`` from it.
+
+    Lengths are in units of a: the body's ``radius``, and its ``smallest`` extent.
+    """
+    return min(max(1.0, min(distance, radius) ** 2), max(1.0, 100 * smallest))
 
 
 @dataclass(frozen=True)
@@ -124,22 +136,17 @@ class Meridian:
         return "bottom" in self.fixed if isinstance(self.fixed, str) else self.fixed >= -self.height
 
     def mesh(self, grading: Grading) -> MeridianArrays:
-        """Mesh the half plane."""
-        return generate_meridian(self, grading)
-
-
-def generate_meridian(meridian: Meridian, grading: Grading) -> MeridianArrays:
-    """Mesh the meridian: the same input gives the same arrays, bit for bit."""
-    start = time.perf_counter()
-    singular = _singular_points(meridian)
-    boxes = _boxes(meridian, singular, grading)
-    points, cells, box = triangulate(boxes)
-    layer = np.sum(boxes[box, 2, None] < np.array(_interfaces(meridian)), axis=1)  # as many interfaces are above it
-    regions = np.where((layer < len(meridian.interfaces)) | meridian.is_filled, layer + 1, 0)
-    corners, groups = _outline(meridian)
-    facets = name_edges(list(zip(corners, [*corners[1:], corners[0]], groups, strict=True)), points)
-    places = np.array([(r, z) for r, z, _ in singular]).reshape(-1, 2)
-    return MeridianArrays(points, cells, regions, facets, places, meridian.unit, time.perf_counter() - start)
+        """Mesh the half plane: the same input gives the same arrays, bit for bit."""
+        start = time.perf_counter()
+        singular = _singular_points(self)
+        boxes = _boxes(self, singular, grading)
+        points, cells, box = triangulate(boxes)
+        layer = np.sum(boxes[box, 2, None] < np.array(_interfaces(self)), axis=1)  # as many interfaces are above it
+        regions = np.where((layer < len(self.interfaces)) | self.is_filled, layer + 1, 0)
+        corners, groups = _outline(self)
+        facets = name_edges(list(zip(corners, [*corners[1:], corners[0]], groups, strict=True)), points)
+        places = np.array([(r, z) for r, z, _ in singular]).reshape(-1, 2)
+        return MeridianArrays(points, cells, regions, facets, places, self.unit, time.perf_counter() - start)
 
 
 def split_regions(arrays: MeridianArrays) -> dict[int, MeridianArrays]:
@@ -169,19 +176,11 @@ def meridian_mesh(arrays: MeridianArrays) -> tuple[Any, dict[str, Int32Array]]:
     What of its boundary is in no group of the body's is where it is joined to other regions.
     """
     mesh = compat.create_mesh(MPI.COMM_SELF, arrays.cells, arrays.points, arrays.order)
-    topology = mesh.topology
-    for dims in ((1, 2), (1, 0), (2, 0)):
-        topology.create_connectivity(*dims)
-    exterior = np.asarray(dolfinx.mesh.exterior_facet_indices(topology), dtype=np.int32)
-    node_of_vertex = np.empty(topology.index_map(0).size_local, dtype=np.int64)
-    node_of_vertex[topology.connectivity(2, 0).array] = compat.geometry_dofs(mesh)[:, :3].reshape(-1)
-    number = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)[node_of_vertex]
-    ends = number[topology.connectivity(1, 0).array.reshape(-1, 2)[exterior]]
-
-    def keys(edges: IntArray) -> IntArray:
-        return edges.min(axis=1) * len(arrays.points) + edges.max(axis=1)
-
-    facets = {name: exterior[np.isin(keys(ends), keys(edges))] for name, edges in arrays.facets.items()}
+    exterior, ends = exterior_facets(mesh)
+    key = np.array([len(arrays.points), 1])
+    facets = {
+        name: exterior[np.isin(ends @ key, np.sort(edges, axis=1) @ key)] for name, edges in arrays.facets.items()
+    }
     return mesh, facets | {JOINT: np.setdiff1d(exterior, np.concatenate([*facets.values()]))}
 
 
@@ -254,14 +253,11 @@ def _singular_points(meridian: Meridian) -> list[tuple[float, float, float]]:
         held = {PROBE: 2, FIXED: 1}  # the rest is free
         if AXIS in (before, after) or not {before, after} & set(held):
             continue
-        distance = hypot(r - 1, z)
-        factor = min(max(1.0, min(distance, radius) ** 2), max(1.0, 100 * smallest))
+        factor = mildness(hypot(r - 1, z), radius, smallest)
         points.append((r, z, factor if held.get(before) != held.get(after) else _MILD * factor))
     points += [(ratio(radius, meridian.unit), 0.0, KINK) for radius in meridian.kinks]
-    for z in _interfaces(meridian):
-        factor = min(max(1.0, min(hypot(radius - 1, z), radius) ** 2), max(1.0, 100 * smallest))
-        points.append((radius, z, _MILD * factor))
-    return points
+    ends = _interfaces(meridian)
+    return points + [(radius, z, _MILD * mildness(hypot(radius - 1, z), radius, smallest)) for z in ends]
 
 
 def _boxes(meridian: Meridian, singular: list[tuple[float, float, float]], grading: Grading) -> FloatArray:
@@ -283,7 +279,7 @@ def _boxes(meridian: Meridian, singular: list[tuple[float, float, float]], gradi
         size = np.full(len(boxes), most)
         for r, z, factor in singular:
             distance = np.hypot(np.maximum(np.maximum(r0 - r, r - r1), 0), np.maximum(np.maximum(z0 - z, z - z1), 0))
-            size = np.minimum(size, min(grading.floor * factor, least) + grading.growth * distance)
+            size = np.minimum(size, grading.near(distance, factor, least))
         return np.maximum(r1 - r0, z1 - z0) > size, z1 - z0 > r1 - r0
 
     layers = [(0.0, r_end, low, high) for high, low in pairwise(ends)]

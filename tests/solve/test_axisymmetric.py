@@ -6,7 +6,7 @@ from math import inf, pi
 import numpy as np
 import pytest
 
-from pipeline.mesh.meridian import Grading, Meridian, generate_meridian
+from pipeline.mesh.meridian import Grading, Meridian
 from pipeline.solve import SolveError
 from pipeline.solve.compiled import compiling
 from pipeline.solve.conditions import Conditions
@@ -189,7 +189,7 @@ def test_error_bar_of_layers_holds_the_truth(number, monkeypatch):
 
 
 def test_regions_of_the_mesh_are_the_layers():
-    arrays = generate_meridian(Meridian(7.3, 2.1, 0.9, -1.3, interfaces=(-0.2, -1.31)), Grading())
+    arrays = Meridian(7.3, 2.1, 0.9, -1.3, interfaces=(-0.2, -1.31)).mesh(Grading())
     corners = arrays.points[arrays.cells] * arrays.unit
     area = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 2
     sizes = [area[arrays.regions == n].sum() for n in range(3)]
@@ -200,7 +200,7 @@ def test_regions_of_the_mesh_are_the_layers():
 
 def test_mesh_is_repeatable_and_exact():
     meridian = Meridian(7.3, 2.1, 0.9, -1.3)
-    first, second = (generate_meridian(meridian, Grading()) for _ in range(2))
+    first, second = (meridian.mesh(Grading()) for _ in range(2))
     assert np.array_equal(first.points, second.points)
     assert np.array_equal(first.cells, second.cells)
     corners = first.points[first.cells]
