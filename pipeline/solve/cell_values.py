@@ -39,14 +39,15 @@ _clear: WeakKeyDictionary[Any, dict[Front | None, BoolArray]] = WeakKeyDictionar
 class Cells:
     """Owned cells of a solution: the mean ``gradient`` of the displacement (n, 3, 3), and λ and μ (n), in Pa.
 
-    λ is infinite where tissue is incompressible; of mixed elements λ tr ε is not the mean pressure, so that a stress
-    is not known there: return what is not a number.
+    λ is infinite where tissue is incompressible. In mixed elements (``is_mixed``) λ tr ε is not the mean pressure, so
+    the stress is not known: return NaN there.
     """
 
     gradient: FloatArray
     lame_lambda: FloatArray
     lame_mu: FloatArray
     is_linear: bool
+    is_mixed: bool
 
     @cached_property
     def principal_strains(self) -> FloatArray:
@@ -68,9 +69,9 @@ LARGEST: dict[str, Callable[[Cells], FloatArray]] = {"max_strain": _max_strain}
 class CellValues:
     """Reads what the present ``displacement`` of a space does to each cell of its mesh."""
 
-    def __init__(self, body: BodyMesh, displacement: Any):
-        """Compile; collective."""
-        self._body = body
+    def __init__(self, body: BodyMesh, displacement: Any, *, is_mixed: bool = False):
+        """Compile; ``is_mixed`` if there is a pressure beside the displacement; collective."""
+        self._body, self._is_mixed = body, is_mixed
         space = displacement.function_space
         tensors = cellwise_space(space.mesh, (3, 3))
         test, ones = ufl.TestFunction(tensors), ufl.as_tensor(np.ones((3, 3)).tolist())
@@ -92,6 +93,7 @@ class CellValues:
             lame_lambda=of_regions(law.lame_lambda, regions, owned),
             lame_mu=of_regions(law.lame_mu, regions, owned),
             is_linear=law.is_linear,
+            is_mixed=self._is_mixed,
         )
 
     def principal_strains(self, law: MaterialLaw) -> FloatArray:
@@ -104,7 +106,7 @@ class CellValues:
         found = [value(cells)[clear].max(initial=-np.inf) for value in LARGEST.values()]
         # Not a number on one rank is none on all, which MPI's own maximum does not promise.
         largest = np.max(self._body.comm.allgather(found), axis=0)
-        return {name: float(value) if value > -np.inf else 0.0 for name, value in zip(LARGEST, largest, strict=True)}
+        return {name: 0.0 if value == -np.inf else float(value) for name, value in zip(LARGEST, largest, strict=True)}
 
     def _clear_of(self, front: Front | None) -> BoolArray:
         known = _clear.setdefault(self._body.mesh, {})

@@ -76,7 +76,8 @@ class QuasiStaticProblem(Problem):
         if tool is not None:
             self.constraint = ContactSearch(spaces, self.elements, tool, reuse=reuse, condense=condense)
         self._body, self._conditions = spaces.body, conditions
-        self._values = CellValues(self._body, self.elements.displacements.forms.displacement)
+        displacement = self.elements.displacements.forms.displacement
+        self._values = CellValues(self._body, displacement, is_mixed=element == "mixed")
         self._law: MaterialLaw | None = None  # of the last solution
 
     def close(self) -> None:

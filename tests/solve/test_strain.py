@@ -6,6 +6,7 @@ from mpi4py import MPI
 
 from pipeline.run.meshing import mesh_case
 from pipeline.run.problem import conditions_of
+from pipeline.solve import cell_values
 from pipeline.solve.cell_values import CellValues
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import Spaces
@@ -47,6 +48,29 @@ def test_strain_at_the_front_of_a_slit_is_left_out_of_its_own_body_only():
         values = CellValues(mesh, u)
         with_front, without, again = (values.largest(law, line)["max_strain"] for line in (front, None, front))
     assert with_front == again < 0.9 * without
+
+
+def test_a_value_that_is_not_known_is_not_nought(monkeypatch):
+    """A stress of displacements is not that of elements with a pressure: a function of cells can say so."""
+
+    def stress(cells):
+        hookes = cells.lame_lambda * cells.principal_strains.sum(axis=1)
+        hookes += 2 * cells.lame_mu * cells.principal_strains[:, -1]
+        return np.full_like(hookes, np.nan) if cells.is_mixed else hookes
+
+    monkeypatch.setitem(cell_values.LARGEST, "stress", stress)
+    case = case_of()
+    mesh = mesh_case(case, ("x", "y"), MPI.COMM_SELF)
+    law, strains = MaterialLaw.of_moduli(10e3, 0.3), np.array([-3e-3, 1e-3, -2e-3])
+    with Spaces(mesh) as spaces:
+        u = spaces.get(2, conditions_of(case)).forms.displacement
+        u.interpolate(lambda x: strains[:, None] * x)
+        known, unknown = (CellValues(mesh, u, is_mixed=kind).largest(law) for kind in (False, True))
+    pulled = law.lame_lambda[0] * strains.sum() + 2 * law.lame_mu[0] * strains.max()
+    assert known["stress"] == pytest.approx(pulled, rel=1e-9)
+    assert pulled < 0
+    assert np.isnan(unknown["stress"])
+    assert unknown["max_strain"] == pytest.approx(3e-3)
 
 
 @pytest.mark.parametrize(("depth", "allowed"), [("19.9 mm", True), ("20 mm", False), ("30 mm", False)])
