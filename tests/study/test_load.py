@@ -54,7 +54,7 @@ MISTAKES = {
     "unknown contact": ({"probe": {"contact": "glued"}}, ["probe.contact", "'bonded', 'frictionless' or 'unilateral'"]),
     "unknown element": ({"mesh": {"element": "hybrid"}}, ["mesh.element", "'mixed'"]),
     "key of another shape": (
-        {"probe": {"length": "4 mm"}}, ['probe.length = "4 mm"', "a disc has no length: blade and wedge have"],
+        {"probe": {"length": "4 mm"}}, ['probe.length = "4 mm"', "a disc has no length: blade", "and wedge have"],
     ),
     "key of one other shape": ({"probe": {"incision": "4 mm"}}, ["a disc has no incision: blade has"]),
     "truth for a degree": ({"mesh": {"degree": True}}, ["mesh.degree = true", "1, 2 or 3"]),
