@@ -1,8 +1,8 @@
 """The dataset of a study: every record in its place, with labels, units and provenance."""
 
 import json
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import isinf, nan
 from pathlib import Path
 from typing import Any
@@ -16,44 +16,50 @@ from pipeline.plan.equivalent_places import EquivalentPlace
 from pipeline.plan.key import digest
 from pipeline.plan.plan import Plan
 from pipeline.quantities import LARGEST, attributes, quantity_of
-from pipeline.run.outcome import without_contact
+from pipeline.run.outcome import LOST, without_contact
 from pipeline.run.record import Record
 from pipeline.shapes.frame import Frame, PlaceError
 from pipeline.shapes.from_file import FromFile
 from pipeline.shapes.scanned import Scanned
-from pipeline.study.sweep import Axis, Case, Scale, Study
+from pipeline.study.sweep import Axis, Case, Study
 
-# The variables that are taken as they are from the records of the cases, and from those of F_exact.
-_FLOATS = (
-    "force",
-    "force_error",
-    "energy",
-    "balance",
-    "time_mesh",
-    "time_assemble",
-    "time_setup",
-    "time_solve",
-    "time_error",
-    "time_total",
-    "time_spread",
-    "machine_load",
-    "memory",
+_SIZES = {"component": 3, "movement": 6, "conjugate": 6}
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Variables that records hold: their dimensions beside the study's, and the cases of which one must be swept."""
+
+    names: tuple[str, ...]
+    dims: tuple[str, ...] = ()
+    of: Callable[[Case], bool] = lambda case: True
+
+
+_COSTS = ("time_mesh", "time_assemble", "time_setup", "time_solve", "time_error", "time_total", "time_spread")
+_COUNTS = ("dofs", "cells", "iterations")
+_OF_LOADS = ("load_force", "load_force_error", "load_energy", "sag", "load_force_vector")
+_PARTS = (
+    _Part(("force", "force_error", "energy", "balance", *_COSTS, "machine_load", "memory")),
+    _Part(
+        ("contact_area", "contact_area_error", "contact_radius", "contact_radius_error"),
+        of=lambda case: case.probe.is_unilateral,
+    ),
+    _Part(("surface_deviation",), of=lambda case: isinstance(case.body, Scanned)),
+    _Part((*LARGEST, *_COUNTS, "force_exact", "force_exact_error")),
+    _Part(("force_vector", "force_vector_error"), ("component",)),
+    _Part(("stiffness", "stiffness_error"), ("movement", "conjugate"), lambda case: case.probe.motion == "all"),
+    _Part(
+        ("energy_release", "energy_release_error", "energy_release_exact"), of=lambda case: case.probe.slit is not None
+    ),
+    _Part(_OF_LOADS[:-1], of=lambda case: case.load.acts),
+    _Part(_OF_LOADS[-1:], ("component",), lambda case: case.load.acts),
 )
 # What a record calls otherwise than the dataset.
 _IN_RECORD = {"machine_load": "load"}
-# Those of contact that is found, if any of the study's is.
-_FOUND = ("contact_area", "contact_area_error", "contact_radius", "contact_radius_error")
-# Of bodies of triangles.
-_SCANNED = ("surface_deviation",)
-_COUNTS = ("dofs", "cells", "iterations")
-# Of loads, if any of the study's acts; nought where none does.
-_OF_LOADS = ("load_force", "load_force_error", "load_energy", "sag")
-_EXACT = ("force_exact", "force_exact_error")
-# Of blades that stand in a slit.
-_OF_SLITS = ("energy_release", "energy_release_error", "energy_release_exact")
+# What is known of a failed case, too: what it took, and how far its bar missed.
+_OF_FAILURES = {*_COSTS, "machine_load", "memory", "force_error", "energy_release_error", "surface_deviation"}
 # Translations, and rotations about the axes of the point of contact.
 _MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
-_NO_STIFFNESS = ((nan,) * 6,) * 6
 # Where the probe touches, and along which unit vector it advances.
 _PLACE = ("at_x", "at_y", "at_z")
 _OF_CLOSURE = "of half balls closed by a far field, error bars are those of the mesh alone, not of the closure"
@@ -63,68 +69,58 @@ _MISSING = -1  # of counts, which have no NaN
 def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | None = None) -> xr.Dataset:
     """Arrange ``records`` (by key) as the dataset of the plan's study; ``run`` adds attributes of the run."""
     study = plan.study
-    flat = [
-        _imaged(_scaled(records.get(key), plan.scale_of(case)), plan.equivalent.get(case.index))
-        or without_contact(case)
-        for key, case in zip(plan.keys, study.cases(), strict=True)
-    ]
-    keys = plan.reference_keys or [""] * len(flat)
-    exact = [
-        _scaled(records.get(key), plan.scale_of(case)) or without_contact(case)
-        for key, case in zip(keys, study.cases(), strict=True)
-    ]
-    variables = _of_records(study, flat, exact)
-    variables |= _of_movements(study, flat) | _of_slits(study, flat, exact) | _of_loads(study, flat)
-    variables |= _of_places(study) | _texts(plan, flat, exact)
+    cases = list(study.cases())
+    flat = _records_of(plan, cases, plan.keys, records)
+    flat = [_imaged(record, plan.equivalent.get(case.index)) for record, case in zip(flat, cases, strict=True)]
+    exact = _records_of(plan, cases, plan.reference_keys or [""] * len(cases), records)
+    variables = {}
+    for part in _PARTS:
+        if any(map(part.of, cases)):
+            for name in part.names:
+                source = zip(exact if "_exact" in name else flat, cases, strict=True)
+                values = [_value(record, case, name, part.dims) for record, case in source]
+                variables[name] = _variable(study, name, values, *part.dims)
+    variables |= _of_places(study, cases) | _texts(plan, cases, flat, exact)
     coordinates = {axis.name: _coordinate(axis) for axis in study.axes} | {"component": ["x", "y", "z"]}
     if "stiffness" in variables:
         coordinates |= _motions()
     dataset = xr.Dataset(variables, coordinates, _attributes(plan, flat, run or {}))
-    if any(case.is_closed for case in study.cases() if not case.lost_contact):
+    if any(case.is_closed for case in cases if not case.lost_contact):
         dataset["force_error"].attrs["comment"] = _OF_CLOSURE
     if path := {axis.name for axis in study.axes if axis.off}:
         dataset = dataset.assign_coords({name: _along(dataset[name], path) for name in _PLACE})
     return _add_ratios(dataset)
 
 
-def _variable(study: Study, name: str, values: Sequence[Any], *more: str, dtype: Any = float) -> tuple[Any, ...]:
+def _records_of(
+    plan: Plan, cases: Sequence[Case], keys: Sequence[str], records: Mapping[str, Record]
+) -> list[Record | None]:
+    """Return the record of each case, at its scale; None if there is none."""
+    found = []
+    for key, case in zip(keys, cases, strict=True):
+        record = records.get(key)
+        found.append(record.scaled(plan.scale_of(case)) if record else without_contact(case))
+    return found
+
+
+def _value(record: Record | None, case: Case, name: str, dims: Sequence[str]) -> Any:
+    """Return what a record holds of a variable, not a number if nothing; what loads add that do not act is nought."""
+    if name in _COUNTS:
+        return getattr(record, name) if record and record.status == "ok" else _MISSING
+    value, own = nan, name.replace("_exact", "")
+    if record and name in _OF_LOADS and record.is_ok and not case.load.acts:
+        value = 0.0
+    elif record and (record.is_ok or record.status == LOST or own in _OF_FAILURES):
+        value = record.largest.get(own, nan) if own in LARGEST else getattr(record, _IN_RECORD.get(own, own))
+    return np.broadcast_to(np.array(nan if value == () else value, dtype=float), [_SIZES[dim] for dim in dims])
+
+
+def _variable(study: Study, name: str, values: Sequence[Any], *more: str) -> tuple[Any, ...]:
     """Return a variable of ``values``, one a case, of which each has ``more`` dimensions."""
-    array = np.array(values, dtype=dtype)
+    array = np.array(values, dtype=object if isinstance(values[0], str) else None)
     dims = tuple(axis.name for axis in study.axes)
-    return (*dims, *more), array.reshape((*study.shape, *array.shape[1:])), attributes(name)
-
-
-def _of_records(study: Study, flat: Sequence[Record | None], exact: Sequence[Record | None]) -> dict[str, Any]:
-    """Return what every dataset has of the records of the cases, and of those of F_exact."""
-    variables: dict[str, Any] = {}
-    found = _FOUND if any(case.probe.is_unilateral for case in study.cases()) else ()
-    scanned = _SCANNED if any(isinstance(case.body, Scanned) for case in study.cases()) else ()
-    for name in (*_FLOATS, *found, *scanned):
-        variables[name] = _variable(study, name, [getattr(r, _IN_RECORD.get(name, name)) if r else nan for r in flat])
-    for name in LARGEST:
-        variables[name] = _variable(study, name, [r.largest.get(name, nan) if r else nan for r in flat])
-    for name in _COUNTS:
-        values = [getattr(r, name) if r and r.status == "ok" else _MISSING for r in flat]
-        dims, array, attrs = _variable(study, name, values, dtype=np.int64)
-        variables[name] = (dims, array, {**attrs, "missing_value": _MISSING})
-    for name in _EXACT:
-        values = [getattr(r, name.replace("_exact", "")) if r else nan for r in exact]
-        variables[name] = _variable(study, name, values)
-    for name in ("force_vector", "force_vector_error"):
-        values = [getattr(r, name) if r else (nan,) * 3 for r in flat]
-        variables[name] = _variable(study, name, values, "component")
-    return variables
-
-
-def _of_movements(study: Study, flat: Sequence[Record | None]) -> dict[str, Any]:
-    """Return the stiffness against all movements, if any of the study's probes makes them."""
-    if not any(case.probe.motion == "all" for case in study.cases()):
-        return {}
-    variables = {}
-    for name in ("stiffness", "stiffness_error"):
-        values = [(r and getattr(r, name)) or _NO_STIFFNESS for r in flat]
-        variables[name] = _variable(study, name, values, "movement", "conjugate")
-    return variables
+    missing = {"missing_value": _MISSING} if name in _COUNTS else {}
+    return (*dims, *more), array.reshape((*study.shape, *array.shape[1:])), attributes(name) | missing
 
 
 def _motions() -> dict[str, Any]:
@@ -138,21 +134,9 @@ def _motions() -> dict[str, Any]:
     }
 
 
-def _of_slits(study: Study, flat: Sequence[Record | None], exact: Sequence[Record | None]) -> dict[str, Any]:
-    """Return the energy that slits release, if any of the study's blades stands in one."""
-    if not any(case.probe.slit for case in study.cases()):
-        return {}
-    variables = {}
-    for name in _OF_SLITS:
-        source = exact if name.endswith("_exact") else flat
-        values = [getattr(r, name.removesuffix("_exact")) if r else nan for r in source]
-        variables[name] = _variable(study, name, values)
-    return variables
-
-
-def _of_places(study: Study) -> dict[str, Any]:
+def _of_places(study: Study, cases: Sequence[Case]) -> dict[str, Any]:
     """Return where the probe touches, and along what it advances."""
-    frames = [_frame(case) for case in study.cases()]
+    frames = [_frame(case) for case in cases]
     variables = {
         name: _variable(study, name, [frame.point[number] if frame else nan for frame in frames])
         for number, name in enumerate(_PLACE)
@@ -161,27 +145,18 @@ def _of_places(study: Study) -> dict[str, Any]:
     return variables | {"axis": _variable(study, "axis", axes, "component")}
 
 
-def _texts(plan: Plan, flat: Sequence[Record | None], exact: Sequence[Record | None]) -> dict[str, Any]:
+def _texts(
+    plan: Plan, cases: Sequence[Case], flat: Sequence[Record | None], exact: Sequence[Record | None]
+) -> dict[str, Any]:
     """Return what is told in words of each case."""
-    study = plan.study
-    notices = ["; ".join(case.body.notices) if isinstance(case.body, FromFile) else "" for case in study.cases()]
+    notices = ["; ".join(case.body.notices) if isinstance(case.body, FromFile) else "" for case in cases]
     texts = {
         "status": [r.status if r else "pending" for r in flat],
         "message": [r.message if r else "" for r in flat],
         "origin": [_origin(plan, key, record) for key, record in zip(plan.keys, flat, strict=True)],
         "force_exact_message": [r.message if r else "" for r in exact],
     } | ({"body_message": notices} if any(notices) else {})
-    return {name: _variable(study, name, words, dtype=object) for name, words in texts.items()}
-
-
-def _of_loads(study: Study, flat: Sequence[Record | None]) -> dict[str, Any]:
-    """Return the variables of loads, if any of the study's acts."""
-    if not any(case.load.acts for case in study.cases()):
-        return {}
-    loaded = [_loaded(record, case) for record, case in zip(flat, study.cases(), strict=True)]
-    variables = {name: _variable(study, name, [getattr(r, name) if r else nan for r in loaded]) for name in _OF_LOADS}
-    vectors = [r.load_force_vector if r else (nan,) * 3 for r in loaded]
-    return variables | {"load_force_vector": _variable(study, "load_force_vector", vectors, "component")}
+    return {name: _variable(plan.study, name, words) for name, words in texts.items()}
 
 
 def write(dataset: xr.Dataset, path: Path) -> None:
@@ -201,67 +176,29 @@ def _along(place: xr.DataArray, path: Collection[str]) -> xr.DataArray:
 def _add_ratios(dataset: xr.Dataset) -> xr.Dataset:
     """Add F_max, F/F_max and speed-up: against the full-order case of the same scene and mesh settings."""
     force, seconds = dataset["force"], dataset["time_total"]
-    full_force, full_seconds = xr.full_like(force, nan), xr.full_like(seconds, nan)
-    if "epsilon" in dataset.dims and bool(np.isinf(dataset["epsilon"]).any()):
-        position = int(np.flatnonzero(np.isinf(dataset["epsilon"].values))[0])
-        full_force = force.isel(epsilon=position, drop=True).broadcast_like(force)
-        full_seconds = seconds.isel(epsilon=position, drop=True).broadcast_like(force)
-    elif "epsilon" not in dataset.dims and dataset.attrs["epsilon_is_full"]:
-        full_force, full_seconds = force, seconds
-    order = force.dims
+    full_force = _of_full_order(dataset, "force")
     ratios = {
         "accuracy": force / dataset["force_exact"],
         "force_max": full_force,
         "force_ratio": force / full_force,
-        "speedup": full_seconds / seconds,
+        "speedup": _of_full_order(dataset, "time_total") / seconds,
     }
-    if "energy_release" in dataset:
-        ratios["energy_release_ratio"] = _over_full_order(dataset["energy_release"], dataset)
-    if "load_force" in dataset:
-        ratios["load_force_ratio"] = _over_full_order(dataset["load_force"], dataset)
+    for name in ("energy_release", "load_force"):
+        if name in dataset:
+            ratios[f"{name}_ratio"] = dataset[name] / _of_full_order(dataset, name)
     if "law" in dataset.dims and "linear" in dataset["law"].values:
         ratios["linear_ratio"] = force / force.sel(law="linear", drop=True)
     return dataset.assign(
-        {name: values.transpose(*order).assign_attrs(attributes(name)) for name, values in ratios.items()}
+        {name: values.transpose(*force.dims).assign_attrs(attributes(name)) for name, values in ratios.items()}
     )
 
 
-def _over_full_order(values: xr.DataArray, dataset: xr.Dataset) -> xr.DataArray:
-    """Return ``values`` over those of the full-order case of the same scene and mesh settings."""
-    if "epsilon" not in dataset.dims:
-        return values / values.where(bool(dataset.attrs["epsilon_is_full"]))
-    full = values.where(np.isinf(dataset["epsilon"])).max("epsilon")
-    return values / full
-
-
-def _scaled(record: Record | None, scale: Scale) -> Record | None:
-    """Return the record for the ``scale`` of a case; of a failure, without what is not known.
-
-    How far its bar missed, and what it took, is.
-    """
-    if record is None or record.is_ok:
-        return record.scaled(scale) if record else None
-    return replace(
-        record,
-        force=nan,
-        force_vector=(nan, nan, nan),
-        force_vector_error=(nan, nan, nan),
-        stiffness=(),
-        stiffness_error=(),
-        energy=nan,
-        energy_release=nan,
-        balance=nan,
-        contact_area=nan,
-        contact_radius=nan,
-        contact_area_error=nan,
-        contact_radius_error=nan,
-        load_force=nan,
-        load_force_error=nan,
-        load_energy=nan,
-        sag=nan,
-        load_force_vector=(nan, nan, nan),
-        largest={},
-    )
+def _of_full_order(dataset: xr.Dataset, name: str) -> xr.DataArray:
+    """Return a variable of the full-order case of the same scene and mesh settings, in its own shape."""
+    values = dataset[name]
+    if "epsilon" in values.dims:
+        return values.where(np.isinf(dataset["epsilon"])).max("epsilon").broadcast_like(values)
+    return values.where(bool(dataset.attrs["epsilon_is_full"]))
 
 
 def _imaged(record: Record | None, image: EquivalentPlace | None) -> Record | None:
@@ -270,15 +207,6 @@ def _imaged(record: Record | None, image: EquivalentPlace | None) -> Record | No
         return record
     vector, bars = image.vector(record.force_vector), image.bars(record.force_vector_error)
     return replace(record, origin="image", force_vector=vector, force_vector_error=bars)
-
-
-def _loaded(record: Record | None, case: Case) -> Record | None:
-    """Return the record of a study of loads: what loads do that do not act is nought."""
-    if record is None or case.load.acts or not record.is_ok:
-        return record
-    return replace(
-        record, load_force=0.0, load_force_error=0.0, load_force_vector=(0.0, 0.0, 0.0), load_energy=0.0, sag=0.0
-    )
 
 
 def _frame(case: Case) -> Frame | None:
