@@ -51,10 +51,7 @@ def guideline(data: xr.Dataset) -> Figure:
 def one_number(data: xr.Dataset) -> Figure:
     """c of every tool over that of the smallest disc that slides, against the mean square distance of F, over ε²."""
     found = data.epsmesh.compliance("full")["compliance"].sel(outside="free")
-    known = sinking(data)
-    dims = data["force"].dims
-    square = xr.DataArray([one.square for one in known.ravel()], dims="case").values.reshape(known.shape)
-    square = xr.DataArray(square, dims=dims, coords={dim: data[dim] for dim in dims}).sel(outside="free")
+    square = sinking(data).assign_coords(data.coords)["square"].sel(outside="free")
     drawn, axes = plt.subplots(1, 2, figsize=(9, 3.2), sharey=True, layout="constrained")
     for ax, nu in zip(axes, data["poisson"].values, strict=True):
         for epsilon, colour in zip((5e-3, 7e-3, 10e-3), COLOURS, strict=False):

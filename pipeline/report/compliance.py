@@ -10,9 +10,11 @@ for every tool, whatever its shape and its friction. Where contact grows with de
 own f; if that goes like a power n of the depth, c = (E d / F) (1 - (F / F_exact)^(1/n)).
 """
 
+import itertools
 from typing import Any, Literal
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from pipeline.quantities import attributes
@@ -41,16 +43,10 @@ def compliance(dataset: xr.Dataset, against: Against = "exact") -> xr.Dataset:
     bar = dataset["force_error"]
     other_bar = dataset["force_exact_error"] if against == "exact" else _of_full_order(dataset)
     known = sinking(dataset)
-    if all(one.why_not for one in known.ravel()):
-        raise DatasetError(f"compliances do not add: {known.ravel()[0].why_not}")
-
-    def labelled(name: str) -> xr.DataArray:
-        values = np.array([getattr(one, name) for one in known.ravel()], dtype=object if name == "why_not" else float)
-        return xr.DataArray(values.reshape(force.shape), dims=force.dims)
-
-    whole = labelled("scale") / force
-    c, error = beyond(whole, force / other, labelled("exponent"), bar, other_bar)
-    variables = {"compliance": c, "compliance_error": error, "compliance_message": labelled("why_not")}
+    if (known["why_not"] != "").all():
+        raise DatasetError(f"compliances do not add: {known['why_not'].values.flat[0]}")
+    c, error = beyond(known["scale"] / force, force / other, known["exponent"], bar, other_bar)
+    variables = {"compliance": c, "compliance_error": error, "compliance_message": known["why_not"]}
     coordinates = {str(name): values for name, values in dataset.coords.items() if set(values.dims) <= set(force.dims)}
     return xr.Dataset(
         {name: values.transpose(*force.dims).assign_attrs(attributes(name)) for name, values in variables.items()},
@@ -67,7 +63,7 @@ def tool_dimension(dataset: xr.Dataset) -> str:
     study = study_of(dataset)
     names = [axis.name for axis in (study.axes if study else ()) if axis.section == "probe"]
     names = [name for name in names if name not in LOADS | PLACES and dataset.sizes.get(name, 0) > 1]
-    if not names or all(one.why_not for one in sinking(dataset).ravel()):
+    if not names or bool((sinking(dataset)["why_not"] != "").all()):
         return ""
     return min(names, key=lambda name: (name != "probe_radius", name != "probe"))
 
@@ -89,11 +85,10 @@ def _of_full_order(dataset: xr.Dataset) -> xr.DataArray:
     return bar
 
 
-def sinking(dataset: xr.Dataset) -> np.ndarray:
-    """Return what is known of each case's tool, in the shape of the force."""
+def sinking(dataset: xr.Dataset) -> xr.Dataset:
+    """Return what is known of each case's tool: the fields of :class:`Sinking`, on the dimensions of the force."""
     study, force = study_of(dataset), dataset["force"]
-    found = np.empty(force.shape, dtype=object)
-    for index in np.ndindex(force.shape):
-        labels = {str(dim): dataset[dim].values[i] for dim, i in zip(force.dims, index, strict=True)}
-        found[index] = Sinking.of(case_at(dataset, study, labels))
-    return found
+    labels = itertools.product(*(dataset[dim].values for dim in force.dims))
+    known = [Sinking.of(case_at(dataset, study, dict(zip(map(str, force.dims), at, strict=True)))) for at in labels]
+    columns = pd.DataFrame(known)
+    return xr.Dataset({str(name): (force.dims, column.values.reshape(force.shape)) for name, column in columns.items()})

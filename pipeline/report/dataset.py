@@ -112,7 +112,8 @@ def _value(record: Record | None, case: Case, name: str, dims: Sequence[str]) ->
         value = 0.0
     elif record and (record.is_ok or record.status == LOST or own in _OF_FAILURES):
         value = record.largest.get(own, nan) if own in LARGEST else getattr(record, _IN_RECORD.get(own, own))
-    return np.broadcast_to(np.array(nan if value == () else value, dtype=float), [_SIZES[dim] for dim in dims])
+    numbers = np.array(value, dtype=float)
+    return np.broadcast_to(numbers if numbers.size else nan, [_SIZES[dim] for dim in dims])
 
 
 def _variable(study: Study, name: str, values: Sequence[Any], *more: str) -> tuple[Any, ...]:

@@ -33,7 +33,7 @@ def text(guide: Guideline) -> str:
 
 def question(guide: Guideline) -> str:
     """Return what was asked for, and of how many scenes."""
-    axes = " × ".join(f"{length} {name}" for name, length in guide.axes)
+    axes = " × ".join(f"{length} {name}" for name, length in guide.axes.items())
     wanted = [f"F within {percent(guide.accuracy)} of F_exact, error bars included"] if isfinite(guide.accuracy) else []
     wanted += [f"at most {time(guide.budget)} a case"] if isfinite(guide.budget) else []
     scenes = f"{counted(guide.scenes, 'scene')}{f' ({axes})' if axes and not guide.lost else ''}"
@@ -102,7 +102,7 @@ def _for_other_tools(guide: Guideline) -> str:
     chosen = guide.carried or guide.best_carried
     law = chosen.laws.best if chosen else None
     if chosen is None or law is None:
-        why = "; ".join(f"{counted(count, 'scene')}: {reason}" for reason, count in guide.no_law)
+        why = "; ".join(f"{counted(count, 'scene')}: {reason}" for reason, count in guide.no_law.items())
         return f"For other tools: nothing can be said: it takes a study of several tools{f' ({why})' if why else ''}"
     best = "" if guide.carried else "no setting does that either; best reached: "
     found = f"{best}{words(chosen.labels)}, {law.formula}, {constants(law)}"

@@ -66,13 +66,13 @@ class Sinking:
         return Sinking(scale, float(probe.force_exponent or nan), probe.mean_square, inverse, probe.contact)
 
 
-def tools(cases: Iterable[Case]) -> tuple[str, ...]:
+def tools(cases: Iterable[Case]) -> list[str]:
     """Describe the tools of scenes: shape, contact, and how far (mm) what may touch reaches from the axis."""
     reaches: dict[tuple[str, str], list[float]] = {}
     for case in cases:
         key = case.probe.shape, case.probe.contact
         reaches.setdefault(key, []).append(1e3 * case.probe.circumradius)
-    return tuple(
+    return [
         f"{shape}, {contact}, {min(reach):.3g}{f' to {max(reach):.3g}' if max(reach) > min(reach) else ''} mm"
         for (shape, contact), reach in reaches.items()
-    )
+    ]

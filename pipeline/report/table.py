@@ -7,6 +7,7 @@ from math import isinf
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from pipeline.quantities import MESH_DIMENSIONS, symbol, write
@@ -47,7 +48,7 @@ class Table:
     why: np.ndarray
     meshes: tuple[Labels, ...]  # element sizes of each setting: what is swept and what is not
     cases: tuple[Case | None, ...]  # of each scene, with some mesh; None if the study does not tell
-    sinking: tuple[Sinking, ...]  # of each scene's tool
+    sinking: pd.DataFrame  # of each scene's tool, a column for each field of Sinking
     tools: tuple[str, ...]  # the axes that make a tool what it is, and
     loads: tuple[str, ...]  # those that only say how far it moves
 
@@ -114,7 +115,7 @@ def arrange(dataset: xr.Dataset) -> Table:
         why=why,
         meshes=tuple(_mesh(dataset, study, settings[i]) for i in keep),
         cases=cases,
-        sinking=tuple(Sinking.of(case) for case in cases),
+        sinking=pd.DataFrame([Sinking.of(case) for case in cases]),
         tools=tuple(sorted(of_probe - LOADS - PLACES)),
         loads=tuple(sorted(of_probe & LOADS)),
     )

@@ -108,15 +108,12 @@ def judge(table: Table, row: int) -> Verdict:
 
 def _laws(table: Table, row: int, use: np.ndarray, *, of_full: bool = False) -> Laws:
     """Judge the laws of one row on the scenes in ``use`` whose compliances add."""
-    use = use & np.array([not one.why_not for one in table.sinking])
+    use = use & (table.sinking["why_not"] == "").to_numpy()
     ratio = table.share[row, use] if of_full else table.ratio[row, use]
     if not np.isfinite(ratio).all():
         return Laws()
     bar, exact_bar = (0.0 * ratio if of_full else part[row, use] for part in (table.force_bar, table.exact_bar))
-    sinking = [one for one, used in zip(table.sinking, use, strict=True) if used]
-    scale, exponent, square = (
-        np.array([getattr(one, name) for one in sinking]) for name in ("scale", "exponent", "square")
-    )
+    scale, exponent, square = table.sinking.loc[use, ["scale", "exponent", "square"]].to_numpy().T
     forces = Forces(ratio, bar, exact_bar, scale / table.force[row, use], exponent, square)
     axes = {name: positions[use] for name, positions in table.axes.items()}
     return laws.judge(forces, axes, table.tools, table.loads)

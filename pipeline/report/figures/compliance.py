@@ -43,23 +43,12 @@ def _with_positions(dataset: xr.Dataset) -> tuple[xr.Dataset, str]:
     Round flat tools stand at 1 / a, what else there is at E d / F of full order.
     """
     known = sinking(dataset)
-
-    def labelled(name: str) -> xr.DataArray:
-        values = [getattr(one, name) if one.exponent == 1.0 else np.nan for one in known.ravel()]
-        return xr.DataArray(np.reshape(values, known.shape), dims=dataset["force"].dims)
-
-    whole, inverse = _PER_MM * labelled("scale") / dataset["force"], _PER_MM * labelled("inverse")
+    linear = known[["scale", "inverse"]].where(known["exponent"] == 1)
+    whole, inverse = _PER_MM * linear["scale"] / dataset["force"], _PER_MM * linear["inverse"]
     is_round = bool(np.isfinite(inverse.where(np.isfinite(whole), 0.0)).all())
     full = whole.where(np.isinf(dataset["epsilon"])).max("epsilon").broadcast_like(whole)
-    contact = np.array([one.contact for one in known.ravel()], dtype=object).reshape(known.shape)
-    data = dataset.assign(
-        {
-            _WHOLE: whole,
-            "position": inverse if is_round else full,
-            "of_full_order": full,
-            "touch": (dataset["force"].dims, contact),
-        }
-    )
+    places = {"position": inverse if is_round else full, "of_full_order": full}
+    data = dataset.assign({_WHOLE: whole, "touch": known["contact"], **places})
     return data, "1 / radius a, 1/mm" if is_round else "$E d/F_{max}$, 1/mm"
 
 
