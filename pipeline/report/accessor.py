@@ -129,10 +129,9 @@ class Accessor:
             ax = plt.figure(figsize=(5, 3.4), layout="constrained").subplots()
         data = data.isel(epsilon=np.isfinite(data["epsilon"].values)).sortby("epsilon")
         others = [str(d) for d in data.dims if d != "epsilon"]
-        if np.prod([data.sizes[d] for d in others]) <= _MOST_CURVES or {*others} <= {*MESH_DIMENSIONS, by}:
-            _draw_curves(ax, data, others)
-        else:
-            _draw_bands(ax, data, others, by)
+        is_few = np.prod([data.sizes[d] for d in others]) <= _MOST_CURVES
+        scene = [d for d in others if not is_few and d not in (*MESH_DIMENSIONS, by)]
+        _draw(ax, data, [d for d in others if d not in scene], scene)
         if variable == "force_ratio":
             ax.axhline(1.0, color="black", linewidth=0.7)
         ax.set_xlabel("ε, mm")
@@ -142,28 +141,19 @@ class Accessor:
         return ax
 
 
-def _draw_curves(ax: "Axes", data: xr.DataArray, dims: list[str]) -> None:
-    from pipeline.report.figures.style import COLOURS, MARKERS  # noqa: PLC0415 (matplotlib is slow to load)
+def _draw(ax: "Axes", data: xr.DataArray, dims: list[str], scene: list[str]) -> None:
+    """Draw a curve for each combination along ``dims``: the median over the dimensions of ``scene``, in their range."""
+    from pipeline.report.figures.style import look  # noqa: PLC0415 (matplotlib is slow to load)
 
     x = 1e3 * data["epsilon"].values
+    count = int(np.prod([data.sizes[d] for d in scene]))
     for number, labels in enumerate(_combinations(data, dims)):
-        style = {"color": COLOURS[number % len(COLOURS)], "marker": MARKERS[number % len(MARKERS)], "markersize": 4}
-        ax.plot(x, data.sel(labels).values, label=words(labels) if labels else "", **style)
-
-
-def _draw_bands(ax: "Axes", data: xr.DataArray, dims: list[str], by: str | None) -> None:
-    from pipeline.report.figures.style import COLOURS, MARKERS  # noqa: PLC0415 (matplotlib is slow to load)
-
-    x = 1e3 * data["epsilon"].values
-    scene = [d for d in dims if d not in (*MESH_DIMENSIONS, by)]
-    for number, labels in enumerate(_combinations(data, [d for d in dims if d not in scene])):
-        chosen = data.sel(labels)
-        colour = COLOURS[number % len(COLOURS)]
-        ax.fill_between(x, chosen.min(scene).values, chosen.max(scene).values, color=colour, alpha=0.25, linewidth=0)
-        style = {"color": colour, "marker": MARKERS[number % len(MARKERS)], "markersize": 4}
-        count = int(np.prod([data.sizes[d] for d in scene]))
-        name = f"{words(labels)}: " if labels else ""
-        ax.plot(x, chosen.median(scene).values, label=f"{name}median and range of {count} scenes", **style)
+        chosen, style, name = data.sel(labels), look(number), words(labels) if labels else ""
+        if scene:
+            low, high = chosen.min(scene).values, chosen.max(scene).values
+            ax.fill_between(x, low, high, color=style["color"], alpha=0.25, linewidth=0)
+            name = f"{name}{': ' if name else ''}median and range of {count} scenes"
+        ax.plot(x, chosen.median(scene).values if scene else chosen.values, label=name, markersize=4, **style)
 
 
 def _combinations(data: xr.DataArray, dims: list[str]) -> list[dict[str, Any]]:

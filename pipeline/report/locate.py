@@ -39,7 +39,7 @@ class Located:
         """Draw the excess (%) and the centre that was found, and return the axes."""
         import matplotlib.pyplot as plt  # noqa: PLC0415 (slow to load)
 
-        from pipeline.report.figures.excess import draw_excess  # noqa: PLC0415
+        from pipeline.report.figures.map import draw_excess  # noqa: PLC0415
 
         if ax is None:
             ax = plt.figure(figsize=(5, 3.4), layout="constrained").subplots()

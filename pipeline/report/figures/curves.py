@@ -1,7 +1,7 @@
 """Curves of quantities against a swept dimension, in a grid of panels."""
 
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pipeline.report.figures.facets import Facets, Selection, title_of
+from pipeline.report.figures.facets import Facets
 from pipeline.report.figures.style import FAILED, LEGEND, WIDTH, log_scale, look, new_figure
 from pipeline.report.words import choices, heading, is_numeric, lengths, scale
 
@@ -22,13 +22,12 @@ BARS = {"capsize": 2, "elinewidth": 0.8}
 
 @dataclass(frozen=True)
 class Panel:
-    """One panel: its axes, the part of the dataset that it shows, its quantity, its column, its row of quantities."""
+    """One panel: its axes, the part of the dataset that it shows, its quantity, its column."""
 
     ax: Axes
     data: xr.Dataset
     quantity: str
     column: int
-    row: int
 
 
 def grid(dataset: xr.Dataset, facets: Facets, quantities: Sequence[str]) -> tuple[Figure, list[Panel]]:
@@ -40,9 +39,9 @@ def grid(dataset: xr.Dataset, facets: Facets, quantities: Sequence[str]) -> tupl
     for i, j, selection in facets.panels:
         for k, quantity in enumerate(quantities):
             ax = axes[i * len(quantities) + k, j]
-            panels.append(Panel(ax, dataset.sel(facets.at | selection), quantity, j, i))
+            panels.append(Panel(ax, dataset.sel(facets.at | selection), quantity, j))
             if k == 0:
-                ax.set_title(textwrap.fill(title_of(dataset, selection), _TITLE))
+                ax.set_title(textwrap.fill(choices(dataset, selection), _TITLE))
             if j == 0:
                 ax.set_ylabel(textwrap.fill(heading(dataset[quantity]), 26))
     if facets.x:
@@ -68,7 +67,8 @@ def draw(panel: Panel, facets: Facets, bar: str = "") -> None:
     x = positions(panel.data[facets.x])
     joins = is_numeric(panel.data[facets.x]) and len(x) > 1
     factor = scale(panel.data[panel.quantity])[0]
-    for position, (curve, line) in enumerate(lines(panel.data, facets.curves)):
+    for position, curve in enumerate(facets.curves):
+        line = panel.data.sel(curve)
         y = factor * line[panel.quantity].values.astype(float)
         if not np.isfinite(y).any():
             continue
@@ -83,12 +83,6 @@ def draw(panel: Panel, facets: Facets, bar: str = "") -> None:
         place = {"transform": panel.ax.get_xaxis_transform(), "zorder": 6}
         panel.ax.plot(x[failed], np.full(failed.sum(), 0.04), "x", color=FAILED, **place)
     write_ticks(panel.ax, panel.data[facets.x])
-
-
-def lines(data: xr.Dataset, curves: Sequence[Selection]) -> Iterator[tuple[Selection, xr.Dataset]]:
-    """Yield the selection and the data of each curve."""
-    for curve in curves:
-        yield curve, data.sel(curve)
 
 
 def positions(coordinate: xr.DataArray) -> np.ndarray:

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.quantities import MESH_DIMENSIONS
-from pipeline.report.figures.curves import BARS, lines, positions, write_ticks
-from pipeline.report.figures.facets import Facets, arrange, main_dimension, title_of, with_error
+from pipeline.report.figures.curves import BARS, positions, write_ticks
+from pipeline.report.figures.facets import Facets, arrange, main_dimension, with_error
 from pipeline.report.figures.style import LEGEND, QUIET, WIDTH, finish, log_scale, look, new_figure
 from pipeline.report.pareto import front
 from pipeline.report.times import spreads, warned
@@ -30,13 +30,13 @@ def error(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     axes = figure.subplots(len(facets.rows), 1 + len(_COSTS), squeeze=False, sharex="col", sharey=True)
     for number, (row, shown) in enumerate(zip(axes, facets.rows, strict=True)):
         part = data.sel(facets.at | shown)
-        for position, (curve, line) in enumerate(lines(part, facets.curves)):
-            _draw_curve(row, facets, line, position, choices(data, curve))
+        for position, curve in enumerate(facets.curves):
+            _draw_curve(row, facets, part.sel(curve), position, choices(data, curve))
         for ax, name in zip(row, (str(facets.x), *_COSTS), strict=True):
             if number == len(facets.rows) - 1:
                 ax.set_xlabel(heading(data[name]))
         row[0].set_ylabel(f"error of F against $F_{{{reference}}}$, %")
-        row[1].set_title(textwrap.fill(title_of(data, shown), 60))
+        row[1].set_title(textwrap.fill(choices(data, shown), 60))
         write_ticks(row[0], part[facets.x])
     log_scale(axes[0, 0])
     floor = 100 * float(data["force_exact_error"].max())

@@ -10,7 +10,7 @@ import xarray as xr
 
 from pipeline.quantities import MESH_DIMENSIONS, QUANTITIES
 from pipeline.report.pareto import is_by_chance
-from pipeline.report.words import choice, choices, is_numeric, number, symbol
+from pipeline.report.words import choice, is_numeric, number, symbol
 
 Selection = dict[str, Any]
 
@@ -102,11 +102,6 @@ def rest(dataset: xr.Dataset, facets: Facets) -> Iterator[tuple[str, xr.Dataset]
         if groups and not all(set(chosen) <= seen[dim] for dim, chosen in part.items()):
             words = [f"{symbol(dataset[d])}: {', '.join(number(dataset[d], v) for v in part[d])}" for d in part]
             yield "; ".join(words), dataset.sel({dim: list(chosen) for dim, chosen in part.items()})
-
-
-def title_of(dataset: xr.Dataset, selection: Selection) -> str:
-    """Return the words for what a panel shows."""
-    return choices(dataset, selection)
 
 
 def swept(dataset: xr.Dataset) -> list[str]:

@@ -60,8 +60,8 @@ def _draw_column(axes: np.ndarray, dataset: xr.Dataset, dim: str, quantities: li
     first = ("law", "probe") if "contact_area" in quantities else ("law", "poisson")
     facets = arrange(dataset, quantities, dim, most=(_MOST_CURVES, 1, 1), first=first)
     data = dataset.sel(facets.at)
-    for row, (ax, name) in enumerate(zip(axes, quantities, strict=True)):
-        draw(Panel(ax, data, name, 0, row), facets, _LOAD_BAR if name == "load_force" else _RELATIVE.get(name, ""))
+    for ax, name in zip(axes, quantities, strict=True):
+        draw(Panel(ax, data, name, 0), facets, _LOAD_BAR if name == "load_force" else _RELATIVE.get(name, ""))
         if name in _SHARES:
             ax.axhline(1.0, color=LINE, linewidth=0.7)
         if name == "accuracy" and np.isfinite(bar := float(dataset["force_exact_error"].max())):

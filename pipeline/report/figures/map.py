@@ -1,4 +1,4 @@
-"""The force over a raster of places: a map, and below it the map of its error bar."""
+"""Maps over a raster of places: of the force and its error bar, and of its excess over that on a healthy body."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.report.figures.facets import arrange
-from pipeline.report.figures.style import FAILED, LINE, finish, new_figure
+from pipeline.report.figures.style import CLAIM, FAILED, LINE, finish, look, new_figure
 from pipeline.report.words import choices, heading, scale
 
 PLACES = ("x", "y")
@@ -23,13 +23,16 @@ def force_map(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     Places where contact is lost have a ring, those without a force a cross.
     """
     facets = arrange(dataset, ("force",), None, flat=PLACES, most=(_MOST_PANELS, 1, 1))
+    dataset = dataset.assign(force_bar=dataset["force_error"] * dataset["force"])
     parts = [dataset.sel(facets.at | curve).transpose("y", "x", ...) for curve in facets.curves]
     titles = [choices(dataset, curve) for curve in facets.curves]
-    (width, height), rows = _extent(dataset), (_forces(parts), _bars(parts))
+    width, height = (float(np.ptp(dataset[name].values)) for name in PLACES)
     panel = _PANEL * min(1.0, max(0.4, height / width))
     figure = new_figure(_PANEL * len(parts) + 1.2, 2 * panel + 1.3)
     axes = figure.subplots(2, len(parts), squeeze=False, sharex=True, sharey=True)
-    for row, (maps, label) in enumerate(zip(rows, (heading(dataset["force"]), "its error bar, mN"), strict=True)):
+    for row, (name, label) in enumerate((("force", heading(dataset["force"])), ("force_bar", "its error bar, mN"))):
+        # Zero where contact is lost would leave no colours for the others.
+        maps = [1e3 * part[name].where(part["status"] == "ok").values for part in parts]
         known = np.concatenate([values[np.isfinite(values)] for values in maps])
         limits = {"vmin": known.min(), "vmax": known.max()} if known.size else {}
         for column, (ax, values) in enumerate(zip(axes[row], maps, strict=True)):
@@ -62,18 +65,29 @@ def draw_map(ax: Axes, part: xr.Dataset, values: np.ndarray, **look: Any) -> Any
     return drawn
 
 
-def _forces(parts: list[xr.Dataset]) -> list[np.ndarray]:
-    """Return the forces (mN), none where contact is lost: zero would leave no colours for the others."""
-    return [1e3 * part["force"].where(part["status"] == "ok").values for part in parts]
+def draw_excess(ax: Axes, excess: xr.DataArray, bar: xr.DataArray, point: tuple[float, float, float]) -> Any:
+    """Draw the ``excess`` (%) on ``ax``: a map of a raster, with a dot where it is beyond its ``bar``, or a curve.
 
-
-def _bars(parts: list[xr.Dataset]) -> list[np.ndarray]:
-    return [1e3 * (part["force_error"] * part["force"]).where(part["status"] == "ok").values for part in parts]
-
-
-def _extent(dataset: xr.Dataset) -> tuple[float, float]:
-    x, y = (float(np.ptp(dataset[name].values)) for name in PLACES)
-    return x, y
+    ``point`` (m) is marked. Return what has colours, None of a curve.
+    """
+    if excess.ndim == 1:
+        (dim,) = excess.dims
+        ax.errorbar(1e3 * excess[dim], 100 * excess, 100 * bar, capsize=2, elinewidth=0.8, **look(1))
+        ax.axhline(0.0, color=LINE, linewidth=0.7)
+        ax.set_xlabel("length along the path, mm")
+        ax.set_ylabel("excess of F, %")
+        return None
+    seen = excess.transpose("y", "x")
+    beyond = (excess > bar).transpose("y", "x")
+    status = xr.where(np.isfinite(seen), "ok", "failed").rename("status")
+    drawn = draw_map(ax, xr.Dataset({"status": status}), 100 * seen.values)
+    rows, columns = np.nonzero(beyond.values)
+    x, y = 1e3 * seen["x"].values, 1e3 * seen["y"].values
+    ax.plot(x[columns], y[rows], ".", color="white", markersize=3, label="beyond the error bars")
+    ax.plot(1e3 * point[0], 1e3 * point[1], "+", color=CLAIM, markersize=12, markeredgewidth=2, label="centre")
+    ax.set_xlabel("x, mm")
+    ax.set_ylabel("y, mm")
+    return drawn
 
 
 def _some(values: np.ndarray, most: int = 7) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from pipeline.report.figures.curves import BARS, Panel, draw, grid, lines, positions, share
+from pipeline.report.figures.curves import BARS, Panel, draw, grid, positions, share
 from pipeline.report.figures.facets import Facets, arrange
 from pipeline.report.figures.style import CLAIM, LINE, finish, log_scale, look
 from pipeline.report.table import study_of
@@ -84,7 +84,8 @@ def _draw_spread(panel: Panel, facets: Facets, spread: xr.DataArray) -> None:
     """Draw bars that reach above and below the speed-ups by the factor ``spread``."""
     x = positions(panel.data["epsilon"])
     data = panel.data.assign(spread=spread.sel({d: panel.data[d] for d in spread.dims if d in panel.data.coords}))
-    for position, (_, line) in enumerate(lines(data, facets.curves)):
+    for position, curve in enumerate(facets.curves):
+        line = data.sel(curve)
         y, factor = line["speedup"].values, line["spread"].values
         known = np.isfinite(y) & (factor > 1)
         bars = np.abs(np.stack([y / factor - y, y * factor - y]))[:, known]
