@@ -1,11 +1,13 @@
 """Datasets of paths: maps of the force, and what they tell of a place below."""
 
+import itertools
+
 import numpy as np
 import pytest
 import xarray as xr
 
 import pipeline.report.accessor  # noqa: F401
-from pipeline.report.figures import choose, draw
+from pipeline.report.figures import choose, figure
 from pipeline.report.table import DatasetError
 from tests.cases import raw
 from tests.report.synthetic import dataset
@@ -25,21 +27,31 @@ def mapped(path, centre=(4e-3, -2e-3), height=0.2, **changes):
     return found.assign(force=found["force"] * xr.where(found["body"] == "ill", more, 1.0))
 
 
-def test_a_map_is_the_main_figure_of_a_raster_and_a_curve_that_of_a_line(tmp_path):
+def test_a_map_is_the_main_figure_of_a_raster_and_a_curve_that_of_a_line():
+    """Maps hold the forces and their bars (mN), of each body, at their places (mm)."""
     raster, line = mapped(RASTER), mapped(LINE)
-    assert choose(raster)[0] == "map"
-    assert choose(line)[0] == "force"
-    text = draw(raster, tmp_path / "a", ["svg"], ["map"])[0].read_text()
-    for word in ("ill", "healthy", "its error bar, mN", "x, mm", "95 %"):
-        assert word in text
-    assert "length along the path, mm" in draw(line, tmp_path / "b", ["svg"])[0].read_text()
+    assert (choose(raster)[0], choose(line)[0]) == ("map", "force")
+    axes = figure(raster, "map").axes
+    bars = raster["force"] * raster["force_error"]
+    assert [ax.get_title() for ax in axes[:2]] == ["ill", "healthy"]
+    for ax, (values, body) in zip(axes, itertools.product((raster["force"], bars), ("ill", "healthy")), strict=False):
+        shown = 1e3 * values.sel(body=body).transpose("y", "x")
+        np.testing.assert_allclose(ax.collections[0].get_array().reshape(shown.shape), shown)
+        np.testing.assert_allclose(ax.get_xticks(), 1e3 * raster["x"])
+    assert "length along the path, mm" in {ax.get_xlabel() for ax in figure(line, "force").axes}
 
 
-def test_where_contact_is_lost_the_map_says_so_and_keeps_its_colours(tmp_path):
-    wide = {"raster": {"x": ["0 mm", "9 mm", "30 mm"], "y": ["0 mm", "19 mm"]}, "off": "lost"}
-    text = draw(mapped(wide), tmp_path / "a", ["svg"], ["map"])[0].read_text()
-    assert "contact lost" in text
-    assert "no force" in text
+def test_where_contact_is_lost_the_map_says_so_and_keeps_its_colours():
+    wide = mapped({"raster": {"x": ["0 mm", "9 mm", "30 mm"], "y": ["0 mm", "19 mm"]}, "off": "lost"})
+    (ax, *_) = figure(wide, "map").axes
+    found = {mark.get_label(): mark.get_xydata() for mark in ax.lines}
+    seen = wide.isel(body=0).transpose("y", "x", ...)
+    for label, states in {"contact lost": ["lost"], "no force": ["failed", "skipped", "pending"]}.items():
+        rows, columns = np.nonzero(np.isin(seen["status"], states))
+        assert len(rows)
+        np.testing.assert_allclose(found[label], 1e3 * np.stack([seen["x"][columns], seen["y"][rows]], axis=1))
+    low, high = ax.collections[0].get_clim()
+    assert 0 < low < high
 
 
 @pytest.mark.parametrize("path", [RASTER, LINE], ids=["raster", "line"])
