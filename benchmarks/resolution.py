@@ -130,7 +130,7 @@ def solve(body: dict[str, Any], place: str, folder: Path, axis: list[float] | No
         return {"refused": str(found["message"].values)}
     return {
         "force": float(found["force"]),
-        "bar": float(found["force_error"]),
+        "bar": float(found["force_error"] / found["force"]),
         "z": float(found["at_z"]),
         "axis": found["axis"].values.ravel().tolist(),
     }

@@ -10,7 +10,7 @@ import typer
 
 from pipeline.cli import app
 from pipeline.plan.plan import make_plan
-from pipeline.quantities import attributes
+from pipeline.quantities import RUN, attributes
 from pipeline.report.dataset import build
 from pipeline.study.capabilities import FEATURES, OBSTACLES, REFUSALS
 from pipeline.study.json_schema import study_schema
@@ -111,21 +111,31 @@ def dataset_page() -> str:
     lines = [
         "# Dataset",
         "",
-        "`results/<study>.nc`: netCDF4, SI units, CF attributes. Its dimensions are what the study sweeps, in the "
-        "file's order, with coordinates named like the keys of `body`, `material`, `probe` and `mesh`. An array of "
-        "tables gives the dimension `body`, `material`, `probe` or `mesh`; a radius or shape is `probe_radius`, "
-        "`body_radius`; a key of a layer or an inclusion has its name before it, `skin_young`. A path gives the "
-        "dimension `path`, a raster `x` and `y`: lengths in m, and `at_x`, `at_y` and `at_z` are then coordinates. "
-        "`epsilon` is infinite for the full order.",
+        "`results/<study>.nc`: netCDF4, SI units, CF-1.8. The root group has the results; the group `run` has what "
+        "each case cost and how its force was obtained. `pipeline.open` reads both as one dataset, with `status` in "
+        "words.",
         "",
-        'What belongs to loads, slits, unilateral contact, `motion = "all"`, several laws, a surface of triangles or a '
-        "mended file is there only where the study has it.",
+        "Dimensions are what the study sweeps, in the file's order, with coordinates named like the keys of the file. "
+        "A variable has only those that it depends on. An array of tables gives the dimension `body`, `material`, "
+        "`probe` or `mesh`; a radius or shape is `probe_radius`, `body_radius`; a key of a layer or an inclusion has "
+        "its name before it, `skin_young`. A path gives the dimension `path`, a raster `x` and `y`: lengths in m, and "
+        "`at_x`, `at_y` and `at_z` are then coordinates.",
         "",
-        *_table(("variable", "unit", "meaning")),
+        "`epsilon` is infinite for the full order. `dataset.epsmesh.finite_epsilon()` leaves it out, for `interp` and "
+        "maps over ε.",
+        "",
+        "Error bars are absolute, in the unit of their value, which names its error bar in `ancillary_variables`. "
+        '`dataset.epsmesh.relative("force_error")` returns one as a share.',
+        "",
+        'Variables of loads, slits, found contact, `motion = "all"`, several laws, a surface of triangles or a '
+        "repaired file exist only where the study has these.",
     ]
-    for name, attrs in sorted(found.items()):
-        unit = attrs.get("units", "text")
-        lines.append(_row(f"`{name}`", "" if unit == "1" else unit, attrs.get("long_name", "")))
+    groups = {"Results": sorted(found.keys() - {*RUN}), "Group `run`": [name for name in RUN if name in found]}
+    for title, names in groups.items():
+        lines += ["", f"## {title}", "", *_table(("variable", "unit", "meaning"))]
+        for name in names:
+            unit = found[name].get("units", "flag" if name == "status" else "text")
+            lines.append(_row(f"`{name}`", "" if unit == "1" else unit, found[name].get("long_name", "")))
     lines += [
         "",
         "Values are missing (NaN; -1 for counts) where a case failed, was skipped or has not been run. Where a "

@@ -20,8 +20,11 @@ def write_netcdf(
     path: Path,
     kind: Literal["NETCDF4", "NETCDF3_64BIT"],
     encoding: Mapping[str, Mapping[str, Any]] | None = None,
+    groups: "Mapping[str, xr.Dataset] | None" = None,
 ) -> None:
     """Write ``dataset`` to ``path`` in one piece or not at all; netCDF4 with a Fletcher-32 checksum on arrays.
+
+    ``groups`` are written to groups of those names.
 
     Texts become arrays of characters, which checksums cover, too: HDF5 keeps texts of varying length elsewhere. Single
     numbers (arrays without a dimension) and attributes have no checksum: HDF5 filters work on arrays stored in chunks.
@@ -30,16 +33,21 @@ def write_netcdf(
     Raises:
         OSError: if it cannot be written.
     """
-    if kind == "NETCDF4":
-        known = encoding or {}
-        encoding = {str(name): _guarded(dataset[name]) | dict(known.get(str(name), {})) for name in dataset.variables}
+    parts = [(None, dataset), *(groups or {}).items()]
+    own = encoding or {}
     with atomic(path) as temporary:
-        temporary.write_bytes(bytes(most_bytes(dataset)))
-        dataset.to_netcdf(temporary, format=kind, engine="netcdf4", encoding=encoding)
+        temporary.write_bytes(bytes(sum(most_bytes(part) for _, part in parts)))
+        for group, part in parts:
+            chosen = {
+                str(name): (_guarded(part[name]) if kind == "NETCDF4" else {}) | dict(own.get(str(name), {}))
+                for name in part.variables
+            }
+            part.to_netcdf(temporary, "a" if group else "w", kind, group, "netcdf4", chosen)
 
 
 def _guarded(array: "xr.DataArray") -> dict[str, Any]:
-    text = {"dtype": "S1"} if array.dtype.kind in "OU" else {}
+    # A coordinate has no missing values: one that says what they would be breaks the CF conventions.
+    text = {"dtype": "S1"} if array.dtype.kind in "OU" else {"_FillValue": None} if array.name in array.dims else {}
     return text | {"fletcher32": True} if array.size and (array.ndim or text) else text
 
 

@@ -50,12 +50,15 @@ def _read(section: str) -> tuple[Quantity, ...]:
 
 _TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 _MESH, _LARGEST, _OF_PIECES = _read("mesh"), _read("largest"), _read("piece")
-_RESULTS = (*_read("result"), *_LARGEST)
+_RUN = _read("run")
+_RESULTS = (*_read("result"), *_RUN, *_LARGEST)
 QUANTITIES = _table(*_MESH, *_read("scene"), *_RESULTS)
 # Names of the dataset's own variables and coordinates: no swept input may have them as its dimension.
 RESERVED = frozenset(quantity.name for quantity in _RESULTS)
 STRESSES = frozenset(quantity.name for quantity in _LARGEST if quantity.unit == "Pa")
 LARGEST = tuple(quantity.name for quantity in _LARGEST)
+# Variables of a dataset's group ``run``.
+RUN = tuple(quantity.name for quantity in _RUN)
 MESH_DIMENSIONS = tuple(quantity.name for quantity in _MESH)
 
 # Factor and unit of what people do not read in SI.

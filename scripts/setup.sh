@@ -9,7 +9,7 @@ cd "$(dirname "$0")/.."
 packages=(
     python3-dolfinx python3-gmsh python3-mpi4py python3-petsc4py python3-numpy python3-scipy
     python3-xarray python3-netcdf4 python3-matplotlib python3-venv python3-dev
-    libopenblas0-pthread openmpi-bin gcc g++ make git ca-certificates
+    libopenblas0-pthread openmpi-bin gcc g++ make git ca-certificates libudunits2-0
 )
 python=/usr/bin/python3
 venv=.venv

@@ -16,6 +16,8 @@ from pathlib import Path
 import psutil
 
 from benchmarks.faults.victim import WIDTH
+from pipeline.report.read import load
+from pipeline.report.table import DatasetError
 from pipeline.run.reading import read_rows
 from pipeline.run.store import Store, StoreError
 
@@ -214,10 +216,8 @@ class Scene:
             store.close()
         if self.dataset.exists():
             try:
-                import xarray as xr
-
-                xr.load_dataset(self.dataset)
-            except (OSError, ValueError) as error:
+                load(self.dataset)
+            except DatasetError as error:
                 yield f"the dataset is torn: {error}"
 
 

@@ -194,7 +194,7 @@ def _tell(made: "Plan", records: "dict[str, Record]", case: "Case") -> None:
             "status": record.status,
             "origin": record.origin,
             "force": record.force,
-            "force_error": record.force_error,
+            "force_error": abs(record.force) * record.force_error,
             "seconds": record.time_total,
             **record.provenance,
         }

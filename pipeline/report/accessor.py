@@ -13,6 +13,7 @@ from pipeline.report.guide import Guide, guide
 from pipeline.report.locate import Located, locate
 from pipeline.report.pareto import front, is_by_chance
 from pipeline.report.table import words
+from pipeline.report.values import relative, with_words
 from pipeline.report.words import formula
 
 if TYPE_CHECKING:
@@ -32,7 +33,15 @@ class Accessor:
     """Questions that a study's dataset answers: ``dataset.epsmesh``."""
 
     def __init__(self, dataset: xr.Dataset):
-        self._dataset = dataset
+        self._dataset = with_words(dataset)
+
+    def relative(self, error: str) -> xr.DataArray:
+        """Return an error bar as a share of its value: "force_error" over force, and so for every ``…_error``.
+
+        Raises:
+            ValueError: if the dataset has no such error.
+        """
+        return relative(self._dataset, error)
 
     def to_frame(self) -> "pd.DataFrame":
         """Return a pandas frame with a row for each case and a column for each variable, SI units.
@@ -62,6 +71,15 @@ class Accessor:
         units = {str(n): v.attrs["units"] for n, v in data.variables.items() if "units" in v.attrs} | of_entries
         frame.attrs["units"] = {name: units[name] for name in frame.columns if name in units}
         return frame
+
+    def finite_epsilon(self) -> xr.Dataset:
+        """Return the dataset without the full order, whose ε is infinite: for ``interp`` and maps over ε.
+
+        ``force_max`` and the ratios have what it found.
+        """
+        if "epsilon" not in self._dataset.dims:
+            return self._dataset
+        return self._dataset.isel(epsilon=np.isfinite(self._dataset["epsilon"].values))
 
     def guide(self, accuracy: str | float | None = None, budget: str | float | None = None) -> Guide:
         """Return the smallest ε for an ``accuracy`` ("5 %"), or the best setting within a ``budget`` ("10 ms").
@@ -98,7 +116,7 @@ class Accessor:
         A row of :meth:`to_frame` with ``error`` = |F/F_exact - 1| added, by scene and from the fastest on. Left out are
         errors that are small by chance: those of which a finer mesh has one 1.5 times as large.
         """
-        error = abs(self._dataset["accuracy"] - 1).where(self._dataset["status"] == "ok")
+        error = abs(self._dataset["force_exact_ratio"] - 1).where(self._dataset["status"] == "ok")
         frame = Accessor(self._dataset.assign(error=error.where(~is_by_chance(error)))).to_frame()
         frame = frame[frame["error"].notna()]
         scene = [str(d) for d in self._dataset["force"].dims if d not in MESH_DIMENSIONS]
@@ -135,7 +153,7 @@ class Accessor:
         if variable == "force_ratio":
             ax.axhline(1.0, color="black", linewidth=0.7)
         ax.set_xlabel("ε, mm")
-        ax.set_ylabel(formula(variable) if variable in ("force_ratio", "accuracy") else variable)
+        ax.set_ylabel(formula(variable) if variable in ("force_ratio", "force_exact_ratio") else variable)
         if ax.get_legend_handles_labels()[1]:
             ax.legend(fontsize=9)
         return ax

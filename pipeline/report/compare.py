@@ -19,12 +19,8 @@ from pipeline.report.table import DatasetError, study_of
 
 # Forces that agree to this share of them agree, whatever their bars: the tolerance of solvers.
 SAME = 1e-6
-# What has an error bar: variable, its bar, and whether that is relative.
-_JUDGED = (
-    ("force", "force_error", True),
-    ("load_force", "load_force_error", False),
-    ("energy_release", "energy_release_error", True),
-)
+# What is compared: each has an error bar.
+_JUDGED = ("force", "load_force", "energy_release")
 
 
 @dataclass(frozen=True)
@@ -189,15 +185,13 @@ def _not_run(a: xr.Dataset, i: tuple[int, ...], b: xr.Dataset, j: tuple[int, ...
 
 def _pairs(case: str, a: xr.Dataset, i: tuple[int, ...], b: xr.Dataset, j: tuple[int, ...]) -> Iterator[Pair]:
     """Yield what is compared of one case."""
-    for quantity, bar, is_relative in _JUDGED:
+    for quantity in _JUDGED:
         if quantity not in a or quantity not in b:
             continue
         (one, bar_a, time_a), (other, bar_b, time_b) = (
-            (_number(data, quantity, at), _number(data, bar, at), _number(data, "time_total", at))
+            [_number(data, name, at) for name in (quantity, f"{quantity}_error", "time_total")]
             for data, at in ((a, i), (b, j))
         )
-        if is_relative:
-            bar_a, bar_b = abs(one) * bar_a, abs(other) * bar_b
         states = [_text(data, "status", at) for data, at in ((a, i), (b, j))]
         state, why = _judge(one, other, bar_a, bar_b, states)
         if quantity != "force" and not (isfinite(one) or isfinite(other)):

@@ -20,6 +20,7 @@ import xarray as xr
 from pipeline.quantities import attributes
 from pipeline.report.sinking import LOADS, PLACES, Sinking
 from pipeline.report.table import DatasetError, case_at, study_of
+from pipeline.report.values import relative
 
 Against = Literal["exact", "full"]
 
@@ -40,8 +41,8 @@ def compliance(dataset: xr.Dataset, against: Against = "exact") -> xr.Dataset:
     if not bool(np.isfinite(other).any()):
         missing = {"exact": "F_exact: run its study with `exact = true` in [solve]", "full": 'F_max: epsilon = "full"'}
         raise DatasetError(f"the dataset holds no {missing[against]}")
-    bar = dataset["force_error"]
-    other_bar = dataset["force_exact_error"] if against == "exact" else _of_full_order(dataset)
+    bar = relative(dataset, "force_error")
+    other_bar = relative(dataset, "force_exact_error") if against == "exact" else _of_full_order(bar)
     known = sinking(dataset)
     if (known["why_not"] != "").all():
         raise DatasetError(f"compliances do not add: {known['why_not'].values.flat[0]}")
@@ -78,10 +79,9 @@ def beyond(whole: Any, ratio: Any, exponent: Any, bar: Any, other_bar: Any) -> t
     return c, abs(c + other / exponent) * bar + other / exponent * other_bar
 
 
-def _of_full_order(dataset: xr.Dataset) -> xr.DataArray:
-    bar = dataset["force_error"]
+def _of_full_order(bar: xr.DataArray) -> xr.DataArray:
     if "epsilon" in bar.dims:
-        return bar.where(np.isinf(dataset["epsilon"])).max("epsilon")
+        return bar.where(np.isinf(bar["epsilon"])).max("epsilon")
     return bar
 
 

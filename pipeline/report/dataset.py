@@ -15,7 +15,8 @@ from pipeline.netcdf import write_netcdf
 from pipeline.plan.equivalent_places import EquivalentPlace
 from pipeline.plan.key import digest
 from pipeline.plan.plan import Plan
-from pipeline.quantities import LARGEST, attributes, quantity_of
+from pipeline.quantities import LARGEST, MESH_DIMENSIONS, RUN, attributes, quantity_of
+from pipeline.report.values import with_flags
 from pipeline.run.outcome import LOST, without_contact
 from pipeline.run.record import Record
 from pipeline.shapes.frame import Frame, PlaceError
@@ -28,11 +29,19 @@ _SIZES = {"component": 3, "movement": 6, "conjugate": 6}
 
 @dataclass(frozen=True)
 class _Part:
-    """Variables that records hold: their dimensions beside the study's, and the cases of which one must be swept."""
+    """Variables that records hold: their dimensions beside the study's, and the cases of which one must be swept.
+
+    ``is_exact`` variables are those of F_exact's records, which are the same for all meshes of a scene.
+    """
 
     names: tuple[str, ...]
     dims: tuple[str, ...] = ()
     of: Callable[[Case], bool] = lambda case: True
+    is_exact: bool = False
+
+
+def _has_slit(case: Case) -> bool:
+    return case.probe.slit is not None
 
 
 _COSTS = ("time_mesh", "time_assemble", "time_setup", "time_solve", "time_error", "time_total", "time_spread")
@@ -45,19 +54,21 @@ _PARTS = (
         of=lambda case: case.probe.is_unilateral,
     ),
     _Part(("surface_deviation",), of=lambda case: isinstance(case.body, Scanned)),
-    _Part((*LARGEST, *_COUNTS, "force_exact", "force_exact_error")),
+    _Part((*LARGEST, *_COUNTS)),
+    _Part(("force_exact", "force_exact_error"), is_exact=True),
     _Part(("force_vector", "force_vector_error"), ("component",)),
     _Part(("stiffness", "stiffness_error"), ("movement", "conjugate"), lambda case: case.probe.motion == "all"),
-    _Part(
-        ("energy_release", "energy_release_error", "energy_release_exact"), of=lambda case: case.probe.slit is not None
-    ),
+    _Part(("energy_release", "energy_release_error"), of=_has_slit),
+    _Part(("energy_release_exact", "energy_release_exact_error"), of=_has_slit, is_exact=True),
     _Part(_OF_LOADS[:-1], of=lambda case: case.load.acts),
     _Part(_OF_LOADS[-1:], ("component",), lambda case: case.load.acts),
 )
 # What a record calls otherwise than the dataset.
 _IN_RECORD = {"machine_load": "load"}
-# What is known of a failed case, too: what it took, and how far its bar missed.
-_OF_FAILURES = {*_COSTS, "machine_load", "memory", "force_error", "energy_release_error", "surface_deviation"}
+# Error bars that a record has as a share of the value.
+_RELATIVE = {"force_error", "energy_release_error", "contact_area_error", "contact_radius_error"}
+# What is known of a failed case, too: what it took, and by how much its error bars are too wide.
+_OF_FAILURES = {*_COSTS, *_RELATIVE, "machine_load", "memory", "surface_deviation"}
 # Translations, and rotations about the axes of the point of contact.
 _MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
 # Where the probe touches, and along which unit vector it advances.
@@ -72,24 +83,42 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     cases = list(study.cases())
     flat = _records_of(plan, cases, plan.keys, records)
     flat = [_imaged(record, plan.equivalent.get(case.index)) for record, case in zip(flat, cases, strict=True)]
-    exact = _records_of(plan, cases, plan.reference_keys or [""] * len(cases), records)
-    variables = {}
+    reference_keys = plan.reference_keys or [""] * len(cases)
+    exact = _records_of(plan, cases, reference_keys, records)
+    variables, of_scene = {}, ["force_exact_message"]
     for part in _PARTS:
         if any(map(part.of, cases)):
             for name in part.names:
-                source = zip(exact if "_exact" in name else flat, cases, strict=True)
-                values = [_value(record, case, name, part.dims) for record, case in source]
+                values = [
+                    _value(record, case, name, part.dims)
+                    for record, case in zip(exact if part.is_exact else flat, cases, strict=True)
+                ]
                 variables[name] = _variable(study, name, values, *part.dims)
+                of_scene += [name] if part.is_exact else []
     variables |= _of_places(study, cases) | _texts(plan, cases, flat, exact)
-    coordinates = {axis.name: _coordinate(axis) for axis in study.axes} | {"component": ["x", "y", "z"]}
+    component = ("component", ["x", "y", "z"], attributes("component"))
+    coordinates = {axis.name: _coordinate(axis) for axis in study.axes} | {"component": component}
     if "stiffness" in variables:
         coordinates |= _motions()
     dataset = xr.Dataset(variables, coordinates, _attributes(plan, flat, run or {}))
     if any(case.is_closed for case in cases if not case.lost_contact):
         dataset["force_error"].attrs["comment"] = _OF_CLOSURE
-    if path := {axis.name for axis in study.axes if axis.off}:
-        dataset = dataset.assign_coords({name: _along(dataset[name], path) for name in _PLACE})
-    return _add_ratios(dataset)
+    for name in of_scene:
+        dataset[name] = dataset[name].isel(_shared(study, reference_keys), drop=True)
+    path = {axis.name for axis in study.axes if axis.off}
+    for name in {*_PLACE, "axis", "body_message"} & {*variables}:
+        dataset[name] = _along(dataset[name], {*path, "component"})
+    return _linked(_add_ratios(dataset.set_coords(_PLACE if path else ()), plan))
+
+
+def _shared(study: Study, keys: Sequence[str], at: Mapping[str, int] | None = None) -> dict[str, int]:
+    """Return dimensions of meshes along which ``keys``, one a case, are the same, each with its first place.
+
+    ``at`` has the place along a dimension that is not asked about.
+    """
+    dims = [axis.name for axis in study.axes]
+    table = xr.DataArray(np.array(keys, dtype=object).reshape(study.shape), dims=dims).isel(at or {})
+    return {str(dim): 0 for dim in table.dims if dim in MESH_DIMENSIONS and bool((table == table.isel({dim: 0})).all())}
 
 
 def _records_of(
@@ -112,6 +141,8 @@ def _value(record: Record | None, case: Case, name: str, dims: Sequence[str]) ->
         value = 0.0
     elif record and (record.is_ok or record.status == LOST or own in _OF_FAILURES):
         value = record.largest.get(own, nan) if own in LARGEST else getattr(record, _IN_RECORD.get(own, own))
+        if own in _RELATIVE:
+            value *= abs(getattr(record, own.removesuffix("_error")))
     numbers = np.array(value, dtype=float)
     return np.broadcast_to(numbers if numbers.size else nan, [_SIZES[dim] for dim in dims])
 
@@ -161,26 +192,29 @@ def _texts(
 
 
 def write(dataset: xr.Dataset, path: Path) -> None:
-    """Write ``dataset`` to ``path`` as netCDF4: to a new file beside it, which then takes its place."""
-    write_netcdf(dataset, path, "NETCDF4")
+    """Write ``dataset`` to ``path`` as netCDF4: to a new file beside it, which then takes its place.
+
+    What cases cost, and how they were obtained, is the group ``run`` of the file; ``status`` is a flag.
+    """
+    run = [name for name in RUN if name in dataset]
+    write_netcdf(with_flags(dataset.drop_vars(run)), path, "NETCDF4", groups={"run": dataset[run]})
 
 
-def _along(place: xr.DataArray, path: Collection[str]) -> xr.DataArray:
-    """Return a coordinate of places without the dimensions, other than its ``path``'s, on which it does not depend."""
+def _along(place: xr.DataArray, own: Collection[str]) -> xr.DataArray:
+    """Return a variable without the dimensions, other than its ``own``, along which its values are the same."""
     for dim in place.dims:
         first = place.isel({dim: 0}, drop=True)
-        if dim not in path and bool(((place == first) | (place.isnull() & first.isnull())).all()):
+        if dim not in own and bool(((place == first) | (place.isnull() & first.isnull())).all()):
             place = first
     return place
 
 
-def _add_ratios(dataset: xr.Dataset) -> xr.Dataset:
+def _add_ratios(dataset: xr.Dataset, plan: Plan) -> xr.Dataset:
     """Add F_max, F/F_max and speed-up: against the full-order case of the same scene and mesh settings."""
     force, seconds = dataset["force"], dataset["time_total"]
     full_force = _of_full_order(dataset, "force")
     ratios = {
-        "accuracy": force / dataset["force_exact"],
-        "force_max": full_force,
+        "force_exact_ratio": force / dataset["force_exact"],
         "force_ratio": force / full_force,
         "speedup": _of_full_order(dataset, "time_total") / seconds,
     }
@@ -189,17 +223,28 @@ def _add_ratios(dataset: xr.Dataset) -> xr.Dataset:
             ratios[f"{name}_ratio"] = dataset[name] / _of_full_order(dataset, name)
     if "law" in dataset.dims and "linear" in dataset["law"].values:
         ratios["linear_ratio"] = force / force.sel(law="linear", drop=True)
-    return dataset.assign(
-        {name: values.transpose(*force.dims).assign_attrs(attributes(name)) for name, values in ratios.items()}
-    )
+    ratios = {name: values.transpose(*force.dims) for name, values in ratios.items()}
+    full = {"epsilon": int(np.argmax(dataset["epsilon"].values))} if "epsilon" in dataset.dims else {}
+    ratios["force_max"] = full_force.isel(_shared(plan.study, plan.keys, full), drop=True)
+    return dataset.assign({name: values.assign_attrs(attributes(name)) for name, values in ratios.items()})
 
 
 def _of_full_order(dataset: xr.Dataset, name: str) -> xr.DataArray:
-    """Return a variable of the full-order case of the same scene and mesh settings, in its own shape."""
+    """Return a variable of the full-order case of the same scene and mesh settings."""
     values = dataset[name]
     if "epsilon" in values.dims:
-        return values.where(np.isinf(dataset["epsilon"])).max("epsilon").broadcast_like(values)
+        return values.where(np.isinf(dataset["epsilon"])).max("epsilon")
     return values.where(bool(dataset.attrs["epsilon_is_full"]))
+
+
+def _linked(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset in which each value names its error bar, and those that can be missing the reason."""
+    of_status = {"force": "status message", "force_exact": "force_exact_message"}
+    for name, variable in dataset.data_vars.items():
+        error = f"{name}_error" if f"{name}_error" in dataset else ""
+        if found := f"{error} {of_status.get(str(name), '')}".strip():
+            variable.attrs["ancillary_variables"] = found
+    return dataset
 
 
 def _imaged(record: Record | None, image: EquivalentPlace | None) -> Record | None:
@@ -236,6 +281,14 @@ def _coordinate(axis: Axis) -> Any:
     return (axis.name, values, texts)
 
 
+def _is_monotonic(axis: Axis) -> bool:
+    """Tell whether a dimension's labels are words, or rise or fall all along, as the CF conventions require."""
+    if isinstance(axis.labels[0], str):
+        return True
+    steps = np.diff(np.array(axis.labels, dtype=float))
+    return bool((steps > 0).all() or (steps < 0).all())
+
+
 def _attributes(plan: Plan, records: list[Record | None], run: Mapping[str, Any]) -> dict[str, Any]:
     """Return the dataset's attributes: what does not vary by case."""
     study = plan.study
@@ -247,7 +300,7 @@ def _attributes(plan: Plan, records: list[Record | None], run: Mapping[str, Any]
     provenance = {name: ", ".join(map(str, dict.fromkeys(values))) for name, values in seen.items()}
     epsilons = {section.epsilon for section in study.sections["mesh"]}  # type: ignore[attr-defined]
     return {
-        "Conventions": "CF-1.8",
+        **({"Conventions": "CF-1.8"} if all(map(_is_monotonic, study.axes)) else {}),
         "title": study.title,
         "study": study.text,
         "study_hash": digest(study.text),

@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.report.table import DatasetError
+from pipeline.report.values import by_case, relative
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -74,17 +75,17 @@ def locate(dataset: xr.Dataset, body: str, healthy: str) -> Located:
     with_it, without = (dataset.sel(body=name).transpose(*dims, ...) for name in (body, healthy))
     touched = (with_it["status"] == "ok") & (without["status"] == "ok")
     excess = (with_it["force"] / without["force"] - 1).where(touched)
-    bar = (1 + excess) * (with_it["force_error"] + without["force_error"])
+    bar = (1 + excess) * (relative(with_it, "force_error") + relative(without, "force_error"))
     weight = (excess - bar).clip(min=0).fillna(0) * _areas(dataset, dims)
     beyond, total = (weight > 0).values, float(weight.sum())
     if not total > 0:
         raise DatasetError("nowhere is the force beyond the error bars of both larger than on the healthy body")
-    places = np.stack([with_it[f"at_{c}"].values for c in "xyz"], axis=-1)[beyond]
+    places = np.stack([by_case(with_it, f"at_{c}").values for c in "xyz"], axis=-1)[beyond]
     shares = weight.values[beyond] / total
     point = shares @ places
     areas = np.broadcast_to(_areas(dataset, dims).values, weight.shape)[beyond]
     moved = (areas * bar.values[beyond] / total)[:, None] * (places - point)
-    axis = shares @ with_it["axis"].values[beyond]
+    axis = shares @ by_case(with_it, "axis").values[beyond]
     return Located(
         point=_vector(point),
         axis=_vector(axis / np.linalg.norm(axis)),

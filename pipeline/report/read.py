@@ -11,6 +11,7 @@ import xarray as xr
 
 from pipeline.printable import printable, printable_lines
 from pipeline.report.table import DatasetError, warnings_of
+from pipeline.report.values import with_words
 
 # What every dataset of a study has, and figures and report are made from.
 _NEEDED = (
@@ -20,7 +21,7 @@ _NEEDED = (
     "force_exact",
     "force_exact_error",
     "force_exact_message",
-    "accuracy",
+    "force_exact_ratio",
     "status",
     "message",
     "origin",
@@ -72,7 +73,9 @@ def read(file: str | Path, output: str | Path = "results", warn: Callable[[str],
 
 
 def load(path: Path) -> xr.Dataset:
-    """Return the dataset at ``path``, in memory; every array is compared with its checksum.
+    """Return the dataset at ``path``, its group ``run`` with it, in memory; every array is compared with its checksum.
+
+    ``status`` is in words.
 
     Raises:
         DatasetError: if it is damaged, no netCDF, or beyond what any study has.
@@ -81,7 +84,7 @@ def load(path: Path) -> xr.Dataset:
         # A few bytes of a packed file may stand for any number of values.
         if (size := _size(path)) > _LARGEST:
             raise DatasetError(f"{path}: would take {size / 1e9:.3g} GB: no study's dataset has more than 1")
-        return xr.load_dataset(path)
+        return with_words(xr.merge([xr.load_dataset(path), _run(path)], combine_attrs="override"))
     except DatasetError:
         raise
     except Exception as error:  # of a damaged file the libraries raise many kinds
@@ -92,12 +95,22 @@ def load(path: Path) -> xr.Dataset:
         ) from None
 
 
+def _run(path: Path) -> xr.Dataset:
+    """Return the group ``run`` of a file; an empty dataset if there is none, as in one that xarray has written."""
+    from netCDF4 import Dataset  # noqa: PLC0415 (xarray loads it, too)
+
+    with Dataset(path) as file:
+        has_run = "run" in file.groups
+    return xr.load_dataset(path, group="run") if has_run else xr.Dataset()
+
+
 def _size(path: Path) -> int:
     """Return how many bytes the variables of a file take in memory, without reading them."""
     from netCDF4 import Dataset  # noqa: PLC0415 (xarray loads it, too)
 
     with Dataset(path) as file:
-        kinds = [(variable.shape, variable.dtype) for variable in file.variables.values()]
+        parts = [file, *file.groups.values()]
+        kinds = [(variable.shape, variable.dtype) for part in parts for variable in part.variables.values()]
         return sum(prod(map(int, shape)) * getattr(kind, "itemsize", _POINTER) for shape, kind in kinds)
 
 

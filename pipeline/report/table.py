@@ -12,6 +12,7 @@ import xarray as xr
 
 from pipeline.quantities import MESH_DIMENSIONS, symbol, write
 from pipeline.report.sinking import LOADS, PLACES, Sinking
+from pipeline.report.values import by_case, relative
 from pipeline.study.load import load_text
 from pipeline.study.problems import StudyError
 from pipeline.study.sweep import Case, Study
@@ -84,14 +85,18 @@ def arrange(dataset: xr.Dataset) -> Table:
     settings, scenes = _labels(dataset, rows), _labels(dataset, columns)
     keep = _distinct(settings)
 
+    dataset = dataset.assign(
+        force_bar=relative(dataset, "force_error"), exact_bar=relative(dataset, "force_exact_error")
+    )
+
     def matrix(name: str) -> np.ndarray:
-        values = dataset[name].transpose(*rows, *columns).values
+        values = by_case(dataset, name).transpose(*rows, *columns).values
         return np.asarray(values.reshape(len(settings), len(scenes))[keep])
 
-    why = _reasons(matrix("status"), matrix("message"), matrix("force_error"), matrix("force_exact"))
+    why = _reasons(matrix("status"), matrix("message"), matrix("force_bar"), matrix("force_exact"))
     blank = np.where(why == "", 0.0, np.nan)
     force, exact = matrix("force") + blank, matrix("force_exact") + blank
-    force_bar, exact_bar = matrix("force_error") + blank, matrix("force_exact_error") + blank
+    force_bar, exact_bar = matrix("force_bar") + blank, matrix("exact_bar") + blank
     counts = np.indices([dataset.sizes[d] for d in columns]).reshape(len(columns), len(scenes))
     study = study_of(dataset)
     cases = tuple(case_at(dataset, study, labels, "mesh") for labels in scenes)

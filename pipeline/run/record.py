@@ -123,7 +123,7 @@ class Record:
     def scaled(self, scale: Scale) -> "Record":
         """Return the record of a case that differs from this one's in its ``scale`` only."""
         young, depth = scale.stress, scale.length
-        if (young, depth) == (self.young, self.depth) or not self.is_ok:
+        if (young, depth) == (self.young, self.depth) or not isfinite(self.force):
             return self
         stiffer, deeper = young / self.young, depth / self.depth
         scaled = {name: _times(getattr(self, name), stiffer * deeper**power) for name, power in _POWERS.items()}

@@ -83,12 +83,12 @@ def test_forces_on_images_are_images():
     once, each = (build(plan, compute(plan, MPI.COMM_SELF)) for plan in plans)
     assert [len(plan.solves) for plan in plans] == [1, 2]
     assert once["origin"].values.tolist()[1] == "image"
-    np.testing.assert_allclose(once["force"], each["force"], rtol=2 * float(each["force_error"].max()))
+    np.testing.assert_allclose(once["force"], each["force"], atol=2 * float(each["force_error"].max()))
     vectors = once["force_vector"].values
     np.testing.assert_allclose(vectors[1], [vectors[0][1], -vectors[0][0], vectors[0][2]], atol=1e-15)
     off = np.abs(vectors - each["force_vector"].values)
     assert abs(vectors[0][0]) > 0.01 * vectors[0][2]  # the nearer wall pulls
-    assert np.all(off <= 2 * (each["force_error"] * each["force"]).values[:, None])
+    assert np.all(off <= 2 * each["force_error"].values[:, None])
 
 
 def test_f_exact_of_images_is_one():

@@ -54,9 +54,7 @@ def test_reduced_basis_of_tissues_with_moduli_of_their_own():
     tissues = [{"name": f"t{i}", "young": f"{(1, 100)[i % 2]} kPa", "poisson": 0.05 * i} for i in range(9)]
     _, reduced = run(material=tissues, probe={"at": ["3 mm", "1 mm"]})
     assert int((reduced["origin"] == "reduced").sum()) >= 3
-    np.testing.assert_allclose(
-        reduced["force_vector_error"].sel(component="z"), reduced["force_error"] * reduced["force"], rtol=1e-9
-    )
+    np.testing.assert_allclose(reduced["force_vector_error"].sel(component="z"), reduced["force_error"], rtol=1e-9)
 
 
 @pytest.mark.parametrize("name", STUDIES)
@@ -89,7 +87,7 @@ def test_axisymmetric_agrees_to_the_error_bars():
     flat, solid = run(**changes), run(("axisymmetric",), **changes)
     assert set(np.unique(flat[1]["origin"])) == {"axisymmetric"}
     assert set(np.unique(solid[1]["origin"])) == {"symmetric"}
-    error = np.abs(flat[1]["force"] / solid[1]["force"] - 1)
+    error = np.abs(flat[1]["force"] - solid[1]["force"])
     assert bool((error <= solid[1]["force_error"] + flat[1]["force_error"]).all())
     assert len(make_plan(parse(raw(**changes, plan={}))).solves) == len(flat[0].solves)
 

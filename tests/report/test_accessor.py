@@ -34,7 +34,7 @@ def test_pareto_front_is_what_nothing_beats():
         status=lambda case: random.choice(["ok", "ok", "ok", "failed"]),
     )  # fmt: skip
     every = data.epsmesh.to_frame()
-    every = every[every.status == "ok"].assign(error=lambda f: abs(f.accuracy - 1))
+    every = every[every.status == "ok"].assign(error=lambda f: abs(f.force_exact_ratio - 1))
     front = data.epsmesh.pareto()
     assert 4 <= len(front) < len(every)
     for _, group in every.groupby(["poisson", "probe"]):
@@ -58,7 +58,7 @@ def test_ratio_is_drawn_against_epsilon_in_mm():
     here = data["force_ratio"].sel(outside="free", poisson=0.3, probe="needle").values[:3]
     np.testing.assert_allclose(line.get_ydata(), here)
     assert "ν = 0.3, probe = needle" in [text.get_text() for text in axes.get_legend().get_texts()]
-    exact = data.epsmesh.plot_ratio(variable="accuracy", outside="coarse", ax=axes)
+    exact = data.epsmesh.plot_ratio(variable="force_exact_ratio", outside="coarse", ax=axes)
     assert exact is axes
     assert "exact" in axes.get_ylabel()
 

@@ -56,9 +56,9 @@ def test_swept_accuracy_and_reached_accuracy_are_told_apart():
         material={"poisson": [0.3, 0.4]}, solve={"exact": True},
         mesh={"epsilon": None, "fine": None, "coarse": None, "rim": None, "growth": None, "accuracy": ["5 %", "1 %"]},
     )  # fmt: skip
-    assert data["accuracy"].dims == data["force"].dims == ("poisson", "mesh_accuracy")
+    assert data["force_exact_ratio"].dims == data["force"].dims == ("poisson", "mesh_accuracy")
     assert list(data["mesh_accuracy"].values) == [0.05, 0.01]
-    assert np.isfinite(data["accuracy"]).all()
+    assert np.isfinite(data["force_exact_ratio"]).all()
 
 
 def test_what_was_struck_out_and_why_is_kept():

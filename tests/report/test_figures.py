@@ -78,7 +78,7 @@ def test_forces_and_errors_are_drawn_as_they_are_in_the_dataset():
     drawn = np.concatenate([bars.lines[0].get_ydata() for bars in against_nu.containers])
     assert {*np.round(drawn, 9)} <= {*np.round(1e3 * data["force"].values.ravel(), 9)}
     first = figure(data, "error").axes[0]
-    errors = 100 * abs(data["accuracy"].values - 1).ravel()
+    errors = 100 * abs(data["force_exact_ratio"].values - 1).ravel()
     drawn = np.concatenate([line.get_ydata() for line in first.lines if len(line.get_xdata()) == 3])
     assert {*np.round(drawn, 9)} <= {*np.round(errors, 9)}
     assert first.get_xlabel() == "ε-mesh radius ε, mm"

@@ -11,6 +11,7 @@ from pipeline.report.correction import fit, r_without
 from pipeline.report.guide import guide, quantity
 from pipeline.report.guide_text import settings
 from pipeline.report.table import DatasetError, arrange
+from pipeline.report.values import relative
 from tests.report.chosen import BAR, EXACT_BAR, TEXT, dataset
 from tests.report.synthetic import FIGURE
 from tests.report.synthetic import dataset as synthetic
@@ -48,7 +49,7 @@ def test_the_worst_scene_is_the_worst_with_its_own_bar(seed):
             [data.sizes[dim] if dim in ("poisson", "probe") else 1 for dim in data[name].dims]
         )
     ratio = data["force"] / data["force_exact"]
-    worst = abs(ratio - 1) + ratio * (data["force_error"] + data["force_exact_error"])
+    worst = abs(ratio - 1) + ratio * (relative(data, "force_error") + relative(data, "force_exact_error"))
     verdicts = [v for v in guide(data, "5%").verdicts if v.is_judged]
     assert len(verdicts) > 4
     for verdict in verdicts:
@@ -178,7 +179,8 @@ def test_whatever_fails_the_answer_holds_for_every_scene_that_it_claims(seed):
     if found.answer is None:
         return
     chosen = data.sel(found.answer.labels)
-    error = abs(chosen["accuracy"] - 1) + chosen["accuracy"] * (chosen["force_error"] + chosen["force_exact_error"])
+    ratio = chosen["force_exact_ratio"]
+    error = abs(ratio - 1) + ratio * (relative(chosen, "force_error") + relative(chosen, "force_exact_error"))
     computed = int((chosen["status"] == "ok").sum())
     assert computed == found.scenes
     assert float(error.max()) <= accuracy

@@ -32,7 +32,7 @@ def test_a_map_is_the_main_figure_of_a_raster_and_a_curve_that_of_a_line():
     raster, line = mapped(RASTER), mapped(LINE)
     assert (choose(raster)[0], choose(line)[0]) == ("map", "force")
     axes = figure(raster, "map").axes
-    bars = raster["force"] * raster["force_error"]
+    bars = raster["force_error"]
     assert [ax.get_title() for ax in axes[:2]] == ["ill", "healthy"]
     for ax, (values, body) in zip(axes, itertools.product((raster["force"], bars), ("ill", "healthy")), strict=False):
         shown = 1e3 * values.sel(body=body).transpose("y", "x")

@@ -31,7 +31,7 @@ def test_larger_epsilons_are_not_run_and_say_so():
     )
     run = dataset["status"] == "ok"
     np.testing.assert_allclose(dataset["force"].values[run], whole["force"].values[run], rtol=1e-8)
-    near = np.abs(whole["accuracy"] - 1) <= 0.05
+    near = np.abs(whole["force_exact_ratio"] - 1) <= 0.05
     coarse = dataset["status"].sel(outside="coarse", young=5e3).sortby("epsilon")
     assert list(coarse.values[:3]) == ["ok", "ok", "skipped"]
     assert bool(near.sel(outside="coarse", young=5e3).sortby("epsilon")[:2].all())

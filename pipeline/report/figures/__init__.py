@@ -54,7 +54,7 @@ def choose(dataset: xr.Dataset) -> list[str]:
     suits = {
         "force": is_of_depth and (_known(dataset, "linear_ratio") or _known(dataset, "contact_area")),
         "ratio": dataset.sizes.get("epsilon", 0) > 1 and _known(dataset, "force_ratio"),
-        "error": is_meshed(dataset) and (_known(dataset, "accuracy") or _known(dataset, "force_ratio")),
+        "error": is_meshed(dataset) and (_known(dataset, "force_exact_ratio") or _known(dataset, "force_ratio")),
         "map": all(dataset.sizes.get(name, 0) > 1 for name in ("x", "y")),
     }
     kinds = [*(kind for kind, is_suited in suits.items() if is_suited), "force"]

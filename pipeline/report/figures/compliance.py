@@ -9,6 +9,7 @@ from pipeline.report.compliance import sinking, tool_dimension
 from pipeline.report.figures.curves import grid, share
 from pipeline.report.figures.facets import arrange
 from pipeline.report.figures.style import finish, look
+from pipeline.report.values import relative
 from pipeline.report.words import choice
 
 _PER_MM = 1e-3  # of 1/m
@@ -48,6 +49,7 @@ def _with_positions(dataset: xr.Dataset) -> tuple[xr.Dataset, str]:
     is_round = bool(np.isfinite(inverse.where(np.isfinite(whole), 0.0)).all())
     full = whole.where(np.isinf(dataset["epsilon"])).max("epsilon").broadcast_like(whole)
     places = {"position": inverse if is_round else full, "of_full_order": full}
+    places["force_bar"] = relative(dataset, "force_error")
     data = dataset.assign({_WHOLE: whole, "touch": known["contact"], **places})
     return data, "1 / radius a, 1/mm" if is_round else "$E d/F_{max}$, 1/mm"
 
@@ -66,9 +68,7 @@ def _draw(ax: Axes, data: xr.Dataset) -> None:
 
 def _draw_tools(ax: Axes, line: xr.Dataset, style: dict[str, str], label: str) -> None:
     """Draw the tools of one kind of contact at one ε."""
-    x, y, full, bars = (
-        line[name].values.astype(float) for name in ("position", _WHOLE, "of_full_order", "force_error")
-    )
+    x, y, full, bars = (line[name].values.astype(float) for name in ("position", _WHOLE, "of_full_order", "force_bar"))
     known = np.isfinite(x) & np.isfinite(y) & np.isfinite(full)
     if not known.any():
         return

@@ -61,8 +61,8 @@ def share(panels: Sequence[Panel], facets: Facets) -> None:
             panel.ax.autoscale_view()
 
 
-def draw(panel: Panel, facets: Facets, bar: str = "") -> None:
-    """Draw the curves of a panel, with bars of the relative errors in ``bar``, and crosses where cases failed."""
+def draw(panel: Panel, facets: Facets) -> None:
+    """Draw the curves of a panel, with the error bars of its quantity, and crosses where cases failed."""
     assert facets.x is not None
     x = positions(panel.data[facets.x])
     joins = is_numeric(panel.data[facets.x]) and len(x) > 1
@@ -75,8 +75,9 @@ def draw(panel: Panel, facets: Facets, bar: str = "") -> None:
         style = look(position) | ({} if joins else {"linestyle": "none"})
         label = choices(panel.data, curve) or None
         beside = x if joins else x + 0.12 * (position - (len(facets.curves) - 1) / 2)
-        if bar:
-            panel.ax.errorbar(beside, y, np.nan_to_num(np.abs(y * line[bar].values)), label=label, **BARS, **style)
+        if (error := f"{panel.quantity}_error") in line:
+            bars = np.broadcast_to(np.nan_to_num(np.abs(factor * line[error].values)), y.shape)
+            panel.ax.errorbar(beside, y, bars, label=label, **BARS, **style)
         else:
             panel.ax.plot(beside, y, label=label, **style)
         failed = line["status"].values == "failed"

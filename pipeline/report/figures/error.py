@@ -39,14 +39,14 @@ def error(dataset: xr.Dataset, title: str, warning: str) -> Figure:
         row[1].set_title(textwrap.fill(choices(data, shown), 60))
         write_ticks(row[0], part[facets.x])
     log_scale(axes[0, 0])
-    floor = 100 * float(data["force_exact_error"].max())
+    floor = 100 * float(data["exact_bar"].max())
     low, high = axes[0, 0].get_ylim()
     for row, shown in zip(axes, facets.rows, strict=True):
         _mark_floor(row, data.sel(facets.at | shown))
     axes[0, 0].set_ylim(max(low, floor / 10) if floor > 0 else low, high)
     for ax in axes[0, 1:]:
         log_scale(ax, "x")
-    bar = at_most(data["force_exact_error"])
+    bar = at_most(data["exact_bar"])
     grey = f"grey: below the error bar of F_exact{bar}" if reference == "exact" else "no F_exact: errors against F_max"
     steps = "lines against cost: cases that no other beats in both, without errors 1.5 times as large on a finer mesh"
     repeats = "" if spread is None else "bars: how far repeats are apart"
@@ -87,7 +87,7 @@ def _draw_curve(row: np.ndarray, facets: Facets, line: xr.Dataset, position: int
 
 def _mark_floor(row: Iterable[Axes], data: xr.Dataset) -> None:
     """Shade the errors that the error bar of F_exact does not tell from none."""
-    bar = 100 * float(data["force_exact_error"].max())
+    bar = 100 * float(data["exact_bar"].max())
     if np.isfinite(bar) and bar > 0:
         for ax in row:
             ax.axhspan(1e-3 * bar, bar, color=QUIET, alpha=0.18, linewidth=0)

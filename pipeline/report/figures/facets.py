@@ -10,6 +10,7 @@ import xarray as xr
 
 from pipeline.quantities import MESH_DIMENSIONS, QUANTITIES
 from pipeline.report.pareto import is_by_chance
+from pipeline.report.values import relative
 from pipeline.report.words import choice, is_numeric, number, symbol
 
 Selection = dict[str, Any]
@@ -124,12 +125,16 @@ def is_meshed(dataset: xr.Dataset) -> bool:
 def with_error(dataset: xr.Dataset) -> tuple[str, xr.Dataset]:
     """Add ``error``, the relative error of F against F_exact, or F_max where there is no F_exact, and ``is_by_chance``.
 
+    ``exact_bar`` is the relative error bar of F_exact.
+
     Return the name of the reference as well, "exact" or "max". A case that is its own reference has no error.
     """
-    is_exact = bool(np.isfinite(dataset["accuracy"]).any())
-    signed = dataset["accuracy" if is_exact else "force_ratio"] - 1
+    is_exact = bool(np.isfinite(dataset["force_exact_ratio"]).any())
+    signed = dataset["force_exact_ratio" if is_exact else "force_ratio"] - 1
     error = abs(signed) if is_exact else abs(signed).where(signed != 0)
-    return "exact" if is_exact else "max", dataset.assign(error=error, is_by_chance=is_by_chance(error))
+    exact_bar = relative(dataset, "force_exact_error")
+    added = {"error": error, "is_by_chance": is_by_chance(error), "exact_bar": exact_bar}
+    return "exact" if is_exact else "max", dataset.assign(added)
 
 
 def _depends(array: xr.DataArray, dim: str) -> bool:

@@ -11,15 +11,14 @@ from matplotlib.figure import Figure
 from pipeline.report.figures.curves import Panel, draw
 from pipeline.report.figures.facets import arrange, swept
 from pipeline.report.figures.style import FAILED, LINE, QUIET, finish, look, new_figure
+from pipeline.report.values import relative
 from pipeline.report.words import at_most, choices, heading, scale
 
 _MOST_PANELS, _MOST_CURVES = 4, 4
 _WIDTH, _HEIGHT, _LINE = 3.1, 2.2, 0.17  # inches: of a panel, and of a line of the legend above it
 # What is drawn below the force where a study has it; those that are shares of something have a line at 1.
-_WITH_FORCE = ("contact_area", "load_force", "sag", "linear_ratio", "accuracy")
-_SHARES = ("linear_ratio", "accuracy")
-_RELATIVE = {"force": "force_error", "accuracy": "force_error"}
-_LOAD_BAR = "load_force_share"
+_WITH_FORCE = ("contact_area", "load_force", "sag", "linear_ratio", "force_exact_ratio")
+_SHARES = ("linear_ratio", "force_exact_ratio")
 
 
 def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
@@ -29,8 +28,9 @@ def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
         return _one(dataset, title, warning)
     shown = sorted(dims, key="depth".__ne__)[:_MOST_PANELS]
     quantities = ["force", *(name for name in _WITH_FORCE if _varies(dataset, name))]
-    if "load_force" in quantities:
-        dataset = dataset.assign({_LOAD_BAR: dataset["load_force_error"] / abs(dataset["load_force"])})
+    exact_bar = relative(dataset, "force_exact_error")
+    of_ratio = abs(dataset["force_exact_ratio"]) * relative(dataset, "force_error")
+    dataset = dataset.assign(force_exact_ratio_error=of_ratio)
     figure = new_figure(max(_WIDTH * len(shown), 4.6) + 0.6, _HEIGHT * len(quantities) + 1.6)
     axes = figure.subplots(len(quantities), len(shown), squeeze=False, sharex="col", sharey="row")
     left_out = [_draw_column(column, dataset, dim, quantities) for dim, column in zip(shown, axes.T, strict=True)]
@@ -39,7 +39,7 @@ def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
         low, high = row[0].get_ylim()
         if name not in _SHARES and low * high > 0 and low > -0.05 * high:
             row[0].set_ylim(0, 1.05 * high)  # a small change then looks small
-    band = f"grey: error bar of F_exact{at_most(dataset['force_exact_error'])}" if "accuracy" in quantities else ""
+    band = f"grey: error bar of F_exact{at_most(exact_bar)}" if "force_exact_ratio" in quantities else ""
     more = f"not shown: against {', '.join(dims[_MOST_PANELS:])}" if dims[_MOST_PANELS:] else ""
     figure.set_figheight(figure.get_figheight() + _LINE * max(map(_legend_lines, axes[0])))
     part = dict.fromkeys(words for column in left_out for words in column)
@@ -61,10 +61,10 @@ def _draw_column(axes: np.ndarray, dataset: xr.Dataset, dim: str, quantities: li
     facets = arrange(dataset, quantities, dim, most=(_MOST_CURVES, 1, 1), first=first)
     data = dataset.sel(facets.at)
     for ax, name in zip(axes, quantities, strict=True):
-        draw(Panel(ax, data, name, 0), facets, _LOAD_BAR if name == "load_force" else _RELATIVE.get(name, ""))
+        draw(Panel(ax, data, name, 0), facets)
         if name in _SHARES:
             ax.axhline(1.0, color=LINE, linewidth=0.7)
-        if name == "accuracy" and np.isfinite(bar := float(dataset["force_exact_error"].max())):
+        if name == "force_exact_ratio" and np.isfinite(bar := float(relative(dataset, "force_exact_error").max())):
             ax.axhspan(1 - bar, 1 + bar, color=QUIET, alpha=0.25, linewidth=0)
     axes[-1].set_xlabel(heading(dataset[dim]))
     at = textwrap.fill(choices(dataset, facets.fixed), 34)
@@ -101,10 +101,11 @@ def _legend_lines(ax: Axes) -> int:
 def _one(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     """Draw the force of the one case."""
     factor, unit = scale(dataset["force"])
-    value, share = factor * float(dataset["force"].squeeze()), float(dataset["force_error"].squeeze())
+    value, bar = (factor * float(dataset[name].squeeze()) for name in ("force", "force_error"))
+    share = float(relative(dataset, "force_error").squeeze())
     figure = new_figure(4.6, 3.3)
     ax = figure.subplots()
-    ax.errorbar([0], [value], [np.nan_to_num(abs(value) * share)], capsize=3, linestyle="none", **look(0))
+    ax.errorbar([0], [value], [np.nan_to_num(bar)], capsize=3, linestyle="none", **look(0))
     ax.set_xticks([0], [f"{value:.4g} {unit} ± {100 * share:.2g} %"])
     ax.set_ylim(bottom=min(0.0, 1.1 * value))
     ax.set_ylabel(heading(dataset["force"]))

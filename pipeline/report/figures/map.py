@@ -23,14 +23,13 @@ def force_map(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     Places where contact is lost have a ring, those without a force a cross.
     """
     facets = arrange(dataset, ("force",), None, flat=PLACES, most=(_MOST_PANELS, 1, 1))
-    dataset = dataset.assign(force_bar=dataset["force_error"] * dataset["force"])
     parts = [dataset.sel(facets.at | curve).transpose("y", "x", ...) for curve in facets.curves]
     titles = [choices(dataset, curve) for curve in facets.curves]
     width, height = (float(np.ptp(dataset[name].values)) for name in PLACES)
     panel = _PANEL * min(1.0, max(0.4, height / width))
     figure = new_figure(_PANEL * len(parts) + 1.2, 2 * panel + 1.3)
     axes = figure.subplots(2, len(parts), squeeze=False, sharex=True, sharey=True)
-    for row, (name, label) in enumerate((("force", heading(dataset["force"])), ("force_bar", "its error bar, mN"))):
+    for row, (name, label) in enumerate((("force", heading(dataset["force"])), ("force_error", "its error bar, mN"))):
         # Zero where contact is lost would leave no colours for the others.
         maps = [1e3 * part[name].where(part["status"] == "ok").values for part in parts]
         known = np.concatenate([values[np.isfinite(values)] for values in maps])

@@ -9,6 +9,7 @@ from markupsafe import Markup
 
 from pipeline.pages import json_in_page
 from pipeline.quantities import LARGEST, QUANTITIES
+from pipeline.report.values import by_case
 from pipeline.report.words import is_numeric, number, scale, symbol
 
 # Rows of a page of the table.
@@ -19,7 +20,7 @@ _QUANTITIES = (
     "force",
     "force_error",
     "force_ratio",
-    "accuracy",
+    "force_exact_ratio",
     "force_exact_error",
     "speedup",
     "time_total",
@@ -36,7 +37,7 @@ _QUANTITIES = (
     "energy",
     "balance",
 )
-_SHOWN = {"force", "force_error", "force_ratio", "accuracy", "speedup", "time_total"}
+_SHOWN = {"force", "force_error", "force_ratio", "force_exact_ratio", "speedup", "time_total"}
 _DIGITS = 4
 
 
@@ -92,16 +93,16 @@ def case_table(dataset: xr.Dataset) -> Table:
     states = [str(state) for state in dataset["status"].values.ravel()]
     numbers = Column("case", "case", list(range(size)), "the number by which `epsmesh plan` knows it")
     axes = [_axis(dataset, dim, position, dims) for position, dim in enumerate(dims)]
-    quantities = [_quantity(dataset[name].transpose(*dims), name) for name in _QUANTITIES if name in dataset]
+    quantities = [_quantity(by_case(dataset, name), name) for name in _QUANTITIES if name in dataset]
     status = _texts("status", states, QUANTITIES["status"].meaning, is_filter=True)
     origin = _texts(
         "origin",
-        dataset["origin"].transpose(*dims).values.ravel(),
+        by_case(dataset, "origin").values.ravel(),
         QUANTITIES["origin"].meaning,
         is_filter=True,
         is_first=False,
     )
-    message = _texts("message", dataset["message"].transpose(*dims).values.ravel(), "why there is no force")
+    message = _texts("message", by_case(dataset, "message").values.ravel(), "why there is no force")
     known = [column for column in quantities if any(value is not None for value in column.values)]
     told = [column for column in (origin, message) if any(column.words or ())]
     rank = {state: position for position, state in enumerate(_STATES)}

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.report.times import doubts
+from pipeline.report.values import by_case, relative
 from pipeline.report.words import choices
 
 # Of git, with a sign for changes that were not committed.
@@ -44,13 +45,12 @@ def facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
     if np.isfinite(force).any():
         low, high = np.nanmin(force), np.nanmax(force)
         found.append(("force", f"{low:.3g} mN" if high - low < 5e-4 * high else f"{low:.3g} to {high:.3g} mN"))
-    for name, text, scale, unit in (
-        ("force_error", "largest error bar", 100, " %"),
-        ("balance", "worst imbalance", 1, ""),
-        ("speedup", "largest speed-up", 1, " ×"),
+    for values, text, unit in (
+        (100 * relative(dataset, "force_error").values, "largest error bar", " %"),
+        (dataset["balance"].values, "worst imbalance", ""),
+        (dataset["speedup"].values, "largest speed-up", " ×"),
     ):
-        values = dataset[name].values * scale if name in dataset else np.array([np.nan])
-        if np.isfinite(values).any() and not (name == "speedup" and np.nanmax(values) == 1):
+        if np.isfinite(values).any() and not (unit == " ×" and np.nanmax(values) == 1):
             found.append((text, f"{np.nanmax(values):.2g}{unit}"))
     if any(name == "largest speed-up" for name, _ in found):
         found += [("speed-ups", text) for text in doubts(dataset)]
@@ -123,7 +123,7 @@ def reproduce(dataset: xr.Dataset, name: str) -> list[str]:
 
 def _by_message(dataset: xr.Dataset, status: str, variable: str) -> list[dict[str, Any]]:
     dims = [str(dim) for dim in dataset["status"].dims]
-    states, messages = dataset["status"].values, dataset[variable].transpose(*dims).values
+    states, messages = dataset["status"].values, by_case(dataset, variable).values
     found: dict[str, list[tuple[int, ...]]] = defaultdict(list)
     for index in np.ndindex(states.shape):
         if messages[index] if not status else states[index] == status:

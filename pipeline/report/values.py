@@ -1,0 +1,47 @@
+"""Values of a dataset: relative errors, variables on all dimensions of the study, status as flags."""
+
+import numpy as np
+import xarray as xr
+
+# What became of a case, in the order of its flags in a file.
+STATES = ("ok", "failed", "skipped", "lost", "pending")
+
+
+def relative(dataset: xr.Dataset, error: str) -> xr.DataArray:
+    """Return the ``error`` of a variable, such as "force_error", as a share of that variable; 0 where both are 0.
+
+    Raises:
+        ValueError: if the dataset has no such error.
+    """
+    value = error.removesuffix("_error")
+    if value == error or error not in dataset or value not in dataset:
+        known = sorted(str(name) for name in dataset.data_vars if str(name).endswith("_error") and name != "time_error")
+        raise ValueError(f"error = {error!r}: must be one of {', '.join(known)}")
+    size = abs(dataset[value])
+    share = (dataset[error] / size.where(size > 0)).where(~((size == 0) & (dataset[error] == 0)), 0.0)
+    return share.rename(error).assign_attrs(units="1", long_name=f"{error} as a share of {value}")
+
+
+def by_case(dataset: xr.Dataset, name: str) -> xr.DataArray:
+    """Return a variable on all dimensions of the study, in the order of ``force``."""
+    force = dataset["force"]
+    return dataset[name].broadcast_like(force).transpose(*force.dims, ...)
+
+
+def with_flags(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset with ``status`` as the integer flags of a file; :func:`with_words` is the inverse."""
+    status = dataset["status"]
+    flags = np.array([STATES.index(str(word)) for word in status.values.ravel()], dtype=np.int8)
+    texts = {"flag_values": np.arange(len(STATES), dtype=np.int8), "flag_meanings": " ".join(STATES)}
+    return dataset.assign(status=(status.dims, flags.reshape(status.shape), status.attrs | texts))
+
+
+def with_words(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset with ``status`` as words: "ok", "failed", …; one that has them already is returned as it is."""
+    status = dataset["status"] if "status" in dataset else xr.DataArray("")
+    if "flag_meanings" not in status.attrs:
+        return dataset
+    words = dict(zip(status.attrs["flag_values"], status.attrs["flag_meanings"].split(), strict=True))
+    texts = np.array([words[flag] for flag in status.values.ravel()], dtype=object).reshape(status.shape)
+    attributes = {name: text for name, text in status.attrs.items() if not name.startswith("flag_")}
+    return dataset.assign(status=(status.dims, texts, attributes))
