@@ -24,8 +24,8 @@ from benchmarks.machine import machine
 from benchmarks.work_precision_figure import draw
 from pipeline.files import result_files, why_not_writable
 from pipeline.mesh.meridian import Meridian
+from pipeline.netcdf import write_netcdf
 from pipeline.plan.plan import make_plan
-from pipeline.report.dataset import write
 from pipeline.run.execute import compute
 from pipeline.run.record import Record
 from pipeline.solve.conditions import Conditions
@@ -202,7 +202,7 @@ def main(output: Path, repeats: int, *, quick: bool = False) -> list[Path]:
         )
     found = dataset(points, repeats)
     path = outputs(output)[0]
-    write(found, path)
+    write_netcdf(found, path, "NETCDF4")
     return [path, *draw(found, path.with_suffix(""))]
 
 

@@ -42,7 +42,9 @@ def write_netcdf(
                 str(name): (_guarded(part[name]) if kind == "NETCDF4" else {}) | dict(own.get(str(name), {}))
                 for name in part.variables
             }
-            part.to_netcdf(temporary, "a" if group else "w", kind, group, "netcdf4", chosen)
+            part.to_netcdf(
+                temporary, mode="a" if group else "w", format=kind, group=group, engine="netcdf4", encoding=chosen
+            )
 
 
 def _guarded(array: "xr.DataArray") -> dict[str, Any]:

@@ -194,5 +194,5 @@ def test_a_force_that_failed_is_no_yardstick():
         )  # fmt: skip
     data = build(plan, records)
     assert data["force"].notnull().values.tolist() == [True, False]
-    for name in ("force_max", "force_ratio", "force_exact", "accuracy"):
+    for name in ("force_max", "force_ratio", "force_exact", "force_exact_ratio"):
         assert data[name].isnull().all(), name
