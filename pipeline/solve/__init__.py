@@ -2,8 +2,8 @@
 
 
 class CompilerError(Exception):
-    """No C compiler works here; raised on every rank."""
+    """No working C compiler was found; raised on every rank."""
 
 
 class SolveError(Exception):
-    """A solve that did not give a solution to rely on."""
+    """A linear or nonlinear solve failed, or its solution failed a check."""

@@ -1,7 +1,7 @@
-"""How well forces balance: what must hold of every solution, and how well a solver must have solved for it.
+"""Force and energy balance: the checks of every solution, and the solver tolerance that satisfies them.
 
-F·d = 2U and F_probe + F_support = 0 hold for the exact solution of the discrete system. What misses them is the
-solver's error, in which both are linear.
+F·d = 2U and F_probe + F_support = 0 hold exactly for the solution of the discrete system. The imbalance is linear in
+the error of the linear solver.
 """
 
 from collections.abc import Sequence
@@ -18,23 +18,23 @@ from pipeline.solve.movement import Movement
 from pipeline.solve.response import whole_force
 from pipeline.solve.spaces import ElasticSpace
 
-# A solution whose forces miss their balance by more than this share has not been solved.
+# Largest relative imbalance of forces of a solution that counts as solved.
 BALANCE_LIMIT = 1e-6
-# The energy norm of the solver's error, relative: F, which is quadratic in it, then has no error above 1e-9 up to
-# ν = 0.49, and 1e-11 as a rule (docs/solvers.md).
+# Relative energy norm of the solver's error. F is quadratic in this error: it errs by at most 1e-9 up to ν = 0.49, and
+# by 1e-11 as a rule (docs/solvers.md).
 TOLERANCE = 1e-6
-# Rounds of further iterations where forces do not balance, what each aims at as a share of the limit, and the most by
-# which it lowers the error.
+# Where forces do not balance: rounds of further iterations, the imbalance that each round aims at (share of the limit),
+# and the largest reduction of the error in one round.
 MOST_ROUNDS = 3
 _AIM, _MOST = 0.3, 1e-2
-# Loads that do less work than this share of what they would on the probe alone do none.
+# Loads count as doing no work below this share of the work that they would do acting on the probe alone.
 _NO_WORK = 1e-6
 
 
 def rest(balance: float, tolerance: float) -> float:
-    """Return the share of the solver's error that may remain where forces do not balance, 1 if it is small enough.
+    """Return the factor by which the solver's error must still fall for forces to balance; 1 if they balance.
 
-    It is, too, at a ``tolerance`` that was chosen loosely: that the forces do not balance is then no wonder.
+    Return 1, too, if ``tolerance`` is looser than the default: an imbalance is then expected.
     """
     if balance <= BALANCE_LIMIT or tolerance > TOLERANCE or not isfinite(balance):
         return 1.0
@@ -42,10 +42,10 @@ def rest(balance: float, tolerance: float) -> float:
 
 
 def check_balance(balance: float, error: type[SolveError] = SolveError, why: str = "") -> None:
-    """See that forces balance.
+    """Check that forces balance.
 
     Raises:
-        SolveError: if they do not, or the kind of ``error`` that is given; its message ends with ``why``.
+        SolveError: if they do not; raised as ``error``, with ``why`` at the end of the message.
     """
     if isnan(balance) or balance > BALANCE_LIMIT:
         raise error(f"forces do not balance: relative error {balance:.1e}, allowed {BALANCE_LIMIT:.0e}{why}")
@@ -53,10 +53,11 @@ def check_balance(balance: float, error: type[SolveError] = SolveError, why: str
 
 @dataclass(frozen=True)
 class Sums:
-    """Sums of residuals of n motions on the modelled part; global: ``on_probe`` and ``on_support`` (n, 3), N per unit.
+    """Sums of the residuals of n rigid motions on the modelled part, global, in N per unit of motion.
 
-    ``works`` (n) are held_j·r_j over all prescribed dofs. With one residual more, that of loads, the first two are
-    (n + 1, 3), and ``crossed`` (n) are the products of the last residual with each held_j.
+    ``on_probe`` and ``on_support`` (n, 3) are resultants. ``works`` (n) are held_j·r_j over all prescribed dofs. With
+    loads there is one more residual: the resultants are then (n + 1, 3), and ``crossed`` (n) are the products of this
+    last residual with each held_j.
     """
 
     on_probe: FloatArray
@@ -67,8 +68,8 @@ class Sums:
     def imbalance(self, twice_energies: FloatArray, movement: Movement, mirrored: Sequence[int]) -> float:
         """Return the largest relative error of F·d = 2U (``twice_energies``, n) and of F_probe + F_support = 0.
 
-        A rotation, or a slit that is opened, may take no force at all: its forces are measured by what its energy is
-        worth in a translation.
+        The forces of a rotation, or of the opening of a slit, may vanish. Their scale is the force of a translation
+        with the same energy.
         """
         count, (straight, stiffest) = len(movement.motions), _stiffest(movement, twice_energies)
         on_probe, on_support = (whole_force(part[:count], mirrored) for part in (self.on_probe, self.on_support))
@@ -86,27 +87,27 @@ class Sums:
         movement: Movement,
         mirrored: Sequence[int],
     ) -> float:
-        """Return the largest relative error of what must hold of loads, all of the modelled part.
+        """Return the largest relative error of the three balances of dead loads, on the modelled part.
 
-        That the work of the loads is twice their strain energy; that probe, support and loads are in balance; and that
-        the force on the held probe is, by reciprocity, the work of the loads in its motion. ``energies`` (n + 1) are
-        twice the strain energies of motions and loads, ``works`` (n + 1) are f·u_j.
+        The work of the loads is twice their strain energy. Forces on probe, support and body sum to zero. By
+        reciprocity, the force on the fixed probe is the work of the loads in the probe's motion. ``energies`` (n + 1)
+        are twice the strain energies of motions and loads, ``works`` (n + 1) are f·u_j.
         """
         _, stiffest = _stiffest(movement, energies[:-1])
         least = _NO_WORK * applied.size**2 / stiffest
         work = abs(energies[-1] - works[-1]) / max(abs(works[-1]), least)
         left = whole_force(self.on_probe[-1] + self.on_support[-1] + applied.resultant, mirrored)
         forces = float(np.linalg.norm(left)) / (2.0 ** len(mirrored) * applied.size)
-        # A unit of a rotation, or of a slit's opening, does as much work as a translation of the same energy.
+        # Scale of the work: a translation with the same energy as the rotation or the opening of the slit.
         worth = applied.size * np.maximum(1.0, np.sqrt(energies[:-1] / stiffest))
         mutual = np.abs(self.crossed + works[:-1]) / worth
         return float(max(work, forces, mutual.max()))
 
 
 def sums(space: ElasticSpace, residuals: Sequence[FloatArray], held: Sequence[FloatArray]) -> Sums:
-    """Return what residuals of n motions (owned dofs) sum up to; ``held`` are the prescribed values; collective.
+    """Return the sums of the residuals of n motions (owned dofs); ``held`` are the prescribed values; collective.
 
-    One residual more is that of loads.
+    With loads, ``residuals`` has one entry more than ``held``: that of the loads.
     """
     prescribed, rows = space.prescribed_owned, []
     for residual in residuals:
@@ -124,6 +125,6 @@ def sums(space: ElasticSpace, residuals: Sequence[FloatArray], held: Sequence[Fl
 
 
 def _stiffest(movement: Movement, twice_energies: FloatArray) -> tuple[BoolArray, float]:
-    """Tell which motions are translations, and the largest energy of these, or of all if none is."""
+    """Return which motions are translations, and the largest energy among them (of all motions if there is none)."""
     straight = np.array([motion.is_translation for motion in movement.motions])
     return straight, float(twice_energies[straight].max() if straight.any() else twice_energies.max())

@@ -1,7 +1,7 @@
-"""What is read off cells: strains of a solution, from the mean of ∇u over each, and what is at singular edges.
+"""Values on cells: strains from the mean of ∇u over each cell, and the cells near singular edges.
 
-To report another one, write it as a function of :class:`Cells`, enter it in :data:`LARGEST`, and give it a line in
-``pipeline/quantities.toml``. What is in Pa there is scaled with Young's modulus and the depth, all else with the depth.
+To report another value, write it as a function of :class:`Cells`, add it to :data:`CELL_MAXIMA`, and give it a line in
+``pipeline/quantities.toml``. A value in Pa is scaled with Young's modulus and the depth, any other with the depth.
 """
 
 from collections.abc import Callable
@@ -31,7 +31,7 @@ from pipeline.stages import stage
 # A quarter point is at 0.25 of its edge, a mid node at 0.5, up to the bulge of a curved edge.
 _BETWEEN = 0.375
 _CORNERS = 4
-# Of each mesh, by the front of its slit: which cells are clear of singular edges.
+# For each mesh, by the front of its slit: the cells that are clear of singular edges.
 _clear: WeakKeyDictionary[Any, dict[Front | None, BoolArray]] = WeakKeyDictionary()
 
 
@@ -39,8 +39,8 @@ _clear: WeakKeyDictionary[Any, dict[Front | None, BoolArray]] = WeakKeyDictionar
 class Cells:
     """Owned cells of a solution: the mean ``gradient`` of the displacement (n, 3, 3), and λ and μ (n), in Pa.
 
-    λ is infinite where tissue is incompressible. In mixed elements (``is_mixed``) λ tr ε is not the mean pressure, so
-    the stress is not known: return NaN there.
+    λ is infinite in incompressible tissue. In mixed elements (``is_mixed``) the mean pressure is not λ tr ε, so the
+    stress is unknown: return NaN there.
     """
 
     gradient: FloatArray
@@ -61,16 +61,16 @@ def _max_strain(cells: Cells) -> FloatArray:
     return np.asarray(np.abs(cells.principal_strains).max(axis=1, initial=0.0))
 
 
-# Of which the largest value is reported, by its name in the dataset: one number for each cell. Nearer to a singular
-# edge (:func:`clear_cells`) strains grow without end as elements there get smaller.
-LARGEST: dict[str, Callable[[Cells], FloatArray]] = {"max_strain": _max_strain}
+# Values with one number per cell, by their name in the dataset; the largest over all cells is reported. Cells near a
+# singular edge (:func:`clear_cells`) are left out: strain there grows without limit as elements shrink.
+CELL_MAXIMA: dict[str, Callable[[Cells], FloatArray]] = {"max_strain": _max_strain}
 
 
 class CellValues:
-    """Reads what the present ``displacement`` of a space does to each cell of its mesh."""
+    """Values on the cells of a mesh for the current ``displacement`` of a space."""
 
     def __init__(self, body: BodyMesh, displacement: Any, *, is_mixed: bool = False):
-        """Compile; ``is_mixed`` if there is a pressure beside the displacement; collective."""
+        """Compile the forms; ``is_mixed`` if the elements have a pressure, too; collective."""
         self._body, self._is_mixed = body, is_mixed
         space = displacement.function_space
         tensors = cellwise_space(space.mesh, (3, 3))
@@ -81,7 +81,7 @@ class CellValues:
 
     @stage("strain")
     def cells(self, law: MaterialLaw) -> Cells:
-        """Return what the owned cells do, of the material of ``law``; collective."""
+        """Return gradient and moduli of the owned cells for the material ``law``; collective."""
         owned = self._body.owned_cells
         integral, volume = (
             np.asarray(fem.assemble_vector(part).array).reshape(-1, 3, 3)[:owned]
@@ -101,12 +101,14 @@ class CellValues:
         return self.cells(law).principal_strains
 
     def largest(self, law: MaterialLaw, front: Front | None = None) -> dict[str, Any]:
-        """Return the largest of each of ``LARGEST`` over cells clear of singular edges, by name; collective."""
+        """Return the maximum of each of ``CELL_MAXIMA`` over cells clear of singular edges, by name; collective."""
         cells, clear = self.cells(law), self._clear_of(front)
-        found = [value(cells)[clear].max(initial=-np.inf) for value in LARGEST.values()]
-        # Not a number on one rank is none on all, which MPI's own maximum does not promise.
+        found = [value(cells)[clear].max(initial=-np.inf) for value in CELL_MAXIMA.values()]
+        # NaN on one rank must give NaN on all ranks; MPI's MAX does not promise that.
         largest = np.max(self._body.comm.allgather(found), axis=0)
-        return {name: 0.0 if value == -np.inf else float(value) for name, value in zip(LARGEST, largest, strict=True)}
+        return {
+            name: 0.0 if value == -np.inf else float(value) for name, value in zip(CELL_MAXIMA, largest, strict=True)
+        }
 
     def _clear_of(self, front: Front | None) -> BoolArray:
         known = _clear.setdefault(self._body.mesh, {})
@@ -116,22 +118,22 @@ class CellValues:
 
 
 def compile_cell_values(degree: int, *, straight: bool) -> None:
-    """Compile what reads displacements of ``degree``."""
+    """Compile the forms of :class:`CellValues` for displacements of ``degree``."""
     body = distribute(MPI.COMM_SELF, one_cell(straight=straight))
     CellValues(body, fem.Function(vector_space(body.mesh, degree)))
 
 
 # ---- edges at which strain is singular -----------------------------------------------------------------
 #
-# Elements with quarter points follow r^½ at the probe's edge. Straight elements have none, and where an edge's few,
-# long arcs would fold a cell the mesh gives them up (pipeline.mesh.curve). What the next degree leaves of the error is
-# then up to twice as large.
+# Elements with quarter points reproduce r^½ at the probe's edge. Straight elements have none. A mesh also omits them
+# where long arcs of the edge would fold a cell (pipeline.mesh.curve). The error that the next degree leaves is then up
+# to twice as large.
 
 
 def plain_share(body: BodyMesh) -> float:
-    """Return the share, 0 to 1, of the edges that end on the probe's edge without a quarter point there; collective.
+    """Return the share (0 to 1) of element edges at the probe's rim that have no quarter point; collective.
 
-    An edge counts once for every cell that it belongs to.
+    These are edges with one end on the rim. An edge counts once for each cell that contains it.
     """
     nodes = compat.geometry_dofs(body.mesh)[: body.owned_cells]
     if nodes.shape[1] == _CORNERS:
@@ -153,10 +155,11 @@ def plain_share(body: BodyMesh) -> float:
 
 
 def clear_cells(body: BodyMesh, front: Front | None = None) -> BoolArray:
-    """Tell which owned cells are clear of the edges at which strain is singular; collective.
+    """Return a mask of the owned cells that are clear of edges with singular strain; collective.
 
-    Those are the edge of the footprint, that of what is held, and the ``front`` of a slit. Clear is what has its centre
-    farther from them than a tenth of the footprint's half width, the largest distance within it to its edge.
+    Singular edges are the rim of the footprint, the edge of the support, and the ``front`` of a slit. A cell is clear
+    if its centre is farther from them than a tenth of the footprint's half width (the largest distance within the
+    footprint to its rim).
     """
     x = np.asarray(body.mesh.geometry.x)
     rim = _points_of(body, _on_edge(body, PROBE))
@@ -173,14 +176,14 @@ def clear_cells(body: BodyMesh, front: Front | None = None) -> BoolArray:
 
 
 def _points_of(body: BodyMesh, chosen: BoolArray) -> FloatArray:
-    """Return where the ``chosen`` of the local nodes of all ranks are (n, 3); collective."""
+    """Return the coordinates (n, 3) of the ``chosen`` local nodes of all ranks; collective."""
     return np.vstack(body.comm.allgather(np.asarray(body.mesh.geometry.x)[chosen]))
 
 
 def _on_edge(body: BodyMesh, name: str) -> BoolArray:
-    """Tell of each local node of the geometry whether it is a corner on the edge of a group of facets; collective.
+    """Return a mask of the local geometry nodes that are corners on the edge of a group of facets; collective.
 
-    That is where the group meets the rest of the surface, planes of symmetry aside.
+    The edge is where the group meets the rest of the surface. Planes of symmetry do not count.
     """
     number = np.asarray(body.mesh.geometry.input_global_indices, dtype=np.int64)
     group = _gathered(body.comm, number[_nodes_of(body, {name})])
@@ -189,7 +192,7 @@ def _on_edge(body: BodyMesh, name: str) -> BoolArray:
 
 
 def _nodes_of(body: BodyMesh, names: set[str]) -> IntArray:
-    """Return the local nodes at the corners of the facets of some groups, with repetitions."""
+    """Return the local nodes at the corners of the facets of the groups ``names``, with repetitions."""
     topology = body.mesh.topology
     facet_vertices = topology.connectivity(topology.dim - 1, 0).array.reshape(-1, topology.dim)
     facets = [body.facets[name] for name in names if name in body.facets]
@@ -207,5 +210,5 @@ def _node_of_vertex(body: BodyMesh) -> IntArray:
 
 
 def _gathered(comm: MPI.Comm, values: IntArray) -> IntArray:
-    """Return the ``values`` of all ranks, each once; collective."""
+    """Return the distinct ``values`` of all ranks; collective."""
     return np.unique(np.concatenate(comm.allgather(np.unique(values))))

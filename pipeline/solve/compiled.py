@@ -1,8 +1,8 @@
-"""Spaces, forms and vectors of dolfinx, made of compiled code that is looked up once.
+"""Spaces, forms and vectors of dolfinx from compiled code that is looked up once.
 
-``fem.form`` looks into the folder of compiled code at every call (5 ms) and takes generated kernels only. Here the same
-compiler is called, its code is kept by the form's signature, and the C++ objects are made of it, or of the addresses of
-our own kernels, as dolfinx allows. The folder of compiled code is the project's own.
+``fem.form`` searches the cache folder at every call (5 ms) and accepts generated kernels only. This module calls the
+same compiler, keeps its code in memory by the form's signature, and builds the C++ objects from it. As dolfinx allows,
+it may pass addresses of hand-written kernels instead. The cache folder belongs to the project.
 """
 
 import fcntl
@@ -26,10 +26,10 @@ _known: dict[tuple[str, str], compat.Code] = {}
 
 
 def form(expression: Any, kernels: dict[int, int] | None = None) -> Any:
-    """Return the form of ``expression``, compiled if it is not yet; collective.
+    """Return the form of ``expression``, compiled at its first use; collective.
 
-    ``kernels`` are addresses of kernels for integrals over cells, by the mark of the cells: this form uses them in the
-    place of the generated ones. It then has integrals over cells alone, and no functions as coefficients.
+    ``kernels`` are addresses of cell kernels, by the mark of the cells. They replace the generated kernels in this
+    form, which must then have cell integrals only and no functions as coefficients.
     """
     ((domain, tags),) = expression.subdomain_data().items()
     mesh = domain.ufl_cargo()
@@ -64,10 +64,10 @@ def cellwise_space(mesh: Any, shape: tuple[int, ...]) -> Any:
 
 
 def quadrature_degree(degree: int) -> int:
-    """Return up to which degree polynomials are integrated on curved cells of a space of ``degree``.
+    """Return the degree of quadrature on curved cells of a space of degree p.
 
-    The map of a quarter-point element varies within the cell, and 2p reads F up to 0.07 % low there; at p = 2, degree 4
-    has points at which the map is singular.
+    The map of a quarter-point element varies within the cell: degree 2p gives F up to 0.07 % too low. For p = 2,
+    degree 4 has points at which the map is singular.
     """
     return max(6, 2 * degree)
 
@@ -77,11 +77,11 @@ def quadrature_degree(degree: int) -> int:
 
 @contextmanager
 def vector(space: Any) -> Iterator[PETSc.Vec]:
-    """Lend a ghosted vector of zeros on the dofs of ``space``; collective."""
+    """Lend a ghosted zero vector on the dofs of ``space``; collective."""
     index_map, width = space.dofmap.index_map, space.dofmap.index_map_bs
     ghosts = np.asarray(index_map.ghosts, dtype=PETSc.IntType)
     size = width * index_map.size_local, None
-    # Without blocks for scalars: PETSc's ghosted vectors of blocks of one are slower to make.
+    # No block size for scalars: PETSc creates ghosted vectors with blocks of one more slowly.
     blocks = {"bsize": width} if width > 1 else {}
     found = PETSc.Vec().createGhost(ghosts, size, comm=space.mesh.comm, **blocks)
     found.set(0.0)
@@ -92,14 +92,14 @@ def vector(space: Any) -> Iterator[PETSc.Vec]:
 
 
 def fill(function: Any, values: PETSc.Vec, factor: float = 1.0) -> None:
-    """Make ``factor`` times ``values`` the dofs of ``function``, ghosts included; collective."""
+    """Set the dofs of ``function``, ghosts included, to ``factor`` times ``values``; collective."""
     values.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
     with values.localForm() as local:
         function.x.array[:] = factor * local.array if factor != 1.0 else local.array
 
 
 def assemble(form: Any, result: PETSc.Vec) -> None:
-    """Write the vector of a linear form into ``result``; collective."""
+    """Assemble a linear form into ``result``; collective."""
     with result.localForm() as local:
         local.set(0.0)
     fem_petsc.assemble_vector(result, form)
@@ -107,7 +107,7 @@ def assemble(form: Any, result: PETSc.Vec) -> None:
 
 
 def add_from_ghosts(values: PETSc.Vec) -> None:
-    """Add what each rank has put on ghosts to their owners; collective."""
+    """Add the ghost entries of each rank to their owners; collective."""
     values.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
 
 
@@ -123,7 +123,7 @@ def global_sum(comm: MPI.Comm, values: FloatArray) -> FloatArray:
 
 @contextmanager
 def quiet_compiler() -> Iterator[None]:
-    """Keep the compiler's own words, which go to the root logger, from those who wait for a force."""
+    """Silence the form compiler, which logs to the root logger."""
     before = logging.root.manager.disable
     logging.disable(logging.INFO)
     try:
@@ -133,9 +133,9 @@ def quiet_compiler() -> Iterator[None]:
 
 
 def _code(comm: MPI.Comm, expression: Any, signature: str) -> compat.Code:
-    """Return what ``expression`` is compiled to; ``signature`` tells it from all others.
+    """Return the compiled code of ``expression``, identified by its ``signature``; collective.
 
-    Ranks that compile together must all look into the folder, or none of them: their memories may differ.
+    Either all ranks search the cache folder or none does: what they hold in memory may differ.
     """
     folder = str(form_cache())
     options = {"cache_dir": folder, "cffi_extra_compile_args": ["-O2", "-march=native"], "timeout": 120}
@@ -150,7 +150,7 @@ def _code(comm: MPI.Comm, expression: Any, signature: str) -> compat.Code:
 
 
 def form_cache() -> Path:
-    """Return the folder of compiled forms: one for each kind of processor, since code is made for the machine."""
+    """Return the cache folder of compiled forms; one for each processor type, since the code is built for it."""
     try:
         text = Path("/proc/cpuinfo").read_text()
         features = next(line for line in text.splitlines() if line.startswith(("flags", "Features")))
@@ -161,10 +161,10 @@ def form_cache() -> Path:
 
 @contextmanager
 def compiling() -> Iterator[None]:
-    """Hold the cache's lock, which the system releases when its holder dies, however it dies.
+    """Hold the lock of the cache; the system releases it when the process ends, in whatever way.
 
-    A process killed while compiling leaves a source file without its mark of completion, for which every later run
-    would wait in vain; a mark without its source fails every later run. Whoever holds the lock may remove such orphans.
+    A process killed while compiling leaves a source file without its completion mark, and every later run would wait
+    for the mark in vain. A mark without its source makes every later run fail. The holder of the lock removes both.
     """
     folder = form_cache()
     folder.mkdir(parents=True, exist_ok=True)

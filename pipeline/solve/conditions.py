@@ -1,4 +1,4 @@
-"""What is prescribed of a displacement, whatever its value, and where the front of a slit is."""
+"""Prescribed components of the displacement, independent of their values, and the position of a slit's front."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -9,18 +9,19 @@ from pipeline.arrays import FloatArray
 from pipeline.solve import SolveError
 from pipeline.solve.movement import Vector
 
-# v is 1 up to the first of these shares of its radius, and nothing from the second on.
+# The virtual extension v is 1 up to the first of these shares of its radius, and 0 from the second on.
 _INNER, _OUTER = 0.4, 1.0
-# A direction this near to an axis of coordinates is it.
+# A direction counts as a coordinate axis within this tolerance.
 _SAME = 1e-9
 
 
 @dataclass(frozen=True)
 class Front:
-    """Where the front of a slit is, or a blade's tip in it, in a mesh whose probe presses along -z; lengths in m.
+    """Front of a slit, or tip of a blade in it, in a mesh whose probe presses along -z; lengths in m.
 
-    ``point`` is where the probe's axis meets the surface, ``along`` the unit vector along the front, which is ``depth``
-    below, from -``reach`` to ``reach`` or all through the body. Within ``radius`` of it nothing else is.
+    ``point`` is where the probe's axis meets the surface. The front is ``depth`` below it, along the unit vector
+    ``along``, from -``reach`` to ``reach`` or through the whole body. Within ``radius`` of the front there is no other
+    edge.
     """
 
     point: Vector
@@ -36,7 +37,7 @@ class Front:
         return 0.0 - y, x, 0.0
 
     def advance(self, x: FloatArray) -> FloatArray:
-        """Return by how much each of the points (3, n) goes along the axis (n,)."""
+        """Return the displacement (n,) along the axis of the points (3, n) under a unit advance of the front."""
         offset = x.T - np.array(self.point)
         away = np.maximum(np.abs(offset @ np.array(self.normal)), np.abs(offset[:, 2] + self.depth))
         if isfinite(self.reach):
@@ -46,12 +47,12 @@ class Front:
 
 @dataclass(frozen=True)
 class Conditions:
-    """What is prescribed, whatever its value: on the footprint all components (``bonded``) or that along z alone.
+    """Prescribed components, independent of their values: all on the footprint (``bonded``), or that along z alone.
 
-    Nothing is where contact is ``unilateral``: what touches is found, and held by those who find it. The support is
-    held, and on planes of symmetry that bound the mesh so is the displacement across them. A probe that stands in a
-    slit, with that ``front``, touches both of its faces, and without bond holds them apart only: what pushes it on is
-    then at its ``tip``.
+    With ``unilateral`` contact the footprint prescribes nothing: the active set does. The support is fixed. On planes
+    of symmetry that bound the mesh the normal displacement is zero. A probe in a slit with that ``front`` touches both
+    faces of the slit; unless it is bonded, it prescribes their opening only, and the force that drives it acts at its
+    ``tip``.
     """
 
     bonded: bool = True
@@ -64,7 +65,7 @@ class Conditions:
         """Components of the displacement that the probe prescribes.
 
         Raises:
-            SolveError: if that would be none of them alone.
+            SolveError: if a sliding direction is no coordinate axis, so that no single component describes it.
         """
         if self.unilateral:
             return ()
@@ -74,5 +75,5 @@ class Conditions:
             return (2,)
         normal = [axis for axis, part in enumerate(self.front.normal) if abs(part) > 1 - _SAME]
         if not normal:
-            raise SolveError("tissue slides along the faces of a slit that lies along x or y only")
+            raise SolveError("frictionless contact in a slit needs a slit along x or along y")
         return tuple(normal)

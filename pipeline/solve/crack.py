@@ -1,20 +1,20 @@
-"""The energy release rate of a slit's front, by virtual extension.
+"""Energy release rate of a slit's front, by virtual extension.
 
-A field v moves the points of the body along the probe's axis: by 1 on the front, by nothing on what the probe touches,
-and along the surface where there is one. Prescribed displacements do not change. The strain energy changes by
+A virtual extension v moves the points of the body along the probe's axis: by 1 on the front, by zero on the footprint,
+and tangentially on the surface. Prescribed displacements do not change. The strain energy changes by
 
     dU = ∫ w div v − σ(u) : (∇u ∇v),    w = ½ λ (div u)² + μ ε(u) : ε(u)
 
 (P. Destuynder and M. Djaoua, Math. Methods Appl. Sci. 3, 70, 1981: the J integral over a domain). A unit of advance
 releases −dU = ∫ G along the front. In mixed elements p div u − p²/(2 λ₁) replaces ½ λ₁ (div u)². As v is piecewise
-linear on the mesh, −dU is the exact derivative of the discrete energy by the movement of its nodes.
+linear on the mesh, −dU is the exact derivative of the discrete energy with respect to its nodes.
 
-If tissue slides along a blade, v is 1 on the blade's tip, nothing on the front, and along the faces everywhere. dU is
-then the force that pushes the blade on: a configurational force of the singular pressure at its tip (D. Bigoni,
+For tissue that slides along a blade, v is 1 on the blade's tip, zero on the front, and tangential to the faces. dU is
+then the force that drives the blade: a configurational force of the singular pressure at its tip (D. Bigoni,
 F. Dal Corso, F. Bosi and D. Misseroni, Mech. Mater. 80, 368, 2015).
 
-With dead loads f the potential energy replaces the strain energy: −dU + df·u is released, df the change of the nodal
-forces. All of it is quadratic in the amounts of motions and loads: R_ij is what a pair of them releases.
+With dead loads f the potential energy replaces the strain energy: −dU + df·u is released, where df is the change of the
+nodal forces. All terms are quadratic in the amounts of motions and loads: R_ij is the release of a pair.
 """
 
 from collections.abc import Callable, Iterator
@@ -38,17 +38,17 @@ from pipeline.solve.estimate import extrapolate_release, release_bar
 from pipeline.solve.forms import ElasticForms, dx, one_cell
 from pipeline.solve.physics import pressurised, small_strain, strain
 
-# Nodes are moved by this share of that radius to see what becomes of the loads, and back.
+# Step of the nodes, as a share of the front's radius, for the finite difference of the loads' nodal forces.
 _STEP = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class Advance:
-    """The energy (J/m) that an advance of a line releases: a quadratic ``form`` (n, n) of ``amounts`` (n).
+    """The energy (J/m) released by an advance of a line: a quadratic ``form`` (n, n) of ``amounts`` (n).
 
-    The amounts are those of so many ``motions`` and, with loads, a last 1 for these. ``finer`` is the form in elements
-    of one ``degree`` more, ``energy_bar`` the relative 95 % bar on the energy. If it ``is_extrapolated``, energies are
-    those that the sequence of degrees tends to.
+    The first ``motions`` amounts are those of motions; loads add a last amount of 1. ``finer`` is the form in elements
+    of one ``degree`` more, ``energy_bar`` the relative 95 % bar on the energy. If ``is_extrapolated``, the form is the
+    limit of the sequence of degrees.
     """
 
     form: FloatArray
@@ -61,12 +61,12 @@ class Advance:
 
     @property
     def released(self) -> float:
-        """What is released (J/m)."""
+        """The released energy (J/m)."""
         return float(self.amounts @ self.gains)
 
     @property
     def gains(self) -> FloatArray:
-        """Half of what a unit more of each amount releases (n)."""
+        """Half the derivative of the released energy with respect to each amount (n)."""
         form = self.form
         if self.is_extrapolated and self.finer is not None:
             form = extrapolate_release(form, self.finer, self.degree)
@@ -74,7 +74,7 @@ class Advance:
 
     @property
     def error(self) -> float:
-        """The 95 % bar (J/m) on it; not a number without a finer form."""
+        """The 95 % bar (J/m) on the released energy; NaN without a finer form."""
         if self.finer is None:
             return nan
         finer = float(self.amounts @ self.finer @ self.amounts)
@@ -83,28 +83,28 @@ class Advance:
 
     @property
     def own(self) -> float:
-        """What is released (J/m) in the elements themselves."""
+        """The released energy (J/m) of these elements, not extrapolated."""
         return float(self.amounts @ self.form @ self.amounts)
 
     @property
     def bar(self) -> float:
-        """The bar relative to what is released in the elements themselves."""
+        """The bar relative to the released energy of these elements."""
         return self.error / abs(self.own)
 
     def without_loads(self) -> "Advance":
-        """Return what the motions alone release."""
+        """Return the part of the motions."""
         return self._only(self._is_of_motions)
 
     def of_loads(self) -> "Advance":
-        """Return what the loads add."""
+        """Return the part that loads add."""
         return self._only(~self._is_of_motions)
 
     def with_finer(self, finer: "Advance", degree: int, energy_bar: float) -> "Advance":
-        """Return it with what elements of one ``degree`` more make of it, and the relative bar on the energy."""
+        """Return a copy with the form of elements of one ``degree`` more, and the relative bar on the energy."""
         return replace(self, finer=finer.form, degree=degree, energy_bar=energy_bar)
 
     def extrapolated(self, energy_bar: float) -> "Advance":
-        """Return what the sequence of degrees tends to, itself without a finer form."""
+        """Return the limit of the sequence of degrees; unchanged without a finer form."""
         return replace(self, energy_bar=energy_bar, is_extrapolated=True)
 
     @property
@@ -118,7 +118,7 @@ class Advance:
 
 
 class Release:
-    """What a unit of advance of a front releases, for the fields of some forms."""
+    """The energy released by a unit advance of a front, for the fields of given forms."""
 
     def __init__(
         self,
@@ -131,19 +131,19 @@ class Release:
     ):
         """Compile; collective.
 
-        Of mixed elements there is a ``pressure`` with its compliance, and the ``forms`` have λ₀ and μ. Moduli are in a
-        ``unit`` (Pa).
+        Mixed elements pass a ``pressure`` with its compliance, and their ``forms`` have λ₀ and μ. ``unit`` (Pa) is the
+        unit of moduli.
         """
         self._body, self._front, self._unit = body, front, unit
         self._step = _STEP * front.radius
         self._form = _form(forms, _advance(body, front), pressure)
 
     def __call__(self) -> float:
-        """Return −dU (J/m) for the present fields, of the modelled part; collective."""
+        """Return −dU (J/m) of the modelled part for the current fields; collective."""
         return self._unit * float(self._body.comm.allreduce(fem.assemble_scalar(self._form), op=MPI.SUM))
 
     def of_forces(self, nodal: Callable[[], FloatArray]) -> FloatArray:
-        """Return df (N/m), what a unit of advance makes of ``nodal`` forces (N) on the mesh as it is; collective."""
+        """Return df (N/m), the change of the ``nodal`` forces (N) of the current mesh per unit advance; collective."""
         found = []
         for step in (self._step, -self._step):
             with moved_on(self._body, self._front, step):
@@ -151,7 +151,7 @@ class Release:
         return np.asarray(found[0] - found[1]) / (2 * self._step)
 
     def matrix(self, count: int, put: Callable[[FloatArray], None]) -> FloatArray:
-        """Return R (n, n): −dU = c·R·c (J/m), where ``put(c)`` sets the fields of the sum of ``count`` solutions c."""
+        """Return R (n, n) with −dU = c·R·c (J/m); ``put(c)`` sets the fields to the sum of ``count`` solutions by c."""
         units = np.eye(count)
 
         def of(amounts: FloatArray) -> float:
@@ -168,7 +168,7 @@ class Release:
 
 @contextmanager
 def moved_on(body: BodyMesh, front: Front, step: float) -> Iterator[None]:
-    """Move the nodes of the mesh along with a ``front`` that goes on by a ``step`` (m), and back in the end."""
+    """Move the nodes of the mesh with an advance of the ``front`` by ``step`` (m), and back at the end."""
     advance, nodes, points = _advance(body, front), compat.geometry_dofs(body.mesh), body.mesh.geometry.x
     corners = advance.x.array[compat.cell_dofs(advance.function_space)]
     middles = [(corners[:, i] + corners[:, j]) / 2 for i, j in EDGES] if nodes.shape[1] > len(corners.T) else []
@@ -197,7 +197,7 @@ def _form(forms: ElasticForms, advance: Any, pressure: Any) -> Any:
 
 
 def compile_release(degree: int, *, mixed: bool, of_regions: bool) -> None:
-    """Compile what the front of a slit adds to the forms of elements of ``degree``, and of one degree more."""
+    """Compile the forms of the energy release rate for elements of ``degree``, and of one degree more."""
     body = distribute(MPI.COMM_SELF, one_cell(straight=False))
     regions = np.zeros(1, dtype=np.int32) if of_regions else None
     front = Front((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 1.0, 1.0, 1.0)

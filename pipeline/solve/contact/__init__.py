@@ -1,1 +1,1 @@
-"""Contact that finds its own area: frictionless, without tension and without penetration."""
+"""Unilateral contact with unknown area: frictionless, without tension and without penetration."""

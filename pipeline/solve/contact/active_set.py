@@ -1,13 +1,13 @@
-"""The active set of found contact: which nodes touch, by the primal-dual method.
+"""The active set of unilateral contact, by the primal-dual active-set method.
 
-    u_z <= b,    r <= 0,    r (u_z - b) = 0    at each candidate,
+    u_z <= b,    r <= 0,    r (u_z - b) = 0    at each candidate node,
 
-with b the height of the pressed-in probe above the node, and r the reaction (K u along z). Active nodes are held at b.
-Nodes with a tensile reaction leave the set, nodes that penetrate the probe enter it, until the set does not change
-(M. Hintermüller, K. Ito and K. Kunisch, SIAM J. Optim. 13, 865, 2002).
+where b is the height of the pressed-in probe above the node, and r the reaction (K u along z). Active nodes have
+u_z = b. A node with a tensile reaction leaves the set, a node that penetrates the probe enters it, until the set does
+not change (M. Hintermüller, K. Ito and K. Kunisch, SIAM J. Optim. 13, 865, 2002).
 
-An even pressure on quadratic facets loads their mid nodes alone, on cubic ones hardly their corners. The sign of a
-corner's reaction then means nothing: a corner is active if all nodes beside it on its edges are.
+A uniform pressure on quadratic facets has nodal forces at their mid nodes only, on cubic facets hardly any at their
+corners. The sign of a corner's reaction then means nothing: a corner is active if all its neighbours along edges are.
 """
 
 from collections.abc import Sequence
@@ -21,19 +21,19 @@ from pipeline.solve.contact.elements import ContactElements, State
 from pipeline.solve.contact.surface import Candidates
 from pipeline.stages import stage
 
-# A pull below this share of the mean reaction, and a way through below this share of the depth, are the solver's error.
+# Tension below this share of the mean reaction, and penetration below this share of the depth, are solver error.
 SLACK = 1e-6
-# The most that was seen is 14, and no set came back but by the error of a solver that was stopped early.
+# The largest number of sets seen is 14. Sets only repeated where the linear solver had been stopped early.
 _MOST_SETS = 60
 
 
 class ContactError(SolveError):
-    """Contact that was not found, or is not one: no other linear solver mends that."""
+    """Contact not found, or not valid. Another linear solver does not help."""
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """A set that stays as it is, and its solution; ``sets`` were solved for it, with all their ``iterations``."""
+    """A converged active set and its solution; ``sets`` and ``iterations`` count the sets solved and all iterations."""
 
     active: BoolArray
     state: State
@@ -43,7 +43,7 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class Obstacle:
-    """What is in the way of the ``candidates``: their ``bounds`` (n, m) with the probe pushed in by ``depth`` (m)."""
+    """The obstacle above the ``candidates``: their ``bounds`` (n, m) with the probe pressed in by ``depth`` (m)."""
 
     candidates: Candidates
     bounds: FloatArray
@@ -60,14 +60,14 @@ def find_set(
     *,
     roughly: bool = False,
 ) -> Found:
-    """Return the set that ``active`` (n) leads to, solved to the last of the ``tolerances``; collective.
+    """Return the converged active set from the initial guess ``active`` (n); collective.
 
-    Each of them is of the energy norm, relative to the root of an ``energy`` (J), known roughly. A set that is wanted
-    ``roughly`` may be one of several that come back.
+    The ``tolerances`` are used in turn, the last one for the result. Each is an energy norm of the error, relative to
+    the root of ``energy`` (J), of which an estimate will do. With ``roughly`` a set from a repeating cycle is accepted.
 
     Raises:
         SolveError: if the linear solver fails.
-        ContactError: if sets come back, or become empty.
+        ContactError: if sets repeat, or become empty.
     """
     count = iterations = 0
     elements.hold(active)
@@ -86,7 +86,7 @@ def find_set(
             if count >= _MOST_SETS or following.tobytes() in seen:
                 if roughly or number < len(tolerances):
                     break
-                raise ContactError(f"the contact area does not settle: {count} sets of nodes were tried")
+                raise ContactError(f"the contact area does not settle: {count} active sets were tried")
             if not following.any():
                 raise ContactError("the probe does not touch a single node: use smaller elements below it")
             active = following
@@ -95,7 +95,7 @@ def find_set(
 
 
 def next_set(obstacle: Obstacle, active: BoolArray, state: State) -> BoolArray:
-    """Return the nodes to hold next: the active ones that are pressed, the others that came through."""
+    """Return the next active set: active nodes under pressure, and inactive nodes that penetrate the probe."""
     pull = SLACK * float(np.abs(state.reactions[active]).mean())
     through = SLACK * obstacle.depth
     return np.where(active, state.reactions < pull, state.moved - obstacle.bounds > through)

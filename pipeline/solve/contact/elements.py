@@ -1,8 +1,8 @@
-"""Elements of which candidate nodes may be held, other ones in each active set, and the body without a tool.
+"""Elements with one operator for every active set, and the body without a probe.
 
-Loads f and a unit φ of the far field act on the body without a tool: K w = f, K φ = 0 inside. By linearity the
-displacement is v + s φ + w, where v belongs to the reactions r alone. Since v vanishes on the cut face, a(v, φ) = 0:
-the share s of the far field follows from k s = φ·r, with k twice the energy of a unit on both sides of the cut.
+Loads f and a unit φ of the far field act on the body without a probe: K w = f, and K φ = 0 inside. By linearity the
+displacement is v + s φ + w, where v belongs to the reactions r alone. Since v vanishes on the cut face, a(v, φ) = 0.
+The amplitude s of the far field follows from k s = φ·r, where k is twice the energy of φ on both sides of the cut.
 """
 
 from contextlib import ExitStack
@@ -24,19 +24,19 @@ from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import ElasticSpace
 from pipeline.stages import stage
 
-# What is solved for, owned dofs: displacement (m), and of mixed elements pressure (in the law's unit).
+# Unknowns, owned dofs: displacement (m), and in mixed elements pressure (in the law's unit).
 Unknowns = tuple[FloatArray, ...]
 
-# The share of the far field is found where it changes by less than this, in units of the solver's tolerance.
+# The far field's amplitude has converged when it changes by less than this, in units of the solver's tolerance.
 _SETTLED = 10.0
 _MOST_ROUNDS = 20
 
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Of one solution: the candidates' displacement along z (n, m), and the reactions there (n, N).
+    """Displacements of the candidates along z (n, m), and their reactions (n, N), in one solution.
 
-    ``energy`` (J) is twice that of the part that is modelled.
+    ``energy`` (J) is twice the energy of the modelled part.
     """
 
     moved: FloatArray
@@ -46,10 +46,10 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class FreeResponse:
-    """What the body does while nothing touches it.
+    """Response of the body without a probe to loads or to the far field.
 
-    ``unknowns`` are those of the elements; ``moved`` (n, m) is the displacement of the candidates along z; ``energy``
-    (J) twice the strain energy of the part that is modelled.
+    ``unknowns`` are those of the elements, ``moved`` (n, m) the displacement of the candidates along z, and ``energy``
+    (J) twice the strain energy of the modelled part.
     """
 
     unknowns: Unknowns
@@ -59,7 +59,7 @@ class FreeResponse:
 
 @dataclass(eq=False)
 class FarShare:
-    """A ``unit`` of the far ``field``, twice its energy on both sides of the cut (J), and how much of it there is."""
+    """A ``unit`` of the far ``field``, twice its energy on both sides of the cut (J), and its current amplitude."""
 
     field: FarField
     unit: FreeResponse
@@ -68,24 +68,25 @@ class FarShare:
     _slope: float = 0.0
 
     def wanted(self, reactions: FloatArray) -> float:
-        """Return the share that goes with ``reactions`` (n, N)."""
+        """Return the amplitude that belongs to ``reactions`` (n, N)."""
         return float(self.unit.moved @ reactions) / self.stiffness
 
     def follow(self, before: float | None, wanted: float, wanted_before: float) -> None:
-        """Move on to where the share will be what is ``wanted``, which is linear in it."""
+        """Take the next amplitude by the secant method; ``wanted`` is linear in the amplitude."""
         if before is not None and before != self.share:
             self._slope = (wanted - wanted_before) / (self.share - before)
         self.share += (wanted - self.share) / (1 - self._slope)
 
 
 class ContactElements:
-    """Elements with one operator for every set; they keep the solution found last. Methods are collective.
+    """Elements with one operator for every active set. Methods are collective.
 
-    What they make is freed with the stack. ``load`` is a right-hand side besides the probe, ``far`` the far field on
-    the cut face, None without. ``unit`` (Pa) is that of the law's moduli: energies and forces are in J and N.
+    They keep the last solution, and free what they make with the stack. ``load`` is a right-hand side besides the
+    probe. ``far`` is the far field on the cut face, or None. ``unit`` (Pa) is the unit of the law's moduli; energies
+    and forces are in J and N.
     """
 
-    # Whether every solve is, to rounding.
+    # Whether every solve is exact to rounding.
     is_exact = False
 
     def __init__(self, elements: Elements, surface: Surface, law: MaterialLaw, method: str, stack: ExitStack):
@@ -107,18 +108,18 @@ class ContactElements:
         stack.callback(self.close)
 
     def finer(self, stack: ExitStack) -> "ContactElements":
-        """Return elements of one degree more, which begin with the fields of the forms."""
+        """Return elements of one degree more, with the current fields as initial guess."""
         elements = self.surface.elements(self.plug.degree + 1, self.plug.element, stack)
         found = ContactElements(elements, self.surface, self.law, "iterative", stack)
         found.start_from(self)
         return found
 
     def couple(self, far: FarShare | None) -> None:
-        """Let a far field act on the cut face from now on, or none."""
+        """Couple a far field, or none, to the cut face from now on."""
         self.far = far
 
     def hierarchy_of(self, stack: ExitStack, *, direct: bool) -> Hierarchy:
-        """Return the operators in which nodes may be held, given back with the ``stack``; collective."""
+        """Return the operators in which candidate nodes may be fixed, freed with the ``stack``; collective."""
         law, degree = self.plug.elastic(self.law), self.plug.degree
         return Hierarchy(self.surface, degree, law, stack, direct=direct, masks=self.plug.masks)
 
@@ -132,7 +133,7 @@ class ContactElements:
 
     @stage("set-up")
     def hold(self, active: BoolArray) -> None:
-        """Hold the ``active`` candidates (n) from now on.
+        """Prescribe the displacement of the ``active`` candidates (n) from now on.
 
         Raises:
             SolveError: if the solver cannot be set up.
@@ -142,7 +143,7 @@ class ContactElements:
 
     @stage("set-up")
     def hold_facets(self, facets: Int32Array) -> None:
-        """Hold all of the local ``facets`` where they are, in the place of any set."""
+        """Fix all of the local ``facets`` at their displacement, instead of an active set."""
         dofs = normal_dofs(self.space, facets)
         self._active, self._held = np.zeros(len(self.candidates), dtype=bool), dofs[dofs < self.space.owned]
         self._use(self.hierarchy.hold_facets(facets))
@@ -151,19 +152,19 @@ class ContactElements:
         self.solver = self.plug.solver_on(levels, self.law, self._held, direct=self._direct, earlier=self.solver)
 
     def held_levels(self, facets: Int32Array, stack: ExitStack) -> list[Level]:
-        """Return the levels of multigrid with the local ``facets`` held, in the place of any set."""
+        """Return multigrid levels with the local ``facets`` fixed, instead of an active set."""
         self.close()
         hierarchy = self.hierarchy_of(stack, direct=False) if self._direct else self.hierarchy
         return hierarchy.hold_facets(facets)
 
     def improve(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
-        """Move what is held to ``bounds`` (n, m), and then the rest; return the iterations.
+        """Move the active nodes to ``bounds`` (n, m), solve for the others, and return the iterations.
 
-        They end when the energy norm of the error is ``tolerance`` times the root of ``energy`` (J), or without one
-        times that of the error in the beginning.
+        Iterations end when the energy norm of the error is ``tolerance`` times the root of ``energy`` (J). Without
+        ``energy`` the norm is relative to the initial error.
 
         Raises:
-            SolveError: if the solver does not converge, or the far field is not found.
+            SolveError: if the solver or the far field does not converge.
         """
         if (far := self.far) is None:
             return self.approach(bounds, tolerance, energy)
@@ -177,10 +178,10 @@ class ContactElements:
                 return iterations
             far.follow(before, wanted, wanted_before)
             before, wanted_before = share, wanted
-        raise SolveError(f"the share of the far field is not found in {_MOST_ROUNDS} rounds")
+        raise SolveError(f"the amplitude of the far field does not converge in {_MOST_ROUNDS} rounds")
 
     def approach(self, bounds: FloatArray, tolerance: float, energy: float | None) -> int:
-        """Move what is held to ``bounds`` (n, m), and then the rest, far field aside: see ``improve``."""
+        """Move the active nodes to ``bounds`` (n, m) and solve, without the far field: see ``improve``."""
         self.numbering.put(self.fields[0].array, bounds, self._active)
         with self.plug.fields() as rest, self.plug.fields() as correction:
             self._multiply(self.fields, rest)
@@ -199,14 +200,14 @@ class ContactElements:
         return iterations
 
     def near_state(self) -> State:
-        """Return what the candidates do, far field aside."""
+        """Return displacements and reactions of the candidates, without the far field."""
         with self.plug.fields() as forces:
             self._multiply(self.fields, forces)
             moved, reactions = (self.numbering.gather(part.array) for part in (self.fields[0], forces[0]))
             return State(moved, self.unit * reactions, self._work(forces))
 
     def state(self) -> State:
-        """Return what the candidates do."""
+        """Return displacements and reactions of the candidates."""
         state = self.near_state()
         if (far := self.far) is None:
             return state
@@ -214,9 +215,9 @@ class ContactElements:
         return State(moved, state.reactions, state.energy + far.share**2 * far.stiffness)
 
     def energy(self) -> float:
-        """Return twice the energy (J) of the part that is modelled, stationary at the solution, less a constant.
+        """Return twice the energy (J) of the modelled part, stationary at the solution, up to a constant.
 
-        The constant is that of what is prescribed, if that is not nothing.
+        The constant belongs to the prescribed displacement, and is zero if that is zero.
         """
         with self.plug.fields() as forces:
             self._multiply(self.fields, forces)
@@ -231,16 +232,16 @@ class ContactElements:
     # ---- the fields -----------------------------------------------------------------------------------
 
     def unknowns(self) -> Unknowns:
-        """Return a copy of what is solved for."""
+        """Return a copy of the unknowns."""
         return tuple(np.array(field.array) for field in self.fields)
 
     def start_at(self, unknowns: Unknowns) -> None:
-        """Take over what is solved for."""
+        """Set the unknowns."""
         for field, values in zip(self.fields, unknowns, strict=True):
             field.array[:] = values
 
     def start_from(self, coarse: "ContactElements") -> None:
-        """Begin with the fields of elements of a lower degree; what is prescribed goes to the right-hand side."""
+        """Interpolate the initial guess from ``coarse``; prescribed displacements go to the right-hand side."""
         displacement = self.space.forms.displacement
         self.plug.start_from(coarse.plug, self.fields, np.zeros_like(displacement.x.array))
         if coarse.far is not None:
@@ -250,18 +251,18 @@ class ContactElements:
                 self.load = self.right_side(Column(prescribed=held, applied=None, right=right, unknown=unknown))
 
     def show(self) -> None:
-        """Make what is solved for, far field aside, the fields of the forms."""
+        """Copy the solution, without the far field, to the fields of the forms."""
         self.plug.set_fields(self.fields)
 
     # ---- without a probe ------------------------------------------------------------------------------
 
     def right_side(self, column: Column) -> Unknowns:
-        """Return the right-hand side of what a ``column`` prescribes, or of its loads."""
+        """Return the right-hand side of a ``column``: of its prescribed displacement, or of its loads."""
         self.plug.lift(column, self.law)
         return tuple(np.array(part.array) for part in column.right)
 
     def free_response(self, column: Column, tolerance: float) -> FreeResponse:
-        """Return what a unit of a ``column`` does without a probe, and make it the column's solution.
+        """Return the response to a unit of a ``column`` without a probe, and store it as the column's solution.
 
         Raises:
             SolveError: if the solver does not converge, or forces do not balance.
@@ -276,7 +277,7 @@ class ContactElements:
         return FreeResponse((moved, *found[1:]), self.numbering.gather(moved), energy)
 
     def _imbalance(self, applied: Applied, moved: FloatArray, residual: FloatArray, energy: float) -> float:
-        """Return the relative error of work and forces of loads."""
+        """Return the relative imbalance of work and forces under loads."""
         space, mirrored = self.space, self.plug.body.mirrored
         on_support = (residual - applied.forces).reshape(-1, 3)[space.fixed_owned].sum(axis=0)
         *support, work = global_sum(space.comm, np.array([*on_support, moved @ applied.forces]))
@@ -284,7 +285,7 @@ class ContactElements:
         return max(float(np.linalg.norm(rest)) / applied.size, abs(energy / work - 1) if work else 0.0)
 
     def relax(self, tolerance: float, load: Unknowns) -> Unknowns:
-        """Return the solution for a ``load`` with nothing held by the probe."""
+        """Return the solution for a ``load`` on the body without a probe."""
         nothing, count = tuple(np.zeros_like(part) for part in load), len(self.candidates)
         self.start_at(nothing)
         self.load = load

@@ -1,11 +1,11 @@
-"""What was found of a contact: the force, the area, and how far F is from the truth, by one degree more.
+"""Results of a contact: the force, the area, and the error bar from elements of one degree more.
 
-The contact area is held: a facet whose nodes, corners aside, all touch is held along the axis at its displacement. The
-force of that problem is wrong, since its area is; the share of the energy that it takes away estimates the error of F.
-F is no bound: the bar is on both sides.
+For the error bar the contact area is fixed: a facet whose nodes, corners aside, are all active keeps its displacement
+along the axis. The force of that problem is wrong, because the area is. The share of the energy that the next degree
+removes estimates the error of F. F is no bound, so the bar applies to both sides.
 
-If such facets cover too little of the area, elements are as large as the contact. Contact is then found again in one
-degree more, and the bar is the change of the force.
+If such facets cover too little of the area, elements are as large as the contact. The contact is then solved again in
+the next degree, and the bar follows from the change of the force.
 """
 
 from collections.abc import Callable, Sequence
@@ -33,21 +33,21 @@ from pipeline.solve.movement import Movement
 from pipeline.solve.physics import of_regions
 from pipeline.solve.response import Contact, Response, reaction
 
-# Bounds that differ by no more than this share of the depth are the same.
+# Bounds that differ by at most this share of the depth are equal.
 _SAME = 1e-9
-# Where facets with all nodes in contact cover less than this share of its area, contact is found again for the bar.
+# Contact is solved again for the bar where fully active facets cover less than this share of its area.
 _COVERED = 0.3
-# Relative energy norm of the error to which the solution of the next degree is found for the error bar.
+# Relative energy norm of the error of the next degree's solution, for the error bar.
 _ESTIMATE_TOLERANCE = 0.1
-# And to which contact is found again in it: loosely first.
+# Tolerances for contact that is solved again in the next degree: loose first.
 _AGAIN = (1e-3, 1e-5)
 
 
 @dataclass(frozen=True, eq=False)
 class FoundContact:
-    """What was ``found`` by the elements of a ``sweep``, where an ``obstacle`` is in the way; methods are collective.
+    """Contact ``found`` by the elements of a ``sweep`` with an ``obstacle``; methods are collective.
 
-    ``loaded`` is what loads did before, None without; ``obstacle_above`` is the obstacle of one degree more.
+    ``loaded`` is the response to loads before contact, or None. ``obstacle_above`` is the obstacle of the next degree.
     """
 
     sweep: Sweep
@@ -62,26 +62,26 @@ class FoundContact:
 
     @property
     def stored(self) -> float | None:
-        """The energy (J) of the modelled part; None where all of a face touches and moves by the depth.
+        """The energy (J) of the modelled part; None where a whole face touches and moves by the depth.
 
-        Then the area of contact was no question, and the energy is half the work of the force.
+        The contact area is then known, and the energy is half the work of the force.
         """
         is_flat = np.ptp(self.obstacle.bounds) <= _SAME * self.obstacle.depth
         return None if self.found.active.all() and is_flat else self.found.state.energy / 2
 
     @property
     def force(self) -> float:
-        """The force (N) on the part of the tool that is modelled."""
+        """The force (N) on the modelled part of the tool."""
         return _force(self.found)
 
     def summary(self, sag: float) -> Contact:
-        """Return the area of the whole contact, and what loads do; ``sag`` (m) is that of the first touch."""
+        """Return the area of the whole contact, and the effect of loads; ``sag`` (m) is that of the first touch."""
         whole = 2.0 ** len(self._plug.body.mirrored)
         energy = nan if self.loaded is None else whole * self.loaded.energy / 2
         return Contact(whole * self._area().value, sag=sag, load_energy=energy)
 
     def response(self, column: Column, movement: Movement) -> Response:
-        """Return the force for the depth, as if it were proportional to it; its balance is that of all checks."""
+        """Return the force at this depth as a stiffness, F/d; its balance is the largest of all checks."""
         space, state, (depth,) = self._plug.displacements, self.found.state, movement.amounts
         (residual,) = self._plug.products(self.sweep.law, [column]).residuals
         local = depth * residual.reshape(-1, 3)[space.fixed_owned, 2].sum()
@@ -93,9 +93,9 @@ class FoundContact:
         return reaction(movement, np.array([[per_depth]]), on_probe, self._plug.body.mirrored, balance)
 
     def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
-        """Return what one degree more makes of the force, and its bar.
+        """Return the change of the force in one degree more, and its error bar.
 
-        Where loads act each depth has its own, as it has where the surface is not condensed.
+        Each depth has its own bar where loads act, or where the surface is not condensed.
         """
         sweep, depth, iterations, at_edge = self.sweep, self.obstacle.depth, 0, self._area().bar
         known = sweep.bar(depth, movement.far) if self.loaded is None else None
@@ -116,7 +116,7 @@ class FoundContact:
         )
 
     def _estimated(self, area_bar: float) -> tuple[float, float, int]:
-        """Return the share of the energy that one degree more takes away, that of the bar, and the iterations."""
+        """Return the share of the energy that one degree more removes, the share for the bar, and the iterations."""
         candidates, found, elements = self.obstacle.candidates, self.found, self.sweep.elements
         touching = float(candidates.weights[found.active].sum())
         covered = float(candidates.areas[candidates.closed(found.active)].sum())
@@ -131,7 +131,7 @@ class FoundContact:
         return share, found_bar(share, unseen, area_bar), more
 
     def _area(self) -> Area:
-        """Return the area of contact of the part that is modelled."""
+        """Return the contact area of the modelled part."""
         candidates, law = self.obstacle.candidates, self.sweep.law
         modulus = np.empty(len(candidates))
         of_facets = of_regions(law.values("plane_modulus"), candidates.regions, len(candidates.facets))
@@ -144,10 +144,10 @@ def _force(found: Found) -> float:
 
 
 def _decrement(elements: ContactElements, facets: Int32Array) -> tuple[float, float, int]:
-    """Return what one degree more takes away of twice the energy (J) of the modelled part, and the iterations.
+    """Return how much one degree more lowers twice the energy (J) of the modelled part, N (J), and the iterations.
 
-    In between is N (J) of mixed elements, none of others. Collective. The local ``facets`` are held; the fields are
-    those of the forms of ``elements``.
+    N is the energy norm squared of the first correction of mixed elements, zero for others. Collective. The local
+    ``facets`` are fixed; the fields are those of the forms of ``elements``.
 
     Raises:
         SolveError: if the solver does not converge.
@@ -179,15 +179,15 @@ def _mixed_decrement(elements: ContactElements, facets: Int32Array) -> tuple[flo
         finer = elements.finer(stack)
         finer.hold_facets(facets)
         before = finer.energy()
-        iterations = finer.approach(np.zeros(len(finer.candidates)), _ESTIMATE_TOLERANCE, None)  # nothing held moves
+        iterations = finer.approach(np.zeros(len(finer.candidates)), _ESTIMATE_TOLERANCE, None)  # fixed nodes stay
         assert isinstance(finer.solver, MixedSolver)
         return before - finer.energy(), float(finer.solver.first_energies[0]), iterations
 
 
 def _found_again(elements: ContactElements, obstacle: Obstacle, found: Found) -> tuple[float, int]:
-    """Return the share of the force that one degree more takes away, contact found again, and the sets; collective.
+    """Solve contact again in one degree more: return the share of the force that it removes, and the sets; collective.
 
-    ``obstacle`` is what is in the way of the nodes of that degree, far field aside.
+    ``obstacle`` is the obstacle of that degree, without the far field.
 
     Raises:
         SolveError: if the solver does not converge.

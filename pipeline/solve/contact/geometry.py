@@ -1,10 +1,10 @@
-"""The first touch of probe and surface, and the area of contact, also between nodes.
+"""First touch of probe and surface, and contact area with sub-element resolution.
 
-Depths count from the first touch of the surface as it is, or as loads have bent it.
+Depths count from the first touch of the surface, undeformed or deformed by loads.
 
-At a distance x from the edge of contact the pressure is K x^½ and the gap beside it (4 K / 3 E*) x^{3/2}, wherever the
-probe's surface is smooth (K. L. Johnson, Contact Mechanics, 1985, ch. 4 and 5). Nodes beside the edge thus give their
-distance from it, and count by the share of their own area within the edge: area and radius vary smoothly.
+At a distance x from the edge of contact the pressure is K x^½ and the gap outside (4 K / 3 E*) x^{3/2}, wherever the
+probe's surface is smooth (K. L. Johnson, Contact Mechanics, 1985, ch. 4 and 5). Nodes near the edge thus give their
+distance from it. Each counts with the share of its own area inside the edge, so area and radius vary smoothly.
 """
 
 from collections.abc import Callable
@@ -18,14 +18,14 @@ from pipeline.solve.contact.active_set import Obstacle
 from pipeline.solve.contact.elements import FreeResponse, State
 from pipeline.solve.contact.surface import FACET_CORNERS, Candidates
 
-# Points on each facet where the first touch is looked for, along an edge; and then, so many times, nearer to the best
-# of each of the nearest facets.
+# Search for the first touch: sampling points along an edge of each facet, rounds of refinement, the factor by which a
+# round is finer, and the number of nearest facets that are refined.
 _ALONG, _ROUNDS, _CLOSER, _NEAREST = 8, 4, 0.25, 12
 
 
 @dataclass(frozen=True)
 class Touch:
-    """Heights (m) of the probe's surface above points (n, 3) of the undeformed one, the least of them ``first``."""
+    """Heights (m) of the probe's surface above points (n, 3) of the undeformed one; the smallest is ``first``."""
 
     height: Callable[[FloatArray], FloatArray]
     first: float = 0.0
@@ -33,9 +33,9 @@ class Touch:
     def heights(
         self, candidates: Candidates, loaded: FreeResponse | None = None, known: Candidates | None = None
     ) -> FloatArray:
-        """Return how far the probe is above each of the ``candidates`` (n, m) when it first touches the surface.
+        """Return the height (n, m) of the probe above each of the ``candidates`` at first touch.
 
-        What loads do is that of the nodes of the ``known`` candidates, None where they are the same.
+        The response to loads is given at the nodes of the ``known`` candidates; None if they are the same.
         """
         heights = self.height(candidates.points) - self.first
         if loaded is None:
@@ -45,12 +45,12 @@ class Touch:
         return np.asarray(heights - moved - self.sag(known, loaded))
 
     def sag(self, candidates: Candidates, loaded: FreeResponse) -> float:
-        """Return how much farther (m) the probe goes until it touches the surface that loads have bent."""
+        """Return how much farther (m) the probe moves to touch the surface that loads have deformed."""
         moved = loaded.moved[candidates.facets]
         return self._first(candidates, moved) - self._first(candidates, np.zeros_like(moved))
 
     def _first(self, candidates: Candidates, moved: FloatArray) -> float:
-        """Return the least gap (m) to the surface that is ``moved`` (m, k) at the nodes of its facets."""
+        """Return the smallest gap (m) to a surface displaced by ``moved`` (m, k) at the nodes of its facets."""
         x, facets, step = candidates.points[candidates.facets], np.arange(len(moved)), 1.0
         middle = np.full((len(facets), FACET_CORNERS), 1 / FACET_CORNERS)
         for _ in range(_ROUNDS):
@@ -82,21 +82,21 @@ def _grid() -> FloatArray:
     return np.column_stack([first, second, 1 - first - second])
 
 
-# K, in units of the mean pressure times (2 / a)^½, a the smaller semi-axis of contact: that of a ball.
+# K, in units of the mean pressure times (2 / a)^½, where a is the smaller semi-axis of contact: value for a ball.
 _INTENSITY = 1.5
-# The width of a node's own area, in units of the side of a square as large.
+# Width of a node's own area, in units of the side of a square of the same area.
 _WIDTH = 1.3
-# The smaller semi-axis of a ball's contact is that many times the root of its pressure's mean x².
+# Smaller semi-axis of a ball's contact, in units of the root mean square of x weighted with its pressure.
 _SEMI_AXIS = 5**0.5
-# Rounds in which K and the area that it depends on are found, and the change at which they end.
+# Fixed-point iteration for K and the area, which depend on each other: most rounds, and the change at which it ends.
 _MOST_ROUNDS, _SMALL = 60, 1e-9
-# The 95 % bar on the area, in units of the area of nodes that share a facet with the edge: docs/accuracy.md.
+# The 95 % bar on the area, in units of the area of nodes that share a facet with the contact's edge: docs/accuracy.md.
 _BAR = 0.07
 
 
 @dataclass(frozen=True)
 class Area:
-    """An area of contact (m², normal to the axis) and its relative 95 % bar, of the elements' size alone."""
+    """A contact area (m², normal to the axis) and its relative 95 % bar, for the element size alone."""
 
     value: float
     bar: float
@@ -105,7 +105,7 @@ class Area:
 def contact_area(
     obstacle: Obstacle, active: BoolArray, state: State, modulus: FloatArray, mirrored: tuple[int, ...] = ()
 ) -> Area:
-    """Return the area that touches, of the part that is modelled, bounded by planes of symmetry across ``mirrored``.
+    """Return the contact area of the modelled part, bounded by planes of symmetry normal to the axes ``mirrored``.
 
     ``modulus`` (n) is E / (1 - ν²) of the tissue at each candidate (Pa).
     """
@@ -131,7 +131,7 @@ def contact_area(
 
 
 def _semi_axis(points: FloatArray, load: FloatArray, mirrored: tuple[int, ...]) -> float:
-    """Return the smaller semi-axis (m) of the ellipse on which a ball's pressure has a ``load``'s moments."""
+    """Return the smaller semi-axis (m) of the elliptic contact of a ball with the moments of ``load``."""
     points = points - np.where(np.isin([0, 1], mirrored), 0.0, load @ points / load.sum())
     moments = (points * load[:, None]).T @ points / load.sum()
     for axis in mirrored:

@@ -1,4 +1,4 @@
-"""Operators of multigrid with candidates held along the probe's axis, other ones for each contact set."""
+"""Multigrid operators in which candidate nodes are fixed along the probe's axis, different ones for each active set."""
 
 from contextlib import ExitStack
 from typing import Any
@@ -22,7 +22,7 @@ _SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
 
 
 class Surface:
-    """The elements of a mesh, of which nodes may touch, and the candidates by their degree, found when first asked for.
+    """Elements of a mesh with unilateral contact, and the candidate nodes of each degree, found at first use.
 
     ``spaces`` are those of the mesh.
     """
@@ -39,14 +39,14 @@ class Surface:
         return self._found[degree]
 
     def elements(self, degree: int, element: str, stack: ExitStack) -> Elements:
-        """Return elements of a ``degree`` and a kind, which the ``stack`` closes; collective."""
+        """Return elements of a ``degree`` and kind, which the ``stack`` closes; collective."""
         found = elements_of(self.spaces, degree, CONDITIONS, element)
         stack.callback(found.close)
         return found
 
 
 class Numbering:
-    """Where candidates are among the local dofs of a space; takes values from there to all ranks.
+    """Positions of the candidates among the local dofs of a space, and transfer of values from there to all ranks.
 
     ``local`` (n) are the blocks of this rank, −1 where it has none.
     """
@@ -64,7 +64,7 @@ class Numbering:
         self._is_owned = (self.local >= 0) & (self.local < index_map.size_local)
 
     def normal_dofs(self, chosen: BoolArray, *, owned: bool = False) -> Int32Array:
-        """Return the local dofs (unrolled) along z of the ``chosen`` (n) that are on this rank, or only its own."""
+        """Return the local dofs (unrolled) along z of the ``chosen`` (n): all on this rank, or owned ones only."""
         here = chosen & self._is_owned if owned else chosen & (self.local >= 0)
         return np.sort(3 * self.local[here] + 2).astype(np.int32)
 
@@ -81,16 +81,16 @@ class Numbering:
 
 
 class Hierarchy:
-    """The operators of degrees 1 … p, or of p alone for a direct solve; on lower levels the set is what most say.
+    """Operators of degrees 1 … p, or of p alone for a direct solve. On lower levels the active set is a majority vote.
 
-    Unless the solve is direct, what is held changes the cycle's smoothers alone: but for degree 1, operators are never
-    changed. ``masks`` says that their user can do with that.
+    For iterations only the smoothers change with the active set: above degree 1 the operators stay the same. ``masks``
+    says that the solver supports this.
     """
 
     def __init__(
         self, surface: Surface, degree: int, law: MaterialLaw, stack: ExitStack, *, direct: bool, masks: bool = True
     ):
-        """Assemble; collective. What is made is given back with the ``stack``."""
+        """Assemble; collective. Matrices are freed with the ``stack``."""
         degrees = [degree] if direct else range(1, degree + 1)
         found = [surface.spaces.get(d, CONDITIONS) for d in degrees]
         self._operators = [
@@ -102,16 +102,16 @@ class Hierarchy:
 
     @property
     def finest(self) -> PETSc.Mat:
-        """The operator without a contact set."""
+        """The operator without an active set."""
         return self._operators[-1].free
 
     @property
     def numbering(self) -> Numbering:
-        """Where the candidates are in the finest space."""
+        """Positions of the candidates in the finest space."""
         return self._numberings[-1]
 
     def hold(self, active: BoolArray) -> list[Level]:
-        """Return the levels with the ``active`` candidates (n) held, good until the next call; collective."""
+        """Return the levels with the ``active`` candidates (n) fixed, valid until the next call; collective."""
         *coarser, finest = self._candidates
         sets = [*(finest.lowered(active, lower) for lower in coarser), active]
         return [
@@ -120,30 +120,30 @@ class Hierarchy:
         ]
 
     def hold_facets(self, facets: Int32Array) -> list[Level]:
-        """Return the levels with all of the local ``facets`` held, good until the next call; collective."""
+        """Return the levels with all of the local ``facets`` fixed, valid until the next call; collective."""
         return [operator.hold(normal_dofs(operator.space, facets)) for operator in self._operators]
 
 
 class HeldOperator:
-    """The operator of one space, of which more dofs are held than its conditions say, and others each time.
+    """The operator of a space with further fixed dofs, which change from call to call.
 
-    ``free`` has the conditions of the space alone. ``masked`` leaves the holding to who smooths.
+    ``free`` has the conditions of the space alone. With ``masked`` the smoothers fix the dofs, not the operator.
     """
 
     def __init__(self, space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, direct: bool, masked: bool):
-        """Assemble; collective. What is made is freed with the ``stack``."""
+        """Assemble; collective. Matrices are freed with the ``stack``."""
         matrix = stack.enter_context(space.lend(law, entries=direct))
         self.space, self._matrix, self._law, self._is_masked = space, matrix, law, masked
         self.free, self._is_held, self._stack = matrix, False, stack
         if not masked and not is_product(matrix):
-            # A matrix of PETSc multiplies faster than its copy: the copy is what others are made from.
+            # An assembled PETSc matrix multiplies faster than its copy: other matrices are made from the copy.
             self.free = matrix.copy()
             stack.callback(self.free.destroy)
 
     def hold(self, dofs: Int32Array) -> Level:
-        """Return the level in which the local ``dofs`` (unrolled, owned and ghosts), too, are held; collective.
+        """Return the level with the local ``dofs`` (unrolled, owned and ghosts) fixed, too; collective.
 
-        It is good until the next call.
+        It is valid until the next call.
         """
         space, matrix, is_uniform = self.space, self._matrix, self._law.is_uniform
         if not self._is_masked and is_product(matrix):

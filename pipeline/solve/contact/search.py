@@ -1,10 +1,10 @@
-"""Found contact: where a probe touches, without friction, tension or penetration.
+"""Unilateral contact with unknown area, without friction, tension or penetration.
 
-The active set is found on elements of degree 1 first, which costs little, then on those of higher degrees. F is the sum
-of the reactions K u on its nodes. It is no bound: a coarse contact area may be too large or too small.
+The active set is found on elements of degree 1 first, at little cost, then on higher degrees. F is the sum of the
+reactions K u of its nodes. F is no bound: a coarse contact area may be too large or too small.
 
-Loads bend the surface before the probe touches it: the depth counts from the first touch of that surface, along the
-axis.
+Loads deform the surface before the probe touches it. The depth counts from the first touch of the deformed surface,
+along the axis.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,22 +32,22 @@ from pipeline.solve.solution import Request
 from pipeline.solve.spaces import Spaces
 from pipeline.stages import recharge, recorded, stage
 
-# Energy norm of the error to which each set but the last one is solved, relative to that of the solution.
+# Energy norm of the error for all active sets but the last one, relative to that of the solution.
 _LOOSE = 1e-3
-# Stricter than what serves a prescribed displacement: F is linear in the solver's error here.
+# Factor on the tolerance of a prescribed displacement: here F is linear in the solver's error.
 _STRICTER = 0.01
-# The first set is looked for in a material that elements of degree 1 do not lock in: λ/μ at most (ν = 0.3).
+# Largest λ/μ for the first active set (ν = 0.3), so that elements of degree 1 do not lock.
 _FIRST_RATIO = 1.5
 
 
 @dataclass(frozen=True)
 class Tool:
-    """A probe's surface, to be pushed in along -z.
+    """A probe's surface, pressed in along -z.
 
-    ``height`` gives, at points (n, 3) of the undeformed surface (m), how far above each the probe's surface is before
-    it moves, infinite where there is no probe. ``ends_at`` tells of points (n, 3) on the candidates' edge whether the
-    probe itself ends there: elsewhere contact must not reach that edge. ``first`` (m) is the least height, none where
-    it touches on its axis first.
+    ``height`` gives the initial height of the probe above points (n, 3) of the undeformed surface (m), infinite where
+    there is no probe. ``ends_at`` is a mask of points (n, 3) on the edge of the candidates: true where the probe itself
+    ends. Elsewhere contact must not reach that edge. ``first`` (m) is the smallest height; None if the probe touches on
+    its axis first.
     """
 
     height: Callable[[FloatArray], FloatArray]
@@ -56,14 +56,13 @@ class Tool:
 
 
 class ContactSearch:
-    """Finds what touches of a tool, for any material and depth; ``contact`` is what was found last, None before."""
+    """Finds the contact of a tool for any material and depth; ``contact`` is the last one found, or None."""
 
     def __init__(self, spaces: Spaces, elements: Elements, tool: Tool, *, reuse: bool = False, condense: bool = False):
         """Prepare; collective.
 
-        With ``reuse``, a depth begins with what is known of others of the same material. ``condense`` says that many
-        depths of each material are to come: where the body is small, its surface is condensed for them, and they share
-        error bars.
+        With ``reuse``, earlier depths of the same material give the initial guess. ``condense`` says that many depths
+        of each material follow: the surface of a small body is then condensed for them, and they share error bars.
         """
         self._elements, self._tool = elements, tool
         self._surface, self._touch = Surface(spaces), Touch(tool.height, tool.first)
@@ -71,10 +70,10 @@ class ContactSearch:
         self._supported = self._held_by_support()
         self.contact: FoundContact | None = None
         self._reuse, self._condense = reuse or condense, condense
-        self._sweep: Sweep | None = None  # what is kept of a material
+        self._sweep: Sweep | None = None  # kept from depth to depth of one material
 
     def close(self) -> None:
-        """Free what is kept from solve to solve."""
+        """Free what is kept between solves."""
         self.contact = None
         if self._sweep is not None:
             self._sweep.close()
@@ -82,12 +81,12 @@ class ContactSearch:
 
     @stage("solve")
     def solve(self, asked: Request, stack: ExitStack) -> Equilibrium:
-        """Find the contact at the depth of the movement, and the force; collective. The ``stack`` frees what is made.
+        """Find contact and force at the depth of the movement; the ``stack`` frees what is made; collective.
 
         Raises:
-            SolveError: if a linear solver fails, or the solution a check.
-            ContactError: if the contact does not settle, reaches the candidates' edge where the probe does not end, or
-                what is held of the body.
+            SolveError: if a linear solver fails, or the solution fails a check.
+            ContactError: if the contact does not settle, reaches the support, or reaches the candidates' edge where
+                the probe does not end.
         """
         law, movement, strict = asked.law, asked.movement, _STRICTER * asked.tolerance
         columns = self._elements.columns(movement, stack)
@@ -97,7 +96,7 @@ class ContactSearch:
         loaded = None if movement.loads is None else elements.free_response(columns[-1], strict)
         obstacle = self._obstacle(self.candidates, depth, loaded)
         if np.any(obstacle.bounds[self._supported] < 0):
-            raise ContactError("the probe runs into what is held of the body: no displacement satisfies both")
+            raise ContactError("the probe reaches the fixed part of the body: no displacement satisfies both")
         first, found = self._find(sweep, obstacle, (_LOOSE, strict), loaded)
         self._check_edge(found.active)
         unknowns = elements.unknowns()
@@ -119,12 +118,12 @@ class ContactSearch:
         iterations = first + found.sets
         return Equilibrium(contact, columns, movement, iterations, response, contact=contact.summary(sag))
 
-    # ---- what acts besides the probe ------------------------------------------------------------------
+    # ---- far field ------------------------------------------------------------------------------------
 
     def _couple(
         self, elements: ContactElements, movement: Movement, columns: Sequence[Column], mu: float, tolerance: float
     ) -> None:
-        """Let the far field of ``movement``, if there is one, act on the cut face; collective."""
+        """Couple the far field of ``movement``, if there is one, to the cut face; collective."""
         if movement.far is None:
             elements.couple(None)
             return
@@ -139,18 +138,18 @@ class ContactSearch:
     # ---- contact --------------------------------------------------------------------------------------
 
     def _obstacle(self, candidates: Candidates, depth: float, loaded: FreeResponse | None) -> Obstacle:
-        """Return what is in the way of candidates of some degree at a ``depth`` (m), far field aside."""
+        """Return the obstacle above candidates of some degree at a ``depth`` (m), without the far field."""
         return Obstacle(candidates, self._touch.heights(candidates, loaded, self.candidates) - depth, depth)
 
     def _find(
         self, sweep: Sweep, obstacle: Obstacle, tolerances: tuple[float, float], loaded: FreeResponse | None
     ) -> tuple[int, Found]:
-        """Return how many sets of lower degrees were solved, and what was found; collective."""
+        """Return the number of active sets solved in lower degrees, and the contact found; collective."""
         try:
             found = sweep.find(obstacle, tolerances)
             if found is not None:
                 return 0, found
-        except SolveError:  # afresh, then
+        except SolveError:  # then without the initial guess
             if sweep.elements.is_exact:
                 raise
         with ExitStack() as stack:
@@ -162,7 +161,7 @@ class ContactSearch:
     def _first_set(
         self, sweep: Sweep, depth: float, loaded: FreeResponse | None, stack: ExitStack
     ) -> tuple[int, ContactElements, Found]:
-        """Return sets solved, the elements of one degree less, and what was found on them; collective."""
+        """Return the sets solved, the elements of one degree less, and the contact found on them; collective."""
         sets, found = 0, None
         elements: ContactElements | None = None
         for degree in range(1, self._elements.degree):
@@ -187,9 +186,9 @@ class ContactSearch:
         return sets, elements, found
 
     def _sweep_of(self, law: MaterialLaw, method: str, stack: ExitStack) -> Sweep:
-        """Return what is kept of a material, or new elements, which are freed with the ``stack`` if not to be kept.
+        """Return the sweep kept for a material, or a new one; the ``stack`` frees it unless it is to be kept.
 
-        Where the surface is to be condensed, it is; collective.
+        The surface is condensed if that was requested; collective.
         """
         if self._sweep is not None and (self._sweep.law, self._sweep.method) == (law, method):
             recharge(self._sweep.cost)
@@ -208,7 +207,7 @@ class ContactSearch:
         return sweep
 
     def _held_by_support(self) -> BoolArray:
-        """Tell which candidates (n) are held by the support; collective. Of them none is ever found to touch."""
+        """Return a mask (n) of candidates that the support fixes; they never become active; collective."""
         space = self._elements.displacements
         is_held = np.zeros(space.owned)
         is_held[3 * space.fixed_owned + 2] = 1.0
@@ -218,6 +217,6 @@ class ContactSearch:
         points = self.candidates.points[active & self.candidates.is_edge]
         if not np.all(self._tool.ends_at(points)):
             raise ContactError(
-                "the contact reaches the edge of the part of the surface where it is looked for: "
-                "press the probe in less far, or set it up straighter"
+                "the contact reaches the edge of the surface region that is searched for contact: "
+                "use a smaller depth, or align the probe's axis with the surface normal"
             )

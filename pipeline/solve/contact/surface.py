@@ -1,6 +1,6 @@
-"""The part of a body's surface that a probe may touch: its facets and their nodes, the same on every rank.
+"""Candidate nodes: the part of a body's surface that a probe may touch, its facets and nodes, equal on every rank.
 
-Contact is decided node by node for all ranks at once: they are a few thousand at most, and each rank holds them all.
+The active set is decided for all ranks at once. Candidates are a few thousand at most, and each rank stores them all.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from pipeline.scene.model import PROBE
 from pipeline.solve.conditions import Conditions
 
 FACET_CORNERS = 3
-# The corners of a reference tetrahedron's facet that is opposite to each of its own, and an equilateral facet.
+# Corners of the facet opposite to each corner of the reference tetrahedron, and an equilateral facet.
 _OPPOSITE = [[j for j in range(4) if j != i] for i in range(4)]
 _EQUILATERAL = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.75**0.5]])
 
@@ -26,9 +26,9 @@ _EQUILATERAL = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.75**0.5]])
 class FacetNodes:
     """The k nodes of a facet, corners first.
 
-    ``places`` (4, k) are their numbers in a cell, for each of its facets, ``corners`` (k, 3) their barycentric
-    coordinates. ``boundary`` are the nodes on the edges, once round; ``edges`` (3, ·) those of each edge, its two ends
-    first. ``weights`` (k) are the shares of an even pressure.
+    ``places`` (4, k) are their numbers within a cell, for each of its facets, ``corners`` (k, 3) their barycentric
+    coordinates. ``boundary`` are the nodes along the edges, in order; ``edges`` (3, ·) those of each edge, its two ends
+    first. ``weights`` (k) are the nodal shares of a uniform pressure.
     """
 
     degree: int
@@ -40,19 +40,19 @@ class FacetNodes:
 
     @property
     def facets_per_node(self) -> FloatArray:
-        """How many facets have each node (k): inside one, two beside an edge, and six round a corner or so."""
+        """Number of facets that share each node (k): one inside, two on an edge, about six at a corner."""
         found = np.ones(len(self.corners))
         found[self.boundary] = 2.0
         found[:FACET_CORNERS] = 6.0
         return found
 
     def distances(self, other: "FacetNodes") -> FloatArray:
-        """Return the distances (k, l) to the nodes of another degree, in lengths of an edge of an even facet."""
+        """Return the distances (k, l) to the nodes of another degree, in edge lengths of an equilateral facet."""
         here, there = self.corners @ _EQUILATERAL, other.corners @ _EQUILATERAL
         return np.asarray(np.linalg.norm(here[:, None] - there[None], axis=2))
 
     def values(self, points: FloatArray) -> FloatArray:
-        """Return the nodes' functions at points (q, 3) in barycentric coordinates, (q, k)."""
+        """Return the shape functions at points (q, 3) in barycentric coordinates, (q, k)."""
         return np.asarray(np.linalg.solve(_monomials(self.degree, self.corners).T, _monomials(self.degree, points).T).T)
 
 
@@ -86,23 +86,22 @@ def facet_nodes(degree: int) -> FacetNodes:
     return FacetNodes(degree, places, first, on_edge[np.argsort(angle[on_edge])], np.array(edges), weights)
 
 
-# What is held is the contact set's alone; of the footprint as such nothing is.
+# Conditions without a footprint: the active set alone prescribes displacements.
 CONDITIONS = Conditions(bonded=False, unilateral=True)
-# A point nearer to a plane of symmetry than this, in units of the candidates' extent, is in it.
+# A point counts as in a plane of symmetry within this distance, in units of the candidates' extent.
 _IN_PLANE = 1e-9
-# Nodes of another degree are near those of degree p within this share of an edge, divided by p: its mid nodes, too.
+# Nodes of two degrees are neighbours within this share of an edge, divided by p; mid nodes are included.
 _NEAR = 0.6
 
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Nodes of one degree that may touch, and the facets between them; equal on every rank.
+    """Candidate nodes of one degree, and the facets between them; equal on every rank.
 
     ``numbers`` (n) are the nodes' global numbers (blocks) in the space, ``points`` (n, 3) are in m. ``facets`` (m, k)
-    index the nodes, in the order of ``shape``; candidates of another degree on the same mesh have the same facets.
-    ``is_edge`` (n) tells which nodes bound the candidates, planes of symmetry aside. ``regions`` (m) are those of the
-    tissue below the facets. ``local_facets`` (m) alone differ: the numbers of facets on this rank, −1 of those of
-    others.
+    index the nodes, in the order of ``shape``; candidates of all degrees on a mesh have the same facets. ``is_edge``
+    (n) marks nodes on the boundary of the candidates, planes of symmetry aside. ``regions`` (m) are those of the tissue
+    below the facets. Only ``local_facets`` (m) differ by rank: the facets' numbers there, −1 for facets of others.
     """
 
     numbers: IntArray
@@ -118,7 +117,7 @@ class Candidates:
 
     @cached_property
     def is_corner(self) -> BoolArray:
-        """Which nodes are corners of facets (n)."""
+        """Mask of the nodes that are corners of facets (n)."""
         return self._marked(self.facets[:, :FACET_CORNERS])
 
     @cached_property
@@ -130,48 +129,48 @@ class Candidates:
 
     @cached_property
     def weights(self) -> FloatArray:
-        """The areas (m²) of which an even pressure acts on each node, (n): on corners of degree 2 it does not."""
+        """Nodal forces of a uniform unit pressure, i.e. areas (m²), (n): zero at corners in degree 2."""
         return np.asarray(np.bincount(self.facets.ravel(), np.outer(self.areas, self.shape.weights).ravel(), len(self)))
 
     @cached_property
     def widths(self) -> FloatArray:
-        """The sides of squares as large as the area of each node (m), in a plane of symmetry, too; (n)."""
+        """Sides (m) of squares with the area of each node, (n); planes of symmetry are accounted for."""
         shares = np.outer(self.areas, self.shape.weights * self.shape.facets_per_node).ravel()
         count = np.bincount(self.facets.ravel(), minlength=len(self))
         return np.asarray(np.sqrt(np.bincount(self.facets.ravel(), shares, len(self)) / count))
 
     def enclosed(self, active: BoolArray) -> BoolArray:
-        """Tell of each corner whether all nodes next to it on its edges are active; (n)."""
+        """Return a mask (n) of corners whose neighbours along all edges are active."""
         if self.shape.degree == 1:
             return np.zeros(len(self), dtype=bool)
         corner, beside = self._beside_corners.T
         return np.asarray((np.bincount(corner, ~active[beside], len(self)) == 0) & self.is_corner)
 
     def bordering(self, active: BoolArray) -> BoolArray:
-        """Tell which nodes share a facet with active and with other nodes, corners not counted; (n)."""
+        """Return a mask (n) of nodes that share a facet with both active and inactive nodes; corners do not count."""
         inner = active[self.facets[:, FACET_CORNERS:]]
         return self._marked(self.facets[inner.any(axis=1) & ~inner.all(axis=1)])
 
     def closed(self, active: BoolArray) -> BoolArray:
-        """Tell of which facets all nodes but the corners are active; (m)."""
+        """Return a mask (m) of facets whose nodes, corners aside, are all active."""
         return np.asarray(active[self.facets[:, FACET_CORNERS:]].all(axis=1))
 
     def held_facets(self, active: BoolArray) -> Int32Array:
-        """Return the local numbers of the facets on this rank that are closed."""
+        """Return the local numbers of the closed facets on this rank."""
         return self.local_facets[self.closed(active) & (self.local_facets >= 0)]
 
     def raised(self, active: BoolArray, higher: "Candidates") -> BoolArray:
-        """Return the nodes of a ``higher`` degree that active ones suggest: those near one of them."""
+        """Return the initial guess in a ``higher`` degree: its nodes near an active node."""
         pairs = self._near(higher)
         return higher._marked(pairs[active[pairs[:, 0]], 1])
 
     def lowered(self, active: BoolArray, lower: "Candidates") -> BoolArray:
-        """Return the nodes of a ``lower`` degree round which most nodes are active."""
+        """Return the nodes of a ``lower`` degree around which most nodes are active."""
         near, this = lower._near(self).T
         return np.asarray(np.bincount(near, np.where(active[this], 1.0, -1.0), len(lower)) > 0)
 
     def _near(self, higher: "Candidates") -> IntArray:
-        """Return nodes and those of a ``higher`` degree that are near them, (k, 2), each pair once."""
+        """Return pairs (k, 2) of a node and a neighbouring node of a ``higher`` degree, each once."""
         near = np.argwhere(self.shape.distances(higher.shape) < _NEAR / self.shape.degree)
         pairs = [np.column_stack([self.facets[:, i], higher.facets[:, j]]) for i, j in near]
         return np.unique(np.concatenate(pairs), axis=0)
@@ -189,7 +188,7 @@ class Candidates:
 
 
 def find_candidates(body: BodyMesh, space: Any) -> Candidates:
-    """Return the nodes of ``space`` in the footprint of ``body``; collective."""
+    """Return the nodes of ``space`` on the footprint of ``body``; collective."""
     topology, tdim = body.mesh.topology, body.mesh.topology.dim
     facets = body.facets[PROBE]
     topology.create_connectivity(tdim, tdim - 1)
@@ -213,7 +212,7 @@ def find_candidates(body: BodyMesh, space: Any) -> Candidates:
 def _assembled(
     body: BodyMesh, of_facets: IntArray, x: FloatArray, shape: FacetNodes, regions: IntArray, local: Int32Array
 ) -> Candidates:
-    """Number the nodes of facets of all ranks, in an order that does not depend on how many there are."""
+    """Number the nodes of the facets of all ranks, in an order independent of the number of ranks."""
     _, first = np.unique(of_facets, return_index=True)
     points = x.reshape(-1, 3)[first]
     order = np.lexsort(points.T)
@@ -225,7 +224,7 @@ def _assembled(
 
 
 def _edge(body: BodyMesh, points: FloatArray, facets: IntArray, shape: FacetNodes) -> BoolArray:
-    """Tell which nodes bound the facets, planes of symmetry aside."""
+    """Return a mask of nodes on the boundary of the facets, planes of symmetry aside."""
     is_edge = np.zeros(len(points), dtype=bool)
     edges = np.concatenate([facets[:, edge] for edge in shape.edges])
     _, which, count = np.unique(np.sort(edges[:, :2], axis=1), axis=0, return_inverse=True, return_counts=True)

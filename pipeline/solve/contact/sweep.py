@@ -1,4 +1,4 @@
-"""What depths of one material on one mesh have in common: elements, what was found, how far F was from the truth."""
+"""Data shared by the depths of one material on one mesh: elements, contacts found, and error bars."""
 
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -12,19 +12,20 @@ from pipeline.solve.movement import FarField
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import Times
 
-# Between two depths of which the larger is at most so many times the smaller one, error bars are those of these two.
+# Error bars are shared between two depths that differ by at most this factor.
 NEAR = 2.0
-# And this many times the larger of both: nodes of contact are gained one by one, and bars jump with them.
+# A depth between them gets the larger bar times this factor: contact gains whole nodes, and bars jump with them.
 _SAFE = 1.25
-# So many depths are remembered: in a sweep in order the last ones are the neighbours.
+# Number of remembered depths: in an ordered sweep the last ones are the nearest.
 _REMEMBERED = 2
+# Two depths are extrapolated to a third at most this many times their own distance away.
 # Two depths tell of a third that is at most so many times as far from them as they are from each other.
 _FARTHEST = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """Where to begin: a set (n), what the elements solve for (owned dofs), twice the energy (J) about."""
+    """An initial guess: active set (n), unknowns of the elements (owned dofs), twice the energy (J), estimated."""
 
     active: BoolArray
     unknowns: Unknowns
@@ -40,9 +41,9 @@ class _Known:
 
 @dataclass(eq=False)
 class Sweep:
-    """Depths of the material of ``law``, by ``elements`` that live until ``close``; ``method`` was asked for.
+    """Depths of the material ``law`` with ``elements`` that live until ``close``; ``method`` is the requested solver.
 
-    ``cost`` is what the elements took to make.
+    ``cost`` is that of setting up the elements.
     """
 
     law: MaterialLaw
@@ -58,9 +59,9 @@ class Sweep:
         self.stack.close()
 
     def find(self, obstacle: Obstacle, tolerances: tuple[float, ...]) -> Found | None:
-        """Return what the neighbours lead to, or, on a condensed surface, all that is in the way; None without them.
+        """Return the contact from the initial guess of earlier depths; None without one; collective.
 
-        Collective.
+        On a condensed surface the initial guess is every candidate that the undeformed surface would touch.
 
         Raises:
             SolveError: if the solver fails.
@@ -76,8 +77,9 @@ class Sweep:
         return find_set(self.elements, obstacle, guess.active, tolerances, guess.energy)
 
     def guess(self, obstacle: Obstacle) -> Guess | None:
-        """Return what to begin with at the depth of an ``obstacle``, or None: what is nearest is scaled, or
-        extrapolated where two are known.
+        """Return the initial guess for an ``obstacle``, or None.
+
+        The nearest depth is scaled; from two depths it is extrapolated.
         """
         if not self._known:
             return None
@@ -102,19 +104,19 @@ class Sweep:
         return Guess(active, unknowns, last.found.state.energy * (obstacle.depth / last.depth) ** 2)
 
     def keep(self, depth: float, found: Found, unknowns: Unknowns) -> None:
-        """Remember what was ``found`` at a ``depth`` (m), and what was solved for there."""
+        """Remember the contact ``found`` at a ``depth`` (m), and its unknowns."""
         others = [known for known in self._known if known.depth != depth]
         self._known = [*others, _Known(depth, found, unknowns)][-_REMEMBERED:]
 
     def keep_bar(self, depth: float, taken: float, share: float, far: FarField | None = None) -> None:
-        """Remember the share of the energy that one degree more takes away at a ``depth`` (m), and the force's bar.
+        """Remember two shares at a ``depth`` (m): of the energy that one degree more removes, and of the force's bar.
 
-        ``far`` is the far field on the cut face, None without one: another one has other bars.
+        ``far`` is the far field on the cut face, or None; bars are not shared between different far fields.
         """
         self._bars.setdefault(far, {})[depth] = taken, share
 
     def bar(self, depth: float, far: FarField | None = None) -> tuple[float, float] | None:
-        """Return both shares between two near depths for which they are known, on a condensed surface alone."""
+        """Return both shares from two neighbouring depths with known bars; only on a condensed surface."""
         bars = self._bars.get(far, {})
         below, above = [d for d in bars if d <= depth], [d for d in bars if d >= depth]
         if not (self.elements.is_exact and below and above):

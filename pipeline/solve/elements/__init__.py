@@ -1,4 +1,4 @@
-"""The elements of a body, by their kind: displacements alone, or displacements and pressures (mixed)."""
+"""Elements of a body: displacement elements, or mixed elements with displacements and pressures."""
 
 from pipeline.solve.conditions import Conditions
 from pipeline.solve.elements.base import Elements
@@ -8,7 +8,7 @@ from pipeline.solve.spaces import Spaces
 
 
 def elements_of(spaces: Spaces, degree: int, conditions: Conditions, element: str = "displacement") -> Elements:
-    """Return elements of a kind, "displacement" or "mixed", and a ``degree``; collective.
+    """Return elements of a ``degree``, of the kind "displacement" or "mixed"; collective.
 
     Raises:
         SolveError: if footprint and support share a point: no displacement satisfies both.

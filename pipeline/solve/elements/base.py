@@ -1,4 +1,4 @@
-"""What all elements have in common: unknown fields, load cases, and what solutions do."""
+"""Base classes of elements and their solvers: unknown fields, load cases, and energies of solutions."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
@@ -30,10 +30,10 @@ Fields = tuple[PETSc.Vec, ...]
 
 @dataclass(eq=False)
 class Column:
-    """One load case and its solution: a unit of a motion, or dead loads on a probe that is held.
+    """One load case and its solution: a unit of a motion, or dead loads on a fixed probe.
 
-    The solution is ``unknown``, whose prescribed dofs are nought, and ``prescribed`` (m, local dofs with ghosts).
-    ``right`` is the right-hand side for the unknown. ``amount`` is that of the motion (m, or rad), 1 for loads.
+    The solution is ``unknown``, with zeros at prescribed dofs, plus ``prescribed`` (m, local dofs with ghosts).
+    ``right`` is the right-hand side of the unknown. ``amount`` is that of the motion (m, or rad), 1 for loads.
     """
 
     prescribed: FloatArray
@@ -45,10 +45,10 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class Products:
-    """What n solutions do: displacements ``moved`` (m) and ``residuals`` (N) of the unmodified operator, owned dofs.
+    """Of n solutions: displacements ``moved`` (m) and ``residuals`` (N) of the unmodified operator, owned dofs.
 
-    ``stationary`` (n, n), J, are a(u_i, u_j), or what takes their place in mixed elements, stationary at the solution;
-    ``energies`` (n) are twice the strain energies. Energies are global, of the part that is modelled.
+    ``stationary`` (n, n), J, are a(u_i, u_j), or in mixed elements the form that is stationary at the solution.
+    ``energies`` (n) are twice the strain energies. Energies are global, of the modelled part.
     """
 
     space: ElasticSpace
@@ -60,11 +60,11 @@ class Products:
 
 @dataclass(frozen=True, eq=False)
 class Enriched:
-    """What one degree more makes of n solutions: ``columns`` in ``elements`` of that degree, if they were to be kept.
+    """Hierarchical estimate of n solutions, from one degree more.
 
-    ``decrements`` (n, n), J, is what it takes from their energies, None where that is to be found from the columns;
-    ``unseen`` (n), J, are N of mixed elements; ``relative`` (n) are 95 % bars, None where they follow from both;
-    ``area_bar`` is that on the area of contact that is found.
+    ``columns`` are the solutions in ``elements`` of that degree, if requested. ``decrements`` (n, n), J, is the
+    reduction of the energies, None if the columns give it. ``unseen`` (n), J, are N of mixed elements. ``relative`` (n)
+    are 95 % bars, None if they follow from both. ``area_bar`` is that on the area of unilateral contact.
     """
 
     elements: "Elements"
@@ -77,7 +77,7 @@ class Enriched:
 
 
 class Enriching(Protocol):
-    """What goes on in one degree more."""
+    """An object with a hierarchical estimate from one degree more."""
 
     @property
     def stored(self) -> float | None:

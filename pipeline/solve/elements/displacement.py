@@ -20,7 +20,7 @@ from pipeline.stages import Times, recharge, recorded
 
 
 class DisplacementElements(Elements):
-    """Displacements alone."""
+    """Displacement elements."""
 
     element, stricter, masks = "displacement", 1.0, True
 
@@ -30,11 +30,11 @@ class DisplacementElements(Elements):
 
     @property
     def direct_limit(self) -> int:
-        """Unknowns up to which a factorisation is faster than iterations."""
+        """Number of unknowns up to which a factorisation is faster than iterations."""
         return DIRECT_LIMIT[self.degree]
 
     def close(self) -> None:
-        """Free what is kept from solve to solve."""
+        """Free what is kept between solves."""
         if self._kept is not None:
             self._kept.close()
         self._kept = None
@@ -42,8 +42,8 @@ class DisplacementElements(Elements):
     def set_up(self, law: MaterialLaw, stack: ExitStack, *, direct: bool, keep: bool) -> "DisplacementSolver":
         """Return a solver.
 
-        What is kept begins each solve from the best sum of earlier solutions. A factorisation is not kept: it takes
-        much memory beside the next degree.
+        A kept solver recycles earlier solutions for the initial guess. A factorisation is not kept: it would take much
+        memory besides the next degree.
         """
         if self._kept is not None and self._kept.law == law and keep and not direct:
             recharge(self._kept.cost)
@@ -68,7 +68,7 @@ class DisplacementElements(Elements):
     def solver_on(
         self, levels: list[Level], law: MaterialLaw, held: Int32Array, *, direct: bool, earlier: Solver | None
     ) -> "DisplacementSolver":
-        """Return a solver of operators in which more dofs are held."""
+        """Return a solver of operators in which further dofs are fixed."""
         if isinstance(earlier, DisplacementSolver) and earlier.linear.cycle is not None:
             earlier.linear.hold(levels)
             return earlier
@@ -77,7 +77,7 @@ class DisplacementElements(Elements):
         return DisplacementSolver(self, law, levels, direct=direct)
 
     def operator(self, stiffness: PETSc.Mat, law: MaterialLaw, *, entries: bool) -> Callable[[Fields, Fields], None]:
-        """Return what writes K u into other fields."""
+        """Return a function that writes K u into other fields."""
         return lambda fields, result: stiffness.mult(fields[0], result[0])
 
     def finer(
@@ -85,7 +85,7 @@ class DisplacementElements(Elements):
     ) -> tuple["DisplacementElements", LinearSolver]:
         """Return elements of one degree more and a solver above ``levels``, freed with the stack.
 
-        ``below`` is the solver of ``levels``, if it is still there.
+        ``below`` is the solver of ``levels``, unless it was closed.
         """
         finer = DisplacementElements(self._spaces, self.degree + 1, self._conditions)
         if len(levels) == 1 and self.degree > 1:
@@ -95,9 +95,9 @@ class DisplacementElements(Elements):
 
 
 class DisplacementSolver(Solver):
-    """A solver of displacement elements for a law, by its ``levels``, and the one above it, once it was made.
+    """A solver of displacement elements for a law, by its ``levels``, and the solver above it once it was made.
 
-    ``cost`` is what it took to make.
+    ``cost`` is that of its set-up.
     """
 
     elements: DisplacementElements
@@ -111,19 +111,19 @@ class DisplacementSolver(Solver):
         self.linear = self.owner.enter_context(LinearSolver(levels, direct=direct))
 
     def solve(self, columns: Sequence[Column], tolerance: float, target: float | None = None) -> int:
-        """Lower the energy norm of each error, relative to that of the solution; return the iterations."""
+        """Reduce the energy norm of each error, relative to that of the solution; return the iterations."""
         self._tolerance = tolerance
         return sum(self.linear.solve(column.right[0], column.unknown[0], tolerance, target) for column in columns)
 
     def improve(self, columns: Sequence[Column], share: float) -> int:
-        """Lower it to that ``share`` of what the last solve left; return the iterations."""
+        """Reduce it to this ``share`` of what the last solve left; return the iterations."""
         return self.solve(columns, share * self._tolerance)
 
     def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
-        """Solve on in one degree more, from the residuals there."""
+        """Return the hierarchical estimate, from the residuals in one degree more."""
         coarse = self.elements
         if self.linear.cycle is None and coarse.degree > 1:
-            self.linear.close()  # what the next degree takes is the most memory of all
+            self.linear.close()  # the next degree sets the peak of memory
         self._above = self._above or coarse.finer(self.law, self.levels, self.owner, self.linear)
         finer, solver = self._above
         space, residuals = finer.displacements, []

@@ -1,13 +1,13 @@
-"""Mixed elements for nearly and fully incompressible tissue: Taylor–Hood, P_k / P_{k-1}, u and a pressure p, to ν = ½.
+"""Mixed elements for nearly and fully incompressible tissue: Taylor–Hood, P_k / P_{k-1}, u and pressure p, up to ν = ½.
 
-λ = λ₀ + λ₁ is split, λ₀ = μ. The energy is ½ ∫ λ₀ (div u)² + 2μ ε(u) : ε(u) + λ₁ (Π div u)², with Π the projection onto
-the pressures and p = λ₁ Π div u:
+λ = λ₀ + λ₁ is split, with λ₀ = μ. The energy is ½ ∫ λ₀ (div u)² + 2μ ε(u) : ε(u) + λ₁ (Π div u)², with Π the projection
+onto the pressures and p = λ₁ Π div u:
 
     a₀(u, v) + b(v, p) = 0,    b(u, q) − (1/λ₁) (p, q) = 0,    b(v, q) = ∫ q div v.
 
-Divided by μ, all but 1/λ₁ is the same for every material, and is set up once. In several materials λ₀, λ₁ and μ belong
-to the region, and pressures jump between regions. F is no upper bound, and F_k − F_{k+1} may have either sign: N, the
-energy norm squared of the correction in degree k + 1, is given, too.
+Divided by μ, all terms but 1/λ₁ are the same for every material, and are set up once. With several materials λ₀, λ₁ and
+μ depend on the region, and pressures jump between regions. F is no upper bound, and F_k − F_{k+1} may have either sign.
+The solver therefore also gives N, the energy norm squared of the correction in degree k + 1.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -31,19 +31,19 @@ from pipeline.solve.saddle import Saddle, SaddleSolver
 from pipeline.solve.spaces import Spaces
 from pipeline.stages import Times, recharge, recorded, stage
 
-# λ₀/μ = 1 (ν = ¼): small enough for the multigrid, large enough for the pressure's mass to be a good preconditioner.
+# λ₀/μ = 1 (ν = ¼): small enough for multigrid, large enough for the pressure's mass to be a good preconditioner.
 LAME = MaterialLaw.of(1.0, 1.0)
-# Relative energy norm of the error to which the solution of degree k + 1 is found for the error bar.
+# Relative energy norm of the error of the solution of degree k + 1, for the error bar.
 _ESTIMATE_TOLERANCE = 0.1
 
 
 class MixedElements(Elements):
-    """Displacements of degree k and pressures of degree k - 1, for λ > μ somewhere, infinity too.
+    """Displacements of degree k and pressures of degree k - 1, for a law with λ > μ somewhere, infinite included.
 
-    Set-ups are shared by all laws that have the same λ₀ and μ up to a unit, as those of one material have.
+    Laws with the same λ₀ and μ up to a factor share one set-up, as all laws of one material do.
     """
 
-    # Forces balance at a tenth of the tolerance that F needs: three iterations more, less than to find out and go on.
+    # Forces balance at a tenth of the tolerance for F: three more iterations, less than a second round would cost.
     element, stricter, masks = "mixed", 0.1, False
     # Measured for degrees 2 and 3 (docs/solvers.md).
     direct_limit = 1_500
@@ -60,16 +60,16 @@ class MixedElements(Elements):
 
     @property
     def dofs(self) -> int:
-        """Unknowns of the modelled part."""
+        """Number of unknowns of the modelled part."""
         return super().dofs + self.pressures.dofs
 
     @property
     def whole_dofs(self) -> int:
-        """Unknowns of the whole body."""
+        """Number of unknowns of the whole body."""
         return super().whole_dofs + self.pressures.whole_dofs
 
     def close(self) -> None:
-        """Free what is kept from solve to solve."""
+        """Free what is kept between solves."""
         if self._finer is not None:
             self._finer.close()
         self._set_up.close()
@@ -84,22 +84,22 @@ class MixedElements(Elements):
         return SplitLaw.of(law).unit
 
     def compliance(self, law: MaterialLaw) -> float | FloatArray:
-        """Return 1/λ₁ in units of the law, one number or one for each pressure of this rank."""
+        """Return 1/λ₁ in units of the law: one number, or one for each pressure of this rank."""
         return self.pressures.by_region(SplitLaw.of(law).compliance)
 
     @contextmanager
     def fields(self) -> Iterator[Fields]:
-        """Lend displacement and pressure of zeros."""
+        """Lend zero fields of displacement and pressure."""
         with super().fields() as (u,), vector(self.pressures.space) as p:
             yield u, p
 
     def set_fields(self, fields: Fields) -> None:
-        """Make ``fields`` those of the forms."""
+        """Copy ``fields`` to the fields of the forms."""
         super().set_fields(fields)
         self.pressures.set(fields[1])
 
     def start_from(self, coarse: Elements, unknown: Fields, prescribed: FloatArray) -> None:
-        """Begin with the fields of ``coarse``; of displacement elements there is no pressure."""
+        """Interpolate the initial guess from ``coarse``; displacement elements give no pressure."""
         super().start_from(coarse, unknown, prescribed)
         if isinstance(coarse, MixedElements):
             self.pressures.forms.pressure.interpolate(coarse.pressures.forms.pressure)
@@ -116,7 +116,7 @@ class MixedElements(Elements):
             part.scale(self.unit(law))
 
     def lift(self, column: Column, law: MaterialLaw, *, checked: bool = True) -> None:
-        """Put what a column prescribes and its loads, in the law's unit, on its right-hand side."""
+        """Put prescribed displacement and loads of a column, in the law's unit, on its right-hand side."""
         super().lift(column, law, checked=checked)
         if column.applied is None:
             self.pressures.dilate(column.right[1], checked=checked)
@@ -130,16 +130,16 @@ class MixedElements(Elements):
         """Return a solver; it is kept for all laws of the same λ₀ and μ, in their units.
 
         Raises:
-            SolveError: if λ <= μ everywhere, or it cannot be set up.
+            SolveError: if λ <= μ everywhere, or the set-up fails.
         """
         if not any(region.ratio > 1 for region in law.parameters):
-            raise SolveError("mixed elements are for Poisson's ratios above 0.25; use displacement elements")
+            raise SolveError("mixed elements need a Poisson's ratio above 0.25; use displacement elements")
         return MixedSolver(self, law, self._solver(self.elastic(law), direct=direct), is_exact=direct)
 
     def solver_on(
         self, levels: list[Level], law: MaterialLaw, held: Int32Array, *, direct: bool, earlier: Solver | None
     ) -> "MixedSolver":
-        """Return a solver of operators in which the owned dofs ``held`` are held, too."""
+        """Return a solver of operators in which the owned dofs ``held`` are fixed, too."""
         if earlier is not None:
             earlier.close()
         with ExitStack() as stack:
@@ -151,7 +151,7 @@ class MixedElements(Elements):
         return found
 
     def operator(self, stiffness: PETSc.Mat, law: MaterialLaw, *, entries: bool) -> Callable[[Fields, Fields], None]:
-        """Return what writes K₀ u + Bᵀ p and B u − M p / λ₁, in the law's unit, into other fields."""
+        """Return a function that writes K₀ u + Bᵀ p and B u − M p / λ₁, in the law's unit, into other fields."""
         (coupling, mass), compliance = self.pressures.blocks(entries=entries), self.compliance(law)
 
         def multiply(fields: Fields, result: Fields) -> None:
@@ -167,18 +167,18 @@ class MixedElements(Elements):
         return multiply
 
     def finer(self) -> "MixedElements":
-        """Return the elements of one degree more, made when first asked for."""
+        """Return the elements of one degree more, made at the first call."""
         if self._finer is None:
             self._finer = MixedElements(self._spaces, self.degree + 1, self._conditions)
         return self._finer
 
     def saddle(self, elastic: MaterialLaw, stack: ExitStack, *, direct: bool) -> Saddle:
-        """Return the blocks for λ₀ and μ of the law ``elastic``, given back with the ``stack``."""
+        """Return the blocks for λ₀ and μ of the law ``elastic``, freed with the ``stack``."""
         levels = self.levels(elastic, stack, direct=direct)
         return self.saddle_of(levels, elastic, *self.pressures.blocks(entries=direct))
 
     def saddle_of(self, levels: list[Level], elastic: MaterialLaw, coupling: PETSc.Mat, mass: PETSc.Mat) -> Saddle:
-        """Return the saddle point of some blocks, K₀ being the last of ``levels``."""
+        """Return the saddle point of given blocks; K₀ is the last of ``levels``."""
         stiffness = self.pressures.by_region(tuple(part.lame_lambda + 2 * part.lame_mu for part in elastic.parameters))
         return Saddle(levels, coupling, mass, stiffness, self.degree - 1)
 
@@ -209,22 +209,22 @@ class MixedSolver(Solver):
         self.saddle = saddle
 
     def solve(self, columns: Sequence[Column], tolerance: float, target: float | None = None) -> int:
-        """Lower the energy norm of each error, relative to what it is in the beginning; return the iterations."""
+        """Reduce the energy norm of each error, relative to the initial error; return the iterations."""
         right, unknown = [column.right for column in columns], [column.unknown for column in columns]
         with stage("iterations"):
             return self.saddle.solve(self.elements.compliance(self.law), right, unknown, tolerance, target)
 
     @property
     def first_energies(self) -> FloatArray:
-        """N (J) of each column: the energy norm squared of what the last solve began with, as far as it was seen."""
+        """N (J) of each column: squared energy norm of the last solve's initial error, seen by the preconditioner."""
         return self.elements.unit(self.law) * np.array(self.saddle.first_energies)
 
     def improve(self, columns: Sequence[Column], share: float) -> int:
-        """Lower it to that ``share`` of what the last solve left; return the iterations."""
+        """Reduce it to this ``share`` of what the last solve left; return the iterations."""
         return self.solve(columns, share)
 
     def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
-        """Solve on in elements of one degree more."""
+        """Return the hierarchical estimate, from elements of one degree more."""
         coarse, finer = self.elements, self.elements.finer()
         below = coarse._solvers.get(False, (None, None))[0]
         saddle = finer._solver(coarse.elastic(self.law), direct=False, below=below)

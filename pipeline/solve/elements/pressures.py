@@ -1,8 +1,8 @@
-"""The pressures of mixed elements, one degree below the displacements, and what couples them.
+"""Pressures of mixed elements, one degree below the displacements, and the coupling between both.
 
-They are continuous within each region of a body and jump from one to the next. The pressure of a mixed element is
-λ₁ div u: where λ jumps, so does it, and a continuous one would smear the jump over the cells on either side. Masses and
-Schur complements then weigh the dofs of each region, and nothing couples two.
+Pressures are continuous within each region of a body and jump between regions. The pressure is λ₁ div u, which jumps
+where λ does: a continuous pressure would smear the jump over the cells on both sides. Masses and Schur complements then
+weigh the dofs of each region separately.
 """
 
 from contextlib import ExitStack
@@ -27,10 +27,10 @@ from pipeline.stages import stage
 class Pressures:
     """Pressures on a mesh, with B(q, u) = ∫ q div u and M(p, q) = ∫ p q. Methods are collective.
 
-    They are counted in units of ``unit`` × μ, ``unit`` (1/m) being about one over the element size: the blocks of the
-    saddle point are then of like magnitude in any unit of length. B and M are multiplied cell by cell (:meth:`blocks`),
-    and assembled where entries are asked for. ``dofs`` and ``whole_dofs`` count those of the modelled part, and of the
-    whole body.
+    Pressures are in units of ``unit`` × μ, with ``unit`` (1/m) about one over the element size. The blocks of the
+    saddle point then have similar magnitude in any unit of length. B and M act cell by cell (:meth:`blocks`), and are
+    assembled where entries are needed. ``dofs`` and ``whole_dofs`` count those of the modelled part and of the whole
+    body.
     """
 
     def __init__(self, body: BodyMesh, displacements: ElasticSpace):
@@ -48,18 +48,18 @@ class Pressures:
             self.unit = self._products.unit
 
     def close(self) -> None:
-        """Free the matrices that pressures take part in."""
+        """Free the matrices."""
         self._stack.close()
 
     def blocks(self, *, entries: bool) -> tuple[PETSc.Mat, PETSc.Mat]:
-        """Return B and M: with ``entries``, or as products.
+        """Return B and M: assembled with ``entries``, otherwise matrix-free.
 
-        B has columns of zeros for prescribed displacements. Both are kept here, and freed with the pressures.
+        B has zero columns for prescribed displacements. Both matrices are kept here, and freed with the pressures.
         """
         return self._assembled if entries else self._shells
 
     def holding(self, held: Int32Array, *, entries: bool) -> PETSc.Mat:
-        """Return B with columns of zeros for the owned dofs ``held``, too; the caller destroys it."""
+        """Return B with zero columns for the owned dofs ``held``, too; the caller destroys it."""
         coupling, _ = self.blocks(entries=entries)
         if not entries:
             return coupling.getPythonContext().holding(held).matrix()
@@ -68,7 +68,7 @@ class Pressures:
         return coupling
 
     def by_region(self, values: tuple[float, ...]) -> float | FloatArray:
-        """Return what a pressure dof has of a value by region: one for all, or an array for this rank's dofs."""
+        """Return a value by region on pressure dofs: one number for all, or an array for this rank's dofs."""
         return np.array(values)[self._region] if self._has_regions else values[0]
 
     @property
@@ -77,7 +77,7 @@ class Pressures:
         return np.asarray(self.forms.pressure.x.array[: self._owned] / self.unit)
 
     def set(self, pressure: PETSc.Vec) -> None:
-        """Make ``pressure`` that of the forms."""
+        """Set the pressure of the forms."""
         fill(self.forms.pressure, pressure, self.unit)
 
     def weighed(self) -> FloatArray:
@@ -85,7 +85,7 @@ class Pressures:
         return self._products.weigh(self.values)
 
     def pull(self, result: PETSc.Vec, *, checked: bool) -> None:
-        """Add Bᵀ p, for all displacements, to ``result``. ``checked``: see :meth:`ElasticSpace.apply`."""
+        """Add Bᵀ p, for all displacement dofs, to ``result``. ``checked``: see :meth:`ElasticSpace.apply`."""
         if not checked:
             result.array[:] += self._products.pull(self.values, whole=True)
             return
@@ -94,7 +94,7 @@ class Pressures:
             result.axpy(1.0, pull)
 
     def dilate(self, result: PETSc.Vec, *, checked: bool) -> None:
-        """Write B u, of all displacements, into ``result``. ``checked``: see :meth:`ElasticSpace.apply`."""
+        """Write B u, for all displacement dofs, into ``result``. ``checked``: see :meth:`ElasticSpace.apply`."""
         if not checked:
             displacement = self._displacements.forms.displacement.x.array[: self._displacements.owned]
             result.array[:] = self._products.dilation(displacement, whole=True)
@@ -122,14 +122,14 @@ class Pressures:
 def region_wise_space(body: BodyMesh, degree: int) -> tuple[Any, Int32Array]:
     """Return the space of scalars of ``degree``, and the region of each owned dof; collective.
 
-    On a mesh of one region it is the continuous space.
+    On a mesh of one region the space is continuous everywhere.
     """
     space = scalar_space(body.mesh, degree)
     owned = space.dofmap.index_map.size_local
     if body.regions is None:
         return space, np.zeros(owned, dtype=np.int32)
     count = 1 + body.comm.allreduce(int(body.regions.max(initial=0)), op=MPI.MAX)
-    # A dof has a copy for each region that it is in; the copies of one follow each other.
+    # A dof has one copy for each of its regions; the copies of a dof have consecutive numbers.
     has_copy = _copies(space, body.regions, count)
     copies = int(has_copy[:owned].sum())
     first = body.mesh.comm.scan(copies) - copies
@@ -152,7 +152,7 @@ def _without_columns(matrix: PETSc.Mat, dofs: Int32Array) -> None:
 
 
 def _copies(space: Any, regions: Int32Array, count: int) -> BoolArray:
-    """Tell, for each local dof and region, whether a cell of any rank that has the dof is in the region."""
+    """Return a mask by local dof and region: whether a cell of any rank in this region has the dof."""
     dofs, columns = compat.cell_dofs(space), []
     with vector(space) as mark:
         for region in range(count):
@@ -165,9 +165,9 @@ def _copies(space: Any, regions: Int32Array, count: int) -> BoolArray:
 
 
 def _first_copies(space: Any, owned: IntArray) -> IntArray:
-    """Return the global number of the first copy of each local dof, given those that this rank owns."""
+    """Return the global number of the first copy of each local dof; ``owned`` are those of the owned dofs."""
     with vector(space) as numbers:
-        numbers.array[:] = owned  # double precision holds them to the last digit
+        numbers.array[:] = owned  # integers of this size are exact in double precision
         return _with_ghosts(numbers).astype(np.int64)
 
 
