@@ -39,8 +39,8 @@ _LIMITS_SEVERAL = (0.5, 0.35)
 # opposite sign, while N contains both.
 _APART = {2: 0.3, 3: 0.15}
 _LIMITS_COARSE, _LIMITS_PLAIN = (0.4, 1.0), (0.85, 0.85)
-# Interfaces between materials, curved surfaces and thin plates add errors of their own, of which the next degree removes
-# another share than at the probe's edge.
+# Interfaces between materials, curved surfaces and thin plates add errors. The next degree removes another share of
+# these errors than of those at the probe's edge.
 _LIMITS_ELSEWHERE = {"displacement": (0.4, 0.4), "mixed": (0.5, 0.9)}
 # Energy release of a slit's front: the limit is that of degree p + 1, less (centre ± spread) θ times its last change.
 _RELEASE = (0.45, 0.9)

@@ -1,17 +1,16 @@
-"""The far field of a tool on a plane face: it closes a half ball that is cut out round the contact.
+"""Far field of a tool on a plane face, coupled to a half ball that is cut out around the contact.
 
-Far away a tool acts as a point force, but for terms of the order a/r (bonded: it also pulls sideways) or (a/r)². A
-*unit* of the far field belongs to 4πμε newtons a metre, ε the radius of the half ball: displacements of about a metre
-on the cut face. The body beyond the cut is one unknown, the share of the far field, in the energy that is made
-stationary. The force is from above: the energy that the far field leaves out is of the order (a/ε)³ (small, bonded) and
-(a/ε)⁵.
+Far away a tool acts as a point force, up to terms of order a/r (bonded: it also pulls sideways) or (a/r)². One *unit*
+of the far field belongs to a force of 4πμε newtons a metre, with ε the radius of the half ball, so that it displaces
+the cut face by about a metre. The body beyond the cut has one unknown, the amplitude of the far field, for which the
+energy is stationary. The force is an upper bound: the neglected energy is of order (a/ε)³ (small, bonded) and (a/ε)⁵.
 
-On a finite body the field of a point force is its half-space's u and a regular part R, smooth where the force acts
-(:mod:`pipeline.solve.greens_function`) and kept as polynomials. Beyond a half sphere of radius ε, n outwards,
+On a finite body the Green's function is the half-space's field u plus a regular part R, which is smooth at the force
+(:mod:`pipeline.solve.greens_function`) and stored as polynomials. Beyond a half sphere of radius ε, n outwards,
 
     twice the energy of u + R = that of u - 2 ∫ R·σ(u) n - R(0)·P - ∫ R·σ(R) n,
 
-by Betti's theorem within, where the force P of u acts and R has none.
+by Betti's theorem inside, where u has the force P and R has none.
 """
 
 from dataclasses import dataclass, replace
@@ -30,18 +29,18 @@ from pipeline.solve import SolveError
 from pipeline.solve.compiled import form
 from pipeline.solve.movement import Place
 
-# Below the centre there is no direction aside; a point this near to it, in units of the radius, is it.
+# Tolerances: no direction sideways below the centre, and a point at the centre, in units of the radius.
 _TINY, _AT_CENTRE = 1e-14, 1e-9
-# Of the polynomials that the regular part is kept as.
+# Highest degree of the polynomials for the regular part.
 _POWER = 5
 _EXPONENTS = np.array([e for e in product(range(_POWER + 1), repeat=3) if sum(e) <= _POWER])
-# Points of quadrature on the half sphere, from pole to rim and round it.
+# Quadrature points on the half sphere, from pole to rim and around it.
 _UP, _ROUND = 16, 24
 
 
 @dataclass(frozen=True)
 class PointForce:
-    """A half-space under a point force along -z at ``centre`` (J. Boussinesq, 1885), ``radius`` (m) away from it."""
+    """Half-space under a point force along -z at ``centre`` (J. Boussinesq, 1885), cut at ``radius`` (m) from it."""
 
     poisson: float
     centre: Place
@@ -53,7 +52,7 @@ class PointForce:
         return 2 * self.poisson / (1 - 2 * self.poisson)
 
     def at(self, points: FloatArray) -> FloatArray:
-        """Return the displacement (n, 3) of a unit, in m: ε/ρ times what depends on the direction alone."""
+        """Return the displacement (n, 3) of a unit, in m: ε/ρ times a function of the direction."""
         outward, distance = self._directions(points)
         cosine, softness = -outward[:, 2], 1 - 2 * self.poisson
         found = (cosine - softness / (1 + cosine))[:, None] * outward
@@ -63,7 +62,7 @@ class PointForce:
     def traction(self, points: FloatArray) -> FloatArray:
         """Return the traction (n, 3) of a unit on the half sphere through each point, in units of μ.
 
-        That is σn with n away from the centre.
+        It is σn with n pointing away from the centre.
         """
         outward, distance = self._directions(points)
         cosine = -outward[:, 2]
@@ -72,7 +71,7 @@ class PointForce:
         return 2 * self.radius / distance[:, None] ** 2 * found
 
     def stress(self, points: FloatArray) -> FloatArray:
-        """Return the stress (n, 3, 3) of a unit, in units of μ, with nothing at the centre itself."""
+        """Return the stress (n, 3, 3) of a unit, in units of μ; zero at the centre itself."""
         offsets = points - np.array(self.centre)
         distance = np.linalg.norm(offsets, axis=1)
         away = distance > _AT_CENTRE * self.radius
@@ -86,20 +85,20 @@ class PointForce:
         return 2 * self.radius * found
 
     def stiffness(self, mu: float) -> float:
-        """Return twice the strain energy (N/m) of a unit beyond the half ball: -∫ u·σn of the two above."""
+        """Return twice the strain energy (N/m) of a unit beyond the half ball: -∫ u·σn on its surface."""
         softness = 1 - 2 * self.poisson
         return 4 * pi * mu * self.radius * (2 + softness / 3 + softness**2 * (2 * log(2) - 1))
 
     def force(self, mu: float) -> float:
-        """Return the force (N/m) that makes a unit."""
+        """Return the force (N/m) of a unit."""
         return 4 * pi * mu * self.radius
 
     def moved(self, centre: Place) -> "PointForce":
-        """Return that of a force at another ``centre`` (m)."""
+        """Return the field of a force at another ``centre`` (m)."""
         return replace(self, centre=centre)
 
     def pull(self, space: Any, places: FloatArray) -> "Pull":
-        """Return what integrates such forces' stresses on the boundary of ``space``, its points at ``places``."""
+        """Return the boundary integrals of such stresses for the test functions of ``space``, points at ``places``."""
         return StressPull(space, places)
 
     def _directions(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -110,14 +109,14 @@ class PointForce:
 
 
 class Pull(Protocol):
-    """What pulls at the boundary of a body for the field of a force's half-space."""
+    """Boundary tractions of the half-space field of a point force."""
 
     def of(self, force: Any) -> FloatArray:
         """Return ∫ σn·v on the whole boundary, on all dofs of this process, in units of μ."""
 
 
 class StressPull:
-    """∫ σn·v on the whole boundary for the stress of a force's half-space: the rows of σ as functions of a space."""
+    """∫ σn·v on the whole boundary for a half-space's stress; the rows of σ are interpolated in a space."""
 
     def __init__(self, space: Any, places: FloatArray):
         self._rows, normal = [fem.Function(space) for _ in range(3)], ufl.FacetNormal(space.mesh)
@@ -128,7 +127,7 @@ class StressPull:
         self._points = places[self._outer]
 
     def of(self, force: PointForce) -> FloatArray:
-        """Return it on all dofs."""
+        """Return the integral on all dofs, in units of μ."""
         for row, values in zip(self._rows, force.stress(self._points).transpose(1, 0, 2), strict=True):
             row.x.array.reshape(-1, 3)[self._outer] = values
         return np.asarray(fem.assemble_vector(self._form).array)
@@ -144,13 +143,13 @@ class Smooth:
 
     @staticmethod
     def fit(centre: tuple[float, float, float], unit: float, points: FloatArray, values: FloatArray) -> "Smooth":
-        """Return what fits ``values`` (n, 3) at ``points`` best in the mean square.
+        """Return the least-squares fit to ``values`` (n, 3) at ``points``.
 
         Raises:
-            SolveError: if the points are fewer than the coefficients.
+            SolveError: if there are fewer points than coefficients.
         """
         if len(points) < len(_EXPONENTS):
-            raise SolveError(f"{len(points)} nodes of the mesh are too few for the regular part at {centre}")
+            raise SolveError(f"the mesh is too coarse for the Green's function at {centre}: {len(points)} nodes there")
         found, *_ = np.linalg.lstsq(_terms((points - np.array(centre)) / unit), values, rcond=None)
         return Smooth(centre, unit, found)
 
@@ -159,13 +158,13 @@ class Smooth:
         return np.asarray(_terms((points - np.array(self.centre)) / self.unit) @ self.coefficients)
 
     def at_centre(self) -> tuple[FloatArray, FloatArray]:
-        """Return the displacement (3,), in m, at the centre, and ∂²/∂x² + ∂²/∂y² of it (3,), in 1/m."""
+        """Return the displacement (3,), in m, at the centre, and its ∂²/∂x² + ∂²/∂y² (3,), in 1/m."""
         places = {tuple(exponents): number for number, exponents in enumerate(_EXPONENTS.tolist())}
         flat, bent = places[0, 0, 0], [places[2, 0, 0], places[0, 2, 0]]
         return self.coefficients[flat], 2 * self.coefficients[bent].sum(axis=0) / self.unit**2
 
     def bends(self) -> tuple[FloatArray, FloatArray]:
-        """Return (∂²/∂x² - ∂²/∂y²)/2 of the displacement (3,), in 1/m, at the centre, and ∂²/∂x∂y."""
+        """Return (∂²/∂x² - ∂²/∂y²)/2 and ∂²/∂x∂y of the displacement at the centre, both (3,), in 1/m."""
         places = {tuple(exponents): number for number, exponents in enumerate(_EXPONENTS.tolist())}
         xx, yy, xy = (self.coefficients[places[powers]] for powers in ((2, 0, 0), (0, 2, 0), (1, 1, 0)))
         return (xx - yy) / self.unit**2, xy / self.unit**2
@@ -181,13 +180,13 @@ class Smooth:
 
 @dataclass(frozen=True, eq=False)
 class BodyField:
-    """The far field of a body: that of a point force on a half-space, a unit, and what goes with it of ``regular``."""
+    """Far field of a body, per unit: the half-space field of a point force (``near``), plus the ``regular`` part."""
 
     near: PointForce
     regular: Smooth
 
     def at(self, points: FloatArray) -> FloatArray:
-        """Return the displacement (n, 3) of a unit, in m, within the half ball that ``regular`` was fitted in."""
+        """Return the displacement (n, 3) of a unit, in m, within the half ball in which ``regular`` was fitted."""
         return self.near.at(points) + self._scale * self.regular.at(points)
 
     def stiffness(self, mu: float) -> float:
@@ -195,7 +194,7 @@ class BodyField:
         return self.near.stiffness(mu) + mu * self._of_regular
 
     def moved(self, centre: Place) -> "BodyField":
-        """Return the same field about another ``centre`` (m): as on the mesh of a half ball that stands there."""
+        """Return the same field around another ``centre`` (m), as on the mesh of a half ball there."""
         return replace(self, near=self.near.moved(centre), regular=replace(self.regular, centre=centre))
 
     @property
@@ -219,7 +218,7 @@ def _outer(vectors: FloatArray) -> FloatArray:
 
 
 def _half_sphere() -> tuple[FloatArray, FloatArray]:
-    """Return points (n, 3) of the lower unit half sphere and the weights of a quadrature on it."""
+    """Return quadrature points (n, 3) and weights (n) on the lower unit half sphere."""
     nodes, weights = np.polynomial.legendre.leggauss(_UP)
     cosine, angle = np.meshgrid((nodes + 1) / 2, 2 * np.pi * (np.arange(_ROUND) + 0.5) / _ROUND, indexing="ij")
     sine = np.sqrt(1 - cosine**2)
@@ -238,8 +237,8 @@ def _terms(local: FloatArray, axis: int | None = None) -> FloatArray:
 
 
 def outer_triangles(cells: IntArray, places: FloatArray) -> IntArray:
-    """Return the triangles (m, 6) that belong to one cell (k, 10) alone."""
-    # In a tetrahedron the edge of the corners i < j is numbered from the last pair on (basix).
+    """Return the triangles (m, 6) on the boundary: those that belong to exactly one cell (k, 10)."""
+    # basix numbers the edges of a tetrahedron by their corners i < j, the last pair first.
     middle = {pair: 4 + number for number, pair in enumerate([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])}
     faces = [(1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)]
     columns = [[i, j, k, middle[j, k], middle[i, k], middle[i, j]] for i, j, k in faces]

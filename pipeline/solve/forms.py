@@ -1,7 +1,7 @@
-"""Forms of all elements, compiled once and kept in a cache of the project's own; what they mean is in ``physics``.
+"""Forms of all elements, compiled once and cached in the project's own folder; ``physics`` has their formulas.
 
-λ and μ are constants of the compiled form, or functions that are constant on each cell, so that no value of them is
-ever compiled in. Each form is made when it is first asked for, which is collective.
+λ and μ are constants of the compiled form, or functions that are constant on each cell: no value is compiled in. Each
+form is made at its first use, which is collective.
 """
 
 from functools import cached_property
@@ -23,25 +23,25 @@ from pipeline.solve.physics import COEFFICIENTS, LAWS, MaterialLaw, of_regions, 
 
 
 class CellKernel(Protocol):
-    """Gives the address of a kernel for the stiffness of straight cells, as dolfinx calls them."""
+    """Returns the address of a stiffness kernel for straight cells, with the signature that dolfinx calls."""
 
     def __call__(self, degree: int, *, of_regions: bool) -> int: ...  # noqa: D102
 
 
-# Marks of cells, and the bulge of an edge, in units of its length, that rounding may leave.
+# Marks of cells, and the rounding error of an edge's bulge, in units of its length.
 _NEITHER, _STRAIGHT, _CURVED = 0, 1, 2
 _FLAT = 1e-9
 _curved: WeakKeyDictionary[Any, BoolArray | None] = WeakKeyDictionary()
-# Integrands of large displacements are no polynomials: quadrature of so many degrees more than of linear elasticity.
+# Integrands of large displacements are no polynomials: quadrature degrees added to those of linear elasticity.
 _MORE = 2
 
 
 class ElasticForms:
     """Forms of linear elasticity, K = λ ∫ div u div v + μ ∫ 2 ε(u) : ε(v), on one space.
 
-    ``coefficients`` are the law's parameters in them, by name: constants, or, on a mesh of several ``regions`` (of the
-    local cells, ghosts too), functions that are constant on each cell. ``displacement`` is the function that
-    ``action``, K u, acts on. K of straight cells is integrated by the ``cell_kernel``, if there is one.
+    ``coefficients`` are the law's parameters by name: constants, or, on a mesh of several ``regions`` (of the local
+    cells, ghosts included), functions that are constant on each cell. ``displacement`` is the u of ``action``, K u.
+    With a ``cell_kernel``, that kernel integrates K on straight cells.
     """
 
     def __init__(self, space: Any, regions: Int32Array | None = None, cell_kernel: CellKernel | None = None):
@@ -55,7 +55,7 @@ class ElasticForms:
             self._put(coefficient, law.values(name))
 
     def by_region(self, values: tuple[float, ...]) -> Any:
-        """Return a constant of forms, or a function, that has one of ``values`` in each region."""
+        """Return a coefficient with the given ``values`` by region: a constant, or a function."""
         result = self._coefficient()
         self._put(result, values)
         return result
@@ -79,21 +79,21 @@ class ElasticForms:
 
     @cached_property
     def stiffness(self) -> Any:
-        """K."""
+        """Stiffness K."""
         return self._form(ufl.TrialFunction(self._space), dx(self._space), self._kernels())
 
     @cached_property
     def curved_stiffness(self) -> Any:
-        """The part of K from cells with curved edges: the same code, but no other cell is marked for it."""
+        """The part of K from cells with curved edges: the same code, with only these cells marked."""
         return self._form(ufl.TrialFunction(self._space), dx(self._space, curved_only=True))
 
     @cached_property
     def action(self) -> Any:
-        """K u."""
+        """Product K u."""
         return self._form(self.displacement, dx(self._space))
 
     def _kernels(self) -> dict[int, int]:
-        """Return our kernel for the straight cells: it takes a twelfth of the time of the generated one."""
+        """Return the hand-written kernel for straight cells: it takes a twelfth of the time of the generated one."""
         if self._cell_kernel is None:
             return {}
         kernel = self._cell_kernel(compat.degree(self._space), of_regions=self._regions is not None)
@@ -106,9 +106,9 @@ class ElasticForms:
 
 
 class MixedForms:
-    """What couples displacement and pressure of mixed elements: B(q, u) = ∫ q div u and M(p, q) = ∫ p q.
+    """Coupling of displacement and pressure in mixed elements: B(q, u) = ∫ q div u and M(p, q) = ∫ p q.
 
-    ``dilation`` and ``pull`` are of the ``displacement`` that was passed and of the function ``pressure``.
+    ``dilation`` is for the ``displacement`` that was passed, ``pull`` for the function ``pressure``.
     """
 
     def __init__(self, displacement: Any, pressures: Any):
@@ -117,24 +117,24 @@ class MixedForms:
 
     @cached_property
     def mass(self) -> Any:
-        """M."""
+        """Mass M."""
         p, q = ufl.TrialFunction(self._pressures), ufl.TestFunction(self._pressures)
         return self._form(p * q)
 
     @cached_property
     def coupling(self) -> Any:
-        """B."""
+        """Coupling B."""
         u, q = ufl.TrialFunction(self._displacement.function_space), ufl.TestFunction(self._pressures)
         return self._form(q * ufl.div(u))
 
     @cached_property
     def dilation(self) -> Any:
-        """B u, a vector on pressures."""
+        """Product B u, a vector on pressures."""
         return self._form(ufl.TestFunction(self._pressures) * ufl.div(self._displacement))
 
     @cached_property
     def pull(self) -> Any:
-        """Bᵀ p, a vector on displacements."""
+        """Product Bᵀ p, a vector on displacements."""
         return self._form(self.pressure * ufl.div(ufl.TestFunction(self._displacement.function_space)))
 
     def _form(self, integrand: Any) -> Any:
@@ -142,9 +142,9 @@ class MixedForms:
 
 
 class HyperelasticForms:
-    """Derivatives of the energy of a law, with the coefficients and the displacement u of some ``elastic`` forms.
+    """Derivatives of a law's energy, with coefficients and displacement u shared with the ``elastic`` forms.
 
-    ``direction`` is the function w that ``product`` acts on.
+    ``direction`` is the function w of ``product``.
     """
 
     def __init__(self, space: Any, elastic: ElasticForms, law: str):
@@ -163,31 +163,31 @@ class HyperelasticForms:
 
     @cached_property
     def energy(self) -> Any:
-        """Stored energy; not a number where J < 0 anywhere."""
+        """Stored energy; NaN where J < 0 anywhere."""
         return form(self._energy)
 
     @cached_property
     def residual(self) -> Any:
-        """Nodal forces."""
+        """Nodal forces, the first derivative of the energy."""
         return form(self._residual)
 
     @cached_property
     def tangent(self) -> Any:
-        """Derivative K of the nodal forces."""
+        """Tangent K, the derivative of the nodal forces."""
         trial = ufl.TrialFunction(self._space)
         return form(ufl.derivative(self._residual, self._displacement, trial))
 
     @cached_property
     def product(self) -> Any:
-        """K w."""
+        """Product K w."""
         return form(ufl.derivative(self._residual, self._displacement, self.direction))
 
 
 def dx(space: Any, *, curved_only: bool = False, more: int = 0) -> Any:
-    """Return the measure for forms of elasticity on ``space``, with its quadrature; of straight cells, too, or not.
+    """Return the measure for forms of elasticity on ``space``, with quadrature degrees; of curved cells only, if so.
 
-    On straight cells 2p - 2 is exact; few cells of a curved mesh are curved. On straight cells degrees are ``more``
-    than that, where integrands are no polynomials of degree 2p - 2.
+    On straight cells degree 2p - 2 is exact; ``more`` is added for integrands that are no such polynomials. Curved
+    cells have a higher degree of their own, since few cells of a mesh are curved.
     """
     degree, mesh = compat.degree(space), space.mesh
     exact, enough = ({"quadrature_degree": d} for d in (2 * degree - 2 + more, quadrature_degree(degree)))
@@ -200,14 +200,14 @@ def dx(space: Any, *, curved_only: bool = False, more: int = 0) -> Any:
 
 
 def curved_cells(mesh: Any) -> BoolArray | None:
-    """Tell which local cells have a mid node away from the middle of its edge, None if cells have no mid nodes."""
+    """Return a mask of local cells with a mid node off the middle of its edge; None if cells have no mid nodes."""
     if mesh not in _curved:
         _curved[mesh] = _find_curved(mesh)
     return _curved[mesh]
 
 
 def has_curved_cells(mesh: Any) -> bool:
-    """Tell whether any rank has a curved cell; collective."""
+    """Return whether any rank has a curved cell; collective."""
     curved = curved_cells(mesh)
     return bool(mesh.comm.allreduce(curved is not None and bool(curved.any()), op=MPI.LOR))
 
@@ -225,14 +225,14 @@ def _find_curved(mesh: Any) -> BoolArray | None:
 def compile_forms(
     degree: int, element: str = "displacement", law: str = "linear", *, straight: bool = False, of_regions: bool = False
 ) -> None:
-    """Compile the forms of elements of ``degree`` and of those below, and of one degree more for the error bar."""
+    """Compile the forms for elements of ``degree``, for all lower degrees, and for the next one (error bar)."""
     regions = np.zeros(1, dtype=np.int32) if of_regions else None
     mesh = distribute(MPI.COMM_SELF, one_cell(straight=straight)).mesh
     for level in range(1, degree + 2):
         space = vector_space(mesh, level)
         elastic = ElasticForms(space, regions)
         _ = elastic.stiffness, elastic.action
-        if element == "mixed" and level > 1:  # contact is found from the lowest degree up
+        if element == "mixed" and level > 1:  # the search for contact begins at the lowest degree
             mixed = MixedForms(elastic.displacement, scalar_space(mesh, level - 1))
             _ = mixed.mass, mixed.coupling, mixed.dilation, mixed.pull
         if law != "linear" and level >= degree:
@@ -243,7 +243,7 @@ def compile_forms(
 
 
 def one_cell(*, straight: bool) -> MeshArrays:
-    """Return a mesh of one tetrahedron, to compile forms on."""
+    """Return a mesh of one tetrahedron, on which forms are compiled."""
     corners = np.vstack([np.zeros(3), np.eye(3)])
     middle = corners[EDGES].mean(axis=1)
     points = corners if straight else np.vstack([corners, middle])

@@ -1,9 +1,10 @@
-"""The regular part of a body's Green's function: what its sides and its support make of a point force on its top.
+"""Regular part of a body's Green's function for a point force on its top: the effect of sides and support.
 
-    G = u + R, u the half-space's field; R has no loads in the body, -σ(u) n on what is free, -u on what is held.
+    G = u + R, with u the half-space's field. R has no body forces, traction -σ(u) n on the free boundary, and
+    displacement -u on the support.
 
-R is smooth where the force acts: a coarse mesh gives it, once for all tools, ε, and moduli. Within the largest half
-ball that the body holds it is kept as polynomials, by least squares (:class:`~pipeline.solve.far_field.Smooth`).
+R is smooth at the force: a coarse mesh resolves it, once for all tools, ε, and moduli. It is stored as least-squares
+polynomials in the largest half ball that fits into the body (:class:`~pipeline.solve.far_field.Smooth`).
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -27,26 +28,25 @@ from pipeline.solve.movement import Motion
 from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.spaces import ElasticSpace, Spaces
 
-# Of the elements that R is found with.
+# Degree of the elements for R.
 DEGREE = 2
-# A node this near to a force, in units of the radius, is where it acts.
+# A node is at the force within this distance, in units of the radius.
 _AT_CENTRE = 1e-9
-# From so many forces on an operator without conditions is assembled: its products take a tenth of an integration.
+# Number of forces from which the operator without conditions is assembled: a product costs a tenth of an integration.
 _MANY = 8
-# Right-hand sides that are solved for together.
+# Right-hand sides solved together.
 _TOGETHER = 24
 
 
 def regular_parts(body: BodyMesh, forces: Sequence[PointForce], law: MaterialLaw | None = None) -> Iterator[Smooth]:
-    """Yield R for a unit of the field of each of ``forces``, as it is within its radius: one factorisation for all.
+    """Yield the regular part R per unit of each of ``forces``, within its radius; one factorisation serves all.
 
-    The mesh is of this process alone; it may be the half or the quarter of which planes through the centre of one force
-    make the whole. All forces have one Poisson's ratio.
-    A ``law`` of several regions is in units of μ where the forces act: the half-space is of that material, and R has
-    what other regions make of its field as loads.
+    The mesh is on this process alone. It may be a half or a quarter, bounded by planes of symmetry through the centre
+    of a single force. All forces have the same Poisson's ratio. A ``law`` of several regions is in units of μ at the
+    forces. The half-space is of that material, and the contrast of other regions enters R as loads.
 
     Raises:
-        SolveError: if that cannot be solved, or if the mesh is too coarse for the radius of a force.
+        SolveError: if the solve fails, or if the mesh is too coarse for the radius of a force.
     """
     with Spaces(body) as spaces:
         space = spaces.get(DEGREE, Conditions(unilateral=True))
@@ -88,14 +88,14 @@ def _solved(
                     loads[:, column] = -free * load
                 found = solver.solve_many(loads).T + held
                 if not np.isfinite(found).all():
-                    raise SolveError(f"the regular parts at {[force.centre for force in some]} are not finite")
+                    raise SolveError(f"the Green's functions at {[force.centre for force in some]} are not finite")
                 yield from found
         finally:
             solver.close()
 
 
 def _beyond(law: MaterialLaw, own: MaterialLaw) -> MaterialLaw:
-    """Return by how much Lamé's constants of each region are more than a half-space's ``own``."""
+    """Return the contrast of Lamé's constants of each region to those of the half-space, ``own``."""
     (within,) = own.parameters
     return MaterialLaw.of(
         [region.lame_lambda - within.lame_lambda for region in law.parameters],
@@ -104,7 +104,7 @@ def _beyond(law: MaterialLaw, own: MaterialLaw) -> MaterialLaw:
 
 
 def _field(force: PointForce, places: FloatArray) -> FloatArray:
-    """Return the half-space's field at all places, 0 where the force acts."""
+    """Return the half-space's field at all places; 0 at the force itself."""
     away = np.linalg.norm(places - np.array(force.centre), axis=1) > _AT_CENTRE * force.radius
     found = np.zeros_like(places)
     found[away] = force.at(places[away])
@@ -113,7 +113,7 @@ def _field(force: PointForce, places: FloatArray) -> FloatArray:
 
 @contextmanager
 def _products(space: ElasticSpace, forces: int) -> Iterator[Callable[[FloatArray, MaterialLaw], FloatArray]]:
-    """Lend what makes K u of u on all dofs, none held, for any law: if it is for many forces, by a matrix for each."""
+    """Lend a function that returns K u on all dofs, without conditions, for any law; for many forces by a matrix."""
     with vector(space.space) as result, ExitStack() as stack:
         if forces < _MANY:
 
@@ -138,7 +138,7 @@ def _products(space: ElasticSpace, forces: int) -> Iterator[Callable[[FloatArray
 
 
 def compile_regular() -> None:
-    """Compile the forms that the regular part takes."""
+    """Compile the forms for the regular part."""
     compile_forms(DEGREE)
     space = vector_space(distribute(MPI.COMM_SELF, one_cell(straight=False)).mesh, DEGREE)
     StressPull(space, np.asarray(space.tabulate_dof_coordinates()))
@@ -146,10 +146,10 @@ def compile_regular() -> None:
 
 @dataclass(frozen=True, eq=False)
 class OnBoundary:
-    """R on a body's boundary, by quadratic triangles: their ``nodes`` (n, 3) in m, ``triangles`` (m, 6) of them.
+    """R on the boundary of a body, on quadratic triangles: ``nodes`` (n, 3) in m, ``triangles`` (m, 6) index them.
 
-    Corners run round the outward normal; behind them come the middles of the sides opposite to each. ``values``
-    (forces, n, 3), in m, belong to a unit of the field of each force.
+    Corners are ordered around the outward normal; then come the mid nodes of the sides opposite to each. ``values``
+    (forces, n, 3), in m, are per unit of the field of each force.
     """
 
     nodes: FloatArray
@@ -158,12 +158,12 @@ class OnBoundary:
 
 
 def regular_on_boundary(body: BodyMesh, forces: Sequence[PointForce], law: MaterialLaw | None = None) -> OnBoundary:
-    """Return R on the whole boundary for each of ``forces``, of one Poisson's ratio, as ``regular_parts`` finds it.
+    """Return R on the whole boundary for each of ``forces``, of one Poisson's ratio: see ``regular_parts``.
 
-    On a curved boundary, where all are ``PlacedForce``, R grows like the logarithm of the distance towards the force.
+    On a curved boundary, with forces of type ``PlacedForce``, R grows logarithmically towards the force.
 
     Raises:
-        SolveError: if that cannot be solved.
+        SolveError: if the solve fails.
     """
     with Spaces(body) as spaces:
         space = spaces.get(DEGREE, Conditions(unilateral=True))

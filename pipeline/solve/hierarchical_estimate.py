@@ -1,10 +1,11 @@
-"""The hierarchical estimate of a displacement element's error: solve on in the space of one degree more.
+"""Hierarchical error estimate of displacement elements: the correction in the space of one degree more.
 
-F_p·d - F·d is the energy of the error: F_p is too high, never too low. The part that degree p + 1 sees,
+F_p·d - F·d is the energy of the error: F_p is an upper bound. The part of it that degree p + 1 resolves,
 
     s = F_p - F_{p+1},    s·d = a(u_p - u_{p+1}, u_p - u_{p+1}),
 
-is summed by conjugate gradients from u_p on: each iteration adds α (r, z). A few give s to a few per cent, from below.
+is summed by conjugate gradients with initial guess u_p: each iteration adds α (r, z). A few iterations give s to a few
+per cent, from below.
 """
 
 from collections.abc import Sequence
@@ -20,10 +21,10 @@ from pipeline.solve.compiled import global_sum
 from pipeline.solve.krylov import INDEFINITE, SOLVERS, check_converged, explained, keep, solver_of
 from pipeline.solve.linear_solver import LinearSolver
 
-# Iterations end when one adds less than this share of the sum; the first few may be short by chance.
+# Iterations end when an increment is below this share of the sum, after a minimum: early ones may be small by chance.
 _SMALL = 0.02
 _FEWEST, _MOST = 3, SOLVERS["energy decrements"]["ksp_max_it"]
-# What is left to gain below this share of the sum is rounding.
+# A remaining increment below this share of the sum is rounding.
 _ROUNDING = 1e-6
 _REASONS = PETSc.KSP.ConvergedReason
 
@@ -31,10 +32,11 @@ _REASONS = PETSc.KSP.ConvergedReason
 def energy_decrements(solver: LinearSolver, residuals: Sequence[PETSc.Vec]) -> tuple[FloatArray, list[FloatArray], int]:
     """Return r_i·A⁻¹·r_j (J) of n ``residuals``, (n, n), each A⁻¹·r_i (owned dofs), and the iterations; collective.
 
-    On the diagonal it is from below; the error of any entry is at most the root of the two on the diagonal.
+    Diagonal entries are lower bounds. The error of any other entry is at most the root of the errors of its two
+    diagonal entries.
 
     Raises:
-        SolveError: if the increments do not get small.
+        SolveError: if the increments do not become small.
     """
     with ExitStack() as stack, explained():
         checked = _Checked(solver)
@@ -45,7 +47,7 @@ def energy_decrements(solver: LinearSolver, residuals: Sequence[PETSc.Vec]) -> t
         corrections = [solution.array.copy() for solution in solutions]
         if len(found) == 1:
             return np.array([[found[0][0]]]), corrections, iterations
-        # x_i·r_j + x_j·r_i - x_i·A·x_j, whose error is that of both solutions.
+        # x_i·r_j + x_j·r_i - x_i·A·x_j: its error is the product of both solutions' errors.
         product = keep(stack, residuals[0].duplicate())
         local = np.empty((len(found), len(found)))
         for j, (solution, residual) in enumerate(zip(solutions, residuals, strict=True)):
@@ -64,11 +66,11 @@ def _sum(ksp: PETSc.KSP, checked: "_Checked", residual: PETSc.Vec, solution: PET
     ksp.solve(residual, solution)
     if ksp.getConvergedReason() == INDEFINITE and not checked.is_rounding(test.total):
         if not checked.solver.look_closer():
-            raise SolveError("the error estimate has no positive preconditioner")
+            raise SolveError("the preconditioner of the error estimate is not positive definite")
         solution.set(0.0)
         ksp.solve(residual, solution)
     if ksp.getConvergedReason() == _REASONS.DIVERGED_MAX_IT:
-        raise SolveError(f"the error estimate did not settle in {_MOST} iterations")
+        raise SolveError(f"the error estimate did not converge in {_MOST} iterations")
     if ksp.getConvergedReason() != INDEFINITE:
         check_converged(ksp)
     return test.total, int(ksp.its)
@@ -81,17 +83,17 @@ class _Checked:
         self.solver, self.energy = solver, 0.0
 
     def apply(self, _: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
-        """Apply it; PETSc calls this."""
+        """Apply the preconditioner; PETSc calls this."""
         self.solver.precondition(residual, result)
         self.energy = float(residual.dot(result))
 
     def is_rounding(self, total: float) -> bool:
-        """Tell whether what there was left to gain is nothing but rounding."""
+        """Return whether the remaining increment is only rounding."""
         return abs(self.energy) <= _ROUNDING * total
 
 
 class _Increments:
-    """Stops conjugate gradients from zero when x·r, their sum of increments, grows by a small share."""
+    """Stops conjugate gradients, begun at zero, when x·r, the sum of increments, grows by a small share only."""
 
     def __init__(self, checked: _Checked):
         self._checked, self.total = checked, 0.0

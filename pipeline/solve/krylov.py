@@ -1,6 +1,6 @@
-"""One factory of PETSc's linear solvers, what its errors mean, and which systems are factorised.
+"""Factory of PETSc's linear solvers, their errors, and the choice between factorisation and iteration.
 
-A KSP is Cholesky's or LDLᵀ factorisation by MUMPS, or an iteration. Every KSP and PC has its own options prefix.
+A KSP is a Cholesky or LDLᵀ factorisation by MUMPS, or an iteration. Every KSP and PC has its own options prefix.
 """
 
 import itertools
@@ -12,21 +12,21 @@ from petsc4py import PETSc
 
 from pipeline.solve import SolveError
 
-# Dofs up to which Cholesky is faster than conjugate gradients, measured: docs/solvers.md.
+# Number of dofs up to which Cholesky is faster than conjugate gradients, measured: docs/solvers.md.
 DIRECT_LIMIT = {1: 5_000, 2: 1_500, 3: 1_500}
 
 _CG = {"ksp_type": "cg", "ksp_atol": 0.0, "ksp_initial_guess_nonzero": True}
 _FACTORS = {"ksp_type": "preonly", "pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"}
 _TANGENT = {"ksp_norm_type": "natural", "ksp_rtol": 1e-4, "ksp_max_it": 400}
-# Options of PETSc by what is solved. Iterations improve what they are given, unless it says otherwise.
+# PETSc options by the system solved. Iterations use the vector passed as initial guess, except where noted.
 SOLVERS: dict[str, dict[str, Any]] = {
     "factors": _FACTORS,
-    # MUMPS enlarges its work space by this percentage: an indefinite matrix fills in more than the analysis foresees.
+    # MUMPS enlarges its work space by this percentage: fill-in of an indefinite matrix exceeds the analysis.
     "factors, indefinite": _FACTORS | {"mat_mumps_icntl_14": 100},
     "elasticity": _CG | {"ksp_norm_type": "natural", "ksp_max_it": 500},
-    # The preconditioner is not applied once more for a norm.
+    # No norm: it would cost one more application of the preconditioner.
     "energy decrements": _CG | {"ksp_norm_type": "none", "ksp_max_it": 60},
-    # Newton's method gains three digits a step, and begins each from nothing.
+    # Newton's method gains three digits a step; each linear solve has a zero initial guess.
     "tangent": _CG | _TANGENT,
     "Newton's method": {
         **_CG,
@@ -46,7 +46,7 @@ SOLVERS: dict[str, dict[str, Any]] = {
         "ksp_chebyshev_esteig_steps": 10,
         "pc_type": "jacobi",
     },
-    # Symmetric: Gauss–Seidel down, backwards up. Three entries to a row of the interpolation keep coarse levels sparse.
+    # Symmetric: Gauss–Seidel down, backwards up. At most three interpolation entries a row keep coarse levels sparse.
     "degree 1": {
         "pc_type": "hypre",
         "pc_hypre_type": "boomeramg",
@@ -59,9 +59,9 @@ SOLVERS: dict[str, dict[str, Any]] = {
         "pc_hypre_boomeramg_relax_type_up": "backward-SOR/Jacobi",
     },
 }
-# On several ranks a sweep takes what other ranks hold as it was. Where the material jumps that amplifies, and leaves no
-# definite preconditioner; with the sums of those entries' sizes on the diagonal it cannot (A. H. Baker, R. D. Falgout,
-# T. V. Kolev and U. M. Yang, SIAM J. Sci. Comput. 33, 2864, 2011).
+# On several ranks a sweep uses old values of other ranks. Where the material jumps this amplifies errors, and the
+# preconditioner becomes indefinite. Adding the magnitudes of off-rank entries to the diagonal prevents it
+# (A. H. Baker, R. D. Falgout, T. V. Kolev and U. M. Yang, SIAM J. Sci. Comput. 33, 2864, 2011).
 _ON_RANKS = {
     "pc_hypre_boomeramg_relax_type_down": "l1-Gauss-Seidel",
     "pc_hypre_boomeramg_relax_type_up": "backward-l1-Gauss-Seidel",
@@ -73,10 +73,10 @@ INDEFINITE = PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC
 
 @contextmanager
 def explained() -> Iterator[None]:
-    """Raise what PETSc and the multigrid cycle raise as errors for the reader of a record.
+    """Translate errors of PETSc and of the multigrid cycle into errors for the reader of a record.
 
     Raises:
-        SolveError: in their place.
+        SolveError: instead of them.
     """
     try:
         yield
@@ -87,7 +87,7 @@ def explained() -> Iterator[None]:
 
 
 def explain(error: PETSc.Error) -> str:
-    """Return what an error of PETSc means, for the reader of a record."""
+    """Return the meaning of a PETSc error, for the reader of a record."""
     return {
         55: "out of memory",
         76: "the factorisation failed (out of memory, or the operator is singular)",
@@ -109,7 +109,7 @@ def check_converged(ksp: PETSc.KSP) -> int:
 
 
 def configure(solver: PETSc.KSP | PETSc.PC | PETSc.SNES, options: Mapping[str, Any]) -> None:
-    """Give a solver ``options`` of PETSc, which have an own prefix and are removed again; collective."""
+    """Set PETSc ``options`` of a solver under a prefix of its own, and remove them again; collective."""
     held, prefix = PETSc.Options(), f"epsmesh{next(_prefixes)}_"
     try:
         solver.setOptionsPrefix(prefix)
@@ -122,10 +122,10 @@ def configure(solver: PETSc.KSP | PETSc.PC | PETSc.SNES, options: Mapping[str, A
 
 
 def solver_of(kind: str, matrix: PETSc.Mat, stack: ExitStack, preconditioner: Any = None, **options: Any) -> PETSc.KSP:
-    """Return a KSP of a ``kind`` of ``SOLVERS``, not set up, freed with the ``stack``; collective.
+    """Return a KSP of a ``kind`` in ``SOLVERS``, not set up, freed with the ``stack``; collective.
 
-    The ``preconditioner`` is a PC, or a context in Python; without one, the options name it. More ``options`` of PETSc
-    are added to those of the kind.
+    The ``preconditioner`` is a PC, or a Python context; without one, the options name it. Further PETSc ``options``
+    extend those of the kind.
     """
     ksp = keep(stack, PETSc.KSP().create(matrix.comm))
     ksp.setOperators(matrix)
@@ -139,7 +139,7 @@ def solver_of(kind: str, matrix: PETSc.Mat, stack: ExitStack, preconditioner: An
 
 
 def algebraic(matrix: PETSc.Mat, stack: ExitStack) -> PETSc.PC:
-    """Return hypre's multigrid for a ``matrix`` of degree 1, freed with the ``stack``; collective."""
+    """Return hypre's algebraic multigrid for a ``matrix`` of degree 1, freed with the ``stack``; collective."""
     pc = keep(stack, PETSc.PC().create(matrix.comm))
     pc.setOperators(matrix)
     configure(pc, SOLVERS["degree 1"] | (_ON_RANKS if matrix.comm.size > 1 else {}))
@@ -148,11 +148,11 @@ def algebraic(matrix: PETSc.Mat, stack: ExitStack) -> PETSc.PC:
 
 
 def keep(stack: ExitStack, item: Any) -> Any:
-    """Let ``stack`` destroy an ``item`` of PETSc, and return it."""
+    """Let ``stack`` destroy a PETSc object, and return the object."""
     stack.callback(item.destroy)
     return item
 
 
 def is_direct(method: str, dofs: int, limit: int) -> bool:
-    """Decide between a factorisation, faster up to a ``limit`` of unknowns, and iterations."""
+    """Return whether to factorise: a factorisation is faster up to a ``limit`` of unknowns."""
     return method == "direct" or (method == "auto" and dofs <= limit)

@@ -1,6 +1,6 @@
-"""The linear solver for elasticity: a factorisation, or conjugate gradients with a multigrid cycle.
+"""The linear solver for elasticity: a factorisation, or conjugate gradients preconditioned by a multigrid cycle.
 
-The cycle goes down in degree (p, p - 1, …, 1), :mod:`pipeline.solve.kernels.multigrid`, and from degree 1 by hypre's
+The cycle coarsens in degree (p, p - 1, …, 1), :mod:`pipeline.solve.kernels.multigrid`; below degree 1 it is hypre's
 BoomerAMG.
 """
 
@@ -21,8 +21,8 @@ from pipeline.solve.kernels.product import operator_of
 from pipeline.solve.krylov import INDEFINITE, algebraic, check_converged, explained, keep, solver_of
 from pipeline.stages import stage
 
-# So many earlier solutions begin the next one, and no more than fit into so many bytes of a process; and Fischer's
-# second method, for operators that are symmetric and positive definite.
+# Recycled solutions: most of them, and most bytes of a process; and Fischer's second method, for symmetric positive
+# definite operators.
 _MOST_RECYCLED, _RECYCLED_BYTES = 48, 100_000_000
 _IN_ENERGY = 2
 _NONE = np.empty(0, dtype=np.int32)
@@ -32,8 +32,8 @@ _NONE = np.empty(0, dtype=np.int32)
 class Level:
     """One level of a hierarchy: its space, its operator and the local dofs (unrolled) that are prescribed.
 
-    ``jumps`` says that the material does, from one region to the next. ``held`` are those of the prescribed dofs that
-    the operator knows nothing of: the multigrid cycle takes them into account.
+    ``jumps`` says that the material jumps between regions. ``held`` are prescribed dofs that the operator ignores: the
+    multigrid cycle accounts for them.
     """
 
     space: Any
@@ -49,20 +49,20 @@ class Level:
 
 
 class LinearSolver:
-    """A KSP for one operator, with everything that it needs: a context manager, which frees it.
+    """A KSP for one operator, with all its resources: a context manager, which frees them.
 
-    ``levels`` are what it was made of, ``cycle`` is the multigrid cycle, None for a direct solver and for degree 1.
+    ``levels`` are those it was made from; ``cycle`` is the multigrid cycle, None for a direct solver and for degree 1.
     """
 
     @stage("set-up")
     def __init__(self, levels: list[Level], *, direct: bool, below: "LinearSolver | None" = None):
-        """Set up; collective. Operators above degree 1 are products, but for that of a ``direct`` solver.
+        """Set up; collective. Operators above degree 1 are matrix-free unless the solver is ``direct``.
 
-        ``below`` is a solver of all levels but the last, if there is one: what it has set up serves on where it can,
-        and it must then live as long.
+        ``below`` is a solver of all levels but the last, if there is one. Its set-up is shared, so it must live as
+        long.
 
         Raises:
-            SolveError: if that fails.
+            SolveError: if the set-up fails.
         """
         self.levels = levels
         self.cycle: Cycle | None = None
@@ -102,10 +102,10 @@ class LinearSolver:
     def solve(
         self, rhs: PETSc.Vec, solution: PETSc.Vec, tolerance: float | None = None, target: float | None = None
     ) -> int:
-        """Improve ``solution`` and return the iterations; collective. A direct solve does not look at what it holds.
+        """Improve the initial guess ``solution``, ignored by a direct solve; return the iterations; collective.
 
-        ``tolerance`` is for the energy norm of the error relative to that of the whole solution, a ``target`` for that
-        norm itself. An iteration takes one of them.
+        ``tolerance`` is for the energy norm of the error relative to that of the solution, ``target`` for the norm
+        itself. An iteration needs one of them.
 
         Raises:
             SolveError: if PETSc reports anything but convergence.
@@ -124,7 +124,7 @@ class LinearSolver:
 
     @stage("iterations")
     def solve_many(self, loads: FloatArray) -> FloatArray:
-        """Return the solutions (m, n) for the columns of ``loads`` (m, n), of a direct solver on one process.
+        """Return the solutions (m, n) for the columns of ``loads`` (m, n); for a direct solver on one process.
 
         Raises:
             SolveError: if the factorisation fails.
@@ -137,18 +137,19 @@ class LinearSolver:
             return np.array(left.getDenseArray())
 
     def recycle(self) -> None:
-        """Begin each solve from the best sum of earlier solutions, in the energy norm; collective.
+        """Recycle: take the initial guess from the span of earlier solutions, best in the energy norm; collective.
 
-        PETSc keeps them (P. F. Fischer, Comput. Methods Appl. Mech. Eng. 163, 193, 1998), and begins anew once there
-        are as many as fit. What a solve is given to begin with has no part in it.
+        PETSc stores the solutions (P. F. Fischer, Comput. Methods Appl. Mech. Eng. 163, 193, 1998), and starts again
+        once the store is full. The caller's initial guess is ignored.
         """
         comm = self.matrix.comm.tompi4py()
         size = comm.allreduce(max(1, self.matrix.getLocalSize()[0]), op=MPI.MAX)
         self.ksp.setUseFischerGuess(_IN_ENERGY, max(2, min(_MOST_RECYCLED, _RECYCLED_BYTES // (8 * size))))
 
     def look_closer(self) -> bool:
-        """Make an indefinite preconditioner definite, if that was not tried: what smoothers took for their largest
-        eigenvalue was too small. Only a cycle can.
+        """Repair an indefinite preconditioner once: return whether a better estimate of its eigenvalues was made.
+
+        The smoothers' estimate of their largest eigenvalue was too small. Only a multigrid cycle has one.
         """
         if self.cycle is None or self._looked_closer:
             return False
@@ -157,13 +158,13 @@ class LinearSolver:
         return True
 
     def carries(self, levels: list[Level]) -> bool:
-        """Tell whether what is set up serves a cycle of ``levels``, one more than its own."""
+        """Return whether this set-up serves a cycle of ``levels``, one more than its own."""
         same = len(levels) == len(self.levels) + 1 and all(map(operator.is_, levels, self.levels))
         return same and not self._is_direct and all(level.held is None for level in levels)
 
     @stage("set-up")
     def hold(self, levels: list[Level]) -> None:
-        """Hold other dofs from now on: those of ``levels``, whose operators are the same but for degree 1; collective.
+        """Fix other dofs from now on: those of ``levels``, with the same operators above degree 1; collective.
 
         Raises:
             SolveError: if PETSc fails.
@@ -184,7 +185,7 @@ class LinearSolver:
         return self.levels[-1].matrix
 
     def precondition(self, residual: PETSc.Vec, result: PETSc.Vec) -> None:
-        """Apply the preconditioner alone; collective. ``residual`` must be nought where dofs are prescribed.
+        """Apply the preconditioner alone; collective. ``residual`` must be zero at prescribed dofs.
 
         Raises:
             SolveError: if PETSc fails.
@@ -193,9 +194,9 @@ class LinearSolver:
             self.ksp.pc.apply(residual, result)
 
     def apply(self, _: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
-        """Be the preconditioner of another operator; PETSc calls this."""
+        """Act as preconditioner of another operator; PETSc calls this."""
         self.precondition(residual, result)
 
     def close(self) -> None:
-        """Free everything that was made."""
+        """Free all resources."""
         self._stack.close()

@@ -1,16 +1,16 @@
-"""Large displacements: load steps to the depth, each solved by Newton's method.
+"""Large displacements: load steps up to the depth, each solved by Newton's method.
 
-The force is the reaction. It must be the derivative of the stored energy by the depth: its integral over the steps is
-compared with the energy.
+The force is the reaction. It must be the derivative of the stored energy with respect to the depth: its integral over
+the steps is compared with the energy.
 
-The error bar comes of one degree more, as in linear elasticity. With the residual r of the solution u there, and r'
+The error bar comes from one degree more, as in linear elasticity. With the residual r of the solution u there, and r'
 that of v = ∂u/∂d under the tangent K,
 
-    F_p - F_{p+1} = r'·K⁻¹ r,    of second order in what degree p + 1 changes.
+    F_p - F_{p+1} = r'·K⁻¹ r,    of second order in the change that degree p + 1 makes.
 
-(r'·K⁻¹ r' · r·K⁻¹ r)^½ is at least that, and cannot vanish by chance: it is used instead. K is taken to be the operator
-of linear elasticity. At moderate depths the result agrees to a few per cent; at larger ones the tangent of one degree
-more is not definite at the probe's edge.
+(r'·K⁻¹ r' · r·K⁻¹ r)^½ is an upper bound of it that cannot vanish by chance, and is used instead. K is replaced by the
+operator of linear elasticity. At moderate depths this agrees within a few per cent; at larger ones the tangent of one
+degree more is not positive definite at the probe's edge.
 """
 
 from collections.abc import Sequence
@@ -32,23 +32,23 @@ from pipeline.solve.movement import Motion, Movement
 from pipeline.solve.newton import HyperelasticBody, LargeError, tangent_product
 from pipeline.solve.physics import MaterialLaw
 
-# The depth is reached in so many steps at least; smaller ones than this share of it are not tried.
+# Fewest load steps, and the smallest step as a share of the depth.
 _FEWEST, _SMALLEST = 3, 1 / 50
-# A step that leaves less than this share of the way goes to its end.
+# A step that would leave less than this share of the depth goes to the end.
 _SLIVER = 1e-6
-# Newton's steps that make a step of the depth one to lengthen the next of.
+# The next load step is longer if this one took at most so many Newton iterations.
 _EASY = 4
-# Work and energy may differ by this share, and by what rounding makes of energies where strains are tiny. Where an
-# element at the edge folds between the points that it is integrated at, energy is lost that no work was done for.
+# Largest relative difference of work and energy, and rounding of energies where strains are tiny. An element at the
+# edge may fold between its quadrature points: the energy then drops without work.
 _WORK, _ROUNDING = 3e-4, 1e-13
 
 
 @dataclass
 class Walk:
-    """How far a ``motion`` of the probe has gone in a body of a ``law``.
+    """A load path: how far a ``motion`` of the probe has proceeded in a body of a ``law``.
 
-    ``path`` has depth (m), force (N) and energy (J) of each step, of the modelled part; ``displacement`` (owned dofs)
-    is that at the last one. No depth begins with a step of more than the last one, ``step`` (m).
+    ``path`` has depth (m), force (N) and energy (J) of each step, of the modelled part. ``displacement`` (owned dofs)
+    is that of the last step. The first step of the next depth is at most as long as the last one, ``step`` (m).
     """
 
     law: MaterialLaw
@@ -63,18 +63,18 @@ class Walk:
         return self.path[-1][0]
 
     def leads_to(self, law: MaterialLaw, movement: Movement) -> bool:
-        """Tell whether it is on the way to what ``movement`` do."""
+        """Return whether this path can be continued to the movement under this law."""
         return (self.law, (self.motion,)) == (law, movement.motions) and self.reached <= movement.amounts[0]
 
 
 class LoadSteps(Solver):
     """A solver of displacement elements for a law of large displacements, one material and one motion.
 
-    ``stored`` is the energy (J) that the modelled part stores at the end. What is made is freed with the stack.
+    ``stored`` is the energy (J) of the modelled part at the end. What is made is freed with the stack.
     """
 
     def __init__(self, elements: DisplacementElements, walk: Walk, stack: ExitStack, *, direct: bool):
-        """Set up for what a ``walk`` leads to; collective.
+        """Set up for the law and motion of a load path, ``walk``; collective.
 
         Raises:
             SolveError: if the preconditioner cannot be set up.
@@ -90,15 +90,15 @@ class LoadSteps(Solver):
         stack.callback(self._body.close)
 
     def lift(self, columns: Sequence[Column]) -> None:
-        """Do nothing: what is prescribed is moved step by step."""
+        """Do nothing: each load step prescribes its own displacement."""
 
     def solve(self, columns: Sequence[Column], tolerance: float, target: float | None = None) -> int:
-        """Press from where the walk has come to the depth of the one column; return the iterations; collective.
+        """Continue the load path to the depth of the single column; return the iterations; collective.
 
-        ``tolerance`` and ``target`` have no part in it: Newton's method ends where what it gains is rounding.
+        ``tolerance`` and ``target`` are ignored: Newton's method ends where its gain is rounding.
 
         Raises:
-            LargeError: if Newton's method does not get there, or what it finds fails a check.
+            LargeError: if Newton's method does not converge, or the solution fails a check.
         """
         (column,), before = columns, self._body.iterations
         self._space.forms.set_law(self._law)
@@ -112,11 +112,11 @@ class LoadSteps(Solver):
         return self._body.iterations - before
 
     def improve(self, columns: Sequence[Column], share: float) -> int:
-        """Raise an error: Newton's method has done all that it can."""
+        """Raise an error: Newton's method has already converged to rounding."""
         raise LargeError("forces do not balance")
 
     def products(self, columns: Sequence[Column]) -> Products:
-        """Return the residual and the work of the solution, both as a secant: for a unit of the motion."""
+        """Return residual and work of the solution as secants, per unit of the motion."""
         (column,), space = columns, self._space
         with vector(space.space) as displacement, vector(space.space) as forces:
             self._at(column, displacement)
@@ -127,10 +127,10 @@ class LoadSteps(Solver):
         return Products(space, [moved], [residual], work[None], work)
 
     def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
-        """Solve on in one degree more, from the residuals of the solution and of its rate there; collective.
+        """Return the hierarchical estimate, from the residuals of the solution and of its rate; collective.
 
         Raises:
-            LargeError: if elements of that degree give way.
+            LargeError: if the elements of one degree more fail.
         """
         (column,), space = columns, self._space
         displacement, rate, unit = (stack.enter_context(vector(space.space)) for _ in range(3))
@@ -154,13 +154,13 @@ class LoadSteps(Solver):
             residual.scale(-1.0)
             residual.array[finer.prescribed_owned] = 0.0
         if not all(np.isfinite(residual.norm()) for residual in residuals):
-            raise LargeError("elements of one degree more turn tissue inside out, so that no error bar can be made")
+            raise LargeError("no error bar: elements of one degree more turn tissue inside out")
         found, _, iterations = energy_decrements(solver, residuals)
         taken = float(np.sqrt(found[0, 0] * found[1, 1])) / column.amount
         if not taken < self.products(columns).stationary[0, 0]:
             raise LargeError(
-                f"no error bar: elements of degree {finer.degree}, of which it is made, give way at the probe's "
-                "edge; use a smaller depth, a larger rim, or degree 2"
+                f"no error bar: it needs elements of degree {finer.degree}, which fail at the probe's edge; "
+                "use a smaller depth, a larger rim, or degree 2"
             )
         return Enriched(elements, [], iterations, decrements=np.array([[taken]]))
 
@@ -170,13 +170,13 @@ class LoadSteps(Solver):
         displacement.scale(column.amount)
 
     def _press(self, displacement: PETSc.Vec, column: Column) -> FloatArray:
-        """Take ``displacement`` along the walk to the depth of a column.
+        """Continue ``displacement`` along the load path to the depth of a column.
 
-        Return the path: depth, force and energy of each step. Each step begins along the tangent; one that Newton's
-        method cannot end is halved.
+        Return the path: depth, force and energy of each step. The tangent gives the initial guess of each step. A step
+        is halved where Newton's method does not converge.
 
         Raises:
-            LargeError: if that gets too small; the walk has come as far as it says.
+            LargeError: if a step becomes too small; the path keeps the steps that converged.
         """
         walk, depth, space = self._walk, column.amount, self._space.space
         displacement.array[:] = walk.displacement
@@ -200,13 +200,13 @@ class LoadSteps(Solver):
     def _step(
         self, displacement: PETSc.Vec, rate: PETSc.Vec, trial: PETSc.Vec, walk: Walk, step: float, depth: float
     ) -> tuple[float, int]:
-        """Write the equilibrium a ``step`` (m) farther into ``trial``; return the step, and Newton's steps to it.
+        """Write the equilibrium a ``step`` (m) farther into ``trial``; return the step and its Newton iterations.
 
-        ``rate`` is the tangent at ``displacement``, for a metre; at ``depth`` (m) the ``walk`` ends.
+        ``rate`` is the tangent at ``displacement``, per metre; the path ends at ``depth`` (m).
         """
         reached = walk.reached
         if step > (1 - _SLIVER) * (depth - reached):
-            step = depth - reached  # not one more for what rounding leaves
+            step = depth - reached  # no further step for a rounding error
         with vector(self._space.space) as forces:
             while True:
                 trial.array[:] = displacement.array + step * rate.array
@@ -221,12 +221,12 @@ class LoadSteps(Solver):
                         raise LargeError(self._stopped(walk, depth, error)) from error
 
     def _stopped(self, walk: Walk, depth: float, why: LargeError) -> str:
-        """Return what to say of a walk that ends before ``depth`` (m)."""
+        """Return the message about a path that ends before ``depth`` (m)."""
         reached, force, _ = walk.path[-1]
         whole = 2.0 ** len(self._elements.body.mirrored) * force
         return (
-            f"reached {reached * 1e3:.3g} mm of {depth * 1e3:.3g} mm, where F is {whole:.4g} N; Newton's method "
-            f"stopped there ({why}): the tissue gives way, or elements at the probe's edge are squeezed to nothing; "
+            f"load steps ended at {reached * 1e3:.3g} mm of {depth * 1e3:.3g} mm, where F is {whole:.4g} N "
+            f"(Newton's method: {why}); the tissue becomes unstable, or elements at the probe's edge are flattened; "
             "use a smaller depth, or a larger rim"
         )
 
@@ -240,9 +240,9 @@ class LoadSteps(Solver):
 
 
 def check_path(path: FloatArray, rounding: float) -> None:
-    """See that the force is the derivative of the energy by the depth; ``path`` has depth, force and energy in rows.
+    """Check that the force is the derivative of the energy by the depth; ``path`` has depth, force, energy in rows.
 
-    ``rounding`` is what that makes of energies (J).
+    ``rounding`` is the rounding error of energies (J).
 
     Raises:
         LargeError: if it is not.
@@ -253,6 +253,6 @@ def check_path(path: FloatArray, rounding: float) -> None:
     wrong = abs(float(through(1.0)) * depth[-1] / energy[-1] - 1)
     if not wrong <= _WORK + rounding / energy[-1]:
         raise LargeError(
-            f"the force is not the derivative of the energy by the depth: {wrong:.1e} apart, since an element at "
+            f"the force is not the derivative of the energy: they differ by {wrong:.1e}, because an element at "
             "the probe's edge folds; use a smaller depth, a larger rim, or degree 2"
         )

@@ -1,9 +1,9 @@
-"""Nodal forces of dead loads, weights and tractions that keep size and direction while the body deforms:
+"""Nodal forces of dead loads: weights and tractions that keep magnitude and direction while the body deforms,
 
     f_i = ∫ ρ g · φ_i dx + ∫ t · φ_i ds.
 
-Tractions act on the free surface. A cap ends within facets: these are cut into small pieces, so that the resultant is
-that of the cap.
+Tractions act on the free surface. The edge of a cap crosses facets: these are subdivided, so that the resultant is that
+of the cap.
 """
 
 from dataclasses import dataclass
@@ -23,19 +23,19 @@ from pipeline.solve.movement import Loads, SurfaceLoad, Vector
 
 _CORNERS = np.vstack([np.zeros(3), np.eye(3)])  # of the reference cell
 _FACETS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])  # corners of its facets, in the order of dolfinx
-# The map of a curved cell has so many degrees more than the functions on it.
+# Quadrature degrees that the map of a curved cell adds.
 _CURVED = 3
-# Pieces of a facet that a cap's edge cuts are this much smaller than the cap's radius, but in so many halvings at most.
+# Subdivision of facets at a cap's edge: cap radius over size of a piece, and most halvings.
 _PIECE, _MOST_HALVINGS = 32, 7
-# Cells that are looked at together.
+# Cells processed together.
 _CHUNK = 20_000
 
 
 @dataclass(frozen=True, eq=False)
 class Applied:
-    """Loads on the dofs of a space: ``forces`` (N) on those that this rank owns, as they act on the modelled part.
+    """Loads on the dofs of a space: nodal ``forces`` (N) on owned dofs, on the modelled part.
 
-    ``size`` (N) is the integral of their magnitude and ``resultant`` (3), in N, that of the loads; both global.
+    ``size`` (N) is the integral of the loads' magnitude, ``resultant`` (3), in N, that of the loads; both global.
     """
 
     forces: FloatArray
@@ -60,14 +60,14 @@ def apply_loads(loads: Loads, body: BodyMesh, space: Any) -> Applied:
         add_from_ghosts(forces)
         totals = global_sum(body.comm, np.array(found).reshape(-1, 5))
         if len(totals) and not np.all(totals[:, 4] > 0):
-            raise SolveError("no free part of the surface carries a traction: it lies under the probe, or is held")
+            raise SolveError("the traction acts on no free surface: its area is under the probe, or fixed")
         return Applied(forces.array.copy(), float(totals[:, 3].sum()), totals[:, :3].sum(axis=0))
 
 
 def _add_weights(
     weights: tuple[Vector, ...], body: BodyMesh, space: Any, dofs: Int32Array, nodal: FloatArray
 ) -> list[float]:
-    """Add the body's weight to ``nodal`` forces; return what it is on this rank: x, y, z, magnitude, volume."""
+    """Add the body's weight to ``nodal`` forces; return this rank's integrals: x, y, z, magnitude, volume."""
     degree, geometry = compat.degree(space), _nodes(body)
     order = 1 if geometry.shape[1] == 4 else 2
     points, quadrature = basix.make_quadrature(basix.CellType.tetrahedron, degree + (0 if order == 1 else _CURVED))
@@ -88,7 +88,7 @@ def _add_weights(
 
 
 def _add_traction(load: SurfaceLoad, body: BodyMesh, space: Any, dofs: Int32Array, nodal: FloatArray) -> list[float]:
-    """Add a load on the surface to ``nodal`` forces; return what it is on this rank: x, y, z, magnitude, area."""
+    """Add a surface load to ``nodal`` forces; return this rank's integrals: x, y, z, magnitude, area."""
     sums = np.zeros(5)
     cells, sides = _free_facets(body)
     geometry = _nodes(body)[cells]
@@ -127,7 +127,7 @@ def _add_traction(load: SurfaceLoad, body: BodyMesh, space: Any, dofs: Int32Arra
 
 
 def _free_facets(body: BodyMesh) -> tuple[Int32Array, Int32Array]:
-    """Return the owned cells with a free facet, and which of their facets it is, one of each for each facet."""
+    """Return the owned cells with a free facet and the local number of that facet, one entry for each facet."""
     topology, tdim = body.mesh.topology, body.mesh.topology.dim
     topology.create_connectivity(tdim - 1, tdim)
     topology.create_connectivity(tdim, tdim - 1)
@@ -141,13 +141,13 @@ def _free_facets(body: BodyMesh) -> tuple[Int32Array, Int32Array]:
 
 
 def _halvings(load: SurfaceLoad, corners: FloatArray) -> Int32Array:
-    """Return how often each facet's sides are halved for the quadrature, -1 where it is clear of the load's ball."""
+    """Return how often to halve each facet's sides for the quadrature, -1 for facets outside the load's ball."""
     halvings = np.zeros(len(corners), dtype=np.int32)
     if load.within is None:
         return halvings
     centre, radius = np.array(load.within[0]), load.within[1]
     middle = corners.mean(axis=1)
-    # A facet lies within this of its middle; one that is bent, a little farther out.
+    # Radius of a facet around its centre, with a margin for curved facets.
     size = 1.2 * np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
     away = np.linalg.norm(middle - centre, axis=1)
     needed = np.ceil(np.log2(np.maximum(1.0, _PIECE * size / radius)))
@@ -169,7 +169,7 @@ def _table(degree: int, points: FloatArray) -> FloatArray:
 
 @cache
 def _rule(degree: int, halvings: int) -> tuple[FloatArray, FloatArray]:
-    """Return points (q, 2) and weights (q) on the reference triangle, of pieces of which each is a rule of its own."""
+    """Return points (q, 2) and weights (q) on the reference triangle: a composite rule on its pieces."""
     points, weights = basix.make_quadrature(basix.CellType.triangle, degree if halvings == 0 else 1)
     for _ in range(halvings):
         moved = [points + shift for shift in ([0.0, 0.0], [1.0, 0.0], [0.0, 1.0])]

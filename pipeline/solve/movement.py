@@ -1,6 +1,6 @@
-"""What is asked of a body: the movement of the probe, dead loads, and a far field on a cut face.
+"""Loading of a body: the movement of the probe, dead loads, and a far field on a cut face.
 
-A movement is the sum of a few motions, each of which is solved for once.
+A movement is a sum of rigid motions; each is solved for once.
 """
 
 from collections.abc import Callable
@@ -19,7 +19,7 @@ _ZERO: Vector = (0.0, 0.0, 0.0)
 
 
 class FarField(Protocol):
-    """A displacement of what is beyond the cut face, free of loads but there; hashable."""
+    """Displacement field of the body beyond the cut face, without loads there; hashable."""
 
     def at(self, points: FloatArray) -> FloatArray:
         """Return the displacement (n, 3) of a unit, in m, at points (n, 3), in m, on the cut face."""
@@ -28,15 +28,15 @@ class FarField(Protocol):
         """Return twice the strain energy (N/m) of a unit beyond the cut face, for the shear modulus ``mu`` (Pa)."""
 
     def moved(self, centre: Place) -> Self:
-        """Return it as it is seen from a half ball of the same size round another ``centre`` (m)."""
+        """Return the field for a half ball of the same size around another ``centre`` (m)."""
 
 
 @dataclass(frozen=True, eq=False)
 class SurfaceLoad:
     """A ``traction`` (Pa), or a ``pressure`` (Pa) against the outward normal, on part of the free boundary.
 
-    ``on_facets`` tells of facets, by their corners (n, 3, 3) and outward unit normals (n, 3), whether they may carry
-    it; ``within``, None for all, is the centre (m) and the radius (m) of the ball that bounds it.
+    ``on_facets`` is a mask of loaded facets, from their corners (n, 3, 3) and outward unit normals (n, 3). ``within``
+    is the ball that bounds the load, its centre (m) and radius (m); None for no bound.
     """
 
     on_facets: Callable[[FloatArray, FloatArray], BoolArray]
@@ -47,7 +47,7 @@ class SurfaceLoad:
 
 @dataclass(frozen=True, eq=False)
 class Loads:
-    """Weights (N/m³) of each region of the body, and loads on its surface, on the mesh as it is solved."""
+    """Dead loads: specific weights (N/m³) of each region of the body, and surface loads; on the modelled part."""
 
     weights: tuple[Vector, ...] = ()
     surface: tuple[SurfaceLoad, ...] = ()
@@ -55,11 +55,11 @@ class Loads:
 
 @dataclass(frozen=True)
 class Motion:
-    """A unit of one movement: along the unit vector ``direction``, or about the axis ``rotation`` of a point.
+    """A unit of one rigid motion: along the unit vector ``direction``, or about the axis ``rotation``.
 
-    A unit is a metre, or, for the small rotation ω × (x − ``centre``), a radian. ``opening`` moves what the probe
-    touches of a slit's faces apart, each by a metre: the face on the side of that unit vector along it, the other back.
-    ``far`` moves the cut face, by ``share`` of a unit of that field.
+    A unit is a metre, or a radian for the small rotation ω × (x − ``centre``). ``opening`` moves the two faces of a
+    slit apart: each by a metre, the face on the side of that unit vector along it, the other one back. ``far`` moves
+    the cut face, by ``share`` units of that field.
     """
 
     direction: Vector = _ZERO
@@ -71,12 +71,12 @@ class Motion:
 
     @property
     def is_rotation(self) -> bool:
-        """Whether it turns the probe."""
+        """Whether it is a rotation."""
         return any(self.rotation)
 
     @property
     def is_translation(self) -> bool:
-        """Whether it moves the probe along a direction."""
+        """Whether it is a translation."""
         return any(self.direction)
 
     def at(self, points: FloatArray, sides: FloatArray | None = None) -> FloatArray:
@@ -86,7 +86,7 @@ class Motion:
         """
         if any(self.opening):
             if sides is None:
-                raise ValueError("there is no slit to be opened")
+                raise ValueError("an opening needs a slit")
             return np.asarray(np.outer(sides, np.array(self.opening)))
         turned = np.cross(np.array(self.rotation), points - np.array(self.centre))
         return np.asarray(np.array(self.direction) + turned)
@@ -94,10 +94,10 @@ class Motion:
 
 @dataclass(frozen=True)
 class Movement:
-    """What moves: the sum of ``motions``, each by its amount (m, or rad); translations are along orthogonal directions.
+    """Movement of the probe: ``motions`` times their amounts (m, or rad); translations have orthogonal directions.
 
-    ``apart`` says that symmetry keeps the motions apart: none takes any work in the movement of another. ``loads`` are
-    the loads that act on the tissue meanwhile.
+    ``apart`` says that symmetry decouples the motions: none does work in another. ``loads`` are dead loads on the
+    tissue.
     """
 
     motions: tuple[Motion, ...]
@@ -107,17 +107,17 @@ class Movement:
 
     @property
     def far(self) -> FarField | None:
-        """What closes the cut face, if it is not simply held."""
+        """The far field on the cut face; None if the cut face is fixed or free."""
         return next((motion.far for motion in self.motions if motion.far is not None), None)
 
     @property
     def shares(self) -> FloatArray:
-        """How much of the far field belongs to each motion."""
+        """Amplitude of the far field in each motion."""
         return np.array([motion.share for motion in self.motions])
 
     @staticmethod
     def along(travel: Vector, *, apart: bool = False) -> "Movement":
-        """Return the movement of a probe that presses by −z of ``travel`` (m) and slides by the rest of it."""
+        """Return the movement of a probe along ``travel`` (m): it presses by −z and slides by x and y."""
         x, y, z = travel
         slide = hypot(x, y)
         press = Motion((0.0, 0.0, -1.0))
@@ -127,20 +127,20 @@ class Movement:
 
     @staticmethod
     def all(travel: Vector, centre: Vector) -> "Movement":
-        """Return ``travel`` (m) as an amount of all six rigid motions: along x, y, z, and about those axes."""
+        """Return ``travel`` (m) as an amount of all six rigid motions: along x, y, z, and about axes at ``centre``."""
         axes: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         motions = [Motion(axis) for axis in axes] + [Motion(rotation=axis, centre=centre) for axis in axes]
         return Movement(tuple(motions), (*travel, 0.0, 0.0, 0.0))
 
     def opened(self, normal: Vector, amount: float) -> "Movement":
-        """Return the movement of a probe that also holds each face of a slit ``amount`` (m) off its plane."""
+        """Return the movement of a probe that also moves each face of a slit ``amount`` (m) off its plane."""
         return replace(self, motions=(*self.motions, Motion(opening=normal)), amounts=(*self.amounts, amount))
 
     def with_far(self, far: FarField) -> "Movement":
-        """Return the movement with a unit of the ``far`` field as a motion more, whose amount is to be found."""
+        """Return the movement with a unit of the ``far`` field as one more motion, of unknown amplitude."""
         return Movement((*self.motions, Motion(far=far, share=1.0)), (*self.amounts, 0.0))
 
     def closed(self, share: float) -> "Movement":
-        """Return that of one motion and a far field as that of one motion, with that ``share`` of the field."""
+        """Return the movement of one motion and a far field as a single motion, with that ``share`` of the field."""
         press, far = self.motions
         return Movement((replace(press, far=far.far, share=share),), self.amounts[:1])

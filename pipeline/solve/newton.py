@@ -1,7 +1,7 @@
-"""Newton's method for the equilibrium of a hyperelastic body whose prescribed displacements are in place.
+"""Newton's method for the equilibrium of a hyperelastic body with prescribed displacements.
 
-PETSc's SNES with a line search; the linear systems by conjugate gradients, preconditioned by the multigrid of linear
-elasticity, which is set up once: the tangent differs from it by what strain makes of the stiffness.
+PETSc's SNES with a line search. The linear systems are solved by conjugate gradients, preconditioned by the multigrid
+of linear elasticity, which is set up once: at moderate strain the tangent is close to linear elasticity.
 """
 
 from collections.abc import Callable
@@ -23,16 +23,16 @@ from pipeline.solve.linear_solver import LinearSolver
 from pipeline.solve.spaces import ElasticSpace
 from pipeline.stages import stage
 
-# Residual that is left, relative to the forces on what is prescribed, and the most steps to get there.
+# Tolerance on the residual, relative to the forces at prescribed dofs, and most Newton iterations.
 _LEFT = 1e-9
-# A step that turns tissue inside out is halved, at most this often.
+# Most halvings of a step that turns tissue inside out.
 _HALVINGS = 12
-# Of the gain that the slope promises, a step must bring so much.
+# Sufficient decrease: least gain of energy, as a share of that predicted by the slope.
 _GAIN = 1e-4
 
 
 class LargeError(SolveError):
-    """Newton's method does not get to where the probe is to be."""
+    """Newton's method does not converge at the prescribed displacement."""
 
 
 class HyperelasticBody:
@@ -54,21 +54,21 @@ class HyperelasticBody:
         self.tangent.destroy()
 
     def energy(self, displacement: PETSc.Vec) -> float:
-        """Return the stored energy (J) of the modelled part, not a number if tissue is inside out; collective."""
+        """Return the stored energy (J) of the modelled part, NaN if tissue is inside out; collective."""
         self._space.set_displacement(displacement)
         return float(self._space.comm.allreduce(fem.assemble_scalar(self._forms.energy), op=MPI.SUM))
 
     def forces(self, displacement: PETSc.Vec, result: PETSc.Vec) -> None:
-        """Write the nodal forces (N), on prescribed dofs, too, into ``result``; collective."""
+        """Write the nodal forces (N), prescribed dofs included, into ``result``; collective."""
         self._space.set_displacement(displacement)
         assemble(self._forms.residual, result)
 
     @stage("tangent solves")
     def move(self, displacement: PETSc.Vec, prescribed: PETSc.Vec, result: PETSc.Vec) -> None:
-        """Write the movement into ``result`` that a small one of the ``prescribed`` dofs makes; collective.
+        """Write the linearised response to a small change of the ``prescribed`` dofs into ``result``; collective.
 
         Raises:
-            LargeError: if the tangent is not definite: the tissue gives way.
+            LargeError: if the tangent is not positive definite: the tissue is unstable.
         """
         with ExitStack() as stack, vector(self._space.space) as load:
             self._assemble(displacement)
@@ -76,7 +76,7 @@ class HyperelasticBody:
             load.scale(-1.0)
             load.array[self._held] = prescribed.array[self._held]
             self.tangent.zeroRowsColumns(self._rows, 1.0)
-            # What is prescribed is there from the beginning: a preconditioner may know nothing of it.
+            # Prescribed values are in the initial guess: the preconditioner may ignore these dofs.
             result.set(0.0)
             result.array[self._held] = prescribed.array[self._held]
             ksp = solver_of("tangent", self.tangent, stack, self._solver)
@@ -84,12 +84,12 @@ class HyperelasticBody:
 
     @stage("Newton's method")
     def settle(self, displacement: PETSc.Vec, scale: float) -> int:
-        """Find the equilibrium from ``displacement``, its prescribed dofs fixed; return Newton's steps; collective.
+        """Find the equilibrium from the initial guess ``displacement``, its prescribed dofs fixed; collective.
 
-        ``scale`` (N) is the size of the forces on what is prescribed.
+        Return Newton's iterations. ``scale`` (N) is the size of the forces at prescribed dofs.
 
         Raises:
-            LargeError: if there is none nearby.
+            LargeError: if Newton's method does not converge.
         """
         with ExitStack() as stack, vector(self._space.space) as residual:
             snes = keep(stack, PETSc.SNES().create(self._space.comm))
@@ -117,9 +117,9 @@ class HyperelasticBody:
         compat.assemble_matrix(self._forms.tangent, [], 1.0, self.tangent)
 
     def _shorten(self, here: PETSc.Vec, step: PETSc.Vec) -> bool:
-        """Halve a ``step`` (which is subtracted) until no tissue is inside out behind it, and less energy is stored.
+        """Halve a ``step`` (which is subtracted) until no tissue is inside out after it, and less energy is stored.
 
-        Where rounding hides what is gained of that, the residual tells.
+        Where rounding hides the decrease of the energy, the residual must fall.
         """
         with vector(self._space.space) as there, vector(self._space.space) as residual:
             stored = self.energy(here)
@@ -138,12 +138,12 @@ class HyperelasticBody:
         return True
 
     def _run(self, solver: Any, ksp: PETSc.KSP, solve: Callable[[], None]) -> None:
-        """Run a solver of PETSc, whose linear systems are those of ``ksp``, and see that it has converged; collective.
+        """Run a PETSc solver, with the linear solver ``ksp``, and check that it converges; collective.
 
-        Where the preconditioner turns out not to be definite, it is made so, and the solver goes on.
+        If the preconditioner proves indefinite, it is repaired and the solver continues.
 
         Raises:
-            LargeError: if it has not.
+            LargeError: if the solver does not converge.
         """
         try:
             self._counted(solver, solve)
@@ -160,6 +160,6 @@ class HyperelasticBody:
 
 
 def tangent_product(forms: HyperelasticForms, x: PETSc.Vec, result: PETSc.Vec) -> None:
-    """Write K x into ``result``, of all dofs, with the tangent K at the forms' displacement; collective."""
+    """Write K x, on all dofs, into ``result``, with the tangent K at the forms' displacement; collective."""
     fill(forms.direction, x)
     assemble(forms.product, result)

@@ -1,9 +1,9 @@
-"""What tissue is made of: parameters of each region, and laws, each a strain energy in UFL.
+"""Material laws: parameters of each region, and strain energies in UFL.
 
-A law gives the energy ψ (J/m³) of the undeformed body by F = I + ∇u and by parameters, named as in :class:`Parameters`.
-To second order in ∇u it is linear elasticity with the same λ and μ. To add one, write ψ and enter it in :data:`LAWS`;
-the study file takes it once its name is in the list of ``pipeline/study/schema.py``. A further parameter is a field of
-:class:`Parameters`, named in :data:`COEFFICIENTS`: forms then have it in each region.
+A law gives the energy density ψ (J/m³, undeformed volume) as a function of F = I + ∇u and of parameters, named as in
+:class:`Parameters`. To second order in ∇u it must be linear elasticity with the same λ and μ. To add a law, write ψ and
+enter it in :data:`LAWS`; studies may use it once its name is in the list of ``pipeline/study/schema.py``. A further
+parameter is a field of :class:`Parameters`, named in :data:`COEFFICIENTS`: forms then have it in each region.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -18,17 +18,17 @@ import ufl
 from pipeline.arrays import FloatArray, Int32Array, IntArray
 from pipeline.shapes.tissue import lame
 
-# The parameters that forms have as coefficients; those that an energy does not use are not compiled in.
+# Parameters that are coefficients of forms; those that an energy does not use are not compiled in.
 COEFFICIENTS = ("lame_lambda", "lame_mu")
-# λ₁ in units of μ, at least: λ₀ may then be −μ/4, and K₀ is definite as long as it is above −2μ/3.
+# Least λ₁, in units of μ: λ₀ may then be −μ/4, and K₀ is positive definite as long as λ₀ is above −2μ/3.
 _LEAST_REST = 0.25
 
 
 @dataclass(frozen=True)
 class Parameters:
-    """What one region is made of, at small strains: Lamé's λ and μ (Pa); λ is infinite where it is incompressible.
+    """Material parameters of one region at small strain: Lamé's λ and μ (Pa); λ is infinite if incompressible.
 
-    ``given_poisson`` is Poisson's ratio as it was given, None where λ and μ were.
+    ``given_poisson`` is Poisson's ratio as given, None if λ and μ were given.
     """
 
     lame_lambda: float
@@ -49,7 +49,7 @@ class Parameters:
 
     @property
     def ratio(self) -> float:
-        """λ/μ: all that F/μ depends on."""
+        """λ/μ, the only parameter of F/μ."""
         return self.lame_lambda / self.lame_mu
 
     @property
@@ -60,9 +60,9 @@ class Parameters:
 
 @dataclass(frozen=True)
 class MaterialLaw:
-    """A law, one of :data:`LAWS`, with the ``parameters`` of each region of the mesh, in the order of its numbers.
+    """A law, one of :data:`LAWS`, with the ``parameters`` of each region of the mesh, by region number.
 
-    A law of one region holds for all regions that a mesh may have.
+    A law with one region applies to all regions of a mesh.
     """
 
     parameters: tuple[Parameters, ...]
@@ -86,7 +86,7 @@ class MaterialLaw:
         return self.name == "linear"
 
     def values(self, name: str) -> tuple[float, ...]:
-        """Return one of the parameters, by its name, of each region."""
+        """Return one parameter, by its name, for each region."""
         return tuple(getattr(each, name) for each in self.parameters)
 
     @cached_property
@@ -100,17 +100,17 @@ class MaterialLaw:
         return self.values("lame_mu")
 
     def softened(self, ratio: float) -> "MaterialLaw":
-        """Return linear elasticity of the same μ, with λ/μ of each region at most ``ratio``."""
+        """Return linear elasticity of the same μ, with λ/μ of each region limited to ``ratio``."""
         return MaterialLaw.of([min(each.lame_lambda, ratio * each.lame_mu) for each in self.parameters], self.lame_mu)
 
     @property
     def is_uniform(self) -> bool:
-        """Whether there is one material."""
+        """Whether there is only one material."""
         return len(self.parameters) == 1
 
 
 def of_regions(values: Sequence[float], regions: Int32Array | IntArray | None, count: int) -> FloatArray:
-    """Return which of ``values`` by region each of ``count`` cells has, in ``regions``; one value is that of all."""
+    """Return the value of each of ``count`` cells from ``values`` by region; a single value applies to all cells."""
     if regions is None or len(values) == 1:
         return np.full(count, values[0], dtype=np.float64)
     return np.array(values, dtype=np.float64)[regions[:count]]
@@ -126,7 +126,7 @@ class SplitLaw:
 
     @staticmethod
     def of(law: MaterialLaw) -> "SplitLaw":
-        """Split a law: λ₀ = μ, and less where λ is not much larger than μ, so that λ₁ stays positive."""
+        """Split a law: λ₀ = μ, or less where λ is not much larger than μ, so that λ₁ stays positive."""
         unit = max(law.lame_mu)
         elastic, compliance = [], []
         for region in law.parameters:
@@ -146,7 +146,7 @@ def strain(u: Any) -> Any:
 
 
 def axisymmetric_strain(u: Any, r: Any) -> Any:
-    """Return ε in the directions r, θ, z of a displacement (u_r, u_z) in the half plane of these r and z."""
+    """Return the strain ε (r, θ, z) of a displacement (u_r, u_z) in the half plane with radius r."""
     slide = (u[0].dx(1) + u[1].dx(0)) / 2
     return ufl.as_tensor([[u[0].dx(0), 0, slide], [0, u[0] / r, 0], [slide, 0, u[1].dx(1)]])
 
@@ -157,7 +157,7 @@ def small_strain(strain: Any, lame_lambda: Any, lame_mu: Any) -> Any:
 
 
 def pressurised(strain: Any, lame_lambda: Any, lame_mu: Any, pressure: Any, compliance: Any) -> Any:
-    """Linear elasticity with λ₁ more than λ, by a pressure p = λ₁ tr ε and the compliance 1/λ₁: stationary in both."""
+    """Linear elasticity, with λ₁ added to λ by a pressure p = λ₁ tr ε and the compliance 1/λ₁; stationary in both."""
     return small_strain(strain, lame_lambda, lame_mu) + pressure * ufl.tr(strain) - compliance * pressure**2 / 2
 
 
@@ -167,14 +167,14 @@ def linear(gradient: Any, of: Mapping[str, Any]) -> Any:
 
 
 def neo_hookean(gradient: Any, of: Mapping[str, Any]) -> Any:
-    """A compressible neo-Hookean body: μ/2 (F : F − 3) − μ ln J + λ/2 (J − 1)², J = det F.
+    """Compressible neo-Hookean law: μ/2 (F : F − 3) − μ ln J + λ/2 (J − 1)², J = det F.
 
-    It is polyconvex (J. M. Ball, Arch. Rational Mech. Anal. 63, 1977), and infinite where tissue has no volume left.
+    It is polyconvex (J. M. Ball, Arch. Rational Mech. Anal. 63, 1977), and infinite at J = 0.
     """
     volume, lame_lambda, lame_mu = ufl.det(gradient), of["lame_lambda"], of["lame_mu"]
     stretched = lame_mu / 2 * (ufl.inner(gradient, gradient) - 3) - lame_mu * ufl.ln(volume)
     return stretched + lame_lambda / 2 * (volume - 1) ** 2
 
 
-# ψ of F and of parameters by name, by the name that a study file has.
+# ψ as a function of F and of parameters by name; keys are the names in a study file.
 LAWS: dict[str, Callable[[Any, Mapping[str, Any]], Any]] = {"linear": linear, "neo-hookean": neo_hookean}

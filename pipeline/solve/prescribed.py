@@ -1,9 +1,9 @@
-"""Prescribed motion of a footprint: a column for each motion, one for loads, and what their solutions do.
+"""Prescribed motion of a footprint: one column for each motion, one for loads, and the response from their solutions.
 
 Loads f add the column w with K w = f, w = 0 on footprint and support (:mod:`pipeline.solve.response`). A far field on
-the cut face (:mod:`pipeline.solve.far_field`) adds that of one unit. With K the stiffness of the tool's movement (0)
-and that unit (1), the body beyond the cut added to K₁₁, the energy is stationary for the share -K₁₀ / K₁₁. The work of
-the tool is that of both sides of the cut, F d = 2 (U within + U beyond).
+the cut face (:mod:`pipeline.solve.far_field`) adds one column per unit. Let K be the stiffness of the tool's movement
+(index 0) and that unit (index 1), with the body beyond the cut added to K₁₁. The energy is stationary for the amplitude
+-K₁₀ / K₁₁. The tool's work is the energy on both sides of the cut, F d = 2 (U within + U beyond).
 """
 
 from collections.abc import Sequence
@@ -25,36 +25,37 @@ from pipeline.solve.response import LoadResponse, Response, load_response_of, re
 from pipeline.solve.solution import Request
 from pipeline.stages import stage
 
-# The work of both sides of a cut balances where each motion's does to this share of what is asked of it.
+# Tolerance of each motion's own balance for the balance of both sides of a cut, as a share of the limit.
 TWO_SIDED = 0.1
 
 
 class PrescribedMotion:
-    """Solves for each motion of a footprint, by elements, with one set-up.
+    """Solver for each motion of a footprint, with one set-up of the elements.
 
-    ``corrections`` are, by motion, the last solution for a unit of it less the prescribed displacements, owned dofs.
+    ``corrections`` are the last solutions per unit of each motion, less the prescribed displacements, owned dofs.
     """
 
     def __init__(self, elements: Elements, *, reuse: bool = False):
-        """``reuse`` begins each solve from the one before: depths of a nonlinear law share one walk."""
+        """With ``reuse`` the last solution is the initial guess: depths of a nonlinear law share one load path."""
         self._elements = elements
         self._reuse = reuse and elements.element == "displacement"
         self.corrections: dict[Motion, tuple[FloatArray, ...]] = {}
         self._law: MaterialLaw | None = None  # of the corrections
-        self._walk: Walk | None = None  # to the last depth in a body of a law that is not linear
+        self._walk: Walk | None = None  # load path to the last depth, for a nonlinear law
 
     def close(self) -> None:
-        """Free what is kept from solve to solve."""
+        """Free what is kept between solves."""
         self.corrections.clear()
 
     def solve(self, asked: Request, stack: ExitStack) -> Equilibrium:
-        """Solve for each motion of the movement and for its loads; collective. The ``stack`` frees what is made.
+        """Solve for each motion of the movement and for its loads; the ``stack`` frees what is made; collective.
 
         Raises:
-            SolveError: if the elements are not for the law, the solver did not converge, or the solution fails a check.
+            SolveError: if the elements do not support the law, the solver does not converge, or the solution fails a
+                check.
         """
         law, movement, direct = asked.law, asked.movement, self._elements.is_direct(asked.method)
-        # A tool at many places: the same operator and the same motion, another far field each time.
+        # A tool at many places: operator and motion stay the same, the far field differs.
         keep = self._reuse and movement.far is not None and not direct
         solver = self._set_up(law, movement, stack, direct=direct, keep=keep)
         with stage("assembly"):
@@ -79,10 +80,10 @@ class PrescribedMotion:
     def _iterate(
         self, solver: Solver, columns: list[Column], todo: list[Column], movement: Movement, tolerance: float
     ) -> tuple[int, Response, LoadResponse | None]:
-        """Solve ``todo`` of the ``columns`` until forces balance; return the iterations, and what the solutions do.
+        """Solve ``todo`` of the ``columns`` until forces balance; return the iterations, and the responses.
 
         Raises:
-            SolveError: if they do not.
+            SolveError: if forces do not balance.
         """
         aim = tolerance * min(self._elements.stricter, TWO_SIDED if movement.far is not None else 1.0)
         iterations = solver.solve(todo, aim)
@@ -96,7 +97,7 @@ class PrescribedMotion:
         return iterations, response, load_response
 
     def _guess(self, columns: Sequence[Column], movement: Movement) -> list[Column]:
-        """Begin with the last solution for each motion, if there is one; return the columns that do."""
+        """Set the initial guess of each motion to its last solution, if there is one; return these columns."""
         guessed = []
         for motion, column in zip(movement.motions, columns, strict=False):
             if self._reuse and motion in self.corrections:
@@ -106,15 +107,15 @@ class PrescribedMotion:
         return guessed
 
     def _set_up(self, law: MaterialLaw, movement: Movement, stack: ExitStack, *, direct: bool, keep: bool) -> Solver:
-        """Return a solver for a law, freed with the ``stack`` unless it is to ``keep``; collective.
+        """Return a solver for a law; the ``stack`` frees it unless it is to be kept (``keep``); collective.
 
         Raises:
-            SolveError: if it cannot be set up, or the elements are not for the law.
+            SolveError: if it cannot be set up, or the elements do not support the law.
         """
         if law.is_linear:
             return self._elements.set_up(law, stack, direct=direct, keep=keep)
         if not isinstance(self._elements, DisplacementElements):
-            raise SolveError(f"the law {law.name} is for displacement elements")
+            raise SolveError(f"the law {law.name} needs displacement elements")
         walk = self._walk
         if walk is None or not walk.leads_to(law, movement):
             walk = Walk(law, movement.motions[0], np.zeros(self._elements.displacements.owned))
@@ -125,7 +126,7 @@ class PrescribedMotion:
 def respond(
     found: Products, columns: Sequence[Column], law: MaterialLaw, movement: Movement
 ) -> tuple[Response, LoadResponse | None]:
-    """Return the response to the motions, and what dead loads do, of which the last column is; collective."""
+    """Return the response to the motions, and to dead loads, whose column is the last one; collective."""
     count, mirrored = len(movement.motions), found.space.body.mirrored
     motions, loaded = columns[:count], columns[count:]
     residuals = [
@@ -147,17 +148,17 @@ def respond(
 
 
 def _energy_beyond(movement: Movement, mu: float, mirrored: Sequence[int]) -> FloatArray | float:
-    """Return twice the strain energies (n, n), by pairs of motions, beyond the cut face of the part modelled."""
+    """Return twice the strain energies (n, n), by pairs of motions, beyond the cut face of the modelled part."""
     if movement.far is None:
         return 0.0
     return np.outer(movement.shares, movement.shares) * movement.far.stiffness(mu) / 2.0 ** len(mirrored)
 
 
 def _balanced(response: Response) -> Response:
-    """Return the response of tool and far field together, its balance with F d = 2 (U within + U beyond).
+    """Return the response of tool and far field together, with its balance, F d = 2 (U within + U beyond).
 
     Raises:
-        SolveError: if that does not hold.
+        SolveError: if forces do not balance.
     """
     force, taken = float(response.forces[0, 2]), float(response.stiffness[0, 0])
     balance = max(response.balance, abs(force - taken) / taken)

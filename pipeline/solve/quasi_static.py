@@ -1,9 +1,9 @@
-"""A body, a probe that displaces part of its surface, and the force that this takes, whatever the elements.
+"""The quasi-static problem: a body, a probe that displaces part of its surface, and the reaction force.
 
     Find u with K u = 0 inside, u = the probe's motion on its footprint (bonded) or its normal part only
     (frictionless), u = 0 on the support.
 
-The tool is a constraint: its motion is prescribed (:mod:`pipeline.solve.prescribed`), or its contact is found
+The tool is a constraint: its motion is prescribed (:mod:`pipeline.solve.prescribed`), or its contact area is found
 (:mod:`pipeline.solve.contact.search`). Both give an equilibrium. The force is the reaction
 (:mod:`pipeline.solve.response`): stress integrated under the probe is wrong by tens of per cent.
 """
@@ -36,21 +36,21 @@ from pipeline.stages import recorded, stage
 
 
 class Constraint(Protocol):
-    """What is asked of the surface that a tool touches."""
+    """Constraint of the surface under a tool: a prescribed motion, or unilateral contact."""
 
     def solve(self, asked: Request, stack: ExitStack) -> Equilibrium:
-        """Find the equilibrium for a movement of the tool; collective. The ``stack`` frees what is made.
+        """Find the equilibrium for a movement of the tool; the ``stack`` frees what is made; collective.
 
         Raises:
-            SolveError: if there is none, or what is found fails a check.
+            SolveError: if there is none, or it fails a check.
         """
 
     def close(self) -> None:
-        """Free what is kept from solve to solve."""
+        """Free what is kept between solves."""
 
 
 class QuasiStaticProblem(Problem):
-    """Elements on a mesh with conditions: solves for any material and movement. A context manager."""
+    """Elements on a mesh with conditions, ready for any material and movement. A context manager."""
 
     def __init__(
         self,
@@ -63,10 +63,10 @@ class QuasiStaticProblem(Problem):
         reuse: bool = False,
         condense: bool = False,
     ):
-        """Prepare elements of a ``degree``, of a kind, "displacement" or "mixed"; collective.
+        """Prepare elements of a ``degree``, of the kind "displacement" or "mixed"; collective.
 
-        Where contact is unilateral, what touches of the ``tool`` is found. ``reuse`` begins each solve from the
-        solution of the one before; ``condense``: see ``ContactSearch``.
+        Unilateral contact needs the ``tool``. With ``reuse`` the last solution is the initial guess of the next solve;
+        ``condense``: see ``ContactSearch``.
 
         Raises:
             SolveError: if footprint and support share a point: no displacement satisfies both.
@@ -81,29 +81,29 @@ class QuasiStaticProblem(Problem):
         self._law: MaterialLaw | None = None  # of the last solution
 
     def close(self) -> None:
-        """Free what is kept from solve to solve."""
+        """Free what is kept between solves."""
         self.constraint.close()
         self.elements.close()
 
     @property
     def corrections(self) -> dict[Motion, tuple[FloatArray, ...]]:
-        """The last solution for a unit of each prescribed motion, see ``PrescribedMotion``; none of found contact."""
+        """The last solution per unit of each prescribed motion: see ``PrescribedMotion``; empty in unilateral contact."""
         return self.constraint.corrections if isinstance(self.constraint, PrescribedMotion) else {}
 
     @property
     def dofs(self) -> int:
-        """Unknowns of the modelled part."""
+        """Number of unknowns of the modelled part."""
         return self.elements.dofs
 
     def answer(self, asked: Request) -> Solution:
         """Solve for each motion of the movement, with one set-up, and return forces and checks; collective.
 
-        An estimate goes on in elements of one degree more, for the solution's ``decrements``, which may be negative for
-        mixed ones, and ``bars``.
+        An error estimate also solves in elements of one degree more, for ``bars`` and ``decrements``; the latter may
+        be negative in mixed elements.
 
         Raises:
-            SolveError: if the elements are not for the law, the solver did not converge, or the solution fails a check;
-                a ContactError, if contact is not found.
+            SolveError: if the elements do not support the law, the solver does not converge, or the solution fails a
+                check; a ContactError, if contact is not found.
         """
         self._law = law = asked.law
         with recorded() as times, ExitStack() as stack:
@@ -131,7 +131,7 @@ class QuasiStaticProblem(Problem):
 
     @stage("error bar")
     def _estimated(self, solution: Solution, found: Equilibrium, law: MaterialLaw) -> Solution:
-        """Return the last ``solution`` with its bars; collective."""
+        """Return the last ``solution`` with its error bars; collective."""
         elements, columns, movement = self.elements, found.columns, found.movement
         whole = 2.0 ** len(self._body.mirrored)
         with ExitStack() as stack:
@@ -175,7 +175,7 @@ class QuasiStaticProblem(Problem):
     def _released(
         self, elements: Elements, columns: Sequence[Column], law: MaterialLaw, movement: Movement
     ) -> tuple[Advance | None, Advance | None]:
-        """Return what a slit's front and the blade's tip in the whole body release (J/m)."""
+        """Return the energy (J/m) that a slit's front, and the blade's tip, release in the whole body."""
 
         def of(line: Front | None) -> Advance | None:
             if line is None:
@@ -212,11 +212,11 @@ class QuasiStaticProblem(Problem):
         return self.elements.displacements.forms.displacement, self._values.principal_strains(self._law)
 
     def largest(self, law: MaterialLaw, displacement: PETSc.Vec) -> dict[str, Any]:
-        """Return the largest values of ``displacement`` over the cells, by name; collective."""
+        """Return the cell maxima of ``displacement`` by name; collective."""
         self.elements.displacements.set_displacement(displacement)
         return self._values.largest(law, self._conditions.front)
 
 
 def _form(response: Response, load_response: LoadResponse | None) -> FloatArray:
-    """Return the stiffness, with a row more for loads."""
+    """Return the stiffness, with one more row and column for loads."""
     return response.stiffness if load_response is None else load_response.form

@@ -1,12 +1,13 @@
 """A reduced basis: many Poisson's ratios on one mesh from few solves, with a bound on the error of F.
 
-Divided by μ the operator is K(t) = A_μ + t A_λ, t = λ/μ. Among the combinations of solutions for a few t the Galerkin
-solution has the smallest energy: F is too high, by
+Divided by μ the operator is K(t) = A_μ + t A_λ, t = λ/μ. In the span of solutions for a few t, the Galerkin solution
+has the smallest energy: F is an upper bound, with error
 
     F_rb·d - F_h·d = r K(t)⁻¹ r <= r K(t₀)⁻¹ r <= r P r / λ_min(P K(t₀))        for t >= t₀,
 
-r the residual, P the preconditioner for the smallest t: one application of P for each t (A. K. Noor and J. M. Peters,
-AIAA J. 18, 455, 1980; G. Rozza, D. B. P. Huynh and A. T. Patera, Arch. Comput. Methods Eng. 15, 229, 2008).
+with r the residual and P the preconditioner for the smallest t: one application of P for each t (A. K. Noor and
+J. M. Peters, AIAA J. 18, 455, 1980; G. Rozza, D. B. P. Huynh and A. T. Patera, Arch. Comput. Methods Eng. 15, 229,
+2008).
 """
 
 from contextlib import ExitStack
@@ -24,14 +25,14 @@ from pipeline.solve.physics import MaterialLaw
 from pipeline.solve.response import Response, reaction
 from pipeline.solve.spaces import ElasticSpace
 
-# λ_min is estimated from above, by Lanczos: its share that is relied on.
+# Lanczos gives λ_min from above: safety factor on it.
 _TRUST = 0.5
 _LAMBDA, _MU = MaterialLaw.of(1.0, 0.0), MaterialLaw.of(0.0, 1.0)
 
 
 @dataclass(frozen=True)
 class Reduced:
-    """What the basis gives for one t and μ = 1 Pa: response, relative bound on F, share of each solution."""
+    """Result of the basis for one t and μ = 1 Pa: response, relative bound on F, coefficient of each solution."""
 
     response: Response
     bound: float
@@ -39,18 +40,18 @@ class Reduced:
 
 
 class ReducedBasis:
-    """Solutions in a space of displacements for a few t, and what follows from them for others; a context manager."""
+    """Reduced basis in a space of displacements: solutions for a few t, evaluated for others; a context manager."""
 
     def __init__(self, space: ElasticSpace, solver: LinearSolver, movement: Movement):
-        """Begin without solutions for a ``movement`` of one motion; collective.
+        """Begin without solutions, for a ``movement`` of one motion; collective.
 
-        The ``solver`` is that of the ``space`` for the least t that will be asked for, and must live as long.
+        ``solver`` is that of the ``space`` for the smallest t to be evaluated, and must live as long.
         """
         self._space, self._solver = space, solver
         (motion,) = movement.motions
         self._movement, self._mirrored = movement, self._space.body.mirrored
         self._stack = ExitStack()
-        # What the residual is made of: first the loads, then two for each w.
+        # Terms of the residual: first the loads, then two for each w.
         self._parts: list[PETSc.Vec] = []
         self._solutions: list[PETSc.Vec] = []
         self._reactions: list[FloatArray] = []
@@ -71,10 +72,10 @@ class ReducedBasis:
         self._stack.close()
 
     def add(self, correction: FloatArray) -> None:
-        """Take a solution, less the prescribed displacements, into the basis; owned dofs, collective."""
+        """Add a solution, less the prescribed displacements, to the basis; owned dofs, collective."""
         added = self._vector()
         added.array[:] = correction
-        # Made orthogonal to the others: the small systems stay well conditioned.
+        # Orthogonalised, so that the small systems stay well conditioned.
         for other in self._solutions:
             added.axpy(-added.dot(other), other)
         norm = added.norm()
@@ -95,9 +96,9 @@ class ReducedBasis:
         self._products = products
 
     def evaluate(self, t: float) -> Reduced:
-        """Return force, energy and bound for t = λ/μ, for the work of one application of P; collective.
+        """Return force, energy and bound for t = λ/μ, at the cost of one application of P; collective.
 
-        With loads b_q = -A_q·held and the solutions' w_i·A_q·w_j from the products of parts and solutions.
+        The products of terms and solutions give the loads b_q = -A_q·held and the w_i·A_q·w_j.
         """
         count = len(self._solutions)
         theta = np.array([t, 1.0])
@@ -116,9 +117,9 @@ class ReducedBasis:
         return Reduced(response, bound, weights)
 
     def displacement(self, reduced: Reduced) -> PETSc.Vec:
-        """Return the displacement of an evaluation, with the loads' amount.
+        """Return the displacement of an evaluation, with the motion's amount.
 
-        The basis owns it, and the next one takes its place.
+        The basis owns it; the next call overwrites it.
         """
         self._held.copy(self._result)
         for weight, solution in zip(reduced.weights, self._solutions, strict=True):
@@ -127,7 +128,7 @@ class ReducedBasis:
         return self._result
 
     def _add(self, values: PETSc.Vec, law: MaterialLaw, *, sign: float) -> float:
-        """Take sign · A·``values`` among the parts of the residual; return ``values``·A·``values``; collective."""
+        """Add sign · A·``values`` to the terms of the residual; return ``values``·A·``values``; collective."""
         space, part = self._space, self._vector()
         space.set_displacement(values)
         space.apply(part, law)
@@ -144,7 +145,7 @@ class ReducedBasis:
 
 
 def _smallest_eigenvalue(solver: LinearSolver, load: PETSc.Vec) -> float:
-    """Return the smallest eigenvalue of preconditioner times operator, from above, by Lanczos' method; collective."""
+    """Return an upper estimate of the smallest eigenvalue of preconditioner times operator, by Lanczos; collective."""
     if solver.ksp.getType() == "preonly":
         return 1.0
     with ExitStack() as stack:

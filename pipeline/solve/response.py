@@ -1,16 +1,16 @@
-"""The response of a body to a movement of the probe and to loads, as quadratic forms; for every kind of element.
+"""Response of a body to a movement of the probe and to loads, as quadratic forms, for every kind of element.
 
-With r_j = K u_j for a unit of motion j, the stiffness is K_ij = u_i·r_j: symmetric and stationary, its error the
-product of two solver errors. Forces summed over the probe's dofs are linear in that error: along a motion that was
-solved for, the stiffness gives the force.
+With r_j = K u_j for a unit of motion j, the stiffness is K_ij = u_i·r_j: symmetric and stationary, its error is the
+product of two solver errors. Forces summed over the probe's dofs are linear in that error. Along each motion solved
+for, the force is therefore taken from the stiffness.
 
-Loads add a row. With w their solution while the probe is held, twice the potential energy is a'K a + 2 a'g - a(w, w),
-g_i = -f·u_i (E. Betti) the force that holds the probe along motion i. Written as a(u_i, w) - f·u_i it is stationary,
-too; one degree more changes the whole form by minus the products of its corrections.
+Loads add a row. With w their solution for a fixed probe, twice the potential energy is a'K a + 2 a'g - a(w, w), where
+g_i = -f·u_i (E. Betti) is the force that holds the probe along motion i. Written as a(u_i, w) - f·u_i it is stationary,
+too. One degree more changes the whole form by minus the products of its corrections.
 
-By Cauchy and Schwarz the bar on g_i is the root of those on K_ii and a(w, w), if the errors of u_i and w are at the
-same places. The cosine of their corrections in energy, |S_ij| / (S_ii S_jj)^½ with S what one degree more takes away,
-says how far they are. It may vanish by chance: a share of the root remains.
+By Cauchy and Schwarz the bar on g_i is the geometric mean of those on K_ii and a(w, w), if u_i and w have their errors
+at the same places. The cosine of their corrections in energy, |S_ij| / (S_ii S_jj)^½ with S the decrements of one
+degree more, measures how far this is so. It may vanish by chance: a fraction of the geometric mean remains.
 """
 
 from collections.abc import Sequence
@@ -24,18 +24,18 @@ from pipeline.solve import SolveError
 from pipeline.solve.estimate import extrapolate
 from pipeline.solve.movement import Movement, Vector
 
-# A bar on what loads do to the probe, in units of the root of both bars: so many cosines, and what remains without.
+# Bar on the loads' effect on the probe, in units of the geometric mean of both bars: factor of the cosine, and rest.
 # Measured: docs/accuracy.md.
 _SEEN, _UNSEEN = {"displacement": 1.15, "mixed": 1.25}, {"displacement": 0.12, "mixed": 0.2}
-# Directions that differ by less than this are the same.
+# Directions are equal within this distance.
 _SAME = 1e-9
 
 
 @dataclass(frozen=True)
 class Contact:
-    """Contact that was found: its area (m²), with a relative 95 % bar where one was asked for.
+    """Unilateral contact: its area (m²), with a relative 95 % bar if requested.
 
-    ``sag`` (m) is how far loads have moved the first touch, ``load_energy`` (J) their strain energy without the probe.
+    ``sag`` (m) is the displacement of the first touch by loads, ``load_energy`` (J) their strain energy without probe.
     """
 
     area: float
@@ -45,18 +45,18 @@ class Contact:
 
     @property
     def radius(self) -> float:
-        """Radius (m) of a disc of that area."""
+        """Radius (m) of a disc of the same area."""
         return float(self.area / pi) ** 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """How the whole body answers n motions; global, equal on every rank.
+    """Response of the whole body to n motions; global, equal on every rank.
 
     ``stiffness`` (n, n) is the work-conjugate force of each motion (row) for a unit of each (column): N/m between
-    translations, N (per rad, or N·m per m) between one and a rotation, N·m between rotations. ``forces`` (n, 3) are
-    the forces of the tissue on the probe (N) for a unit of each, from the residuals. ``balance`` is the largest of the
-    relative errors of F·d = 2U and of F_probe + F_support = 0.
+    translations, N (per rad, or N·m per m) between a translation and a rotation, N·m between rotations. ``forces``
+    (n, 3) are the forces of the tissue on the probe (N) per unit of each, from the residuals. ``balance`` is the
+    largest relative error of F·d = 2U and of F_probe + F_support = 0.
     """
 
     movement: Movement
@@ -83,17 +83,17 @@ class Response:
 def reaction(
     movement: Movement, stationary: FloatArray, on_probe: FloatArray, mirrored: Sequence[int] = (), balance: float = nan
 ) -> Response:
-    """Return the response of the whole body, from what belongs to the modelled part of it.
+    """Return the response of the whole body from that of the modelled part.
 
-    ``stationary`` (n, n) are the energies u_i·r_j, or what takes their place in a mixed method; ``on_probe`` (n, 3) the
+    ``stationary`` (n, n) are the energies u_i·r_j, or the stationary form of a mixed method; ``on_probe`` (n, 3) the
     sums of r_j over the probe's dofs; ``mirrored`` the axes normal to planes of symmetry that bound the part.
 
     Raises:
-        SolveError: if one of them is not a number, or a motion takes no energy.
+        SolveError: if one of them is not finite, or a motion has no energy.
     """
     taken = np.diag(stationary)
     if not (np.all(np.isfinite(stationary)) and np.all(np.isfinite(on_probe)) and taken.min() > 0):
-        raise SolveError(f"the solution is not a number or has no energy (2U = {taken.min():g} J for a unit of travel)")
+        raise SolveError(f"the solution is not finite or has no energy (2U = {taken.min():g} J for a unit of travel)")
     stiffness = 2.0 ** len(mirrored) * (stationary + stationary.T) / 2
     if movement.apart:
         stiffness = np.diag(np.diag(stiffness))
@@ -102,11 +102,11 @@ def reaction(
 
 @dataclass(frozen=True, eq=False)
 class LoadResponse:
-    """What loads do to a probe that makes a ``movement``; of the whole body, global.
+    """Effect of loads on a probe in a ``movement``; of the whole body, global.
 
-    ``form`` (n + 1, n + 1), of twice the potential energy (J) for n motions and, last, the loads, holds K, g and
+    ``form`` (n + 1, n + 1) of twice the potential energy (J), for n motions and the loads last, contains K, g and
     -a(w, w). ``forces`` (3) is the force of the tissue on the probe (N) from residuals. ``decrements`` is what one
-    degree more takes away from the form, ``bars`` the 95 % bars on its entries.
+    degree more removes from the form, ``bars`` the 95 % bars on its entries.
     """
 
     movement: Movement
@@ -117,7 +117,7 @@ class LoadResponse:
 
     @property
     def energy(self) -> float:
-        """Strain energy (J) of the loads while the probe is held."""
+        """Strain energy (J) of the loads with the probe fixed."""
         return float(-self.form[-1, -1]) / 2
 
     @property
@@ -126,12 +126,12 @@ class LoadResponse:
         return _along_motions(self.movement, self.forces, self.form[:-1, -1])
 
     def bar_along(self, direction: Vector) -> float:
-        """Return the 95 % bar (N) on the force along a direction, not a number if no motion was solved along it."""
+        """Return the 95 % bar (N) on the force along a direction; NaN if no motion was solved along it."""
         number = self._motion_along(direction)
         return nan if number is None or self.bars is None else float(self.bars[number, -1])
 
     def stiffness_along(self, direction: Vector) -> float:
-        """Return the stiffness (N/m) of the motion that was solved along a direction, not a number without one."""
+        """Return the stiffness (N/m) of the motion solved along a direction; NaN without one."""
         number = self._motion_along(direction)
         return nan if number is None else float(self.form[number, number])
 
@@ -140,7 +140,7 @@ class LoadResponse:
         return next((number for number, cosine in enumerate(cosines) if abs(cosine - 1) < _SAME), None)
 
     def extrapolated(self, degree: int, element: str, *, plain: float, graded: bool) -> "LoadResponse":
-        """Return what the sequence of degrees tends to, itself without bars."""
+        """Return the limit of the sequence of degrees; unchanged without bars."""
         if self.decrements is None or self.bars is None:
             return self
         form, bars = extrapolate(
@@ -152,16 +152,16 @@ class LoadResponse:
 def load_response_of(
     movement: Movement, energies: FloatArray, works: FloatArray, on_probe: FloatArray, mirrored: Sequence[int]
 ) -> LoadResponse:
-    """Return what the loads do, from what belongs to the modelled part.
+    """Return the effect of the loads on the whole body from that on the modelled part.
 
-    ``energies`` (n + 1, n + 1) are the a(u_i, u_j) of all solutions, or what takes their place in a mixed method,
+    ``energies`` (n + 1, n + 1) are the a(u_i, u_j) of all solutions, or the stationary form of a mixed method,
     ``works`` (n + 1) those of the loads, f·u_j, ``on_probe`` (3) the sum of the residual of w on the probe's dofs.
 
     Raises:
-        SolveError: if one of them is not a number.
+        SolveError: if one of them is not finite.
     """
     if not (np.all(np.isfinite(energies)) and np.all(np.isfinite(works)) and np.all(np.isfinite(on_probe))):
-        raise SolveError("what the loads do is not a number")
+        raise SolveError("the response to the loads is not finite")
     form = (energies + energies.T) / 2
     if movement.apart:
         form[:-1, :-1] = np.diag(np.diag(form[:-1, :-1]))
@@ -171,13 +171,13 @@ def load_response_of(
 
 
 def shares(decrements: FloatArray, form: FloatArray) -> FloatArray:
-    """Return the share of each energy on the diagonal that one degree more takes away, none of what is none."""
+    """Return the share of each diagonal energy that one degree more removes; zero for a zero energy."""
     energies = np.abs(np.diag(form))
     return np.asarray(np.diag(decrements) / np.where(energies > 0, energies, np.inf))
 
 
 def load_bars(bars: FloatArray, decrements: FloatArray, element: str) -> FloatArray:
-    """Return ``bars`` (n + 1, n + 1) on the form, narrower where motions and loads have their errors apart."""
+    """Return ``bars`` (n + 1, n + 1) on the form, narrower if motions and loads have their errors at other places."""
     diagonal = np.abs(np.diag(decrements))
     root = np.sqrt(diagonal[:-1] * diagonal[-1])
     cosine = np.divide(np.abs(decrements[:-1, -1]), root, out=np.ones_like(root), where=root > 0)
@@ -188,14 +188,14 @@ def load_bars(bars: FloatArray, decrements: FloatArray, element: str) -> FloatAr
 
 
 def whole_force(forces: FloatArray, mirrored: Sequence[int]) -> FloatArray:
-    """Return forces on the whole body: images double what lies in a plane of symmetry and cancel what is across it."""
+    """Return forces on the whole body: mirror images double the components in a plane of symmetry and cancel others."""
     whole = np.full(3, 2.0 ** len(mirrored))
     whole[list(mirrored)] = 0.0
     return np.asarray(whole * forces)
 
 
 def _along_motions(movement: Movement, force: FloatArray, conjugate: FloatArray) -> Vector:
-    """Return a ``force`` (3) on the probe (N) that along each motion is minus the ``conjugate`` one (n)."""
+    """Return ``force`` (3) on the probe (N), replaced along each motion by minus its ``conjugate`` force (n)."""
     for motion, needed in zip(movement.motions, conjugate, strict=True):
         direction = np.array(motion.direction)
         if motion.is_translation:

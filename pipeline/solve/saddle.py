@@ -4,8 +4,8 @@
     [ B  −c M ] [p] = [g],
 
 by LDLᵀ (MUMPS), or by generalised conjugate residuals (GCR) with a block-triangular preconditioner: multigrid for K₀,
-a multiple of the mass M for the Schur complement (D. Silvester and A. Wathen, SIAM J. Numer. Anal. 31, 1352, 1994). K₀
-is far from incompressible: neither c (0 if incompressible) nor the mesh size changes the iterations much.
+and a multiple of the mass M for the Schur complement (D. Silvester and A. Wathen, SIAM J. Numer. Anal. 31, 1352, 1994).
+K₀ is far from incompressible: neither c (0 if incompressible) nor the mesh size changes the iterations much.
 """
 
 from collections.abc import Sequence
@@ -23,20 +23,21 @@ Pair = tuple[PETSc.Vec, PETSc.Vec]
 Weight = float | FloatArray
 
 _MOST_ITERATIONS = SOLVERS["saddle point"]["ksp_max_it"]
-# More directions than a solve takes, as a rule, and than one to a tenth: all of them are made and zeroed beforehand.
+# Search directions before a restart, more than a solve needs as a rule, and fewer for a rough tolerance (0.1): all are
+# allocated and zeroed at the start.
 _RESTART, _RESTART_ROUGH, _ROUGH = 40, 20, 0.1
-# B K₀⁻¹ Bᵀ is M / (λ₀ + 2μ) inside the body and less where the displacement is held; measured, flat from 0.8 to 1.6.
+# B K₀⁻¹ Bᵀ is M / (λ₀ + 2μ) inside the body, and less at prescribed displacements; measured, flat from 0.8 to 1.6.
 _SCHUR = 1.2
 # Chebyshev steps for M preconditioned by its diagonal, and smallest over largest eigenvalue, by the degree of the
-# pressure. Degree 1: 1/5 (A. Wathen, IMA J. Numer. Anal. 7, 449, 1987); the rest measured by the iterations.
+# pressure. Degree 1: 1/5 (A. Wathen, IMA J. Numer. Anal. 7, 449, 1987); the others are tuned for few iterations.
 _MASS = {1: (3, 0.2), 2: (5, 0.1), 3: (10, 0.04), 4: (14, 0.02)}
 
 
 @dataclass(frozen=True)
 class Saddle:
-    """The blocks: ``levels`` end with K₀, ``coupling`` is B, with columns of zeros for prescribed displacements.
+    """Blocks of the saddle point: ``levels`` end with K₀, ``coupling`` is B, with zero columns at prescribed dofs.
 
-    For a direct solve all have entries; else these may be products, as of :mod:`pipeline.solve.kernels.pressure`.
+    All are assembled for a direct solve; otherwise they may be matrix-free (:mod:`pipeline.solve.kernels.pressure`).
 
     ``stiffness`` is λ₀ + 2μ in units of the pressure, one number or one for each pressure of this rank; ``degree`` is
     that of the pressure.
@@ -50,15 +51,15 @@ class Saddle:
 
 
 class SaddleSolver:
-    """Solves a saddle point for any c; a context manager, which frees what it made.
+    """Solver of a saddle point for any c; a context manager, which frees what it made.
 
-    c is one number, or one for each pressure of this rank. What does not depend on it is set up once.
-    ``first_energies`` are the energy norms, squared, of the errors that an iterative solve began with, as its
-    preconditioner sees them, one for each right-hand side.
+    c is one number, or one for each pressure of this rank. All that does not depend on c is set up once.
+    ``first_energies`` are the squared energy norms of an iterative solve's initial errors, one for each right-hand
+    side, as measured by the preconditioner.
     """
 
     def __init__(self, saddle: Saddle, *, direct: bool, below: "SaddleSolver | None" = None):
-        """Set up; collective. ``below`` is one for elements of one degree less, if there is: see ``LinearSolver``."""
+        """Set up; collective. ``below`` is a solver for elements of one degree less, or None: see ``LinearSolver``."""
         self._saddle, self._direct = saddle, direct
         self.first_energies: list[float] = []
         with ExitStack() as stack, stage("set-up"):
@@ -79,8 +80,8 @@ class SaddleSolver:
     ) -> int:
         """Improve each of ``unknowns``, (u, p), until the energy norm of its error has fallen by ``tolerance``.
 
-        A ``target`` is for that norm itself, and not relative to anything. Returns the iterations of all; collective.
-        A direct solve is exact and does not look at what they hold.
+        A ``target`` is for the norm itself. Return the iterations of all; collective. A direct solve is exact and
+        ignores the initial guess.
 
         Raises:
             SolveError: if PETSc reports anything but convergence.
@@ -103,7 +104,7 @@ class SaddleSolver:
 
     @property
     def multigrid(self) -> LinearSolver | None:
-        """The solver for K₀, None where factors are."""
+        """The multigrid solver for K₀; None for a factorisation."""
         return None if self._direct else self._multigrid
 
     def _matrix(self, c: Weight, stack: ExitStack) -> PETSc.Mat:
@@ -142,8 +143,8 @@ class SaddleSolver:
 class _BlockTriangular:
     """The preconditioner z_u = K₀⁻¹ r_u, z_p = −S⁻¹ t with t = r_p − B z_u, both inverses approximate.
 
-    ``energy`` is |r_u·z_u| + |t·z_p| of what it was last applied to: with exact inverses r_u·K₀⁻¹r_u − t·S⁻¹t is the
-    error of the energy, and the sum a norm of the error that does not depend on units.
+    ``energy`` is |r_u·z_u| + |t·z_p| of the last residual. With exact inverses r_u·K₀⁻¹r_u − t·S⁻¹t is the error of the
+    energy, and the sum of magnitudes a norm of the error that does not depend on units.
     """
 
     def __init__(self, multigrid: LinearSolver, coupling: PETSc.Mat, mass: PETSc.KSP, schur: Weight):
@@ -153,7 +154,7 @@ class _BlockTriangular:
         self.energy = self.first_energy = 0.0
 
     def apply(self, _: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
-        """Apply it; PETSc calls this."""
+        """Apply the preconditioner; PETSc calls this."""
         r_u, z_u, rest, z_p = self._vectors
         split = r_u.getLocalSize()
         r_u.array[:] = residual.getArray(readonly=True)[:split]
@@ -172,7 +173,7 @@ class _BlockTriangular:
 
 
 class _EnergyTest:
-    """Stops GCR when the energy of the error has fallen to the square of the tolerance, or of the target if any."""
+    """Stops GCR when the energy of the error is below tolerance² times the initial one, or below target²."""
 
     def __init__(self, block: _BlockTriangular, tolerance: float, target: float | None):
         self._block, self._share, self._target = block, tolerance**2, target
@@ -189,7 +190,7 @@ class _EnergyTest:
             return 0
         if iteration == 1:
             self._block.first_energy = self._block.energy
-        # The preconditioner has seen the residual of one iteration ago; what was gained since, the plain norm tells.
+        # The energy is that of the previous iteration's residual; the ratio of plain norms estimates the gain since.
         enough = self._share * self._block.first_energy if self._target is None else self._target**2
         if self._block.energy * (norm / previous) ** 2 <= enough:
             return int(reasons.CONVERGED_RTOL)
@@ -204,7 +205,7 @@ def _gcr(matrix: PETSc.Mat, block: _BlockTriangular, aim: tuple[float, float | N
 
 
 def _weighed(mass: PETSc.Mat, weight: Weight) -> PETSc.Mat:
-    """Return a mass times a weight, to be destroyed; pressures of different weights have no entry between them."""
+    """Return a mass times a weight, which the caller destroys; pressures of different weights share no entry."""
     if mass.getType() == "python":
         return mass.getPythonContext().weighted(weight).matrix()
     mass = mass.copy()

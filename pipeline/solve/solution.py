@@ -1,4 +1,4 @@
-"""What is asked of a problem, and what one solve gives, whatever the elements."""
+"""Request to a problem and solution of one solve, for every kind of element."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
@@ -19,33 +19,33 @@ from pipeline.stages import Times
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Solution:
-    """What one solve gives; all values global and equal on every rank."""
+    """Result of one solve; all values are global and equal on every rank."""
 
     response: Response
-    load_response: LoadResponse | None = None  # what loads do while the probe is held
-    # Largest values of all cells clear of singular edges, numbers by name (pipeline.solve.cell_values).
+    load_response: LoadResponse | None = None  # effect of loads on the fixed probe
+    # Maxima over cells clear of singular edges, by name (pipeline.solve.cell_values).
     largest: dict[str, Any]
-    # Strain energy (J) where that is not half of F d.
+    # Strain energy (J), unless it is half of F d.
     stored: float | None = None
 
-    # Unknowns of the whole body, cells of the part that is modelled; of all motions, or the linear solves of contact.
+    # Unknowns of the whole body, cells of the modelled part; iterations of all motions, or linear solves of contact.
     dofs: int
     cells: int
     iterations: int
     times: Times
 
-    # The error bar (pipeline.solve.estimate): what one degree more takes away from the stiffness (n, n), 95 % bars on
-    # its entries; the share of edges at the rim without quarter points; N of mixed elements, in units of the energies
-    # on the diagonal (n).
+    # Error bar (pipeline.solve.estimate): decrements of the stiffness (n, n) in one degree more, 95 % bars on its
+    # entries, share of edges at the rim without quarter points, and N of mixed elements, in units of the energies on
+    # the diagonal (n).
     decrements: FloatArray | None = None
     bars: FloatArray | None = None
     plain: float = nan
     unseen: FloatArray | None = None
     estimate_iterations: int = 0
 
-    contact: Contact | None = None  # where it is found
+    contact: Contact | None = None  # unilateral contact only
 
-    # Energy released (pipeline.solve.crack) by a slit's front, and by the tip of a blade along which tissue slides.
+    # Energy released (pipeline.solve.crack) by a slit's front, and by the tip of a blade that slides in it.
     front: Advance | None = None
     tip: Advance | None = None
 
@@ -57,7 +57,7 @@ class Solution:
 
     @property
     def load_force(self) -> Vector:
-        """Force of the tissue on the probe (N) that loads add; not a number if there are none."""
+        """Force of the tissue on the probe (N) that loads add; NaN without loads."""
         if self.load_response is None:
             return nan, nan, nan
         x, y, z = self.load_response.force
@@ -65,7 +65,7 @@ class Solution:
 
     @property
     def load_force_bar(self) -> float:
-        """The 95 % bar (N) on that along the axis, not a number if no motion along it was solved for."""
+        """The 95 % bar (N) on the loads' force along the axis; NaN if no motion was solved along it."""
         if self.load_response is None:
             return nan
         if self.tip is not None:
@@ -118,7 +118,7 @@ class Solution:
 
     @property
     def reaction_bars(self) -> Vector:
-        """95 % error bars (N) on the components of the reaction, not a number where no motion was solved for."""
+        """95 % error bars (N) on the components of the reaction; NaN where no motion was solved."""
         spanned, bars = np.zeros(3), np.zeros(3)
         if self.bars is not None:
             conjugate = self.bars @ np.abs(self.response.amounts)
@@ -132,9 +132,9 @@ class Solution:
         return x, y, z
 
     def with_bars(self, decrements: FloatArray, bars: FloatArray, element: str, *, apart: bool) -> "Solution":
-        """Return the solution with what one degree more takes away, and bars; loads have a row more than motions.
+        """Return the solution with decrements and bars; with loads they have one row more than motions.
 
-        The entries between motions that symmetry keeps ``apart`` are zero, and known to be.
+        With ``apart``, symmetry makes the entries between motions exactly zero.
         """
         count = len(self.response.movement.motions)
         decrements, bars = decrements.copy(), bars.copy()
@@ -148,26 +148,26 @@ class Solution:
 
     @property
     def release(self) -> float:
-        """Energy (J) that a metre of advance of the slit's front releases; not a number if there is no slit."""
+        """Energy (J/m) released per metre of advance of the slit's front; NaN without a slit."""
         return nan if self.front is None else self.front.released
 
     @property
     def release_bar(self) -> float:
-        """Relative 95 % bar on that energy."""
+        """Relative 95 % bar on the released energy."""
         return nan if self.front is None else self.front.bar
 
     @property
     def is_shut(self) -> bool:
-        """Whether to open a slit further would release less: its faces are pressed together at the front."""
+        """Whether opening the slit further would release less energy: its faces are then pressed together there."""
         if self.front is None:
             return False
         motions = self.response.movement.motions
         return any(g < 0 for g, motion in zip(self.front.gains, motions, strict=False) if any(motion.opening))
 
     def extrapolated(self, degree: int, element: str, *, graded: bool = True, elsewhere: bool = False) -> "Solution":
-        """Return what the sequence of degrees tends to, ``graded`` to the edge or not; itself if it has no bars.
+        """Return the limit of the sequence of degrees, on a mesh ``graded`` to the edge or not; unchanged without bars.
 
-        ``elsewhere`` tells that the probe's edge may not be all that F errs by.
+        ``elsewhere`` says that F has errors from other places than the probe's edge.
         """
         if self.decrements is None or self.bars is None:
             return self
@@ -200,10 +200,10 @@ class Solution:
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked of a problem: what tissue of a ``law`` does in a ``movement`` of the probe, and its loads.
+    """Request to a problem: material ``law``, and ``movement`` of the probe with its loads.
 
-    ``method`` is "auto", "direct" or "iterative"; ``tolerance`` is that of the energy norm of the solver's error,
-    relative. ``estimate`` asks for error bars.
+    ``method`` is "auto", "direct" or "iterative"; ``tolerance`` is the relative energy norm of the solver's error.
+    ``estimate`` requests error bars.
     """
 
     law: MaterialLaw
@@ -214,12 +214,12 @@ class Request:
 
 
 class Problem(ABC):
-    """A body, conditions and elements, ready to be solved for any material and loads; a context manager."""
+    """A body, conditions and elements, ready for any material and loads; a context manager."""
 
     @property
     @abstractmethod
     def dofs(self) -> int:
-        """Unknowns of the modelled part."""
+        """Number of unknowns of the modelled part."""
 
     def __enter__(self) -> Self:
         return self
@@ -229,10 +229,10 @@ class Problem(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Free what is kept from solve to solve."""
+        """Free what is kept between solves."""
 
     def solve(self, law: MaterialLaw, movement: Movement, **how: Any) -> Solution:
-        """Solve for a ``law`` and a ``movement``; ``how`` is the rest of a :class:`Request`. Collective.
+        """Solve for a ``law`` and a ``movement``; ``how`` are the other fields of a :class:`Request`; collective.
 
         Raises:
             SolveError: see :meth:`answer`.
@@ -241,8 +241,8 @@ class Problem(ABC):
 
     @abstractmethod
     def answer(self, asked: Request) -> Solution:
-        """Solve for what is asked; collective.
+        """Return the solution of a request; collective.
 
         Raises:
-            SolveError: if the solver did not converge, or the solution fails a check.
+            SolveError: if the solver does not converge, or the solution fails a check.
         """

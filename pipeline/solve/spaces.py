@@ -1,4 +1,4 @@
-"""The displacement spaces of one mesh, shared by all that solve on it: prescribed dofs, forms, operators.
+"""Displacement spaces of one mesh, shared by all solvers on it: prescribed dofs, forms, operators.
 
 The operator is K = λ A_λ + μ A_μ, with prescribed dofs eliminated symmetrically.
 """
@@ -33,28 +33,28 @@ _NO_DOFS = np.empty(0, dtype=np.int32)
 
 
 class ElasticSpace:
-    """Displacements of one degree on a mesh: which of their dofs are prescribed, their forms, and operators of both.
+    """Displacements of one degree on a mesh: prescribed dofs, forms, and operators.
 
-    ``prescribed`` are local dofs (unrolled, owned and ghosts); arrays named ``…_owned`` index the dofs, or for
-    ``probe_owned`` and ``fixed_owned`` the blocks of three dofs, that this rank owns. ``owned`` and ``size`` count dofs
-    of this rank, and of all. ``space`` and ``dirichlet`` are dolfinx's.
+    ``prescribed`` are local dofs (unrolled, owned and ghosts). Arrays named ``…_owned`` index owned dofs;
+    ``probe_owned`` and ``fixed_owned`` index owned blocks of three dofs. ``owned`` and ``size`` count the dofs of this
+    rank, and of all ranks. ``space`` and ``dirichlet`` are dolfinx objects.
     """
 
     @stage("spaces, forms")
     def __init__(self, body: BodyMesh, degree: int, conditions: Conditions):
-        """Collective.
+        """Make the space; collective.
 
         Raises:
-            SolveError: if what the probe moves and the support share a point.
+            SolveError: if footprint and support share a point.
         """
         self.body, self.comm, self.degree, self.conditions = body, body.comm, degree, conditions
         self.space = space = vector_space(body.mesh, degree)
         index_map = space.dofmap.index_map
         self.owned, self.size = 3 * index_map.size_local, 3 * index_map.size_global
         probe, fixed = (_points(space, body, name) for name in (PROBE, FIXED))
-        # What may touch may be held, too, as long as it does not: who finds contact looks after that.
+        # Candidates for unilateral contact may be on the support: the active set leaves them out.
         if not conditions.unilateral and self.comm.allreduce(len(np.intersect1d(probe, fixed))):
-            raise SolveError("the probe's footprint touches the held face: no displacement satisfies both conditions")
+            raise SolveError("the probe's footprint touches the fixed face: no displacement satisfies both conditions")
         mirrors = list(zip(body.mirrored, _planes(space, body), strict=True))
         single = [(3 * probe + axis, axis) for axis in conditions.components]
         single += [(3 * plane + axis, axis) for axis, plane in mirrors]
@@ -69,7 +69,7 @@ class ElasticSpace:
 
     @property
     def whole_dofs(self) -> int:
-        """Unknowns of the whole body, of which a half or a quarter may be modelled; collective."""
+        """Number of unknowns of the whole body, of which a half or a quarter may be modelled; collective."""
         return 3 * whole_points(self.space, self.body)
 
     def held(self, motion: Motion) -> FloatArray:
@@ -89,10 +89,10 @@ class ElasticSpace:
 
     @contextmanager
     def lend(self, law: MaterialLaw, *, whole: bool = False, entries: bool = True) -> Iterator[PETSc.Mat]:
-        """Lend K, which its borrower may change; collective.
+        """Lend K, which the borrower may change; collective.
 
-        With ``entries``, or of degree 1, it is of type aij, the diagonal of prescribed dofs being the first region's μ.
-        As a ``whole`` it has no conditions. Without entries it is a product, prescribed rows being the identity's.
+        With ``entries``, or in degree 1, it has type aij, with the first region's μ on the diagonal of prescribed dofs.
+        With ``whole`` it has no conditions. Without entries it is matrix-free, with identity rows at prescribed dofs.
         """
         matrix = self._assemble(law, whole=whole) if entries or self.degree == 1 else self._product(law)
         try:
@@ -102,7 +102,7 @@ class ElasticSpace:
 
     @cached_property
     def cells(self) -> CellStiffness:
-        """The cells as products have them, laid out when first asked for; of degree 2 or more; collective."""
+        """The cells in the layout of products, made at first use; for degree 2 or more; collective."""
         return CellStiffness(self.space, curved_cells(self.body.mesh), self.prescribed, self.body.regions)
 
     @cached_property
@@ -131,7 +131,7 @@ class ElasticSpace:
     def apply(self, result: PETSc.Vec, law: MaterialLaw, *, checked: bool = True) -> None:
         """Write K u (N), with the unmodified operator and the forms' displacement, into ``result``; collective.
 
-        ``checked``: never by the code that solves multiply with, so that each agrees with the other.
+        With ``checked`` the code is other than that of the solver, so that each verifies the other.
         """
         if checked or self.degree not in DEGREES:
             self.forms.set_law(law)
@@ -140,9 +140,9 @@ class ElasticSpace:
             result.array[:] = CellOperator(self.cells, law).whole(self.forms.displacement.x.array[: self.owned])
 
     def residual_of(self, other: "ElasticSpace", law: MaterialLaw, result: PETSc.Vec) -> None:
-        """Write -K u (N), nought where u is prescribed, of the displacement of an ``other`` space's forms; collective.
+        """Write -K u (N), zero at prescribed dofs, for the displacement u of an ``other`` space, into ``result``.
 
-        It is the displacement of the own forms then.
+        Collective. The displacement of the own forms is then u.
         """
         self.forms.displacement.interpolate(other.forms.displacement)
         self.apply(result, law, checked=False)
@@ -150,10 +150,10 @@ class ElasticSpace:
         result.array[self.prescribed_owned] = 0.0
 
     def lift(self, rhs: PETSc.Vec, held: FloatArray, law: MaterialLaw, *, checked: bool = True) -> None:
-        """Put the loads of the prescribed displacements ``held`` into ``rhs``; collective.
+        """Write the right-hand side of the prescribed displacements ``held`` into ``rhs``; collective.
 
-        What is left to find is zero on the prescribed dofs, and so is its load: the solver's norms then measure the
-        energy of the error and nothing else, in any unit of length.
+        The unknown is zero at prescribed dofs, and so is its right-hand side: the solver's norms then measure the
+        energy of the error alone, in any unit of length.
         """
         self.forms.displacement.x.array[:] = held
         self.apply(rhs, law, checked=checked)
@@ -165,21 +165,21 @@ class ElasticSpace:
         """Return dead loads on the dofs of the space; collective.
 
         Raises:
-            SolveError: if no facet carries a traction.
+            SolveError: if no facet has a traction.
         """
         return apply_loads(loads, self.body, self.space)
 
     def put(self, rhs: PETSc.Vec, applied: Applied, factor: float = 1.0) -> None:
-        """Add ``factor`` times loads to ``rhs``, but for the prescribed dofs."""
+        """Add ``factor`` times loads to ``rhs``, except at prescribed dofs."""
         rhs.array[:] += factor * applied.forces
         rhs.array[self.prescribed_owned] = 0.0
 
     def set_displacement(self, values: PETSc.Vec, factor: float = 1.0) -> None:
-        """Make ``factor`` times ``values`` the displacement of the forms; collective."""
+        """Set the displacement of the forms to ``factor`` times ``values``; collective."""
         fill(self.forms.displacement, values, factor)
 
     def _sides_of(self, probe: Int32Array) -> FloatArray | None:
-        """Return of each point of the footprint on which side of a slit its face is, 1 or -1; collective."""
+        """Return the side of the slit of each point of the footprint, 1 or -1; None without a slit; collective."""
         if self.conditions.front is None:
             return None
         sides = np.full(len(probe), -1.0)
@@ -188,7 +188,7 @@ class ElasticSpace:
 
 
 class Spaces:
-    """Displacement spaces of a mesh, one a degree, each made when first asked for; a context manager."""
+    """Displacement spaces of a mesh, one per degree, each made at first use; a context manager."""
 
     def __init__(self, body: BodyMesh):
         self.body = body
@@ -202,7 +202,7 @@ class Spaces:
         self.close()
 
     def get(self, degree: int, conditions: Conditions) -> ElasticSpace:
-        """Return the space of ``degree`` with ``conditions``; collective. Those of other conditions are closed.
+        """Return the space of ``degree`` with ``conditions``; spaces of other conditions are closed; collective.
 
         Raises:
             SolveError: if footprint and support share a point: no displacement satisfies both.
@@ -215,13 +215,13 @@ class Spaces:
         return self._made[degree]
 
     def close(self) -> None:
-        """Free the operators that all spaces keep."""
+        """Free the operators of all spaces."""
         while self._made:
             self._made.popitem()
 
 
 def whole_points(space: Any, body: BodyMesh) -> int:
-    """Return the points of ``space`` on the whole body, of which those in a plane have one image; collective."""
+    """Return the number of points of ``space`` on the whole body: mirror images count, points in planes once."""
     images = np.full(space.dofmap.index_map.size_local, 2.0 ** len(body.mirrored))
     for plane in _planes(space, body):
         images[plane[plane < len(images)]] /= 2

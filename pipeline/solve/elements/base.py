@@ -81,18 +81,18 @@ class Enriching(Protocol):
 
     @property
     def stored(self) -> float | None:
-        """The energy (J) of the modelled part where that is not half the work of the force."""
+        """The energy (J) of the modelled part, unless it is half the work of the force."""
 
     def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
-        """Solve on in one degree more; what is made is freed with the ``stack``; collective.
+        """Return the hierarchical estimate; what is made is freed with the ``stack``; collective.
 
-        ``keep`` asks for the solutions, too.
+        ``keep`` requests the solutions of that degree, too.
         """
 
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """What a ``solver`` found for a ``movement``: columns of its motions and loads, and the response."""
+    """The solution of a ``solver`` for a ``movement``: columns of its motions and loads, and the response."""
 
     solver: Enriching
     columns: list[Column]
@@ -106,7 +106,7 @@ class Equilibrium:
 class Solver(ABC):
     """A solver of ``elements`` for one ``law``; ``close`` frees what it owns. Methods are collective.
 
-    ``is_exact`` tells that nothing improves what it finds; for ``stored`` see :class:`Enriching`.
+    ``is_exact`` says that its solutions cannot be improved; for ``stored`` see :class:`HierarchicalEstimator`.
     """
 
     def __init__(self, elements: "Elements", law: MaterialLaw, *, is_exact: bool):
@@ -115,11 +115,11 @@ class Solver(ABC):
         self.owner = ExitStack()
 
     def close(self) -> None:
-        """Free what it owns."""
+        """Free all resources."""
         self.owner.close()
 
     def lift(self, columns: Sequence[Column]) -> None:
-        """Put what columns prescribe and their loads on their right-hand sides."""
+        """Put prescribed displacements and loads of the columns on their right-hand sides."""
         for column in columns:
             self.elements.lift(column, self.law)
 
@@ -129,9 +129,9 @@ class Solver(ABC):
 
     @abstractmethod
     def solve(self, columns: Sequence[Column], tolerance: float, target: float | None = None) -> int:
-        """Lower the energy norm of the error of each solution to a relative ``tolerance``; return the iterations.
+        """Reduce the energy norm of the error of each solution to a relative ``tolerance``; return the iterations.
 
-        A ``target`` is for that norm itself (J^½ in the law's unit), and takes the tolerance's place.
+        A ``target`` is absolute (J^½ in the law's unit), and replaces the tolerance.
 
         Raises:
             SolveError: if the solver does not converge.
@@ -139,24 +139,24 @@ class Solver(ABC):
 
     @abstractmethod
     def improve(self, columns: Sequence[Column], share: float) -> int:
-        """Lower it to that ``share`` of what the last solve left; return the iterations."""
+        """Reduce the error to this ``share`` of what the last solve left; return the iterations."""
 
     @abstractmethod
     def enrich(self, columns: Sequence[Column], movement: Movement, stack: ExitStack, *, keep: bool) -> Enriched:
-        """Solve on in one degree more: see :class:`Enriching`."""
+        """Return the hierarchical estimate: see :class:`HierarchicalEstimator`."""
 
 
 class Elements(ABC):
     """Elements of one degree on a mesh, with their conditions; ``close`` frees them. Methods are collective.
 
-    What is written here is for displacements; pressures add what is theirs.
+    The methods here serve displacements; mixed elements add the pressures.
     """
 
-    # As the study has it.
+    # Name of the element in a study file.
     element: str
-    # Solutions are found to this share of the tolerance that is asked for.
+    # Factor on the requested tolerance.
     stricter: float
-    # Whether the solver can do with dofs that are held by the cycle's smoothers alone.
+    # Whether the solver allows dofs that only the smoothers of the cycle fix.
     masks: bool
 
     def __init__(self, spaces: Spaces, degree: int, conditions: Conditions):
@@ -172,40 +172,40 @@ class Elements(ABC):
 
     @property
     def dofs(self) -> int:
-        """Unknowns of the modelled part."""
+        """Number of unknowns of the modelled part."""
         return self.displacements.size
 
     @property
     def whole_dofs(self) -> int:
-        """Unknowns of the whole body."""
+        """Number of unknowns of the whole body."""
         return self.displacements.whole_dofs
 
     @property
     @abstractmethod
     def direct_limit(self) -> int:
-        """Unknowns up to which a factorisation is faster than iterations."""
+        """Number of unknowns up to which a factorisation is faster than iterations."""
 
     def is_direct(self, method: str) -> bool:
-        """Decide between a factorisation and iterations."""
+        """Return whether to factorise; otherwise iterate."""
         return is_direct(method, self.dofs, self.direct_limit)
 
     @abstractmethod
     def close(self) -> None:
-        """Free what is kept from solve to solve."""
+        """Free what is kept between solves."""
 
     @abstractmethod
     def set_up(self, law: MaterialLaw, stack: ExitStack, *, direct: bool, keep: bool) -> Solver:
-        """Return a solver, freed with the ``stack`` unless it is to ``keep``.
+        """Return a solver; the ``stack`` frees it unless it is to be kept (``keep``).
 
         Raises:
-            SolveError: if it cannot be set up, or the elements are not for the law.
+            SolveError: if it cannot be set up, or the elements do not support the law.
         """
 
     @abstractmethod
     def solver_on(
         self, levels: list[Level], law: MaterialLaw, held: Int32Array, *, direct: bool, earlier: Solver | None
     ) -> Solver:
-        """Return a solver of operators in which the owned dofs ``held`` are held, too; an ``earlier`` one ends.
+        """Return a solver of operators in which the owned dofs ``held`` are fixed, too; an ``earlier`` one is closed.
 
         Raises:
             SolveError: if it cannot be set up.
@@ -213,13 +213,13 @@ class Elements(ABC):
 
     @abstractmethod
     def operator(self, stiffness: PETSc.Mat, law: MaterialLaw, *, entries: bool) -> Callable[[Fields, Fields], None]:
-        """Return what writes the operator times fields into other fields, K being the ``stiffness``.
+        """Return a function that writes operator times fields into other fields; its K is ``stiffness``.
 
-        With ``entries`` the other blocks have them, too, as for a direct solve.
+        With ``entries`` the other blocks are assembled, too, as for a direct solve.
         """
 
     def levels(self, law: MaterialLaw, stack: ExitStack, *, direct: bool) -> list[Level]:
-        """Return the levels of multigrid, or the one of a direct solve, given back with the ``stack``."""
+        """Return the levels of multigrid, or the single one of a direct solve; the ``stack`` frees them."""
         degrees = [self.degree] if direct else range(1, self.degree + 1)
         spaces = [self._spaces.get(degree, self._conditions) for degree in degrees]
         return [level_of(space, law, stack, direct=direct) for space in spaces]
@@ -227,7 +227,7 @@ class Elements(ABC):
     # ---- the operator ---------------------------------------------------------------------------------
 
     def elastic(self, law: MaterialLaw) -> MaterialLaw:
-        """Return the law of the displacements' own operator."""
+        """Return the law of the displacement block."""
         return law
 
     def unit(self, law: MaterialLaw) -> float:
@@ -239,7 +239,7 @@ class Elements(ABC):
         self.displacements.apply(result[0], self.elastic(law), checked=checked)
 
     def lift(self, column: Column, law: MaterialLaw, *, checked: bool = True) -> None:
-        """Put what a column prescribes and its loads, in the law's unit, on its right-hand side."""
+        """Put prescribed displacement and loads of a column, in the law's unit, on its right-hand side."""
         if column.applied is None:
             self.displacements.lift(column.right[0], column.prescribed, self.elastic(law), checked=checked)
         else:
@@ -255,7 +255,7 @@ class Elements(ABC):
                 self.apply(image, law, checked=checked)
                 found.append([part.array.copy() for part in total])
                 images.append([part.array.copy() for part in image])
-        # Each field's part: of pressures it is, at the solution, what compressing takes, with the other sign.
+        # Products by field. At the solution those of pressures are minus the volumetric energy.
         parts = [[[x @ y for x, y in zip(field, image, strict=True)] for image in images] for field in found]
         stretching, *compressing = np.moveaxis(global_sum(self.body.comm, np.array(parts)), -1, 0)
         return Products(
@@ -267,36 +267,36 @@ class Elements(ABC):
         )
 
     def release(self, law: MaterialLaw, line: Front) -> Release:
-        """Return what tells the energy that the forms' fields release at a ``line``."""
+        """Return the functional of the energy that the forms' fields release at a ``line``."""
         forms = self.displacements.forms
         forms.set_law(self.elastic(law))
         return Release(self.body, line, forms, self._pressure(law), unit=self.unit(law))
 
     def _pressure(self, law: MaterialLaw) -> tuple[Any, Any] | None:
-        """Return a pressure of forms and its compliance, if there is one."""
+        """Return the pressure of the forms and its compliance, or None."""
         return None
 
     # ---- fields ---------------------------------------------------------------------------------------
 
     @contextmanager
     def fields(self) -> Iterator[Fields]:
-        """Lend fields of zeros."""
+        """Lend zero fields."""
         with vector(self.displacements.space) as u:
             yield (u,)
 
     def set_fields(self, fields: Fields) -> None:
-        """Make ``fields`` those of the forms."""
+        """Copy ``fields`` to the fields of the forms."""
         self.displacements.set_displacement(fields[0])
 
     def start_from(self, coarse: "Elements", unknown: Fields, prescribed: FloatArray) -> None:
-        """Interpolate the fields of ``coarse`` to the own forms, and, less what is ``prescribed`` (m), ``unknown``."""
+        """Interpolate fields of ``coarse`` to the forms, and to ``unknown`` after subtracting ``prescribed`` (m)."""
         displacement, space = self.displacements.forms.displacement, self.displacements
         displacement.interpolate(coarse.displacements.forms.displacement)
         unknown[0].array[:] = displacement.x.array[: space.owned] - prescribed[: space.owned]
         unknown[0].array[space.prescribed_owned] = 0.0
 
     def columns(self, movement: Movement, stack: ExitStack) -> list[Column]:
-        """Return a column for each motion, and a last one for dead loads, not solved yet; the ``stack`` frees them."""
+        """Return unsolved columns: one per motion, and a last one for dead loads; the ``stack`` frees them."""
         prescribed = [self.displacements.held(motion) for motion in movement.motions]
         amounts = [*movement.amounts]
         applied: list[Applied | None] = [None for _ in prescribed]
@@ -316,7 +316,7 @@ class Elements(ABC):
         ]
 
     def show(self, columns: Sequence[Column], amounts: Sequence[float] | None = None) -> None:
-        """Make the sum of solutions, each times its amount or another one, the fields of the forms."""
+        """Copy the sum of solutions, each times its amount or those given, to the fields of the forms."""
         with self.fields() as total:
             for column, amount in zip(columns, amounts or [column.amount for column in columns], strict=True):
                 for whole, part in zip(total, column.unknown, strict=True):
@@ -325,13 +325,13 @@ class Elements(ABC):
             self.set_fields(total)
 
     def put(self, column: Column, values: Sequence[FloatArray], amount: float = 1.0) -> None:
-        """Make owned ``values`` of the fields, for an ``amount`` of what a column is a unit of, its solution."""
+        """Make ``values`` (owned dofs), divided by ``amount``, the solution of a column."""
         for part, of_field in zip(column.unknown, values, strict=True):
             part.array[:] = of_field / amount
         column.unknown[0].array[self.displacements.prescribed_owned] = 0.0
 
     def total(self, column: Column, result: Fields) -> None:
-        """Write a solution into ``result``."""
+        """Write a solution, prescribed dofs included, into ``result``."""
         for whole, part in zip(result, column.unknown, strict=True):
             part.copy(whole)
         result[0].array[:] += column.prescribed[: self.displacements.owned]
@@ -347,13 +347,13 @@ class Elements(ABC):
 
 
 def close_far(columns: list[Column], movement: Movement, share: float) -> Movement:
-    """Make one motion, with its ``share`` of the far field, of two: return it.
+    """Combine tool motion and ``share`` of the far field into one motion: return that movement.
 
     Raises:
-        SolveError: if the tool's movement has none.
+        SolveError: if the share is not finite.
     """
     if not np.isfinite(share):
-        raise SolveError("the far field is not a number")
+        raise SolveError("the amplitude of the far field is not a finite number")
     tool, far = columns[0], columns.pop(1)
     for part, of_field in zip(tool.unknown, far.unknown, strict=True):
         part.axpy(share, of_field)
@@ -362,6 +362,6 @@ def close_far(columns: list[Column], movement: Movement, share: float) -> Moveme
 
 
 def level_of(space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, direct: bool = False) -> Level:
-    """Return a level of multigrid, or of a direct solve; its operator is given back with the ``stack``; collective."""
+    """Return a multigrid level, or that of a direct solve; the ``stack`` frees its operator; collective."""
     matrix = stack.enter_context(space.lend(law, entries=direct))
     return Level(space.space, matrix, space.prescribed, not law.is_uniform)

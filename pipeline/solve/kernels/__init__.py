@@ -1,6 +1,6 @@
-"""Operators cell by cell, and what preconditions them: C code and what calls it.
+"""Matrix-free operators and their preconditioners: C code and its Python callers.
 
-``cells`` lays out the cells of a rank, and exchanges values between ranks; ``product`` multiplies with the stiffness,
-``pressure`` with what mixed elements add to it. ``assembly`` makes the few matrices that need entries: degree 1 and
-direct solves. ``multigrid`` is a cycle in single precision over degrees, ``native`` the compiled library.
+``cells`` lays out the cells of a rank and exchanges ghosts. ``product`` is the matrix-free stiffness, ``pressure`` the
+matrix-free blocks of mixed elements. ``assembly`` assembles the matrices that need entries: degree 1 and direct solves.
+``multigrid`` is a cycle over degrees in single precision, ``native`` the compiled library.
 """

@@ -1,7 +1,7 @@
-"""The stiffness λ A_λ + μ A_μ as a matrix with entries, of straight cells, in 3 × 3 blocks: ``assembly.c``.
+"""Assembled stiffness λ A_λ + μ A_μ of straight cells, in 3 × 3 blocks: ``assembly.c``.
 
-On straight cells no quadrature is needed, and every entry knows its place. On one process the entries are put together
-here, a third of the time of an assembly by dolfinx; on several dolfinx assembles, with our kernel for the cells.
+Straight cells need no quadrature, and the position of every entry is known. On one process the matrix is assembled
+here, in a third of dolfinx's time. On several processes dolfinx assembles, with the cell kernel from here.
 """
 
 from functools import cache, cached_property
@@ -19,10 +19,9 @@ from pipeline.solve.physics import MaterialLaw
 
 
 class StraightStiffness:
-    """The straight cells of a space of displacements on one process, and the pattern of the operator on all cells.
+    """Straight cells of a space of displacements on one process, and the sparsity pattern of all cells.
 
-    ``curved`` tells for each cell whether it is left to others, None if none is; ``regions`` number what cells are made
-    of.
+    ``curved`` is a mask of the cells that others assemble, or None; ``regions`` are the numbers of the cells' regions.
     """
 
     def __init__(self, space: Any, curved: BoolArray | None, regions: Int32Array | None = None):
@@ -33,9 +32,9 @@ class StraightStiffness:
         self._offsets, self._columns, self._places = _pattern(self._dofs, space.dofmap.index_map.size_local)
 
     def matrix(self, law: MaterialLaw, prescribed: Int32Array, diagonal: float) -> PETSc.Mat:
-        """Return the straight cells' part, with room for the others; the caller destroys it.
+        """Return the matrix of the straight cells, with the pattern of all; the caller destroys it.
 
-        ``prescribed`` dofs (unrolled) have no row or column, but for a ``diagonal``.
+        Rows and columns of ``prescribed`` dofs (unrolled) are zero but for the ``diagonal``.
         """
         free = np.ones(3 * (len(self._offsets) - 1))
         free[prescribed] = 0.0
@@ -53,12 +52,12 @@ class StraightStiffness:
         size = 3 * (len(self._offsets) - 1)
         csr = offsets, columns, values
         matrix = PETSc.Mat().createAIJWithArrays((size, size), csr, comm=PETSc.COMM_SELF)
-        matrix.setBlockSizes(3, 3)  # for BoomerAMG, which halves the iterations by it
+        matrix.setBlockSizes(3, 3)  # this halves BoomerAMG's iterations
         return matrix
 
     @cached_property
     def _unrolled(self) -> tuple[np.ndarray, np.ndarray, Int32Array]:
-        """Sparse rows of numbers: offsets, columns, and where the entries of each block are, (blocks, 9)."""
+        """Unblocked sparse rows: offsets, columns, and positions of the entries of each block, (blocks, 9)."""
         places = _unblocked(self._offsets)
         columns = np.empty(9 * len(self._columns), dtype=PETSc.IntType)
         columns[places] = np.repeat(3 * self._columns[:, None] + np.arange(3, dtype=np.int32), 3, axis=1)
@@ -67,11 +66,11 @@ class StraightStiffness:
 
 
 def _pattern(dofs: Int32Array, points: int) -> tuple[Int32Array, Int32Array, Int32Array]:
-    """Return sparse rows of points that share a cell, and the entry of each pair of a cell's, (cells, n, n)."""
+    """Return sparse rows of points that share a cell, and the position of each pair of a cell, (cells, n, n)."""
     count, width = dofs.shape
     offsets = np.arange(0, dofs.size + 1, width, dtype=np.int32)
     visited = sp.csr_matrix((np.ones(dofs.size, dtype=np.bool_), dofs.reshape(-1), offsets), shape=(count, points))
-    # A product's columns come in no order; those of a transposed matrix do, for less than they take to sort.
+    # A product's columns are unsorted. Transposition sorts them, and is faster than sorting.
     graph = (visited.T.tocsr() @ visited).T.tocsr()
     visited.data = np.arange(dofs.size, dtype=np.int32)
     visits = visited.T.tocsr()
@@ -82,7 +81,7 @@ def _pattern(dofs: Int32Array, points: int) -> tuple[Int32Array, Int32Array, Int
 
 
 def _unblocked(offsets: Int32Array) -> Int32Array:
-    """Return where the entries of each block, by columns, are in sparse rows without blocks, shape (blocks, 9)."""
+    """Return the positions of the entries of each block, by columns, in unblocked sparse rows, (blocks, 9)."""
     width = np.diff(offsets)
     row = np.repeat(np.arange(len(width), dtype=np.int32), width)
     first = (6 * offsets[:-1])[row] + 3 * np.arange(len(row), dtype=np.int32)
@@ -92,9 +91,9 @@ def _unblocked(offsets: Int32Array) -> Int32Array:
 
 @cache
 def cell_kernel(degree: int, *, of_regions: bool) -> int:
-    """Return the address of a kernel for the stiffness of a straight cell, for dolfinx.
+    """Return the address of a stiffness kernel of a straight cell, for dolfinx.
 
-    λ and μ are constants of the form, or, ``of_regions``, functions that are constant on each cell.
+    λ and μ are constants of the form, or with ``of_regions`` functions that are constant on each cell.
     """
     point_at(f"tensors_{degree}", _reference_tensors(degree))
     return address(f"regions_{degree}" if of_regions else f"kernel_{degree}")

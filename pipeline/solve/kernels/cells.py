@@ -1,8 +1,7 @@
-"""The cells of a rank and their points: side by side, one in each lane of the vectors of the C code.
+"""Cells of a rank and their points, interleaved: one cell per vector lane of the C code.
 
-Cells with curved edges go by quadrature, as dolfinx assembles them: at each of its points a cell has the gradient of
-its map, and ``curved.c`` sums over the points. Values at points that another rank owns are exchanged by dolfinx's own
-vectors (:class:`Ghosts`).
+Curved cells use quadrature, as in dolfinx: each stores the gradient of its map at every quadrature point, and
+``curved.c`` sums over these. The ghost exchange uses dolfinx's own vectors (:class:`Ghosts`).
 """
 
 from typing import Any
@@ -17,14 +16,14 @@ from pipeline.solve.compiled import quadrature_degree
 from pipeline.solve.kernels.native import call
 from pipeline.solve.physics import MaterialLaw, of_regions
 
-# Cells that are taken side by side, as product.c has it.
+# Cells per batch, as in product.c.
 LANES = 16
 
 
 class Lanes:
-    """Some cells of a rank, ``LANES`` at a time; what fills up the last batch is nought.
+    """Cells of a rank in batches of ``LANES``; the last batch is padded with zeros.
 
-    ``which`` numbers the cells, ``dofs`` (batches, points, lanes) has their points: fillers have the first.
+    ``which`` are the cells' numbers, ``dofs`` (batches, points, lanes) their points; padding repeats the first cell's.
     """
 
     def __init__(self, which: Int32Array, dofs: Int32Array):
@@ -39,7 +38,7 @@ class Lanes:
         return np.ascontiguousarray(filled.reshape(self.batches, LANES, -1).transpose(0, 2, 1))
 
     def lame(self, law: MaterialLaw, regions: Int32Array | None) -> FloatArray:
-        """Return λ and μ (Pa), shape (batches, 2, lanes); ``regions`` number what all cells of the rank are made of."""
+        """Return λ and μ (Pa), (batches, 2, lanes); ``regions`` are the regions' numbers of all cells of the rank."""
         of_cells = None if regions is None else regions[self.which]
         lame = [of_regions(values, of_cells, len(self.which)) for values in (law.lame_lambda, law.lame_mu)]
         return self.spread(np.column_stack(lame))
@@ -49,11 +48,11 @@ class CurvedCells:
     """The curved cells of this rank, laid out for products.
 
     ``maps`` (batches, quadrature, 9, lanes), ``signs`` of weights (quadrature) and ``gradients`` (quadrature, points,
-    3) are in both precisions, ``roots`` (batches, quadrature, lanes) in double: see ``curved.c``.
+    3) exist in both precisions, ``roots`` (batches, quadrature, lanes) in double only: see ``curved.c``.
     """
 
     def __init__(self, space: Any, which: Int32Array, dofs: Int32Array):
-        """``which`` cells are curved, ``dofs`` (cells, points) are the points of all cells of this rank."""
+        """``which`` are the numbers of the curved cells, ``dofs`` (cells, points) the points of all local cells."""
         self.lanes, degree = Lanes(which, dofs), compat.degree(space)
         self._quadrature = quadrature_degree(degree)
         weights, _, of_geometry = reference(2, self._quadrature)
@@ -63,25 +62,25 @@ class CurvedCells:
         sizes = len(which), nodes.shape[1], len(weights)
         call("map_curved", *sizes, nodes, _by_points(of_geometry), weights, maps, self.roots)
         self.maps = _in_both(maps)
-        self.signs = _in_both(np.sign(weights))  # not all weights are positive
+        self.signs = _in_both(np.sign(weights))  # some weights are negative
         self.gradients = _in_both(_by_points(reference(degree, self._quadrature)[2]))
 
     def values(self, degree: int) -> FloatArray:
-        """Return the values (quadrature, functions) of a space of ``degree`` at the points of the quadrature."""
+        """Return the shape functions of ``degree`` at the quadrature points, (quadrature, functions)."""
         return np.ascontiguousarray(reference(degree, self._quadrature)[1])
 
     @property
     def nbytes(self) -> int:
-        """Bytes of all that products read."""
+        """Bytes that a product reads."""
         return self.lanes.dofs.nbytes + sum(maps.nbytes for maps in self.maps.values())
 
     def add_product(self, lame: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:
-        """Add A x to ``y``, all in one precision; ``lame`` is of the lanes, what is prescribed is as any other."""
+        """Add A x to ``y``, all in one precision and without conditions; ``lame`` is in the layout of the lanes."""
         end = "_double" if x.dtype == np.float64 else ""
         call(f"add_curved{end}", *self._arguments(lame, x.dtype.name), x, y)
 
     def add_diagonal(self, lame: FloatArray, blocks: np.ndarray) -> None:
-        """Add the blocks on the diagonal to ``blocks`` (local, 9)."""
+        """Add the diagonal blocks to ``blocks`` (local, 9)."""
         call("add_curved_diagonal", *self._arguments(lame, "float64"), blocks)
 
     def _arguments(self, lame: np.ndarray, kind: str) -> tuple[Any, ...]:
@@ -89,14 +88,14 @@ class CurvedCells:
 
     @property
     def sizes(self) -> tuple[int, int, int]:
-        """Points of a cell, those of the quadrature, and batches."""
+        """Number of points of a cell, of quadrature points, and of batches."""
         return self.lanes.dofs.shape[1], self.maps["float64"].shape[1], self.lanes.batches
 
 
 class Ghosts:
-    """The points of a space: owned ones first, then ghosts. All methods are collective, but not on one process.
+    """Points of a space, owned ones first, then ghosts, and their exchange. Methods are collective on several ranks.
 
-    Arrays hold ``size`` numbers a point, in single or double precision.
+    Arrays have ``size`` numbers per point, in single or double precision.
     """
 
     def __init__(self, space: Any):
@@ -106,7 +105,7 @@ class Ghosts:
         self._vectors: dict[tuple[str, int], Any] = {}
 
     def extended(self, x: np.ndarray, size: int) -> np.ndarray:
-        """Return the values at all local points, given those of the owned ones; good until the next call."""
+        """Return values at all local points from those at owned points; valid until the next call."""
         if self._is_alone:
             return x
         vector = self._vector(x.dtype, size)
@@ -115,7 +114,7 @@ class Ghosts:
         return np.asarray(vector.array)
 
     def folded(self, x: np.ndarray, size: int) -> np.ndarray:
-        """Return the sums over ranks at the owned points, given what this rank has at all; good until the next call."""
+        """Return sums over ranks at owned points from this rank's values at all local points; valid until next call."""
         if self._is_alone:
             return x
         vector = self._vector(x.dtype, size)
@@ -131,13 +130,13 @@ class Ghosts:
 
 
 def straight_cells(curved: BoolArray | None, count: int) -> Int32Array:
-    """Return the numbers of those of the first ``count`` cells that are not ``curved``, None if none is."""
+    """Return the numbers of the first ``count`` cells that are not ``curved``; None means that none is curved."""
     every = np.arange(count, dtype=np.int32)
     return every if curved is None else every[~curved[:count]]
 
 
 def owned_cells(space: Any) -> Int32Array:
-    """Return the points of each cell that this rank owns, shape (cells, points of a cell)."""
+    """Return the points of each owned cell, (cells, points of a cell)."""
     topology = space.mesh.topology
     return np.ascontiguousarray(compat.cell_dofs(space)[: topology.index_map(topology.dim).size_local])
 
@@ -150,7 +149,7 @@ def corners(mesh: Any) -> FloatArray:
 def reference(degree: int, quadrature: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return weights, values (q, i) and gradients (a, q, i) of the functions of ``degree`` on the reference cell.
 
-    The points integrate polynomials of degree ``quadrature``.
+    The quadrature is exact for polynomials of degree ``quadrature``.
     """
     points, weights = basix.make_quadrature(basix.CellType.tetrahedron, quadrature)
     table = compat.reference_element(degree).tabulate(1, points)[:, :, :, 0]
@@ -158,11 +157,11 @@ def reference(degree: int, quadrature: int) -> tuple[FloatArray, FloatArray, Flo
 
 
 def summed(comm: MPI.Comm, value: float, how: MPI.Op = MPI.SUM) -> float:
-    """Return the sum of all ranks' values, or what ``how`` makes of them; collective."""
+    """Return the sum of all ranks' values, or another reduction (``how``); collective."""
     if comm.size == 1:
         return value
     result = np.empty(1)
-    comm.Allreduce(np.array([value], dtype=np.float64), result, op=how)  # numbers alone: allreduce sends objects
+    comm.Allreduce(np.array([value], dtype=np.float64), result, op=how)  # buffers; allreduce would pickle
     return float(result[0])
 
 

@@ -1,8 +1,8 @@
-"""A multigrid cycle over degrees p, …, 2 in single precision, above a solver of degree 1 in double precision.
+"""Multigrid cycle over degrees p, …, 2 in single precision, above a coarse solver of degree 1 in double precision.
 
-Interpolation goes up, its transpose down. The smoother is Chebyshev's iteration with the diagonal's blocks, as PETSc's;
-operators multiply cell by cell. The residual is scaled to magnitude 1 first, so that no float overflows. On several
-ranks each smooths its own rows; ghosts are exchanged in single precision.
+Prolongation is interpolation, restriction its transpose. The smoother is Chebyshev's iteration with the inverses of the
+diagonal blocks, as in PETSc; operators are matrix-free. The residual is scaled to magnitude 1 first, so that single
+precision does not overflow. Each rank smooths its own rows; ghosts are exchanged in single precision.
 """
 
 from dataclasses import dataclass, replace
@@ -21,20 +21,20 @@ from pipeline.solve.kernels.native import Single, call
 from pipeline.solve.kernels.product import CellOperator
 from pipeline.stages import stage
 
-# Chebyshev's iteration: steps, the share of the spectrum that is left to the coarser level, and by how much the
-# largest eigenvalue that so many of Lanczos' steps find is raised. Measured: docs/solvers.md.
+# Chebyshev's iteration: steps, lower end of its interval as a share of the largest eigenvalue, safety factor on the
+# estimated largest eigenvalue, and Lanczos steps for that estimate. Measured: docs/solvers.md.
 _STEPS, _LEFT, _RAISED, _LANCZOS = 2, 0.1, 1.15, 5
-# Where the material jumps, the mode of the largest one sits in the stiffest region, of which noise has little.
+# Where the material jumps, the largest eigenvector is in the stiffest region, where random vectors have little of it.
 _LANCZOS_JUMPS = 12
-# Beyond 1.1 times what it is taken for, an eigenvalue makes the cycle indefinite. A few slender elements have one of
-# which noise has little; so many steps find it.
+# An eigenvalue above 1.1 times the estimate makes the cycle indefinite. A few slender elements may have one, with an
+# eigenvector that random vectors hardly contain; this many steps find it.
 _LANCZOS_CLOSER = 40
-# What interpolates to less than this does so by rounding.
+# Prolongation weights below this are rounding.
 _NOTHING = 1e-12
 
 
 class Side(Protocol):
-    """A space of vectors and its local dofs (unrolled) that are prescribed."""
+    """A vector space and its prescribed local dofs (unrolled)."""
 
     @property
     def space(self) -> Any: ...  # noqa: D102
@@ -45,10 +45,10 @@ class Side(Protocol):
 
 @dataclass(frozen=True)
 class Interpolation:
-    """From the points of a coarse space to those of a fine one: sparse rows with the same weight for all components.
+    """Prolongation from the points of a coarse space to those of a fine one: sparse rows, equal for all components.
 
-    ``coarse_free`` and ``fine_free`` are 0 for numbers that are prescribed, else 1. Rows are of the points that this
-    rank owns; ``ghosts`` are those of the coarse space. Both maps are collective.
+    ``coarse_free`` and ``fine_free`` are 0 at prescribed dofs, else 1. Rows belong to the owned points; ``ghosts`` are
+    those of the coarse space. Both maps are collective.
     """
 
     offsets: Int32Array
@@ -59,12 +59,12 @@ class Interpolation:
     ghosts: Ghosts
 
     def prolong(self, coarse: Single, fine: Single) -> None:
-        """Add the interpolation of ``coarse`` to ``fine``."""
+        """Add the prolongation of ``coarse`` to ``fine``."""
         rows = len(self.offsets) - 1, self.offsets, self.points, self.weights
         call("prolong", *rows, self.coarse_free, self.fine_free, self.ghosts.extended(coarse, 3), fine)
 
     def restrict(self, fine: Single, coarse: Single) -> None:
-        """Write the transposed interpolation of ``fine`` into ``coarse``."""
+        """Write the restriction of ``fine``, the transposed prolongation, into ``coarse``."""
         rows = len(self.offsets) - 1, self.offsets, self.points, self.weights
         found = np.empty(len(self.coarse_free), dtype=np.float32)
         call("restrict_to", *rows, len(found), self.coarse_free, self.fine_free, fine, found)
@@ -75,10 +75,10 @@ class SmoothedLevel:
     """An operator in single precision and its smoother."""
 
     def __init__(self, operator: CellOperator, *, jumps: bool = False):
-        """Set up; ``jumps``: the material does. Collective.
+        """Set up; ``jumps`` says that the material jumps between regions. Collective.
 
         Raises:
-            ArithmeticError: if a block of the diagonal is not positive.
+            ArithmeticError: if a diagonal block is not positive definite.
         """
         self._operator, self._comm, rows = operator, operator.comm, operator.rows
         self._rows, self._blocks = rows, operator.diagonal()
@@ -92,17 +92,17 @@ class SmoothedLevel:
         self._most = _RAISED * self._largest_eigenvalue(_LANCZOS_JUMPS if jumps else _LANCZOS)
 
     def look_closer(self) -> None:
-        """Find the largest eigenvalue by many more steps, for the smoother from now on."""
+        """Estimate the largest eigenvalue again with many more steps, and use it from now on; collective."""
         held = self._held
-        self.hold(np.empty(0, dtype=np.int32))  # the operator knows nothing of what is held
+        self.hold(np.empty(0, dtype=np.int32))  # the operator ignores the dofs that the smoother fixes
         self._most = max(self._most, _RAISED * self._largest_eigenvalue(_LANCZOS_CLOSER))
         self.hold(held)
 
     def hold(self, dofs: Int32Array) -> None:
-        """Let the smoother alone hold ``dofs`` from now on, which the operator knows nothing of, and no others.
+        """Fix local ``dofs``, and no others, in the smoother alone from now on; the operator ignores them.
 
-        They are local ones; ghosts are left to their owners. Where it neither reads nor writes, it smooths for the
-        operator without those rows and columns.
+        Ghosts are left to their owners. The smoother neither reads nor writes fixed dofs: it then smooths for the
+        operator without these rows and columns.
         """
         self._invert(np.unique(self._held // 3), np.zeros(0, dtype=np.int32))
         held = np.union1d(self._operator.prescribed, dofs).astype(np.int32)
@@ -110,7 +110,7 @@ class SmoothedLevel:
         self._invert(np.unique(self._held // 3), self._held)
 
     def _invert(self, rows: Int32Array, held: Int32Array) -> None:
-        """Invert blocks of the diagonal without the rows and columns of ``held`` dofs, where the inverse is nought."""
+        """Invert diagonal blocks without the rows and columns of ``held`` dofs, where the inverse is zero."""
         free = np.ones((len(rows), 3), dtype=bool)
         free[np.searchsorted(rows, held // 3), held % 3] = False
         both = free[:, :, None] & free[:, None, :]
@@ -119,14 +119,14 @@ class SmoothedLevel:
         self._inverse[rows] = np.where(both, inverse, 0.0).reshape(-1, 9)
 
     def subtract_product(self, x: Single, r: Single) -> None:
-        """Take A x away from ``r``."""
+        """Subtract A x from ``r``."""
         self._multiply(x)
         call("subtract", self.size, self._product, r)
 
     def smooth(self, x: Single, r: Single) -> Single:
-        """Improve ``x``, of which ``r`` is the residual, by Chebyshev's iteration.
+        """Improve ``x``, with residual ``r``, by Chebyshev's iteration.
 
-        Returns its last step, by which ``r`` still differs from the residual; the next call overwrites it.
+        Return its last step, which ``r`` does not account for yet; the next call overwrites it.
         """
         theta, delta = (1 + _LEFT) * self._most / 2, (1 - _LEFT) * self._most / 2
         d, rho = self._direction, delta / theta
@@ -139,14 +139,14 @@ class SmoothedLevel:
         return d
 
     def _multiply(self, x: Single) -> None:
-        """Write A x into the product."""
+        """Write A x into the work vector."""
         self._operator.multiply(x, self._product)
 
     def _largest_eigenvalue(self, steps: int) -> float:
-        """Return the largest eigenvalue of D⁻¹ A, from below, by Lanczos' method from noise; collective.
+        """Return a lower estimate of the largest eigenvalue of D⁻¹ A, by Lanczos from random vectors; collective.
 
         Raises:
-            ArithmeticError: on every rank, if entries leave the range of single precision.
+            ArithmeticError: on every rank, if entries exceed the range of single precision.
         """
         r = np.random.default_rng(self._comm.rank).standard_normal(self.size, dtype=np.float32)
         z, p, diagonal, beside = np.empty_like(r), np.zeros_like(r), [], []
@@ -163,7 +163,7 @@ class SmoothedLevel:
             diagonal.append(1 / step + (ratio / before if before else 0.0))
             beside.append(ratio**0.5 / before if before else 0.0)
             if not isfinite(diagonal[-1]):
-                raise ArithmeticError("moduli or sizes leave the range of single precision")
+                raise ArithmeticError("moduli or sizes exceed the range of single precision")
             self._product *= step
             call("subtract", self.size, self._product, r)
             previous = rz
@@ -186,7 +186,7 @@ class Cycle:
         self._bottom = bottom.createVecs()
 
     def hold(self, held: list[Int32Array], masks: list[tuple[Single, Single]], coarse: PETSc.PC) -> None:
-        """Hold other dofs of each level than the operators say, with the masks of each interpolation."""
+        """Fix other dofs on each level than the operators do, with the masks of each interpolation."""
         for level, dofs in zip(self._levels, held, strict=True):
             level.hold(dofs)
         self._interpolations = [
@@ -196,16 +196,16 @@ class Cycle:
         self.coarse = coarse
 
     def above(self, levels: list[SmoothedLevel], interpolations: list[Interpolation]) -> "Cycle":
-        """Return the cycle with more levels on top, which shares those that are there."""
+        """Return a cycle with more levels on top; it shares the present ones."""
         return Cycle([*self._levels, *levels], [*self._interpolations, *interpolations], self.coarse)
 
     def look_closer(self) -> None:
-        """Let each level's smoother find its largest eigenvalue by many more steps."""
+        """Estimate the largest eigenvalue of each level again with many more steps."""
         for level in self._levels:
             level.look_closer()
 
     def apply(self, _: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
-        """Write one cycle's correction for ``residual`` into ``result``; collective."""
+        """Write the correction of one cycle for ``residual`` into ``result``; collective."""
         top, given = len(self._levels), residual.array_r
         scale = summed(self._comm, call("largest", len(given), given), MPI.MAX)
         call("to_single", len(given), 1 / scale if scale else 0.0, given, self._r[top])
@@ -218,7 +218,7 @@ class Cycle:
             vector.destroy()
 
     def _cycle(self, number: int) -> None:
-        """Solve roughly for the residual of a level, which is overwritten."""
+        """Apply the cycle from this level down to its residual, which is overwritten."""
         x, r = self._x[number], self._r[number]
         if number == 0:
             self._solve_coarsest(x, r)
@@ -257,7 +257,7 @@ def interpolation(coarse: Side, fine: Side) -> Interpolation:
 
 
 def free(side: Side) -> Single:
-    """Return 0 for each number of a side that is prescribed, else 1; owned ones and ghosts."""
+    """Return a mask of a side's local dofs, ghosts included: 0 where prescribed, else 1."""
     dofmap = side.space.dofmap
     mask = np.ones(3 * (dofmap.index_map.size_local + dofmap.index_map.num_ghosts), dtype=np.float32)
     mask[side.prescribed] = 0.0
@@ -265,9 +265,9 @@ def free(side: Side) -> Single:
 
 
 def _point_weights(coarse: Any, fine: Any) -> tuple[IntArray, Int32Array, FloatArray]:
-    """Return the interpolation of scalars as sparse rows, one for each point of ``fine`` that this rank owns.
+    """Return the scalar prolongation as sparse rows, one for each owned point of ``fine``.
 
-    A point's row is that of any cell it belongs to.
+    A point may belong to several cells; any of them gives the same row.
     """
     local = _on_one_cell(compat.degree(coarse), compat.degree(fine))
     few = [np.flatnonzero(np.abs(row) > _NOTHING) for row in local]

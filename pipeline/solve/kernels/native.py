@@ -1,6 +1,6 @@
-"""The C code of this folder, compiled into one library for this machine when first needed.
+"""The C code of this folder, compiled into one library for this machine at its first use.
 
-The compiler is the one that dolfinx compiles its forms with; the library is kept beside them.
+The compiler is that of dolfinx's forms; the library is cached beside them.
 """
 
 import hashlib
@@ -18,7 +18,7 @@ import numpy.typing as npt
 from pipeline.solve import CompilerError
 from pipeline.solve.compiled import form_cache, quiet_compiler
 
-# Vectors of the cycle, and what products take in single precision.
+# Vectors of the multigrid cycle and of products in single precision.
 Single = npt.NDArray[np.float32]
 
 _FLAGS = ("-O3", "-march=native", "-fvisibility=hidden")
@@ -26,7 +26,7 @@ _FOLDER = Path(__file__).parent
 
 
 def call(name: str, *arguments: Any) -> Any:
-    """Call a function; arrays are passed as they are, and must be contiguous and of the declared type."""
+    """Call a C function; arrays are passed without copies, and must be contiguous and of the declared type."""
     module = library()
     function = getattr(module.lib, name)
     passed = [
@@ -37,23 +37,23 @@ def call(name: str, *arguments: Any) -> Any:
 
 
 def address(name: str) -> int:
-    """Return where a function begins."""
+    """Return the address of a C function."""
     module = library()
     return int(module.ffi.cast("uintptr_t", module.ffi.addressof(module.lib, name)))
 
 
 def point_at(name: str, values: np.ndarray) -> None:
-    """Let a pointer of the library point at ``values``, which the caller keeps."""
+    """Point a C pointer of the library at ``values``, which the caller must keep alive."""
     module = library()
     setattr(module.lib, name, module.ffi.from_buffer("double[]", values))
 
 
 @cache
 def library() -> Any:
-    """Return the compiled module, compiled now if the cache does not have it.
+    """Return the compiled module; it is compiled if the cache does not have it.
 
     Raises:
-        CompilerError: if that fails.
+        CompilerError: if compilation fails.
     """
     header, sources = _FOLDER / "kernels.h", sorted(_FOLDER.glob("*.c"))
     suffix = sysconfig.get_config_var("EXT_SUFFIX")
@@ -80,7 +80,7 @@ def _compile(name: str, path: Path, header: Path, sources: list[Path]) -> None:
         include_dirs=[str(_FOLDER)],
         extra_compile_args=list(_FLAGS),
     )
-    with TemporaryDirectory(dir=path.parent) as folder, quiet_compiler():  # others see nothing of it, or all
+    with TemporaryDirectory(dir=path.parent) as folder, quiet_compiler():  # other processes see a complete file or none
         try:
             made = Path(builder.compile(tmpdir=folder))
         except Exception as error:  # distutils raises many kinds

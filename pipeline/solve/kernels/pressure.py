@@ -1,7 +1,7 @@
-"""What pressures take part in, ∫ p q and ∫ q div u, as products cell by cell (``pressure.c``): contexts for PETSc.
+"""Matrix-free ∫ p q and ∫ q div u of mixed elements (``pressure.c``): contexts for PETSc.
 
-On several ranks each multiplies with its own cells; what others' points have is read first, and what they get added
-last, as :class:`~pipeline.solve.kernels.product.CellOperator` does. All of it is collective.
+On several ranks each multiplies with its own cells, between two ghost exchanges, as
+:class:`~pipeline.solve.kernels.product.CellOperator` does. All methods are collective.
 """
 
 from copy import copy
@@ -18,13 +18,13 @@ from pipeline.solve.kernels.product import CellStiffness, bernstein
 
 
 class CellPressures:
-    """The pressures of one degree less than displacements on the same cells, in units of ``unit`` (1/m).
+    """Pressures, one degree below the displacements on the same cells, in units of ``unit`` (1/m).
 
     ``diagonal`` is that of the mass, of owned pressures.
     """
 
     def __init__(self, pressures: Any, cells: CellStiffness):
-        """Lay out; collective. ``unit`` is about one over the size of an element."""
+        """Lay out the cells; collective. ``unit`` is about one over the size of an element."""
         self.ghosts, dofs = Ghosts(pressures), owned_cells(pressures)
         self.comm, self.cells, self.degree = cells.comm, cells, compat.degree(pressures)
         self._prescribed = cells.prescribed
@@ -32,7 +32,7 @@ class CellPressures:
         self._roots = cells.lanes.spread(_roots(corners(pressures.mesh)[cells.lanes.which])[:, None])
         weights, values, _ = reference(self.degree, 2 * self.degree)
         self._mass = np.ascontiguousarray(np.einsum("q,qi,qj->ij", weights, values, values))
-        # p² of displacements, of which a gradient has one p.
+        # The displacements' mass has a factor p²; a single gradient needs one p.
         self._coupled = bernstein(cells.degree, "float64").mass / cells.degree
         if (curved := cells.curved) is not None:
             self._bent = curved.lanes.spread(dofs[curved.lanes.which])
@@ -52,13 +52,13 @@ class CellPressures:
         return self.ghosts.folded(np.asarray(found), 1).copy()
 
     def holding(self, dofs: Int32Array) -> "CellPressures":
-        """Return them with owned displacements ``dofs`` (unrolled) prescribed, too; they share everything else."""
+        """Return a copy with owned displacement ``dofs`` (unrolled) prescribed, too; it shares everything else."""
         other = copy(self)
         other._prescribed = np.union1d(self._prescribed, dofs).astype(np.int32)
         return other
 
     def dilation(self, x: FloatArray, *, whole: bool = False) -> FloatArray:
-        """Return B x for owned displacements; unless ``whole``, those that are prescribed count as nought."""
+        """Return B x for owned displacements; prescribed ones count as zero unless ``whole``."""
         given = x.copy()
         if not whole:
             given[self._prescribed] = 0.0
@@ -67,7 +67,7 @@ class CellPressures:
         return self.unit * self.ghosts.folded(found, 1)
 
     def pull(self, x: FloatArray, *, whole: bool = False) -> FloatArray:
-        """Return Bᵀ x for owned pressures; unless ``whole``, nought where displacements are prescribed."""
+        """Return Bᵀ x for owned pressures; zero at prescribed displacements unless ``whole``."""
         found = np.zeros(3 * self.cells.ghosts.local)
         self._couple("pull", self.ghosts.extended(x, 1), found)
         result = self.unit * self.cells.ghosts.folded(found, 3)
@@ -87,7 +87,7 @@ class CellPressures:
         return self.unit**2 * self.ghosts.folded(found, 1)
 
     def _couple(self, which: str, x: FloatArray, y: FloatArray) -> None:
-        """Add B x or Bᵀ x, of local points, to ``y``."""
+        """Add B x or Bᵀ x, on local points, to ``y``."""
         cells, kind = self.cells, "float64"
         table, pressures = bernstein(cells.degree, kind), bernstein(self.degree, kind)
         there, back = (table, pressures) if which == "dilation" else (pressures, table)
@@ -101,17 +101,17 @@ class CellPressures:
 
 
 class Coupling:
-    """B: a context for PETSc."""
+    """The operator B: a context for PETSc."""
 
     def __init__(self, pressures: CellPressures):
         self._pressures = pressures
 
     def holding(self, dofs: Int32Array) -> "Coupling":
-        """Return it with columns of zeros for owned ``dofs`` (unrolled), too."""
+        """Return B with zero columns for owned ``dofs`` (unrolled), too."""
         return Coupling(self._pressures.holding(dofs))
 
     def matrix(self) -> PETSc.Mat:
-        """Return it as a matrix of PETSc; the caller destroys it."""
+        """Return B as a PETSc matrix; the caller destroys it."""
         of = self._pressures
         return _matrix(self, of.ghosts.owned, 3 * of.cells.ghosts.owned, of.comm)
 
@@ -125,17 +125,17 @@ class Coupling:
 
 
 class Mass:
-    """M, each row times its ``weight``: a context for PETSc."""
+    """The mass M, each row times its ``weight``: a context for PETSc."""
 
     def __init__(self, pressures: CellPressures, weight: float | FloatArray = 1.0):
         self._pressures, self._weight = pressures, weight
 
     def weighted(self, weight: float | FloatArray) -> "Mass":
-        """Return it with other weights."""
+        """Return the mass with other weights."""
         return Mass(self._pressures, weight)
 
     def matrix(self) -> PETSc.Mat:
-        """Return it as a matrix of PETSc; the caller destroys it."""
+        """Return M as a PETSc matrix; the caller destroys it."""
         of = self._pressures
         return _matrix(self, of.ghosts.owned, of.ghosts.owned, of.comm)
 
@@ -155,7 +155,7 @@ def _matrix(context: Any, rows: int, columns: int, comm: Any) -> PETSc.Mat:
 
 
 def _roots(points: FloatArray) -> FloatArray:
-    """Return the root of what the maps of cells (n, 4, 3) do to volumes, with the sign of their determinant."""
+    """Return the signed root of the volume ratio of the cells' maps, (n, 4, 3); its sign is the determinant's."""
     first, second, third = (points[:, 1:] - points[:, :1]).transpose(1, 2, 0)
     determinants = sum(
         first[i] * (second[j] * third[k] - second[k] * third[j]) for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))

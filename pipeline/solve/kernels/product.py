@@ -1,7 +1,7 @@
-"""The stiffness of a space of displacements as a product, cell by cell: no pattern, no matrix, nothing assembled.
+"""Matrix-free stiffness of a space of displacements, cell by cell.
 
-A blocked matrix of degree 3 takes 15 kB a tetrahedron, and a product with it the time to read them; here a cell takes
-200 bytes and 2,000 vectorised multiplications (``product.c``). Those of cells with curved edges go by quadrature.
+A blocked matrix of degree 3 takes 15 kB per tetrahedron, and a product with it the time to read them. The matrix-free
+product takes 200 bytes and 2,000 vectorised multiplications per cell (``product.c``). Curved cells use quadrature.
 """
 
 import itertools
@@ -31,12 +31,12 @@ from pipeline.solve.kernels.native import Single, call
 from pipeline.solve.physics import MaterialLaw
 
 DEGREES = (2, 3, 4)
-# What takes points to coefficients is sparse but for rounding.
+# The map from values to coefficients is sparse up to rounding of this size.
 _NOTHING = 1e-12
 
 
 class Rows(NamedTuple):
-    """A sparse matrix by rows."""
+    """A sparse matrix in compressed rows."""
 
     offsets: Int32Array
     columns: Int32Array
@@ -45,10 +45,10 @@ class Rows(NamedTuple):
 
 @dataclass(frozen=True)
 class Bernstein:
-    """What a degree has on the reference cell.
+    """Tables of a degree on the reference cell.
 
-    ``forward`` takes values at points to coefficients, ``back`` is its transpose; ``raised`` are the places of b + e_a,
-    ``mass`` is times p².
+    ``forward`` maps values at points to coefficients, ``back`` is its transpose. ``raised`` are the positions of
+    b + e_a, ``mass`` is the mass matrix times p².
     """
 
     forward: Rows
@@ -59,7 +59,7 @@ class Bernstein:
 
 @cache
 def bernstein(degree: int, kind: str) -> Bernstein:
-    """Return the tables of Bernstein's polynomials of ``degree``, in numbers of a ``kind`` (of numpy)."""
+    """Return the tables of Bernstein polynomials of ``degree``, in numpy's type ``kind``."""
     high, low = _indices(degree), _indices(degree - 1)
     points = compat.reference_element(degree).points
     barycentric = np.hstack([1 - points.sum(axis=1, keepdims=True), points])
@@ -68,7 +68,7 @@ def bernstein(degree: int, kind: str) -> Bernstein:
     matrix[np.abs(matrix) < _NOTHING] = 0.0
     place = {b: number for number, b in enumerate(high)}
     raised = [[place[tuple(np.add(b, unit))] for unit in np.eye(4, dtype=int)] for b in low]
-    # The integral of a monomial of barycentric coordinates: b! / (|b| + 3)!.
+    # Integral of a monomial in barycentric coordinates: b! / (|b| + 3)!.
     mass = [[_multinomial(b) * _multinomial(c) * _factorials(tuple(np.add(b, c))) for c in low] for b in low]
     scale = degree**2 / factorial(2 * degree + 1)
     return Bernstein(
@@ -80,14 +80,14 @@ def bernstein(degree: int, kind: str) -> Bernstein:
 
 
 class CellStiffness:
-    """The cells of this rank, laid out for products: the straight ones, and the others.
+    """The cells of this rank, laid out for products: straight ones and curved ones.
 
-    ``curved`` tells for each local cell whether it is, None if none is; ``prescribed`` are the local dofs (unrolled)
-    whose rows and columns the operator does not have; ``regions`` number what cells are made of.
+    ``curved`` is a mask of local cells, or None if none is curved. ``prescribed`` are the local dofs (unrolled) without
+    rows and columns in the operator. ``regions`` are the numbers of the cells' regions.
     """
 
     def __init__(self, space: Any, curved: BoolArray | None, prescribed: Int32Array, regions: Int32Array | None = None):
-        """Collective."""
+        """Lay out the cells; collective."""
         self.comm, self.degree, self.ghosts = space.mesh.comm, compat.degree(space), Ghosts(space)
         self.prescribed = prescribed[prescribed < 3 * self.ghosts.owned]
         dofs, self._regions = owned_cells(space), regions
@@ -99,18 +99,18 @@ class CellStiffness:
         self.curved = CurvedCells(space, bent.astype(np.int32), dofs) if len(bent) else None
 
     def lame(self, law: MaterialLaw) -> list[FloatArray]:
-        """Return λ and μ (Pa) of the straight cells, and of the curved ones if there are any, as lanes have them."""
+        """Return λ and μ (Pa) of straight cells, and of curved ones if there are any, in the layout of the lanes."""
         lanes = [self.lanes] if self.curved is None else [self.lanes, self.curved.lanes]
         return [each.lame(law, self._regions) for each in lanes]
 
     @property
     def nbytes(self) -> int:
-        """Bytes of all that products read of the geometry."""
+        """Bytes of geometry that a product reads."""
         straight = self.lanes.dofs.nbytes + sum(maps.nbytes for maps in self.maps.values())
         return straight + (0 if self.curved is None else self.curved.nbytes)
 
     def add_product(self, lame: list[np.ndarray], x: np.ndarray, y: np.ndarray) -> None:
-        """Add the product with the ``x`` of the local points to ``y``, all in one precision."""
+        """Add the product with ``x``, on local points, to ``y``; all in one precision."""
         kind = x.dtype.name
         end, table = "_double" if kind == "float64" else "", bernstein(self.degree, kind)
         cells = self.degree, self.lanes.batches, self.lanes.dofs, self.maps[kind], lame[0]
@@ -119,7 +119,7 @@ class CellStiffness:
             self.curved.add_product(lame[1], x, y)
 
     def diagonal(self, lame: list[FloatArray]) -> Single:
-        """Return the blocks on the diagonal, shape (local, 9), that the cells of this rank make."""
+        """Return the diagonal blocks (local, 9), contributions of this rank's cells only."""
         blocks = np.zeros((self.ghosts.local, 9), dtype=np.float32)
         weights, _, gradients = reference(self.degree, 2 * self.degree - 2)
         tensors = np.ascontiguousarray(np.einsum("q,aqi,bqi->abi", weights, gradients, gradients))
@@ -131,11 +131,11 @@ class CellStiffness:
 
 
 class CellOperator:
-    """The stiffness of a material as a product: a context for PETSc, without entries.
+    """The matrix-free stiffness of a material: a context for PETSc.
 
-    Prescribed dofs are left as they are. In double precision, or, by :meth:`multiply`, in single precision. On several
-    ranks each multiplies with its own cells, what others' points have is read first, and what they get added last:
-    products and diagonals are collective.
+    Rows of prescribed dofs are the identity's. Products are in double precision, or by :meth:`multiply` in single
+    precision. On several ranks each multiplies with its own cells, between two ghost exchanges: products and diagonals
+    are collective.
     """
 
     def __init__(self, cells: CellStiffness, law: MaterialLaw):
@@ -144,20 +144,20 @@ class CellOperator:
         self._lame["float32"] = [each.astype(np.float32) for each in self._lame["float64"]]
 
     def holding(self, dofs: Int32Array) -> "CellOperator":
-        """Return the operator in which ``dofs`` (unrolled) are prescribed, too; it shares everything else."""
+        """Return the operator with ``dofs`` (unrolled) prescribed, too; it shares everything else."""
         other = copy(self)
         other.prescribed = np.union1d(self.prescribed, dofs[dofs < 3 * self.rows]).astype(np.int32)
         return other
 
     def matrix(self) -> PETSc.Mat:
-        """Return it as a matrix of PETSc; the caller destroys it."""
+        """Return the operator as a PETSc matrix; the caller destroys it."""
         size = 3 * self.rows, None
         matrix = PETSc.Mat().createPython((size, size), self, comm=self.comm)
         matrix.setUp()
         return matrix
 
     def multiply(self, x: Single, y: Single) -> None:
-        """Write A x into ``y``; what is prescribed must be nought in ``x``, and is anything in ``y``."""
+        """Write A x into ``y``; prescribed dofs must be zero in ``x``, and are undefined in ``y``."""
         self._write(x, y)
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
@@ -171,18 +171,18 @@ class CellOperator:
         result[self.prescribed] = values
 
     def whole(self, x: FloatArray) -> FloatArray:
-        """Return A x for the displacement of the owned points, without any conditions."""
+        """Return A x for the displacement of the owned points, without conditions."""
         result = np.empty(3 * self.rows)
         self._write(x, result)
         return result
 
     @property
     def nbytes(self) -> int:
-        """Bytes of all that it reads."""
+        """Bytes that a product reads."""
         return self._cells.nbytes + sum(each.nbytes for kind in self._lame.values() for each in kind)
 
     def diagonal(self) -> Single:
-        """Return the blocks on the diagonal, shape (points, 9), as if nothing was prescribed."""
+        """Return the diagonal blocks (points, 9), without conditions."""
         blocks = self._cells.diagonal(self._lame["float64"])
         return self._cells.ghosts.folded(blocks.reshape(-1), 9).reshape(-1, 9)
 
@@ -198,13 +198,13 @@ class CellOperator:
 
 
 def operator_of(matrix: PETSc.Mat) -> CellOperator:
-    """Return the operator of cells that a matrix without entries stands for."""
+    """Return the cell operator behind a matrix-free PETSc matrix."""
     operator: CellOperator = matrix.getPythonContext()
     return operator
 
 
 def is_product(matrix: PETSc.Mat) -> bool:
-    """Tell whether a matrix is an operator of cells, without entries."""
+    """Return whether a matrix is a matrix-free cell operator."""
     return matrix.getType() == "python" and isinstance(matrix.getPythonContext(), CellOperator)
 
 

@@ -1,1 +1,1 @@
-"""Round scenes in the half plane (r, z): what is the meridian's own."""
+"""Axisymmetric scenes in the half plane (r, z)."""

@@ -1,13 +1,13 @@
-"""Found contact of round scenes in the half plane (r, z): the radius of contact as an unknown, and F to about 1e-6.
+"""Unilateral contact of axisymmetric scenes in the half plane (r, z): the contact radius is unknown; F to about 1e-6.
 
-For a trial radius a of contact the scene is linear: u_z = -(d - g(r)) for r < a, g the gap before anything moves. The
-solution is d u₁ + u₂, of a flat punch and of the gap alone. Both have stresses like (a - r)^-½ at the edge, which
-cancel where contact ends by itself: d(a) = -k₂/k₁, k the reactions of the node at the edge. A few trials on coarse
-meshes find the radius for a depth. F(a) = d E₁₁(a) + E₁₂(a), E the work of one solution on the other, is largest at the
-true radius: an error of the radius changes F by its square.
+For a trial contact radius a the scene is linear: u_z = -(d - g(r)) for r < a, with g the initial gap. The solution is
+d u₁ + u₂, the flat punch plus the gap alone. Both have stresses like (a - r)^-½ at the edge, which cancel at the true
+radius: d(a) = -k₂/k₁, with k the reactions at the edge's node. A few trials on coarse meshes find the radius for a
+depth. F(a) = d E₁₁(a) + E₁₂(a), with E the work of one solution on the other, is largest at the true radius: F errs by
+the square of the radius's error.
 
-A blunt tool on a stiff skin may lift off within its outline. An active set on the meridian's nodes finds the rings, the
-second time with many more nodes at their edges. F is stationary in these radii, too.
+A blunt tool on stiff skin may lift off inside its outline. An active set on the meridian's nodes finds these rings, the
+second time with many more nodes at their edges. F is stationary with respect to their radii, too.
 
 Lengths are in units of a, stresses in units of μ of region 0, displacements in metres.
 """
@@ -29,18 +29,18 @@ from pipeline.solve.meridian.system import HalfPlane, max_strain
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
 
-# A depth this near to the one asked for is near enough: F errs by its square.
+# Tolerance on the depth of a trial radius (F errs by its square), and most trials.
 _NEAR, _MOST_TRIALS = 3e-4, 12
-# Powers of the radius that the depth may go like: 1 of a cone, 2 of a ball, more of flat tools with round edges.
+# Range of the exponent of the radius in the depth: 1 for a cone, 2 for a ball, more for flat tools with round edges.
 _POWERS = (0.5, 8.0)
-# Contact as wide as this share of what is kept of the body has no edge left.
+# Largest contact radius, as a share of the modelled body's: beyond it contact has no edge.
 _WIDEST = 0.999
-# Nodes along the radius where rings that are lost are looked for, and between two of them the second time.
+# Nodes along the radius for the search for rings that lift off, and between two of them the second time.
 _ALONG, _BETWEEN = 20, 8
 
 
 class MeridianContact(MeridianSolver):
-    """The meridian of a round scene that a tool presses along its axis, in contact as far as that is pressed."""
+    """The meridian of an axisymmetric scene with unilateral contact: a tool presses along its axis."""
 
     def __init__(self, meridian: HalfPlane, tool: RoundTool, *, accuracy: float = 1e-5, degree: int = DEGREE):
         """Prepare to refine until the error bar is at most ``accuracy``."""
@@ -64,10 +64,10 @@ class MeridianContact(MeridianSolver):
 
 @dataclass(frozen=True)
 class _Patch:
-    """Where contact is: within a radius (m), but for the rings that are ``lost``.
+    """Contact area within a radius (m), without the rings that are ``lost``.
 
-    ``power`` is that of the radius which the depth goes like, inf where the tool ends; ``off`` what the edges of rings
-    may be off by, in units of the narrowest piece.
+    ``power`` is the exponent of the radius in the depth, inf where the tool ends; ``off`` the position error of the
+    rings' edges, in units of the narrowest piece.
     """
 
     radius: float
@@ -81,12 +81,12 @@ class _Patch:
 
 
 class _Search:
-    """Looks for the radii of contact of a tool on the meridian of a body."""
+    """Search for the contact radii of a tool on the meridian of a body."""
 
     def __init__(self, meridian: HalfPlane, tool: RoundTool, law: MaterialLaw):
         self._tool = tool
         kept = meridian.radius if isinstance(meridian, EllipticMeridian) else meridian.kept_radius
-        # A flat tool that covers all of a column ends where that does; contact that grows must not get there.
+        # A flat tool that covers a whole column ends with the column; a growing contact must not reach its edge.
         covers = tool.limit >= kept and tool.is_flat(kept)
         self._widest = kept if covers else _WIDEST * kept
         self._limit = min(tool.limit, self._widest)
@@ -94,17 +94,17 @@ class _Search:
         self.punches = Punches(meridian, tool, law)
 
     def find(self, depth: float) -> _Patch:
-        """Return the round patch of contact."""
+        """Return the contact area without rings."""
         radius, power = self._on_half_space(depth)
         low, high, before = 0.0, self._limit, None
         for _ in range(_MOST_TRIALS):
             punch = self.punches.at(radius)
             if radius == self._limit and punch.depth <= depth:
                 if radius == self._widest < self._tool.limit and not self._covers:
-                    raise SolveError("contact reaches the edge of what is kept of the body")
+                    raise SolveError("contact reaches the edge of the modelled part of the body")
                 return _Patch(radius, inf)
             if punch.depth <= 0:
-                raise SolveError("no area of contact was found: the tool does not touch on its axis first")
+                raise SolveError("no contact area was found: the tool does not touch on its axis first")
             miss = log(punch.depth / depth)
             if before is not None:
                 power = (miss - before[1]) / log(radius / before[0])
@@ -118,13 +118,13 @@ class _Search:
                 radius = high if high == self._limit != before[0] else (before[0] + high) / 2
             if radius <= low:
                 radius = (before[0] + low) / 2
-        raise SolveError(f"the radius of contact was not found in {_MOST_TRIALS} trials")
+        raise SolveError(f"the contact radius did not converge in {_MOST_TRIALS} trials")
 
     def find_rings(self, patch: _Patch, depth: float) -> _Patch:
-        """Return what touches where a round ``patch`` would have to pull somewhere within.
+        """Return the contact area with rings, where a round ``patch`` has tension somewhere inside.
 
         Raises:
-            SolveError: if it is not found, or its outer edge is another one.
+            SolveError: if it is not found, or its outer radius differs.
         """
         radius = patch.radius
         marks = radius * np.linspace(0, 1, _ALONG + 1)[1:-1]
@@ -138,23 +138,23 @@ class _Search:
         return replace(patch, lost=lost, off=step / min(pieces))
 
     def _lost(self, radius: float, depth: float, marks: FloatArray, before: Rings = ()) -> tuple[Rings, float]:
-        """Return the rings that do not touch, and the widest distance (m) of nodes at their edges; from ``before``."""
+        """Return the rings without contact, with initial guess ``before``, and the node distance (m) at their edges."""
         radii, active = self.punches.touching(radius, depth, tuple(marks), before)
         if not active[-1]:
-            raise SolveError('contact on the meridian ends nearer to the axis than one round patch: use model = "3d"')
+            raise SolveError('the contact area is smaller than one round patch: use model = "3d"')
         (changes,) = np.nonzero(active[1:] != active[:-1])
         edges = [float(radii[i] + radii[i + 1]) / 2 for i in changes]
         if not active[0]:
             edges = [0.0, *edges]
         if not edges:
-            raise SolveError('contact on the meridian was not found: use model = "3d"')
+            raise SolveError('the contact area on the meridian was not found: use model = "3d"')
         step = max((float(radii[i + 1] - radii[i]) for i in changes), default=0.0)
         return tuple(zip(edges[::2], edges[1::2], strict=True)), step
 
     def settle(self, patch: _Patch, depth: float, grading: Grading, degree: int) -> Answer:
         """Return the contact at a depth, from solutions of two degrees with nearly the right radii.
 
-        The error bar is that of :func:`error_bar`, and the squares of what the radii are off by.
+        The error bar is that of :func:`error_bar`, plus the squares of the radii's errors.
         """
         radius = patch.radius
         arrays, meshes = self.punches.mesh(radius, grading, patch.lost)
@@ -162,7 +162,7 @@ class _Search:
         fine = self.punches.solve(meshes, arrays, radius, degree)
         force = fine.force(depth)
         if not force > 0:
-            raise SolveError("the solution is not a number or takes no force")
+            raise SolveError("the solution is not finite or has no force")
         error = error_bar(coarse.force(depth), force, degree, max(coarse.balance, fine.balance))
         if patch.power < inf:
             misses = [log(punch.depth / depth) for punch in (coarse, fine)]
@@ -189,7 +189,7 @@ class _Search:
         )
 
     def _on_half_space(self, depth: float) -> tuple[float, float]:
-        """Return the radius on an elastic half-space, and the power of it that the depth goes like."""
+        """Return the radius on an elastic half-space, and its exponent in the depth."""
         tool = self._tool
         if tool.indentation((1 - STEP) * self._limit) <= depth:
             return self._limit, 2.0

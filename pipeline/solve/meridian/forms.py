@@ -1,8 +1,8 @@
-"""Linear elasticity in the half plane (r, z) of a round scene: space, operator, residual, strain.
+"""Linear elasticity in the half plane (r, z) of an axisymmetric scene: space, operator, residual, strain.
 
 The energy of :mod:`pipeline.solve.physics`, with axisymmetric strains, is integrated over r dr dz. Mixed elements
-(Taylor–Hood) have all of λ in the pressure, by its inverse, 0 for ν = 0.5. On the axis u_r = 0. Stresses are in units
-of the μ of region 0. Each material has a mesh and a space of its own: displacements are joined, pressures jump.
+(Taylor–Hood) put all of λ into the pressure block as 1/λ, which is 0 for ν = 0.5. On the axis u_r = 0. Stresses are in
+units of the μ of region 0. Each region has its own mesh and space: displacements are continuous, pressures jump.
 """
 
 from functools import cached_property
@@ -21,25 +21,25 @@ from pipeline.solve import SolveError
 from pipeline.solve.compiled import cellwise_space, form, taylor_hood_space, vector_space
 from pipeline.solve.physics import MaterialLaw, Parameters, axisymmetric_strain, pressurised, small_strain
 
-# Later than in three dimensions (Mesh.MIXED_FROM, 0.45), since elements of degree 5 lock later than those of degree 2:
-# on three scenes displacement elements differ from mixed ones by 5e-9 to 1e-8 at ν = 0.45 and by 2e-8 at 0.49, take
-# half the time (0.3 s, not 0.65), and have bars of 3e-6 at most, where 1e-5 is asked for.
+# A larger Poisson's ratio than in three dimensions (Mesh.MIXED_FROM, 0.45): elements of degree 5 lock later than those
+# of degree 2. On three scenes displacement elements differ from mixed ones by 5e-9 to 1e-8 at ν = 0.45 and by 2e-8 at
+# 0.49. They take half the time (0.3 s, not 0.65), and have bars of 3e-6 at most, where 1e-5 is needed.
 MIXED_FROM = 0.49
-# Of the larger coordinate: what rounding may put between one place and itself.
+# Two places are equal within this share of the larger coordinate (rounding).
 _SAME_PLACE = 1e-11
 
-# Of each region of a body, by its number: its mesh and the facets of each group.
+# By region number: mesh, and facets of each group.
 Meshes = dict[int, tuple[Any, dict[str, Int32Array]]]
 
 
 class MeridianForms:
-    """Elements of one ``degree`` on the meshes of all regions of a half plane, for a ``law``; all on this process."""
+    """Elements of one ``degree`` on the meshes of all regions of a half plane, for a ``law``, on this process alone."""
 
     def __init__(self, meshes: Meshes, degree: int, law: MaterialLaw):
         """Compile, and number the dofs.
 
         Raises:
-            SolveError: if the regions do not fit together.
+            SolveError: if the meshes of two regions do not match.
         """
         unit = law.parameters[0].lame_mu
         parts = [_Region(*mesh, degree, law.parameters[region], unit) for region, mesh in meshes.items()]
@@ -61,16 +61,16 @@ class MeridianForms:
             self._parts.append((part, number))
             dofs, places = np.vstack([dofs, number[own]]), np.vstack([places, where])
         if joined != len(places):
-            raise SolveError(f"{len(places) - joined} places where materials meet have none on the other side")
+            raise SolveError(f"{len(places) - joined} nodes on interfaces of materials have no partner")
 
     def on(self, name: str) -> tuple[IntArray, FloatArray]:
-        """Return the dofs (n, 2) of u_r and u_z on a group of facets, and where they are (n, 2)."""
+        """Return the dofs (n, 2) of u_r and u_z on a group of facets, and their coordinates (n, 2)."""
         found = [(number[dofs], places) for part, number in self._parts for dofs, places in (part.on(name),)]
         dofs, first = np.unique(np.vstack([dofs for dofs, _ in found]), axis=0, return_index=True)
         return dofs, np.vstack([places for _, places in found])[first]
 
     def stiffness(self) -> sp.csr_matrix:
-        """Assemble the operator (μ a, per radian), with nothing prescribed."""
+        """Assemble the operator (μ a, per radian), without conditions."""
         if len(self._parts) == 1:
             return self._parts[0][0].stiffness()
         total = sp.csr_matrix((self.dofs, self.dofs))
@@ -82,18 +82,18 @@ class MeridianForms:
     def residual(self, solution: FloatArray) -> FloatArray:
         """Apply the operator to ``solution`` by way of its strains.
 
-        In a slender body the strains are small differences: the product with the assembled operator loses twice the
-        digits, since its rounded entries see rigid motions.
+        In a slender body the strains are small differences. The assembled matrix loses twice as many digits, because
+        rounding of its entries makes it sensitive to rigid motions.
         """
         total = np.zeros(self.dofs)
         for part, number in self._parts:
-            total[number] += part.residual(solution[number])  # no number is there twice in one part
+            total[number] += part.residual(solution[number])  # numbers are unique within a part
         return total
 
     def mean_strains(self) -> tuple[FloatArray, FloatArray]:
         """Return the largest principal strain, by magnitude, of each cell's mean strain, and its corners (m, 3, 2).
 
-        They are those of the solution last given to ``residual``.
+        They belong to the last argument of ``residual``.
         """
         strains, corners = zip(*(part.mean_strains() for part, _ in self._parts), strict=True)
         return np.concatenate(strains), np.concatenate(corners)
@@ -110,7 +110,7 @@ class _Region:
         self._solution = fem.Function(self._space)
         self.dofs = len(self._solution.x.array)
         r, mu = ufl.SpatialCoordinate(mesh)[0], fem.Constant(mesh, material.lame_mu / unit)
-        # Of the integrands only u_r v_r/r is no polynomial on straight cells; the others have degree 2p at most.
+        # Only u_r v_r/r is no polynomial on straight cells; the other integrands have degree 2p at most.
         order = mesh_order(mesh)
         dx = ufl.dx(metadata={"quadrature_degree": 2 * degree + order})
         if self.is_mixed:
@@ -128,7 +128,7 @@ class _Region:
         self._areas = form(ufl.TestFunction(cellwise_space(mesh, ())) * dx) if order > 1 else None
 
     def on(self, name: str) -> tuple[IntArray, FloatArray]:
-        """Return the dofs (n, 2) of u_r and u_z on a group of facets, and where they are (n, 2)."""
+        """Return the dofs (n, 2) of u_r and u_z on a group of facets, and their coordinates (n, 2)."""
         if name not in self._facets:
             return np.empty((0, 2), dtype=np.int64), np.empty((0, 2))
         blocks = np.asarray(fem.locate_dofs_topological(self._displacements, 1, self._facets[name]), dtype=np.int64)

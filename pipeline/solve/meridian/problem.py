@@ -1,4 +1,4 @@
-"""Round scenes in the half plane (r, z): linear elasticity in two dimensions, and F to about 1e-7.
+"""Axisymmetric scenes in the half plane (r, z): linear elasticity in two dimensions, and F to about 1e-7.
 
 Lengths are in units of the footprint's radius a, stresses in units of μ, displacements in units of the depth d. The
 force is the reaction, times 2π. Meshes are refined until the error bar is small enough.
@@ -23,18 +23,18 @@ from pipeline.solve.solution import Problem, Request, Solution
 from pipeline.stages import recorded, stage
 
 DEGREE = 5
-# Meshes in the order in which they are tried, until the error bar is below the accuracy asked for.
+# Meshes, tried in this order until the error bar is below the required accuracy.
 GRADINGS = (Grading(1e-6, 1.0, 4.0), Grading(1e-7, 0.7, 2.0), Grading(1e-8, 0.5, 1.0))
-# An error bar above this is no answer.
+# Largest error bar of a result.
 _WORST_ERROR = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """What one mesh gives at a depth: F/d by energy and as the reaction, in units of μ a, and the rest of a solution.
+    """Result of one mesh at a depth: F/d from the energy and from the reaction, in units of μ a, and the solution.
 
-    ``error`` is the relative error bar of the force. Of contact that is found there are its area (m²) and the strain
-    energy, in units of μ a times m².
+    ``error`` is the relative error bar of the force. Unilateral contact adds its area (m²) and the strain energy, in
+    units of μ a times m².
     """
 
     stiffness: float
@@ -51,38 +51,36 @@ class Answer:
 
 
 class MeridianSolver(Problem):
-    """A problem on this process alone, which holds nothing between solves: each makes meshes of its own."""
+    """A problem on this process alone; it keeps nothing between solves, and each solve makes its own meshes."""
 
     def __init__(self, meridian: HalfPlane, *, accuracy: float = 1e-5, degree: int = DEGREE):
         """Prepare to refine until the error bar is at most ``accuracy``; ``degree`` is 3 at least."""
         self._meridian, self._accuracy, self._degree = meridian, accuracy, degree
 
     def close(self) -> None:
-        """There is nothing to free."""
+        """Do nothing: there is nothing to free."""
 
     @property
     def dofs(self) -> int:
-        """None: unknowns are counted in each solve, which is direct."""
+        """Zero: unknowns are counted in each solve, which is direct."""
         return 0
 
     @stage("axisymmetric")
     def answer(self, asked: Request) -> Solution:
-        """Solve for 0 <= ν <= 0.5 and a movement along the axis; directly, refined until round-off stops it.
+        """Solve for 0 <= ν <= 0.5 and a movement along the axis, directly, with iterative refinement to round-off.
 
-        Takes the next mesh until the error bar is small enough, or there is no finer one; then takes the best. The
-        bars are there whether they are asked for or not; ``max_strain`` is that of cells at least a/10 away
-        from every singular point. ``dofs`` and ``cells`` belong to the solve that gave F, the seconds are of all.
-        ``iterations`` are those of that solve, more than one where round-off was refined; where contact is found, they
-        count the linear solves.
+        The mesh is refined until the error bar is small enough, or no finer mesh is left; the best result counts. Error
+        bars are always computed. ``max_strain`` is that of cells at least a/10 away from every singular point. ``dofs``
+        and ``cells`` belong to the solve that gave F, the seconds to all solves. ``iterations`` counts the steps of
+        refinement of that solve, or the linear solves of unilateral contact.
 
         Raises:
-            SolveError: if the conditions contradict each other or nothing is held, if contact is not found or no round
-                patch, with rings lost or not, or reaches the edge of the body; if a solve fails a check, or the error
-                bar stays above 1e-3.
+            SolveError: if the conditions contradict each other or nothing is fixed; if contact is not found, or reaches
+                the edge of the body; if a solve fails a check, or the error bar stays above 1e-3.
         """
         law, movement = asked.law, asked.movement
         if len(movement.motions) > 1 or movement.motions[0].is_rotation or any(movement.motions[0].direction[:2]):
-            raise SolveError("the meridian serves movements along its axis only")
+            raise SolveError("an axisymmetric model needs a movement along its axis")
         for tissue in law.parameters:
             if not 0 <= tissue.poisson <= 0.5:
                 raise SolveError(f"Poisson's ratio is {tissue.poisson:g}, must be between 0 and 0.5")
@@ -105,10 +103,10 @@ class MeridianSolver(Problem):
 
     @abstractmethod
     def _answer(self, law: MaterialLaw, depth: float) -> Answer:
-        """Return the best answer at a ``depth`` (m)."""
+        """Return the best result at a ``depth`` (m)."""
 
     def _best(self, solve_on: Callable[[Grading], Answer]) -> Answer:
-        """Return the best of what meshes give, the next one taken until the error bar is small enough.
+        """Return the best result of the meshes, each tried until the error bar is small enough.
 
         Raises:
             SolveError: if a solve fails a check, or the error bar stays above 1e-3.
@@ -118,7 +116,7 @@ class MeridianSolver(Problem):
             try:
                 found = solve_on(grading)
             except Unbalanced:
-                # Round-off grows with refinement: a finer mesh would do no better.
+                # Round-off grows with refinement: a finer mesh would be no better.
                 if best is None:
                     raise
                 break
@@ -128,23 +126,23 @@ class MeridianSolver(Problem):
                 break
         assert best is not None
         if best.error > _WORST_ERROR:
-            raise SolveError(f"the force is known to {best.error:.0e} only, allowed {_WORST_ERROR:.0e}")
+            raise SolveError(f"the error bar of the force is {best.error:.0e}, allowed {_WORST_ERROR:.0e}")
         return best
 
 
 def error_bar(coarse: float, fine: float, degree: int, balance: float) -> float:
-    """Return the relative error bar of ``fine``, of a degree p, from what degree p - 1 gives on the same mesh.
+    """Return the relative error bar of ``fine``, of degree p, from degree p - 1 (``coarse``) on the same mesh.
 
-    At an edge where the displacement goes like r^½, the error falls like p⁻² if nothing else is left (the mesh's
-    smallest cell), faster elsewhere: what is left is at most θ = p²/(2p + 1) times the last step, p counted before
-    it. The safety of 1.25 on it is measured, and so is that round-off errs by less than 3 times the ``balance``.
+    At an edge where the displacement goes like r^½ the error falls like p⁻², once the mesh's smallest cell dominates,
+    and faster elsewhere. The remaining error is at most θ = p²/(2p + 1) times the last step, with p of the step before.
+    The safety factor 1.25 is measured; so is that round-off errs by less than 3 times the ``balance``.
     """
     theta = (degree - 1) ** 2 / (2 * degree - 1)
     return 1.25 * theta * abs(coarse / fine - 1) + 3 * balance
 
 
 class MeridianProblem(MeridianSolver):
-    """The meridian of a round scene, which a probe presses along its axis."""
+    """The meridian of an axisymmetric scene whose probe, with prescribed footprint, presses along its axis."""
 
     def __init__(self, meridian: HalfPlane, conditions: Conditions, *, accuracy: float = 1e-5, degree: int = DEGREE):
         """Prepare to refine until the error bar is at most ``accuracy``; ``degree`` is 3 at least."""
@@ -155,7 +153,7 @@ class MeridianProblem(MeridianSolver):
         return self._best(lambda grading: self._solve_on(grading, law, depth))
 
     def _solve_on(self, grading: Grading, law: MaterialLaw, depth: float) -> Answer:
-        """Solve with degrees p - 1 and p on one mesh: the answer is that of p, its error bar comes from the difference.
+        """Solve with degrees p - 1 and p on one mesh: the result is that of p, the error bar their difference.
 
         Raises:
             SolveError: if a solve fails a check.
@@ -171,7 +169,7 @@ class MeridianProblem(MeridianSolver):
                 pressed = solve(np.full(len(system.probe), -1.0))
             on_probe = 2 * pi * float(pressed.residual[system.probe].sum())
             if on_probe >= 0:
-                raise SolveError("the tissue pulls at the probe that presses it")
+                raise SolveError("the force has the wrong sign: the tissue pulls the probe in")
             found.append((system, pressed, on_probe))
         (_, coarse, coarse_force), (system, fine, force) = found
         with stage("solve"):
@@ -190,9 +188,9 @@ class MeridianProblem(MeridianSolver):
 
 
 def compile_axisymmetric(degree: int = DEGREE, *, curved: bool = False, lowest: int = 0) -> None:
-    """Compile every form that a :class:`MeridianProblem` needs, on this process; call it within ``compiling()``.
+    """Compile every form of a :class:`MeridianProblem`, on this process; call it within ``compiling()``.
 
-    Those from the degree ``lowest`` on, if it is given.
+    If ``lowest`` is given, degrees from there on are compiled.
     """
     example: HalfPlane = EllipticMeridian(2.0, 2.0, 1.0, 0.0) if curved else Meridian(2.0, 1.0, 1.0)
     mesh = meridian_mesh(example.mesh(Grading(1.0)))

@@ -1,7 +1,7 @@
-"""What a punch does, a round tool that touches up to a given radius: linear scenes in the half plane (r, z).
+"""Punch solutions: a round tool in contact up to a given radius; linear scenes in the half plane (r, z).
 
-See :mod:`pipeline.solve.meridian.contact`. Lengths are in units of the outer radius of contact, stresses in units of μ
-of region 0, displacements in metres.
+See :mod:`pipeline.solve.meridian.contact`. Lengths are in units of the outer contact radius, stresses in units of μ of
+region 0, displacements in metres.
 """
 
 from collections.abc import Callable
@@ -20,10 +20,10 @@ from pipeline.solve.meridian.system import HalfPlane, System, meshes_of
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
 
-# Trials are on this mesh, by elements of this degree: the depth of a radius comes out to some 1e-5.
+# Mesh and degree of trials: they give the depth of a radius to about 1e-5.
 TRIAL_DEGREE = 3
 _TRIAL = Grading(1e-4, 1.0, 4.0)
-# A kink nearer to an edge of contact than this, in units of a, is within the small elements there.
+# A kink closer to an edge of contact than this, in units of a, lies within the small elements there.
 _APART = 1e-2
 _POINTS, STEP = 48, 1e-5
 _MOST_SETS, _SLACK = 40, 1e-6
@@ -35,10 +35,10 @@ Rings = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True)
 class RoundTool:
-    """A tool that is the same all round its axis, above the surface that it touches.
+    """An axisymmetric tool, above the surface that it touches.
 
-    ``gap`` returns the distance (n,) along the axis (m) between tool and surface, at radii (n,) up to ``limit`` (m),
-    where the tool ends, when its lowest point touches; ``kinks`` are the radii (m) at which that is not smooth.
+    ``gap`` returns the initial distance (n,) along the axis (m) between tool and surface, at radii (n,) up to ``limit``
+    (m), where the tool ends. ``kinks`` are the radii (m) at which the gap is not smooth.
     """
 
     gap: Callable[[FloatArray], FloatArray]
@@ -46,11 +46,11 @@ class RoundTool:
     kinks: tuple[float, ...] = ()
 
     def is_flat(self, radius: float) -> bool:
-        """Tell whether it lies on the surface all the way to a ``radius`` (m) when it touches."""
+        """Return whether the gap is zero all the way to a ``radius`` (m)."""
         return not np.any(self.gap(np.linspace(0.0, radius, _POINTS)))
 
     def indentation(self, radius: float) -> float:
-        """Return the depth (m) at which contact on an elastic half-space has a ``radius`` (I. N. Sneddon, 1965)."""
+        """Return the depth (m) at which contact on an elastic half-space has this ``radius`` (I. N. Sneddon, 1965)."""
         sine, weights = _quarter_turn()
         at = radius * sine
         slope = (self.gap(at) - self.gap((1 - STEP) * at)) / (STEP * at)
@@ -59,17 +59,17 @@ class RoundTool:
 
 @cache
 def _quarter_turn() -> tuple[FloatArray, FloatArray]:
-    """Return sines and weights of a rule over a quarter of a turn."""
+    """Return sines and weights of a quadrature rule over a quarter turn."""
     nodes, weights = np.polynomial.legendre.leggauss(_POINTS)
     return np.sin(pi / 4 * (nodes + 1)), pi / 4 * weights
 
 
 @dataclass(frozen=True, eq=False)
 class PunchSolution:
-    """What contact up to a radius gives, rings lost or not; ``punch`` is u₁ (per m of depth), ``pressed`` u₂ (m).
+    """Solution for contact up to a radius, with or without rings: ``punch`` is u₁ (per m of depth), ``pressed`` u₂ (m).
 
-    ``depth`` (m) is that at which contact ends by itself at that radius, ``stiffness`` E₁₁ (per m) and ``preload`` E₁₂
-    those of F = d E₁₁ + E₁₂, in units of μ a.
+    ``depth`` (m) is the depth at which this is the true radius, ``stiffness`` E₁₁ (per m) and ``preload`` E₁₂ those of
+    F = d E₁₁ + E₁₂, in units of μ a.
     """
 
     radius: float
@@ -88,21 +88,21 @@ class PunchSolution:
 
 
 class Punches:
-    """Solves for contact of one tool on the meridian of one body; ``count`` says how often it did."""
+    """Punch solutions of one tool on the meridian of one body; ``count`` is the number of solves."""
 
     def __init__(self, meridian: HalfPlane, tool: RoundTool, law: MaterialLaw):
         self._meridian, self._tool, self._law = meridian, tool, law
         self.count = 0
 
     def at(self, radius: float) -> PunchSolution:
-        """Return what contact up to a ``radius`` (m) gives, on a coarse mesh."""
+        """Return the punch solution for a contact ``radius`` (m), on a coarse mesh."""
         arrays, meshes = self.mesh(radius, _TRIAL)
         return self.solve(meshes, arrays, radius, TRIAL_DEGREE)
 
     def mesh(
         self, radius: float, grading: Grading, lost: Rings = (), marks: tuple[float, ...] = ()
     ) -> tuple[MeridianArrays, Meshes]:
-        """Return the mesh for contact up to a ``radius`` (m) without rings ``lost``, with nodes at ``marks`` (m)."""
+        """Return the mesh for a contact ``radius`` (m) without rings ``lost``, with nodes at ``marks`` (m)."""
         kinks = {kink for kink in self._tool.kinks if kink < (1 - _APART) * radius}
         for edge in (edge for ring in lost for edge in ring):
             kinks = {kink for kink in kinks if abs(kink - edge) > _APART * radius}
@@ -114,7 +114,7 @@ class Punches:
             return arrays, meshes_of(arrays)
 
     def solve(self, meshes: Meshes, arrays: MeridianArrays, radius: float, degree: int) -> PunchSolution:
-        """Solve for a flat punch and for the gap, with one degree."""
+        """Solve for a flat punch and for the gap, in one degree."""
         self.count += 1
         with stage("assembly"):
             system = System(meshes, degree, self._law)
@@ -141,10 +141,10 @@ class Punches:
     def touching(
         self, radius: float, depth: float, marks: tuple[float, ...], lost: Rings
     ) -> tuple[FloatArray, BoolArray]:
-        """Return the radii (m) of nodes up to a ``radius`` (m), sorted, and which touch at a ``depth`` (m).
+        """Return the radii (m) of nodes up to a ``radius`` (m), sorted, and which are active at a ``depth`` (m).
 
-        A primal-dual active set, as in three dimensions, on a mesh with nodes at the ``marks`` (m); it begins without
-        the rings ``lost``.
+        A primal-dual active set, as in three dimensions, on a mesh with nodes at the ``marks`` (m). Its initial guess
+        is contact without the rings ``lost``.
 
         Raises:
             SolveError: if the set does not settle.
@@ -169,4 +169,4 @@ class Punches:
             active = following
             if not active.any():
                 break
-        raise SolveError('the area of contact on the meridian does not settle: use model = "3d"')
+        raise SolveError('the contact area on the meridian does not settle: use model = "3d"')

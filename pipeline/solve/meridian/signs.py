@@ -1,4 +1,4 @@
-"""Whether contact on the meridian, one round patch or one ring, is one: pressed all over, clear of the tool beside."""
+"""Checks of contact on the meridian: no tension inside the contact, no penetration beside it."""
 
 import numpy as np
 
@@ -9,18 +9,18 @@ from pipeline.solve import SolveError
 from pipeline.solve.meridian.forms import MeridianForms
 from pipeline.solve.meridian.punch import RoundTool
 
-# Tension below this share of the mean pressure, penetration below this share of the depth: what a radius that is off
-# by 1e-4 leaves.
+# Allowed tension, as a share of the mean pressure, and penetration, as a share of the depth: those of a radius that is
+# wrong by 1e-4.
 _TENSION, _PENETRATION = 1e-2, 1e-4
-# Pressures are not read nearer to an edge than this, in units of the outer one's radius: there they are its error.
+# Pressures closer to an edge than this, in units of the outer radius, are ignored: they measure the edge's error.
 _BESIDE_EDGE = 1e-3
-# A height this near to the top, in units of the radius of contact, is the top's.
+# A height is that of the top within this share of the contact radius.
 _LEVEL = 1e-9
 _ROUNDING = 1e-12
 
 
 class LiftsOff(SolveError):
-    """Contact that was taken for one round patch, and would have to pull."""
+    """Contact assumed to be one round patch has tension inside."""
 
 
 def check_signs(
@@ -34,18 +34,18 @@ def check_signs(
 ) -> None:
     """Check a ``solution`` (displacements in m, lengths of the mesh in units of ``arrays.unit``) and its ``residual``.
 
-    The ``tool`` is pushed in by a ``depth`` (m).
+    The ``tool`` is pressed in by ``depth`` (m).
 
     Raises:
-        LiftsOff: if the tool pulls somewhere.
-        SolveError: if it goes through the surface beside the contact.
+        LiftsOff: if there is tension somewhere in the contact.
+        SolveError: if the tool penetrates the surface beside the contact.
     """
     dofs, places = forms.on(PROBE)
     order = np.argsort(places[:, 0])
     radii, reactions = places[order, 0], residual[dofs[order, 1]]
     mean, tension, at = -2 * reactions.sum(), 0.0, 0.0
     rings = _rings(arrays)
-    shape = "one round patch" if len(rings) == 1 and not rings[0][0] else "what it was taken for"
+    shape = "one round patch" if len(rings) == 1 and not rings[0][0] else "the rings that were found"
     for ends in rings:
         here = (radii > ends[0] - _ROUNDING) & (radii < ends[-1] + _ROUNDING)
         pressure = -np.linalg.solve(_mass(radii[here], ends), reactions[here])
@@ -55,24 +55,24 @@ def check_signs(
             tension, at = pull, max(float(radii[here][within][np.argmin(pressure[within])]) * arrays.unit, 0.0)
     if tension > _TENSION:
         raise LiftsOff(
-            f"contact is not {shape}: {1e3 * at:.3g} mm from the axis the tool would pull with {tension:.1%} "
+            f"contact is not {shape}: {1e3 * at:.3g} mm from the axis it has a tension of {tension:.1%} "
             'of the mean pressure; use model = "3d"'
         )
     dofs, places = forms.on(FREE)
-    # What can be seen along the axis: of a cylinder its top, of an ellipsoid its upper half.
+    # Surface seen along the axis: the top of a cylinder, the upper half of an ellipsoid.
     top = -_LEVEL if arrays.order == 1 else arrays.points[:, 1].min() / 2
     beside = (places[:, 1] > top) & (places[:, 0] * arrays.unit < tool.limit)
     clear = tool.gap(places[beside, 0] * arrays.unit) - depth - solution[dofs[beside, 1]]
     if (through := -clear.min(initial=0.0) / depth) > _PENETRATION:
         at = places[beside, 0][np.argmin(clear)] * arrays.unit
         raise SolveError(
-            f"contact is not {shape}: {1e3 * at:.3g} mm from the axis the tool would go through the surface "
+            f"contact is not {shape}: {1e3 * at:.3g} mm from the axis the tool penetrates the surface "
             f'by {through:.1%} of its depth; use model = "3d"'
         )
 
 
 def _rings(arrays: MeridianArrays) -> list[FloatArray]:
-    """Return, of each round or ring-shaped piece of the contact, the radii at which its elements end."""
+    """Return the radii of the element ends, for each round or ring-shaped piece of the contact."""
     edges = np.sort(arrays.points[arrays.facets[PROBE], 0], axis=1)
     edges = edges[np.argsort(edges[:, 0])]
     (breaks,) = np.nonzero(edges[1:, 0] > edges[:-1, 1] + _ROUNDING)

@@ -1,4 +1,4 @@
-"""The linear problem in a half plane: what is held, and solutions by a factorisation, refined until round-off."""
+"""The linear problem in a half plane: conditions, factorisation, and iterative refinement to round-off."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -21,20 +21,20 @@ from pipeline.solve.meridian.forms import MeridianForms, Meshes
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
 
-# Each refinement gains the digits that the factors hold; a balance below the second number has nothing to gain.
+# Most steps of iterative refinement; a balance below the second number needs none.
 _MOST_REFINEMENTS, _BALANCED = 20, 1e-9
 
-# The half planes that are solved on.
+# Meshes of half planes.
 HalfPlane = Meridian | EllipticMeridian
 
 
 class Unbalanced(SolveError):
-    """Round-off has spoilt the solution."""
+    """Round-off dominates the solution."""
 
 
 @dataclass(frozen=True, eq=False)
 class Pressed:
-    """A solution with its residual, the balance's relative error, and the steps of refinement."""
+    """A solution with its residual, relative imbalance, and number of refinement steps."""
 
     solution: FloatArray
     residual: FloatArray
@@ -48,7 +48,7 @@ class Pressed:
 
 
 class System:
-    """Elements of a half plane whose support, axis and tool are held; ``radii`` (n) are those of the tool's nodes.
+    """Elements of a half plane with conditions on support, axis and tool; ``radii`` (n) are those of the tool's nodes.
 
     ``probe`` and ``slide`` (n) are the dofs there of u_z and u_r, from the axis outwards.
     """
@@ -68,7 +68,7 @@ class System:
 
     @contextmanager
     def factors(self, held: IntArray) -> Iterator[Callable[[FloatArray], Pressed]]:
-        """Factorise with the dofs ``held`` of u_z below the tool; lend the function that solves for their values."""
+        """Factorise with the dofs ``held`` of u_z below the tool fixed; lend the solver for their values."""
         free = np.setdiff1d(self._free, held)
         unknown = self._stiffness[free][:, free]
         unknown.sort_indices()
@@ -95,14 +95,14 @@ class System:
     def _refined(
         self, solve: Callable[[FloatArray], FloatArray], free: IntArray, held: IntArray, values: FloatArray
     ) -> Pressed:
-        """Return the solution with ``values`` on the dofs ``held``; ``solve`` knows the operator on the ``free`` ones.
+        """Return the solution with ``values`` at the dofs ``held``; ``solve`` inverts the operator on ``free`` dofs.
 
-        What the mixed form's second row, p = λ div u, leaves out of the work is nought once it holds, so that the work
-        on the solution is twice its energy for that form, too.
+        The mixed form's second row, p = λ div u, vanishes at the solution. The work on the solution is then twice its
+        energy in the mixed form, too.
 
         Raises:
-            Unbalanced: if round-off keeps the forces from balance.
-            SolveError: if the solution is not a number or has no energy.
+            Unbalanced: if round-off prevents the balance of forces.
+            SolveError: if the solution is not finite or has no energy.
         """
         solution: FloatArray = np.zeros(self.forms.dofs)
         solution[held] = values
@@ -115,11 +115,11 @@ class System:
             on_probe, on_support = (float(residual[dofs].sum()) for dofs in (held, self._support))
             twice_energy, work = float(solution @ residual), float(values @ residual[held])
             if not 0 < twice_energy < inf:
-                raise SolveError(f"the solution is not a number or has no energy (2U = {2 * pi * twice_energy:g})")
+                raise SolveError(f"the solution is not finite or has no energy (2U = {2 * pi * twice_energy:g})")
             balance = max(abs(on_probe + on_support) / abs(on_probe), abs(work / twice_energy - 1))
             if balance < _BALANCED or balance > before / 2:
                 break
-        check_balance(balance, Unbalanced, "; the body is so slender that its stiffness drowns in round-off")
+        check_balance(balance, Unbalanced, "; the body is so slender that round-off exceeds its stiffness")
         return Pressed(solution, residual, balance, step)
 
 
@@ -127,19 +127,19 @@ def meshes_of(arrays: MeridianArrays) -> Meshes:
     """Return the mesh of each region.
 
     Raises:
-        SolveError: if nothing is held, or all that lies between the probe and what is.
+        SolveError: if nothing is fixed, or no free surface separates probe and support.
     """
     if FIXED not in arrays.facets:
-        raise SolveError("nothing that is kept of the body is held: the tissue would float")
+        raise SolveError("no fixed face is in the modelled part of the body: the tissue would float")
     if len(np.intersect1d(arrays.facets[PROBE], arrays.facets[FIXED])):
-        raise SolveError("the probe covers the top right to the held side: no displacement satisfies both conditions")
+        raise SolveError("the probe covers the top up to the fixed side: no displacement satisfies both conditions")
     return {region: meridian_mesh(part) for region, part in split_regions(arrays).items()}
 
 
 def max_strain(forms: MeridianForms, arrays: MeridianArrays) -> float:
     """Return the largest principal strain of a cell's mean strain, away from every singular point.
 
-    It is that of the solution whose residual was last asked for.
+    It belongs to the solution of the last residual.
     """
     strain, corners = forms.mean_strains()
     distance = np.linalg.norm(corners[:, :, None] - arrays.singular, axis=-1).min(axis=(1, 2))
