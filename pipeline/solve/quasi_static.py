@@ -87,7 +87,7 @@ class QuasiStaticProblem(Problem):
 
     @property
     def corrections(self) -> dict[Motion, tuple[FloatArray, ...]]:
-        """The last solution per unit of each prescribed motion: see ``PrescribedMotion``; empty in unilateral contact."""
+        """The last solution per unit of each prescribed motion: see ``PrescribedMotion``; empty if contact is found."""
         return self.constraint.corrections if isinstance(self.constraint, PrescribedMotion) else {}
 
     @property
