@@ -1,1 +1,1 @@
-"""Bodies, supports and probes: one file a shape holds all that the program knows of it. Knows nothing else."""
+"""Bodies, supports and probes: one file per shape has all that the program knows about it. Imports nothing else."""

@@ -1,4 +1,4 @@
-"""What every body tells of itself. There are no defaults: a body that leaves something out cannot be made."""
+"""The interface of every body. It has no defaults: a class that leaves out a property cannot be instantiated."""
 
 from abc import ABC, abstractmethod
 from functools import cached_property
@@ -15,18 +15,18 @@ from pipeline.shapes.section import Section, Words
 from pipeline.shapes.support import Fixed, Support, support_of
 from pipeline.shapes.surface import Surface
 
-# Layers that miss the height by this share of it fill the body.
+# Layers fill the body if their sum differs from its height by at most this share.
 _SAME = 1e-9
-# Of the extent: an inclusion so near to the z axis is centred on it.
+# An inclusion is centred on the z axis within this share of the extent.
 _ON_AXIS = 1e-9
-# Points on an inclusion, besides the ends of its axes, that are looked at.
+# Sampling points on an inclusion, besides the ends of its axes.
 _POINTS = 2000
 
 
 class Body(Section, ABC):
-    """A piece of tissue in its own coordinates, and where it is held.
+    """A body of tissue in its own coordinates, and its support.
 
-    Places on it are given as the :class:`Frame` of the probe there.
+    A place on it is the :class:`Frame` of a probe there.
     """
 
     shape: Annotated[str, Words("Shape of the body.", '"box"', is_used=True)]
@@ -44,22 +44,22 @@ class Body(Section, ABC):
 
     @property
     def regions(self) -> tuple[Region, ...]:
-        """Its pieces of materials of their own, whose numbers in meshes begin with 1; 0 is what none of them is."""
+        """Regions with a material of their own, numbered from 1 in meshes; 0 is the rest of the body."""
         return self.inclusion
 
     @property
     def interfaces(self) -> tuple[float, ...]:
-        """Heights z (m) at which one of its layers ends and another material begins, from the top down."""
+        """Heights z (m) of the interfaces between layers of different materials, from the top down."""
         return ()
 
     @property
     def is_filled(self) -> bool:
-        """Whether its layers leave nothing of it to any other material."""
+        """Whether its layers fill it, so that `[material]` applies nowhere."""
         return False
 
     @cached_property
     def support(self) -> Support:
-        """What is held of its boundary."""
+        """The fixed part of its boundary."""
         return support_of(self.fixed)
 
     # ---- size -----------------------------------------------------------------------------------------
@@ -83,31 +83,32 @@ class Body(Section, ABC):
 
     @abstractmethod
     def frame(self, at: tuple[float, ...], axis: Vector | None = None) -> Frame:
-        """Return the place that two or three coordinates ``at`` (m) name; ``axis`` defaults to the inward normal there.
+        """Return the frame at two or three coordinates ``at`` (m); ``axis`` defaults to the inward normal there.
 
-        Two are x and y of the highest point of the surface over them; three are projected to the nearest.
+        Two coordinates, x and y, name the highest surface point there; three are projected to the nearest one.
 
         Raises:
             PlaceError: if a probe cannot touch the body there.
         """
 
     def frame_below(self, at: tuple[float, ...], axis: Vector | None, around: float) -> Frame:
-        """Return the place as a footprint of radius ``around`` (m) has it, as :meth:`frame` does.
+        """Return the frame for a footprint of radius ``around`` (m): see :meth:`frame`.
 
-        A smooth surface has one normal at a point, whatever covers it. One of triangles has that of what is covered.
+        A smooth surface has one normal per point. A surface of triangles has the mean normal below the footprint.
         """
         return self.frame(at, axis)
 
     @abstractmethod
     def lift(self, frame: Frame, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return where lines along a probe's axis through ``points`` (n, 2), in its own plane, enter the body nearby.
+        """Return where lines along a probe's axis enter the body near the contact, and the outward unit normals there.
 
-        That is (n, 3), in m, not a number where they miss; and the outward unit normals there.
+        The lines pass through ``points`` (n, 2), m, in the probe's plane. Both results are (n, 3), the first in m; they
+        are NaN for lines that miss the body.
         """
 
     @abstractmethod
     def thickness(self, frame: Frame) -> float:
-        """Return how far (m) the body reaches along a probe's axis, below the point of contact."""
+        """Return the extent (m) of the body along a probe's axis, below the point of contact."""
 
     @abstractmethod
     def reach(self, frame: Frame) -> float:
@@ -115,43 +116,43 @@ class Body(Section, ABC):
 
     @abstractmethod
     def farthest(self, frame: Frame) -> float:
-        """Return a distance (m) from the point of contact within which the whole body lies."""
+        """Return a distance (m) from the point of contact that no point of the body exceeds."""
 
     @abstractmethod
     def inside(self, points: FloatArray) -> FloatArray:
-        """Return the distance (m) of points (n, 3) of the body to its surface, negative outside."""
+        """Return the distance (m) of points (n, 3) to the surface, negative outside."""
 
     def room(self, surface: Ovoid) -> float:
-        """Return the distance (m) between the body's surface and another one within, negative if that sticks out."""
+        """Return the distance (m) between the body's surface and a ``surface`` inside, negative if that sticks out."""
         return float(self.inside(surface.sample(_POINTS)).min())
 
     @abstractmethod
     def gap(self, point: Vector) -> float:
-        """Return the distance (m) from a point of a face to its edge, negative outside; infinite if it has none."""
+        """Return the distance (m) of a point of a face to its edge, negative outside; infinite without edges."""
 
     @property
     @abstractmethod
     def is_smooth(self) -> bool:
-        """Whether its surface has no edges, but for facets that stand for what is smooth."""
+        """Whether its surface has no edges; facets that approximate a smooth surface do not count."""
 
     @property
     @abstractmethod
     def face(self) -> str:
-        """The size of the face that a probe touches, in words."""
+        """The size of the face under a probe, in words."""
 
     # ---- symmetry -------------------------------------------------------------------------------------
 
-    # The planes, of x = 0 ("x") and y = 0 ("y"), in which its shape is its own image.
+    # Planes of mirror symmetry of its shape: x = 0 ("x") and y = 0 ("y").
     mirror_planes: ClassVar[tuple[str, ...]] = ()
 
     @property
     @abstractmethod
     def is_round(self) -> bool:
-        """Whether its shape and what is in it, wherever it is held, are the same all round the z axis."""
+        """Whether its shape and its regions are axisymmetric about z, whatever its support."""
 
     @property
     def holds_round(self) -> bool:
-        """Whether what is in it is the same all round the z axis."""
+        """Whether its regions are axisymmetric about z."""
         return all(
             max(map(abs, piece.at[:2])) <= _ON_AXIS * self.extent and piece.surface.axes[0] == piece.surface.axes[1]
             for piece in self.inclusion
@@ -160,35 +161,35 @@ class Body(Section, ABC):
     @property
     @abstractmethod
     def half_sides(self) -> tuple[float, float] | None:
-        """Half extents (m) along x and y of a body whose middle is the z axis, of a round one its radius twice."""
+        """Half extents (m) along x and y of a body centred on the z axis, twice the radius of a round one; or None."""
 
     def half_plane(self) -> HalfPlane | None:
-        """Return its half plane if it and its regions are the same all round the z axis, None if they are not."""
+        """Return its half plane if it and its regions are axisymmetric about z, otherwise None."""
         return None
 
     # ---- geometry -------------------------------------------------------------------------------------
 
     @abstractmethod
     def surfaces(self) -> dict[str, tuple[Surface, ...]]:
-        """Return all the surfaces that bound it, by the names under which they can be held."""
+        """Return all boundary surfaces, by the names that a support can use."""
 
     @property
     @abstractmethod
     def bend(self) -> float:
-        """Radius (m) of the roundest of its sides, which elements must resolve; infinite if all are flat."""
+        """Smallest radius of curvature (m) of its sides, which elements must resolve; infinite if all are flat."""
 
     @property
     def curvature(self) -> float:
-        """Integral (m) of the mean curvature over its surface, twice, as far as ``bend`` does not tell of it."""
+        """Twice the surface integral (m) of the mean curvature, as far as ``bend`` does not include it."""
         return 0.0
 
     @abstractmethod
     def outline(self) -> list[FloatArray]:
-        """Return its edges as lines of points (n, 3), in m, for pictures."""
+        """Return its edges as polylines of points (n, 3), in m, for pictures."""
 
 
 class Drawn(Body):
-    """A body that a CAD kernel draws, its middle on the z axis."""
+    """A body drawn by a CAD kernel, centred on the z axis."""
 
     mirror_planes: ClassVar[tuple[str, ...]] = ("x", "y")
 
@@ -196,12 +197,12 @@ class Drawn(Body):
     def draw(self, kernel: Any, units: Units, frame: Frame | None = None) -> int:
         """Add it to a CAD ``kernel`` (gmsh's ``occ``), in the model's ``units``; return the tag of the volume.
 
-        Where a curved surface must have a seam, it is far from the ``frame`` at which a footprint will be imprinted.
+        The seam of a curved surface is placed far from ``frame``, where a footprint will be imprinted.
         """
 
 
 class Layered(Drawn):
-    """A body with a flat top, which may be made of horizontal layers."""
+    """A body with a flat top, and horizontal layers if any."""
 
     layers: Annotated[
         tuple[Layer, ...], Words("Horizontal layers of other materials, from the top down.", "[[body.layers]]")
@@ -214,7 +215,7 @@ class Layered(Drawn):
 
     @property
     def interfaces(self) -> tuple[float, ...]:
-        """Heights z (m) at which one of its layers ends and another material begins, from the top down."""
+        """Heights z (m) of the interfaces between layers of different materials, from the top down."""
         low, high = self.heights
         ends = (high - total for total in accumulate(layer.thickness or inf for layer in self.layers))
         return tuple(end for end in ends if end - low > _SAME * (high - low))
@@ -222,7 +223,7 @@ class Layered(Drawn):
     @property
     @abstractmethod
     def half_sides(self) -> tuple[float, float]:
-        """Half extents (m) of the top along x and y, of a round one its radius twice."""
+        """Half extents (m) of the top along x and y, twice the radius of a round one."""
 
     @property
     @abstractmethod
@@ -231,17 +232,17 @@ class Layered(Drawn):
 
     @property
     def is_round(self) -> bool:
-        """Whether the top and what is in it are the same all round the z axis."""
+        """Whether the top and the regions are axisymmetric about z."""
         return self.has_round_top and self.holds_round
 
     @property
     @abstractmethod
     def corners(self) -> FloatArray:
-        """Points (n, 3), in m, whose convex hull just holds it."""
+        """Points (n, 3), in m, whose convex hull contains the body tightly."""
 
     @abstractmethod
     def far_side(self, x: float, y: float) -> float:
-        """Return the largest distance (m) of its sides from an upright line through x and y (m)."""
+        """Return the largest distance (m) of its sides from a vertical line through x and y (m)."""
 
     def reach(self, frame: Frame) -> float:
         """Return the largest distance (m) of a corner, or of a side, from a probe's axis."""
@@ -256,14 +257,14 @@ class Layered(Drawn):
 
     @property
     def depth_of_tissue(self) -> float:
-        """How far (m) below the top the first other tissue begins, or the bottom lies."""
+        """Depth (m) below the top of the first interface between materials, or of the bottom."""
         low, top = self.heights
         ends = [low, *self.interfaces, *(piece.at[2] + piece.surface.axes[2] for piece in self.inclusion)]
         return top - max(ends)
 
     @abstractmethod
     def to_side(self, point: tuple[float, float], direction: tuple[float, float]) -> float:
-        """Return how far (m) it is from x and y of a point of the top, along a unit vector in it, to the side."""
+        """Return the distance (m) to the side from a point of the top, along a unit vector in it."""
 
     @property
     def is_filled(self) -> bool:

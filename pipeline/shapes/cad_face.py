@@ -1,4 +1,4 @@
-"""Faces of a solid that is known by triangles, and points of its true surface between their corners."""
+"""Faces of a CAD solid that is stored as triangles, and its true surface between their corners."""
 
 import numpy as np
 
@@ -9,10 +9,10 @@ from pipeline.shapes.triangles import Triangles, doubled_normals, edge_keys, hal
 
 
 class CadFace(Surface):
-    """The facets of a solid that are ``chosen`` (m): those of the faces of one name.
+    """The ``chosen`` facets (m) of a solid: those of all faces with one name.
 
-    A point next to one of them counts as on it: triangles are a little off the faces. Elements are bent to faces by the
-    geometry kernel while it meshes, not by this.
+    A point whose nearest facet is one of them is on the face: facets are slightly off the true surface. The geometry
+    kernel curves elements while it meshes; this class does not.
     """
 
     is_curved = False
@@ -31,10 +31,11 @@ class CadFace(Surface):
 
 
 def raised(points: FloatArray, corners: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return how far points (n, 3) of facets with ``corners`` (n, 3, 3) are off the true surface, and unit normals.
+    """Return the offset of facet points (n, 3) from the true surface, and its unit normals there.
 
-    ``normals`` (n, 3, 3) are those of the surface at the corners. Half of the mean of the projections to the tangent
-    planes there is exact for surfaces of second order (T. Boubekeur, M. Alexa, ACM Trans. Graph. 27, 141, 2008).
+    ``corners`` (n, 3, 3) are those of the facets, ``normals`` (n, 3, 3) those of the surface at the corners. Half of
+    the mean projection to the tangent planes at the corners is exact for quadratic surfaces (T. Boubekeur, M. Alexa,
+    ACM Trans. Graph. 27, 141, 2008).
     """
     weights = _weights(points, corners)
     heights = ((corners - points[:, None]) * normals).sum(axis=2)
@@ -54,7 +55,7 @@ def _weights(points: FloatArray, corners: FloatArray) -> FloatArray:
 
 
 def plane_piece(triangles: Triangles, start: int, same: float = 1e-9) -> IntArray:
-    """Return the ends (k, 2) of the edges round the plane piece of the surface to which the facet ``start`` belongs."""
+    """Return the ends (k, 2) of the edges around the plane piece of the surface that contains the facet ``start``."""
     points, facets = triangles.points, triangles.facets
     normals = doubled_normals(points, facets)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)

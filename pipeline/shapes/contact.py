@@ -1,6 +1,7 @@
-"""What a footprint needs of the surface below it, told from where lines along the probe's axis meet that surface.
+"""Checks of the surface below a footprint, from where lines along the probe's axis meet it.
 
-The footprint is what projects along the axis into the probe's outline. It must be one smooth piece of the surface.
+The footprint is the part of the surface that projects along the axis into the probe's outline. It must be one smooth
+piece.
 """
 
 from functools import lru_cache
@@ -14,28 +15,28 @@ from pipeline.shapes.frame import MOST_INCLINED, Frame, PlaceError
 from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import in_mm
 
-# The normals under a footprint may be turned at most this far (degrees) from the one where the axis meets the surface:
-# a probe that bends tissue round more of a body than that touches it along its side, too.
+# Largest angle (degrees) between normals under a footprint and the one at the axis: a probe that bends tissue around
+# more of a body touches it with its side, too.
 MOST_TURNED = 45.0
-# Points along the outline, and the smaller outlines within it that are looked at.
+# Sampling points along the outline, and scales of the smaller outlines inside.
 _ALONG = 240
 _WITHIN = (0.0, 0.25, 0.5, 0.75, 0.9)
-# Neighbours differ in height by less than this, in units of what the steepest slope that is allowed makes of their
-# distance: more is a fold.
+# Neighbouring points differ in height by less than this, in units of their distance times the steepest allowed slope;
+# otherwise the surface has a fold.
 _FOLD = 2.0
-# A tool that finds its contact touches first within this share of what it may touch.
+# With unilateral contact the first touch must be within this share of the region that is searched.
 _WELL_WITHIN = 0.7
-# Smaller outlines within which the first touch is looked for; then, round the best point, in steps that get smaller.
+# Search for the first touch: scales of smaller outlines, then a grid around the best point with shrinking steps.
 _RINGS = tuple(i / 12 for i in range(13))
 _AROUND = np.array([(i, j) for i in range(-2, 3) for j in range(-2, 3)], dtype=float)
 _CLOSER = 0.6
 _MANY = 256
-# A surface this near to a plane, in units of the footprint, is one.
+# A surface counts as plane within this distance, in units of the footprint.
 _FLAT = 1e-9
 
 
 def outline_points(probe: Probe, count: int = _ALONG) -> FloatArray:
-    """Return about ``count`` points (n, 2), in m, along a footprint's outline, its corners among them; not closed."""
+    """Return about ``count`` points (n, 2), in m, along a footprint's outline, corners included; not closed."""
     line = probe.outline()
     lengths = np.linalg.norm(np.diff(line, axis=0), axis=1)
     if len(line) > count:
@@ -51,22 +52,22 @@ def outline_points(probe: Probe, count: int = _ALONG) -> FloatArray:
 
 
 def lifted_edge(body: Body, probe: Probe, frame: Frame) -> FloatArray:
-    """Return points (n, 3), in m, of the edge of a footprint on the body; not a number where it is not there."""
+    """Return points (n, 3), in m, of the edge of a footprint on the body; NaN where it misses the body."""
     return body.lift(frame, outline_points(probe))[0]
 
 
 def edge_gap(body: Body, probe: Probe, frame: Frame) -> float:
-    """Return the distance (m) from a footprint to the edge of the face that it lies on, negative outside."""
+    """Return the distance (m) from a footprint to the edge of its face, negative if it reaches over the edge."""
     return min(body.gap((float(x), float(y), float(z))) for x, y, z in lifted_edge(body, probe, frame))
 
 
 def is_level(body: Body, frame: Frame) -> bool:
-    """Tell whether the probe presses straight down on a plane face with edges."""
+    """Return whether the probe presses straight down on a plane face with edges."""
     return frame.is_upright and isfinite(body.gap(frame.point))
 
 
 def is_flat(body: Body, probe: Probe, frame: Frame) -> bool:
-    """Tell whether the probe is set at right angles on a plane piece of the surface."""
+    """Return whether the probe is at right angles to a plane piece of the surface."""
     if is_level(body, frame):
         return True
     if frame.axis != frame.normal:
@@ -78,18 +79,18 @@ def is_flat(body: Body, probe: Probe, frame: Frame) -> bool:
 
 
 def check_contact(body: Body, probe: Probe, frame: Frame) -> None:
-    """Check that a footprint lies on one smooth piece of a body's surface, and nowhere too steep.
+    """Check that a footprint is on one smooth piece of a body's surface, and nowhere too steep.
 
     Raises:
-        PlaceError: with what was found.
+        PlaceError: if not; the message says what was found.
     """
     rim = outline_points(probe)
     rings = np.concatenate([share * rim for share in _WITHIN] + [rim])
     points, normals = body.lift(frame, rings)
     if (missed := np.isnan(points).any(axis=1)).any():
         raise PlaceError(
-            f"{missed.mean():.0%} of the footprint of the {probe.shape} misses the body: all of it must lie on the "
-            "surface, not over its edge"
+            f"{missed.mean():.0%} of the footprint of the {probe.shape} misses the body: the whole footprint must be "
+            "on the surface, away from its edge"
         )
     inclined = _angles(normals, np.array(frame.outward))
     if inclined > MOST_INCLINED:
@@ -108,31 +109,31 @@ def check_contact(body: Body, probe: Probe, frame: Frame) -> None:
     if step > _FOLD * tan(radians(MOST_INCLINED)):
         height = float(np.abs(np.diff(heights, axis=0)).max(initial=np.abs(np.diff(heights, axis=1)).max()))
         raise PlaceError(
-            f"the surface under the footprint leaps by {in_mm(height)}, as over a fold: it must be one piece; use "
+            f"the surface under the footprint has a step of {in_mm(height)}, as at a fold: it must be one piece; use "
             "another place, another axis or a smaller probe"
         )
 
 
 def check_first_touch(body: Body, probe: Probe, frame: Frame) -> None:
-    """Check that a tool whose contact is found touches a body first well within what it may touch.
+    """Check that a tool with unilateral contact first touches the body well within the searched region.
 
     Raises:
-        PlaceError: with where it would touch.
+        PlaceError: if not; the message says where it would touch.
     """
     x, y, _ = first_touch(body, probe, frame)
     beside, most = hypot(max(0.0, abs(x) - getattr(probe, "half_length", 0.0)), y), _WELL_WITHIN * probe.half_width
     if not probe.has_singular_edge and beside > most:
         raise PlaceError(
-            f"the {probe.shape} would touch the body first {in_mm(beside)} beside its axis: at most {in_mm(most)} are "
-            "allowed, so that contact stays where it is looked for; use another place or axis, or press it in deeper"
+            f"the {probe.shape} would touch the body first {in_mm(beside)} from its axis, outside the region that is "
+            f"searched for contact: at most {in_mm(most)} is allowed; use another place or axis, or a larger depth"
         )
 
 
 @lru_cache(_MANY)
 def first_touch(body: Body, probe: Probe, frame: Frame) -> tuple[float, float, float]:
-    """Return where a tool first touches a body, beside its axis (m, along and across), and its gap (m) there.
+    """Return where a tool first touches a body, relative to its axis (m, along and across), and its gap (m) there.
 
-    Gaps are none where the axis meets the surface, and less where the tool touches before it gets there.
+    Gaps count from the surface point on the axis: they are negative where the tool touches earlier.
     """
     if is_level(body, frame):
         return 0.0, 0.0, 0.0
@@ -143,7 +144,7 @@ def first_touch(body: Body, probe: Probe, frame: Frame) -> tuple[float, float, f
     while not probe.has_singular_edge and step > _FLAT * probe.half_width:
         best, gap = _least_gap(body, probe, frame, best + step * _AROUND)
         step *= _CLOSER
-    # Rounding is no place beside the axis.
+    # A touch off the axis by rounding alone counts as on the axis.
     return (float(best[0]), float(best[1]), gap) if gap < -_FLAT * probe.half_width else (0.0, 0.0, 0.0)
 
 

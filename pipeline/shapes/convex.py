@@ -1,4 +1,4 @@
-"""Where lines enter and leave what bounds convex bodies."""
+"""Intersections of lines with half spaces and balls, the faces of convex bodies."""
 
 import numpy as np
 
@@ -7,10 +7,10 @@ from pipeline.shapes.frame import Vector
 
 
 def slab(origins: FloatArray, direction: Vector, normal: Vector, low: float, high: float) -> tuple[FloatArray, ...]:
-    """Return where lines enter and leave what lies between two planes: ``low`` <= x · ``normal`` <= ``high`` (m).
+    """Return where lines enter and leave the slab between two planes: ``low`` <= x · ``normal`` <= ``high`` (m).
 
-    Lines start at ``origins`` (n, 3); both results are (n), in m along the unit vector ``direction``, infinite where a
-    line never does, not a number where it lies outside altogether.
+    Lines start at ``origins`` (n, 3). Both results are (n), in m along the unit vector ``direction``; infinite for a
+    line parallel to the planes, NaN if that line is outside.
     """
     height, slope = origins @ np.array(normal), float(np.dot(direction, normal))
     if slope == 0:
@@ -23,8 +23,8 @@ def slab(origins: FloatArray, direction: Vector, normal: Vector, low: float, hig
 def ball(origins: FloatArray, direction: FloatArray) -> tuple[FloatArray, ...]:
     """Return where lines enter and leave the unit ball, or in the plane the unit disc.
 
-    Lines start at ``origins`` (n, d); both results are (n), in units of ``direction`` (d), of any length but nought,
-    not a number where a line misses.
+    Lines start at ``origins`` (n, d). Both results are (n), in units of ``direction`` (d), of any non-zero length; NaN
+    for a line that misses.
     """
     square, along = float(direction @ direction), origins @ direction
     with np.errstate(invalid="ignore"):

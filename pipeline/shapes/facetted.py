@@ -1,4 +1,4 @@
-"""Bodies whose surface is known by triangles: how large they are, and where lines meet them."""
+"""Bodies with a surface of triangles: their size, and intersections with lines."""
 
 from abc import abstractmethod
 from functools import lru_cache
@@ -16,12 +16,12 @@ from pipeline.shapes.section import in_mm
 from pipeline.shapes.skin import Skin
 from pipeline.shapes.triangles import Triangles
 
-_FEW = 8  # surfaces whose trees are kept
-_MANY = 10_000  # places of a large study
+_FEW = 8  # cached surfaces with their search trees
+_MANY = 10_000  # cached places, enough for a large study
 
 
 class Facetted(Body):
-    """A body that triangles bound, or nearly so."""
+    """A body bounded, exactly or approximately, by triangles."""
 
     is_round: ClassVar[bool] = False
 
@@ -51,7 +51,7 @@ class Facetted(Body):
     # ---- under a probe --------------------------------------------------------------------------------
 
     def touched(self, at: tuple[float, ...]) -> tuple[FloatArray, int]:
-        """Return the point of the surface that coordinates name, and its facet."""
+        """Return the surface point at two or three coordinates (m), and its facet: see :meth:`Body.frame`."""
         points, facets = self.triangles.points, self.triangles.facets
         if len(at) == 3:
             facet, point = nearest_point(points, facets, np.array(at))
@@ -60,13 +60,13 @@ class Facetted(Body):
         if hit[0] < 0:
             low, high = self.triangles.bounds
             raise PlaceError(
-                f"no part of the surface lies above or below x = {in_mm(at[0])}, y = {in_mm(at[1])}: it reaches from "
+                f"no part of the surface is above or below x = {in_mm(at[0])}, y = {in_mm(at[1])}: it extends from "
                 f"{in_mm(low[0])} to {in_mm(high[0])} in x and from {in_mm(low[1])} to {in_mm(high[1])} in y"
             )
         return np.array([*at, height[0]]), int(hit[0])
 
     def thickness(self, frame: Frame) -> float:
-        """Return the distance (m) along the axis to where it leaves the tissue again, over hollows and all."""
+        """Return the distance (m) along the axis to the last point of tissue, hollows included."""
         return _thickness(self.triangles, frame)
 
     def reach(self, frame: Frame) -> float:
@@ -78,11 +78,11 @@ class Facetted(Body):
         return frame.farthest(self.triangles.points)
 
     def inside(self, points: FloatArray) -> FloatArray:
-        """Return the distance (m) of points (n, 3) of the body to its surface, negative outside."""
+        """Return the distance (m) of points (n, 3) to the surface, negative outside."""
         return skin_of(self.triangles).depth(points)
 
     def room(self, surface: Ovoid) -> float:
-        """Return the distance (m) to a surface within: hollows and spikes of the body that it holds stick out, too."""
+        """Return the distance (m) to a ``surface`` inside; it is negative if hollows or spikes of the body cut it."""
         return _room(self.model_copy(update={"inclusion": ()}), surface)
 
     @property
@@ -93,10 +93,10 @@ class Facetted(Body):
 
     # ---- symmetry -------------------------------------------------------------------------------------
 
-    # What was measured or modelled is not looked at for symmetry: it has no mirror planes and no half plane.
+    # Scanned or modelled shapes are not tested for symmetry: they have no mirror planes and no half plane.
     @property
     def half_sides(self) -> None:
-        """None: nothing is known of an axis."""
+        """None: no axis is known."""
         return
 
 
@@ -109,7 +109,7 @@ def _room(body: Facetted, surface: Ovoid) -> float:
 
 @lru_cache(_FEW)
 def skin_of(triangles: Triangles) -> Skin:
-    """Return the surface with its tree."""
+    """Return the surface with its search tree."""
     return Skin(triangles)
 
 

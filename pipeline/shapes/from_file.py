@@ -1,4 +1,4 @@
-"""Bodies whose triangles come from a file: how it is read, what is told of it, and what results depend on."""
+"""Bodies with triangles from a file: how the file is read, notices about it, and the identity of results."""
 
 from abc import abstractmethod
 from collections.abc import Mapping
@@ -13,23 +13,23 @@ from pipeline.shapes.section import Words
 from pipeline.shapes.support import Below, Fixed
 from pipeline.shapes.triangles import SurfaceError, Triangles
 
-# Raise by hand when the same file gives another place, mesh or force: records made before are then not used any more.
+# Increase by hand when the same file gives another place, mesh or force: older records are then not used.
 _VERSION = 2
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
 
 
 class FromFile(Facetted):
-    """A body bounded by triangles that a ``file`` holds, or its content is made into.
+    """A body bounded by the triangles of a ``file``, or by triangles made from its content.
 
-    A class that derives from it declares ``file`` after the fields that say how it is read, those of ``READ_BY``, and
-    keeps these out of what it is known by: the triangles tell.
+    A subclass declares ``file`` after the fields that control reading, those of ``READ_BY``. It leaves these out of the
+    body's identity, which follows from the triangles.
     """
 
     READ_BY: ClassVar[frozenset[str]]
     HAS_NAMES: ClassVar[bool] = False  # whether its faces may have names
 
     if TYPE_CHECKING:
-        file: str  # not here, or it were checked before the fields that say how it is read
+        file: str  # not declared here, or it would be validated before the fields that control reading
     fixed: Annotated[
         Fixed,
         Words(
@@ -57,7 +57,7 @@ class FromFile(Facetted):
             try:
                 cls.load(file, info.data)
             except SurfaceError as error:
-                # Braces in the message are no placeholders.
+                # Braces in the message are not placeholders.
                 raise PydanticCustomError("surface", "{what}", {"what": str(error)}) from None
         return file
 
@@ -67,22 +67,22 @@ class FromFile(Facetted):
         if not isinstance(fixed, Below) and not cls.HAS_NAMES:
             raise PydanticCustomError(
                 "not_supported",
-                'must be {below = "-40 mm"}, a height in the frame of the file: its faces have no names',
+                'must be a height in the frame of the file, {below = "-40 mm"}: its faces have no names',
             )
         return fixed
 
     def model_post_init(self, context: Any, /) -> None:
-        """Keep the surface, which is read once for all bodies of one file."""
+        """Load the surface, which is read once for all bodies of one file."""
         self._loaded = self.load(self.file, dict(self))
 
     @field_serializer("file", check_fields=False)
     def _content(self, file: str) -> str:
-        """What results depend on is the content of the file, in metres, not where it lies."""
+        """Results depend on the content of the file, in metres, not on its path."""
         return self.content
 
     @property
     def content(self) -> str:
-        """Hash of the content of the file, and of how places on it are found."""
+        """Hash of the content of the file, and of the version of the search for places on it."""
         return f"{_VERSION} {self.triangles.hash}"
 
     @property
@@ -92,5 +92,5 @@ class FromFile(Facetted):
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What was done to the surface that its author should know."""
+        """Notices about changes to the surface that the author of the study should know."""
         return self._loaded.notices

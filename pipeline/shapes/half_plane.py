@@ -1,4 +1,4 @@
-"""Half planes (r, z) of bodies that are the same all round the z axis."""
+"""Half planes (r, z) of axisymmetric bodies."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -10,10 +10,10 @@ from pipeline.arrays import FloatArray
 
 @dataclass(frozen=True)
 class Rectangle:
-    """Of a cylinder: r up to ``radius``, z from -``height`` to 0 (m).
+    """Half plane of a cylinder: r up to ``radius``, z from -``height`` to 0 (m).
 
-    ``interfaces`` are the heights z (m), from the top down, at which one layer ends and another material begins;
-    ``is_filled`` tells whether what lies below them all is a layer, too.
+    ``interfaces`` are the heights z (m), from the top down, of the interfaces between layers. ``is_filled`` says that
+    the part below all of them is a layer, too.
     """
 
     is_curved: ClassVar[bool] = False
@@ -24,13 +24,13 @@ class Rectangle:
     is_filled: bool = False
 
     def fall(self, radii: FloatArray) -> FloatArray:
-        """Return how far (m) the surface at ``radii`` (m) lies below its highest point: not at all."""
+        """Return the depth (m) of the surface at ``radii`` (m) below its highest point: zero."""
         return np.zeros_like(radii)
 
 
 @dataclass(frozen=True)
 class HalfEllipse:
-    """Of an ellipsoid about the origin: semi-axes ``radius`` across the z axis and ``semi_height`` along it (m)."""
+    """Half plane of an ellipsoid about the origin: semi-axes ``radius`` and ``semi_height`` along z (m)."""
 
     is_curved: ClassVar[bool] = True
 
@@ -38,7 +38,7 @@ class HalfEllipse:
     semi_height: float
 
     def fall(self, radii: FloatArray) -> FloatArray:
-        """Return how far (m) the surface at ``radii`` (m) lies below its highest point."""
+        """Return the depth (m) of the surface at ``radii`` (m) below its highest point."""
         square = np.minimum(radii / self.radius, 1.0) ** 2
         fall: FloatArray = self.semi_height * square / (1 + np.sqrt(1 - square))
         return fall

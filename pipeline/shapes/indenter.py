@@ -1,8 +1,8 @@
-"""Tools whose area of contact is not known beforehand: what they may touch, and where contact is expected to end.
+"""Indenters, tools with unknown contact area: the region that they may touch, and where contact is expected to end.
 
-The nodes below what a tool may touch, its ``footprint``, are candidates: a solver finds which of them are in contact.
-That region is imprinted on the surface like the footprint of a flat tool; elements are small where contact is expected
-to end, and nothing is singular at the edge of the candidates.
+The nodes below the region that a tool may touch, its ``footprint``, are candidates: the solver finds the active ones.
+The region is imprinted on the surface like the footprint of a flat tool. Elements are small where contact is expected
+to end; nothing is singular at the edge of the candidates.
 """
 
 from abc import abstractmethod
@@ -17,14 +17,14 @@ from pipeline.shapes.rounded import Rounded
 from pipeline.shapes.section import Problems, Words, in_mm
 from pipeline.units import Length
 
-# Candidates reach this far past where the undeformed tool and surface intersect: on a thin incompressible layer tissue
-# is pushed up beside the tool, and a ball touches √2 and a cone 3/2 times as far out, so that its volume is kept.
+# Candidates extend by this factor beyond the intersection of the undeformed tool and surface. On a thin incompressible
+# layer, tissue rises beside the tool: to conserve volume a ball touches √2 times as far out, a cone 3/2 times.
 CANDIDATES = 1.5
-# Contact is expected to end between its edge on a half-space and this much farther out: bodies are finite.
+# Contact is expected to end between its edge on a half-space and this factor farther out, because bodies are finite.
 BAND = 1.15
-# Depths that differ by less than this share are one.
+# Depths are equal within this share.
 _ROUNDING = 1e-9
-# The steepest a tool may stand on the surface at the edge of contact: strains are of that order.
+# Largest slope of the tool against the surface at the edge of contact: strains are of the same order.
 _STEEPEST = 0.3
 
 
@@ -34,13 +34,13 @@ def _texts(lengths: tuple[float, ...]) -> list[str]:
 
 def _found(value: Any) -> Any:
     if value != "unilateral":
-        message = 'must be "unilateral": how much of this tool touches the tissue is found, not prescribed'
+        message = 'must be "unilateral": the contact area of this tool is computed, not prescribed'
         raise PydanticCustomError("not_supported", message)
     return value
 
 
 class _OfFootprint:
-    """What a tool has from its footprint, by the same name."""
+    """Descriptor of a property that an indenter takes from its footprint, under the same name."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
@@ -50,16 +50,16 @@ class _OfFootprint:
 
 
 class Indenter(Probe):
-    """A tool of which no one knows beforehand how much will touch the tissue.
+    """A tool with unknown contact area.
 
     Sizes, symmetry and outline are those of its ``footprint``.
     """
 
-    # Contact ends where the pressure has fallen to nought.
+    # Pressure falls to zero at the edge of contact.
     has_singular_edge: ClassVar[bool] = False
 
     PROPORTIONAL_TO = ()
-    # On meshes graded to where contact ends nothing is singular: not more than a disc's.
+    # Without a singularity, on meshes graded to the edge of contact, the error is at most a disc's.
     EXPECTED_ERROR = 1.0
     NOT_DRAWN: ClassVar[tuple[str, ...]] = ("action", "contact", "motion")
     SWEPT = ("depth_range",)
@@ -88,24 +88,24 @@ class Indenter(Probe):
         Words("Tissue slides along the tool, and touches it where it is pressed.", '"unilateral"'),
     ] = "unilateral"
 
-    # ---- what each of them tells ----------------------------------------------------------------------
+    # ---- for each indenter to define --------------------------------------------------------------------
 
     @property
     @abstractmethod
     def section(self) -> Rounded:
-        """Its section, which is the same all round or all along."""
+        """Its section: the profile of revolution, or the cross-section of an edge."""
 
     @property
     @abstractmethod
     def footprint(self) -> Probe:
-        """The flat tool whose footprint holds all that this one may touch at its depth."""
+        """The flat tool whose footprint contains all that this tool may touch at its depth."""
 
     @property
     @abstractmethod
     def contact_width(self) -> float:
-        """Half the width (m) of contact that is expected: that on an elastic half-space."""
+        """Half the expected width (m) of contact: that on an elastic half-space."""
 
-    # ---- what is the footprint's ----------------------------------------------------------------------
+    # ---- properties of the footprint --------------------------------------------------------------------
 
     circumradius: ClassVar[Any] = _OfFootprint()
     half_width: ClassVar[Any] = _OfFootprint()
@@ -120,48 +120,48 @@ class Indenter(Probe):
     to_edge: ClassVar[Any] = _OfFootprint()
     outline: ClassVar[Any] = _OfFootprint()
 
-    # ---- what follows ---------------------------------------------------------------------------------
+    # ---- derived properties -----------------------------------------------------------------------------
 
     @property
     def not_drawn(self) -> tuple[str, ...]:
-        """Keys on which the mesh does not depend: nor on the depth, where the mesh is one for many."""
+        """Keys on which the mesh does not depend; the depth is one of them if one mesh serves many depths."""
         return (*self.NOT_DRAWN, "depth") if self.depth_range else self.NOT_DRAWN
 
     @property
     def depths(self) -> tuple[float, float]:
-        """The least and the largest depth (m) that the mesh is for."""
+        """The smallest and the largest depth (m) of the mesh."""
         return self.depth_range or (self.depth, self.depth)
 
     @property
     def contact_widths(self) -> tuple[float, float]:
-        """Half the widths (m) of contact that are expected at these depths."""
+        """Half the expected widths (m) of contact at these depths."""
         least, largest = (self.model_copy(update={"depth": depth}).contact_width for depth in self.depths)
         return least, largest
 
     @property
     @abstractmethod
     def expected_radius(self) -> float:
-        """Radius (m) of the smallest circle about the axis that contact is expected to stay within."""
+        """Radius (m) of the smallest circle about the axis that contains the expected contact."""
 
     @property
     def half_length(self) -> float:
-        """Half the length (m) along which it touches at any depth; 0 unless it has a straight edge."""
+        """Half the length (m) of contact, equal at all depths; 0 without a straight edge."""
         return 0.0
 
     @property
     def edge_band(self) -> tuple[float, float]:
-        """The least and the largest half width (m) at which contact is expected to end."""
+        """The smallest and the largest half width (m) at which contact is expected to end."""
         most = self.footprint.half_width
         least, largest = self.contact_widths
         return min(least, most), min(BAND * largest, most)
 
     @property
     def rim_offset(self) -> float:
-        """How far (m) the candidates reach past where contact is expected to end."""
+        """Distance (m) from the expected edge of contact to that of the candidates."""
         return self.footprint.half_width - self.edge_band[1]
 
     def check(self, problems: Problems) -> None:
-        """Report a depth that the mesh is not for, and warn of one at which strains are large."""
+        """Report a depth outside the mesh's range, and warn about large strains."""
         least, largest = self.depths
         if least > largest:
             problems.error("probe.depth_range", _texts(self.depths), "must begin with the smaller depth")
@@ -169,14 +169,14 @@ class Indenter(Probe):
             problems.error(
                 "probe.depth",
                 in_mm(self.depth),
-                f"is not within depth_range, {in_mm(least)} to {in_mm(largest)}, "
-                "which the mesh is for: widen that, or leave it out for a mesh of each depth",
+                f"is outside depth_range, {in_mm(least)} to {in_mm(largest)}, "
+                "for which the mesh is made: widen it, or leave it out for one mesh per depth",
             )
         slope = float(self.section.slope(np.array([self.contact_width]))[0])
         if slope > _STEEPEST:
             problems.warn(
                 "probe.depth",
                 f"{self.depth * 1e3:.4g} mm",
-                f"the {self.shape} stands on the surface at a slope of {slope:.2g} where contact ends, and strains are "
-                f"of that order: above {_STEEPEST:g} linear elasticity is an extrapolation",
+                f"the {self.shape} has a slope of {slope:.2g} against the surface at the edge of contact, and strains "
+                f"are of that order: above {_STEEPEST:g} linear elasticity is an extrapolation",
             )

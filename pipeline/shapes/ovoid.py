@@ -1,4 +1,4 @@
-"""The surface of an ellipsoid whose axes are those of the coordinates."""
+"""The surface of an ellipsoid with its axes along the coordinates."""
 
 from dataclasses import dataclass
 from math import pi
@@ -9,7 +9,7 @@ from pipeline.arrays import FloatArray
 from pipeline.shapes.frame import Vector
 from pipeline.shapes.surface import Surface
 
-# Newton's method from the left converges monotonically; most steps are for points near the centre of flat ones.
+# Newton's method from the left converges monotonically; points near the centre of flat ellipsoids need most steps.
 _STEPS = 200
 _SMALL, _NUDGE, _NEAR = 1e-15, 1e-12, 1e-3
 _GOLDEN = pi * (3 - 5**0.5)
@@ -29,18 +29,18 @@ class Ovoid(Surface):
         return np.where(outside, 1, -1) * np.linalg.norm(points - self.project(points), axis=1)
 
     def level(self, points: FloatArray) -> FloatArray:
-        """Return the factor by which the ellipsoid must be enlarged about its centre to hold each point."""
+        """Return the factor by which the ellipsoid must be scaled about its centre to reach each point."""
         return np.linalg.norm((points - np.array(self.centre)) / np.array(self.axes), axis=1)
 
     def project(self, points: FloatArray) -> FloatArray:
         """Return the nearest points of the surface: y = a² x / (a² + t), with t such that y is on it.
 
-        The sum of (a x / (a² + t))² falls from t = -min a² on and is convex: Newton's method, begun where one term
-        alone is 1, goes to the root without passing it.
+        The sum of (a x / (a² + t))² decreases from t = -min a² on and is convex. Newton's method, begun where the
+        largest single term is 1, therefore converges to the root from one side.
         """
         axes = np.array(self.axes) / max(self.axes)
         x = (points - np.array(self.centre)) / max(self.axes)
-        # From deep inside, on a plane of symmetry, the nearest point is off that plane: a nudge shows the way.
+        # Deep inside, on a plane of symmetry, the nearest point is off that plane: a small shift selects a side.
         nudged = np.where(np.abs(x) < _NUDGE, _NUDGE, x)
         t = (axes * np.abs(nudged) - axes**2).max(axis=1)
         for _ in range(_STEPS):

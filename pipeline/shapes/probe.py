@@ -1,4 +1,4 @@
-"""What every probe tells of itself. There are no defaults for what may be wrong silently."""
+"""The interface of every probe. Properties whose default could be wrong silently have none."""
 
 from abc import ABC, abstractmethod
 from functools import lru_cache
@@ -15,13 +15,13 @@ from pipeline.shapes.section import Problems, Section, Words
 from pipeline.shapes.slit import Slit
 from pipeline.units import Coordinate, Length
 
-# The candidates for mirror planes, by the coordinate that is zero on them, and their normals.
+# Candidate planes of symmetry, by the coordinate that is zero on them, and their normals.
 PLANES: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)}
 _ALIGNED = 1e-12
-_MANY = 200_000  # pairs of body and probe of a large study
+_MANY = 200_000  # cached pairs of body and probe, enough for a large study
 
 Contact = Literal["bonded", "frictionless", "unilateral"]
-ON_EDGE = 1e-6  # of a footprint: a point this near to its edge is on it
+ON_EDGE = 1e-6  # a point is on the edge of a footprint within this share
 
 
 def _two_or_three(at: tuple[float, ...]) -> tuple[float, ...]:
@@ -31,10 +31,11 @@ def _two_or_three(at: tuple[float, ...]) -> tuple[float, ...]:
 
 
 class Probe(Section, ABC):
-    """A tool: where it touches, how it moves, and its shape.
+    """A tool: its place, its movement, and its shape.
 
-    Its footprint is what of the surface moves with it, or what of it may come into contact where that is to be found
-    (``is_unilateral``). It is described in the probe's own coordinates, along and across it: see :class:`Frame`.
+    The footprint is the part of the surface that moves with the tool. With unknown contact area (``is_unilateral``) it
+    is the part that may come into contact. It is given in the probe's own coordinates, along and across: see
+    :class:`Frame`.
     """
 
     shape: Annotated[
@@ -86,22 +87,21 @@ class Probe(Section, ABC):
         ),
     ] = "press"
 
-    # Keys that F is proportional to where contact is known, if all of them change together; the first one is the unit
-    # of the others.
+    # Keys to which F is proportional, with known contact, if all change together; the first is the unit of the others.
     PROPORTIONAL_TO: ClassVar[tuple[str, ...]]
     # Keys on which its footprint, and so the mesh, does not depend.
     NOT_DRAWN: ClassVar[tuple[str, ...]]
-    # Keys that serve sweeps of a tool on one mesh, and say nothing of the tool itself.
+    # Keys for sweeps of a tool on one mesh, which do not belong to the tool itself.
     SWEPT: ClassVar[tuple[str, ...]] = ()
-    # Contacts for which real-time models know the tool.
+    # Contacts for which real-time models support the tool.
     REALTIME: ClassVar[tuple[Contact, ...]] = ()
-    # Error of F on a mesh that is graded to the footprint's edge, in units of that of a disc: docs/accuracy.md.
+    # Error of F on a mesh that is graded to the footprint's edge, in units of a disc's: docs/accuracy.md.
     EXPECTED_ERROR: ClassVar[float]
 
     # ---- place and movement ---------------------------------------------------------------------------
 
     def frame_on(self, body: Body) -> Frame:
-        """Return its place on ``body``.
+        """Return its frame on ``body``.
 
         Raises:
             PlaceError: if it cannot touch the body there.
@@ -110,12 +110,12 @@ class Probe(Section, ABC):
 
     @property
     def lies_along(self) -> Vector:
-        """Direction of its length: its key ``direction``, or x for a tool without that key."""
+        """Direction of its length: its key ``direction``, or x without that key."""
         along: Vector = getattr(self, "direction", (1.0, 0.0, 0.0))
         return along
 
     def travel(self, frame: Frame) -> Vector:
-        """Return the prescribed displacement (m) of the footprint: the depth along the axis, unless it slices, too."""
+        """Return the prescribed displacement (m) of the footprint: the depth along the axis, plus a slice if any."""
         return frame.inward(self.depth)
 
     @property
@@ -125,25 +125,25 @@ class Probe(Section, ABC):
 
     @property
     def is_unilateral(self) -> bool:
-        """Whether which part of the footprint is in contact is to be found."""
+        """Whether the contact area is unknown and computed."""
         return self.contact == "unilateral"
 
     @property
     def slit(self) -> Slit | None:
-        """The slit that it stands in, and whose faces are then all that it touches; None if it is on the surface."""
+        """The slit in which it is, whose faces are then all that it touches; None on the surface."""
         return None
 
     @property
     def proportional_to(self) -> tuple[str, ...]:
-        """Keys that F is proportional to: none where more of the tool touches the deeper it is.
+        """Keys to which F is proportional: none if the contact area grows with the depth.
 
-        Nor does what holds a slit's faces apart grow with the depth.
+        None in a slit either, since the opening of its faces does not grow with the depth.
         """
         return () if self.is_unilateral or self.slit else self.PROPORTIONAL_TO
 
     @property
     def scale(self) -> float:
-        """The length (m) that F is proportional to; 1 if there is none."""
+        """The length (m) to which F is proportional; 1 if there is none."""
         return float(getattr(self, self.proportional_to[0])) if self.proportional_to else 1.0
 
     # ---- size -----------------------------------------------------------------------------------------
@@ -155,9 +155,9 @@ class Probe(Section, ABC):
 
     @property
     def pressed(self) -> float:
-        """Radius (m) of the smallest circle round what goes below the surface: tissue that is held there is in the way.
+        """Radius (m) of the smallest circle around the part below the surface, where no tissue may be fixed.
 
-        Of a flat tool that is all of its footprint.
+        For a flat tool it contains the whole footprint.
         """
         return self.circumradius
 
@@ -173,51 +173,51 @@ class Probe(Section, ABC):
 
     @abstractmethod
     def gap(self, body: Body, frame: Frame) -> float:
-        """Return the distance (m) between the footprint and the edge of the face it touches, negative outside."""
+        """Return the distance (m) from the footprint to the edge of its face, negative outside."""
 
     # ---- symmetry -------------------------------------------------------------------------------------
 
     @property
     @abstractmethod
     def is_round(self) -> bool:
-        """Whether the footprint is the same all round its axis."""
+        """Whether the footprint is axisymmetric about the probe's axis."""
 
     @abstractmethod
     def is_mirrored(self, along: float, across: float) -> bool:
-        """Tell whether the footprint is its own image in the line through its centre normal to (along, across)."""
+        """Return whether the footprint has mirror symmetry in the line through its centre normal to (along, across)."""
 
     # ---- geometry -------------------------------------------------------------------------------------
 
     @abstractmethod
     def draw(self, kernel: Any, frame: Frame, units: Units) -> int:
-        """Add the footprint, at its place, to a CAD ``kernel`` (gmsh's ``occ``); return the tag of the face."""
+        """Add the footprint, in its frame, to a CAD ``kernel`` (gmsh's ``occ``); return the tag of the face."""
 
     @property
     @abstractmethod
     def is_curved(self) -> bool:
-        """Whether a part of the footprint's edge is curved, which elements must be bent to follow."""
+        """Whether a part of the footprint's edge is curved, so that elements must be curved, too."""
 
     @abstractmethod
     def inscribed(self, edges: int) -> "Probe":
-        """Return a probe of the same form in which the polygon of ``edges`` equal edges has this one's area."""
+        """Return a probe of the same shape, enlarged so that its inscribed polygon of ``edges`` has this one's area."""
 
     @abstractmethod
     def edge_distance(self, along: str, across: str, height: str, unit: float) -> str:
-        """Write the distance to the footprint's edge, in units of 1/``unit`` m, from text of the own coordinates.
+        """Return the distance to the footprint's edge as text, in units of 1/``unit`` m, from own coordinates as text.
 
-        It is exact at the edge, where elements are smallest, and never off by much.
+        It is exact at the edge, where elements are smallest, and approximate elsewhere.
         """
 
     @abstractmethod
     def to_edge(self, points: FloatArray) -> FloatArray:
         """Return the nearest points (n, 2) of the footprint's edge to ``points`` (n, 2) near it, in m.
 
-        Where no part of the edge is curved, return ``points``: nothing is to be bent.
+        Without curved edges, return ``points`` unchanged: no element needs to be curved.
         """
 
     @abstractmethod
     def outline(self) -> FloatArray:
-        """Return the edge as a closed line of points (n, 2), in m, counterclockwise: what the rest is held against."""
+        """Return the edge as a closed polyline (n, 2), in m, counterclockwise: the reference of the other methods."""
 
     # ---- contact --------------------------------------------------------------------------------------
 
@@ -225,16 +225,16 @@ class Probe(Section, ABC):
     def profile(self, points: FloatArray) -> FloatArray:
         """Return the height (n,), in m, of the tool above its lowest point at ``points`` (n, 2) of its own coordinates.
 
-        It is measured against the axis, and infinite where there is no tool. At a node of the surface, at a height h
-        in own coordinates, contact is unilateral if the displacement w along the axis is at least depth - (profile - h)
-        and the pressure is not negative, one of them nought.
+        It is measured against the axis, and infinite where there is no tool. At a node of the surface with height h in
+        own coordinates, unilateral contact means: displacement w along the axis >= depth - (profile - h), pressure
+        >= 0, and one of both is an equality.
         """
 
     @abstractmethod
     def ends_at(self, points: FloatArray) -> BoolArray:
-        """Tell of ``points`` (n, 2) on the footprint's edge whether the tool itself ends there (n,).
+        """Return a mask (n,) of ``points`` (n, 2) on the footprint's edge: true where the tool itself ends.
 
-        Contact that is found to reach the edge elsewhere is cut off by what was taken for a candidate.
+        Elsewhere contact that reaches the edge would be cut off by the choice of candidates.
         """
 
     @property
@@ -245,43 +245,42 @@ class Probe(Section, ABC):
     @property
     @abstractmethod
     def rim_size(self) -> tuple[float, float]:
-        """Length (m) of where contact is expected to end, and its area (m²) if that is not known to the point."""
+        """Length (m) of the expected edge of contact, and its area (m²) if its position is not known exactly."""
 
     @property
     @abstractmethod
     def rim_offset(self) -> float:
-        """Distance (m) of the footprint's edge from where contact is expected to end."""
+        """Distance (m) of the footprint's edge from the expected edge of contact."""
 
     @abstractmethod
     def rim_distance(self, along: str, across: str, height: str, unit: float) -> str:
-        """Write the distance to where contact is expected to end, as :meth:`edge_distance` does."""
+        """Return the distance to the expected edge of contact as text, as :meth:`edge_distance` does."""
 
     # ---- on a half-space ------------------------------------------------------------------------------
 
     @property
     @abstractmethod
     def force_exponent(self) -> float | None:
-        """The power of the depth that F goes with on a half-space; None if there is no such power."""
+        """Exponent of the depth in F on a half-space; None if F is no power of the depth."""
 
     @property
     @abstractmethod
     def mean_square(self) -> float:
-        """Mean square distance (m²) of F from the axis on a half-space, without friction, as it counts for compliance.
+        """Mean square distance (m²) of F from the axis on a half-space, without friction, for the compliance.
 
         A compliance c + g (s² + s'²)/2 between points at s and s' from the axis adds c + g ``mean_square``. Where
-        contact grows with depth, this is the mean square of the pressure times 1 + p / 2n, F going with the power n of
-        the depth and the square of the radius with p: energies change by F² times the mean square. NaN where
-        that is not known.
+        contact grows with the depth, this is the mean square of the pressure times 1 + p / 2n, with F of power n in the
+        depth and the radius squared of power p: energies change by F² times the mean square. NaN where unknown.
         """
 
     def realtime_error(self) -> str:
-        """Return which of its keys no real-time model knows, and what would do; "" if all are known."""
+        """Return a key that real-time models do not support, and what to use instead; "" if all are supported."""
         return ""
 
-    # ---- sense ----------------------------------------------------------------------------------------
+    # ---- checks ---------------------------------------------------------------------------------------
 
     def check(self, problems: Problems) -> None:
-        """Report what makes no sense in its keys taken together; what each may be alone its annotation says."""
+        """Report keys that contradict each other; annotations check each key alone."""
 
 
 @lru_cache(_MANY)
@@ -290,5 +289,5 @@ def _frame_on(probe: Probe, body: Body) -> Frame:
 
 
 def is_direction(vector: Vector) -> bool:
-    """Tell whether a vector has a direction."""
+    """Return whether a vector has a direction."""
     return 0 < hypot(*vector) < inf

@@ -1,4 +1,4 @@
-"""What tools with a flat face have in common."""
+"""Punches, tools with a flat face: what they have in common."""
 
 from abc import abstractmethod
 from math import inf
@@ -11,26 +11,26 @@ from pipeline.shapes.body import Body
 from pipeline.shapes.frame import Frame
 from pipeline.shapes.probe import Probe
 
-# A line this near to an axis of the footprint, in parts of a unit vector, is that axis.
+# A line is an axis of the footprint within this tolerance on unit vectors.
 _ALIGNED = 1e-12
 
 
 class Punch(Probe):
-    """A tool with a flat face, whose edge is where contact ends, unless it lifts off."""
+    """A tool with a flat face; contact ends at its edge, unless the tool lifts off."""
 
     has_singular_edge: ClassVar[bool] = True
-    # None (m): contact is expected to end at the edge of the face.
+    # Zero (m): contact is expected to end at the edge of the face.
     rim_offset: ClassVar[float] = 0.0
 
     NOT_DRAWN = ("action", "depth", "contact", "slice", "motion")
 
     @property
     def force_exponent(self) -> float | None:
-        """F is proportional to the depth, unless it holds a slit's faces apart, too."""
+        """1: F is proportional to the depth, except in a slit."""
         return None if self.slit else 1.0
 
     def is_mirrored(self, along: float, across: float) -> bool:
-        """Tell that the footprint is its own image in its two axes, and in any line if it is round."""
+        """Return true for its two axes, and for any line if it is round."""
         return self.is_round or min(abs(along), abs(across)) < _ALIGNED
 
     def gap(self, body: Body, frame: Frame) -> float:
@@ -39,28 +39,28 @@ class Punch(Probe):
 
     @abstractmethod
     def covers(self, points: FloatArray) -> BoolArray:
-        """Tell which ``points`` (n, 2) of its own coordinates (m) are below its face, edge and all."""
+        """Return a mask of ``points`` (n, 2) of its own coordinates (m) below its face, edge included."""
 
     def profile(self, points: FloatArray) -> FloatArray:
-        """Return nought below the face."""
+        """Return zero below the face, infinity elsewhere."""
         return np.where(self.covers(points), 0.0, inf)
 
     def ends_at(self, points: FloatArray) -> BoolArray:
-        """Tell that the tool ends wherever the footprint does."""
+        """Return true: the tool ends wherever the footprint does."""
         return np.ones(len(points), dtype=bool)
 
     @property
     def rim_size(self) -> tuple[float, float]:
-        """Length (m) of the edge, and no area."""
+        """Length (m) of the edge, and zero area."""
         return self.perimeter, 0.0
 
     def rim_distance(self, along: str, across: str, height: str, unit: float) -> str:
-        """Write the distance to the edge of the face."""
+        """Return the distance to the edge of the face as text."""
         return self.edge_distance(along, across, height, unit)
 
 
 class Straight(Punch):
-    """A punch that is only pushed in, along its axis."""
+    """A punch that moves along its axis only."""
 
     PROPORTIONAL_TO = ("depth",)
 

@@ -1,4 +1,4 @@
-"""Lines along a probe's axis through a triangulated surface, and its nearest points: what places a probe there."""
+"""Lines along a probe's axis through a triangulated surface, and nearest points of it."""
 
 from typing import Any
 
@@ -7,20 +7,20 @@ import numpy as np
 from pipeline.arrays import FloatArray, IntArray
 from pipeline.shapes.files.edges import Edges
 
-# Points and facets that are looked at together: arrays of some ten megabytes.
+# Pairs of points and facets processed together: arrays of some ten megabytes.
 _AT_ONCE = 2_000_000
 # Four bits as numpy packs them.
 _ALL_SIDES = 0b1111_0000
-# A point this far outside a facet, in units of it, is on its edge.
+# A point outside a facet by less than this, in units of the facet, is on its edge.
 _ON_EDGE = 1e-9
 
 
 def facing(local: FloatArray, facets: IntArray, radius: float) -> IntArray:
-    """Return the numbers of the facets, seen from above, that lie within ``radius`` of the z axis.
+    """Return the facets that face upwards within ``radius`` of the z axis.
 
-    They are those that are connected to where the axis meets the surface next to the origin, none if it does not.
+    Only those connected to the point nearest to the origin at which the axis meets the surface; none without one.
     """
-    # Facets whose boxes meet the square round the disc: of each side of it, some corner is within.
+    # Facets whose bounding boxes meet the square around the disc.
     x, y = local[:, 0], local[:, 1]
     within = np.packbits([x <= radius, x >= -radius, y <= radius, y >= -radius], axis=0)[0]
     (chosen,) = np.nonzero((within[facets[:, 0]] | within[facets[:, 1]] | within[facets[:, 2]]) == _ALL_SIDES)
@@ -35,9 +35,9 @@ def facing(local: FloatArray, facets: IntArray, radius: float) -> IntArray:
 def pierce(
     local: FloatArray, facets: IntArray, points: FloatArray, nearest: bool = False
 ) -> tuple[IntArray, FloatArray]:
-    """Return which of the facets lines along z through ``points`` (n, 2) meet first from above, and the z there.
+    """Return the first facet from above on each line along z through ``points`` (n, 2), and z there.
 
-    It is -1 where they meet none. With ``nearest``, it is the one next to z = 0.
+    The facet is -1 for a line that meets none. With ``nearest`` it is the one nearest to z = 0 instead.
     """
     a, b, c = (local[facets[:, k]] for k in range(3))
     double = _areas(np.stack([a[:, :2], b[:, :2], c[:, :2]], axis=1))
@@ -52,14 +52,14 @@ def pierce(
         row, column = np.nonzero(inside)
         s, t = u[row, column], v[row, column]
         z = s * a[column, 2] + t * b[column, 2] + (1 - s - t) * c[column, 2]
-        # The last one written of each row is the one wanted.
+        # The last entry written to a row must be the wanted one.
         order = np.lexsort((column, -np.abs(z) if nearest else z))
         hit[start + row[order]], height[start + row[order]] = column[order], z[order]
     return hit, height
 
 
 def nearest_point(points: FloatArray, facets: IntArray, place: FloatArray) -> tuple[int, FloatArray]:
-    """Return the facet next to a ``place`` (3), and its nearest point."""
+    """Return the facet nearest to a ``place`` (3), and the nearest point on it."""
     corners = points[facets]
     middle = corners.mean(axis=1)
     radius = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
@@ -71,7 +71,7 @@ def nearest_point(points: FloatArray, facets: IntArray, place: FloatArray) -> tu
 
 
 def _closest(corners: FloatArray, place: FloatArray) -> FloatArray:
-    """Return the point of each of the triangles (m, 3, 3) that is next to ``place``."""
+    """Return the point nearest to ``place`` in each triangle (m, 3, 3)."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     normal = np.cross(b - a, c - a)
     square = (normal**2).sum(axis=1)
@@ -95,7 +95,7 @@ def _closest(corners: FloatArray, place: FloatArray) -> FloatArray:
 
 
 def _areas(corners: FloatArray) -> FloatArray:
-    """Twice the areas of triangles (m, 3, 2) in a plane, negative where they are seen from below."""
+    """Return twice the areas of plane triangles (m, 3, 2), negative if clockwise."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     area: Any = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     return area

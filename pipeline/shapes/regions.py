@@ -1,4 +1,4 @@
-"""Pieces of a body that are made of something else: layers under a flat top, and inclusions anywhere."""
+"""Regions of a body with a material of their own: layers under a flat top, and inclusions."""
 
 from typing import Annotated
 
@@ -11,7 +11,7 @@ from pipeline.units import Coordinate, Length
 
 
 class Region(Tissue):
-    """A piece of a body with a material of its own; the ``name`` begins the names of its sweeps."""
+    """A region of a body with a material of its own; the ``name`` is the prefix of its sweeps."""
 
     name: Annotated[
         str,
@@ -21,7 +21,7 @@ class Region(Tissue):
 
 
 class Layer(Region):
-    """A horizontal layer. The last one may leave its thickness out: it then reaches the bottom."""
+    """A horizontal layer. The last one may omit its thickness: it then extends to the bottom."""
 
     thickness: Annotated[
         Length | None,
@@ -30,7 +30,7 @@ class Layer(Region):
 
 
 class Inclusion(Region):
-    """A ball, or an ellipsoid whose axes are those of the coordinates, wholly inside the body."""
+    """A ball, or an ellipsoid with axes along the coordinates, wholly inside the body."""
 
     at: Annotated[
         tuple[Coordinate, Coordinate, Coordinate],
@@ -47,5 +47,5 @@ class Inclusion(Region):
         """Its surface."""
         if self.axes is not None:
             return Ovoid(self.at, self.axes)
-        assert self.radius is not None  # checked as the study is read
+        assert self.radius is not None  # validated with the study
         return Ovoid(self.at, (self.radius,) * 3)

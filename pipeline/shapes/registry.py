@@ -1,6 +1,6 @@
-"""The shapes that there are: one file each, in ``bodies/`` and ``probes/``, named like the shape.
+"""Registry of shapes: one file each, in ``bodies/`` and ``probes/``, named like the shape.
 
-A shape is loaded when its class is first asked for: a study loads those that it names.
+A shape is imported when its class is first used: a study loads only the shapes that it names.
 """
 
 from collections.abc import Iterator, Mapping
@@ -17,7 +17,7 @@ Shape_co = TypeVar("Shape_co", bound=Section, covariant=True)
 
 
 class Shapes(Mapping[str, type[Shape_co]], Generic[Shape_co]):
-    """Classes by the names of their shapes: of each file of a folder the class whose ``shape`` is its name."""
+    """Classes by the names of their shapes: from each file of a folder, the class with that ``shape``."""
 
     def __init__(self, folder: str):
         self._folder = folder
@@ -46,7 +46,7 @@ class Shapes(Mapping[str, type[Shape_co]], Generic[Shape_co]):
 
 
 def _shape(kind: type) -> tuple[object, ...]:
-    """Return what the key ``shape`` of a section may be; nothing if it has none."""
+    """Return the allowed values of a section's key ``shape``; empty without that key."""
     field = kind.model_fields.get("shape") if issubclass(kind, Section) else None
     return get_args(field.annotation) if field else ()
 

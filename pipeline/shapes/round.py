@@ -1,4 +1,4 @@
-"""What round flat footprints share: an ellipse in its own plane, of which a disc is one."""
+"""Flat footprints bounded by an ellipse, such as a disc."""
 
 from abc import abstractmethod
 from math import pi
@@ -48,7 +48,7 @@ class RoundPunch(Straight):
         """Add the ellipse."""
         a, b = map(units, self.semi_axes)
         x, y, z = map(units, frame.point)
-        # The kernel wants the longer axis first.
+        # The kernel expects the longer axis first.
         tag = int(kernel.addDisk(x, y, z, max(a, b), min(a, b)))
         if a < b:
             kernel.rotate([(2, tag)], x, y, z, 0, 0, 1, pi / 2)
@@ -65,6 +65,6 @@ class RoundPunch(Straight):
         return self.points_at(np.linspace(0.0, 2 * pi, self.OUTLINE + 1))
 
     def covers(self, points: FloatArray) -> BoolArray:
-        """Tell which points are within the ellipse."""
+        """Return a mask of points within the ellipse."""
         within: BoolArray = np.linalg.norm(points / np.array(self.semi_axes), axis=1) <= 1 + ON_EDGE
         return within

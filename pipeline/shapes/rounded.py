@@ -1,4 +1,4 @@
-"""The section of tools that are the same all round or all along: a straight flank at an angle, its tip rounded."""
+"""Section of a tool of revolution or of an edge: a straight flank at an angle, with a rounded tip."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -8,18 +8,18 @@ import numpy as np
 
 from pipeline.arrays import FloatArray
 
-# Points of Gauss's rule over a quarter of a turn, and halvings until a half width is known to rounding.
+# Points of Gauss's rule over a quarter turn, and bisections until a half width is known to rounding.
 _POINTS, _HALVINGS = 64, 60
-_MANY = 100_000  # depths of a large study
-# Of a wedge's pressure arcosh(b/|y|), the mean of ln(b/|y|).
+_MANY = 100_000  # cached depths, enough for a large study
+# Mean of ln(b/|y|), weighted with a wedge's pressure arcosh(b/|y|).
 _WEDGE = 1 + log(2)
 
 
 @dataclass(frozen=True)
 class Rounded:
-    """A flank at ``angle`` (rad) to the axis that begins where a rounding of radius ``tip`` (m) touches it.
+    """A flank at ``angle`` (rad) to the axis, tangent to a rounding of radius ``tip`` (m). Heights are above the tip.
 
-    An angle of nought is a ball: its flank begins at the equator, where it ends. Heights are above the lowest point.
+    With a zero angle it is a ball: the flank begins at the equator, where the ball ends.
     """
 
     angle: float
@@ -33,7 +33,7 @@ class Rounded:
     def height(self, distance: FloatArray) -> FloatArray:
         """Return heights (n,), in m, at distances (n,) from the axis, in m; infinite beyond a ball's equator."""
         within = np.minimum(distance, self.tangent)
-        # As one over a sum: near the lowest point the difference of R and (R² - r²)^½ would be rounding.
+        # In this form R - (R² - r²)^½ has no cancellation near the lowest point.
         root = np.sqrt(np.maximum(self.tip**2 - within**2, 0.0))
         low = within**2 / np.maximum(self.tip + root, 1e-300)
         beyond = np.maximum(distance - self.tangent, 0.0)
@@ -50,8 +50,9 @@ class Rounded:
         return slope
 
     def reach(self, depth: float) -> float:
-        """Return the distance (m) from the axis at which it is ``depth`` (m) above its lowest point; a ball's, its own
-        radius, where it is not that high.
+        """Return the distance (m) from the axis at which it is ``depth`` (m) above its lowest point.
+
+        For a ball that is not so high, return its radius.
         """
         end = self.tip * (1 - sin(self.angle))
         if depth < end or not self.angle:
@@ -59,17 +60,17 @@ class Rounded:
         return self.tangent + (depth - end) * tan(self.angle)
 
     def contact_radius(self, depth: float) -> float:
-        """Return the radius (m) of contact of the body of revolution, pushed ``depth`` (m) into an elastic half-space.
+        """Return the contact radius (m) of the body of revolution, pressed ``depth`` (m) into an elastic half-space.
 
-        I. N. Sneddon, Int. J. Eng. Sci. 3, 47 (1965): d = a ∫ f'(a sin t) dt over a quarter of a turn.
+        I. N. Sneddon, Int. J. Eng. Sci. 3, 47 (1965): d = a ∫ f'(a sin t) dt over a quarter turn.
         """
         return _solved(self, depth, inf)
 
     def contact_width(self, depth: float, length: float) -> float:
-        """Return half the width (m) of contact of an edge of some ``length`` (m), about that in the middle of it.
+        """Return half the contact width (m), approximately, at the middle of an edge of a given ``length`` (m).
 
-        The line load is that of the plane, E* b ∫ sin t f'(b sin t) dt; a half-space under as much over that length
-        gives way by 2/(π E*) (ln(length / b) + 1 + ln 2) times it.
+        The line load is that of plane strain, E* b ∫ sin t f'(b sin t) dt. Under this load over that length the
+        surface of a half-space moves by 2/(π E*) (ln(length / b) + 1 + ln 2) times it.
         """
         return _solved(self, depth, length)
 

@@ -1,4 +1,4 @@
-"""Bodies whose surface is a file's triangles: where a probe meets them, and how large they are."""
+"""Bodies bounded by triangles from a scan: frames of probes on them, and their size."""
 
 from math import inf
 from typing import ClassVar
@@ -12,31 +12,31 @@ from pipeline.shapes.rays import facing, pierce
 from pipeline.shapes.surface import Surface
 from pipeline.shapes.triangles import Triangles, closed_edges, doubled_normals
 
-# The normal is that of the tissue below the footprint: rays over a disc, sunflower-wise, and twice, since the disc
-# turns with it.
+# The normal is the mean below the footprint, from a sunflower pattern of rays over a disc. It is computed twice, since
+# the disc turns with it.
 _RAYS, _TURNS = 400, 2
 _GOLDEN = 2.399963229728653  # rad
-# Where no footprint is known, the normal is that of a disc of this share of the body.
+# Radius of the disc for the normal, as a share of the body's extent, if no footprint is known.
 _AROUND = 0.02
 _STEEP = 1e-9
 _SAME = 1e-12
-# Normals are means over this share of a footprint's radius, to each side.
+# Normals are averaged within this share of a footprint's radius.
 _OF_FOOTPRINT, _MOST_CELLS = 0.1, 400
-# Of folded surfaces the curvature is 9 to 38 times the area over the bend, of a liver 2. Steps of voxels have more.
+# Limit of the curvature, in units of area over bend: folded surfaces have 9 to 38, a liver 2, voxel steps more.
 _MOST_CURVED = 40.0
 
 
 class Scanned(Facetted):
-    """A body bounded by triangles."""
+    """A body bounded by scanned triangles."""
 
     is_smooth: ClassVar[bool] = True
 
     # ---- under a probe --------------------------------------------------------------------------------
 
     def frame(self, at: tuple[float, ...], axis: Vector | None = None, around: float = 0.0) -> Frame:
-        """Return the place at two or three coordinates (m).
+        """Return the frame at two or three coordinates (m).
 
-        The normal is the mean one, by area, of what a disc of radius ``around`` (m) covers, not that of one facet.
+        The normal is the area-weighted mean within a disc of radius ``around`` (m), not that of one facet.
         """
         point, facet = self.touched(at)
         inward = -doubled_normals(self.triangles.points, self.triangles.facets[facet : facet + 1])[0]
@@ -47,27 +47,27 @@ class Scanned(Facetted):
         return frame
 
     def frame_below(self, at: tuple[float, ...], axis: Vector | None, around: float) -> Frame:
-        """Return the place, with the mean normal of what a disc of radius ``around`` (m) covers."""
+        """Return the frame with the mean normal within a disc of radius ``around`` (m)."""
         return self.frame(at, axis, around)
 
     def _mean_normal(self, frame: Frame, radius: float) -> FloatArray:
-        """Return the mean inward normal, by area, of the tissue that a disc covers."""
+        """Return the mean inward normal, area-weighted, of the tissue below a disc."""
         number = np.arange(_RAYS)
         r, angle = radius * np.sqrt((number + 0.5) / _RAYS), _GOLDEN * number
         points, normals = self.lift(frame, np.column_stack([r * np.cos(angle), r * np.sin(angle)]))
         hit = np.isfinite(points[:, 0])
         if hit.sum() < _RAYS / 2:
             return np.array(frame.normal)
-        # Each ray stands for the same area across the axis, and for 1 / cos as much of the surface.
+        # Rays have equal areas across the axis, and 1 / cos of it on the surface.
         cosine = normals[hit] @ np.array(frame.outward)
         vector: FloatArray = -(normals[hit] / np.maximum(cosine, _STEEP)[:, None]).sum(axis=0)
         return vector
 
     def lift(self, frame: Frame, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return where lines along a probe's axis enter the part of the surface that is joined to the contact.
+        """Return where lines along a probe's axis enter the connected surface around the contact, and normals there.
 
-        That is (n, 3), in m, not a number where they miss it; and the outward normals there: means, by area, over the
-        facets within about a tenth of what the points span, since single ones are as noisy as their image was.
+        Points (n, 3), in m, are NaN for lines that miss it. Normals are area-weighted means over facets within about a
+        tenth of the points' extent, since normals of single facets are as noisy as the image.
         """
         local, facets = frame.local(self.triangles.points), self.triangles.facets
         patch = facets[facing(local, facets, float(np.abs(points).max(initial=0.0)))]
@@ -81,7 +81,7 @@ class Scanned(Facetted):
         return result, normals
 
     def gap(self, point: Vector) -> float:
-        """Return that there is no edge: how far a footprint reaches is told by where its edge can be lifted."""
+        """Return infinity: there are no face edges, and `lift` shows where a footprint misses the surface."""
         return inf
 
     # ---- geometry -------------------------------------------------------------------------------------
@@ -92,22 +92,22 @@ class Scanned(Facetted):
 
     @property
     def bend(self) -> float:
-        """Half of the smallest extent (m) along x, y or z: elements are to be a few through the body, everywhere."""
+        """Half of the smallest extent (m) along x, y or z: a few elements then fit through the body everywhere."""
         low, high = self.triangles.bounds
         return min(high[0] - low[0], high[1] - low[1], high[2] - low[2]) / 2
 
     @property
     def curvature(self) -> float:
-        """Integral (m) of the mean curvature over its surface, twice; steps of voxels count as far as elements do."""
+        """Twice the surface integral (m) of the mean curvature; voxel steps count only if elements resolve them."""
         return min(self.triangles.curvature, _MOST_CURVED * self.triangles.area / self.bend)
 
     def outline(self) -> list[FloatArray]:
-        """Return silhouettes along x, y and z as lines: edges between facets of either side."""
+        """Return silhouettes along x, y and z as lines: edges between facets that face opposite sides."""
         return _silhouettes(self.triangles)
 
 
 def _frame(point: FloatArray, normal: FloatArray, axis: FloatArray | Vector) -> Frame:
-    """Return the frame with these, and ``along`` x as far as it is normal to the axis."""
+    """Return the frame with these vectors, and ``along`` as the projection of x normal to the axis."""
     unit, inward = map(_unit, (axis, normal))
     start = (1.0, 0.0, 0.0) if abs(unit[0]) < 0.9 else (0.0, 1.0, 0.0)
     x, y, z = ((float(v[0]), float(v[1]), float(v[2])) for v in (point, inward, unit))
@@ -115,7 +115,7 @@ def _frame(point: FloatArray, normal: FloatArray, axis: FloatArray | Vector) -> 
 
 
 def _unit(vector: FloatArray | Vector) -> FloatArray:
-    """Return the unit vector, upright if it is but for rounding."""
+    """Return the unit vector; one that is vertical within rounding is exact."""
     unit = np.array(vector) / np.linalg.norm(vector)
     return np.where(np.abs(unit) < _SAME, 0.0, unit) + 0.0 if np.abs(unit).max() > 1 - _SAME else unit
 
@@ -123,7 +123,7 @@ def _unit(vector: FloatArray | Vector) -> FloatArray:
 def _smoothed(
     points: FloatArray, local: FloatArray, patch: IntArray, hit: IntArray, places: FloatArray, around: float
 ) -> FloatArray:
-    """Return unit normals (n, 3) at ``places`` (n, 2) in the facets ``hit``, with those of their surroundings."""
+    """Return unit normals (n, 3) at ``places`` (n, 2) in the facets ``hit``, averaged with their surroundings."""
     vectors, middle = doubled_normals(points, patch), local[patch].mean(axis=1)[:, :2]
     size = max(around, float(np.finfo(float).tiny))
     low = np.minimum(middle.min(axis=0), places.min(axis=0)) - 2 * size

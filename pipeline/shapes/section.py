@@ -1,4 +1,4 @@
-"""What every section of a study file is, and the words that go with its keys."""
+"""Base class of all sections of a study file, and the texts of their keys."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any, Protocol
@@ -8,9 +8,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 @dataclass(frozen=True)
 class Words:
-    """What a key means, an example in TOML, and its default and what it takes where the model does not tell.
+    """Text of a key: its meaning, an example in TOML, its default, and its values where the model does not give them.
 
-    Stands in the annotation of a field; the reference and the studies that ``epsmesh new`` begins are made of it.
+    It is in the annotation of a field. The reference and the studies of ``epsmesh new`` are made from it.
     """
 
     text: str
@@ -23,24 +23,24 @@ class Words:
 class Section(BaseModel):
     """A section of a study file: strict, frozen; lengths in metres, pressures in pascal."""
 
-    # Built when a value is first checked: no study has all sections.
+    # Built at the first validation: no study has all sections.
     model_config = ConfigDict(strict=True, frozen=True, extra="forbid", defer_build=True)
 
     name: Annotated[str, Field(exclude=True)] = ""
 
 
 class Problems(Protocol):
-    """Where a section reports what makes no sense in it: key, value found, what is allowed."""
+    """Receiver of a section's problems: key, value found, and what is allowed."""
 
     def error(self, key: str, found: Any, allowed: str) -> None:
-        """Report what cannot work."""
+        """Report an error."""
 
     def warn(self, key: str, found: Any, allowed: str) -> None:
-        """Report what is doubtful."""
+        """Report a warning."""
 
 
 def words_of(model: type[BaseModel], name: str) -> Words:
-    """Return the words in the annotation of a field, or of the one that it narrows down."""
+    """Return the words in the annotation of a field, or in that of the base class's field."""
     for owner in model.__mro__:
         field = getattr(owner, "model_fields", {}).get(name)
         found = [note for note in field.metadata if isinstance(note, Words)] if field else []

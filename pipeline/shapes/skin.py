@@ -1,4 +1,4 @@
-"""A surface of triangles: nearest points of it, from a tree of its facets."""
+"""A surface of triangles with a search tree: nearest points and signed distances."""
 
 from functools import cached_property
 from importlib import import_module
@@ -12,7 +12,7 @@ from pipeline.shapes.triangles import Triangles
 
 
 class Skin(Surface):
-    """The surface of ``triangles``; its tree (libigl's) is made when it is first asked."""
+    """The surface of ``triangles``; libigl's search tree is made at its first use."""
 
     is_curved = True
 
@@ -36,13 +36,13 @@ class Skin(Surface):
         return self._nearest(points)[2]
 
     def facets(self, points: FloatArray) -> IntArray:
-        """Return the number of the facet that is next to each point."""
+        """Return the number of the nearest facet of each point."""
         return self._nearest(points)[1]
 
     def depth(self, points: FloatArray) -> FloatArray:
         """Return the distance (m) of each point, negative outside."""
         igl = import_module("igl")
-        # Signs by winding numbers: the normals that libigl else tells them by take it five times as long to set up.
+        # Signs from winding numbers: libigl's other method, with normals, needs five times the set-up time.
         sign = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
         signed, *_ = igl.signed_distance(np.ascontiguousarray(points), *self._arrays, sign)
         return -np.asarray(signed).ravel()
@@ -55,7 +55,7 @@ class Skin(Surface):
 
 
 def tree_of(points: FloatArray, facets: IntArray) -> Any:
-    """Return libigl's tree of the facets (m, 3) of a surface."""
+    """Return libigl's search tree of the facets (m, 3) of a surface."""
     tree = import_module("igl").AABB()
     tree.init(points, facets)
     return tree

@@ -1,7 +1,7 @@
-"""A slit that a blade stands in: a plane crack below the surface, whose faces the blade holds apart by its width.
+"""A slit with a blade in it: a plane crack below the surface, whose faces the blade opens by its width.
 
-In the probe's own coordinates it is the plane across = 0 down to its front at height -depth. The blade touches both
-faces, along its length and from the surface down to its tip; beyond that, by ``ahead``, the slit runs on to its front.
+In the probe's own coordinates the slit is the plane across = 0 down to its front at height -depth. The blade touches
+both faces along its length, from the surface down to its tip. The slit extends ``ahead`` of the blade to its front.
 """
 
 from dataclasses import dataclass
@@ -12,15 +12,15 @@ import numpy as np
 from pipeline.arrays import FloatArray
 from pipeline.shapes.body import Body
 
-# A point is on a line of the slit if it is this near, in units of its depth.
+# A point is on a line of the slit within this distance, in units of its depth.
 _ON = 1e-6
 
 
 @dataclass(frozen=True)
 class Slit:
-    """Sizes in metres: ``depth`` of its front, ``length`` and ``width`` of the blade, ``ahead`` of which it runs.
+    """Sizes (m): ``depth`` of the front, ``length`` and ``width`` of the blade, and slit length ``ahead`` of it.
 
-    An ``is_open`` one runs on to the sides of the body; otherwise it ends ``ahead`` of the blade's ends, too.
+    With ``is_open`` the slit extends to the sides of the body; otherwise it ends ``ahead`` of the blade's ends, too.
     """
 
     depth: float
@@ -31,7 +31,7 @@ class Slit:
 
     @property
     def tip(self) -> float:
-        """How deep (m) the blade reaches."""
+        """Depth (m) of the blade's tip."""
         return self.depth - self.ahead
 
     @property
@@ -41,7 +41,7 @@ class Slit:
 
     @property
     def on_surface(self) -> float:
-        """Half of the length (m) that must lie within the body: of the slit, or of the blade in an open one."""
+        """Half of the length (m) that must be within the body: of the slit, or of the blade in an open slit."""
         return self.length / 2 if self.is_open else self.reach
 
     @property
@@ -51,20 +51,20 @@ class Slit:
 
     @property
     def edges(self) -> float:
-        """Length (m) of the lines at which the displacement is singular, in an open slit that near the blade."""
+        """Length (m) of the lines at which the displacement is singular; in an open slit, of those near the blade."""
         front = self.length + 4 * self.depth if self.is_open else 2 * (self.reach + self.depth)
         return 2 * (self.length + self.tip) + front
 
     def touched(self) -> FloatArray:
-        """Return the corners (4, 3), in own coordinates (m), of what the blade touches of a face."""
+        """Return the corners (4, 3), in own coordinates (m), of the part of a face that the blade touches."""
         a, t = self.length / 2, self.tip
         return _polygon([(-a, -t), (a, -t), (a, 0.0), (-a, 0.0)])
 
     def free(self, far: float) -> list[FloatArray]:
-        """Return the corners of the pieces that the rest of a face is made of; an open slit is drawn ``far`` (m) out.
+        """Return the corners of the pieces of the rest of a face; an open slit is drawn out to ``far`` (m).
 
-        Two of them meet at every corner of the front, so that no triangle has all of its corners on it: the nodes
-        there, which both faces share, would hold such a triangle shut.
+        Two pieces meet at every corner of the front, so that no triangle has all of its corners on it. Both faces share
+        the nodes of the front, which would close such a triangle.
         """
         a, t, c = self.length / 2, self.tip, self.depth
         if self.is_open:
@@ -81,7 +81,7 @@ class Slit:
         ]
 
     def is_singular(self, points: FloatArray) -> bool:
-        """Tell whether ``points`` (n, 3), in own coordinates, of a line are on the front or the contact's edge."""
+        """Return whether ``points`` (n, 3) of a line, in own coordinates, are on the front or the contact's edge."""
         along, down, close = np.abs(points[:, 0]), -points[:, 2], _ON * self.depth
         within, sunk = along < self.length / 2 + close, down < self.tip + close
         lines = [
@@ -95,25 +95,25 @@ class Slit:
         return any(bool(line.all()) for line in lines)
 
     def edge_distance(self, along: str, across: str, height: str, unit: float) -> str:
-        """Write the distance to the front and to the edge of the contact, in units of 1/``unit`` m."""
+        """Return the distance to the front and to the edge of the contact as text, in units of 1/``unit`` m."""
         half = self.tip / 2
         touched = to_rectangle(
             f"(Fabs({along})-{unit * self.length / 2:.12g})", f"(Fabs({height}+{unit * half:.12g})-{unit * half:.12g})"
         )
         front = f"(Fabs({height})-{unit * self.depth:.12g})"
         if isfinite(self.reach):
-            # Mirrored in the surface: a slit has no edge at its mouth.
+            # Mirrored at the surface: a slit has no edge at its mouth.
             front = to_rectangle(f"(Fabs({along})-{unit * self.reach:.12g})", front)
         return f"Sqrt(Min({touched}^2,{front}^2)+{across}^2)"
 
     def room(self, body: Body) -> float:
-        """Return the distance (m) from the front to the nearest of the blade, a layer's end, the bottom or support."""
+        """Return the distance (m) from the front to the nearest of: blade, interface of layers, bottom, support."""
         top = body.heights[1]
         ends = (*body.interfaces, *body.support.edges(), body.heights[0])
         return min(self.ahead, *(abs(end - top + self.depth) for end in ends))
 
     def room_at_tip(self, body: Body) -> float:
-        """Return the distance (m) from the blade's tip to the nearest of the front, the surface and a layer's end."""
+        """Return the distance (m) from the blade's tip to the nearest of: front, surface, interface of layers."""
         top = body.heights[1]
         return min(self.ahead, self.tip, *(abs(end - top + self.tip) for end in body.interfaces))
 
@@ -123,5 +123,5 @@ def _polygon(points: list[tuple[float, float]]) -> FloatArray:
 
 
 def to_rectangle(p: str, q: str) -> str:
-    """Write the distance to the sides of a rectangle in its plane, negative inside; p and q are beyond its sides."""
+    """Return the distance to the sides of a rectangle as text, negative inside; p and q are distances past the sides."""
     return f"(Sqrt(Max({p},0)^2+Max({q},0)^2)+Min(Max({p},{q}),0))"

@@ -1,4 +1,4 @@
-"""Where a body is held: on named faces, or everywhere below a height."""
+"""Support of a body: named faces, or everything below a height, is fixed."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -19,52 +19,52 @@ Surfaces = Mapping[str, tuple[Surface, ...]]
 FaceNames = Literal["bottom", "sides", "bottom+sides"]
 HeldOnHalfPlane = FaceNames | float
 
-# Elements may be this much longer than a strip is wide.
+# Largest length of elements, in widths of a strip that they must fill.
 _LONGEST_NEEDLE = 200
 
 
 class Support(ABC):
-    """What is held of a body's boundary.
+    """The fixed part of a body's boundary.
 
-    It is as symmetric as the body: a name stands for a face and for its image, and so does a height. Faces by names of
-    a file are of bodies in which no symmetry is looked for.
+    It has the symmetry of the body: a name means a face and its mirror image, a height applies to both. Names from a
+    file belong to bodies without symmetry.
     """
 
     @abstractmethod
     def holds(self, surfaces: Surfaces, points: FloatArray, tolerance: float) -> bool:
-        """Tell whether a face of the body, of which ``points`` (n, 3), in m, are a sample, is held."""
+        """Return whether a face of the body, sampled by ``points`` (n, 3) in m, is fixed."""
 
     @abstractmethod
     def on_half_plane(self) -> HeldOnHalfPlane:
-        """Return what it is on the half plane of a round body: faces by name, or the height (m) below all is held."""
+        """Return the support on a half plane: names of faces, or the height (m) below which all is fixed."""
 
     @abstractmethod
     def gap(self, to_edge: float) -> float | None:
-        """Return the distance (m) to what is held beside a footprint ``to_edge`` from the edge of its face, if any."""
+        """Return the distance (m) to the support from a footprint ``to_edge`` away from its face's edge, or None."""
 
     @abstractmethod
     def distance(self, surfaces: Surfaces, points: FloatArray) -> FloatArray | None:
-        """Return the distance (m) of points (n, 3) of the body to what is held, at least so much; None if infinite."""
+        """Return a lower bound of the distance (m) of points (n, 3) of the body to the support; None if infinite."""
 
     @abstractmethod
     def holds_column(self) -> bool:
-        """Tell whether a column that is cut out of the middle of the body is still held."""
+        """Return whether a column cut out of the middle of the body is still fixed."""
 
     def edges(self) -> tuple[float, ...]:
-        """Return the heights z (m) at which what is held ends in the middle of a face; none where faces end."""
+        """Return the heights z (m) at which the support ends in the middle of a face."""
         return ()
 
     def check(self, heights: tuple[float, float], fine: float, problems: Problems) -> None:
         """Report what cannot work on a body between two ``heights`` (m), with elements of size ``fine`` (m).
 
-        Names of faces are checked as they are read.
+        Names of faces are validated with the study.
         """
         return
 
 
 @dataclass(frozen=True)
 class Faces(Support):
-    """Held on whole faces, by the names that the body gives them."""
+    """Whole faces are fixed, by the body's names for them."""
 
     fixed: FaceNames
 
@@ -74,7 +74,7 @@ class Faces(Support):
         return tuple(self.fixed.split("+"))
 
     def holds(self, surfaces: Surfaces, points: FloatArray, tolerance: float) -> bool:
-        """Tell whether the face is one of those."""
+        """Return whether the face is one of these."""
         return any(
             bool(np.all(np.abs(surface.distance(points)) < tolerance))
             for name in self.names
@@ -86,7 +86,7 @@ class Faces(Support):
         return self.fixed
 
     def gap(self, to_edge: float) -> float | None:
-        """Return the distance to the sides, if they are held."""
+        """Return the distance to the sides, if these are fixed."""
         return to_edge if "sides" in self.names else None
 
     def distance(self, surfaces: Surfaces, points: FloatArray) -> FloatArray | None:
@@ -95,25 +95,25 @@ class Faces(Support):
         return np.min(held, axis=0) if held else None
 
     def holds_column(self) -> bool:
-        """Tell whether the bottom is held."""
+        """Return whether the bottom is fixed."""
         return "bottom" in self.names
 
 
 class Below(BaseModel, Support):
-    """Held everywhere below a height: ``fixed = {below = "-15 mm"}``."""
+    """Everything below a height is fixed: ``fixed = {below = "-15 mm"}``."""
 
     model_config = ConfigDict(strict=True, frozen=True, extra="forbid", defer_build=True)
     below: Coordinate
 
     @staticmethod
     def read(value: Any) -> "Below":
-        """Return what a table of a study file says."""
+        """Return the support of a table in a study file."""
         if not isinstance(value, dict) or set(value) != {"below"}:
-            raise PydanticCustomError("not_supported", 'a table here has the one key `below`: {below = "-15 mm"}')
+            raise PydanticCustomError("not_supported", 'a table here needs the one key `below`: {below = "-15 mm"}')
         return Below(below=value["below"])
 
     def holds(self, surfaces: Surfaces, points: FloatArray, tolerance: float) -> bool:
-        """Tell whether all of the face is below the height."""
+        """Return whether the whole face is below the height."""
         return bool(np.all(points[:, 2] < self.below + tolerance))
 
     def on_half_plane(self) -> HeldOnHalfPlane:
@@ -121,7 +121,7 @@ class Below(BaseModel, Support):
         return self.below
 
     def gap(self, to_edge: float) -> float | None:
-        """Return the distance to where the side is held."""
+        """Return the distance to the fixed part of the side."""
         return hypot(to_edge, self.below)
 
     def distance(self, surfaces: Surfaces, points: FloatArray) -> FloatArray | None:
@@ -129,7 +129,7 @@ class Below(BaseModel, Support):
         return np.maximum(points[:, 2] - self.below, 0.0)
 
     def holds_column(self) -> bool:
-        """Tell that the bottom is held."""
+        """Return true: the bottom is fixed."""
         return True
 
     def edges(self) -> tuple[float, ...]:
@@ -137,11 +137,11 @@ class Below(BaseModel, Support):
         return (self.below,)
 
     def check(self, heights: tuple[float, float], fine: float, problems: Problems) -> None:
-        """Report a height outside the body, or one so near an end of it that elements would be needles."""
+        """Report a height outside the body, or so near one of its ends that elements would be slivers."""
         low, high = heights
         found = f"below {in_mm(self.below)}"
         if not low < self.below < high:
-            problems.error("body.fixed", found, f"must lie inside the body: between {in_mm(low)} and {high * 1e3:g} mm")
+            problems.error("body.fixed", found, f"must be inside the body: between {in_mm(low)} and {high * 1e3:g} mm")
             return
         strip = min(high - self.below, self.below - low)
         if strip < fine / _LONGEST_NEEDLE < float("inf"):
@@ -154,21 +154,21 @@ class Below(BaseModel, Support):
 
 
 class NamedFace(BaseModel, Support):
-    """Held on the faces that a CAD file gives a name: ``fixed = {face = "base"}``."""
+    """Faces with a name in a CAD file are fixed: ``fixed = {face = "base"}``."""
 
     model_config = ConfigDict(strict=True, frozen=True, extra="forbid", defer_build=True)
     face: str
 
     def holds(self, surfaces: Surfaces, points: FloatArray, tolerance: float) -> bool:
-        """Tell whether the face, or what is left of it, is one of those: most points tell, at its edge any may err."""
+        """Return whether the face, or a part of it, is one of these: by majority, since points on its edge may err."""
         return any(bool(np.median(surface.distance(points)) < tolerance) for surface in surfaces[self.face])
 
     def on_half_plane(self) -> HeldOnHalfPlane:
-        """Refuse: no body with such names has a half plane."""
+        """Raise an error: no body with such names has a half plane."""
         raise ValueError("a named face has no half plane")
 
     def gap(self, to_edge: float) -> float | None:
-        """Return none: :meth:`distance` tells."""
+        """Return None: :meth:`distance` has the exact distance."""
         return None
 
     def distance(self, surfaces: Surfaces, points: FloatArray) -> FloatArray | None:
@@ -177,7 +177,7 @@ class NamedFace(BaseModel, Support):
         return held
 
     def holds_column(self) -> bool:
-        """Tell that it is not known: the face may lie anywhere."""
+        """Return false: the position of the face is unknown."""
         return False
 
 
@@ -193,5 +193,5 @@ Fixed = Annotated[FaceNames | Below, BeforeValidator(_fixed)]
 
 
 def support_of(fixed: FaceNames | Below | NamedFace) -> Support:
-    """Return what the key ``fixed`` of a body says."""
+    """Return the support of a body's key ``fixed``."""
     return Faces(fixed) if isinstance(fixed, str) else fixed

@@ -1,4 +1,4 @@
-"""Surfaces of bodies: which points are on one, and where others lie upon it."""
+"""Surfaces of bodies: distances of points, and projection onto them."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from pipeline.shapes.frame import Vector
 
 
 class Surface(ABC):
-    """One smooth surface. ``is_curved`` tells whether elements must be bent to lie upon it."""
+    """One smooth surface. ``is_curved`` says that elements must be curved to fit it."""
 
     is_curved: bool
 

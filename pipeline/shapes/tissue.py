@@ -1,4 +1,4 @@
-"""What a piece of tissue is made of."""
+"""Material of a region of tissue."""
 
 from math import inf
 from typing import Annotated

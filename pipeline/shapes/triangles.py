@@ -1,4 +1,4 @@
-"""A closed surface of triangles, as segmentation gives an organ, and what is wrong with one that is not."""
+"""A closed surface of triangles, such as a segmented organ, and the error for one that is not closed."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,15 +11,15 @@ from pipeline.shapes.frame import Vector
 
 
 class SurfaceError(ValueError):
-    """A file that does not bound a piece of tissue: says what was found in it, and what mends it."""
+    """A file does not bound a piece of tissue. The message says what was found in it and how to repair it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Triangles:
     """The boundary of one piece of tissue.
 
-    ``points`` (n, 3) in m, none of them twice and none without facets; ``facets`` (m, 3) numbers of points, each seen
-    counter-clockwise from outside. Every edge belongs to two facets. Neither array may be written to.
+    ``points`` (n, 3) in m are distinct, and each has a facet. ``facets`` (m, 3) are point numbers, counterclockwise
+    seen from outside. Every edge has two facets. Both arrays are read-only.
     """
 
     points: FloatArray
@@ -31,7 +31,7 @@ class Triangles:
 
     @cached_property
     def volume(self) -> float:
-        """Volume (m³) within."""
+        """Enclosed volume (m³)."""
         return enclosed(self.points, self.facets)
 
     @cached_property
@@ -41,7 +41,7 @@ class Triangles:
 
     @cached_property
     def curvature(self) -> float:
-        """Integral (m) of the mean curvature over it, twice: by how much facets turn at each edge, times its length."""
+        """Twice the surface integral (m) of the mean curvature: angle between facets at each edge, times its length."""
         edges, owners = closed_edges(self.facets)
         start, end = self.points[edges.T]
         normals = doubled_normals(self.points, self.facets)
@@ -57,13 +57,13 @@ class Triangles:
 
     @cached_property
     def extent(self) -> float:
-        """Largest extent (m) along an axis of coordinates."""
+        """Largest extent (m) along a coordinate axis."""
         low, high = self.bounds
         return max(top - bottom for bottom, top in zip(low, high, strict=True))
 
     @cached_property
     def hash(self) -> str:
-        """Hash of its points and facets: what meshes of it are known by."""
+        """Hash of its points and facets, by which meshes of it are identified."""
         content = sha256(f"{self.points.shape}{self.facets.shape}".encode())
         content.update(np.ascontiguousarray(self.points, dtype="<f8").data)
         content.update(np.ascontiguousarray(self.facets, dtype="<i8").data)
@@ -71,12 +71,12 @@ class Triangles:
 
 
 def half_edges(facets: IntArray) -> IntArray:
-    """Return from which point to which (3m, 2): row 3f + k is the edge of facet f from its corner k to the next one."""
+    """Return start and end points (3m, 2): row 3f + k is the edge of facet f from its corner k to the next."""
     return np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2)
 
 
 def edge_keys(facets: IntArray, count: int) -> IntArray:
-    """Return a number for each half edge (3m,) of facets of ``count`` points, the same for both directions."""
+    """Return a key for each half edge (3m,) of facets of ``count`` points, equal for both directions."""
     pairs = np.sort(half_edges(facets), axis=1)
     keys: IntArray = pairs[:, 0] * count + pairs[:, 1]
     return keys
@@ -90,13 +90,13 @@ def closed_edges(facets: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def doubled_normals(points: FloatArray, facets: IntArray) -> FloatArray:
-    """Return the normals (m, 3) of facets, twice as long as the facets are large."""
+    """Return the normals (m, 3) of facets, with twice the facets' areas as lengths."""
     a, b, c = (points[facets[:, k]] for k in range(3))
     return np.cross(b - a, c - a)
 
 
 def enclosed(points: FloatArray, facets: IntArray) -> float:
-    """Return the volume within closed facets, negative where they are seen clockwise from outside."""
-    # From the middle of the points: from a far origin, what cancels would take the digits with it.
+    """Return the volume within closed facets, negative if they are clockwise seen from outside."""
+    # Relative to the centre of the points: a distant origin would cause cancellation.
     a, b, c = (points[facets[:, k]] - points.mean(axis=0) for k in range(3))
     return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6

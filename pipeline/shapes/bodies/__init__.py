@@ -1,1 +1,1 @@
-"""One file a body."""
+"""Bodies, one per file."""

@@ -14,7 +14,7 @@ from pipeline.shapes.section import Words, in_mm
 from pipeline.shapes.surface import Plane, Surface
 from pipeline.units import Length
 
-# Of coordinates, in units of the body.
+# Rounding of coordinates, in units of the body's extent.
 _ROUNDING = 1e-12
 
 
@@ -23,7 +23,7 @@ class Box(Layered):
 
     is_smooth: ClassVar[bool] = False
     has_round_top: ClassVar[bool] = False
-    # Infinite: all is flat.
+    # Infinite: all faces are flat.
     bend: ClassVar[float] = inf
 
     shape: Literal["box"]
@@ -43,7 +43,7 @@ class Box(Layered):
 
     @property
     def heights(self) -> tuple[float, float]:
-        """Heights (m) of the bottom and of the top."""
+        """Heights z (m) of bottom and top."""
         return -self.size[2], 0.0
 
     @property
@@ -52,7 +52,7 @@ class Box(Layered):
         return self.size[0] * self.size[1] * self.size[2]
 
     def frame(self, at: tuple[float, ...], axis: Vector | None = None) -> Frame:
-        """Return the place at x and y on the top, or at the point of the surface that is nearest to three coordinates.
+        """Return the frame at x and y on the top, or at the surface point nearest to three coordinates (m).
 
         Raises:
             PlaceError: if the axis is inclined too far.
@@ -67,20 +67,20 @@ class Box(Layered):
         return Frame.touching((point[0], point[1], point[2]), (normal[0], normal[1], normal[2]), axis)
 
     def lift(self, frame: Frame, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return where lines along the axis enter the first face."""
+        """Return where lines along the axis enter the body, and the normals there: see :meth:`Body.lift`."""
         origins = frame.in_plane(points)
         units = np.eye(3)
         spans = [slab(origins, frame.axis, tuple(unit), *sides) for unit, sides in zip(units, self._sides, strict=True)]
         enter, leave = (np.array(ends) for ends in zip(*spans, strict=True))
         first = enter.argmax(axis=0)
         distance = enter.max(axis=0)
-        # Rounding of the place of an edge is none of a miss.
+        # A line through an edge must not miss the body by rounding.
         hit = distance <= leave.min(axis=0) + _ROUNDING * self.extent
         found = origins + np.where(hit, distance, np.nan)[:, None] * np.array(frame.axis)
         return found, -np.sign(np.array(frame.axis))[first][:, None] * units[first]
 
     def thickness(self, frame: Frame) -> float:
-        """Return the height (m), or how far the farthest corner lies along the axis."""
+        """Return the extent (m) along the axis: the height, or the depth of the farthest corner."""
         if frame.is_upright and frame.point[2] == 0:
             return self.size[2]
         return float(-frame.local(self.corners)[:, 2].min())
@@ -90,12 +90,12 @@ class Box(Layered):
         return hypot(self.size[0] / 2 + abs(x), self.size[1] / 2 + abs(y))
 
     def inside(self, points: FloatArray) -> FloatArray:
-        """Return the distance (m) of points inside to the nearest face, negative outside."""
+        """Return the distance (m) of points to the nearest face, negative outside."""
         x, y, z = points.T
         return np.minimum.reduce([self.size[0] / 2 - np.abs(x), self.size[1] / 2 - np.abs(y), -z, z + self.size[2]])
 
     def gap(self, point: Vector) -> float:
-        """Return the distance (m) to the edge of the face in whose plane the point lies, negative outside."""
+        """Return the distance (m) of a point of a face to the edge of this face, negative outside."""
         number, is_high = self._nearest_face(point)
         if number == 2 and is_high:
             return min(self.size[0] / 2 - abs(point[0]), self.size[1] / 2 - abs(point[1]))
@@ -103,7 +103,7 @@ class Box(Layered):
         return min(min(c - low, high - c) for c, (low, high) in beside)
 
     def to_side(self, point: tuple[float, float], direction: tuple[float, float]) -> float:
-        """Return the distance (m) to the first of the four sides."""
+        """Return the distance (m) to the nearest of the four sides in a direction."""
         sizes = zip(point, direction, self.size, strict=False)
         return min((copysign(size / 2, d) - p) / d for p, d, size in sizes if d != 0)
 
@@ -118,7 +118,7 @@ class Box(Layered):
         return np.array(list(product(*self._sides)))
 
     def _nearest_face(self, point: Vector) -> tuple[int, int]:
-        """Return the face whose plane is nearest: its axis, and 1 if it is the upper one; of several, the top first."""
+        """Return the face with the nearest plane: its axis, and 1 for the upper one; the top comes first."""
         faces = [(2, 1), (2, 0), (0, 0), (0, 1), (1, 0), (1, 1)]
         return min(faces, key=lambda face: abs(point[face[0]] - self._sides[face[0]][face[1]]))
 

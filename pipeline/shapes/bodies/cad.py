@@ -1,4 +1,4 @@
-"""A body that is a solid of a CAD file."""
+"""A body read as a solid from a CAD file."""
 
 from collections.abc import Mapping
 from functools import lru_cache
@@ -23,10 +23,10 @@ from pipeline.shapes.surface import Surface
 from pipeline.shapes.triangles import closed_edges, doubled_normals
 
 SIZES = UNITS | {"in": 0.0254}
-# A face rounder than this share of the extent is an edge rounded off: elements are small along it alone.
+# A face with a smaller radius than this share of the extent is a rounded edge: elements are small along it alone.
 _ROUNDED = 0.1
 _LEVEL = 1e-12
-# Normals of curved faces are known to this (rad): they are those between corners of facets.
+# Accuracy (rad) of normals of curved faces, which are interpolated between the corners of facets.
 _KNOWN = 5e-4
 _NEAR = 1e-9
 _TURNS = 4
@@ -46,7 +46,7 @@ def _held(value: Any) -> Any:
 
 
 class FromCad(FromFile):
-    """The solid of a STEP or BREP file, in the file's own frame; elements are bent to its true faces."""
+    """The solid of a STEP or BREP file, in the file's own frame; elements are curved to fit its true faces."""
 
     is_smooth: ClassVar[bool] = False
 
@@ -75,7 +75,7 @@ class FromCad(FromFile):
     @classmethod
     def load(cls, file: str, given: Mapping[str, Any]) -> Solid:
         """Return the solid in a file."""
-        from pipeline.shapes.files.cad import load_solid  # noqa: PLC0415 (as a file is read)
+        from pipeline.shapes.files.cad import load_solid  # noqa: PLC0415 (only when a file is read)
 
         return load_solid(Path(file), given["unit"], SIZES[given["unit"]])
 
@@ -86,14 +86,14 @@ class FromCad(FromFile):
         if isinstance(fixed, NamedFace) and info.data.keys() >= cls.READ_BY:
             names = cls.load(file, info.data).names
             if fixed.face not in names:
-                listed = "it has " + ", ".join(sorted(names)) if names else "none of its faces has a name that is known"
-                message = f"no face of it has the name {fixed.face}, by which it is to be held: {listed}"
+                listed = "it has " + ", ".join(sorted(names)) if names else "none of its faces has a name"
+                message = f"the support names the face {fixed.face}, which the file does not have: {listed}"
                 raise PydanticCustomError("no_face", "{what}", {"what": message})
         return file
 
     @property
     def solid(self) -> Solid:
-        """What the file holds."""
+        """The solid read from the file."""
         return self._loaded
 
     @property
@@ -116,16 +116,16 @@ class FromCad(FromFile):
 
     @property
     def volume(self) -> float:
-        """Volume (m³), as the geometry kernel has it."""
+        """Volume (m³), from the geometry kernel."""
         return self.solid.volume
 
     # ---- under a probe --------------------------------------------------------------------------------
 
     def frame(self, at: tuple[float, ...], axis: Vector | None = None) -> Frame:
-        """Return the place above x and y, or at the point of the surface that is nearest to three coordinates.
+        """Return the frame above x and y, or at the surface point nearest to three coordinates (m).
 
         Raises:
-            PlaceError: if there is none, or the axis is inclined too far.
+            PlaceError: if there is no such point, or the axis is inclined too far.
         """
         point, facet = self.touched(at)
         if self._is_plane(facet):
@@ -133,10 +133,10 @@ class FromCad(FromFile):
         else:
             (offset,), (normal,) = self._raised(point[None], np.array([facet]))
             for _ in range(_TURNS if len(at) == 3 else 0):
-                # From afar, the nearest point of the facets is to one side of that of the surface.
+                # From far away, the nearest point of the facets is beside the nearest point of the true surface.
                 point, facet = self.touched(tuple(np.array(at) + ((point + offset - at) @ normal) * normal))
                 (offset,), (normal,) = self._raised(point[None], np.array([facet]))
-            # Symmetric to the last digit where it nearly is: rims are to meet seams of faces, or be clear of them.
+            # Small components are rounded to zero, so that rims meet seams of faces exactly or avoid them.
             normal = np.array(_axial(normal, _KNOWN))
             if len(at) == 2 and abs(normal[2]) > _LEVEL:
                 point = point + np.array([0.0, 0.0, (offset @ normal) / normal[2]])
@@ -147,7 +147,7 @@ class FromCad(FromFile):
         return Frame.touching((x, y, z), (a, b, c), axis)
 
     def lift(self, frame: Frame, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return where lines along a probe's axis enter the part of the surface that is joined to the contact."""
+        """Return where lines along the axis enter the connected surface around the contact, and the normals there."""
         local, facets = frame.local(self.triangles.points), self.triangles.facets
         patch = facing(local, facets, float(np.abs(points).max(initial=0.0)))
         hit, height = pierce(local, facets[patch], points)
@@ -161,13 +161,13 @@ class FromCad(FromFile):
         return result, normals
 
     def _raised(self, points: FloatArray, numbers: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return how far points of facets, by their ``numbers``, are off the true surface, and its unit normals."""
+        """Return the offset of facet points from the true surface, by the facets' ``numbers``, and its unit normals."""
         solid, triangles = self.solid, self.triangles
         offset, normal = raised(points, triangles.points[triangles.facets[numbers]], solid.normals[numbers])
         return np.where(solid.planes[solid.face[numbers]][:, None], 0.0, offset), normal
 
     def inside(self, points: FloatArray) -> FloatArray:
-        """Return the distance (m) of points (n, 3) of the body to its true surface, negative outside."""
+        """Return the distance (m) of points (n, 3) to the true surface, negative outside."""
         nearest, numbers = skin_of(self.triangles).project(points), skin_of(self.triangles).facets(points)
         offset, normal = self._raised(nearest, numbers)
         return super().inside(points) + (offset * normal).sum(axis=1)
@@ -180,7 +180,7 @@ class FromCad(FromFile):
         return vector / np.linalg.norm(vector)
 
     def gap(self, point: Vector) -> float:
-        """Return the distance (m) from a point of a plane face to its edge, negative beside it; infinite on others."""
+        """Return the distance (m) of a point of a plane face to its edge, negative outside; infinite on other faces."""
         at = np.array([point])
         skin = skin_of(self.triangles)
         facet = int(skin.facets(at)[0])
@@ -197,7 +197,7 @@ class FromCad(FromFile):
 
     @property
     def bend(self) -> float:
-        """Radius (m) of the roundest of its sides but for edges that are rounded off."""
+        """Smallest radius of curvature (m) of its faces, without rounded edges."""
         radius = self.solid.radius
         return float(radius[radius >= _ROUNDED * self.extent].min(initial=inf))
 
@@ -209,14 +209,14 @@ class FromCad(FromFile):
 
 
 def _axial(normal: FloatArray, least: float) -> Vector:
-    """Return a unit vector without components that are smaller than ``least``."""
+    """Return a unit vector after setting components below ``least`` to zero."""
     x, y, z = (0.0 if abs(c) < least else float(c) for c in normal)
     return unit((x, y, z))
 
 
 @lru_cache(64)
 def _edge(solid: Solid, facet: int) -> FloatArray:
-    """Return the edges (k, 2, 3), in m, round the plane piece of the surface to which a facet belongs."""
+    """Return the edges (k, 2, 3), in m, around the plane piece of the surface that contains a facet."""
     return solid.triangles.points[plane_piece(solid.triangles, facet)]
 
 

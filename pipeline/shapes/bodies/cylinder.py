@@ -14,9 +14,9 @@ from pipeline.shapes.section import Words, in_mm
 from pipeline.shapes.surface import Plane, Surface, Tube
 from pipeline.units import Length
 
-# Edges of each circle in pictures.
+# Segments of each circle in pictures.
 _ROUND = 200
-# Of coordinates, in units of the body.
+# Rounding of coordinates, in units of the body's extent.
 _ROUNDING = 1e-12
 
 
@@ -37,7 +37,7 @@ class Cylinder(Layered):
 
     @property
     def heights(self) -> tuple[float, float]:
-        """Heights (m) of the bottom and of the top."""
+        """Heights z (m) of bottom and top."""
         return -self.height, 0.0
 
     @property
@@ -46,10 +46,10 @@ class Cylinder(Layered):
         return pi * self.radius**2 * self.height
 
     def frame(self, at: tuple[float, ...], axis: Vector | None = None) -> Frame:
-        """Return the place at x and y on the top, or at the point of the surface that is nearest to three coordinates.
+        """Return the frame at x and y on the top, or at the surface point nearest to three coordinates (m).
 
         Raises:
-            PlaceError: if the axis is inclined too far, or all of the side is equally near.
+            PlaceError: if the axis is inclined too far, or no point is nearest because `at` is on the axis.
         """
         if len(at) == 2:
             return Frame.touching((at[0], at[1], 0.0), (0.0, 0.0, -1.0), axis)
@@ -59,14 +59,14 @@ class Cylinder(Layered):
             x, y, r = x * self.radius / r, y * self.radius / r, self.radius
         if self._is_side((x, y, z)):
             if r == 0:
-                raise PlaceError("lies on the cylinder's axis, as near to one side as to the other: move it aside")
+                raise PlaceError("is on the cylinder's axis, where no side is nearest: move it off the axis")
             return Frame.touching((x * self.radius / r, y * self.radius / r, z), (-x / r, -y / r, 0.0), axis)
         if z > -self.height / 2:
             return Frame.touching((x, y, 0.0), (0.0, 0.0, -1.0), axis)
         return Frame.touching((x, y, -self.height), (0.0, 0.0, 1.0), axis)
 
     def lift(self, frame: Frame, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return where lines along the axis enter top, bottom or side."""
+        """Return where lines along the axis enter top, bottom or side, and the normals there."""
         origins, axis = frame.in_plane(points), np.array(frame.axis)
         end_in, end_out = slab(origins, frame.axis, (0.0, 0.0, 1.0), -self.height, 0.0)
         if np.hypot(axis[0], axis[1]) > 0:
@@ -82,7 +82,7 @@ class Cylinder(Layered):
         return found, np.where((side_in > end_in)[:, None], radial, upward)
 
     def thickness(self, frame: Frame) -> float:
-        """Return the height (m), or how far the farthest point of a rim lies along the axis."""
+        """Return the extent (m) along the axis: the height, or the depth of the farthest point of a rim."""
         if frame.is_upright and frame.point[2] == 0:
             return self.height
         (x, y, z), (a, b, c) = frame.point, frame.axis
@@ -93,12 +93,12 @@ class Cylinder(Layered):
         return self.radius + hypot(x, y)
 
     def inside(self, points: FloatArray) -> FloatArray:
-        """Return the distance (m) of points inside to the nearest face, negative outside."""
+        """Return the distance (m) of points to the nearest face, negative outside."""
         x, y, z = points.T
         return np.minimum.reduce([self.radius - np.hypot(x, y), -z, z + self.height])
 
     def gap(self, point: Vector) -> float:
-        """Return the distance (m) to the edge of the face on which the point lies, negative outside."""
+        """Return the distance (m) of a point of a face to the edge of this face, negative outside."""
         if self._is_side(point):
             return min(-point[2], point[2] + self.height)
         return self.radius - hypot(point[0], point[1])
@@ -111,14 +111,14 @@ class Cylinder(Layered):
 
     @property
     def corners(self) -> FloatArray:
-        """Points (n, 3) in m on circles about the edges of top and bottom, by so little larger as to hold them."""
+        """Points (n, 3) in m on circles just outside the edges of top and bottom: their hull contains the body."""
         angle = np.linspace(0.0, 2 * pi, _ROUND + 1)[1:]
         radius = self.radius / np.cos(pi / _ROUND)
         x, y = radius * np.cos(angle), radius * np.sin(angle)
         return np.vstack([np.column_stack([x, y, np.full(len(angle), z)]) for z in (0.0, -self.height)])
 
     def _is_side(self, point: Vector) -> bool:
-        """Tell whether the side is nearer than top and bottom."""
+        """Return whether the side is nearer than top and bottom."""
         to_side = abs(self.radius - hypot(point[0], point[1]))
         return to_side < min(abs(point[2]), abs(point[2] + self.height))
 
@@ -133,11 +133,11 @@ class Cylinder(Layered):
         return self.radius, self.radius
 
     def half_plane(self) -> Rectangle | None:
-        """Return radius, height and layers; inclusions have none."""
+        """Return radius, height and layers; None with inclusions."""
         return None if self.inclusion else Rectangle(self.radius, self.height, self.interfaces, self.is_filled)
 
     def draw(self, kernel: Any, units: Units, frame: Frame | None = None) -> int:
-        """Add the cylinder, the seam of its side away from the frame."""
+        """Add the cylinder, with the seam of its side away from the frame."""
         height = units(self.height)
         tag = int(kernel.addCylinder(0, 0, -height, 0, 0, height, units(self.radius)))
         if frame is not None and self._is_side(frame.point):

@@ -18,18 +18,18 @@ from pipeline.shapes.support import Below
 from pipeline.shapes.surface import Surface
 from pipeline.units import Length
 
-# Edges of each ellipse in pictures, and of the one that is looked at for the reach.
+# Segments of each ellipse in pictures and in the search for the reach, and bisections for the farthest point.
 _ROUND = 200
 _BISECTIONS = 80
-# By which (rad) the poles of the ball that it is made of are turned about the point of contact: at the ends of the
-# axes, where the surface bends most, gmsh's surface mesher gives up now and then.
+# Angle (rad) by which the poles of the ball, from which the ellipsoid is stretched, are turned about the point of
+# contact: gmsh's surface mesher sometimes fails with poles at the ends of the axes, where curvature is largest.
 _ASIDE = 0.7
 
 
 def _below(value: Any) -> Any:
     if isinstance(value, str):
         raise PydanticCustomError(
-            "not_supported", 'an ellipsoid has no faces to be held on: give a height, {below = "-15 mm"}'
+            "not_supported", 'an ellipsoid has no faces: fix everything below a height, {below = "-15 mm"}'
         )
     return value if isinstance(value, Below) else Below.read(value)
 
@@ -67,26 +67,26 @@ class Ellipsoid(Drawn):
         return 4 / 3 * pi * a * b * c
 
     def frame(self, at: tuple[float, ...], axis: Vector | None = None) -> Frame:
-        """Return the place above x and y, or at the point of the surface that is nearest to three coordinates.
+        """Return the frame above x and y, or at the surface point nearest to three coordinates (m).
 
         Raises:
-            PlaceError: if there is none, or the axis is inclined too far.
+            PlaceError: if there is no such point, or the axis is inclined too far.
         """
         a, b, c = self.axes
         if len(at) == 2:
             x, y = at
             if (square := (x / a) ** 2 + (y / b) ** 2) > 1:
-                raise PlaceError(f"lies beside the body ({self.face}): there is no surface above it")
+                raise PlaceError(f"is outside the body ({self.face}) as seen from above")
             z = c * sqrt(1 - square)
         else:
             if not any(at):
-                raise PlaceError("is the ellipsoid's centre, as near to one side as to the other: move it aside")
+                raise PlaceError("is the ellipsoid's centre, where no side is nearest: move it off the centre")
             x, y, z = map(float, self._surface.project(np.array([at]))[0])
         steepest = unit((x / a**2, y / b**2, z / c**2))
         return Frame.touching((x, y, z), (0.0 - steepest[0], 0.0 - steepest[1], 0.0 - steepest[2]), axis)
 
     def lift(self, frame: Frame, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return where lines along the axis enter the ellipsoid."""
+        """Return where lines along the axis enter the ellipsoid, and the normals there."""
         origins = frame.in_plane(points)
         axis, axes = np.array(frame.axis), np.array(self.axes)
         found = origins + ball(origins / axes, axis / axes)[0][:, None] * axis
@@ -94,12 +94,12 @@ class Ellipsoid(Drawn):
         return found, steepest / np.linalg.norm(steepest, axis=1, keepdims=True)
 
     def thickness(self, frame: Frame) -> float:
-        """Return how far (m) the farthest point lies along the axis."""
+        """Return the extent (m) along the axis."""
         farthest = hypot(*(semi * c for semi, c in zip(self.axes, frame.axis, strict=True)))
         return farthest - sum(p * c for p, c in zip(frame.point, frame.axis, strict=True))
 
     def reach(self, frame: Frame) -> float:
-        """Return the largest distance (m) of a point of the silhouette from the axis, to 1e-4 from above."""
+        """Return the largest distance (m) of the silhouette from the axis, at most 1e-4 too large."""
         semi = np.array([frame.along, frame.across]) * np.array(self.axes)
         turned, lengths, _ = np.linalg.svd(semi)
         angle = np.linspace(0.0, 2 * pi, _ROUND + 1)
@@ -108,9 +108,10 @@ class Ellipsoid(Drawn):
         return float(np.linalg.norm(ellipse.T + centre, axis=1).max())
 
     def farthest(self, frame: Frame) -> float:
-        """Return the distance (m) of the farthest point: the normal there points away from the point of contact.
+        """Return the distance (m) of the farthest point, whose normal points away from the point of contact p.
 
-        Of all x with x - p = t x / a² it is the one with the largest t, at least the square of the longest semi-axis.
+        Such points x satisfy x - p = t x / a². The farthest has the largest t, at least the square of the longest
+        semi-axis.
         """
         longest = max(range(3), key=lambda n: self.axes[n])
         pairs = [(semi**2, p) for semi, p in zip(self.axes, frame.point, strict=True)]
@@ -129,7 +130,7 @@ class Ellipsoid(Drawn):
         return hypot(*(x - p for x, p in zip(found, frame.point, strict=True)))
 
     def inside(self, points: FloatArray) -> FloatArray:
-        """Return the distance (m) of points inside to the surface, negative outside."""
+        """Return the distance (m) of points to the surface, negative outside."""
         return -self._surface.distance(points)
 
     def gap(self, point: Vector) -> float:
@@ -143,7 +144,7 @@ class Ellipsoid(Drawn):
 
     @property
     def is_round(self) -> bool:
-        """Whether its semi-axes along x and y are equal, and its inclusions round."""
+        """Whether the body is axisymmetric: equal semi-axes along x and y, and axisymmetric inclusions."""
         return self.axes[0] == self.axes[1] and self.holds_round
 
     @property
@@ -152,16 +153,16 @@ class Ellipsoid(Drawn):
         return self.axes[0], self.axes[1]
 
     def half_plane(self) -> HalfEllipse | None:
-        """Return half of its ellipse if it is one of revolution; inclusions have none."""
+        """Return half of its ellipse if it is one of revolution; None with inclusions or otherwise."""
         a, b, c = self.axes
         return HalfEllipse(a, c) if a == b and not self.inclusion else None
 
     def draw(self, kernel: Any, units: Units, frame: Frame | None = None) -> int:
-        """Add a ball whose seam lies opposite to the point of contact, and its poles aside, and stretch it."""
+        """Add a stretched ball; its seam is opposite to the point of contact, its poles are away from both."""
         tag = int(kernel.addSphere(0, 0, 0, 1))
         px, py, pz = frame.point if frame else (0.0, 0.0, self.axes[2])
         a, b, c = self.axes
-        # On the ball, the seam is at +x and the poles at ±z: -x is turned to the point of contact.
+        # The ball has its seam at +x and its poles at ±z: -x is turned to the point of contact.
         x, y, z = unit((px / a, py / b, pz / c))
         kernel.rotate([(3, tag)], 0, 0, 0, 1, 0, 0, _ASIDE)
         kernel.rotate([(3, tag)], 0, 0, 0, 0, 1, 0, atan2(z, hypot(x, y)))
@@ -183,7 +184,7 @@ class Ellipsoid(Drawn):
         return min(self.axes) ** 2 / max(self.axes)
 
     def outline(self) -> list[FloatArray]:
-        """Return the three ellipses in which the planes of coordinates cut it."""
+        """Return its three ellipses in the coordinate planes."""
         angle = np.linspace(0.0, 2 * pi, _ROUND + 1)
         zero = np.zeros(len(angle))
         circles = [np.roll(np.column_stack([np.cos(angle), np.sin(angle), zero]), turn, axis=1) for turn in range(3)]

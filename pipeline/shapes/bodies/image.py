@@ -1,4 +1,4 @@
-"""A body that is a label of a segmented image."""
+"""A body segmented in a label map."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -38,8 +38,8 @@ class FromImage(FromFile, Scanned):
 
     @classmethod
     def load(cls, file: str, given: Mapping[str, Any]) -> Loaded:
-        """Return the surface round the label."""
-        from pipeline.shapes.files.image import load_image  # noqa: PLC0415 (as a file is read)
+        """Return the surface of the label."""
+        from pipeline.shapes.files.image import load_image  # noqa: PLC0415 (only when a file is read)
 
         unit = UNITS[given["unit"]] if given["unit"] else None
         return load_image(Path(file), given["label"], unit, given["smooth"])

@@ -1,4 +1,4 @@
-"""A body whose surface is a file of triangles, as a segmentation of an image gives it."""
+"""A body bounded by triangles from a file, such as the surface of a segmentation."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -41,6 +41,6 @@ class FromSurface(FromFile, Scanned):
     @classmethod
     def load(cls, file: str, given: Mapping[str, Any]) -> Loaded:
         """Return the surface in a file."""
-        from pipeline.shapes.files.read import load_surface  # noqa: PLC0415 (as a file is read)
+        from pipeline.shapes.files.read import load_surface  # noqa: PLC0415 (only when a file is read)
 
         return load_surface(Path(file), UNITS[given["unit"]], given["repair"], given["smooth"] or None)

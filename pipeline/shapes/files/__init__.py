@@ -1,1 +1,1 @@
-"""Surfaces that organs are given as: STL, PLY and OBJ files, read strictly."""
+"""Strict readers of organ surfaces: STL, PLY, OBJ, label maps and CAD files."""

@@ -1,4 +1,4 @@
-"""The solid in a STEP or BREP file, as triangles that a geometry kernel made once, in a process of its own."""
+"""The solid of a STEP or BREP file, as triangles that a geometry kernel makes once, in a separate process."""
 
 import subprocess
 from functools import lru_cache
@@ -20,11 +20,11 @@ from pipeline.shapes.files.step import entities_of, named_faces, unit_of
 from pipeline.shapes.triangles import SurfaceError, Triangles, doubled_normals, enclosed
 
 STEP, BREP = (".step", ".stp"), (".brep",)
-# Raise by hand when the same file gives other triangles.
+# Increase by hand when the same file gives other triangles.
 _VERSION = 4
 _PROGRAM = "pipeline.scene.tessellate"
 _LONGEST = 600  # s
-# Of the solid's volume, triangles may miss this much; of its extent, vertices in the file may be off by that.
+# Allowed differences: volume of the triangles to that of the solid, and vertices (share of the extent) to the file's.
 _MISSED, _OFF = 0.03, 1e-5
 
 
@@ -32,7 +32,7 @@ def load_solid(path: Path, unit: str, size: float) -> Solid:
     """Return the solid in a file whose numbers are in a ``unit`` of ``size`` (m).
 
     Raises:
-        SurfaceError: if there is not one solid in it; says what was found, and what mends it.
+        SurfaceError: if it does not contain exactly one solid; the message says what was found and how to repair it.
     """
     return _load(path, *state_of(path), unit, size)
 
@@ -41,7 +41,7 @@ def load_solid(path: Path, unit: str, size: float) -> Solid:
 def _load(path: Path, _changed: int, length: int, unit: str, size: float) -> Solid:
     ending = path.suffix.lower()
     if ending not in STEP + BREP:
-        raise SurfaceError(f"its name ends in `{path.suffix}`; read are {', '.join(STEP + BREP)}")
+        raise SurfaceError(f"its name ends in `{path.suffix}`; allowed are {', '.join(STEP + BREP)}")
     if not 0 < length <= LARGEST_FILE:
         raise SurfaceError("is empty: copy or export it again" if length == 0 else f"has {length / 1e9:.2g} GB")
     try:
@@ -52,7 +52,7 @@ def _load(path: Path, _changed: int, length: int, unit: str, size: float) -> Sol
     if ending in STEP:
         _check_unit(unit_of(entities), unit)
     elif b"CASCADE Topology" not in data[:4000] and b"DBRep_DrawableShape" not in data[:4000]:
-        raise SurfaceError("is no BREP file as OpenCASCADE writes them: export it again, or as STEP")
+        raise SurfaceError("is not a BREP file of OpenCASCADE: export it again, or as STEP")
     content = sha256(data).hexdigest()
     return _solid(_tessellated(path, unit, content), size, entities, f"{content} {unit}")
 
@@ -60,13 +60,13 @@ def _load(path: Path, _changed: int, length: int, unit: str, size: float) -> Sol
 def _check_unit(found: str | None, unit: str) -> None:
     same = {"µm": "um"}.get(unit, unit)
     if found is None:
-        raise SurfaceError("does not say in which one unit its lengths are: export it again, in mm")
+        raise SurfaceError("does not name one unit of its lengths: export it again, in mm")
     if found != same:
-        raise SurfaceError(f'says itself that its lengths are in {found}: unit = "{found}"')
+        raise SurfaceError(f'gives its lengths in {found}: unit = "{found}"')
 
 
 def _tessellated(path: Path, unit: str, content: str) -> dict[str, Any]:
-    """Return what the program writes, which is kept by the content of the file."""
+    """Return the output of the tessellation program, cached by the content of the file."""
     name = "um" if unit == "µm" else unit
     kept = cache_folder() / "cad" / f"{content[:32]}-{name}-{_VERSION}.npz"
     try:
@@ -78,17 +78,17 @@ def _tessellated(path: Path, unit: str, content: str) -> dict[str, Any]:
             _run(path, name, target)
             return read_npz(target)
     except OSError as error:
-        raise SurfaceError(f"{kept.parent}, for what is made of it, cannot be written: set EPSMESH_CACHE") from error
+        raise SurfaceError(f"needs the cache folder {kept.parent}, which is not writable: set EPSMESH_CACHE") from error
 
 
 def _run(path: Path, unit: str, target: Path) -> None:
     try:
         done = run_alone(_PROGRAM, str(path), unit, str(target), timeout=_LONGEST)
     except subprocess.TimeoutExpired:
-        raise SurfaceError(f"could not be covered by triangles within {_LONGEST} s: simplify the solid") from None
+        raise SurfaceError(f"was not triangulated within {_LONGEST} s: simplify the solid") from None
     if done.returncode:
         last = (done.stdout.strip() or done.stderr.strip()).splitlines()
-        raise SurfaceError(last[-1] if last else f"the geometry kernel ended with status {done.returncode} on it")
+        raise SurfaceError(last[-1] if last else f"the geometry kernel failed on it with status {done.returncode}")
 
 
 def _solid(arrays: dict[str, Any], size: float, entities: dict[int, str], content: str) -> Solid:
@@ -102,11 +102,11 @@ def _solid(arrays: dict[str, Any], size: float, entities: dict[int, str], conten
         )
     facets, flipped = oriented(edges)
     if flipped is None:
-        raise SurfaceError("its faces have but one side: they bound nothing")
+        raise SurfaceError("its faces form a one-sided surface, which encloses no volume")
     facets = _outside_out(points, facets, edges)
     if abs(enclosed(points, facets) - volume) > _MISSED * abs(volume):
         raise SurfaceError(
-            f"its faces enclose {enclosed(points, facets) * size**3 * 1e6:.3g} cm³, and its solid "
+            f"its faces enclose {enclosed(points, facets) * size**3 * 1e6:.3g} cm³, but its solid "
             f"{volume * size**3 * 1e6:.3g} cm³: heal the solid in the CAD program, and export it again"
         )
     moved = facets[:, 0] != arrays["facets"][:, 0]
@@ -128,7 +128,7 @@ def _solid(arrays: dict[str, Any], size: float, entities: dict[int, str], conten
 
 
 def _outside_out(points: FloatArray, facets: IntArray, edges: Edges) -> IntArray:
-    """Return facets seen counter-clockwise from outside the largest shell, and from inside those of its hollows."""
+    """Return facets oriented outward from the tissue: outward on the largest shell, inward on those of hollows."""
     count, shell = edges.shells
     volumes = check.shell_volumes(points, facets, shell, count)
     wanted = np.where(np.arange(count) == np.argmax(np.abs(volumes)), 1, -1)
@@ -136,7 +136,7 @@ def _outside_out(points: FloatArray, facets: IntArray, edges: Edges) -> IntArray
 
 
 def _outward(normals: FloatArray, of_facets: FloatArray) -> FloatArray:
-    """Return unit normals to the side of the facets' own, which stand in where a surface has none, as at a tip."""
+    """Return unit normals on the side of the facets' own; these replace normals that do not exist, as at a tip."""
     unit = (of_facets / np.linalg.norm(of_facets, axis=1, keepdims=True))[:, None]
     with np.errstate(invalid="ignore", divide="ignore"):
         normals = normals / np.linalg.norm(normals, axis=2, keepdims=True)
@@ -145,9 +145,9 @@ def _outward(normals: FloatArray, of_facets: FloatArray) -> FloatArray:
 
 
 def _names(faces: list[tuple[str, FloatArray]], arrays: dict[str, Any]) -> dict[str, tuple[int, ...]]:
-    """Return the numbers of the faces of each name: the kernel has the order of the file, and the vertices tell.
+    """Return the numbers of the faces of each name: kernel and file have the same order, and vertices confirm it.
 
-    None are returned where the two do not agree.
+    Return no names if the vertices disagree.
     """
     if not any(name for name, _ in faces) or len(faces) != len(arrays["is_plane"]):
         return {}

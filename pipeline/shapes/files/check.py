@@ -1,6 +1,6 @@
-"""What is asked of a surface before tissue is meshed in it: closed, one piece, outward, of an organ's size.
+"""Checks of a surface before it is meshed: closed, one piece, oriented outward, and of an organ's size.
 
-Places in the messages are in the file's own numbers, by which other programs find them.
+Messages give places in the file's own numbers, so that other programs find them.
 """
 
 import numpy as np
@@ -12,17 +12,17 @@ from pipeline.shapes.files.mend import flats
 from pipeline.shapes.files.raw import Raw
 from pipeline.shapes.triangles import SurfaceError, doubled_normals, enclosed
 
-# Sizes of what a tool may press on (m).
+# Smallest and largest extent (m) of a body.
 SMALLEST, LARGEST = 1e-3, 2.0
 _UNITS = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0}
-# Facets that enclose less than this share of what a ball of their area does are a sheet.
+# Facets are an open sheet if they enclose less than this share of the volume of a ball of the same area.
 _SHEET = 1e-4
-# Points of a shell, at most, by which it is told whether it lies within another one.
+# Most points of a shell that are tested for being inside another one.
 _SAMPLES = 60
 
 
 def check_whole(points: FloatArray, edges: Edges, unit: float, may_cross: bool = True) -> None:
-    """Refuse what does not bound one piece of tissue; facets are known not to cross unless they ``may_cross``."""
+    """Refuse a surface that does not bound one piece of tissue; skip the test for crossings unless ``may_cross``."""
     check_edges(points, edges, unit)
     check_shells(points, edges, unit)
     if may_cross:
@@ -30,7 +30,7 @@ def check_whole(points: FloatArray, edges: Edges, unit: float, may_cross: bool =
 
 
 def check_numbers(raw: Raw) -> None:
-    """Refuse what is not finite, and what has no facets."""
+    """Refuse numbers that are not finite, and a surface without facets."""
     if not len(raw.facets):
         raise SurfaceError("has no facets: export the surface, not points alone or an empty scene")
     (wrong,) = np.nonzero(~np.isfinite(raw.points).all(axis=1))
@@ -42,7 +42,7 @@ def check_numbers(raw: Raw) -> None:
 
 
 def check_size(points: FloatArray, facets: IntArray, unit: float) -> None:
-    """Refuse what is too small or too large for an organ: most likely, the unit is another one."""
+    """Refuse a size that no organ has: most likely, the unit is wrong."""
     extent = float(np.ptp(points[facets].reshape(-1, 3), axis=0).max())
     if SMALLEST <= extent * unit <= LARGEST:
         return
@@ -55,11 +55,11 @@ def check_size(points: FloatArray, facets: IntArray, unit: float) -> None:
 
 
 def check_edges(points: FloatArray, edges: Edges, unit: float) -> None:
-    """Refuse fins, holes and facets seen from opposite sides."""
+    """Refuse fins, holes and inconsistently oriented facets."""
     if len(edges.fins):
         where = _place(points[edges.half[edges.fins[0]]].mean(axis=0))
         raise SurfaceError(
-            f"{len(edges.fins):,} edges have more than two facets (fins, walls within, or parts that touch), "
+            f"{len(edges.fins):,} edges have more than two facets (fins, inner walls, or parts that touch), "
             f"such as at {where}: `repair = true`, or MeshLab: Repair Non Manifold Edges"
         )
     if len(edges.open):
@@ -67,10 +67,10 @@ def check_edges(points: FloatArray, edges: Edges, unit: float) -> None:
     if len(edges.turned):
         _, flipped = oriented(edges)
         if flipped is None:
-            raise SurfaceError("its facets have but one side, like a Möbius strip's: it bounds nothing")
+            raise SurfaceError("its facets form a one-sided surface, like a Möbius strip, which encloses no volume")
         where = _place(points[edges.facets[flipped[0]]].mean(axis=0))
         raise SurfaceError(
-            f"{len(flipped):,} facets are inverted: seen from the side opposite to that of their neighbours, "
+            f"{len(flipped):,} facets are inverted: their normals point opposite to those of their neighbours, "
             f"such as at {where}: `repair = true`, or MeshLab: Re-Orient All Faces Coherently"
         )
 
@@ -92,7 +92,7 @@ def _holes(points: FloatArray, edges: Edges, unit: float) -> str:
 
 
 def check_shells(points: FloatArray, edges: Edges, unit: float) -> None:
-    """Refuse more than one piece, pieces that hang together by a point, and sheets."""
+    """Refuse several pieces, pieces joined at single points, and sheets."""
     count, shell = edges.shells
     facets = edges.facets
     if count > 1:
@@ -100,7 +100,7 @@ def check_shells(points: FloatArray, edges: Edges, unit: float) -> None:
     pinched = edges.pinched()
     if len(pinched):
         raise SurfaceError(
-            f"{len(pinched):,} points join parts that have nothing else in common there, such as "
+            f"{len(pinched):,} points join parts that share nothing else there, such as "
             f"{_place(points[pinched[0]])}: `repair = true`, or MeshLab: Repair Non Manifold Vertices by Splitting"
         )
     area = float(np.linalg.norm(doubled_normals(points, facets), axis=1).sum()) / 2
@@ -115,7 +115,7 @@ def check_shells(points: FloatArray, edges: Edges, unit: float) -> None:
 
 
 def shell_volumes(points: FloatArray, facets: IntArray, shell: IntArray, count: int) -> FloatArray:
-    """Return the volume within each shell, in the cube of the unit of the points."""
+    """Return the volume enclosed by each shell, in the cube of the points' unit."""
     a, b, c = (points[facets[:, k]] - points[facets[0, 0]] for k in range(3))
     volumes: FloatArray = np.bincount(shell, np.einsum("ij,ij->i", a, np.cross(b, c)), count) / 6
     return volumes
@@ -129,20 +129,20 @@ def _shells(points: FloatArray, facets: IntArray, shell: IntArray, count: int, u
     inside = _within(points, facets[shell == order[0]], second)
     how = "inside" if inside.all() else "beside" if not inside.any() else "across"
     return (
-        f"has {count:,} separate shells, of {sizes} cm³, where one bounds the tissue; the second lies {how} the first, "
-        f"round {_place(points[second].mean(axis=0))}: delete what does not belong to it, or `repair = true` "
+        f"has {count:,} separate shells, of {sizes} cm³, but one must bound the tissue; the second is {how} the first, "
+        f"around {_place(points[second].mean(axis=0))}: delete what does not belong to it, or `repair = true` "
         "(keeps the largest), or unite them in MeshLab: Mesh Boolean: Union"
     )
 
 
 def _within(points: FloatArray, facets: IntArray, chosen: IntArray) -> BoolArray:
-    """Tell which of some points, evenly taken from those ``chosen``, lie within closed facets."""
+    """Return a mask of points, sampled evenly from ``chosen``, that are inside closed facets."""
     some = chosen[:: -(-len(chosen) // _SAMPLES)]
     turns = np.zeros(len(some))
     for k, point in enumerate(points[some]):
         a, b, c = (points[facets[:, corner]] - point for corner in range(3))
         la, lb, lc = (np.linalg.norm(edge, axis=1) for edge in (a, b, c))
-        # The solid angle of each facet: Van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 125 (1983).
+        # Solid angle of each facet: Van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 125 (1983).
         dots = [np.einsum("ij,ij->i", u, v) for u, v in ((a, b), (b, c), (c, a))]
         below = la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb
         turns[k] = np.arctan2(np.einsum("ij,ij->i", a, np.cross(b, c)), below).sum() / (2 * np.pi)
@@ -156,7 +156,7 @@ def check_crossings(points: FloatArray, facets: IntArray) -> None:
     if len(found):
         where = _place(points[facets[found[0]]].mean(axis=(0, 1)))
         raise SurfaceError(
-            f"{len(found):,} pairs of facets cross or lie upon each other, such as at {where}: `repair = true`, "
+            f"{len(found):,} pairs of facets cross or overlap, such as at {where}: `repair = true`, "
             "or MeshLab: Select Self Intersecting Faces, delete them, Close Holes"
         )
 

@@ -1,4 +1,4 @@
-"""Surfaces that were found whole, kept on disk: a large file is checked once, not at every command."""
+"""Cache of surfaces that passed the checks: a large file is checked once, not at every command."""
 
 from collections.abc import Callable, Iterable
 from hashlib import file_digest, sha256
@@ -10,17 +10,17 @@ from pipeline.files import atomic, cache_folder
 from pipeline.npz import read_npz
 from pipeline.shapes.triangles import Triangles
 
-# Raise by hand when the same file gives another surface, or is judged in another way.
+# Increase by hand when the same file gives another surface, or the checks change.
 _VERSION = 1
-# Checking fewer bytes takes no time.
+# Smaller files (bytes) are not cached: their check takes no time.
 _SMALL = 1_000_000
 Whole = tuple[Triangles, tuple[str, ...]]
 
 
 def kept_whole(data: bytes, given: str, make: Callable[[], Whole]) -> Whole:
-    """Return the surface in a file's ``data``, and what was done to it, as found before or by ``make``.
+    """Return the surface in a file's ``data`` and its notices, from the cache or from ``make``.
 
-    ``given`` says all else that it depends on. Only what is whole is kept: what is refused is looked at again.
+    ``given`` is everything else that the surface depends on. Only surfaces that pass are cached.
     """
     if len(data) < _SMALL:
         return make()
@@ -28,7 +28,7 @@ def kept_whole(data: bytes, given: str, make: Callable[[], Whole]) -> Whole:
 
 
 def kept_image(files: Iterable[Path], given: str, make: Callable[[], Whole]) -> Whole:
-    """Return the surface in an image's ``files``, as :func:`kept_whole` does, however small they are packed.
+    """Return the surface of an image's ``files``, whatever their size: see :func:`kept_whole`.
 
     Raises:
         OSError: if one of the files cannot be read.
@@ -41,18 +41,18 @@ def kept_image(files: Iterable[Path], given: str, make: Callable[[], Whole]) -> 
 
 
 def _kept(key: str, make: Callable[[], Whole]) -> Whole:
-    """Return what is on disk under a key, or make it and write it there."""
+    """Return the cached value of a key; if there is none, make and cache it."""
     path = cache_folder() / "surfaces" / f"{key[:32]}.npz"
     try:
         found = read_npz(path)
         return Triangles(found["points"], found["facets"]), tuple(found["notices"].tolist())
     except (OSError, KeyError, ValueError):
-        pass  # not there, or cut short
+        pass  # missing, or truncated
     triangles, notices = make()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with atomic(path) as temporary, temporary.open("wb") as file:
             np.savez(file, points=triangles.points, facets=triangles.facets, notices=np.array(notices, dtype=str))
     except OSError:
-        pass  # nowhere to write: it is checked again next time
+        pass  # not writable: the check is repeated next time
     return triangles, notices

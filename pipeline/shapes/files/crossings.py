@@ -1,4 +1,4 @@
-"""Facets of a surface that cross or lie upon each other."""
+"""Facets of a surface that cross or overlap."""
 
 from fractions import Fraction
 from functools import cache
@@ -9,22 +9,22 @@ from pipeline.arrays import BoolArray, FloatArray, IntArray
 
 _Exact = tuple[Fraction, Fraction, Fraction]
 
-# Pairs that are decided again, 1 ms each: of a surface with more, some do cross.
+# Most pairs that are tested exactly, 1 ms each: a surface with more has real crossings.
 _MOST = 2000
-# Volumes above this share of the cube of a facet's extent have the sign that floating point gives them.
+# The sign of a volume is certain in floating point above this share of the cube of a facet's extent.
 _SURE = 1e-9
 
 
 def crossings(points: FloatArray, facets: IntArray) -> IntArray:
-    """Return the pairs (n, 2) of facets that have more in common than the corners and edges they share.
+    """Return the pairs (n, 2) of facets that share more than their common corners and edges.
 
-    Facets that touch count. Of what libigl finds, rational numbers keep what does cross; those that share an edge cross
-    if they are folded upon each other, as far as floating point can tell.
+    Facets that touch count. Rational arithmetic confirms each pair that libigl finds. Facets with a common edge cross
+    if they are folded onto each other, within floating point.
     """
     _make_exact()
     pairs = _search(points, facets)
-    # Its predicates hold with the constants, and in the rounding, that a process begins with: in one that other
-    # libraries had worked in, facets of a good surface were seen to cross.
+    # libigl's predicates rely on constants and on a rounding mode set at the start of a process. After other libraries
+    # had changed these, facets of a good surface were reported as crossing.
     doubtful = np.array([len({*facets[i]} & {*facets[j]}) < 2 for i, j in pairs], dtype=bool)
     doubtful[doubtful] = ~_surely_cross(points[facets[pairs[doubtful]]])
     again = np.flatnonzero(doubtful)[:_MOST]
@@ -34,21 +34,21 @@ def crossings(points: FloatArray, facets: IntArray) -> IntArray:
 
 @cache
 def _make_exact() -> None:
-    """Set the constants of the exact predicates, which threads that search for the first time may find unset."""
+    """Set the constants of the exact predicates, which may be unset in threads that search for the first time."""
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.25, 0.25, -1], [0.25, 0.25, 1], [2, 2, 0]], dtype=float)
     assert len(_search(corners, np.array([[0, 1, 2], [3, 4, 5]]))) == 1
 
 
 def _search(points: FloatArray, facets: IntArray) -> IntArray:
-    from igl.predicates import find_self_intersections  # noqa: PLC0415 (studies without files do without)
+    from igl.predicates import find_self_intersections  # noqa: PLC0415 (only for studies with files)
 
     _, pairs, _ = find_self_intersections(np.ascontiguousarray(points), np.ascontiguousarray(facets))
     pairs = pairs.reshape(-1, 2)
-    return pairs[np.lexsort(pairs.T[::-1])]  # threads find them in any order
+    return pairs[np.lexsort(pairs.T[::-1])]  # threads return them in arbitrary order
 
 
 def _surely_cross(corners: FloatArray) -> BoolArray:
-    """Tell which pairs of triangles (n, 2, 3, 3) cross by more than rounding: an edge of one goes through the other."""
+    """Return a mask of pairs of triangles (n, 2, 3, 3) that cross by more than rounding: an edge pierces the other."""
     found = np.zeros(len(corners), dtype=bool)
     least = _SURE * np.ptp(corners, axis=(1, 2)).max(axis=1, initial=0.0) ** 3
     for one, other in ((0, 1), (1, 0)):
@@ -71,7 +71,7 @@ def _same_sign(values: FloatArray, least: FloatArray) -> BoolArray:
 
 
 def _cross(one: FloatArray, other: FloatArray) -> bool:
-    """Tell, in rational numbers, whether two triangles (3, 3) share anything but corners that are equal."""
+    """Return, in rational arithmetic, whether two triangles (3, 3) share anything but equal corners."""
     corners, polygon = ([(Fraction(x), Fraction(y), Fraction(z)) for x, y, z in part.tolist()] for part in (one, other))
     shared = {*corners} & {*polygon}
     a, b, c = corners

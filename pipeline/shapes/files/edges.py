@@ -1,4 +1,4 @@
-"""What holds facets together: their edges, shells and fans round points."""
+"""Topology of facets: edges, shells, and fans around points."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,13 +11,13 @@ from pipeline.shapes.triangles import half_edges
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """The edges of ``facets`` (m, 3): each of its 3m half edges, sorted so that those of one edge follow each other."""
+    """The 3m half edges of ``facets`` (m, 3), sorted so that those of one edge are consecutive."""
 
     facets: IntArray
 
     @cached_property
     def half(self) -> IntArray:
-        """From which point to which (3m, 2): half edge 3f + k is that of facet f from its corner k to the next one."""
+        """Start and end points (3m, 2): half edge 3f + k belongs to facet f, from its corner k to the next."""
         return half_edges(self.facets)
 
     @cached_property
@@ -32,13 +32,13 @@ class Edges:
 
     @cached_property
     def counts(self) -> IntArray:
-        """How many facets each edge has."""
+        """Number of facets of each edge."""
         starts = np.nonzero(np.diff(self._keys[self.order], prepend=-1))[0]
         return np.diff(starts, append=len(self.order))
 
     @cached_property
     def open(self) -> IntArray:
-        """Half edges whose edge has this one facet alone, in their direction."""
+        """Half edges whose edge has a single facet, in their direction."""
         return self._first[self.counts == 1]
 
     @cached_property
@@ -58,17 +58,17 @@ class Edges:
 
     @cached_property
     def turned(self) -> IntArray:
-        """Pairs whose two facets are seen from opposite sides: both run along their edge the same way."""
+        """Pairs whose two facets have opposite orientation: both run along their edge in the same direction."""
         return self.pairs[self.half[self.pairs[:, 0], 0] == self.half[self.pairs[:, 1], 0]]
 
     @cached_property
     def shells(self) -> tuple[int, IntArray]:
-        """How many shells there are, and that of each facet (m,): facets hang together over edges with two facets."""
+        """Number of shells, and that of each facet (m,): facets are connected by edges with two facets."""
         return components(self.pairs // 3, len(self.facets))
 
     def pinched(self) -> IntArray:
-        """Return the points in which more than one fan of facets meets; all edges have two facets."""
-        # The corner of a facet at the start of its half edge goes with that at the end of the other facet's.
+        """Return the points at which several fans of facets meet; all edges must have two facets."""
+        # The corner at the start of a facet's half edge is identified with the one at the end of the other facet's.
         first, second = self.pairs.T
         after = 3 * (second // 3) + (second + 1) % 3
         same = self.half[first, 0] == self.half[second, 1]
@@ -84,8 +84,8 @@ class Edges:
 
 
 def components(links: IntArray, count: int) -> tuple[int, IntArray]:
-    """Return how many parts ``count`` things fall into that ``links`` (n, 2) tie together, and the part of each."""
-    from scipy.sparse import coo_array  # noqa: PLC0415 (a fifth of a second, which studies without files do without)
+    """Return the number of connected components of ``count`` things with ``links`` (n, 2), and that of each thing."""
+    from scipy.sparse import coo_array  # noqa: PLC0415 (0.2 s to import; only for studies with files)
     from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
 
     graph = coo_array((np.ones(len(links), dtype=np.int8), (links[:, 0], links[:, 1])), shape=(count, count))
@@ -94,14 +94,14 @@ def components(links: IntArray, count: int) -> tuple[int, IntArray]:
 
 
 def oriented(edges: Edges) -> tuple[IntArray, IntArray | None]:
-    """Return facets turned so that all of a shell are seen from one side, and which ones were turned: the fewer.
+    """Return consistently oriented facets, and which ones were turned: the smaller set.
 
-    None instead of these, and the facets as they are, if a shell has but one side.
+    For a one-sided shell return the facets unchanged, and None.
     """
     facets, count = edges.facets, len(edges.facets)
     first, second = edges.pairs.T
     flip = (edges.half[first, 0] == edges.half[second, 0]).astype(np.int64)
-    # Each facet twice, as it is and turned: what hangs together is seen from the same side.
+    # Each facet twice, as it is and turned: connected copies have the same orientation.
     a, b = first // 3, second // 3
     links = np.concatenate([np.stack([a, b + flip * count], 1), np.stack([a + count, b + (1 - flip) * count], 1)])
     parts, part = components(links, 2 * count)

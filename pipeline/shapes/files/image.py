@@ -1,9 +1,9 @@
-"""From a label map to the surface round one label: smoothed, marched through by cubes.
+"""Surface of a label in a label map: Gaussian filter, then marching cubes.
 
-The steps between voxels are taken away by a Gaussian filter. Its level is the one that keeps the volume: the level of a
-half would lose 1 to 7 % of it. Of an ellipsoid of 60 × 45 × 30 mm, voxels of 1, 2 and 4 mm and the filter of
-:func:`default_smooth` leave .05, .12 and .39 mm between surfaces (root mean square), .02, .01 and .2 % of the
-volume, 2° to 3° between normals; without it .2, .4 and .8 mm and 23°.
+The filter removes the steps between voxels. The level of the surface is chosen to keep the volume; a level of one half
+would lose 1 to 7 % of it. Measured on an ellipsoid of 60 × 45 × 30 mm with voxels of 1, 2 and 4 mm and the filter of
+:func:`default_smooth`: distance of surfaces .05, .12 and .39 mm (root mean square), volume .02, .01 and .2 %, normals
+2° to 3°. Without the filter distances are .2, .4 and .8 mm, and normals 23° off.
 """
 
 from functools import lru_cache
@@ -22,32 +22,33 @@ from pipeline.shapes.files.shells import largest_shell
 from pipeline.shapes.files.whole import made_whole
 from pipeline.shapes.triangles import SurfaceError, Triangles, enclosed
 
-# Voxels apart from the largest piece, or enclosed by it, of more than this share of it are no noise.
+# Voxels outside the largest piece, or enclosed by it, are noise up to this share of it.
 MOST_APART = 0.05
-# Raise by hand when the same label gives another surface.
+# Increase by hand when the same label gives another surface.
 _METHOD = 1
-_REACH = 4.0  # of the filter, in standard deviations
-# The level is searched until the volume is kept to this share, in this many trials at most.
+_REACH = 4.0  # truncation of the filter, in standard deviations
+# Tolerance on the volume in the search for the level, and most steps.
 _SAME_VOLUME, _LEVELS = 5e-4, 6
-# A value is moved away from the level by this, lest facets become needles.
+# Values are moved away from the level by this much, to avoid sliver facets.
 _AWAY = 0.005
 _CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
 
 
 def load_image(path: Path, label: int, unit: float | None = None, smooth: float | None = None) -> Loaded:
-    """Return the surface round the voxels with a ``label`` in a NIfTI or NRRD file, and what was done to it.
+    """Return the surface of the voxels with a ``label`` in a NIfTI or NRRD file, and notices of what was changed.
 
-    ``unit`` (m) is needed only where the header names none; ``smooth`` (m) is the standard deviation of the filter.
-    The files are read again only when they have changed, and the surface is kept on disk.
+    ``unit`` (m) is needed only if the header names none; ``smooth`` (m) is the standard deviation of the filter. Files
+    are read again only when they have changed, and the surface is cached on disk.
 
     Raises:
-        SurfaceError: if the label does not bound one piece of tissue; says what was found, and what mends it.
+        SurfaceError: if the label does not bound one piece of tissue; the message says what was found and how to repair
+            it.
     """
     header, *data = _files(path, state_of(path))
     try:
         states = (state_of(header), *map(state_of, data))
     except SurfaceError as error:
-        raise SurfaceError(f"the file of its data, `{data[0]}`, {error}") from error
+        raise SurfaceError(f"the data file of its header, `{data[0]}`, {error}") from error
     return _load((header, *data), states, label, unit, smooth)
 
 
@@ -78,15 +79,15 @@ def _load(
 
 
 def default_smooth(spacing: FloatArray) -> float:
-    """Return the standard deviation (m) of the filter for voxels of sizes ``spacing`` (3,): one and a half of them.
+    """Return the standard deviation (m) of the filter for voxels of sizes ``spacing`` (3,): one and a half voxels.
 
-    That of thick slices is their distance, which is what is known of the surface between them.
+    For thick slices it is their distance, because the surface between them is unknown.
     """
     return max(1.5 * float(np.prod(spacing)) ** (1 / 3), float(spacing.max()))
 
 
 def surface_of(labels: LabelMap, label: int, smooth: float | None = None) -> Loaded:
-    """Return the surface round the voxels with a ``label``."""
+    """Return the surface of the voxels with a ``label``."""
     mask = of_label(labels, label)
     mask, start, notices = _one_piece(mask, float(np.prod(labels.spacing)))
     deviation = default_smooth(labels.spacing) if smooth is None else smooth
@@ -97,13 +98,13 @@ def surface_of(labels: LabelMap, label: int, smooth: float | None = None) -> Loa
     if enclosed(points, facets) < 0:  # a mirrored frame
         facets = np.ascontiguousarray(facets[:, ::-1])
     facets, apart = largest_shell(points, facets, 1.0, MOST_APART)
-    # Each facet lies within a cube of voxels of its own: none can cross another.
+    # Each facet is inside its own cube of voxels: facets cannot cross.
     triangles, more = made_whole(Raw(points, facets), 1.0, may_cross=False)
     return Loaded(triangles, (*labels.notices, *notices, *apart, *more))
 
 
 def _one_piece(mask: Any, voxel: float) -> tuple[Any, IntArray, list[str]]:
-    """Return the largest piece of a mask, cut out, without hollows; the indices where it starts; what was done."""
+    """Return the largest piece of a mask, cropped and without hollows, the index of its corner, and notices."""
     from scipy import ndimage  # noqa: PLC0415
 
     notices = []
@@ -113,7 +114,7 @@ def _one_piece(mask: Any, voxel: float) -> tuple[Any, IntArray, list[str]]:
     if count > 1:
         sizes = np.bincount(parts.ravel())[1:]
         share = 1 - sizes.max() / sizes.sum()
-        said = f"{count - 1:,} pieces apart from the largest, {100 * share:.2g} % of its voxels"
+        said = f"{count - 1:,} pieces besides the largest, {100 * share:.2g} % of its voxels"
         if share > MOST_APART:
             raise SurfaceError(f"the label has {said}: which one is meant? Give each a label of its own")
         notices.append(f"{said}, left out")
@@ -122,7 +123,7 @@ def _one_piece(mask: Any, voxel: float) -> tuple[Any, IntArray, list[str]]:
         box = tuple(slice(b.start + i.start, b.start + i.stop) for b, i in zip(box, inside, strict=True))
     ends = sum((part.start == 0) + (part.stop == size) for part, size in zip(box, mask.shape, strict=True))
     if ends:
-        notices.append(f"it reaches the image's end on {ends} of 6 sides: cut off flat there, do not touch it near by")
+        notices.append(f"cut off flat at the image's boundary on {ends} of 6 sides: do not touch it near these sides")
     filled = ndimage.binary_fill_holes(cut)
     hollow = int(filled.sum() - cut.sum())
     if hollow > MOST_APART * cut.sum():
@@ -141,7 +142,7 @@ def _smoothed(mask: Any, sigma: FloatArray) -> tuple[FloatArray, IntArray]:
         return march(values, 0.5)
     volume = float(mask.sum())
     values = ndimage.gaussian_filter(values, sigma, truncate=_REACH)
-    # Secants, from a half towards where the volume is that of the mask.
+    # Secant method for the level at which the volume is that of the mask, from one half.
     level, before = 0.5, None
     for _ in range(_LEVELS):
         points, facets = march(values, level)
@@ -155,10 +156,10 @@ def _smoothed(mask: Any, sigma: FloatArray) -> tuple[FloatArray, IntArray]:
 
 
 def march(values: Any, level: float) -> tuple[FloatArray, IntArray]:
-    """Return the surface where values (nx, ny, nz) pass the level: points, in indices, and facets."""
+    """Return the surface at which values (nx, ny, nz) equal the level: points, in indices, and facets."""
     import igl  # noqa: PLC0415
 
-    level = float(np.float32(level))  # the values' own precision: what is above it must be so wherever it is asked
+    level = float(np.float32(level))  # in the values' precision, so that all comparisons agree
     above = values >= level
     shifted = [
         above[tuple(slice(o, n - 1 + o) for o, n in zip(corner, values.shape, strict=True))] for corner in _CORNERS
@@ -166,7 +167,7 @@ def march(values: Any, level: float) -> tuple[FloatArray, IntArray]:
     crossed = np.argwhere(np.logical_or.reduce(shifted) & ~np.logical_and.reduce(shifted))
     corners = np.ravel_multi_index(tuple((crossed[:, None] + np.array(_CORNERS)).transpose(2, 0, 1)), values.shape)
     if not len(crossed):
-        raise SurfaceError("the label is thinner than the filter is wide: give a smaller `smooth`")
+        raise SurfaceError("the label is thinner than the width of the filter: give a smaller `smooth`")
     used, cells = np.unique(corners, return_inverse=True)
     at = values.ravel()[used].astype(np.float64)
     at = np.where(np.abs(at - level) < _AWAY, level + np.copysign(_AWAY, at - level), at)

@@ -1,4 +1,4 @@
-"""What the files of bodies are read into."""
+"""Results of reading a body's file."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from pipeline.shapes.triangles import Triangles
 
 @dataclass(frozen=True)
 class Loaded:
-    """A surface, and what was done to it that its author should know."""
+    """A surface, and notices about changes that the author of the study should know."""
 
     triangles: Triangles
     notices: tuple[str, ...]
@@ -16,12 +16,12 @@ class Loaded:
 
 @dataclass(frozen=True, eq=False)
 class Solid(Loaded):
-    """A solid's ``triangles``, and what is known of its faces.
+    """A CAD solid as ``triangles``, with data of its faces.
 
-    ``normals`` (m, 3, 3) are the outward ones of the true surface at the corners of the facets; ``face`` (m) is the
-    number of the face that each facet is on; ``planes`` tells of faces whether they are plane, ``radius`` (m) how
-    round, ``names`` which numbers a name stands for. ``box`` (2, 3) and ``volume`` are in m and m³, ``content`` is the
-    hash of the file.
+    ``normals`` (m, 3, 3) are the outward ones of the true surface at the corners of the facets, ``face`` (m) the number
+    of each facet's face. By face, ``planes`` is a mask of plane faces and ``radius`` (m) the radius of curvature;
+    ``names`` has the face numbers of each name. ``box`` (2, 3) and ``volume`` are in m and m³, ``content`` is the hash
+    of the file.
     """
 
     normals: FloatArray

@@ -1,4 +1,4 @@
-"""What is mended unasked, because nothing is lost by it, and told."""
+"""Repairs that are always made, because they lose nothing, and reported."""
 
 import numpy as np
 
@@ -6,16 +6,15 @@ from pipeline.arrays import FloatArray, IntArray
 from pipeline.shapes.files.edges import Edges
 from pipeline.shapes.files.weld import weld
 
-# Points of open edges that are nearer to each other than this share of the extent are one: a file's numbers have six
-# digits or so.
+# Points of open edges closer than this share of the extent are identical: numbers in files have about six digits.
 NEAR = 1e-5
-# A facet whose height is this share of its longest edge has no area.
+# A facet has no area if its height is below this share of its longest edge.
 FLAT = 1e-7
 _PASSES = 20
 
 
 def joined(points: FloatArray, facets: IntArray) -> tuple[FloatArray, IntArray, list[str]]:
-    """Return a surface whose facets hang together, as far as their corners are in the same places."""
+    """Return a surface with facets joined where their corners coincide, and a notice."""
     facets, notices = without_doubles(facets)
     if not len(Edges(facets).open):
         return points, facets, notices
@@ -34,8 +33,8 @@ def joined(points: FloatArray, facets: IntArray) -> tuple[FloatArray, IntArray, 
 
 
 def _near(points: FloatArray, chosen: IntArray) -> IntArray | None:
-    """Return, of each point, the first one near it, among those ``chosen``; None if there are none."""
-    from scipy.spatial import cKDTree  # noqa: PLC0415 (most files need none)
+    """Return, for each point, the first of the ``chosen`` points near it; None if no points are near each other."""
+    from scipy.spatial import cKDTree  # noqa: PLC0415 (few files need it)
 
     reach = NEAR * float(np.ptp(points, axis=0).max())
     pairs = cKDTree(points[chosen]).query_pairs(reach, output_type="ndarray")
@@ -48,18 +47,18 @@ def _near(points: FloatArray, chosen: IntArray) -> IntArray | None:
 
 
 def without_doubles(facets: IntArray) -> tuple[IntArray, list[str]]:
-    """Return facets without those with two corners in one point, and without copies of others."""
+    """Remove facets with two equal corners, and duplicates; return the others and notices."""
     notices = []
     flat = (facets == np.roll(facets, 1, axis=1)).any(axis=1)
     if flat.any():
         facets = facets[~flat]
         notices.append(f"{flat.sum():,} facets with two corners in one point left out")
-    # Turned so that the lowest number comes first, which keeps the side from which they are seen.
+    # Rotated so that the lowest number comes first, which keeps the orientation.
     shift = facets.argmin(axis=1)
     turned = facets[np.arange(len(facets))[:, None], (shift[:, None] + np.arange(3)) % 3]
     _, first = np.unique(_key(turned), return_index=True)
     if len(first) < len(facets):
-        notices.append(f"{len(facets) - len(first):,} facets that are there twice left out")
+        notices.append(f"{len(facets) - len(first):,} duplicate facets left out")
         facets = facets[np.sort(first)]
     return facets, notices
 
@@ -73,9 +72,9 @@ def _key(facets: IntArray) -> IntArray:
 
 
 def without_flats(points: FloatArray, facets: IntArray) -> tuple[IntArray, list[str]]:
-    """Return a closed surface without facets whose corners lie in a line.
+    """Return a closed surface without facets whose corners are collinear.
 
-    The longest edge of each is turned: it gives its middle corner to the facet on the other side, which it splits.
+    The longest edge of each such facet is flipped: its middle corner then splits the facet on the other side.
     """
     total = 0
     for _ in range(_PASSES):
@@ -87,7 +86,7 @@ def without_flats(points: FloatArray, facets: IntArray) -> tuple[IntArray, list[
             break
         facets, count = turned
         total += count
-    return facets, [f"{total:,} edges beside facets without area turned"] if total else []
+    return facets, [f"{total:,} edges beside facets without area flipped"] if total else []
 
 
 def flats(points: FloatArray, facets: IntArray) -> IntArray:
@@ -106,7 +105,7 @@ def _lengths(points: FloatArray, facets: IntArray) -> FloatArray:
 
 
 def _turn(points: FloatArray, facets: IntArray, flat: IntArray) -> tuple[IntArray, int] | None:
-    """Turn the longest edges of the ``flat`` facets, as far as no two of them are neighbours."""
+    """Flip the longest edges of the ``flat`` facets, as far as no two of them are neighbours."""
     pairs = Edges(facets).pairs
     other = np.full(3 * len(facets), -1)
     other[pairs[:, 0]], other[pairs[:, 1]] = pairs[:, 1], pairs[:, 0]
@@ -122,7 +121,7 @@ def _turn(points: FloatArray, facets: IntArray, flat: IntArray) -> tuple[IntArra
         if far == middle or int(facets[neighbour, across % 3]) != b:
             continue
         result[facet], result[neighbour] = (a, far, middle), (far, b, middle)
-        # Their neighbours, too: what is across an edge has changed.
+        # Their neighbours, too: the facet across an edge has changed.
         touched |= {facet, neighbour} | {int(other[3 * f + k]) // 3 for f in (facet, neighbour) for k in range(3)}
         count += 1
     return (result, count) if count else None

@@ -1,4 +1,4 @@
-"""OBJ: lines of points (v) and of facets (f); all else, textures, normals, groups, is passed over."""
+"""OBJ: lines of points (v) and of facets (f); textures, normals and groups are ignored."""
 
 import numpy as np
 
@@ -10,10 +10,10 @@ _MARK = 1e307
 
 
 def parse(data: bytes) -> Raw:
-    """Read the content of an OBJ file.
+    """Parse the content of an OBJ file.
 
     Raises:
-        SurfaceError: if it is no OBJ file, or has lines that cannot be read.
+        SurfaceError: if it is no OBJ file, or has invalid lines.
     """
     if b"\0" in data:
         raise SurfaceError("not an OBJ file: it is not text")
@@ -34,7 +34,7 @@ def parse(data: bytes) -> Raw:
     corners, counts = _facets(lines, is_facet, np.cumsum(is_point)[is_facet])
     if corners.min(initial=0) < 0 or corners.max(initial=0) >= len(points):
         wrong = corners[(corners < 0) | (corners >= len(points))][0] + 1
-        raise SurfaceError(f"a facet has point {wrong:,}, and there are {len(points):,}: truncated? export it again")
+        raise SurfaceError(f"a facet names point {wrong:,} of {len(points):,}: truncated? export it again")
     return Raw(points, triangulate(points, corners, counts))
 
 
@@ -44,7 +44,7 @@ def _rows(lines: list[bytes], chosen: BoolArray) -> list[bytes]:
 
 
 def _facets(lines: list[bytes], is_facet: BoolArray, before: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the corners of all facets, numbered from nought, and how many each has."""
+    """Return the corners of all facets, numbered from zero, and how many each has."""
     rows = _rows(lines, is_facet)
     if any(b"/" in row for row in rows):
         rows = [b" ".join([corner.partition(b"/")[0] for corner in row.split()]) for row in rows]
@@ -53,12 +53,12 @@ def _facets(lines: list[bytes], is_facet: BoolArray, before: IntArray) -> tuple[
         raise SurfaceError(_fault(lines, "f"))
     values, counts = read
     corners = values.astype(np.int64)
-    # Negative ones count backwards from the last point so far.
+    # Negative numbers count backwards from the last point read.
     return np.where(corners > 0, corners - 1, corners + np.repeat(before, counts)), counts
 
 
 def _fault(lines: list[bytes], letter: str) -> str:
-    """Say which line is not as it should be."""
+    """Return a message about the first invalid line."""
     for number, line in enumerate(lines, 1):
         words = line.partition(b"#")[0].split()
         if not words or words[0] != letter.encode():
@@ -69,8 +69,8 @@ def _fault(lines: list[bytes], letter: str) -> str:
             is_right = all(_is_corner(word) for word in words[1:])
         if not is_right:
             what = "three coordinates" if letter == "v" else "numbers of points, from 1 on"
-            return f"line {number:,}, `{line.decode(errors='replace')[:60]}`, has not {what}: export it again"
-    return f"lines of `{letter}` that cannot be read: export it again"
+            return f"line {number:,}, `{line.decode(errors='replace')[:60]}`, does not have {what}: export it again"
+    return f"lines of `{letter}` that are invalid: export it again"
 
 
 def _is_corner(word: bytes) -> bool:

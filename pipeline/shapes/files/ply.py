@@ -1,4 +1,4 @@
-"""PLY, as text and binary with either order of bytes: elements of properties, of which points and facets are read."""
+"""PLY, as text and binary in either byte order: elements with properties; points and facets are read."""
 
 from dataclasses import dataclass
 
@@ -32,7 +32,7 @@ _CORNERS = ("vertex_indices", "vertex_index")
 
 @dataclass(frozen=True)
 class _Property:
-    """A number of an element, or, where ``count`` is the type of their count, a list of them."""
+    """A scalar property, or, with ``count`` as the type of its length, a list property."""
 
     name: str
     kind: str
@@ -47,16 +47,16 @@ class _Element:
 
 
 def parse(data: bytes) -> Raw:
-    """Read the content of a PLY file.
+    """Parse the content of a PLY file.
 
     Raises:
-        SurfaceError: if it is no PLY file, not a whole one, or holds no facets.
+        SurfaceError: if it is no PLY file, is incomplete, or has no facets.
     """
     order, elements, start = _header(data)
     names = [element.name for element in elements]
     if "vertex" not in names or "face" not in names:
         strips = " (write its triangle strips as facets)" if "tristrips" in names else ""
-        raise SurfaceError(f"no surface: it holds {', '.join(names) or 'nothing'}, wanted are vertex and face{strips}")
+        raise SurfaceError(f"no surface: it has {', '.join(names) or 'nothing'}, needed are vertex and face{strips}")
     source = _Binary(data[start:], order) if order else _Text(data[start:])
     points, corners, counts = np.empty((0, 3)), np.empty(0, np.int64), np.empty(0, np.int64)
     for element in elements:
@@ -72,22 +72,22 @@ def parse(data: bytes) -> Raw:
             corners, counts = lists[found[0]]
     if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
         wrong = corners[(corners < 0) | (corners >= len(points))][0]
-        raise SurfaceError(f"a facet has point {wrong:,}, and they are numbered from 0 to {len(points) - 1:,}")
+        raise SurfaceError(f"a facet names point {wrong:,}, but points have numbers 0 to {len(points) - 1:,}")
     return Raw(points, triangulate(points, corners, counts))
 
 
 def _coordinates(values: dict[str, FloatArray]) -> FloatArray:
     if not {"x", "y", "z"} <= set(values):
-        raise SurfaceError(f"its points have {', '.join(values)}, wanted are x, y and z")
-    with np.errstate(invalid="ignore"):  # what is not finite is told of later
+        raise SurfaceError(f"its points have {', '.join(values)}, needed are x, y and z")
+    with np.errstate(invalid="ignore"):  # check_numbers reports values that are not finite
         return np.column_stack([values[name] for name in "xyz"]).astype(np.float64)
 
 
 def _header(data: bytes) -> tuple[str, list[_Element], int]:
-    """Return the order of bytes ("" is text), the elements, and where they begin."""
+    """Return the byte order ("" for text), the elements, and the offset of their data."""
     end = data.find(b"end_header")
     if not data.startswith(b"ply") or end < 0:
-        raise SurfaceError("not a PLY file: it does not begin with `ply`, a header and `end_header`")
+        raise SurfaceError("not a PLY file: it must begin with `ply`, a header and `end_header`")
     start = data.find(b"\n", end) + 1
     order, elements = None, list[_Element]()
     for line in data[:end].decode("ascii", "replace").splitlines()[1:]:
@@ -103,9 +103,9 @@ def _header(data: bytes) -> tuple[str, list[_Element], int]:
             case ["property", kind, name] if elements and kind in _TYPES:
                 elements[-1] = _with(elements[-1], _Property(name, _TYPES[kind]))
             case _:
-                raise SurfaceError(f"`{line.strip()[:60]}` in its header is not PLY's: export it again")
+                raise SurfaceError(f"`{line.strip()[:60]}` in its header is not PLY: export it again")
     if order is None:
-        raise SurfaceError(f"its header names no format; known are {', '.join(_ORDERS)}")
+        raise SurfaceError(f"its header names no known format; allowed are {', '.join(_ORDERS)}")
     return order, elements, start or len(data)
 
 
@@ -113,17 +113,17 @@ def _with(element: _Element, added: _Property) -> _Element:
     return _Element(element.name, element.rows, (*element.properties, added))
 
 
-# Of an element: its numbers by property; of its lists the entries, and how many each row has.
+# Values of an element: scalars by property, and for lists their entries and the length in each row.
 _Values = tuple[dict[str, FloatArray], dict[str, tuple[IntArray, IntArray]]]
 
 
 class _Text:
-    """Numbers written as text, taken one after another."""
+    """Numbers as text, read in sequence."""
 
     def __init__(self, text: bytes):
         values = numbers(text)
         if values is None:
-            raise SurfaceError("its text holds what is no number: export it again")
+            raise SurfaceError("its text contains words that are not numbers: export it again")
         self.values, self.position = values, 0
 
     def take(self, kind: str, count: int) -> FloatArray:
@@ -132,7 +132,7 @@ class _Text:
         return self.values[self.position - count : self.position]
 
     def rows(self, kinds: list[tuple[str, int]], rows: int) -> list[FloatArray] | None:
-        """Return the next rows of so many numbers of each kind, None where they are not there."""
+        """Return the next rows, by kind and count of their numbers; None if the data end before."""
         widths = [count for _, count in kinds]
         block = self.take("", sum(widths) * rows)
         if len(block) < sum(widths) * rows:
@@ -141,7 +141,7 @@ class _Text:
 
 
 class _Binary:
-    """Numbers written as bytes, taken one after another."""
+    """Numbers as bytes, read in sequence."""
 
     def __init__(self, data: bytes, order: str):
         self.data, self.order, self.position = data, order, 0
@@ -154,7 +154,7 @@ class _Binary:
         return np.frombuffer(part, self.order + kind) if len(part) == size else np.empty(0)
 
     def rows(self, kinds: list[tuple[str, int]], rows: int) -> list[FloatArray] | None:
-        """Return the next rows of so many numbers of each kind, None where they are not there."""
+        """Return the next rows, by kind and count of their numbers; None if the data end before."""
         row = np.dtype([(f"{k}", self.order + kind, (count,)) for k, (kind, count) in enumerate(kinds)])
         start, self.position = self.position, self.position + row.itemsize * rows
         if self.position > len(self.data):
@@ -164,7 +164,7 @@ class _Binary:
 
 
 def _read(source: _Text | _Binary, element: _Element) -> _Values:
-    """Return an element: at once where the lists of all rows are as long as those of the first."""
+    """Return an element: at once if the lists of all rows are as long as those of the first."""
     start = source.position
     lengths = _walk(source, element, 1)[1] if element.rows else {}
     source.position = start

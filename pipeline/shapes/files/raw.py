@@ -1,4 +1,4 @@
-"""What the readers of all formats share: polygons as a file holds them, and numbers written as text."""
+"""Data and helpers shared by all formats: polygons as in a file, and numbers as text."""
 
 import warnings
 from dataclasses import dataclass
@@ -8,13 +8,13 @@ import numpy as np
 from pipeline.arrays import BoolArray, FloatArray, IntArray
 from pipeline.shapes.triangles import SurfaceError
 
-# More facets than any surface to be remeshed needs: those of a whole body scanned at 1 mm.
+# Most facets of a surface that will be remeshed: a whole body scanned at 1 mm has fewer.
 MOST_FACETS = 2_000_000
 
 
 @dataclass(frozen=True)
 class Raw:
-    """Points (n, 3) in the unit of a file, triangles (m, 3) between them, and what the reader passed over."""
+    """Points (n, 3) in the unit of a file, triangles (m, 3) between them, and notices about ignored parts."""
 
     points: FloatArray
     facets: IntArray
@@ -22,7 +22,7 @@ class Raw:
 
 
 def limit(facets: int) -> None:
-    """Refuse more facets than are reasonable, before memory is taken for them."""
+    """Refuse too many facets, before memory is allocated for them."""
     if facets > MOST_FACETS:
         raise SurfaceError(
             f"{facets:,} facets, more than {MOST_FACETS:,}: fewer give the same force. "
@@ -31,9 +31,9 @@ def limit(facets: int) -> None:
 
 
 def numbers(text: bytes) -> FloatArray | None:
-    """Return the numbers of a text that holds nothing else, None if it does."""
+    """Return the numbers of a text, None if it contains anything else."""
     with warnings.catch_warnings():
-        warnings.simplefilter("error", DeprecationWarning)  # what numpy gives where a text ends in no number
+        warnings.simplefilter("error", DeprecationWarning)  # numpy warns where text is not a number
         try:
             return np.fromstring(text, sep=" ")
         except (DeprecationWarning, ValueError):
@@ -43,7 +43,7 @@ def numbers(text: bytes) -> FloatArray | None:
 def table(rows: list[bytes], mark: float) -> tuple[FloatArray, IntArray] | None:
     """Return the numbers in ``rows`` and how many each row has; None if there is anything else.
 
-    ``mark`` is a number that does not occur.
+    ``mark`` is a number that does not occur, used as separator.
     """
     values = numbers(f" {mark!r} ".encode().join([*rows, b""]))
     if values is None:
@@ -56,19 +56,19 @@ def table(rows: list[bytes], mark: float) -> tuple[FloatArray, IntArray] | None:
 
 
 def whole(values: FloatArray) -> IntArray:
-    """Return numbers of points.
+    """Return point numbers as integers.
 
     Raises:
-        SurfaceError: if one of them is not a whole number.
+        SurfaceError: if one of them is not an integer.
     """
     wrong = ~np.isfinite(values) | (values != np.floor(values))
     if wrong.any():
-        raise SurfaceError(f"a facet has point {values[wrong][0]:g}, which is no number of a point: export it again")
+        raise SurfaceError(f"a facet names point {values[wrong][0]:g}, which is not an integer: export it again")
     return values.astype(np.int64)
 
 
 def is_number(word: bytes) -> bool:
-    """Tell whether a word is a number."""
+    """Return whether a word is a number."""
     try:
         float(word)
     except ValueError:
@@ -77,17 +77,15 @@ def is_number(word: bytes) -> bool:
 
 
 def triangulate(points: FloatArray, corners: IntArray, counts: IntArray) -> IntArray:
-    """Return triangles of polygons: ``counts`` (m,) says how many of the ``corners`` belong to each.
+    """Return triangles of polygons; ``counts`` (m,) are the numbers of ``corners`` of each.
 
-    Polygons with four corners and more are cut from the corner from which all their triangles turn the same way.
+    A polygon with more than three corners is cut from a corner from which all triangles have the same orientation.
 
     Raises:
         SurfaceError: if a polygon has fewer than three corners, or no such corner.
     """
     if len(counts) and counts.min() < 3:
-        raise SurfaceError(
-            f"a facet with {counts.min()} corners, where three are the fewest: write it out as triangles"
-        )
+        raise SurfaceError(f"a facet with {counts.min()} corners, but a facet needs three: write it out as triangles")
     starts = np.cumsum(counts) - counts
     if (counts == 3).all():
         return corners.reshape(-1, 3)
@@ -96,7 +94,7 @@ def triangulate(points: FloatArray, corners: IntArray, counts: IntArray) -> IntA
     for count in np.unique(counts):
         (which,) = np.nonzero(counts == count)
         polygons = corners[starts[which][:, None] + np.arange(count)]
-        with np.errstate(all="ignore"):  # what is not finite is told of later
+        with np.errstate(all="ignore"):  # check_numbers reports values that are not finite
             groups.append(_fans(points, polygons).reshape(-1, 3))
         order.append(np.repeat(which, count - 2))
     return np.concatenate(groups)[np.argsort(np.concatenate(order), kind="stable")]

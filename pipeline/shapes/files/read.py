@@ -1,4 +1,4 @@
-"""From a file to a closed surface in metres, or to what is wrong with it."""
+"""Reader of surface files: a closed surface in metres, or an error that names the defect."""
 
 from collections.abc import Callable
 from functools import lru_cache
@@ -13,41 +13,41 @@ from pipeline.shapes.files.whole import made_whole
 from pipeline.shapes.triangles import SurfaceError
 
 _PARSERS: dict[str, Callable[[bytes], Raw]] = {".stl": stl.parse, ".ply": ply.parse, ".obj": obj.parse}
-# That of 2,000,000 facets of an STL file as text.
+# Size of 2,000,000 facets in an STL file as text.
 LARGEST_FILE = 600_000_000  # bytes
 
 
 def load_surface(path: Path, unit: float, repair: bool = False, smooth: float | None = None) -> Loaded:
     """Return the surface in an STL, PLY or OBJ file whose numbers are in a ``unit`` (m).
 
-    ``repair`` mends what can be mended; ``smooth`` (m) takes bumps of such lengths off. The file is read again only
-    when it has changed.
+    ``repair`` allows repairs of a broken surface; ``smooth`` (m) is the length of the smoothing filter. The file is
+    read again only when it has changed.
 
     Raises:
-        SurfaceError: if it does not bound one piece of tissue; says what was found, and what mends it.
+        SurfaceError: if it does not bound one piece of tissue; the message says what was found and how to repair it.
     """
     return _load(path, *state_of(path), unit, repair, smooth)
 
 
 def state_of(path: Path) -> tuple[int, int]:
-    """Return when a file was changed last (ns), and its size (bytes): what it is read again for.
+    """Return the time of a file's last change (ns) and its size (bytes), by which it is cached.
 
     Raises:
-        SurfaceError: if it is not there, or is no file that has an end.
+        SurfaceError: if it does not exist, or is not a regular file.
     """
     try:
         state = path.stat()
     except OSError as error:
         raise SurfaceError(f"cannot be read: {error.strerror or error}") from None
     if not S_ISREG(state.st_mode):
-        raise SurfaceError("cannot be read: it is no plain file, but a directory, a device or a pipe")
+        raise SurfaceError("cannot be read: it is not a regular file, but a directory, a device or a pipe")
     return state.st_mtime_ns, state.st_size
 
 
 @lru_cache(maxsize=8)
 def _load(path: Path, _changed: int, size: int, unit: float, repair: bool, smooth: float | None) -> Loaded:
     if path.suffix.lower() not in _PARSERS:
-        raise SurfaceError(f"its name ends in `{path.suffix}`; read are {', '.join(_PARSERS)}")
+        raise SurfaceError(f"its name ends in `{path.suffix}`; allowed are {', '.join(_PARSERS)}")
     if size == 0:
         raise SurfaceError("is empty: copy or export it again")
     if size > LARGEST_FILE:
@@ -64,7 +64,7 @@ def _load(path: Path, _changed: int, size: int, unit: float, repair: bool, smoot
 
 
 def _parsed(data: bytes, ending: str) -> Raw:
-    """Read the content as what the ending says; where that fails, say what it looks like instead."""
+    """Parse the content by the file's ending; if that fails, report the format that it looks like."""
     try:
         return _PARSERS[ending](data)
     except SurfaceError as error:

@@ -1,7 +1,7 @@
-"""What `repair = true` does: what is lost or made up by it is measured, told, and refused where it is much.
+"""Repairs by `repair = true`: their effect is measured, reported, and refused where it is too large.
 
-First what is exact, facets turned and crumbs left out; then MeshFix (M. Attene, The Visual Computer 26, 1393, 2010),
-which closes holes, and cuts out and closes anew where facets cross.
+Exact repairs come first: facets are turned, and small shells left out. MeshFix (M. Attene, The Visual Computer 26,
+1393, 2010) then closes holes, and cuts out and closes regions where facets cross.
 """
 
 import numpy as np
@@ -14,16 +14,16 @@ from pipeline.shapes.files.shells import largest_shell
 from pipeline.shapes.files.weld import drop_unused, weld
 from pipeline.shapes.triangles import SurfaceError, enclosed
 
-# Shares by which the volume, and the extent along each axis, may change: what changes more is another body.
+# Largest relative change of the volume, and of the extent along each axis: otherwise it is another body.
 MOST_VOLUME, MOST_EXTENT = 0.05, 0.02
 _MENDS = "`repair = true`"
 
 
 def repaired(points: FloatArray, facets: IntArray, unit: float) -> tuple[FloatArray, IntArray, list[str]]:
-    """Return a surface that bounds one piece of tissue, and what was done.
+    """Return a surface that bounds one piece of tissue, and notices about the repairs.
 
     Raises:
-        SurfaceError: if it cannot be mended, or would be another body.
+        SurfaceError: if it cannot be repaired, or would become another body.
     """
     turned, which = oriented(Edges(facets))
     notices = []
@@ -45,11 +45,11 @@ def repaired(points: FloatArray, facets: IntArray, unit: float) -> tuple[FloatAr
 
 def _meshfix(points: FloatArray, facets: IntArray, found: str) -> tuple[FloatArray, IntArray, str]:
     try:
-        from pymeshfix._meshfix import PyTMesh  # noqa: PLC0415 (files that are right do without)
+        from pymeshfix._meshfix import PyTMesh  # noqa: PLC0415 (only for broken files)
     except ImportError:
         raise SurfaceError(
-            f"{found}; `repair` needs MeshFix for that: `pip install pymeshfix` (it is under the GPL), or mend it in "
-            "MeshLab"
+            f"{found}; `repair` needs MeshFix for that: `pip install pymeshfix` (its licence is the GPL), or repair it "
+            "in MeshLab"
         ) from None
 
     before, used = drop_unused(points, facets)
@@ -60,7 +60,7 @@ def _meshfix(points: FloatArray, facets: IntArray, found: str) -> tuple[FloatArr
     is_clean = program.clean(10, 3)
     after, mended = program.return_arrays()
     if not is_clean or not len(mended):
-        raise SurfaceError(f"{found}; `repair` did not succeed: mend it in MeshLab")
+        raise SurfaceError(f"{found}; `repair` did not succeed: repair it in MeshLab")
     points, number = weld(np.asarray(after, dtype=np.float64))
     points, facets, _ = joined(points, number[mended.astype(np.int64)])
     volume = enclosed(points, facets) / enclosed(before, used) - 1
@@ -69,7 +69,7 @@ def _meshfix(points: FloatArray, facets: IntArray, found: str) -> tuple[FloatArr
     said = f"volume {volume:+.2%}, extent {extent:+.2%}, {len(used):,} facets before, {len(facets):,} after"
     if not abs(volume) <= MOST_VOLUME or not abs(extent) <= MOST_EXTENT:
         raise SurfaceError(
-            f"{found}; `repair` would make another body of it ({said}; allowed are {MOST_VOLUME:.0%} and "
-            f"{MOST_EXTENT:.0%}): mend it in MeshLab, or segment it anew"
+            f"{found}; `repair` would change the body too much ({said}; allowed are {MOST_VOLUME:.0%} and "
+            f"{MOST_EXTENT:.0%}): repair it in MeshLab, or segment it again"
         )
     return points, facets, f"repaired by MeshFix: {found}. Changes: {said}"

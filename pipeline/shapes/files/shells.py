@@ -1,4 +1,4 @@
-"""Crumbs beside a surface and bubbles in it."""
+"""Small separate shells outside a surface, and bubbles inside it."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from pipeline.shapes.files.edges import Edges
 
 
 def largest_shell(points: FloatArray, facets: IntArray, unit: float, most: float) -> tuple[IntArray, list[str]]:
-    """Return the facets of the shell with the largest volume, and what was left out.
+    """Return the facets of the shell with the largest volume, and notices about the others.
 
     Raises:
         SurfaceError: if the others enclose more than the share ``most`` of its volume.

@@ -1,4 +1,4 @@
-"""What a STEP file (ISO 10303-21) says that the geometry kernel does not pass on: its unit, and names of faces."""
+"""Data of a STEP file (ISO 10303-21) that the geometry kernel does not pass on: its unit, and names of faces."""
 
 import re
 
@@ -11,7 +11,7 @@ _ENTITY = re.compile(r"#(\d{1,18})\s*=\s*((?:'(?:[^']|'')*'|[^';])*);")
 _REFERENCE = re.compile(r"#(\d{1,18})")
 _NAME = re.compile(r"ADVANCED_FACE\s*\(\s*'((?:[^']|'')*)'")
 _PREFIXES = {"$": "m", ".CENTI.": "cm", ".MILLI.": "mm", ".MICRO.": "um"}
-# What programs write for faces that have no name.
+# Placeholders that programs write for faces without a name.
 _NAMELESS = ("", "NONE", "$")
 
 Entities = dict[int, str]
@@ -25,7 +25,7 @@ def entities_of(data: bytes) -> Entities:
     """
     text = data.decode("latin-1")
     if not text.lstrip().startswith("ISO-10303-21"):
-        raise SurfaceError("is no STEP file: it does not begin with `ISO-10303-21;`")
+        raise SurfaceError("is not a STEP file: it must begin with `ISO-10303-21;`")
     if "END-ISO-10303-21" not in text:
         raise SurfaceError("is truncated: `END-ISO-10303-21;` is missing; copy or export it again")
     body = text[text.find("DATA;") :]
@@ -33,7 +33,7 @@ def entities_of(data: bytes) -> Entities:
 
 
 def unit_of(entities: Entities) -> str | None:
-    """Return the unit of the coordinates; None if it is another one, or several are used."""
+    """Return the unit of the coordinates; None if it is unknown, or several are used."""
     found = set()
     for content in entities.values():
         if "LENGTH_UNIT" not in content.replace("LENGTH_UNIT_", ""):
@@ -42,13 +42,13 @@ def unit_of(entities: Entities) -> str | None:
             found.add("in" if "'INCH'" in content.upper() else None)
         elif prefix := re.search(r"SI_UNIT\s*\(\s*(\$|\.\w+\.)\s*,\s*\.METRE\.\s*\)", content):
             found.add(_PREFIXES.get(prefix[1]))
-    # An inch is defined by a metre.
+    # The definition of an inch names the metre, too.
     based = found - {"m", "mm", "cm"} if "in" in found else found
     return based.pop() if len(based) == 1 else None
 
 
 def named_faces(entities: Entities) -> list[tuple[str, FloatArray]]:
-    """Return the name of each face of the solid, empty if it has none, and its vertices (n, 3), in the file's order."""
+    """Return the name of each face of the solid ("" without one) and its vertices (n, 3), in the file's order."""
     shells = [content for content in entities.values() if content.startswith(("CLOSED_SHELL", "OPEN_SHELL"))]
     faces = [number for shell in shells for number in _referred(shell) if number in entities]
     return [(_name(entities[face]), _vertices(entities, face)) for face in faces]
@@ -61,7 +61,7 @@ def _name(content: str) -> str:
 
 
 def _vertices(entities: Entities, face: int) -> FloatArray:
-    """Return the vertices of a face's edges: those of VERTEX_POINT, over loops, edges and their ends."""
+    """Return the vertices of a face: follow loops and edges to their VERTEX_POINT."""
     points, seen, left = [], {face}, [face]
     while left:
         content = entities.get(left.pop(), "")
@@ -70,7 +70,7 @@ def _vertices(entities: Entities, face: int) -> FloatArray:
             points.append(_point(content))
         if kind in _LEADING:
             found = [number for number in _referred(content) if number not in seen]
-            # Of faces, the surface is the last; of edges, the curve.
+            # The last reference of a face is its surface, of an edge its curve: both are skipped.
             wanted = _referred(content)[:2] if kind == "EDGE_CURVE" else found
             wanted = [n for n in wanted if n not in seen and entities.get(n, "").split("(")[0].strip() in _ON_THE_WAY]
             seen.update(wanted)
@@ -82,7 +82,7 @@ def _point(content: str) -> tuple[float, float, float]:
     try:
         x, y, z = (float(number) for number in content[content.rfind("(") :].strip("() \n").split(","))
     except ValueError:
-        raise SurfaceError(f"is damaged: `{content[:60]!r}` is no point") from None
+        raise SurfaceError(f"is damaged: `{content[:60]!r}` is not a point") from None
     return x, y, z
 
 

@@ -1,4 +1,4 @@
-"""STL, binary and text: triangles one by one, each with its own three corners."""
+"""STL, binary and text: separate triangles, each with its own three corners."""
 
 import numpy as np
 
@@ -12,12 +12,12 @@ _WORDS = (b"facet normal", b"outer loop", b"endloop", b"endfacet", b"vertex")
 
 
 def parse(data: bytes) -> Raw:
-    """Read the content of an STL file.
+    """Parse the content of an STL file.
 
     Raises:
-        SurfaceError: if it is no STL file, or not a whole one.
+        SurfaceError: if it is no STL file, or incomplete.
     """
-    # Many a binary file begins with the word of those in text: their length tells them apart.
+    # Many binary files begin with `solid`, like those in text: the length identifies them.
     notices: tuple[str, ...] = ()
     promised = int.from_bytes(data[80:_HEADER], "little") if len(data) >= _HEADER else -1
     if promised >= 0 and len(data) == _HEADER + _FACET * promised:
@@ -31,7 +31,7 @@ def parse(data: bytes) -> Raw:
 
 
 def written(points: FloatArray, facets: IntArray, header: bytes = b"") -> bytes:
-    """Return a binary file of ``facets`` (m, 3) between ``points`` (n, 3), in whatever unit these are."""
+    """Return a binary file of ``facets`` (m, 3) between ``points`` (n, 3), in the points' unit."""
     rows = np.zeros(len(facets), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
     rows["corners"] = points[facets]
     return header.ljust(_HEADER - 4, b"\0") + len(facets).to_bytes(4, "little") + rows.tobytes()
@@ -41,7 +41,7 @@ def _binary(data: bytes, count: int) -> FloatArray:
     limit(count)
     facet = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
     facets = np.frombuffer(data, facet, count, _HEADER)
-    with np.errstate(invalid="ignore"):  # what is not finite is told of later
+    with np.errstate(invalid="ignore"):  # check_numbers reports values that are not finite
         return facets["corners"].reshape(-1, 3).astype(np.float64)
 
 
@@ -53,11 +53,9 @@ def _binary_of_another_length(data: bytes, promised: int) -> tuple[FloatArray, t
         )
     there = (len(data) - _HEADER) // _FACET
     if there < promised:
-        raise SurfaceError(
-            f"truncated: its header says {promised:,} facets, {there:,} are there: copy or export it again"
-        )
+        raise SurfaceError(f"truncated: its header says {promised:,} facets, it has {there:,}: copy or export it again")
     extra = len(data) - _HEADER - _FACET * promised
-    return _binary(data, promised), (f"{extra:,} bytes after the last facet are not read",)
+    return _binary(data, promised), (f"{extra:,} bytes after the last facet are ignored",)
 
 
 def _is_text(data: bytes) -> bool:
@@ -79,8 +77,8 @@ def _text(data: bytes) -> FloatArray:
     for word in _WORDS:
         if bare.count(word) != count * (3 if word == b"vertex" else 1):
             raise SurfaceError(
-                f"{bare.count(word):,} times `{word.decode()}` in {count:,} facets: not a whole STL file, or facets "
-                "that are no triangles; export it again"
+                f"`{word.decode()}` occurs {bare.count(word):,} times in {count:,} facets: an incomplete STL file, or "
+                "facets that are not triangles; export it again"
             )
     for word in _WORDS:
         bare = bare.replace(word, b"")
@@ -91,7 +89,7 @@ def _text(data: bytes) -> FloatArray:
 
 
 def _without_names(content: bytes) -> bytes:
-    """Return the text without the lines of ``solid`` and ``endsolid``, whose names may be anything."""
+    """Remove the lines of ``solid`` and ``endsolid``, whose names are arbitrary text."""
     parts, start = [], 0
     while (found := content.find(b"solid", start)) >= 0:
         begin = content.rfind(b"\n", 0, found) + 1
@@ -102,11 +100,11 @@ def _without_names(content: bytes) -> bytes:
 
 
 def _fault(content: bytes) -> str:
-    """Say which line is not as it should be."""
+    """Return a message about the first invalid line."""
     for number, line in enumerate(content.splitlines(), 1):
         words = line.split()
         values = {b"vertex": words[1:], b"facet": words[2:]}.get(words[0]) if words else None
         if values is not None and (len(values) != 3 or not all(map(is_number, values))):
             found = line.strip().decode(errors="replace")[:60]
-            return f"line {number:,}, `{found}`, has not three numbers: export it again"
-    return "numbers that belong to no facet: export it again"
+            return f"line {number:,}, `{found}`, does not have three numbers: export it again"
+    return "numbers outside facets: export it again"

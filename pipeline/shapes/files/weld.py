@@ -1,4 +1,4 @@
-"""Points that are one."""
+"""Merging of equal points."""
 
 import numpy as np
 
@@ -6,14 +6,14 @@ from pipeline.arrays import BoolArray, FloatArray, IntArray
 
 
 def weld(points: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return the different ones among points (n, 3), in the order in which they come, and each one's number (n,)."""
+    """Return the distinct points among ``points`` (n, 3), in order of appearance, and the number of each point (n,)."""
     points = points + 0.0  # -0 is 0
     keys = _mixed(points)
     order = np.argsort(keys, kind="stable")
     new = np.ones(len(keys), dtype=bool)
     new[1:] = np.diff(keys[order]) != 0
     number, first = _numbered(order, new)
-    if (points[first][number] != points).any():  # two points mixed to one key
+    if (points[first][number] != points).any():  # two points share a key
         order = np.lexsort(points.T)
         new[1:] = (np.diff(points[order], axis=0) != 0).any(axis=1)
         number, first = _numbered(order, new)
@@ -21,10 +21,10 @@ def weld(points: FloatArray) -> tuple[FloatArray, IntArray]:
 
 
 def _numbered(order: IntArray, new: BoolArray) -> tuple[IntArray, IntArray]:
-    """Return the number of each of the things sorted by ``order``, of which some are ``new``, and which came first."""
+    """Return the number of each element sorted by ``order``, grouped where ``new`` begins one, and the first ones."""
     groups = np.empty(len(order), dtype=np.int64)
     groups[order] = np.cumsum(new) - 1
-    first = order[new]  # sorts are stable: the first one of each
+    first = order[new]  # sorts are stable: the first of each group
     by_place = np.argsort(first)
     rank = np.empty(len(first), dtype=np.int64)
     rank[by_place] = np.arange(len(first))
@@ -32,7 +32,7 @@ def _numbered(order: IntArray, new: BoolArray) -> tuple[IntArray, IntArray]:
 
 
 def _mixed(points: FloatArray) -> IntArray:
-    """Return a number for each point, the same for the same point: one is sorted faster than three."""
+    """Return a key for each point, equal for equal points: one number sorts faster than three."""
     bits = np.ascontiguousarray(points, dtype=np.float64).view(np.uint64)
     factors = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
     bits = bits ^ (bits >> np.uint64(29))
@@ -41,7 +41,7 @@ def _mixed(points: FloatArray) -> IntArray:
 
 
 def drop_unused(points: FloatArray, facets: IntArray) -> tuple[FloatArray, IntArray]:
-    """Return the points that facets use, and the facets with their new numbers."""
+    """Return the points that facets use, and the facets renumbered."""
     used = np.zeros(len(points), dtype=bool)
     used[facets] = True
     return points[used], (np.cumsum(used) - 1)[facets]

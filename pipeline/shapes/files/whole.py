@@ -1,4 +1,4 @@
-"""From facets as a file holds them to a surface that bounds tissue."""
+"""From the facets of a file to a surface that bounds tissue."""
 
 import numpy as np
 
@@ -11,19 +11,19 @@ from pipeline.shapes.files.repair import repaired
 from pipeline.shapes.files.weld import drop_unused
 from pipeline.shapes.triangles import SurfaceError, Triangles, enclosed
 
-# A share of the volume, by which `smooth` may change it.
+# Largest relative change of the volume by `smooth`.
 MOST_VOLUME = 0.05
 
 
 def made_whole(
     raw: Raw, unit: float, repair: bool = False, smooth: float | None = None, may_cross: bool = True
 ) -> tuple[Triangles, tuple[str, ...]]:
-    """Return the surface in metres, welded and turned outwards, and what was done to it.
+    """Return the surface in metres, welded and oriented outward, and notices of what was changed.
 
     ``smooth`` is a length (m); facets are searched for crossings if they ``may_cross``.
 
     Raises:
-        SurfaceError: if it does not bound one piece of tissue; says what was found, and what mends it.
+        SurfaceError: if it does not bound one piece of tissue; the message says what was found and how to repair it.
     """
     check.check_numbers(raw)
     check.check_size(raw.points, raw.facets, unit)
@@ -44,23 +44,23 @@ def made_whole(
 
 
 def _smoothed(points: FloatArray, facets: IntArray, length: float) -> tuple[FloatArray, IntArray, list[str]]:
-    """Return a surface without bumps shorter than a ``length`` (in the unit of the points), and what changed.
+    """Return a surface without bumps shorter than ``length`` (in the unit of the points), and notices.
 
-    Coordinates go through the filter 1 / (1 + (k length)⁴) of their wave numbers k, as Taubin's (SIGGRAPH 1995) in one
-    step and whatever the size of facets: waves four times as long as 2π ``length`` keep .996 of their height, and a
+    Coordinates pass the filter 1 / (1 + (k length)⁴) of their wave numbers k, as Taubin's (SIGGRAPH 1995), but in one
+    step and independent of the facets' size. Waves four times as long as 2π ``length`` keep .996 of their height, and a
     ball of ten times the ``length`` .9996 of its radius.
 
     Raises:
         SurfaceError: if the volume changes by more than 5 %.
     """
     points, facets = drop_unused(points, facets)
-    import igl  # noqa: PLC0415 (a tenth of a second, which other files do without)
+    import igl  # noqa: PLC0415 (0.1 s to import, which other files do not need)
     from scipy.sparse.linalg import splu  # noqa: PLC0415
 
     stiffness, mass = -igl.cotmatrix(points, facets), igl.massmatrix(points, facets, igl.MASSMATRIX_TYPE_BARYCENTRIC)
     before = enclosed(points, facets)
 
-    # 1 / (1 + w²) is the real part of 1 / (1 + iw): one solve with a matrix of neighbours, none of their neighbours.
+    # 1 / (1 + w²) is the real part of 1 / (1 + iw): one solve, whose matrix couples direct neighbours only.
     solve = splu(
         (mass + 1j * length**2 * stiffness).tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
     )
@@ -71,7 +71,7 @@ def _smoothed(points: FloatArray, facets: IntArray, length: float) -> tuple[Floa
     moved = float(np.linalg.norm(result - points, axis=1).max())
     if not abs(change) <= MOST_VOLUME:
         raise SurfaceError(
-            f"`smooth` would change the volume by {change:+.1%}, allowed are {MOST_VOLUME:.0%}: write less"
+            f"`smooth` would change the volume by {change:+.1%}, allowed are {MOST_VOLUME:.0%}: use a smaller length"
         )
     return result, facets, [f"smoothed: volume {change:+.2%}, points moved by {moved / length:.2g} of `smooth` at most"]
 
@@ -81,11 +81,11 @@ def _check_smoothed(points: FloatArray, edges: Edges, unit: float) -> None:
         check.check_whole(points, edges, unit)
     except SurfaceError as error:
         found = str(error).partition(": ")[0]
-        raise SurfaceError(f"once smoothed, {found}: another length of `smooth`, or none") from error
+        raise SurfaceError(f"after smoothing, {found}: use another length of `smooth`, or none") from error
 
 
 def _without_flats(points: FloatArray, edges: Edges) -> tuple[Edges, list[str]]:
-    """Return facets of which none is without area, where all edges have two facets."""
+    """Return facets all of which have an area, if all edges have two facets."""
     if not (edges.counts == 2).all():
         return edges, []
     facets, notices = without_flats(points, edges.facets)
@@ -95,4 +95,4 @@ def _without_flats(points: FloatArray, edges: Edges) -> tuple[Edges, list[str]]:
 def _outward(points: FloatArray, facets: IntArray) -> tuple[IntArray, list[str]]:
     if enclosed(points, facets) > 0:
         return facets, []
-    return facets[:, ::-1], ["all its facets were inverted, seen from within: turned"]
+    return facets[:, ::-1], ["all its facets were inverted: turned"]

@@ -1,1 +1,1 @@
-"""One file a probe."""
+"""Probes, one per file."""

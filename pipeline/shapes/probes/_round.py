@@ -1,4 +1,4 @@
-"""What sphere and cone share: tools that are the same all round, of which no one knows how much will touch."""
+"""Axisymmetric tools with unknown contact area: what sphere and cone have in common."""
 
 from abc import abstractmethod
 from math import pi
@@ -12,7 +12,7 @@ from pipeline.shapes.probes.disc import Disc
 
 
 class RoundIndenter(Indenter):
-    """An indenter that is the same all round its axis."""
+    """An axisymmetric indenter."""
 
     @property
     @abstractmethod
@@ -27,18 +27,18 @@ class RoundIndenter(Indenter):
 
     @property
     def footprint(self) -> Probe:
-        """The disc that holds all that it may touch."""
+        """The disc that contains all that it may touch."""
         radius = min(CANDIDATES * self.section.reach(self.depths[1]), self.limit)
         return Disc.model_construct(shape="disc", radius=radius, depth=self.depth, at=self.at, axis=self.axis)
 
     @property
     def pressed(self) -> float:
-        """Radius (m) at which the undeformed tool goes through the surface."""
+        """Radius (m) at which the undeformed tool intersects the surface."""
         return min(self.section.reach(self.depth), self.limit)
 
     @property
     def contact_width(self) -> float:
-        """Radius (m) of contact on an elastic half-space."""
+        """Contact radius (m) on an elastic half-space."""
         return min(self.section.contact_radius(self.depth), self.limit)
 
     @property
@@ -53,17 +53,17 @@ class RoundIndenter(Indenter):
         return np.where(distance <= (1 + ON_EDGE) * self.limit, height, np.inf)
 
     def ends_at(self, points: FloatArray) -> BoolArray:
-        """Tell that the tool ends at the footprint's edge if that is as large as the tool."""
+        """Return true if the footprint is as large as the tool."""
         return np.full(len(points), self.footprint.half_width >= (1 - ON_EDGE) * self.limit)
 
     @property
     def rim_size(self) -> tuple[float, float]:
-        """Length (m) and area (m²) of where contact is expected to end."""
+        """Length (m) and area (m²) of the ring in which contact is expected to end."""
         inner, outer = self.edge_band
         return pi * (inner + outer), pi * (outer**2 - inner**2)
 
     def rim_distance(self, along: str, across: str, height: str, unit: float) -> str:
-        """Write the distance to the ring in which contact is expected to end, and to what it is pressed down from."""
+        """Return the distance to the ring in which contact is expected to end, including the depth, as text."""
         inner, outer = (unit * radius for radius in self.edge_band)
         radius = f"Sqrt({along}^2+{across}^2)"
         aside = f"Max(Max({inner:.12g}-{radius},{radius}-{outer:.12g}),0)"

@@ -20,7 +20,7 @@ _CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 
 
 class Blade(Punch):
-    """A flat rectangular punch; its length lies along ``direction``. With an ``incision`` it stands in a slit."""
+    """A flat rectangular punch with its length along ``direction``. With an ``incision`` it is in a slit."""
 
     is_round: ClassVar[bool] = False
     is_curved: ClassVar[bool] = False
@@ -66,7 +66,7 @@ class Blade(Punch):
 
     @cached_property
     def slit(self) -> Slit | None:
-        """The slit that it stands in, if there is an incision."""
+        """The slit in which it is, if there is an incision."""
         if not self.incision:
             return None
         ahead = self.width if self.ahead is None else self.ahead
@@ -74,24 +74,25 @@ class Blade(Punch):
 
     @property
     def circumradius(self) -> float:
-        """Half of the diagonal, or, in a slit, of that one's length within the body (m)."""
+        """Half of the diagonal, or in a slit of the slit's length within the body (m)."""
         return self.slit.on_surface if self.slit else hypot(self.length, self.width) / 2
 
     @property
     def half_width(self) -> float:
-        """Half of the shorter side, or, in a slit, of the smallest distance between its lines (m)."""
+        """Half of the shorter side, or in a slit of the smallest distance between its singular lines (m)."""
         return self.slit.half_width if self.slit else min(self.length, self.width) / 2
 
     @property
     def perimeter(self) -> float:
-        """Length of the four sides, or of the lines of the slit (m)."""
+        """Length of the four sides, or of the singular lines of the slit (m)."""
         return self.slit.edges if self.slit else 2 * (self.length + self.width)
 
     @property
     def mean_square(self) -> float:
         """Mean square distance (m²) of the pressure, to 1 %: fitted to boundary elements for sides up to 16 : 1.
 
-        Evenly spread it were a twelfth of the square of each side; it is more at the edges, most of all across.
+        A uniform pressure has a twelfth of the square of each side. The true pressure is larger at the edges, most of
+        all across.
         """
         sides = (self.length, self.width), (self.width, self.length)
         return sum(min(1.38 * (side / other) ** -0.06, 1.5) * side**2 / 12 for side, other in sides)
@@ -110,11 +111,11 @@ class Blade(Punch):
         return tag
 
     def inscribed(self, edges: int) -> Self:
-        """Return the blade itself: straight elements follow it."""
+        """Return the blade itself: straight elements fit it."""
         return self
 
     def edge_distance(self, along: str, across: str, height: str, unit: float) -> str:
-        """Write the distance to the four sides, or to the lines of the slit."""
+        """Return the distance to the four sides, or to the singular lines of the slit, as text."""
         if self.slit:
             return self.slit.edge_distance(along, across, height, unit)
         p = f"(Fabs({along})-{unit * self.length / 2:.12g})"
@@ -122,7 +123,7 @@ class Blade(Punch):
         return f"Sqrt({to_rectangle(p, q)}^2+{height}^2)"
 
     def to_edge(self, points: FloatArray) -> FloatArray:
-        """Return the points: no edge of an element needs to be bent."""
+        """Return the points unchanged: no edge is curved."""
         return points
 
     def outline(self) -> FloatArray:
@@ -130,20 +131,20 @@ class Blade(Punch):
         return np.array([(i * self.length / 2, j * self.width / 2) for i, j in (*_CORNERS, _CORNERS[0])])
 
     def covers(self, points: FloatArray) -> BoolArray:
-        """Tell which points are within the rectangle."""
+        """Return a mask of points within the rectangle."""
         half = np.array([self.length, self.width]) / 2
         within: BoolArray = np.all(np.abs(points) <= (1 + ON_EDGE) * half, axis=1)
         return within
 
     def check(self, problems: Problems) -> None:
-        """Report a slice, or an incision, that makes no sense."""
+        """Report a slice or an incision that is not allowed."""
         if self.slit:
             self._check_slit(self.slit, problems)
         else:
             for key in ("ahead", "ends"):
                 if key in self.model_fields_set:
                     found = in_mm(self.ahead) if key == "ahead" and self.ahead else getattr(self, key)
-                    problems.error(f"probe.{key}", found, "is of a slit: there is no incision")
+                    problems.error(f"probe.{key}", found, "applies to a slit only: there is no incision")
         if self.slice > 0 and self.action != "cut":
             problems.error("probe.slice", in_mm(self.slice), 'only a cut slices: set action = "cut"')
 
@@ -154,8 +155,8 @@ class Blade(Punch):
             problems.error(
                 "probe.ahead",
                 in_mm(slit.ahead),
-                f"leaves nothing of the blade in the slit, which is {in_mm(self.incision)} deep: must be below that "
-                "(left out, it is the blade's width)",
+                f"leaves no part of the blade in the slit, which is {in_mm(self.incision)} deep: must be below that "
+                "(the default is the blade's width)",
             )
         elif slit.ahead < self.width:
             problems.warn(
@@ -170,18 +171,18 @@ class Blade(Punch):
             problems.warn(
                 "probe.depth",
                 in_mm(self.depth),
-                "does nothing where tissue slides along a blade that stands in a "
-                "slit: F is what it takes to push it on from where it stands, `incision` - `ahead` deep",
+                "has no effect without bond in a slit: F is the force that drives the blade on from its "
+                "position, `incision` - `ahead` deep",
             )
 
     def _check_travel(self, slit: Slit, problems: Problems) -> None:
-        """Report a blade that would run through the front of its slit: tissue there is not cut open by it."""
+        """Report a blade that would move past the front of its slit, where tissue is not cut."""
         travels = {"depth": (self.depth, "below its tip"), "slice": (0.0 if slit.is_open else self.slice, "at its end")}
         for key, (travel, where) in travels.items():
             if travel >= slit.ahead:
                 problems.error(
                     f"probe.{key}",
                     in_mm(travel),
-                    f"runs the blade through the slit's front {where}, which is "
-                    f"{in_mm(slit.ahead)} ahead of it and is not cut open: must be below that",
+                    f"moves the blade past the slit's front {where}, which is "
+                    f"{in_mm(slit.ahead)} ahead of it and does not advance: must be below that",
                 )

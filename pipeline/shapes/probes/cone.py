@@ -10,7 +10,7 @@ from pipeline.units import Angle, Length, Rounding
 
 
 class Cone(RoundIndenter):
-    """A needle's tip: a cone, which may be rounded, on a shaft. Friction along the shaft is not computed."""
+    """A needle's tip: a cone, sharp or rounded, on a shaft. Friction along the shaft is not computed."""
 
     REALTIME = ("unilateral",)
 
@@ -31,7 +31,7 @@ class Cone(RoundIndenter):
 
     @property
     def mean_square(self) -> float:
-        """Half the square of the radius of contact (m²) if it is sharp: a third of it, times 3/2."""
+        """Half the square of the contact radius (m²) if it is sharp: a third, times 3/2."""
         return nan if self.tip else self.contact_width**2 / 2
 
     @property
@@ -40,27 +40,23 @@ class Cone(RoundIndenter):
         return self.radius
 
     def realtime_error(self) -> str:
-        """Return that a rounding is not known."""
-        return (
-            f"probe.tip = {in_mm(self.tip)}: a rounded cone has no real-time model yet: a sharp one has"
-            if self.tip
-            else ""
-        )
+        """Return that a rounding is not supported."""
+        return f"probe.tip = {in_mm(self.tip)}: real-time models support a sharp cone only" if self.tip else ""
 
     def check(self, problems: Problems) -> None:
-        """Report a rounding that leaves no cone, and a cone that is pushed in as a whole."""
+        """Report a rounding that leaves no cone, and a depth beyond the whole cone."""
         if self.section.tangent >= self.radius:
             problems.error(
                 "probe.tip",
                 in_mm(self.tip),
-                f"leaves no cone: the rounding would reach {in_mm(self.section.tangent)} "
-                f"from the axis, and the shaft has radius {in_mm(self.radius)}; use a smaller tip, or a sphere",
+                f"leaves no cone: the rounding would extend to {in_mm(self.section.tangent)} "
+                f"from the axis, but the shaft has radius {in_mm(self.radius)}; use a smaller tip, or a sphere",
             )
         elif self.section.reach(depth := max(self.depth, self.depths[1])) >= self.radius:
             problems.error(
                 "probe.depth",
                 in_mm(depth),
-                f"pushes the cone in up to its shaft of radius {in_mm(self.radius)}: "
+                f"presses the cone in up to its shaft of radius {in_mm(self.radius)}: "
                 "use a smaller depth, or a larger radius",
             )
         else:

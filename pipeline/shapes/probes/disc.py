@@ -37,14 +37,14 @@ class Disc(RoundPunch):
         return body.gap(frame.point) - self.radius
 
     def inscribed(self, edges: int) -> Self:
-        """Return the larger disc whose regular polygon has this one's area."""
+        """Return the larger disc whose inscribed regular polygon has this one's area."""
         angle = 2 * pi / edges
         return self.model_copy(update={"radius": self.radius * sqrt(angle / sin(angle))})
 
     def edge_distance(self, along: str, across: str, height: str, unit: float) -> str:
-        """Write the distance to the circle."""
+        """Return the distance to the circle as text."""
         return f"Sqrt((Sqrt({along}^2+{across}^2)-{unit * self.radius:.12g})^2+{height}^2)"
 
     def to_edge(self, points: FloatArray) -> FloatArray:
-        """Return the points moved along their radii onto the circle."""
+        """Return the points moved radially onto the circle."""
         return self.radius * points / np.linalg.norm(points, axis=1, keepdims=True)

@@ -10,16 +10,16 @@ from pipeline.shapes.round import RoundPunch
 from pipeline.shapes.section import Words
 from pipeline.units import Length
 
-# Points along the edge by which its length is divided into equal parts.
+# Points along the edge for its division into equal lengths.
 _FINE = 20_000
-# Newton's iterations to the nearest point; it starts within a few degrees and doubles its digits.
+# Newton's iterations to the nearest point; the initial guess is within a few degrees, and digits double.
 _ITERATIONS = 12
 
 
 class Ellipse(RoundPunch):
-    """A flat elliptical punch; its first semi-axis lies along ``direction``."""
+    """A flat elliptical punch with its first semi-axis along ``direction``."""
 
-    # For the distance to the edge of a face, too: to 1e-6 of the ellipse's size.
+    # Also for the distance to the edge of a face: to 1e-6 of the ellipse's size.
     OUTLINE = 2000
     EXPECTED_ERROR = 0.9
 
@@ -43,7 +43,7 @@ class Ellipse(RoundPunch):
         return pi * (a + b) * (1 + h / (10 + sqrt(4 - h)))
 
     def inscribed(self, edges: int) -> Self:
-        """Return the larger ellipse whose polygon of equal edges, from the end of an axis on, has this one's area."""
+        """Return the larger ellipse whose inscribed polygon of equal edges, from a vertex on, has this one's area."""
         angle = np.linspace(0.0, 2 * pi, _FINE + 1)
         ellipse = self.points_at(angle)
         length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ellipse, axis=0), axis=1))])
@@ -53,12 +53,12 @@ class Ellipse(RoundPunch):
         return self.model_copy(update={"axes": (larger * self.axes[0], larger * self.axes[1])})
 
     def edge_distance(self, along: str, across: str, height: str, unit: float) -> str:
-        """Write a distance to the ellipse: exact at the edge and on the shorter axis, else at most 0.4 of it too small.
+        """Return a distance to the ellipse as text: exact at the edge and on the shorter axis, else up to 40 % low.
 
-        With ρ² = x²/a² + y²/b² and n² = x²/a⁴ + y²/b⁴ it is, in the plane, outside ρ (ρ - 1) / n, or the distance to
-        the circle about the ellipse where that is more. Inside it is b² ((n² + (1 - ρ²) / b²)^½ - n), b the shorter
-        axis: sooner 1 - ρ², whose second derivatives are 2 / b² at most, cannot be nought. To first order alone the
-        middle of a slender footprint would be half its length away from the edge, and meshed as coarsely as that.
+        Let ρ² = x²/a² + y²/b² and n² = x²/a⁴ + y²/b⁴. In the plane, the distance outside is ρ (ρ - 1) / n, or that to
+        the circumscribed circle if larger. Inside it is b² ((n² + (1 - ρ²) / b²)^½ - n), with b the shorter axis:
+        1 - ρ², with second derivatives of at most 2 / b², cannot vanish at a smaller distance. A first-order estimate
+        alone would put the middle of a slender footprint half its length from the edge, and mesh it too coarsely.
         """
         a, b = (unit * axis for axis in self.axes)
         short, long = min(a, b), max(a, b)
@@ -76,7 +76,7 @@ class Ellipse(RoundPunch):
         angle = np.arctan2(y / b, x / a)
         for _ in range(_ITERATIONS):
             sine, cosine = np.sin(angle), np.cos(angle)
-            # The offset is normal to the ellipse where the derivative of half its square is nought.
+            # The offset is normal to the ellipse where the derivative of half its square vanishes.
             slope = (x - a * cosine) * a * sine - (y - b * sine) * b * cosine
             curvature = a * cosine * x + b * sine * y + (a**2 - b**2) * (sine**2 - cosine**2)
             angle = angle - slope / curvature

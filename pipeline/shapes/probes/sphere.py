@@ -12,7 +12,7 @@ class Sphere(RoundIndenter):
     """A ball, such as the tip of a palpating probe."""
 
     REALTIME = ("unilateral",)
-    # 3/2 (H. Hertz), as long as contact is small beside the ball.
+    # 3/2 (H. Hertz), while contact is small compared with the ball.
     force_exponent: ClassVar[float | None] = 1.5
 
     shape: Literal["sphere"]
@@ -20,27 +20,26 @@ class Sphere(RoundIndenter):
 
     @property
     def section(self) -> Rounded:
-        """A circle: it has no flank."""
+        """A circle, without a flank."""
         return Rounded(0.0, self.radius)
 
     @property
     def mean_square(self) -> float:
-        """8/15 of the square of the radius of contact (m²): 2/5 of it, times 4/3."""
+        """8/15 of the square of the contact radius (m²): 2/5, times 4/3."""
         return 8 / 15 * self.contact_width**2
 
     @property
     def limit(self) -> float:
-        """The radius (m): tissue does not reach round the equator."""
+        """The radius (m): contact ends below the equator."""
         return self.radius
 
     def check(self, problems: Problems) -> None:
-        """Report a ball that would be pushed in past its equator."""
+        """Report a ball pressed in past its equator."""
         if (depth := max(self.depth, self.depths[1])) >= self.radius:
             problems.error(
                 "probe.depth",
                 in_mm(depth),
-                f"must be less than the sphere's radius {in_mm(self.radius)}: past "
-                "its equator it does not press any more",
+                f"must be less than the sphere's radius {in_mm(self.radius)}: past its equator contact does not grow",
             )
             return
         super().check(problems)

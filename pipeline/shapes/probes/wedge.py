@@ -15,11 +15,11 @@ from pipeline.units import Angle, Length, Rounding
 
 
 class Wedge(Indenter):
-    """The edge of a scalpel or a chisel: two flanks that meet in a line, which may be rounded; its ends are flat."""
+    """The edge of a scalpel or a chisel: two flanks that meet in a line, sharp or rounded; its ends are flat."""
 
-    # None: the line load of an edge of some length goes with its depth and the logarithm of it.
+    # None: the line load of a finite edge depends on the depth and its logarithm.
     force_exponent: ClassVar[float | None] = None
-    # Not known.
+    # Unknown.
     mean_square: ClassVar[float] = nan
 
     shape: Literal["wedge"]
@@ -38,7 +38,7 @@ class Wedge(Indenter):
 
     @property
     def footprint(self) -> Probe:
-        """The rectangle, as long as the edge, that holds all that it may touch."""
+        """The rectangle, as long as the edge, that contains all that it may touch."""
         width = 2 * CANDIDATES * self.section.reach(self.depths[1])
         return Blade.model_construct(
             shape="blade",
@@ -57,24 +57,24 @@ class Wedge(Indenter):
 
     @property
     def pressed(self) -> float:
-        """Distance (m) of the corners of what the undeformed tool presses below the surface."""
+        """Distance (m) from the axis to the corners of the undeformed tool's intersection with the surface."""
         return hypot(self.length / 2, self.section.reach(self.depth))
 
     @property
     def contact_width(self) -> float:
-        """Half the width (m) of contact in the middle of the edge, on an elastic half-space."""
+        """Half the contact width (m) at the middle of the edge, on an elastic half-space."""
         return self.section.contact_width(self.depth, self.length)
 
     @property
     def edge_band(self) -> tuple[float, float]:
-        """The least and the largest distance (m) from the edge at which contact is expected to end, off its ends."""
+        """The smallest and the largest distance (m) from the edge at which contact is expected to end, off its ends."""
         most = self.footprint.half_width
         least, largest = (min(width, most) for width in self.contact_widths)
         return least, min(1.3 * largest, self.section.reach(self.depths[1]))
 
     @property
     def expected_radius(self) -> float:
-        """Distance (m) of the corners of what is expected to touch."""
+        """Distance (m) from the axis to the corners of the expected contact."""
         return hypot(self.length / 2, self.edge_band[1])
 
     def profile(self, points: FloatArray) -> FloatArray:
@@ -83,18 +83,18 @@ class Wedge(Indenter):
         return np.where(np.abs(points[:, 0]) <= (1 + ON_EDGE) * self.length / 2, height, np.inf)
 
     def ends_at(self, points: FloatArray) -> BoolArray:
-        """Tell which points are at its two ends."""
+        """Return a mask of points at its two ends."""
         at_end: BoolArray = np.abs(points[:, 0]) >= (1 - ON_EDGE) * self.length / 2
         return at_end
 
     @property
     def rim_size(self) -> tuple[float, float]:
-        """Length (m) and area (m²) of where contact is expected to end: two strips, and the two ends."""
+        """Length (m) and area (m²) of the expected edge of contact: two strips, and the two ends."""
         inner, outer = self.edge_band
         return 2 * self.length + 4 * outer, 2 * self.length * (outer - inner)
 
     def rim_distance(self, along: str, across: str, height: str, unit: float) -> str:
-        """Write the distance to the strips in which contact is expected to end, to its ends, and to the depth."""
+        """Return the distance to the strips in which contact is expected to end, to the ends, and in depth, as text."""
         inner, outer = (unit * width for width in self.edge_band)
         beyond = f"(Fabs({along})-{unit * self.length / 2:.12g})"
         aside = f"Max(Max({inner:.12g}-Fabs({across}),Fabs({across})-{outer:.12g}),0)"
