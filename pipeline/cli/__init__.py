@@ -1,4 +1,4 @@
-"""The command line: parse, call, print. Everything below it raises; only this folder prints and exits."""
+"""The command line: parse, call, print. Other folders raise errors; only this one prints and exits."""
 
 import os
 import sys
@@ -15,13 +15,13 @@ from pipeline.cli.group import Commands
 
 _HELP = """How fine must a mesh be, and where, for the reaction force of a surgical tool?
 
-Example: epsmesh new mine && epsmesh run studies/mine.toml
+First steps: `epsmesh new mine`, `epsmesh plan mine`, `epsmesh run mine`, `epsmesh report mine`.
 
-Exit status: 0 done, 1 some cases failed, 2 the input is wrong, 130 interrupted."""
+Exit status: 0 done, 1 some cases failed, 2 wrong input, 130 interrupted."""
 
-# Set by a shell that asks how a word may be completed.
+# The shell sets this variable when it completes a word.
 _COMPLETING = "_EPSMESH_COMPLETE"
-# Libraries that pip alone does not install, and how to get them.
+# Libraries that may be missing, and how to install them.
 _FENICS = "on Debian `make setup` installs it, elsewhere `conda env create -f environment.yml`"
 _ORGANS = "`pip install 'epsmesh[organs]'` installs it (on Debian: `make setup`)"
 _REMEDIES = {
@@ -61,13 +61,13 @@ def _options(
     ctx: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
     verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="With --version: all versions that a force depends on.")
+        bool, typer.Option("--verbose", "-v", help="With --version: versions of the libraries, too.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="With --version: those, as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="With --version: these versions as JSON.")] = False,
 ) -> None:
     if not version:
         if verbose or as_json:
-            fail("before a command, --verbose and --json are of --version; a command's own options follow it")
+            fail("--verbose and --json before a command need --version; write a command's options after its name")
         return
     if not (verbose or as_json):
         print(f"epsmesh {__version__}")
@@ -82,7 +82,7 @@ def _options(
 
 def main() -> None:
     """Run the command ``epsmesh``."""
-    if _COMPLETING not in os.environ:  # what a shell reads has tabs, and is none of a terminal's
+    if _COMPLETING not in os.environ:  # completions contain tabs, which `make_patient` would escape
         make_patient()
     try:
         app(prog_name="epsmesh")

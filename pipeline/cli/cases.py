@@ -1,4 +1,4 @@
-"""Cases by what people call them: a number, or some of their labels."""
+"""Find the case that a user means: by its number, or by some of its labels."""
 
 import re
 import sys
@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
 
 def find_case(study: "Study", text: str, word: str = "CASE") -> "Case":
-    """Return the case of a number, or of labels, the first of several; fail with what there is to choose from.
+    """Return the case with this number, or the first one with these labels; exit with the choices if there is none.
 
-    ``word`` is what names the case on the command line.
+    ``word`` is the argument's or option's name on the command line.
     """
     cases = list(study.cases())
     if text.strip().isdecimal():
@@ -25,17 +25,17 @@ def find_case(study: "Study", text: str, word: str = "CASE") -> "Case":
         return cases[number]
     wanted: dict[str, str] = {}
     names = [axis.name for axis in study.axes]
-    # A label may hold commas itself: what separates is a comma before a name.
+    # A label may contain commas. A comma separates only before a name and "=".
     for part in re.split(r",(?=\s*\w+\s*=)", text):
         name, _, value = (word.strip() for word in part.partition("="))
         if name not in names:
-            fail(_of_case(word, text, f"nothing called {name!r} is swept; swept are {', '.join(names) or 'no keys'}"))
+            fail(_of_case(word, text, f"the study does not sweep {name!r}; it sweeps {', '.join(names) or 'no key'}"))
         wanted[name] = value
     found = [case for case in cases if _matches(case, wanted)]
     if not found:
         choices = {axis.name: [axis.write(label) for label in axis.labels] for axis in study.axes}
         listed = "; ".join(f"{name} = {', '.join(choices[name])}" for name in wanted)
-        fail(_of_case(word, text, f"there is none; there are {listed}"))
+        fail(_of_case(word, text, f"no such case; the study has {listed}"))
     if len(found) > 1 and is_first_rank():
         left = ", ".join(axis.name for axis in study.axes if axis.name not in wanted and len(axis) > 1)
         print(f"{found[0]}: the first of {len(found)} such cases, which differ in {left}", file=sys.stderr)
@@ -56,7 +56,7 @@ def _matches(case: "Case", wanted: dict[str, str]) -> bool:
 
 
 def _is(label: float | int | str, text: str, unit: str) -> bool:
-    """Tell whether ``text`` is the quantity of a label, in whatever unit: 0.4 cm is 4 mm."""
+    """Return whether ``text`` is the quantity of a label, in any unit: 0.4 cm is 4 mm."""
     from pipeline.units import canonical, parse_quantity
 
     try:

@@ -1,4 +1,4 @@
-"""How the command line speaks: colour where a person watches, plain text elsewhere; nobody listening ends nothing."""
+"""Output of the command line: colour on a terminal, plain text or JSON elsewhere; a closed pipe ends no command."""
 
 import json
 import os
@@ -10,13 +10,13 @@ from typing import Any, TextIO
 
 from pipeline.printable import printable_json, printable_lines
 
-# Of the command that runs: whether JSON was asked for, and whether any has been printed.
+# For the running command: whether the user wants JSON, and whether any was printed.
 JSON: ContextVar[dict[str, bool]] = ContextVar("JSON")
 _COLOURS = {"red": "31", "yellow": "33"}
 
 
 def paint(text: str, colour: str, stream: TextIO) -> str:
-    """Return ``text`` in a colour if ``stream`` is a terminal and the environment does not ask for none."""
+    """Return ``text`` in a colour if ``stream`` is a terminal and NO_COLOR is not set."""
     plain = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb" or not stream.isatty()
     return text if plain else f"\033[{_COLOURS[colour]}m{text}\033[0m"
 
@@ -32,24 +32,24 @@ def warning(text: str) -> None:
 
 
 def is_json_wanted() -> bool:
-    """Tell whether the command was asked for JSON: standard output is for that alone then."""
+    """Return whether the command has --json: standard output is then one JSON value."""
     return JSON.get({}).get("wanted", False)
 
 
 def has_printed_json() -> bool:
-    """Tell whether nothing more is to be said in JSON: none was asked for, or the command has spoken."""
+    """Return whether no JSON is left to print: the command has no --json, or has printed its value."""
     return not is_json_wanted() or JSON.get()["printed"]
 
 
 def print_json(value: Any) -> None:
-    """Print ``value`` as JSON: an infinite ε is "full", as in a study file, and null is what JSON has no number for."""
+    """Print ``value`` as JSON. An infinite ε becomes "full", as in a study file; NaN and other infinities, null."""
     if is_json_wanted():
         JSON.get()["printed"] = True
     print(printable_json(json.dumps(plain(value), indent=2, ensure_ascii=False, allow_nan=False)), flush=True)
 
 
 def say(data: Any, *lines: str) -> None:
-    """Print what a command has found: ``data`` if JSON was asked for, ``lines`` for people if not."""
+    """Print a command's result: ``data`` as JSON with --json, else ``lines``."""
     if is_json_wanted():
         print_json(data)
     elif lines:
@@ -57,7 +57,7 @@ def say(data: Any, *lines: str) -> None:
 
 
 def plain(value: Any, key: str = "") -> Any:
-    """Return ``value``, which stands under ``key``, as JSON takes it."""
+    """Return ``value``, found under ``key``, as JSON types."""
     if isinstance(value, dict):
         return {name: plain(item, name) for name, item in value.items()}
     if isinstance(value, list | tuple):
@@ -68,10 +68,10 @@ def plain(value: Any, key: str = "") -> Any:
 
 
 class Patient:
-    """A stream whose reader may go away: what is then written is dropped, and the command goes on to its end.
+    """A stream whose reader may close it early: later text is dropped, and the command continues.
 
-    What one cannot see, or the stream has no sign for, is written out. ``fault`` says why else it could not be written:
-    a full disk.
+    Control characters, and characters outside the stream's encoding, are written as escapes. ``fault`` is any other
+    reason why text could not be written, such as a full disk.
     """
 
     def __init__(self, stream: TextIO):
@@ -90,7 +90,7 @@ class Patient:
         return len(text)
 
     def flush(self) -> None:
-        """Flush, or drop what is left."""
+        """Flush, or drop the rest."""
         try:
             self._stream.flush()
         except OSError as error:
@@ -99,7 +99,7 @@ class Patient:
     def _drop(self, error: OSError) -> None:
         if not isinstance(error, BrokenPipeError):
             self.fault = error.strerror or str(error)
-        # What the buffer still holds must go somewhere when Python ends.
+        # Python flushes the buffer at exit: the null device accepts it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
 
     def __getattr__(self, name: str) -> Any:
@@ -107,9 +107,9 @@ class Patient:
 
 
 def make_patient() -> None:
-    """Let standard output and error outlive their readers: ``epsmesh plan … | head``.
+    """Let commands continue when a reader closes standard output or error: ``epsmesh plan … | head``.
 
-    Standard error that is a terminal has a bar that moves the cursor, and is left as it is.
+    Standard error on a terminal stays as it is: the progress bar moves the cursor.
     """
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
@@ -118,7 +118,7 @@ def make_patient() -> None:
 
 
 def what_was_not_written() -> str:
-    """Flush standard output; say why it could not be written, "" if it was, or if nobody wanted it."""
+    """Flush standard output; return why it could not be written, "" if it was or its reader closed it."""
     if not isinstance(sys.stdout, Patient):
         return ""
     sys.stdout.flush()

@@ -1,4 +1,4 @@
-"""The command that makes a real-time model of a study's body, and copies the evaluator in C that answers from it."""
+"""The command that makes a real-time model of a study's body, and copies the evaluator in C."""
 
 import sys
 from pathlib import Path
@@ -16,13 +16,13 @@ from pipeline.printable import counted
 if TYPE_CHECKING:
     from pipeline.export.export import Exported
 
-# What can be exported, and how: told with a refusal.
+# The page on what can be exported; refusals refer to it.
 _HOWTO = "docs/realtime.md"
-# Of --accuracy: less than the tables and the formulas are good for; more than is of use.
+# The range of --accuracy: tables and formulas allow no less, and more is of no use.
 _ACCURACIES = (0.002, 0.2)
 _MOST_CHECKS = 1000
-# The share of the judged touches whose errors the bars must hold.
-_HELD = 0.95
+# The error bars must cover the errors of this share of the test touches.
+_COVERED = 0.95
 
 
 def export(
@@ -30,33 +30,39 @@ def export(
         Path | None,
         typer.Argument(metavar="FILE", help="A study file (TOML), or a name in studies/.", show_default=False),
     ] = None,
-    accuracy: Annotated[str, typer.Option(help='How near forces must be to those of full solves: "1%".')] = "1%",
+    accuracy: Annotated[str, typer.Option(help='Largest error of a force, against a full solve: "1%".')] = "1%",
     output: Annotated[
         Path | None,
         typer.Option(
-            "--output", "-o", metavar="MODEL", help="The model [default: results/STUDY.epsm.nc].", show_default=False
+            "--output",
+            "-o",
+            metavar="MODEL",
+            help="File of the model [default: results/STUDY.epsm.nc].",
+            show_default=False,
         ),
     ] = None,
     checks: Annotated[
-        int, typer.Option(min=4, max=_MOST_CHECKS, help="Full solves that the bar is fitted to and, half, judged on.")
+        int, typer.Option(min=4, max=_MOST_CHECKS, help="Full solves: half calibrate the error bar, half test it.")
     ] = 24,
     surface: Annotated[
-        bool, typer.Option("--surface/--no-surface", help="With what `epsmesh touch` shows of the body: megabytes.")
+        bool,
+        typer.Option("--surface/--no-surface", help="Include the deforming surface for `epsmesh touch` (megabytes)."),
     ] = True,
     evaluator: Annotated[
         Path | None,
         typer.Option(
             metavar="FOLDER",
-            help="Copy the evaluator in C, and its examples for simulators, to a folder of yours; make no model.",
+            help="Only copy the evaluator in C and its examples to this folder; make no model.",
             show_default=False,
         ),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Make a model that answers 1,000 times a second: forces of small tools on a box, a cylinder, or part of an organ.
+    """Make a real-time model: forces in less than a millisecond.
 
-    Under mpirun the ranks share what there is to solve. Exit status 1 if its bars do not hold what they must on the
-    touches that they are judged on.
+    The model answers for small tools on a box, a cylinder, or a part of an organ. Random touches, solved in full,
+    calibrate its error bar and test it. Under mpirun the ranks share the solves. Exit status 1: the bar covers the
+    error of less than 95 % of the test touches.
 
     Example: epsmesh export studies/quick.toml --accuracy 1% -o box.epsm.nc
 
@@ -68,7 +74,7 @@ def export(
         _copy_evaluator(evaluator)
         return
     if file is None:
-        fail(Fault("name the study whose body a model is made of, or --evaluator FOLDER", key="FILE", howto=_HOWTO))
+        fail(Fault("FILE is missing: give a study, or --evaluator FOLDER", key="FILE", howto=_HOWTO))
     from pipeline.export.scope import ExportError, scope_of
     from pipeline.units import parse_quantity
 
@@ -100,7 +106,7 @@ def export(
     comm = workflow.world()
     ranks = Ranks(comm, (lambda text: print(text, file=sys.stderr, flush=True)) if comm.rank == 0 else lambda _: None)
     fault, status = Fault(""), DONE
-    # Of several ranks each is one thread: BLAS's own would take the others' cores.
+    # With several ranks, one BLAS thread each: more would compete for the cores.
     threads = threadpool_limits(1 if comm.size > 1 else None, user_api="blas")
     with workflow.abort_on_exception(comm), workflow.ended_soon(), threads:
         try:
@@ -115,32 +121,32 @@ def export(
     if status != DONE:
         fail(fault, status=status)
     if comm.rank == 0:
-        _tell(exported, wanted, path)
-    raise typer.Exit(DONE if exported.held >= _HELD else SOME_FAILED)
+        _print_result(exported, wanted, path)
+    raise typer.Exit(DONE if exported.held >= _COVERED else SOME_FAILED)
 
 
-def _tell(exported: "Exported", wanted: float, path: Path) -> None:
-    """Say what a model holds."""
+def _print_result(exported: "Exported", wanted: float, path: Path) -> None:
+    """Print what the model is for, and how good it is."""
     if exported.unseen:
-        warning(f"{path} holds no visible surface: {exported.unseen}")
+        warning(f"{path} has no deforming surface: {exported.unseen}")
     found = exported.summary(wanted) | {"file": str(path)}
     say(
         found,
         repr(exported.model),
-        f"wrote {path}: {counted(int(found['places']), 'place')} solved for, {found['coefficients']} coefficients",
-        f"judged on {found['judged']} touches: {100 * found['held']:.0f} % held by their bars, largest error "
-        f"{100 * found['largest_error']:.2g} %, median bar {100 * found['median_bar']:.2g} %",
+        f"wrote {path}: {counted(int(found['places']), 'place')} solved, {found['coefficients']} coefficients",
+        f"test on {found['judged']} touches: the error bar covers {100 * found['held']:.0f} % of the errors; largest "
+        f"error {100 * found['largest_error']:.2g} %, median error bar {100 * found['median_bar']:.2g} %",
     )
 
 
 def _copy_evaluator(folder: Path) -> None:
-    """Copy the sources of the evaluator to a folder, unless one of them is there already."""
+    """Copy the evaluator's sources to a folder; exit if one of them exists there."""
     from pipeline.realtime.sources import source_files, sources
 
     names = source_files()
     for name in names:
         if (folder / name).exists():
-            fail(of_file(folder / name, "exists already, and is left alone; give another folder", _HOWTO))
+            fail(of_file(folder / name, "exists, and is not overwritten; give another folder", _HOWTO))
     check_output(folder=folder)
     try:
         for name in names:

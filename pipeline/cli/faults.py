@@ -1,4 +1,4 @@
-"""How a command ends that cannot go on: told to people on standard error, and to scripts as JSON where they asked."""
+"""How a command fails: sentences on standard error, and with --json the same as data."""
 
 import time
 from collections.abc import Iterable, Iterator
@@ -23,10 +23,10 @@ _PATIENCE = 5.0  # seconds
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing that is wrong: ``message`` is what people read; the rest is None where it has no place.
+    """One error: ``message`` for people; the other fields for scripts, None where they do not apply.
 
-    ``key`` is that of a study file or an option, ``value`` what was found there, ``allowed`` what is; ``howto`` names
-    the page of the documentation that tells how it is done.
+    ``key`` is the key of a study file or an option, ``value`` its value, ``allowed`` the allowed ones, ``howto`` the
+    page of the documentation that helps.
     """
 
     message: str
@@ -38,24 +38,24 @@ class Fault:
 
 
 def of_option(name: str, value: Any, allowed: str, howto: str | None = None) -> Fault:
-    """Return what is wrong with the ``value`` of an option, and what is allowed."""
+    """Return the error for the ``value`` of an option."""
     return Fault(f"{name} {value}: {allowed}", key=name, value=str(value), allowed=allowed, howto=howto)
 
 
 def of_file(path: str | Path, why: str, howto: str | None = None) -> Fault:
-    """Return what is wrong with a file."""
+    """Return the error for a file."""
     return Fault(f"{printable(str(path))}: {why}", file=str(path), howto=howto)
 
 
 def of_unwritten(problem: OSError, path: str | Path | None = None) -> Fault:
-    """Return what became of a file that cannot be written: that which ``problem`` names, or else ``path``."""
+    """Return the error for a file that cannot be written: the one that ``problem`` names, or else ``path``."""
     name = problem.filename or path
     why = f"cannot be written: {problem.strerror or problem}"
     return of_file(name, why) if name else Fault(why)
 
 
 def of_study(wrong: "StudyError", hint: str = "") -> list[Fault]:
-    """Return what is wrong with a study file, each problem by itself; ``hint`` goes with what people read."""
+    """Return the errors of a study file, one for each problem; ``hint`` is appended to each message."""
     return [
         Fault(f"{printable(wrong.file)}: {one}{hint}", wrong.file, one.key, one.value, one.allowed, one.howto or None)
         for one in wrong.problems
@@ -63,53 +63,54 @@ def of_study(wrong: "StudyError", hint: str = "") -> list[Fault]:
 
 
 def leave_it_to_first_rank() -> None:
-    """Wait, on the other ranks, until the first one has spoken: all are ended as soon as one leaves with a bad status.
+    """Wait, on ranks other than the first, until the first one has printed.
 
-    Who is still here after that is alone in what it found, and is to speak.
+    mpirun ends all ranks as soon as one exits with an error. A rank that still runs after the wait found an error that
+    the first rank did not find, and prints it.
     """
     if not is_first_rank():
         time.sleep(_PATIENCE)
 
 
 def fail(*faults: Fault | str, status: int = BAD_INPUT, on_all_ranks: bool = False) -> NoReturn:
-    """Exit, by default for bad input, with one voice if there are several ranks: the first one's, where it agrees.
+    """Print the errors once, whatever the number of ranks, and exit; the default status is that of wrong input.
 
-    What is known to be said ``on_all_ranks`` the others do not say: once MPI has begun, none ends before all do.
-    Where JSON was asked for, standard output gets an object with the status and the errors.
+    ``on_all_ranks``: every rank calls this with the same errors, so only the first one prints them. Once MPI has
+    started, a rank cannot exit before the others. With --json standard output gets an object with status and errors.
     """
     if on_all_ranks and not is_first_rank():
         raise typer.Exit(status)
     leave_it_to_first_rank()
     found = [fault if isinstance(fault, Fault) else Fault(fault) for fault in faults]
-    tell(found)
+    print_faults(found)
     if is_json_wanted():
         print_json(as_data(found, status))
     raise typer.Exit(status)
 
 
 def of_results(wrong: "ResultsError", file: str) -> tuple[Fault, int]:
-    """Return what keeps the results of a study ``file`` from being made, and the exit status that it has."""
+    """Return the error that prevents the results of a study ``file``, and its exit status."""
     return Fault(str(wrong), file=file), BAD_INPUT if wrong.is_unwritable else SOME_FAILED
 
 
 @contextmanager
 def refusing(*errors: type[Exception], file: str | Path, howto: str | None = None) -> Iterator[None]:
-    """Exit for bad input where one of ``errors`` is raised: its message is what is wrong with ``file``."""
+    """Exit with the status of wrong input if one of ``errors`` is raised; its message is about ``file``."""
     try:
         yield
     except errors as wrong:
         fail(Fault(str(wrong), file=str(file), howto=howto))
 
 
-def tell(faults: Iterable[Fault]) -> None:
-    """Print faults for people, and the pages that tell how it is done."""
+def print_faults(faults: Iterable[Fault]) -> None:
+    """Print errors to standard error, and the documentation pages that help."""
     faults = list(faults)
     for fault in faults:
         error(fault.message)
     if howto := dict.fromkeys(fault.howto for fault in faults if fault.howto):
-        error(f"how to: {', '.join(map(str, howto))}")
+        error(f"see {', '.join(map(str, howto))}")
 
 
 def as_data(faults: Iterable[Fault], status: int) -> dict[str, Any]:
-    """Return faults as scripts get them."""
+    """Return errors as data for scripts."""
     return {"status": status, "errors": [asdict(fault) for fault in faults]}

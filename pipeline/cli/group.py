@@ -1,4 +1,4 @@
-"""The commands as a whole: where scripts asked for JSON, whatever ends one is told in JSON, too."""
+"""The group of all commands: with --json, every error that ends a command is printed as JSON, too."""
 
 import errno
 import os
@@ -24,9 +24,9 @@ from pipeline.files import NOT_UTF8, is_utf8
 from pipeline.launcher import is_first_rank, is_interrupt, is_launched
 from pipeline.printable import printable
 
-# What a disk says that cannot be written to, be it only found when all is done.
+# Errors of a disk that cannot be written to; some appear only at the end.
 _UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
-# What has become of commands that there were.
+# Former commands, and what replaced them.
 _NOW = {
     "validate": "epsmesh plan --check FILE...",
     "explain": "epsmesh plan FILE CASE",
@@ -40,7 +40,7 @@ _NOW = {
 
 
 class Commands(TyperGroup):
-    """A group of commands that knows before any of them begins whether its words ask for JSON."""
+    """A group of commands that finds --json before any command starts."""
 
     words: Sequence[str] = ()
 
@@ -54,17 +54,17 @@ class Commands(TyperGroup):
         try:
             return super().parse_args(ctx, args)
         except Exception as wrong:
-            _tell(wrong, self.words)
+            _print_error(wrong, self.words)
             raise
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Return the command that the first word names; of one that has another name now, that is told."""
+        """Return the command that the first word names; exit with the new name for a former one."""
         if (now := _NOW.get(args[0])) is not None:
             fail(Fault(f"`epsmesh {args[0]}` is now `{now}`", key="COMMAND", value=args[0], allowed=now))
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the command that was asked for; what it raises goes on from here."""
+        """Run the command; print as JSON any error that ends it, and raise it again."""
         try:
             return super().invoke(ctx)
         except OSError as wrong:
@@ -72,12 +72,12 @@ class Commands(TyperGroup):
                 fail(of_unwritten(wrong))
             if wrong.strerror and wrong.filename is not None:
                 fail(of_file(wrong.filename, f"cannot be used: {wrong.strerror}"))
-            _tell(wrong, self.words)
+            _print_error(wrong, self.words)
             raise
         except (Exception, KeyboardInterrupt) as wrong:
             plain = isinstance(wrong, typer.Exit) or not is_interrupt(wrong)
             ended = wrong if plain else KeyboardInterrupt()
-            _tell(ended, self.words)
+            _print_error(ended, self.words)
             if isinstance(ended, KeyboardInterrupt):
                 _end_ranks()
             if ended is wrong:
@@ -86,23 +86,23 @@ class Commands(TyperGroup):
 
 
 def _end_ranks() -> None:
-    """End every rank if there are several: one that alone was interrupted would wait for the others for ever."""
+    """End every rank: if only one was interrupted, it would wait for the others for ever."""
     if not is_launched():
         return
     mpi = sys.modules.get("mpi4py.MPI")
     if mpi is not None and mpi.Is_initialized() and not mpi.Is_finalized():
         mpi.COMM_WORLD.Abort(INTERRUPTED)
-    # An import that was interrupted has left no module, but an MPI that waits for all ranks as Python ends.
+    # After an interrupted import there is no module, but MPI would still wait for all ranks when Python exits.
     sys.stdout.flush()
     os._exit(INTERRUPTED)
 
 
-def _tell(wrong: BaseException, words: Sequence[str]) -> None:
-    """Print what ended a command of these ``words`` as JSON, if it was asked for that and has printed none itself."""
-    usage = getattr(wrong, "format_message", None)  # of words that make no command, in every version of the library
+def _print_error(wrong: BaseException, words: Sequence[str]) -> None:
+    """Print the error that ended a command line of these ``words`` as JSON, with --json and if none was printed yet."""
+    usage = getattr(wrong, "format_message", None)  # usage errors have it, in every version of the library
     if usage is not None:
         leave_it_to_first_rank()
-    # An exit tells its reason before; help is no error.
+    # Before an exit its reason was printed; help is no error.
     if isinstance(wrong, typer.Exit) or has_printed_json() or not is_first_rank():
         return
     if isinstance(wrong, KeyboardInterrupt):
@@ -115,7 +115,7 @@ def _tell(wrong: BaseException, words: Sequence[str]) -> None:
 
 
 def _of_usage(wrong: Any, message: str, words: Sequence[str]) -> Fault:
-    """Return ``words`` that make no command as a fault."""
+    """Return the error of a command line that cannot be parsed."""
     parameter = getattr(wrong, "param", None)
     options = [word for word in getattr(parameter, "opts", ()) if word.startswith("--")]
     argument = getattr(parameter, "metavar", None) or str(getattr(parameter, "name", None) or "").upper()
@@ -126,7 +126,7 @@ def _of_usage(wrong: Any, message: str, words: Sequence[str]) -> Fault:
 
 
 def _after(options: Sequence[str], words: Sequence[str]) -> str | None:
-    """Return the last value that ``words`` give an option, None if they give none."""
+    """Return the last value of an option on the command line, None without one."""
     found = None
     for word, following in zip(words, [*words[1:], None], strict=True):
         name, equals, value = word.partition("=")

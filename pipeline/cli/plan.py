@@ -7,7 +7,7 @@ import typer
 
 from pipeline.cli.cases import find_case
 from pipeline.cli.console import is_json_wanted, say, warning
-from pipeline.cli.faults import BAD_INPUT, DONE, SOME_FAILED, as_data, fail, of_study, refusing, tell
+from pipeline.cli.faults import BAD_INPUT, DONE, SOME_FAILED, as_data, fail, of_study, print_faults, refusing
 from pipeline.cli.words import (
     DEFAULT_OUTPUT,
     File,
@@ -121,7 +121,7 @@ def _check(files: list[Path]) -> NoReturn:
         except StudyError as wrong:
             faults = of_study(wrong, meant(file))
             report.append({"file": str(file), "errors": as_data(faults, BAD_INPUT)["errors"], "warnings": []})
-            tell(faults)
+            print_faults(faults)
             continue
         cases = len(make_plan(study).keys)
         report.append({"file": str(file), "errors": [], "warnings": list(study.warnings), "cases": cases})

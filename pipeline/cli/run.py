@@ -1,4 +1,4 @@
-"""The command that runs studies: what is to be done, progress, and what came of it."""
+"""The command that runs studies: it prints the work to do, progress, and the result."""
 
 import sys
 import time
@@ -39,9 +39,9 @@ if TYPE_CHECKING:
     from pipeline.run.progress import Terminal
     from pipeline.workflow import Opened, Outcome
 
-# Failed cases beyond these are counted only: `status` lists them all.
+# So many failed cases are listed; `status` lists all.
 _MOST_FAILURES = 20
-# Reasons beyond these are left out of a line.
+# So many reasons are given in a line.
 _MOST_REASONS = 2
 
 
@@ -49,24 +49,24 @@ def run(
     files: Files,
     output: Output = DEFAULT_OUTPUT,
     store: StoreFile = None,
-    meshes: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the meshes that are kept.")] = DEFAULT_MESHES,
-    fresh: Annotated[bool, typer.Option("--fresh", help="Compute again what is stored.")] = False,
+    meshes: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the mesh cache.")] = DEFAULT_MESHES,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Compute stored cases again.")] = False,
     without: Without = None,
     shard: Annotated[
-        str | None, typer.Option(metavar="I/N", help="Do part I of N only; it is kept in OUTPUT/shards.")
+        str | None, typer.Option(metavar="I/N", help="Run part I of N only, into a store of its own in DIR/shards.")
     ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
     as_json: Json = False,
-    profile: Annotated[bool, typer.Option("--profile", help="Print where the time went (on the first rank).")] = False,
+    profile: Annotated[bool, typer.Option("--profile", help="Print the time of each stage on the first rank.")] = False,
 ) -> None:
-    """Run studies: forces, timings, dataset and figure. Under mpirun, on all ranks.
+    """Run studies: compute forces, write datasets and figures.
 
-    Cases that are stored already are read back, so an interrupted run goes on where it was. With --json standard
-    output holds one object, at the end; progress goes to standard error.
+    Stored cases are read, not computed again: run the same command to continue after an interruption. With --json
+    standard output gets one object at the end, and progress goes to standard error.
 
-    With --shard I/N no dataset is written: N such runs, which need not know of each other, do the study.
-    `epsmesh status FILE --merge` brings them together; a run of the whole study does so, too, and computes the rest.
+    --shard I/N splits a study into N independent runs. A shard writes no dataset: afterwards `epsmesh status FILE
+    --merge` merges the shards and writes it. So does a run without --shard, which also computes missing cases.
 
     Example: epsmesh run studies/figure3.toml
 
@@ -78,7 +78,7 @@ def run(
     if store:
         check_store(store)
     part = check_shard(shard, studies)
-    # Where nothing was said, meshes that cannot be kept are made again: that stops nobody.
+    # If the default mesh cache cannot be written, meshes are not cached, and the run continues.
     check_output(store or output / STORE_NAME, folder=None if meshes == DEFAULT_MESHES else meshes)
     for study in () if part else studies:
         check_output(*result_files(output, study.name))
@@ -141,7 +141,7 @@ def _progress(plan: "Plan", *, verbose: bool) -> "Terminal":
 
 
 def _announce(plan: "Plan", opened: "Opened", *, quiet: bool, verbose: bool) -> None:
-    """Say, before the run, what is to be done and what is not, and why."""
+    """Print, before the run, the work to do, and what is struck out and why."""
     for notice in opened.notices:
         error(notice)
     if quiet:
@@ -152,7 +152,9 @@ def _announce(plan: "Plan", opened: "Opened", *, quiet: bool, verbose: bool) -> 
     for struck in plan.struck:
         print(f"  {struck.name:13} {struck.count:6}  {struck.reason}")
     if study.solve.timing:
-        print(f"  timing: every case afresh and alone, median of {study.solve.repeats}; nothing is struck out")
+        print(
+            f"  timing study: each case is computed alone {study.solve.repeats} times (median); nothing is struck out"
+        )
     if plan.solves:
         steps = plan.meshes
         print(f"  to do: {counted(len(steps), 'mesh')}, {counted(len(plan.solves), 'solve')}", flush=True)
@@ -161,7 +163,7 @@ def _announce(plan: "Plan", opened: "Opened", *, quiet: bool, verbose: bool) -> 
 
 
 def _as_data(plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float) -> dict[str, Any]:
-    """Return what came of a study as plain data."""
+    """Return the result of a run as plain data."""
     return {
         "study": plan.study.file,
         "warnings": list(plan.study.warnings),
@@ -179,7 +181,7 @@ def _as_data(plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float)
 def _conclude(
     plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float, shard: "Shard | None", *, quiet: bool
 ) -> None:
-    """Say, after the run, what came of it and where it is."""
+    """Print, after the run, failures, counts and files."""
     for case, message in outcome.failures[:_MOST_FAILURES]:
         error(f"failed: {case}: {message}")
     file = quote(plan.study.file)
@@ -190,12 +192,12 @@ def _conclude(
     if outcome.interrupted:
         cases = sum(outcome.counts.values())
         done = cases - outcome.counts["pending"]
-        again = f"`epsmesh run {file}{f' --shard {shard}' if shard else ''}` goes on from there"
-        error(f"interrupted: {done} of {cases} cases are on record; {again}")
+        again = f"`epsmesh run {file}{f' --shard {shard}' if shard else ''}` continues"
+        error(f"interrupted: {done} of {cases} cases are stored; {again}")
 
 
 def _line(plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float, shard: "Shard | None") -> str:
-    """Return one line: cases done, failed, skipped and why, where the files are, and how long it took."""
+    """Return one line: cases by state, with reasons; files; time."""
     from pipeline.run.remaining import format_seconds
 
     counts = []
@@ -207,20 +209,20 @@ def _line(plan: "Plan", opened: "Opened", outcome: "Outcome", seconds: float, sh
         more = "; …" if len(reasons) > _MOST_REASONS else ""
         counts.append(f"{count} {state}{f' ({why}{more})' if why and state in ('failed', 'skipped') else ''}")
     stored = _read_back(plan)
-    read_back = f" ({stored} read back)" if stored else ""
+    read_back = f" ({stored} from the store)" if stored else ""
     found, name = ", ".join(counts), plan.study.file
     if shard:
-        # A shard may hold F_exact and no case, or nothing where there are fewer steps than shards.
+        # A shard may have F_exact but no case; if there are fewer steps than shards, it may have nothing.
         found = found if sum(outcome.counts.values()) else "F_exact" if plan.part else "nothing to do"
         name = f"{name}, shard {shard}"
-        where = f"kept for `epsmesh status {quote(plan.study.file)} --merge`, when all shards are done"
+        where = f"when all shards are done, merge them: `epsmesh status {quote(plan.study.file)} --merge`"
     else:
         where = f"wrote {', '.join(map(str, outcome.files))}"
     return f"{name}: {found}{read_back}; {where}; {format_seconds(seconds)}"
 
 
 def _print_stages(stream: TextIO) -> None:
-    """Print where the time of this process went."""
+    """Print the time that this process spent in each stage."""
     from pipeline.stages import table
 
     for name, spent, share in table():

@@ -1,4 +1,4 @@
-"""`status --merge`: the shards of a study are brought together, and what is missing is told with what computes it."""
+"""`status --merge`: merge the shards of a study, and print the commands that compute missing cases."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -26,7 +26,7 @@ _MOST_CASES = 10
 def merge_shards(
     file: Path, stores: list[Path] | None, output: Path, target: Path, without: list[str] | None
 ) -> NoReturn:
-    """Merge the ``stores`` of a study's shards into the store ``target``, write its results to ``output``, and exit."""
+    """Merge the ``stores`` of a study's shards into ``target``, write the study's results to ``output``, and exit."""
     from pipeline.plan.plan import make_plan
 
     (study,) = load_all([file])
@@ -50,7 +50,7 @@ def merge_shards(
         fail(fault, status=status)
     missing = frozenset(solve.key for solve in plan.solves if solve.key not in records)
     again = _completing(plan, missing, paths, [word for name in without or () for word in ("--without", name)])
-    told = ", ".join(f"{count} {state}" for state, count in counts.items() if count)
+    totals = ", ".join(f"{count} {state}" for state, count in counts.items() if count)
     say(
         {
             "file": str(file),
@@ -62,17 +62,17 @@ def merge_shards(
             "files": [str(path) for path in files],
         },
         *(f"{source.path}: {counted(source.records, 'record')}, {source.taken} of them new" for source in sources),
-        f"{file}: {told}; wrote {', '.join(map(str, files))}",
+        f"{file}: {totals}; wrote {', '.join(map(str, files))}",
     )
     if not is_json_wanted():
         for case, message in failed:
             error(f"failed: {case}: {message}")
-        _tell_pending(plan, missing, again)
+        _print_pending(plan, missing, again)
     raise typer.Exit(SOME_FAILED if problems or missing or counts["failed"] else DONE)
 
 
 def _stores(study: "Study", given: list[Path] | None, output: Path) -> list[Path]:
-    """Return the stores to be merged, or exit if one is not there, or none."""
+    """Return the stores to merge; exit if one is absent, or if there is none."""
     from pipeline.plan.shard import stores_of
 
     absent = [path for path in given or () if not path.is_file()]
@@ -81,19 +81,19 @@ def _stores(study: "Study", given: list[Path] | None, output: Path) -> list[Path
     found = given or stores_of(output, study)
     if not found:
         folder = output / "shards"
-        made = f"`epsmesh run {quote(study.file)} --shard 1/4` and so on make them"
-        fail(of_file(folder, f"no stores of {study.file}; {made}", CLUSTER))
+        made = f"run them first: `epsmesh run {quote(study.file)} --shard 1/4`, …"
+        fail(of_file(folder, f"there are no shards of {study.file}; {made}", CLUSTER))
     return found
 
 
 def _merged(paths: list[Path], path: Path, plan: "Plan") -> "tuple[tuple[Source, ...], dict[str, Record]]":
-    """Merge into the store at ``path`` and return the plan's records, with those of cases that need not be run."""
+    """Merge into the store at ``path``; return the plan's records, with those of skipped cases."""
     from pipeline.run import merge as merging
     from pipeline.run.stop import skipped
     from pipeline.run.store import Store, StoreError
 
     if path.resolve() in [source.resolve() for source in paths]:
-        fail(of_file(path, "this store is what the others are merged into; it cannot be one of them"))
+        fail(of_file(path, "the shards are merged into this store, so it cannot be one of them"))
     with refusing(StoreError, file=path):
         store = Store(path)
         if store.notice:
@@ -112,7 +112,7 @@ def _dates(records: dict[str, "Record"]) -> dict[str, str]:
 
 
 def _completing(plan: "Plan", missing: frozenset[str], paths: list[Path], options: list[str]) -> list[str]:
-    """Return the commands that compute what is missing: the shards it is in, of the deal that was run last."""
+    """Return the commands that compute the missing steps: runs of their shards, split as in the latest run."""
     if not missing:
         return []
     from pipeline.plan.shard import deal, shard_of
@@ -132,8 +132,8 @@ def _completing(plan: "Plan", missing: frozenset[str], paths: list[Path], option
     return commands
 
 
-def _tell_pending(plan: "Plan", missing: frozenset[str], again: list[str]) -> None:
-    """Say which cases are not on record, and what to do."""
+def _print_pending(plan: "Plan", missing: frozenset[str], again: list[str]) -> None:
+    """Print the cases that are not stored, and the commands that compute them."""
     if not missing:
         return
     labels = [solve.label for solve in plan.solves if solve.key in missing]
@@ -141,6 +141,6 @@ def _tell_pending(plan: "Plan", missing: frozenset[str], again: list[str]) -> No
         error(f"pending: {label}")
     if len(labels) > _MOST_CASES:
         error(f"pending: … and {len(labels) - _MOST_CASES} more")
-    error("to complete them, then merge again:")
+    error("compute them, then merge again:")
     for command in again:
         error(f"  {command}")

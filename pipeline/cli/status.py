@@ -1,4 +1,4 @@
-"""The command that tells what is on record, of a study or in the case store, and looks after that."""
+"""The command that shows, merges, checks and prunes stored cases."""
 
 from collections import Counter
 from pathlib import Path
@@ -33,16 +33,16 @@ def status(
     file: Annotated[
         Path | None,
         typer.Argument(
-            metavar="[FILE]",
-            help="A study file (TOML), or a name in studies/; without one, the case store is looked at.",
+            metavar="FILE",
+            help="A study file (TOML), or a name in studies/. Without it: the case store.",
             show_default=False,
         ),
     ] = None,
     stores: Annotated[
         list[Path] | None,
         typer.Argument(
-            metavar="[STORE...]",
-            help="With --merge: stores of shards [default: OUTPUT/shards/<study>.*.sqlite].",
+            metavar="STORE",
+            help="With --merge: stores of shards [default: DIR/shards/<study>.*.sqlite].",
             show_default=False,
         ),
     ] = None,
@@ -50,30 +50,31 @@ def status(
     store: StoreFile = None,
     without: Without = None,
     merge: Annotated[
-        bool, typer.Option("--merge", help="Bring the shards of the study together in the store; write its dataset.")
+        bool, typer.Option("--merge", help="Merge the study's shards into the store, and write its dataset.")
     ] = False,
     prune: Annotated[
-        bool, typer.Option("--prune", help="Say what would be removed: records that cannot be read, and what is named.")
+        bool,
+        typer.Option("--prune", help="List records to remove: unreadable ones, those of --days and --failed."),
     ] = False,
     days: Annotated[
         float | None,
-        typer.Option(metavar="DAYS", help="With --prune: what was stored so many days ago, or before.", min=0),
+        typer.Option(metavar="DAYS", help="With --prune: records at least so many days old.", min=0),
     ] = None,
     failed: Annotated[bool, typer.Option("--failed", help="With --prune: failed cases.")] = False,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="With --prune: remove them.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Say which cases of a study are done, failed, skipped, or still to be run; or what the case store holds.
+    """Count a study's cases by state, or check the case store.
 
-    A run without some of its reductions is asked after with the same --without.
+    Cases are ok, failed, skipped, lost (no contact) or pending. For a run with --without, give the same --without here.
 
-    With --merge the records of the study's shards are taken into the store first, and its dataset and figure written.
-    Of two records of one case that with a force is kept, else the one stored last; merging again changes nothing, and
-    the shards' files stay as they are. Exit status 1 if cases failed or are pending, or if a shard's store is damaged.
+    --merge first copies the records of the study's shards into the store, then writes dataset and figure. If a case
+    has two records, the one with a force is kept, else the later one. Shards stay unchanged; merging twice is harmless.
+    Exit status 1: cases failed or are pending, or a shard's store is damaged.
 
-    Without a study the records of the store are counted, by status and by what computed them, and each is checked:
-    exit status 1 if one cannot be read or makes no sense. With --prune --yes some are removed; a file that is damaged
-    as a whole is moved aside, and a new store begun.
+    Without a study, the store's records are checked and counted by status, origin and versions. Exit status 1: a
+    record cannot be read or is inconsistent. --prune --yes removes records; if the whole file is damaged, it is
+    renamed, and a new store replaces it.
 
     Example: epsmesh status studies/figure3.toml
 
@@ -84,13 +85,13 @@ def status(
     Example: epsmesh status --prune --days 90 --failed --yes
     """
     if not prune and (days is not None or failed or yes):
-        fail("--days, --failed and --yes say what is removed: give --prune, too")
+        fail("--days, --failed and --yes need --prune: give it, too")
     if prune and file:
-        fail("--prune is of the whole store, whatever the study: leave the study out")
+        fail("--prune applies to the whole store: leave the study out")
     if merge and not file:
-        fail("--merge is of the shards of a study: name it")
+        fail("--merge needs a study: give its file before the option")
     if stores and not merge:
-        fail("only with --merge are stores named after the study")
+        fail("stores after the study need --merge: give it, too")
     path = store or output / STORE_NAME
     if file and merge:
         from pipeline.cli.shards import merge_shards
@@ -103,7 +104,7 @@ def status(
 
 
 def _of_study(file: Path, output: Path, path: Path, without: tuple[str, ...]) -> None:
-    """Say which cases of a study are in which state."""
+    """Count the cases of a study by state."""
     from pipeline.plan.plan import make_plan
     from pipeline.plan.shard import stores_of
     from pipeline.run.outcome import count_states, failures
@@ -121,21 +122,19 @@ def _of_study(file: Path, output: Path, path: Path, without: tuple[str, ...]) ->
             records, _ = known_of(path, plan)
     records |= skipped(plan, records)
     counts, failed = count_states(plan, records), failures(plan, records)
-    told = f"{counts['ok']} done, {counts['failed']} failed"
-    told += "".join(f", {counts[state]} {state}" for state in ("skipped", "lost") if counts.get(state))
-    lines = [f"{file}: {told}, {counts['pending']} pending{axes_of(study)}"]
+    totals = f"{counts['ok']} ok, {counts['failed']} failed"
+    totals += "".join(f", {counts[state]} {state}" for state in ("skipped", "lost") if counts.get(state))
+    lines = [f"{file}: {totals}, {counts['pending']} pending{axes_of(study)}"]
     lines += [f"  failed: {case}: {message}" for case, message in failed]
     if counts["pending"] and (shards := len(stores_of(output, study))):
-        lines.append(
-            f"  {counted(shards, 'shard')} in {output / 'shards'}, not looked at: --merge brings them together"
-        )
+        lines.append(f"  {counted(shards, 'shard')} in {output / 'shards'} not counted: --merge merges them")
     say({"file": str(file), **counts, "failures": [{"case": c, "message": m} for c, m in failed]}, *lines)
 
 
 def _of_store(path: Path, prune: bool, days: float | None, *, failed: bool, yes: bool) -> None:
     """Count the records of the case store, and check each; or remove some."""
     if not path.exists():
-        fail(of_file(path, "there is no such store; `epsmesh run` makes one in its results"))
+        fail(of_file(path, "there is no case store here; `epsmesh run STUDY` makes one in its output folder"))
     check_store(path)
     if not prune:
         _check(path)
@@ -151,11 +150,11 @@ def _of_store(path: Path, prune: bool, days: float | None, *, failed: bool, yes:
             opened.close()
     if moved:
         warning(moved)
-    say(found | {"done": yes, "notice": moved}, f"{path}: {_said(found, done=yes)}")
+    say(found | {"done": yes, "notice": moved}, f"{path}: {_removal(found, done=yes)}")
 
 
 def _check(path: Path) -> NoReturn:
-    """Say what the store holds and what is wrong with it, and exit."""
+    """Print what the store contains, and its problems; exit."""
     from pipeline.run.reading import open_to_read
     from pipeline.run.store import StoreError
 
@@ -189,7 +188,7 @@ def _versions(provenance: dict[str, str | int]) -> str:
 
 
 def _doomed(path: Path, older_than: float | None, *, failed: bool) -> dict[str, Any]:
-    """Return what is to be removed, as data; the store is left as it is."""
+    """Return the records to remove, as data; the store is not changed."""
     from pipeline.run.reading import open_to_read
     from pipeline.run.store import DamagedStoreError
 
@@ -209,13 +208,13 @@ def _doomed(path: Path, older_than: float | None, *, failed: bool) -> dict[str, 
     return unknown | {"records": count, "remove": len(doomed), "bytes": size, "reasons": reasons, "damaged": ""}
 
 
-def _said(found: dict[str, Any], *, done: bool) -> str:
-    """Say what was done, or would be."""
+def _removal(found: dict[str, Any], *, done: bool) -> str:
+    """Return a sentence on what was removed, or would be."""
     if found["damaged"]:
-        aside = "moved aside, and a new one begun" if done else "--yes moves it aside and begins a new one"
-        return f"is damaged as a whole, {found['bytes'] / 1e6:.3g} MB: {aside}"
+        aside = "renamed, and replaced by a new one" if done else "--yes renames it and makes a new one"
+        return f"the whole store is damaged, {found['bytes'] / 1e6:.3g} MB: {aside}"
     if not found["remove"]:
-        return f"none of {found['records']} records {'removed' if done else 'would be removed'}"
+        return f"no record to remove, {found['records']} stay"
     why = ", ".join(f"{count} {word}" for word, count in found["reasons"].items())
     what = f"{found['remove']} of {found['records']} records ({why}), {found['bytes'] / 1e3:.3g} kB"
-    return f"{what}: removed" if done else f"{what}, would be removed: --yes does it"
+    return f"{what}: removed" if done else f"{what}: --yes removes them"

@@ -22,16 +22,16 @@ def touch(
             "--output",
             "-o",
             metavar="PAGE",
-            help="Write the page as one HTML file, and serve nothing.",
+            help="Write the page to this HTML file; do not serve it.",
             show_default=False,
         ),
     ] = None,
-    open_it: Annotated[bool, typer.Option("--open/--no-open", help="Open it in the browser.")] = True,
+    open_it: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = True,
     as_json: Json = False,
 ) -> None:
-    """Drag a tool over a body in a browser: its surface, the force, and its error bar, at once.
+    """Show a real-time model in a browser: drag a tool, read the force.
 
-    The page is served on this machine's own address alone, until Ctrl-C.
+    The page shows the surface, the force and its error bar. It is served to this machine only, until Ctrl-C.
 
     Example: epsmesh touch results/quick.epsm.nc
 
@@ -47,7 +47,7 @@ def touch(
         if output is not None:
             path = write_touch_page(surface, output, model.name)
             size = path.stat().st_size
-            say({"file": str(path), "bytes": size}, f"wrote {path} ({size / 1e6:.1f} MB), to be opened in a browser")
+            say({"file": str(path), "bytes": size}, f"wrote {path} ({size / 1e6:.1f} MB): open it in a browser")
             return
         text = render(surface, model.name)
     except (ModelError, OSError) as problem:
@@ -57,7 +57,7 @@ def touch(
 
 
 def _meant(file: Path) -> str:
-    """Return what makes a model, for what is none."""
+    """Return the command that makes a model, if ``file`` is not one."""
     study = quote(str(file if file.suffix == ".toml" else file.with_suffix(".toml").name))
     return "" if file.name.endswith(MODEL) else f"; a model ends in {MODEL}: `epsmesh export {study}` makes one"
 
@@ -69,7 +69,7 @@ def _serve(text: str, *, open_it: bool) -> None:
     from pipeline.touch.server import PageServer
 
     with PageServer(text) as server:
-        say({"address": server.address}, f"{server.address} (Ctrl-C ends it)")
+        say({"address": server.address}, f"{server.address} (Ctrl-C stops the server)")
         if open_it:
             webbrowser.open(server.address)
         try:

@@ -1,4 +1,4 @@
-"""The command that puts the program itself to the test."""
+"""The command that tests the program itself against known forces."""
 
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
@@ -16,11 +16,12 @@ _ROW = "{:4} {:58} {:24} {:>12} {:>12} {:>9} {:>9}  {}"
 
 
 def verify(
-    quick: Annotated[bool, typer.Option("--quick", help="A few rows of each kind.")] = False, as_json: Json = False
+    quick: Annotated[bool, typer.Option("--quick", help="Only a few rows of each kind.")] = False, as_json: Json = False
 ) -> None:
-    """Compare forces with closed forms and published tables.
+    """Compare this installation's forces with known ones.
 
-    Manufactured solutions too, and the program's other paths. Exit status 1 if any row is out.
+    References: closed forms, published tables, manufactured solutions, and other ways through the program. A row is
+    "ok" if value and reference agree within their error bars, else "OUT". Exit status 1 if a row is OUT.
 
     Example: epsmesh verify
     """

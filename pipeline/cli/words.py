@@ -1,4 +1,4 @@
-"""What every command takes and says: options, checks of what they hold, words. Only the command line prints."""
+"""Arguments and options that commands share, and the checks of their values."""
 
 import difflib
 import os
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pipeline.plan.shard import Shard
     from pipeline.study.sweep import Study
 
-_SKIPPING, CLUSTER = "docs/skipping.md", "docs/cluster.md"  # what tells more
+_SKIPPING, CLUSTER = "docs/skipping.md", "docs/cluster.md"  # pages that errors refer to
 _SQLITE = b"SQLite format 3\0"
 DEFAULT_OUTPUT, DEFAULT_MESHES = Path("results"), Path("meshes/cache")
 
@@ -26,7 +26,7 @@ STUDIES = Path("studies")
 
 
 def by_name(file: Path) -> Path:
-    """Return a study file, one that `epsmesh new NAME` has made by its name, too."""
+    """Return a study file: ``file`` itself, or ``studies/file.toml`` if only the name is given."""
     made = STUDIES / f"{file}.toml"
     return made if file.name == str(file) and not file.exists() and made.is_file() else file
 
@@ -38,7 +38,7 @@ def _all_by_name(files: list[Path]) -> list[Path]:
 Files = Annotated[
     list[Path],
     typer.Argument(
-        metavar="FILE...", help="Study files (TOML), or names in studies/.", show_default=False, callback=_all_by_name
+        metavar="FILE", help="Study files (TOML), or names in studies/.", show_default=False, callback=_all_by_name
     ),
 ]
 File = Annotated[
@@ -47,22 +47,24 @@ File = Annotated[
         metavar="FILE", help="A study file (TOML), or a name in studies/.", show_default=False, callback=by_name
     ),
 ]
-Dataset = Annotated[Path, typer.Argument(help="A dataset (.nc), or a study whose dataset exists.", callback=by_name)]
+Dataset = Annotated[
+    Path, typer.Argument(metavar="FILE", help="A dataset (.nc), or a study with a dataset.", callback=by_name)
+]
 Output = Annotated[Path, typer.Option(metavar="DIR", help="Folder of the results.")]
 Found = Annotated[
-    Path, typer.Option("--output", metavar="DIR", help="Folder in which the dataset of a study is looked for.")
+    Path, typer.Option("--output", metavar="DIR", help="Folder of the results, where a study's dataset is.")
 ]
 StoreFile = Annotated[
     Path | None, typer.Option("--store", metavar="FILE", help=f"Case store [default: DIR/{STORE_NAME}].")
 ]
-# What it asks for is known before a command begins: see `console.say`.
-Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts, and nothing else on standard output.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the least: errors, and what was asked for.")]
+# `group.Commands` finds --json before a command starts; `console.say` uses it.
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for scripts on standard output.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only errors and the result.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print more: every step, every case.")]
 
 
 def reductions(incomplete: str) -> list[str]:
-    """Return the reductions whose names begin so, for the shell to complete."""
+    """Return the reductions whose names start with ``incomplete``, for shell completion."""
     return [name for name in REDUCTIONS if name.startswith(incomplete)]
 
 
@@ -70,7 +72,7 @@ Without = Annotated[
     list[str] | None,
     typer.Option(
         metavar="NAME",
-        help=f"A reduction not to use; may be repeated: {', '.join(REDUCTIONS)}.",
+        help=f"Do not use this reduction; may be repeated: {', '.join(REDUCTIONS)}.",
         show_default=False,
         autocompletion=reductions,
     ),
@@ -78,7 +80,7 @@ Without = Annotated[
 
 
 def load_all(files: list[Path]) -> "list[Study]":
-    """Load studies, or exit with every problem of every file; on several ranks only the first one speaks."""
+    """Load studies, or exit with every problem of every file; on several ranks only the first one prints."""
     from pipeline.study.load import load
     from pipeline.study.problems import StudyError
 
@@ -90,7 +92,7 @@ def load_all(files: list[Path]) -> "list[Study]":
             faults += of_study(wrong, meant(file))
     names = [study.name for study in studies]
     faults += [
-        of_file(s.file, f"another study given is called {s.name}, too: both would write {s.name}.nc")
+        of_file(s.file, f"two studies are named {s.name}, and both would write {s.name}.nc: rename one file")
         for s in studies
         if names.count(s.name) > 1
     ]
@@ -100,11 +102,11 @@ def load_all(files: list[Path]) -> "list[Study]":
 
 
 def meant(file: Path) -> str:
-    """Return ``; did you mean …?`` for a study file that is not there; of a folder or a .nc, what to give."""
+    """Return a hint for a path that is no study file: a similar name, or what the path is for."""
     if file.suffix == ".nc":
-        return "; a study file ends in .toml: a dataset is for `report` and `guide`, a model for `touch`"
+        return "; a study file ends in .toml; a dataset is for `report` and `guide`, a model for `touch`"
     if file.is_dir():
-        return f": give its files, such as {file / '*.toml'}"
+        return f": give the files in it, such as {file / '*.toml'}"
     if file.exists():
         return ""
     known = {path.stem: path for path in (*file.parent.glob("*.toml"), *STUDIES.glob("*.toml"))}
@@ -113,7 +115,7 @@ def meant(file: Path) -> str:
 
 
 def read_dataset(file: Path, output: Path) -> "tuple[Path, xr.Dataset]":
-    """Return the dataset that ``file`` names, in memory, and where it is; exit if there is none."""
+    """Return the path of the dataset that ``file`` names, and the dataset in memory; exit if there is none."""
     from pipeline.report.read import dataset_path, read
     from pipeline.report.table import DatasetError
 
@@ -122,7 +124,7 @@ def read_dataset(file: Path, output: Path) -> "tuple[Path, xr.Dataset]":
 
 
 def check_store(path: Path) -> None:
-    """Exit if the file at ``path`` is plainly something else than a case store: a damaged one is moved aside."""
+    """Exit if the file at ``path`` is clearly no case store. A damaged store passes: opening it renames it."""
     if path.is_dir():
         fail(of_option("--store", path, f"is a folder; a case store is a file, such as {path / STORE_NAME}"))
     if path.is_file() and path.suffix not in (".sqlite", ".db"):
@@ -133,7 +135,7 @@ def check_store(path: Path) -> None:
 
 
 def check_output(*files: Path, folder: Path | None = None) -> None:
-    """Exit if one of the files, or any file in a ``folder``, could not be written: before anything is computed."""
+    """Exit, before any computation, if one of the files, or a file in ``folder``, cannot be written."""
     for file in files:
         if why := why_not_writable(file):
             fail(Fault(why, file=str(file)))
@@ -142,31 +144,31 @@ def check_output(*files: Path, folder: Path | None = None) -> None:
 
 
 def check_machine() -> None:
-    """Exit if code cannot be compiled, or MPI not be started, for want of a folder: before anything is computed."""
+    """Exit, before any computation, if a folder that the compiler or MPI needs cannot be written."""
     if found := faults_of_machine():
         fail(*found)
 
 
 def faults_of_machine() -> list[Fault]:
-    """Return what keeps code from being compiled, or MPI from being started: folders that cannot be written."""
+    """Return an error for each folder that the compiler or MPI needs and that cannot be written."""
     tried = {"EPSMESH_CACHE": cache_folder()}
     if given := os.environ.get("TMPDIR"):
         tried["TMPDIR"] = Path(given)
     return [
-        Fault(f"{why}; {name} may name another folder", file=str(folder), key=name)
+        Fault(f"{why}; set the environment variable {name} to another folder", file=str(folder), key=name)
         for name, folder in tried.items()
         if (why := _why_no_files(folder))
     ]
 
 
 def _why_no_files(folder: Path) -> str:
-    """Say why no file can be written in a folder, "" if one can."""
+    """Return why no file can be written in a folder, "" if one can."""
     tried = folder / "tried"
     return why_not_writable(tried).replace(str(tried), str(folder), 1)
 
 
 def axes_of(study: "Study") -> str:
-    """Return the swept inputs in brackets."""
+    """Return the study's axes and their lengths in brackets."""
     text = " × ".join(f"{len(axis)} {axis.name}" for axis in study.axes)
     return f" ({text})" if text else ""
 
@@ -178,18 +180,18 @@ def warn(study: "Study") -> None:
 
 
 def check_names(without: list[str] | None) -> tuple[str, ...]:
-    """Return the names of reductions, or exit if there is none of such a name."""
+    """Return the names of reductions; exit if one does not exist."""
     unknown = [name for name in without or () if name not in REDUCTIONS]
     if unknown:
         from pipeline.study.problems import nearest
 
         meant_one = nearest(unknown[0], REDUCTIONS)
-        fail(of_option("--without", unknown[0], f"no reduction is called so; {meant_one}", _SKIPPING))
+        fail(of_option("--without", unknown[0], f"there is no such reduction; {meant_one}", _SKIPPING))
     return tuple(without or ())
 
 
 def check_shard(text: str | None, studies: "list[Study]") -> "Shard | None":
-    """Return the shard that ``--shard`` names, or exit if it names none or a study cannot be dealt out."""
+    """Return the shard that ``--shard`` names; exit if it names none, or if a study cannot be sharded."""
     if text is None:
         return None
     from pipeline.plan.shard import parse_shard, reason_against

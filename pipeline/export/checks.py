@@ -1,4 +1,4 @@
-"""Touches by full solves of the program: some that a model's bar is fitted to, others that it is judged on."""
+"""Touches solved in full: a calibration set for a model's error bar, and a test set."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -12,27 +12,27 @@ from pipeline.export.ranks import ALONE, Ranks
 from pipeline.realtime.model import Model
 from pipeline.stages import stage
 
-# Half sizes of the tools, in units of the largest that the model takes at the place; depth in units of those.
+# Half sizes of the tools, in units of the largest allowed one at the place; depth in units of the half size.
 _SIZES, _DEPTH = (0.1, 0.99), 0.02
-# The bar is so much longer than the longest that the fit needs.
+# Safety factor on the largest error bar that the calibration set needs.
 _SAFETY = 1.3
-# What few checks show of full solves beside a curved surface grows by this: three times in four, the largest of six
-# errors is more than the 95 % quantile of all over it.
+# Safety factor for curved bodies, whose calibration set is small. In three of four draws, the largest of six errors,
+# times this factor, exceeds the 95 % quantile of all errors.
 _SAFETY_FEW = 1.6
-# Of their own bars, full solves tell F to this share at best.
+# Least error of full solves, as a share of their error bars.
 _LEAST = 0.25
-# Blades are so much longer than wide.
+# Range of a blade's length over its width.
 _SLENDER = (1.0, 12.0)
 TOOLS = ("disc", "blade", "bonded")
 
 
 @dataclass(frozen=True)
 class Check:
-    """A touch: place and half size (m), ν, F (N) of a full solve with its relative bar, and of the model.
+    """A touch: place and half size (m), ν, the force (N) of a full solve with its relative error bar, and the model's.
 
-    ``kind`` is a number of ``TOOLS``: a disc, a blade, whose half size is half its diagonal, or a bonded disc.
-    ``vector`` is what the tissue does to the tool by the full solve (N), ``aside`` by how much the model's force aside
-    is off it, in units of ``full``, if tissue sticks: the bar holds for both.
+    ``kind`` is an index of ``TOOLS``: a disc, a blade (its half size is half its diagonal), or a bonded disc.
+    ``vector`` is the force of the tissue on the tool (N) by the full solve. ``aside`` is the error of the model's
+    lateral force on a bonded tool, in units of ``full``; the model's error bar ``bar`` covers it, too.
     """
 
     x: float
@@ -51,24 +51,24 @@ class Check:
 
     @property
     def error(self) -> float:
-        """How far the model is off, relative to the full solve."""
+        """The model's error, relative to the full solve."""
         return self.force / self.full - 1
 
     @property
     def is_held(self) -> bool:
-        """Whether the model's bar holds the difference, aside as well."""
+        """Whether the model's error bar covers both errors, along the normal and lateral."""
         return max(abs(self.error), self.aside) <= self.bar
 
 
 def random_touches(model: Model, count: int, seed: int, tools: Sequence[int] = (0,)) -> list[Check]:
-    """Return ``count`` random touches of a model, of ``tools`` in turn, not solved yet."""
+    """Return ``count`` random touches, not solved yet, with ``tools`` in turn."""
     rng = np.random.default_rng(seed)
     return [random_touch(model, rng, tools[number % len(tools)]) for number in range(count)]
 
 
 @stage("checks")
 def check_touches(model: Model, solver: Solver, touches: Sequence[Check], ranks: Ranks = ALONE) -> list[Check]:
-    """Return ``touches`` of a model with their full solves; collective.
+    """Return ``touches`` with their full solves; collective.
 
     Raises:
         RuntimeError: if a full solve failed.
@@ -79,11 +79,11 @@ def check_touches(model: Model, solver: Solver, touches: Sequence[Check], ranks:
         (found,) = solved(model, solver, asked, [asked.poisson] if low < high else None)
         return found
 
-    return ranks.in_turn(touches, check, "full solves to check against")
+    return ranks.in_turn(touches, check, "full solves for the error bar")
 
 
 def random_touch(model: Model, rng: np.random.Generator, kind: int) -> Check:
-    """Return a touch of a tool of ``TOOLS``, not solved yet, of which a model tells the force."""
+    """Return a random touch with a tool of ``TOOLS``, not solved yet, with the model's force."""
     x, y = random_place(model, rng)
     smallest, largest = np.log(_SIZES)
     size = model.largest * model.room(x, y) * float(np.exp(rng.uniform(smallest, largest)))
@@ -99,7 +99,7 @@ def random_touch(model: Model, rng: np.random.Generator, kind: int) -> Check:
 
 
 def solved(model: Model, solver: Solver, asked: Check, poissons: Sequence[float] | None) -> list[Check]:
-    """Return a touch with its full solve, for each of ``poissons`` on one mesh, or of the study's own materials.
+    """Return a touch with its full solve, for each of ``poissons`` on one mesh, or with the study's own materials.
 
     Raises:
         RuntimeError: if a full solve failed.
@@ -113,13 +113,13 @@ def solved(model: Model, solver: Solver, asked: Check, poissons: Sequence[float]
 
 
 def with_full(model: Model, asked: Check, full: Full) -> Check:
-    """Return a touch with what a full solve tells of it."""
+    """Return a touch with the result of its full solve."""
     vector = tuple(float(part) for part in full.vector)
     return with_bar(model, replace(asked, full=full.force, full_error=full.error, vector=vector))
 
 
 def with_bar(model: Model, check: Check) -> Check:
-    """Return a check with the force of a model, and its bar."""
+    """Return a check with a model's force and error bar."""
     at, normal = on_face(model, check.x, check.y)
     touch = model.query(check.tool.name, at=at.tolist(), depth=check.depth, poisson=check.poisson, **check.tool.sizes)
     assert touch.status == "ok", touch
@@ -131,13 +131,13 @@ def with_bar(model: Model, check: Check) -> Check:
 
 
 def on_face(model: Model, x: float, y: float) -> tuple[FloatArray, FloatArray]:
-    """Return where a place of the region is in the body's coordinates (3,), in m, and the normal there."""
+    """Return a point of the face in the body's coordinates (3,), in m, and the outward normal there."""
     spot = model.face.at(model.table, x, y)
     return model.origin + np.array([x, y, spot.height]) @ model.axes, spot.normal @ model.axes
 
 
 def random_place(model: Model, rng: np.random.Generator) -> tuple[float, float]:
-    """Return x and y (m), anywhere in the region alike."""
+    """Return x and y (m), uniformly distributed over the region."""
     a, b = model.table.reach
     if not model.table.is_round:
         return float(rng.uniform(-a, a)), float(rng.uniform(-b, b))
@@ -146,21 +146,22 @@ def random_place(model: Model, rng: np.random.Generator) -> tuple[float, float]:
 
 
 def needed(checks: Sequence[Check], floor: float) -> float:
-    """Return by how much bars must grow, ``floor`` apart, to hold errors with a safety, at least 1."""
+    """Return the factor, at least 1, by which error bars beyond ``floor`` must grow to cover all errors."""
     return max(1.0, _SAFETY * max((abs(check.error) - floor) / (check.bar - floor) for check in checks))
 
 
-def told(checks: Sequence[Check], bar: float) -> float:
-    """Return what full solves tell F to, relative: their own ``bar``, which counts in those of the checks, or less.
+def error_of_full(checks: Sequence[Check], bar: float) -> float:
+    """Return the relative error of full solves: their error ``bar``, or less if the checks show less.
 
-    Beside a curved surface own bars are some times the error; what the checks show of it, with a safety, is enough.
+    On curved bodies these error bars are several times the error. The largest error of the checks, times a safety
+    factor, is then enough.
     """
     seen = max(abs(check.error) - (check.bar - bar) for check in checks)
     return min(bar, max(_LEAST * bar, _SAFETY_FEW * seen))
 
 
 def columns(fitted: Sequence[Check], judged: Sequence[Check]) -> dict[str, tuple[str, FloatArray]]:
-    """Return all checks as units and values by name, those that are judged after those that were fitted."""
+    """Return all checks as units and values by name: first the calibration set, then the test set."""
     units = {"x": "m", "y": "m", "radius": "m", "depth": "m", "poisson": "1", "full": "N", "full_error": "1"}
     units |= {"force": "N", "bar": "1", "error": "1", "kind": "1", "aside": "1"}
     checks = [*fitted, *judged]

@@ -1,4 +1,4 @@
-"""c and h of a body, of E = 1, at any places of a region of its top: one coarse mesh and one factorisation for all."""
+"""Local compliances c and h of a body with E = 1, at any place of a region: one coarse mesh, one factorisation."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -26,18 +26,17 @@ from pipeline.stages import stage
 from pipeline.study.schema import Mesh
 from pipeline.study.sweep import Case
 
-# Elements of the mesh: so many along the way from the region's edge to the sides, so many through the thickness, or on
-# the way to other tissue; they grow by so much in between.
+# Number of elements from the region's edge to the sides, through the thickness, or down to other tissue; growth.
 _NEAR, _THROUGH, _TO_TISSUE, _GROWTH = 2.5, 4, 2, 0.4
-# A mid node this far from the middle, in lengths of its edge, is a quarter point.
+# A mid node this far from the middle, in units of its edge's length, is a quarter point.
 _ASIDE = 0.2
 
 
 @stage("export mesh")
 def coarse_mesh(case: Case, region: Region, finer: float = 1.0, ranks: Ranks = ALONE) -> BodyMesh:
-    """Return a mesh of the whole body for all places of a region, elements smaller by a factor ``finer``.
+    """Return a mesh of the whole body for all places of a region, with elements smaller by a factor ``finer``.
 
-    The first of ``ranks`` makes it, and each has it whole.
+    The first of ``ranks`` makes it, and each rank gets all of it.
 
     Raises:
         MeshError: if the body cannot be meshed.
@@ -57,9 +56,10 @@ def coarse_mesh(case: Case, region: Region, finer: float = 1.0, ranks: Ranks = A
 
 
 def _without_quarter_points(arrays: MeshArrays) -> MeshArrays:
-    """Return a mesh whose edges all have their mid nodes in the middle: nothing is singular at the edge of a region.
+    """Return the mesh with all mid nodes in the middle of their edges: there is no singularity at a region's edge.
 
-    An element with quarter points on two sides of a facet has no Jacobian in its corner, where quadrature may need it.
+    An element with quarter points on two sides of a facet has a singular Jacobian at the corner, where quadrature may
+    need it.
     """
     if arrays.cells.shape[1] == len(EDGES) + 4:
         (p, q), mid = np.moveaxis(arrays.points[arrays.cells[:, EDGES]], 2, 0), arrays.points[arrays.cells[:, 4:]]
@@ -71,15 +71,15 @@ def _without_quarter_points(arrays: MeshArrays) -> MeshArrays:
 
 
 def law_of(scope: Scope, poisson: float) -> MaterialLaw | None:
-    """Return the tissues of a body in units of μ at its face, where they are several, for a Poisson's ratio there."""
+    """Return a body's tissues in units of μ at its face, for a Poisson's ratio there; None if there is one tissue."""
     tissues = scope.tissues_at(poisson)
     return MaterialLaw.of(*tissues) if tissues else None
 
 
 def per_newton(force: PointForce) -> float:
-    """Return the number of units of a force's field that make one newton, for E = 1.
+    """Return the factor from the field of a unit force to that of one newton, for E = 1.
 
-    A unit is 4πμ times the radius newtons, and E = 2 (1 + ν) μ.
+    The unit of force is 4πμ times the radius, and E = 2 (1 + ν) μ.
     """
     return 2 * (1 + force.poisson) / (4 * pi * force.radius)
 
@@ -92,13 +92,13 @@ def compliances(
     poisson: float,
     law: MaterialLaw | None = None,
 ) -> FloatArray:
-    """Return what tables are made of, shape (places, 9), with a ``law`` of several regions if there are any.
+    """Return the values to tabulate, shape (places, 9); ``law`` gives the tissues of a body with several.
 
-    They are c (1/m), h, A₁, A_xy (1/m³), and of R (1/m) R_xz, R_yz, the mean of R_xx and R_yy, half their difference,
-    and R_xy: see ``pipeline.realtime.table``.
+    The values are c (1/m); h, A₁, A_xy (1/m³); and of R (1/m): R_xz, R_yz, the mean of R_xx and R_yy, half their
+    difference, R_xy. See ``pipeline.realtime.table``.
 
     Raises:
-        SolveError: if they cannot be solved for, or if the mesh is too coarse.
+        SolveError: if a solve fails, or if the mesh is too coarse.
     """
     centres = [((x, y, 0.0), region.room(x, y)) for x, y in places]
     down = [PointForce(poisson, *centre) for centre in centres]
@@ -111,7 +111,7 @@ def compliances(
         at, bent = pressed.at_centre()
         apart, twist = pressed.bends()
         x, y = (part.at_centre()[0] for part in pulled)
-        # The force that presses is downwards.
+        # The pressing force points down.
         normal = (-at[2], -bent[2], -apart[2], -twist[2], -at[0], -at[1])
         found.append(scale * np.array([*normal, (x[0] + y[1]) / 2, (x[0] - y[1]) / 2, (x[1] + y[0]) / 2]))
     return np.array(found)

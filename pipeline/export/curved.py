@@ -1,4 +1,4 @@
-"""Models of bodies that are not flat: c and h at each place are what full solves of two discs tell."""
+"""Models of curved bodies: c and h at each place come from full solves with two discs."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,23 +16,23 @@ from pipeline.realtime.model import Model
 from pipeline.realtime.table import Table
 from pipeline.shapes.frame import PlaceError
 
-# Radii of the two discs, in units of the study's; the larger one is nearly the largest that the model answers for.
+# Radii of the two discs, in units of the study's; the larger one is close to the model's largest contact.
 RADII, _LARGER = (0.6, 1.5), 1.03
-# Half the region of a body without axes of its own, in units of the disc's radius, and of an ellipsoid's semi-axes.
+# Half size of the region: of a body without axes in units of the disc's radius; of an ellipsoid in its semi-axes.
 _REACH, _OF_AXES = 3.0, 0.4
-# Intervals of the tables; of the depths; steps for h, whose square counts little.
+# Intervals of the tables; depth over radius; fixed-point steps for h, whose square has little weight.
 _SIZES, _DEPTH, _STEPS = (2, 4), 0.02, 50
-# The smaller disc tells most of c, and is asked for so much of the larger one's accuracy.
+# c depends most on the smaller disc, whose solve is so much more accurate.
 _FINER = 2 / 3
-# The table may miss c at the new nodes by this share of the asked accuracy.
+# Largest error of the table for c at new nodes, as a share of the accuracy.
 _SHARE = 0.5
-# The face: points along each direction, and polynomials fitted to them; a facetted one is smooth but for its facets.
+# The face: points along each direction, and the number of polynomials fitted to them (facets are smoothed).
 _POINTS, _TERMS = 25, 9
-# Second derivatives of such a fit to facets are noise towards its ends: curvature is that of paraboloids fitted within
-# so many radii of the study's disc, and may be off by as much as those within others differ; heights for them are apart
-# by so much of that radius.
+# On facets, second derivatives of that fit are noise near its ends. Curvature therefore comes from paraboloids, fitted
+# within _WINDOW radii of the study's disc; its error is the largest difference to the windows _OTHERS. Heights for them
+# are _APART radii apart.
 _WINDOW, _OTHERS, _APART = 1.0, (0.7, 1.4), 0.25
-# A query may be so much further off the face than that fit, and its axis so far off the normal.
+# Tolerances of a query: distance from the face, in units of that fit's error or of the room; angle to the normal.
 _OFF, _LEAST_OFF, _ALIGNED = 1.5, 1e-3, 0.1
 
 
@@ -45,10 +45,10 @@ def curved_model(
     _: float,
     ranks: Ranks = ALONE,
 ) -> tuple[Model, float, int]:
-    """Return a model, by how much its table missed, and how many places were solved for; collective.
+    """Return a model, the error of its table, and the number of places solved; collective.
 
     Raises:
-        ExportError: if the face is not all above the region.
+        ExportError: if the face does not extend over the whole region.
         RuntimeError: if a full solve failed.
     """
     radius = scope.case.probe.circumradius
@@ -57,16 +57,16 @@ def curved_model(
     region = curved_region(scope, room)
     ratios = ratios_of(scope.poissons).tolist()
     known: dict[tuple[float, float], FloatArray] = {}
-    told: list[float] = []
+    bars_of_full: list[float] = []
 
     def regular(place: tuple[float, float]) -> tuple[FloatArray, list[float]]:
         return _regular(solver, (place[0] + middle[0], place[1] + middle[1]), radius, scope, ratios)
 
     def found(places: Places, poisson: float) -> FloatArray:
         unknown = [place for place in dict.fromkeys(places) if place not in known]
-        for place, (values, bars) in zip(unknown, ranks.in_turn(unknown, regular, "places solved for"), strict=True):
+        for place, (values, bars) in zip(unknown, ranks.in_turn(unknown, regular, "places solved"), strict=True):
             known[place] = values
-            told.extend(bars)
+            bars_of_full.extend(bars)
         return np.array([known[place][ratios.index(poisson)] for place in places])
 
     table, missed = tabulate(region, scope.poissons, found, _SHARE * accuracy, _SIZES, sparse=not region.is_round)
@@ -81,7 +81,7 @@ def curved_model(
         scope.young,
         scope.poisson,
         largest,
-        (*bar[:3], float(np.mean(told))),
+        (*bar[:3], float(np.mean(bars_of_full))),
         face,
         max(_OFF * off, _LEAST_OFF * room),
         _ALIGNED,
@@ -91,7 +91,7 @@ def curved_model(
 
 
 def curved_region(scope: Scope, room: float) -> Region:
-    """Return the region of a body that is not flat, round the study's place; a model answers for ``room`` (m)."""
+    """Return the region of a curved body round the study's place; ``room`` (m) is the distance to its boundary."""
     body, radius = scope.body, scope.case.probe.circumradius
     is_round, reach, even = False, (_REACH * radius,) * 2, (False, False)
     if body.half_sides and not any(scope.case.probe.at[:2]) and not body.inclusion:
@@ -103,39 +103,39 @@ def curved_region(scope: Scope, room: float) -> Region:
 def _regular(
     solver: Solver, at: tuple[float, float], radius: float, scope: Scope, ratios: Sequence[float]
 ) -> tuple[FloatArray, list[float]]:
-    """Return c and h for each Poisson's ratio (ratios, 2): d/F = 1/(2aE*) + c + a²h/3 - 2E*h²a⁵/45 for both radii.
+    """Return c and h for each Poisson's ratio (ratios, 2), and the relative error bars of the full solves.
 
-    With them come the relative bars of the full solves.
+    They satisfy d/F = 1/(2aE*) + c + a²h/3 - 2E*h²a⁵/45 for both radii.
     """
     radii, rests = [share * radius for share in RADII], []
-    told: list[float] = []
+    bars: list[float] = []
     planes = 1 / (1 - np.square(ratios))
     for a, share in zip(radii, (_FINER, 1.0), strict=True):
         # The study's own materials, or all ratios on one mesh.
         fulls = replace(solver, accuracy=share * solver.accuracy).press_all(
             Tool("disc", a), at, [_DEPTH * a], ratios if len(ratios) > 1 else None
         )
-        told.extend(full.error for full in fulls)
+        bars.extend(full.error for full in fulls)
         rests.append(scope.young * _DEPTH * a / np.array([full.force for full in fulls]) - 0.5 / (planes * a))
     (a, b), h = radii, np.zeros(len(ratios))
     for _ in range(_STEPS):
         bent = [rest + 2 / 45 * planes * h**2 * r**5 for rest, r in zip(rests, radii, strict=True)]
         h = 3 * (bent[1] - bent[0]) / (b**2 - a**2)
-    return np.stack([bent[0] - a**2 * h / 3, h], axis=-1), told
+    return np.stack([bent[0] - a**2 * h / 3, h], axis=-1), bars
 
 
 def _face(scope: Scope, table: Table, middle: tuple[float, ...]) -> tuple[Face, float, float]:
-    """Return the face as polynomials, and how far (m) it is from them, and its curvature (1/m) from theirs, at most.
+    """Return the face as polynomials, with their largest errors in height (m) and in curvature (1/m).
 
     Raises:
-        ExportError: if there is no face above the region.
+        ExportError: if the face does not extend over the whole region.
     """
     share = np.cos(np.pi * (np.arange(_POINTS) + 0.5) / _POINTS)
     count = 1 if table.is_round else _TERMS
     xs = table.reach[0] * (np.sqrt((share + 1) / 2) if table.even[0] else share)
     ys = table.reach[1] * (np.sqrt((share + 1) / 2) if table.even[1] else share) if count > 1 else np.zeros(1)
     vander = np.polynomial.chebyshev.chebvander(share, _TERMS - 1)
-    heights = _heights(scope, middle, xs, ys, f"the region round it, {1e3 * table.reach[0]:.3g} mm to each side")
+    heights = _heights(scope, middle, xs, ys, f"the model's region, {1e3 * table.reach[0]:.3g} mm to each side of it,")
     rows = vander if count > 1 else np.ones((1, 1))
     height = _fitted(rows, vander, heights)
     if scope.body.half_sides:  # a smooth body
@@ -149,19 +149,21 @@ def _face(scope: Scope, table: Table, middle: tuple[float, ...]) -> tuple[Face, 
 
 
 def _heights(scope: Scope, middle: tuple[float, ...], xs: FloatArray, ys: FloatArray, what: str) -> FloatArray:
-    """Return the face's height (y, x), in m, at places from the middle of the region, ``what`` they are for.
+    """Return the face's height (y, x), in m, at offsets from the middle of the region; ``what`` starts an error.
 
     Raises:
-        ExportError: if there is no face above one of them.
+        ExportError: if the face does not extend to one of them.
     """
     try:
         return np.array([[scope.body.frame((x + middle[0], y + middle[1])).point[2] for x in xs] for y in ys])
     except PlaceError as problem:
-        raise ExportError(f"probe.at: {what}: a place {problem}") from None
+        raise ExportError(
+            f"probe.at: {what} does not fit on the face (a place {problem}): move it, or make the probe smaller"
+        ) from None
 
 
 def _bends(scope: Scope, middle: tuple[float, ...], xs: FloatArray, ys: FloatArray) -> tuple[FloatArray, float]:
-    """Return the mean curvature (y, x), in 1/m, by paraboloids, and by how much those of other sizes differ at most.
+    """Return the mean curvature (y, x), in 1/m, from paraboloids, and the largest difference to other window sizes.
 
     Raises:
         ExportError: if the face ends too near to the region.
@@ -171,8 +173,7 @@ def _bends(scope: Scope, middle: tuple[float, ...], xs: FloatArray, ys: FloatArr
     across, down = (
         np.arange(-most, most + 1e-9, _APART * radius) for most in (np.abs(xs).max() + wide, np.abs(ys).max() + wide)
     )
-    beyond = f"the face is to be known {1e3 * wide:.3g} mm beyond the region, too"
-    z = _heights(scope, middle, across, down, beyond)
+    z = _heights(scope, middle, across, down, f"the model's region with {1e3 * wide:.3g} mm around it")
     x, y = np.meshgrid(across, down)
     places = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
     found, *others = (
@@ -183,7 +184,7 @@ def _bends(scope: Scope, middle: tuple[float, ...], xs: FloatArray, ys: FloatArr
 
 
 def _paraboloid(away: FloatArray, reach: float) -> float:
-    """Return the mean curvature (1/m) on the axis of the paraboloid next to points (n, 3), in m, up to ``reach``."""
+    """Return the mean curvature (1/m) at the apex of a paraboloid fitted to points (n, 3), in m, within ``reach``."""
     x, y, z = away[away[:, 0] ** 2 + away[:, 1] ** 2 <= reach**2].T
     terms = np.column_stack([np.ones_like(x), x, y, x**2 / 2, x * y, y**2 / 2])
     _, *slope, xx, xy, yy = np.linalg.lstsq(terms, z, rcond=None)[0].tolist()

@@ -1,4 +1,4 @@
-"""A study as a real-time model: tabulated, its bar fitted to full solves, and judged on others."""
+"""A study as a real-time model: tables, an error bar calibrated on full solves, and a test on others."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.arrays import FloatArray
-from pipeline.export.checks import TOOLS, Check, check_touches, columns, needed, random_touches, told, with_bar
+from pipeline.export.checks import TOOLS, Check, check_touches, columns, error_of_full, needed, random_touches, with_bar
 from pipeline.export.compliance import coarse_mesh, compliances, law_of
 from pipeline.export.curved import curved_model
 from pipeline.export.far import far_fields
@@ -23,23 +23,23 @@ from pipeline.realtime.model import Model
 from pipeline.realtime.surface import SurfaceTable
 from pipeline.shapes.body import Layered
 
-# What is left out beside the sides, of the smaller of half the width and the thickness; how large contact may be, in
-# units of the way to the nearest side or the bottom.
+# Margin beside the sides, in units of half the width or the thickness, whichever is smaller. Largest contact, in units
+# of the distance to the nearest side or the bottom.
 MARGIN, LARGEST = 0.15, 0.4
-# The table may miss c by this share of what the asked accuracy leaves for the largest disc; full solves are as much
-# more precise, those of two discs that make a curved body's table less. Bars before they are fitted: of c, of h's part,
-# and of the fourth power of what a contact measures; besides, no bar is shorter than what full solves tell.
+# Shares of the accuracy: the table's error in c for the largest disc; full solves of a flat body, of a curved body, and
+# of the two discs for a curved body's table. Error bars before calibration: of c, of h, and of the contact size to the
+# fourth power. No error bar is smaller than that of the full solves.
 _SHARE, _PRECISE, _PRECISE_CURVED, _PRECISE_TABLE, _BARS = 0.4, 0.25, 0.5, 1.0, (1e-3, 0.03, 0.1)
 _SEEDS = (1, 2)
-# How far off a flat face a query may be, in units of the thickness.
+# Largest distance of a query from a flat face, in units of the thickness.
 _OFF = 1e-6
 
 
 @dataclass(frozen=True)
 class Exported:
-    """A model with the touches that its bar was fitted to and those that it was judged on; places solved for.
+    """A model, the touches of its calibration (``fitted``) and of its test (``judged``), the number of places solved.
 
-    ``unseen`` says why it has no visible surface, where one was asked for.
+    ``missed`` is the error of its table; ``unseen`` is why it has no deforming surface, "" if it has one or needs none.
     """
 
     model: Model
@@ -52,11 +52,11 @@ class Exported:
 
     @property
     def held(self) -> float:
-        """The share of the judged touches whose error the bars hold."""
+        """The share of the test touches whose error the error bar covers."""
         return float(np.mean([check.is_held for check in self.judged]))
 
     def summary(self, accuracy: float) -> dict[str, float]:
-        """Return what there is to say of it, with what share of its judged touches is as near as was asked for."""
+        """Return the numbers of its quality; ``as_asked`` is the share of test touches within the ``accuracy``."""
         errors = np.abs([check.error for check in self.judged])
         return {
             "places": self.places,
@@ -80,13 +80,13 @@ def export(
     surface: bool = False,
     ranks: Ranks = ALONE,
 ) -> Exported:
-    """Return the model of a study to a relative ``accuracy``, with half of ``checks`` fitted to and half judged on.
+    """Return the model of a study to a relative ``accuracy``; half of the ``checks`` calibrate it, half test it.
 
-    With ``surface`` it holds what is seen of the body, too. Collective: ``ranks`` share what there is to solve.
+    ``surface`` includes the deforming surface. Collective: ``ranks`` share the solves.
 
     Raises:
-        ExportError: if the body leaves no region.
-        MeshError, SolveError, RuntimeError: if a mesh, a regular part or a full solve fails.
+        ExportError: if no region of the body remains.
+        MeshError, SolveError, RuntimeError: if a mesh, a Green's function or a full solve fails.
     """
     precise = _PRECISE * accuracy if scope.is_flat else _PRECISE_CURVED * accuracy
     solver = Solver(scope.sections, scope.file, scope.young, precise)
@@ -98,16 +98,16 @@ def export(
     touches = [random_touches(bare, count, seed, tools) for count, seed in zip(halves, _SEEDS, strict=True)]
     checked = check_touches(bare, solver, [*touches[0], *touches[1]], ranks)
     fitted, judged = checked[: halves[0]], checked[halves[0] :]
-    # What is beyond the bar of a bonded tool alone is no matter of the others.
+    # Bonded tools have further errors, and would enlarge the error bars of the others.
     plain = [check for check in fitted if TOOLS[check.kind] != "bonded"]
-    floor = precise if scope.is_flat else told(plain, bare.bar[3])
+    floor = precise if scope.is_flat else error_of_full(plain, bare.bar[3])
     factor = needed([with_bar(replace(bare, bar=(*_BARS, floor)), check) for check in plain], floor)
     first, second, third = _BARS
     model = replace(bare, bar=(factor * first, factor * second, factor * third, floor))
     fitted, judged = ([with_bar(model, check) for check in half] for half in (fitted, judged))
     seen, unseen = None, ""
     if surface or scope.is_flat:
-        ranks.note("the visible surface")
+        ranks.note("solving for the deforming surface")
         try:
             far = far_fields(seen_body(scope, model, margin, ranks), scope.poissons)
         except ExportError as reason:
@@ -127,18 +127,18 @@ def _flat(
     margin: float,
     ranks: Ranks,
 ) -> tuple[Model, float, int]:
-    """Return the model of a flat body, by how much its table missed, and the number of places solved; collective."""
+    """Return the model of a flat body, the error of its table, and the number of places solved; collective."""
     assert isinstance(scope.body, Layered)
     region = Region.of(scope.body, margin)
     if min(region.reach) <= 0:
-        raise ExportError("the body leaves no region: ask for a smaller margin")
+        raise ExportError("the body leaves no region: make it wider")
     ranks.note("meshing the body")
     mesh = coarse_mesh(scope.case, region, ranks=ranks)
     solved: list[tuple[float, float]] = []
 
     def counted(places: Places, poisson: float) -> FloatArray:
         solved.extend(places)
-        ranks.note(f"places solved for: {len(solved)}, ν = {poisson:.3g}")
+        ranks.note(f"places solved: {len(solved)}, ν = {poisson:.3g}")
         law = law_of(scope, poisson)
         return np.array(ranks.together(places, lambda some: list(compliances(mesh, region, some, poisson, law))))
 
@@ -159,7 +159,7 @@ def _flat(
 
 
 def write(exported: Exported, path: Path, scope: Scope, study: Path, version: str) -> None:
-    """Write a model with its checks and where it comes from."""
+    """Write a model with its checks and its origin."""
     model, body = exported.model, scope.body
     height = body.heights[1] - body.heights[0]
     attributes = {
@@ -168,7 +168,7 @@ def write(exported: Exported, path: Path, scope: Scope, study: Path, version: st
         "body": f"{body.shape}, {body.face}, {1e3 * height:g} mm high, held at {body.fixed}",
         "tools": "disc, sphere, sharp cone: frictionless"
         + ("; blade; bonded disc" if len(model.table.tensors) else "")
-        + f"; along the normal, contact up to {model.largest:g} of the way to a side, the bottom or other tissue",
+        + f"; along the normal, contact up to {model.largest:g} of the distance to a side, the bottom or other tissue",
         "held": f"{sum(check.is_held for check in exported.judged)} of {len(exported.judged)} judged touches",
     }
     write_model(path, model, columns(exported.fitted, exported.judged), attributes, exported.surface)

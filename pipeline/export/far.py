@@ -1,7 +1,7 @@
-"""R on a body's boundary for forces all over a region of its face: what both of a model's far tables are made of.
+"""R, the regular part of the Green's function, on a body's boundary for forces all over a region of its face.
 
-R (m/N for E = 1) is solved for at Chebyshev places of a quarter of the region, or of a radius, and carried to their
-images: mirror images of a box, turned ones of a round body.
+Both far tables of a model derive from it. R (m/N for E = 1) is solved for forces at the Chebyshev nodes of a quarter of
+the region, or of a radius. Symmetry gives it for their images: reflections of a box, rotations of a round body.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,9 +24,9 @@ from pipeline.solve.greens_function import OnBoundary, regular_on_boundary
 from pipeline.solve.physics import MaterialLaw
 from pipeline.stages import stage
 
-# Intervals between the places from the middle to the end of the region; held-out places.
+# Intervals from the middle to the end of the region; number of places held out for the test.
 _SIZE, _HELD_OUT = 6, 4
-# Triangles that are looked through for the one a point lies in, steps that find its place on a bent one.
+# Nearest triangles searched for the one that contains a point; Newton steps on a curved triangle.
 _NEAREST, _STEPS = 24, 6
 
 Place = tuple[float, float]
@@ -34,23 +34,23 @@ Place = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """A motion (3, 3) that maps the body to itself, and the values at the moved nodes as sums of those at nodes."""
+    """A symmetry (3, 3) of the body, with the interpolation from its nodes to the moved nodes."""
 
     motion: FloatArray
     nodes: IntArray
     weights: FloatArray
 
     def of(self, values: FloatArray) -> FloatArray:
-        """Return the field (n, 3) for the moved force, from that for the force itself."""
+        """Return the field (n, 3) of the moved force, from that of the force itself."""
         return np.asarray(np.einsum("nk,nki->ni", self.weights, values[self.nodes]) @ self.motion.T)
 
 
 @dataclass(frozen=True, eq=False)
 class Pressed:
-    """A meshed body whose ``region`` of the face is pressed on, and the forces that do so, of a Poisson's ratio.
+    """A meshed body with a ``region`` of its face, and the point ``force`` at a place for a Poisson's ratio.
 
-    ``law`` tells the tissues in units of μ at the face, where they are several, for its Poisson's ratio. R is not
-    judged ``next`` (m) to a force. Each of ``ranks`` has the whole mesh, and solves for some of the places.
+    ``law`` gives the tissues in units of μ at the face, for its Poisson's ratio; None if there is one tissue. R is not
+    tested within ``next`` (m) of a force. Each of ``ranks`` has the whole mesh, and solves for some of the places.
     """
 
     mesh: BodyMesh
@@ -62,7 +62,7 @@ class Pressed:
 
     def solve(self, places: Sequence[Place], poisson: float) -> OnBoundary:
         """Return R (m/N, E = 1) for a force at each place; collective."""
-        # All ranks number the boundary alike: their meshes are one.
+        # All ranks have the same mesh, and so the same numbers on the boundary.
         boundary: list[OnBoundary] = []
 
         def solve(some: Sequence[Place]) -> list[FloatArray]:
@@ -72,7 +72,7 @@ class Pressed:
             return list(scales[:, None, None] * boundary[0].values)
 
         values = np.array(self.ranks.together(places, solve))
-        # The first rank has a share of whatever there is.
+        # The first rank always has some of the places.
         return replace(self.ranks.on_first(lambda: boundary[0]), values=values)
 
 
@@ -80,8 +80,8 @@ class Pressed:
 class FarFields:
     """R of a ``body`` for a force at each of its ``sources``, for each of ``ratios`` within ``poissons``.
 
-    Of the middle one of ``solved``, the last fields are those of forces ``held_out``, that no table is made of.
-    ``motions`` map the body to itself and the sources to all ``places``, source by source.
+    ``solved`` has a field for each ratio. The middle one ends with the fields of forces ``held_out`` for the test.
+    ``motions`` are the symmetries of the body; they map the sources to all ``places``, source by source.
     """
 
     body: Pressed
@@ -94,26 +94,26 @@ class FarFields:
 
     @cached_property
     def places(self) -> FloatArray:
-        """The places (n, 2), in m, that fields are known for."""
+        """The places (n, 2), in m, of forces with a known field."""
         return np.array([motion[:2, :2] @ source for source in self.sources for motion in self.motions])
 
     @property
     def rooms(self) -> FloatArray:
-        """The way (n,), in m, from each place to the nearest side or the bottom."""
+        """The distance (n,), in m, from each place to the nearest side or the bottom."""
         return np.array([self.body.region.room(x, y) for x, y in self.places])
 
     @property
     def middle(self) -> int:
-        """The number of the ratio that the places held out are solved for."""
+        """The index of the ratio for which held-out places are solved."""
         return len(self.ratios) // 2
 
     @property
     def known(self) -> FloatArray:
-        """R (places held out, n, 3) on the boundary."""
+        """R (held-out places, n, 3) on the boundary."""
         return self.solved[self.middle].values[len(self.sources) :]
 
     def basis(self) -> FloatArray:
-        """Return T_j(y/Y) T_i(x/X) at the places (n, terms), of a round region those with i + j up to the degree."""
+        """Return T_j(y/Y) T_i(x/X) at the places (n, terms); for a round region i + j is at most the degree."""
         region = self.body.region
         x, y = (np.polynomial.chebyshev.chebvander(self.places[:, i] / region.reach[i], 2 * _SIZE) for i in range(2))
         terms = np.einsum("nj,ni->nji", y, x)
@@ -123,7 +123,7 @@ class FarFields:
 
     @property
     def degrees(self) -> tuple[int, int]:
-        """How many polynomials of y and of x there are in the basis."""
+        """The number of polynomials of y and of x in the basis."""
         return 2 * _SIZE + 1, 2 * _SIZE + 1
 
     def over_ratios(self, values: FloatArray) -> FloatArray:
@@ -142,14 +142,14 @@ def far_fields(body: Pressed, poissons: tuple[float, float]) -> FarFields:
     """
     region, ratios = body.region, ratios_of(poissons)
     sources, held_out, middle = _sources(region), _held_out(region), len(ratios) // 2
-    # Places held out are solved for with the others: a factorisation takes much longer than what it serves for.
+    # Held-out places are solved with the others: the factorisation dominates the time.
     asked = [[*sources, *held_out] if number == middle else sources for number in range(len(ratios))]
     solved = [body.solve(places, float(ratio)) for places, ratio in zip(asked, ratios, strict=True)]
     return FarFields(body, poissons, ratios, sources, held_out, solved, _motions(region))
 
 
 def _sources(region: Region) -> list[Place]:
-    """Return the places that are solved for: the others are their images."""
+    """Return the places to solve; all others are their images."""
     lines = [
         reach * extrema(2 * _SIZE)[: _SIZE + 1 if even else None]
         for reach, even in zip(region.reach, region.even, strict=True)
@@ -161,7 +161,7 @@ def _sources(region: Region) -> list[Place]:
 
 
 def _motions(region: Region) -> list[FloatArray]:
-    """Return the motions that map the body to itself and its sources to all places."""
+    """Return the symmetries of the body, which map its sources to all places."""
     if region.is_round:
         angles = 2 * pi * np.arange(4 * _SIZE + 1) / (4 * _SIZE + 1)
         return [np.array([[np.cos(t), -np.sin(t), 0], [np.sin(t), np.cos(t), 0], [0, 0, 1]]) for t in angles]
@@ -172,18 +172,18 @@ def _motions(region: Region) -> list[FloatArray]:
 
 
 def _held_out(region: Region) -> list[Place]:
-    """Return places that no table is made of."""
+    """Return random places for the test."""
     shares = np.random.default_rng(0).uniform(-1, 1, (_HELD_OUT, 2)) / (np.sqrt(2) if region.is_round else 1)
     return [(float(x), float(y)) for x, y in shares * region.reach]
 
 
 def image_of(boundary: OnBoundary, motion: FloatArray) -> Image:
-    """Find where on the boundary every node comes from."""
+    """Return a symmetry with the point of the boundary that it maps to each node."""
     return Image(motion, *located(boundary, boundary.nodes @ motion))
 
 
 def located(boundary: OnBoundary, points: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return the six nodes of the triangle that each of ``points`` (n, 3) is on, and their weights there."""
+    """Return, for each of ``points`` (n, 3), the six nodes of its triangle and their weights."""
     corners = boundary.nodes[boundary.triangles]
     _, near = cKDTree(corners[:, :3].mean(axis=1)).query(points, k=min(_NEAREST, len(corners)))
     tried = corners[near]
@@ -202,7 +202,7 @@ def located(boundary: OnBoundary, points: FloatArray) -> tuple[IntArray, FloatAr
 
 
 def least_rank(most: int, suffices: Callable[[int], bool]) -> int:
-    """Return the least rank from 1 to ``most`` that ``suffices``, as all larger ones do, or ``most``."""
+    """Return the least rank from 1 to ``most`` that ``suffices`` (then all larger ones do), or ``most``."""
     low, high = 1, most
     while low < high:
         rank = (low + high) // 2
@@ -211,7 +211,7 @@ def least_rank(most: int, suffices: Callable[[int], bool]) -> int:
 
 
 def _quadratic(local: FloatArray) -> FloatArray:
-    """Return the six functions of a triangle at the last two of its barycentric coordinates (..., 2)."""
+    """Return the six shape functions of a triangle at barycentric coordinates 2 and 3 (..., 2)."""
     b, c = local[..., 0], local[..., 1]
     a = 1 - b - c
     ends = [a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1)]

@@ -1,43 +1,43 @@
-"""The file of a real-time model: netCDF classic with 64-bit offsets, which a few lines of C read.
+"""The file of a real-time model: netCDF classic with 64-bit offsets, which is simple to read in C.
 
 All numbers that a query needs are doubles, in SI units, for a body with E = 1:
 
     format                   2
     reciprocal, curvature    (poisson, v, u) Chebyshev coefficients of t = 1/(c + c_ref) (m) and of h t³ (1)
-    tensors                  (7, poisson, v, u) what blades and bonded tools take (pipeline/realtime/table.py); may lack
+    tensors                  (7, poisson, v, u) for blades and bonded tools (pipeline/realtime/table.py); optional
     c_ref                    1/m
     is_round                 1: u = 2(x² + y²)/X² - 1 alone
     even                     (2,) 1: u = 2(x/X)² - 1, v = 2(y/Y)² - 1; 0: u = x/X, v = y/Y
-    leans                    1: the tilt of the face by its force is to be added; 0: it is in h
+    leans                    1: a query adds the tilt of the face under the force; 0: h includes it
     height, bend             (face_v, face_u) coefficients of the face's z (m) and its mean curvature (1/m), 0 if flat
-    off, aligned             how far off the face (m), and its normal (rad), a query may be
-    bend_error               how far the mean curvature may be off (1/m); a file of a flat face may lack it
+    off, aligned             tolerances of a query: distance from the face (m), angle to its normal (rad)
+    bend_error               error of the mean curvature (1/m); optional for a flat face
     reach                    (2,) X and Y (m), half extents of the region, or its radius twice
-    sides, thickness         (2,) half extents of the face (m), or its radius twice; way to support or other tissue
+    sides, thickness         (2,) half extents of the face (m), or its radius twice; depth of support or other tissue
     origin, axes             (3,) and (3, 3): the middle of the face, and rows x, y and outward normal
     poisson_range            (2,) of Poisson's ratios
-    young, poisson           those of the study (Pa, 1), which hold where a query gives none
-    largest                  largest radius of contact, in units of the way to the nearest side or to ``thickness``
-    bar                      (4,) b: c may be off by (b0 + b2 (a/room)⁴)/room + b1 |h| <r²>, and F by b3 of it besides
+    young, poisson           the study's (Pa, 1), the defaults of a query
+    largest                  largest contact radius, in units of the room: distance to the nearest side or ``thickness``
+    bar                      (4,) b: error of c is (b0 + b2 (a/room)⁴)/room + b1 |h| <r²>; relative error of F, b3 more
 
-A flat face knows what tools do to each other (pipeline/realtime/pairs.py); a file may lack all four:
+Interaction of tools on a flat face (pipeline/realtime/pairs.py), optional:
 
     pair_modes               (pair_mode, pair_y, pair_x) Chebyshev coefficients of φ (1) over x/X and y/Y
-    pair_links               (pair_node, pair_mode, pair_other) S (1/m), over ν: a force of one at y sinks x by
-                             φ(x)·S φ(y) more than that of a half-space; symmetric to the last digit
-    pair_error               how far that may be off, times the root of both ways to the nearest side or the bottom (1)
-    pair_aside               how far a force of one moves another place aside, times the way to it, at most (1)
+    pair_links               (pair_node, pair_mode, pair_other) S (1/m), over ν: a unit force at y displaces x by
+                             φ(x)·S φ(y) more than on a half-space; exactly symmetric
+    pair_error               error of that displacement, times the root of both distances to a side or the bottom (1)
+    pair_aside               largest lateral displacement by a unit force, times the distance to the force (1)
 
-A model may hold what is seen of the body (pipeline/realtime/surface.py), in smaller numbers, which C passes over:
+The deforming surface (pipeline/realtime/surface.py), optional, in smaller number types, which C ignores:
 
     surface_points           (vertex, component) m, from the middle of the face along its axes
     surface_triangles        (triangle, corner)
     surface_modes            (vertex, component, mode), whole numbers, and
     surface_amounts          (mode, poisson_degree, y_degree, x_degree) Chebyshev coefficients: R (m/N for E = 1)
-    surface_error            the most that R times the way to the nearest side or the bottom was off where it was judged
+    surface_error            largest error of R on the test places, times the distance to the nearest side or the bottom
 
-What people read besides: check_* (check) are touches that no bar was fitted to, by full solves of the program and by
-the model; attributes say what was exported, by which version and from which study.
+For people: check_* (check) are touches by full solves and by the model, of calibration and test; attributes name the
+body, the tools, the version and the study.
 """
 
 from collections.abc import Mapping
@@ -58,7 +58,7 @@ from pipeline.realtime.surface import SurfaceTable
 Checks = Mapping[str, tuple[str, FloatArray]]
 Variable = tuple[tuple[str, ...], npt.NDArray[Any], dict[str, str]]
 
-# Of the numbers of a model: dimensions, of those that are no single one, and units, of those that have one.
+# Dimensions of a model's arrays, and units of its numbers. All others are scalars, or have no unit.
 _DIMENSIONS: Mapping[str, tuple[str, ...]] = {
     "reciprocal": ("poisson_node", "v", "u"),
     "curvature": ("poisson_node", "v", "u"),
@@ -81,7 +81,7 @@ _UNITS = {
 def write_model(
     path: Path, model: Model, checks: Checks, attributes: Mapping[str, str], surface: SurfaceTable | None = None
 ) -> None:
-    """Write a model with its ``checks``, (unit, values) by name, in one piece or not at all."""
+    """Write a model with its ``checks``, (unit, values) by name. The file appears whole or not at all."""
     variables: dict[str, Variable] = {
         name: (_DIMENSIONS.get(name, ()), values, {"units": _UNITS.get(name, "1")})
         for name, values in numbers_of(model).items()

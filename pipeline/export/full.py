@@ -1,4 +1,4 @@
-"""Full solves of the program: one touch of a tool on a study's body, with the bar of its force."""
+"""Full solves: one touch of a tool on a study's body, with the error bar of its force."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from pipeline.study.load import parse
 
 @dataclass(frozen=True)
 class Tool:
-    """A tool of a study: its name, sizes (m; ``angle`` in rad) and, of a blade, the direction of its edge."""
+    """A tool of a study: its name, sizes (m; ``angle`` in rad) and, for a blade, the direction of its edge."""
 
     name: str
     radius: float = 0.0
@@ -27,7 +27,7 @@ class Tool:
 
     @property
     def sizes(self) -> dict[str, Any]:
-        """What a query takes of it."""
+        """The arguments of a query for this tool."""
         if self.name == "blade":
             return {"length": self.length, "width": self.width, "along": self.along}
         sizes: dict[str, Any] = {"radius": self.radius, "contact": self.contact}
@@ -35,7 +35,7 @@ class Tool:
 
     @property
     def section(self) -> dict[str, Any]:
-        """The keys of the study's section that say what it is."""
+        """The keys of a study's section ``probe`` for this tool."""
         found: dict[str, Any] = {"shape": self.name, "contact": self.contact}
         if self.name == "blade":
             return found | {"length": _mm(self.length), "width": _mm(self.width), "direction": list(self.along)}
@@ -45,7 +45,7 @@ class Tool:
 
 @dataclass(frozen=True)
 class Full:
-    """What a full solve found: F (N) along the axis, its relative bar, and what the tissue does to the tool (3,)."""
+    """The result of a full solve: F (N) along the axis, its relative error bar, the force on the tool (3,), in N."""
 
     force: float
     error: float
@@ -54,7 +54,7 @@ class Full:
 
 @dataclass(frozen=True)
 class Solver:
-    """Full solves on the body of a study, whose ``sections`` are those of its file, to a relative ``accuracy``."""
+    """Full solves on the body of a study with these ``sections``, to a relative ``accuracy``."""
 
     sections: Mapping[str, Any]
     file: str
@@ -64,10 +64,10 @@ class Solver:
     def press(self, tool: Tool, at: tuple[float, ...], depth: float, poisson: float | None) -> Full:
         """Return the force of a tool at x and y, or x, y and z (m), at a ``depth`` (m).
 
-        Without ``poisson`` the study's own materials count, else the tissue at the face has that ratio.
+        Without ``poisson`` the study's own materials apply, else the tissue at the face has that ratio.
 
         Raises:
-            RuntimeError: if it failed.
+            RuntimeError: if the solve failed.
         """
         (found,) = self.press_all(tool, at, [depth], None if poisson is None else [poisson])
         return found
@@ -82,10 +82,10 @@ class Solver:
     ) -> list[Full]:
         """Return the forces for all of ``poissons``, and for each at all ``depths`` (m), on one mesh.
 
-        Without a ``mesh``, the keys of the study's section, it is one for the accuracy.
+        ``mesh`` are the keys of a study's section; without them the mesh is chosen for the accuracy.
 
         Raises:
-            RuntimeError: if one of them failed.
+            RuntimeError: if a solve failed.
         """
         own = {name: value for name, value in self.sections.items() if name in ("body", "material")}
         if poissons is not None:

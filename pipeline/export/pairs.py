@@ -1,7 +1,7 @@
-"""What forces at two places of a flat face do to each other, as a few modes: ``pipeline.realtime.pairs``.
+"""Interaction of forces at two places of a flat face, as a few modes: ``pipeline.realtime.pairs``.
 
-The regular part R of the normal displacement at one Chebyshev place for a force at another is a symmetric matrix, but
-for the mesh. Its range is cut where it misses what is asked; modes are the polynomials through what is left of it.
+R, the regular part of the normal displacement at one Chebyshev node for a force at another, is a symmetric matrix up to
+the mesh's error. A truncated singular value decomposition gives its range; the modes are polynomials through it.
 """
 
 from dataclasses import replace
@@ -14,17 +14,17 @@ from pipeline.export.far import FarFields, least_rank, located
 from pipeline.realtime.pairs import MOST_MODES, MOST_TERMS, Pairs
 from pipeline.stages import stage
 
-# Modes are kept until they miss R times the way to the nearest side by less than this.
+# Error of the truncation, in R times the distance to the nearest side.
 _CUT = 1e-3
-# A node this near to the plane of the face, in units of the thickness, lies on it.
+# A node is on the face if its distance, in units of the thickness, is at most this.
 _ON_FACE = 1e-9
 
 
 @stage("pairs")
 def tabulate_pairs(far: FarFields) -> Pairs:
-    """Return R between all places of a region, and by how much of the way to a side it may be off.
+    """Return R between all places of a region, with its error, in units of the inverse distance to a side.
 
-    That is what it is off for forces held out, anywhere else on the face, or half of what the mesh misses of symmetry.
+    The error is that for held-out forces, anywhere on the face, or half the asymmetry of R, whichever is larger.
     """
     ways = np.sqrt(far.rooms)
     weights = np.multiply.outer(ways, ways)
@@ -41,7 +41,10 @@ def tabulate_pairs(far: FarFields) -> Pairs:
 
 
 def _between(far: FarFields) -> FloatArray:
-    """Return what a force at each place (columns) sinks all places (rows) beyond a half-space: (ν, n, n), in 1/m."""
+    """Return the normal displacement of all places (rows) by a force at each (columns), less a half-space's.
+
+    Shape (ν, n, n), in 1/m.
+    """
     points = _on_face(far.places)
     maps = [located(far.solved[0], points @ motion) for motion in far.motions]
     sunk = [-found.values[: len(far.sources), :, 2] for found in far.solved]
@@ -50,7 +53,7 @@ def _between(far: FarFields) -> FloatArray:
 
 
 def _range(even: FloatArray, most: int) -> FloatArray:
-    """Return orthonormal columns (n, rank) that make ``even`` (ν, n, n) but for ``_CUT``, or the first ``most``."""
+    """Return orthonormal columns (n, rank) that represent ``even`` (ν, n, n) up to ``_CUT``; at most ``most``."""
     found, _, _ = np.linalg.svd(np.concatenate(list(even), axis=1), full_matrices=False)
 
     def suffices(rank: int) -> bool:
@@ -61,7 +64,7 @@ def _range(even: FloatArray, most: int) -> FloatArray:
 
 
 def _missed(pairs: Pairs, far: FarFields) -> float:
-    """Return by how much R times both ways to a side is off at nodes of the face, for forces held out."""
+    """Return the error of R times the root of both distances to a side, at nodes of the face, for held-out forces."""
     nodes, region = far.solved[far.middle].nodes, far.body.region
     inside = np.abs(nodes[:, 2]) <= _ON_FACE * region.thickness
     if region.is_round:
@@ -70,12 +73,12 @@ def _missed(pairs: Pairs, far: FarFields) -> float:
         inside &= (np.abs(nodes[:, :2]) <= region.reach).all(axis=1)
     on = [(float(x), float(y)) for x, y in nodes[inside, :2]]
     rooms = [np.sqrt([region.room(x, y) for x, y in places]) for places in (far.held_out, on)]
-    told = pairs.regular(far.held_out, on, float(far.ratios[far.middle]))
-    return float(np.abs((told + far.known[:, inside, 2]) * np.multiply.outer(*rooms)).max())
+    tabulated = pairs.regular(far.held_out, on, float(far.ratios[far.middle]))
+    return float(np.abs((tabulated + far.known[:, inside, 2]) * np.multiply.outer(*rooms)).max())
 
 
 def _aside(far: FarFields) -> float:
-    """Return the most that a force of one moves another place aside, times the way to it."""
+    """Return the largest lateral displacement of a place by a unit force, times the distance to the force."""
     nodes, weights = located(far.solved[0], _on_face(far.places))
     largest = 0.0
     for found, poisson in zip(far.solved, far.ratios.tolist(), strict=True):

@@ -1,4 +1,4 @@
-"""A half-space whose face touches a curved body at a place: its field, and what pulls at the body's boundary for it."""
+"""A half-space that touches a curved body at a place: its field, and the body's boundary loads by that field."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,36 +14,36 @@ from pipeline.solve.far_field import PointForce
 
 Vector = tuple[float, float, float]
 
-# The loads on the boundary grow like 1/distance towards the force: a quadrature that is exact for as much.
+# The boundary loads grow like 1/distance towards the force, so quadrature needs this degree.
 _QUADRATURE = 8
 
 
 @dataclass(frozen=True)
 class PlacedForce(PointForce):
-    """A half-space under a point force along ``-turn[2]``: the rows of ``turn`` lie along its face, and outwards.
+    """A half-space under a point force along ``-turn[2]``; the rows of ``turn``: two tangents, the outward normal.
 
-    Nearer to the force than ``blunt`` (m) the boundary is taken to be the half-space's own face.
+    Within ``blunt`` (m) of the force the boundary is taken as the half-space's own face, without load.
     """
 
     turn: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     blunt: float = 0.0
 
     def at(self, points: FloatArray) -> FloatArray:
-        """Return the displacement (n, 3) of a unit, in m."""
+        """Return the displacement (n, 3) by a unit force, in m."""
         return np.asarray(self._plain.at(self._local(points)) @ self._rows)
 
     def stress(self, points: FloatArray) -> FloatArray:
-        """Return the stress (n, 3, 3) of a unit, in units of μ, with nothing at the centre itself."""
+        """Return the stress (n, 3, 3) by a unit force, in units of μ; 0 at the force itself."""
         return np.asarray(self._rows.T @ self._plain.stress(self._local(points)) @ self._rows)
 
     def above(self, points: FloatArray) -> float:
-        """Return the largest cosine of the angle between the normal and the way to a point (n, 3) that is not blunt."""
+        """Return the largest cosine of the angle between normal and direction to a point (n, 3) outside ``blunt``."""
         local = self._local(points)
         distance = np.linalg.norm(local, axis=1)
         return float((local[:, 2] / np.where(distance > max(self.blunt, 1e-12 * self.radius), distance, np.inf)).max())
 
     def pull(self, space: Any, places: FloatArray) -> "PlacedPull":
-        """Return what integrates the stresses of such forces over the boundary of ``space``."""
+        """Return the load vectors of such forces on the boundary of ``space``."""
         return PlacedPull(space)
 
     def _local(self, points: FloatArray) -> FloatArray:
@@ -59,16 +59,16 @@ class PlacedForce(PointForce):
 
 
 class PlacedPull:
-    """∫ σn·v on the whole boundary, σ that of a :class:`PlacedForce`, in closed form at the points of quadrature.
+    """∫ σn·v on the whole boundary, with σ of a :class:`PlacedForce` in closed form at the quadrature points.
 
-    On a curved boundary the stress grows like 1/distance², and what of it the normal leaves like 1/distance:
-    polynomials of the stress would not cancel as it does.
+    On a curved boundary the stress grows like 1/distance², but its traction only like 1/distance. An interpolated
+    stress would lose this cancellation.
     """
 
     def __init__(self, space: Any) -> None:
         mesh = space.mesh
         self._centre, self._turn = fem.Constant(mesh, np.zeros(3)), fem.Constant(mesh, np.eye(3))
-        self._numbers = fem.Constant(mesh, np.zeros(3))  # ν, the radius, and what is blunt
+        self._numbers = fem.Constant(mesh, np.zeros(3))  # ν, radius, blunt
         measure = ufl.ds(domain=mesh, metadata={"quadrature_degree": _QUADRATURE})
         self._form = form(ufl.inner(self._traction(mesh), ufl.TestFunction(space)) * measure)
 

@@ -1,4 +1,4 @@
-"""Independent work of an export, shared out to the ranks there are: each does some, and all have what came of it."""
+"""Distribute an export's independent work over MPI ranks: each does some, and all get every result."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,22 +14,22 @@ Found = TypeVar("Found")
 
 @dataclass(frozen=True)
 class Ranks:
-    """The ranks of a communicator, which all ask for the same work in the same order; every method is collective.
+    """The ranks of a communicator. Every method is collective: all ranks call it with the same work.
 
-    What fails on one of them is raised there, and on the others as a RuntimeError of the same text.
+    An error on one rank is raised there, and on the others as a RuntimeError with the same text.
     """
 
     comm: MPI.Comm
-    note: Callable[[str], None] = lambda text: None  # told, on the first rank, what is being worked on
+    note: Callable[[str], None] = lambda text: None  # prints progress, on the first rank
 
     def on_first(self, make: Callable[[], Found]) -> Found:
-        """Return on every rank what ``make`` gives on the first one."""
+        """Return on every rank the result of ``make`` on the first one."""
         return self.together([None], lambda _: [make()])[0]
 
     def together(self, items: Sequence[Item], work: Callable[[Sequence[Item]], Sequence[Found]]) -> list[Found]:
-        """Return what ``work`` makes of all ``items``, of which each rank gives it every so many at once.
+        """Return the results of ``work`` for all ``items``. Each rank calls it once, with every n-th item.
 
-        That is for work which has much to set up, whatever the number of items.
+        Use it for work with a set-up that costs the same for any number of items.
         """
         own = list(range(self.comm.rank, len(items), self.comm.size))
         try:
@@ -39,7 +39,7 @@ class Ranks:
         return self._gathered(len(items), found, wrong)
 
     def in_turn(self, items: Sequence[Item], work: Callable[[Item], Found], what: str) -> list[Found]:
-        """Return what ``work`` makes of each of ``items``, called ``what``: a free rank takes the next one."""
+        """Return the result of ``work`` for each of ``items``: a free rank does the next one. ``what`` names them."""
         found: dict[int, Found] = {}
         wrong = None
         with Counter(self.comm, self.comm.rank, self.comm.size) as counter:
@@ -52,7 +52,7 @@ class Ranks:
         return self._gathered(len(items), found, wrong)
 
     def _gathered(self, count: int, found: Mapping[int, Found], wrong: Exception | None) -> list[Found]:
-        # Not every exception survives being sent.
+        # Some exceptions cannot be pickled, so only their text is sent.
         every: list[Any] = self.comm.allgather((count, found, None if wrong is None else str(wrong)))
         if wrong is not None:
             raise wrong
@@ -60,7 +60,7 @@ class Ranks:
             if message is not None:
                 raise RuntimeError(message)
         if any(other != count for other, _, _ in every):
-            raise RuntimeError("the ranks do not agree on what is to be solved for")
+            raise RuntimeError("the ranks disagree on the number of solves")
         parts = {number: value for _, part, _ in every for number, value in part.items()}
         return [parts[number] for number in range(count)]
 

@@ -1,4 +1,4 @@
-"""Which places of a face a model is made for."""
+"""The region of a face that a model covers."""
 
 from dataclasses import dataclass
 
@@ -12,10 +12,10 @@ _SAME = 1e-9
 
 @dataclass(frozen=True)
 class Region:
-    """What is tabulated of a face: half extents (m) of both, or radii twice, and the thickness (m) below.
+    """A tabulated region: half extents (m) of region (``reach``) and face (``sides``), or their radii twice.
 
-    The thickness ends where other tissue begins. ``even`` tells in which directions the body is its own mirror image,
-    ``is_square`` whether it is where x and y are exchanged.
+    ``thickness`` (m) is the depth of the support or of other tissue. ``even`` says in which directions the body is its
+    own mirror image, ``is_square`` whether exchanging x and y leaves it unchanged.
     """
 
     reach: tuple[float, float]
@@ -27,7 +27,7 @@ class Region:
 
     @staticmethod
     def of(body: Layered, share: float) -> "Region":
-        """Return the region that leaves out the ``share`` of the smaller of half the width and the height."""
+        """Return the region with a margin: a ``share`` of the smaller of half the width and the height."""
         sides, height = body.half_sides, body.heights[1] - body.heights[0]
         left = share * min(*sides, height)
         even = tuple(all(abs(piece.at[axis]) <= _SAME * height for piece in body.inclusion) for axis in range(2))
@@ -37,11 +37,11 @@ class Region:
 
     @property
     def margin(self) -> float:
-        """The way (m) from the region to the sides."""
+        """The distance (m) from the region to the sides."""
         return self.sides[0] - self.reach[0]
 
     def room(self, x: float, y: float) -> float:
-        """Return the way (m) from a place to the nearest side, or to the bottom or other tissue."""
+        """Return the distance (m) from a place to the nearest side, or the depth of the bottom or other tissue."""
         if self.is_round:
             return min(self.sides[0] - float(np.hypot(x, y)), self.thickness)
         return min(self.sides[0] - abs(x), self.sides[1] - abs(y), self.thickness)

@@ -1,4 +1,4 @@
-"""Which studies have a real-time model, and what of them it is made for."""
+"""Which studies a real-time model supports, and the case and range that it covers."""
 
 import tomllib
 from collections.abc import Mapping
@@ -12,23 +12,20 @@ from pipeline.shapes.tissue import Tissue
 from pipeline.study.capabilities import obstacle
 from pipeline.study.sweep import Case, Study
 
-# Poisson's ratios that a model holds at least, and at most: beyond, displacement elements lock.
+# Poisson's ratios that a model covers by default; the largest one before displacement elements lock.
 _USUAL, _MOST = (0.3, 0.49), 0.49
 
-# Depth of other tissue, at least, in units of half the smaller width: c varies over places as fast as that.
+# Least depth of other tissue, in units of half the smaller width: c varies over the face on the scale of that depth.
 _SHALLOWEST = 0.1
 
 
 class ExportError(Exception):
-    """A study that no real-time model can be made of; its text says why, and what would do."""
+    """A study without a real-time model: the message says why, and what to change."""
 
 
 @dataclass(frozen=True)
 class Scope:
-    """A case with the body, E and ν where a query gives none, and the range of ν.
-
-    ``sections`` are those of the study's ``file``, of which full solves are made.
-    """
+    """A case with its body, defaults of E and ν, the range of ν, and the ``sections`` of its ``file``."""
 
     case: Case
     body: Body
@@ -40,13 +37,13 @@ class Scope:
 
     @property
     def is_flat(self) -> bool:
-        """Whether the face is a plane: its regular part then gives the model, else full solves do."""
+        """Whether the face is a plane: tables then come from the Green's function, else from full solves."""
         return isinstance(self.body, Layered)
 
     def tissues_at(self, poisson: float) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
-        """Return λ and μ of all regions in units of μ at the face, or nothing if there is one material.
+        """Return λ and μ of all regions in units of μ at the face; None if there is one material.
 
-        The face has that Poisson's ratio; all else is as the study has it, and so is the face of layers.
+        ``poisson`` replaces the material's ratio. Layers and inclusions keep theirs.
         """
         if not self.body.regions:
             return None
@@ -59,10 +56,10 @@ class Scope:
 
 
 def scope_of(study: Study) -> Scope:
-    """Return what a model is made for.
+    """Return the scope of a study's model.
 
     Raises:
-        ExportError: if there is no model of such a study.
+        ExportError: if the study cannot be exported.
     """
     cases = list(study.cases())
     first = cases[0]
@@ -79,37 +76,38 @@ def scope_of(study: Study) -> Scope:
 
 
 def surface_tissue(case: Case) -> Tissue:
-    """Return what the face of the body is made of."""
+    """Return the tissue at the face of the body."""
     body = case.body
     return body.layers[0] if isinstance(body, Layered) and body.layers else case.material
 
 
 def _is_same_but_for_poisson(case: Case, first: Case) -> bool:
-    """Tell whether materials are the same, Poisson's ratio apart, which a model has a range of."""
+    """Return whether materials are equal up to Poisson's ratio, of which a model covers a range."""
     return case.material.model_copy(update={"poisson": first.material.poisson}) == first.material
 
 
 def _refusal(case: Case, first: Case) -> str:
-    """Return why a case has no model, or the first one's is not its, or nothing."""
+    """Return why a case cannot be part of the ``first`` one's model, "" if it can."""
     body, probe = case.body, case.probe
     if body != first.body:
-        return "a model is of one body, and the study has several: export a study of each"
+        return "the study has several bodies, and a model has one: export a study of each"
     if reason := obstacle("real-time model", case):
         return reason
     if case.poisson > _MOST:
-        return f"material.poisson = {case.poisson:g} is too near to 0.5 for a real-time model: at most {_MOST}"
+        return f"material.poisson = {case.poisson:g} is too close to 0.5 for a real-time model: at most {_MOST}"
     if isinstance(body, Layered):
         return _flat_refusal(case, first, body)
     if not body.is_smooth:
-        return f'body.shape = "{body.shape}" has no real-time model yet: boxes, cylinders, ellipsoids and surfaces have'
+        return f'body.shape = "{body.shape}" has no real-time model: boxes, cylinders, ellipsoids and surfaces have one'
     if not _is_same_but_for_poisson(case, first):
-        return "a model of a curved body is of one material, and the study has several: export a study of each"
+        return "the study has several materials, and a curved body's model has one: export a study of each"
     if (probe.shape, probe.contact) != ("disc", "frictionless"):
         return (
-            "a model of a curved body is made with a frictionless disc, 2/3 as large as the largest tool: give that one"
+            'probe: a curved body needs shape = "disc" and contact = "frictionless"; its radius sets the model\'s '
+            "largest tool, 1.5 times as large"
         )
     if len(probe.at) != len("xy") or probe.axis is not None:
-        return "probe.at must be x and y, the middle of the region, and probe.axis left out"
+        return "probe.at must be x and y, the middle of the model's region; leave probe.axis out"
     return ""
 
 
@@ -117,21 +115,26 @@ def _flat_refusal(case: Case, first: Case, body: Layered) -> str:
     probe = case.probe
     if body.regions and case.material != first.material:
         if body.layers:
-            return "a model of layers is of one set of materials, material.poisson too, and the study has several"
+            return "the study has several sets of materials, and a model of layers has one, material.poisson too"
         if not _is_same_but_for_poisson(case, first):
-            return "a model of inclusions is of one set of materials, and the study has several: export each"
+            return "the study has several sets of materials, and a model of inclusions has one: export a study of each"
     if body.has_round_top and not body.is_round:
-        return f"a {body.shape} with an inclusion off its axis has no real-time model yet"
-    if body.regions and body.depth_of_tissue < _SHALLOWEST * min(body.half_sides):
-        return "other tissue so near to the surface has no real-time model: a tenth of half the width is the least"
+        return f"a {body.shape} with an inclusion off its axis has no real-time model: use a box"
+    least = _SHALLOWEST * min(body.half_sides)
+    if body.regions and body.depth_of_tissue < least:
+        return (
+            f"other tissue begins {1e3 * body.depth_of_tissue:.3g} mm below the surface; a real-time model needs at "
+            f"least {1e3 * least:.3g} mm, a twentieth of the body's width. For thinner layers, make the body narrower "
+            f"(at most {1e3 * 2 * body.depth_of_tissue / _SHALLOWEST:.3g} mm wide)"
+        )
     if not isinstance(body.support, Faces) or set(body.support.names) != {"bottom"}:
-        return 'body.fixed: such a support has no real-time model yet: "bottom" has'
+        return 'body.fixed must be "bottom" for a real-time model'
     if not probe.REALTIME:
         known = ", ".join(shape for shape, kind in PROBES.items() if kind.REALTIME)
-        return f'probe.shape = "{probe.shape}" has no real-time model yet: {known} have'
+        return f'probe.shape = "{probe.shape}" has no real-time model; these have one: {known}'
     if probe.contact not in probe.REALTIME:
         right = '" or "'.join(probe.REALTIME)
-        return f'probe.contact = "{probe.contact}" of a {probe.shape} has no real-time model yet: "{right}" has'
+        return f'probe.contact = "{probe.contact}" has no real-time model for a {probe.shape}; write "{right}"'
     if error := probe.realtime_error():
         return error
-    return "" if case.frame.is_upright else "probe.axis: a model is of tools that press straight down: leave it out"
+    return "" if case.frame.is_upright else "probe.axis: tools of a real-time model press straight down: leave it out"

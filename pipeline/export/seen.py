@@ -1,4 +1,4 @@
-"""The meshed body of a model, with the forces that its visible surface is tabulated for."""
+"""The meshed body of a model, with the point forces for which its deforming surface is tabulated."""
 
 from dataclasses import replace
 from functools import partial
@@ -20,12 +20,12 @@ from pipeline.shapes.body import Layered
 from pipeline.solve.far_field import PointForce
 from pipeline.study.schema import Mesh
 
-# Elements of a curved body: in the region, in units of the study's radius, and elsewhere, of the cube root of the
-# volume; how far round the region's middle they are small, in units of half the region, and how they grow.
+# Element sizes of a curved body: in the region, in units of the study's radius; elsewhere, in units of the cube root of
+# the volume. Radius of the small elements, in units of half the region; growth.
 _IN_REGION, _ELSEWHERE, _AROUND, _GROWTH = 0.9, 0.095, 1.2, 0.4
-# Next to a force, in units of the study's radius: where its loads are left out, and where R is not judged.
+# Distances from a force, in units of the study's radius, within which its loads are omitted, and R is not tested.
 _BLUNT, _NEXT = 0.1, 0.5
-# No part of a body may lie so straight above a place of its region (cosine of the angle to the normal).
+# No part of a body may be above its region: largest cosine of the angle to the normal.
 _STRAIGHT_ABOVE = 0.9
 
 
@@ -33,7 +33,7 @@ def seen_body(scope: Scope, model: Model, margin: float, ranks: Ranks = ALONE) -
     """Return the body of a model, with the forces on its face; collective.
 
     Raises:
-        ExportError: if part of it lies above its own region.
+        ExportError: if part of it is above its own region.
         MeshError: if it cannot be meshed.
     """
     law = partial(law_of, scope)
@@ -61,12 +61,12 @@ def _curved(scope: Scope, model: Model, ranks: Ranks) -> Pressed:
     points = np.asarray(mesh.mesh.geometry.x)
     corners = [(x * region.reach[0], y * region.reach[1]) for x in (-0.7, 0.0, 0.7) for y in (-0.7, 0.0, 0.7)]
     if max(on_face(place, scope.poisson).above(points) for place in corners) > _STRAIGHT_ABOVE:
-        raise ExportError("part of the body lies above its own region, so that what is seen of it is not known")
+        raise ExportError("part of the body is above the model's region, where its displacement cannot be tabulated")
     return Pressed(mesh, region, on_face, partial(law_of, scope), _NEXT * radius, ranks)
 
 
 def _mesh(scope: Scope, region: Region, radius: float, ranks: Ranks) -> BodyMesh:
-    """Return a mesh that is fine enough in the region for loads that grow towards a force, and to be looked at."""
+    """Return a mesh that is fine in the region, for loads that grow towards a force, and for display."""
     around, fine = _AROUND * max(region.reach), _IN_REGION * radius
     coarse = max(fine, _ELSEWHERE * scope.body.volume ** (1 / 3))
     mesh = Mesh.model_construct(epsilon=around, fine=fine, coarse=coarse, rim=fine, growth=_GROWTH)

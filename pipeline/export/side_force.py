@@ -15,7 +15,7 @@ class SideForce(PointForce):
     direction: int = 0
 
     def at(self, points: FloatArray) -> FloatArray:
-        """Return the displacement (n, 3) of a unit, in m."""
+        """Return the displacement (n, 3) by a unit force, in m."""
         x, y, depth, r = self._along(points)
         softness, sunk = 1 - 2 * self.poisson, r + depth
         found = np.zeros((len(points), 3))
@@ -26,7 +26,7 @@ class SideForce(PointForce):
         return self.radius * found
 
     def stress(self, points: FloatArray) -> FloatArray:
-        """Return the stress (n, 3, 3) of a unit, in units of μ, with nothing at the centre itself."""
+        """Return the stress (n, 3, 3) by a unit force, in units of μ; 0 at the force itself."""
         offsets = points - np.array(self.centre)
         away = np.linalg.norm(offsets, axis=1) > 1e-9 * self.radius
         x, y, depth, r = self._along(points[away])

@@ -1,7 +1,6 @@
-"""The far field of a model's visible surface: R on the boundary for a force anywhere in the region, as a few modes.
+"""The deforming surface of a model: R on the boundary for a force anywhere in the region, as a few modes.
 
-What is left of R (``pipeline.export.far``) is of low rank: modes on the boundary, whose amounts are polynomials of the
-place and of ν.
+R (``pipeline.export.far``) has low rank: modes on the boundary, with amounts that are polynomials of the place and ν.
 """
 
 from dataclasses import replace
@@ -12,15 +11,15 @@ from pipeline.arrays import FloatArray
 from pipeline.export.far import FarFields, image_of, least_rank
 from pipeline.realtime.surface import SurfaceTable
 
-# Modes are kept until they miss R × room by this share of its largest value.
+# Error of the truncation, in R × room, as a share of its largest value.
 _CUT = 0.03
 _WHOLE = 32767
-# A quadratic triangle by its halves: corners, then the middles opposite to them.
+# A quadratic triangle as four: corners, then the midpoints of the opposite edges.
 _QUARTERS = ((0, 5, 4), (5, 1, 3), (4, 3, 2), (3, 4, 5))
 
 
 def tabulate_surface(far: FarFields, origin: FloatArray) -> SurfaceTable:
-    """Return the modes of the whole boundary, and by how much of the depth they may be off at places held out."""
+    """Return the modes of the whole boundary, with their error at held-out places."""
     boundary, sources = far.solved[0], len(far.sources)
     images = [image_of(boundary, motion) for motion in far.motions]
     fields = np.array(
@@ -33,7 +32,7 @@ def tabulate_surface(far: FarFields, origin: FloatArray) -> SurfaceTable:
 
 
 def _modes(fields: FloatArray) -> FloatArray:
-    """Return orthonormal modes (values, rank) of fields (fields, values), as many as the largest error takes."""
+    """Return orthonormal modes (values, rank) of fields (fields, values): the fewest within the error ``_CUT``."""
     powers, turned = np.linalg.eigh(fields @ fields.T)
     order = np.argsort(powers)[::-1]
     kept = order[powers[order] > 1e-14 * powers[order[0]]]
@@ -64,7 +63,7 @@ def _table(far: FarFields, modes: FloatArray, amounts: FloatArray, origin: Float
 
 
 def _judged(table: SurfaceTable, far: FarFields) -> SurfaceTable:
-    """Return the table with what it misses R × room by at places that it was not made of."""
+    """Return the table with its error of R × room at held-out places."""
     missed, nodes, body, poisson = 0.0, far.solved[far.middle].nodes, far.body, float(far.ratios[far.middle])
     for (x, y), values in zip(far.held_out, far.known, strict=True):
         centre = np.array(body.force((x, y), poisson).centre)

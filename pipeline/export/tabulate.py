@@ -1,4 +1,4 @@
-"""Chebyshev tables of a body's compliance, as large as the asked accuracy takes, each place and its images once."""
+"""Chebyshev tables of a body's compliance, refined to an accuracy; symmetric places are solved once."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -10,18 +10,18 @@ from pipeline.export.region import Region
 from pipeline.realtime.table import Table, factors
 
 Places = Sequence[tuple[float, float]]
-# c, h and what blades and bonded tools take besides (places, 9) at places, for a Poisson's ratio; or c and h alone.
+# Returns c, h, and the values for blades and bonded tools (places, 9) for a Poisson's ratio; or c and h only.
 Compliances = Callable[[Places, float], FloatArray]
 
-# Intervals between the nodes along one direction, each twice the last: what is known is used again. Nodes over ν.
+# Intervals along one direction, doubled so that nodes are reused. Number of nodes over ν.
 _SIZES, _POISSONS = (4, 8, 16), 3
-# c_ref in units of 1/thickness, above the least c.
+# c_ref minus the least c, in units of 1/thickness.
 _ABOVE = 1.0
 _DIGITS = 12
 _UNKNOWN = np.full(2, np.nan)
-# Of a place and its image where x and y are exchanged: c, h, A₁, A_xy, R_xz, R_yz, mean and half difference, R_xy.
+# Exchange of x and y: order and signs of c, h, A₁, A_xy, R_xz, R_yz, mean and half difference, R_xy.
 _SWAPPED, _SIGNS = [0, 1, 2, 3, 5, 4, 6, 7, 8], np.array([1, 1, -1, 1, 1, 1, 1, -1, 1])
-# Of the tables beyond c and h, so many are second derivatives; on a round body, along x, some are what others are.
+# Of the tables after c and h, the first _BENDS are second derivatives. On a round body, along x, some equal others.
 _BENDS, _TWINS = 2, {1: 0, 3: 2, 6: 5}
 
 
@@ -34,10 +34,10 @@ def tabulate(
     *,
     sparse: bool = False,
 ) -> tuple[Table, float]:
-    """Return a table, and by how much the last but one missed c × room at the new nodes of the last.
+    """Return a table, and the error of the next coarser one in c × room, at the table's new nodes.
 
-    It is the first whose forerunner missed less than ``tolerance``, or the largest. If ``sparse``, where a place is
-    dear, each size but the first is tried with few of its nodes before all are solved for: see :func:`_filled`.
+    The table is the first for which that error is at most ``tolerance``, or the largest. ``sparse``, for expensive
+    solves, tries each size but the first with some of its nodes before all are solved: see :func:`_filled`.
     """
     ratios = ratios_of(poissons)
     known: list[dict[tuple[float, float], FloatArray]] = [{} for _ in ratios]
@@ -46,7 +46,7 @@ def tabulate(
     grids = [(size, few) for n, size in enumerate(sizes) for few in ((True, False) if sparse and n else (False,))]
     for number, (size, few) in enumerate(grids):
         places = _places(region, size, few=few)
-        # The first table is never the last: what the second one takes is solved for together with it.
+        # The first table is never the last, so the nodes of the second are solved with its own.
         wanted = _places(region, grids[1][0], few=grids[1][1]) if number == 0 and len(grids) > 1 else places
         unknown = [place for place in dict.fromkeys(_image(region, p) for p in wanted) if place not in known[0]]
         for ratio, found in zip(ratios, known, strict=True):
@@ -69,13 +69,13 @@ def tabulate(
 
 
 def ratios_of(poissons: tuple[float, float]) -> FloatArray:
-    """Return the Poisson's ratios of the nodes of a range, one if it is one."""
+    """Return the nodes of a range of Poisson's ratios; one if its ends are equal."""
     low, high = poissons
     return np.asarray((low + high) / 2 + (high - low) / 2 * (extrema(_POISSONS - 1) if low < high else np.zeros(1)))
 
 
 def _missed(table: Table, place: tuple[float, float], poisson: float, c: float) -> float:
-    """Return by how much a table misses c at a place, infinitely if it makes no sense of it."""
+    """Return the error of a table for c at a place; infinite if the table has a pole there."""
     try:
         return abs(table.at(*place, poisson).c - c)
     except ArithmeticError:
@@ -94,7 +94,7 @@ def _table(region: Region, poissons: tuple[float, float], size: int, values: Flo
 
 
 def _tensors(region: Region, size: int, values: Sequence[FloatArray]) -> FloatArray:
-    """Return the coefficients of what the tables of blades and bonded tools are times known factors."""
+    """Return the coefficients of the tables for blades and bonded tools, divided by their known factors."""
     xi, eta = (shares(size, even) for even in region.even)
     eta = np.zeros(1) if region.is_round else eta
     found: list[FloatArray] = []
@@ -108,7 +108,7 @@ def _tensors(region: Region, size: int, values: Sequence[FloatArray]) -> FloatAr
 
 
 def _divided(values: FloatArray, factor: FloatArray) -> FloatArray:
-    """Return the coefficients of ``values`` (ν, v, u) over a ``factor`` that is 0 at the last nodes, or at none."""
+    """Return the coefficients of ``values`` (ν, v, u) over a ``factor``, which may be 0 at the last nodes."""
     kept = tuple(slice(None) if len(line) == 1 or line[-1] != 0 else slice(-1) for line in (factor[:, 0], factor[0]))
     smooth = values[:, kept[0], kept[1]] / factor[kept]
     found = np.zeros(values.shape)
@@ -117,10 +117,9 @@ def _divided(values: FloatArray, factor: FloatArray) -> FloatArray:
 
 
 def _filled(values: FloatArray) -> FloatArray:
-    """Return ``values`` (ν, v, u) with what is unknown, NaN, told by the nodes of half as many intervals and a cross.
+    """Return ``values`` (ν, v, u) with NaN replaced by sparse-grid interpolation (S. A. Smolyak, 1963).
 
-    These are S. A. Smolyak's (1963): along the middle lines polynomials of the size's degree, their sum elsewhere, and
-    what that misses of both directions together from the nodes of half the degree.
+    It uses the middle lines at full degree, and all nodes of half as many intervals at half the degree.
     """
     if not np.isnan(values).any():
         return values
@@ -134,7 +133,7 @@ def _filled(values: FloatArray) -> FloatArray:
 
 
 def _places(region: Region, size: int, *, few: bool = False) -> Places:
-    """Return the places of the nodes, x fastest; of ``few`` those of half as many intervals and the middle lines."""
+    """Return the places of the nodes, x fastest; with ``few``, those of the sparse grid of :func:`_filled`."""
     x, y = (reach * shares(size, even) for reach, even in zip(region.reach, region.even, strict=True))
     ys = [0.0] if region.is_round else y.tolist()
     return [
@@ -146,13 +145,13 @@ def _places(region: Region, size: int, *, few: bool = False) -> Places:
 
 
 def _image(region: Region, place: tuple[float, float]) -> tuple[float, float]:
-    """Return the place of which another is the image on a square face, or the same."""
+    """Return the place that represents ``place`` and its image on a square face."""
     x, y = place
     return (max(x, y), min(x, y)) if region.is_square and not region.is_round else place
 
 
 def _turned(region: Region, place: tuple[float, float], found: Mapping[tuple[float, float], FloatArray]) -> FloatArray:
-    """Return what is known of a place, or what its image on a square face tells of it."""
+    """Return the values at a place, or those of its image on a square face, exchanged."""
     image = _image(region, place)
     values = found.get(image, _UNKNOWN)
     if image == place or len(values) < len(_SWAPPED):
@@ -171,7 +170,7 @@ def extrema(size: int) -> FloatArray:
 
 
 def _coefficients(values: FloatArray, nodes: tuple[int, ...] | None = None) -> FloatArray:
-    """Return the Chebyshev coefficients of values at the first of so many ``nodes`` along each direction, or at all."""
+    """Return the Chebyshev coefficients of values at the first of ``nodes`` along each direction, or at all nodes."""
     for axis, (count, of) in enumerate(zip(values.shape, nodes or values.shape, strict=True)):
         if count > 1:
             values = np.moveaxis(np.tensordot(_inverse(of - 1, count), values, (1, axis)), 0, axis)
@@ -179,6 +178,6 @@ def _coefficients(values: FloatArray, nodes: tuple[int, ...] | None = None) -> F
 
 
 def _inverse(size: int, count: int | None = None) -> FloatArray:
-    """Return what makes coefficients of values at the first ``count`` nodes, or at all."""
+    """Return the matrix from values at the first ``count`` nodes, or at all, to coefficients."""
     count = size + 1 if count is None else count
     return np.asarray(np.linalg.inv(np.polynomial.chebyshev.chebvander(extrema(size)[:count], count - 1)))

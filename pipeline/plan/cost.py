@@ -1,9 +1,9 @@
-"""What a step will take: a law for the seconds of each stage, fitted to what earlier cases took.
+"""The cost model: time of each stage of a step, fitted to the times of stored cases.
 
     log t = a + b log(tetrahedra) + c log(1 - 2 ν)
 
-for meshing, for solving and for the error bar, of each kind of element. Where nothing is on record the law is the one
-below; a few observations move it a little, many determine it (ridge regression about the law below).
+for meshing, solving and the error bar, for each kind of element. The constants below are the prior; ridge regression
+about the prior fits stored cases, so that few of them change it little, and many determine it.
 """
 
 from collections.abc import Hashable, Iterable, Mapping
@@ -17,32 +17,32 @@ from pipeline.plan.symmetry import model_planes
 from pipeline.shapes.body import Layered
 from pipeline.study.sweep import Case
 
-# What ranks are worth on one solve: n of them are as good as n^0.8.
+# Parallel speed-up of one solve: n ranks are n^0.8 times faster.
 _PARALLEL = 0.8
-# Seconds on one core of 2020s hardware for 10,000 tetrahedra, and the power of their number that they grow with: of
-# displacement elements by degree. Fitted to eight studies, judged on eight others (docs/performance.md).
+# Seconds for 10,000 tetrahedra on one core of 2020s hardware, and the exponent of their number; by degree of
+# displacement elements. Fitted to eight studies, tested on eight others (docs/performance.md).
 _MESH = (0.35, 0.66)
 _SOLVE = {1: (0.04, 0.75), 2: (0.165, 0.75), 3: (0.4, 0.8)}
 _BAR = {1: (0.03, 0.8), 2: (0.105, 0.8), 3: (0.3, 0.85)}
-# Of large strains: of steps, and of Newton's steps in them; their bar.
+# Large strains, all load steps and Newton iterations together; their error bar.
 _LARGE = {"solve": (9.7, 1.1), "bar": (0.48, 0.8)}
-# Bodies of so many times the curvature of a ball of their volume have folds, whose elements cross at first; a liver has
-# 1.8, a folded brain 7, those on which meshing was timed 9 to 31.
+# A body with _FOLDED times the curvature of a ball of its volume counts as folded: its surface mesh intersects itself
+# at first. A liver has 1.8, a folded brain 7; the bodies of this factor's timing had 9 to 31.
 _FOLDED, _OF_BALL = 5.0, 15.6
-# So many times as much: mixed elements, the search for what touches, several materials; meshes of curved bodies
-# and of folded ones; the proof of an accuracy.
+# Factors on the time: mixed elements, search for the contact area, several materials, proof of an accuracy; meshes of
+# curved and folded bodies.
 _MIXED, _SEARCH, _LAYERED, _PROOF = 1.4, 2.7, 1.8, 1.6
 _MESHED = {"curved": 2.5, "folded": 18.0}
 _MERIDIAN, _MERIDIAN_BYTES = 0.27, 3.8e8
-# And one whose contact is to be found: so many times that.
+# A meridian with contact to find takes _TRIALS times as long.
 _FOUND, _TRIALS = "meridian contact", 1.7
-# Share of the meshes that miss the accuracy they were chosen for: 5 of 60 scenes, 9 of 48 blades that slice.
+# Share of first meshes whose error bar exceeds the accuracy: 5 of 60 scenes, 9 of 48 slicing blades.
 _MISSED, _MISSED_BY_SEVERAL = 0.08, 0.19
-# How fast iterations grow on the way to incompressible.
+# Exponent of 1 - 2ν: growth of the iterations towards incompressibility.
 _LOCKING = -0.35
-# What another movement of the probe adds, in units of the first.
+# Time of each further movement of the probe, in units of the first.
 _MOVEMENT = 1.0
-# Observations that weigh as much as the law above, for its factor and for its exponents.
+# Weight of the prior in observations: for the factor, and for both exponents.
 _WEIGHT = (0.5, 5.0, 5.0)
 
 _Numbers = tuple[float, float, float]
@@ -50,7 +50,7 @@ _Numbers = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Observation:
-    """What one case took (s), by stage, and what was known of it before: see :func:`features`."""
+    """Times (s) of one case by stage, with its :func:`features`."""
 
     kind: str
     cells: float
@@ -60,7 +60,7 @@ class Observation:
 
 @dataclass(frozen=True)
 class StepEstimate:
-    """What a mesh step will take: elements of the part that is modelled, seconds on one rank, bytes."""
+    """Estimate of a mesh step: elements of the modelled part, seconds on one rank, bytes."""
 
     kind: str  # mesh | meridian
     solves: int
@@ -73,7 +73,7 @@ class StepEstimate:
 
 @dataclass(frozen=True)
 class CostModel:
-    """The fitted laws, on how many observations, and by what factor they are typically wrong."""
+    """The fitted laws, the number of observations, and the typical factor of their error."""
 
     laws: Mapping[tuple[str, str], _Numbers] = field(default_factory=dict)
     count: int = 0
@@ -85,7 +85,7 @@ class CostModel:
         return exp(sum(a * b for a, b in zip(law, _row(cells, poisson), strict=True)))
 
     def step(self, step: MeshStep) -> StepEstimate:
-        """Estimate one mesh step: its mesh, its assemblies, its solves with their error bars."""
+        """Return the estimate of a mesh step: mesh, assemblies, solves and error bars."""
         title = step.solves[0].label
         if len(step.solves) > 1:
             title += f" and {len(step.solves) - 1} more"
@@ -103,7 +103,7 @@ class CostModel:
         return StepEstimate("mesh", len(step.solves), len(step.operators), cells, seconds, memory, title)
 
     def _further(self, solve: Solve) -> float:
-        """Return the seconds to expect of the meshes tried where the first one misses the accuracy asked for."""
+        """Return the expected seconds of further meshes, in case the first one's error bar exceeds the accuracy."""
         seconds, likely = 0.0, 1.0
         while solve.goal is not None and solve.later:
             solve, likely = solve.again(), likely * (_MISSED if solve.case.movements == 1 else _MISSED_BY_SEVERAL)
@@ -113,13 +113,13 @@ class CostModel:
 
 
 def _size(solve: Solve) -> Hashable:
-    """Return what tells apart, of the solves on one mesh, those that take other amounts of memory."""
+    """Return what the memory of a solve depends on, among solves on one mesh."""
     case = solve.case
     return case.element, case.mesh.degree, case.material.law, case.solve.method, solve.reduced
 
 
 def _memory(solve: Solve) -> float:
-    """Return the bytes of a solve with its bar, which of a timed one is found apart, by symmetry."""
+    """Return the bytes of a solve with its error bar; a timed case computes the bar separately, by symmetry."""
     apart = solve.case.solve.timing and solve.goal is None
     planes = model_planes(solve.case) if apart else solve.mirrors
     share, of_bar = 0.5 ** len(solve.mirrors), 0.5 ** len(planes)
@@ -127,10 +127,9 @@ def _memory(solve: Solve) -> float:
 
 
 def features(solve: Solve) -> tuple[str, float, float]:
-    """Return what a solve's cost depends on: its kind, the tetrahedra (estimated) of the part modelled, ν.
+    """Return the inputs of the cost model for a solve: its kind, the estimated tetrahedra of the modelled part, ν.
 
-    A kind is the element, its degree, the number of movements if there are several, whether contact is found,
-    whether there are several materials, and whether the body is curved, or folded.
+    The kind names element, degree, several movements, found contact, several materials, and a curved or folded body.
     """
     case = solve.case
     if solve.axisymmetric:
@@ -146,12 +145,12 @@ def features(solve: Solve) -> tuple[str, float, float]:
 
 
 def speed_up(ranks: int) -> float:
-    """Return how many times faster ``ranks`` ranks are than one, on one solve."""
+    """Return the speed-up of one solve on ``ranks`` ranks."""
     return ranks**_PARALLEL
 
 
 def fit(observations: Iterable[Observation]) -> CostModel:
-    """Return the model that fits ``observations``; its error is that of each from the others (leave one out)."""
+    """Return the model fitted to ``observations``; its error is that of leave-one-out prediction."""
     laws, wrong, count = dict[tuple[str, str], _Numbers](), list[float](), 0
     groups: dict[tuple[str, str], list[tuple[_Numbers, float]]] = {}
     for seen in observations:
@@ -167,7 +166,7 @@ def fit(observations: Iterable[Observation]) -> CostModel:
 
 
 def _ridge(prior: _Numbers, found: list[tuple[_Numbers, float]]) -> tuple[_Numbers, list[float]]:
-    """Return the law that fits rows and logarithms, and how far each is from the law of the others (leave one out)."""
+    """Return the law fitted to rows and logarithms, and the leave-one-out residuals."""
     import numpy as np  # noqa: PLC0415 (most commands have nothing to fit)
 
     rows, logs = np.array([row for row, _ in found]), np.array([value for _, value in found])
@@ -183,7 +182,7 @@ def _row(cells: float, poisson: float) -> _Numbers:
 
 
 def _poisson(case: Case) -> float:
-    """Return ν, as far as the cost depends on it: that of the mixed element does not."""
+    """Return ν for the cost model; the cost of mixed elements does not depend on it."""
     return 0.3 if case.element == "mixed" else case.poisson
 
 
@@ -194,7 +193,7 @@ def _prior(stage: str, kind: str) -> _Numbers:
     if stage == "mesh":
         seconds, power = _MESH
         return log(seconds * _MESHED.get(words[-1] if words else "", 1.0)), power, 0.0
-    if element not in ("displacement", "mixed"):  # the name of a law of large displacements
+    if element not in ("displacement", "mixed"):  # the name of a hyperelastic law
         seconds, power = _LARGE[stage]
         return log(seconds), power, _LOCKING
     seconds, power = (_SOLVE if stage == "solve" else _BAR)[int(degree)]

@@ -1,4 +1,4 @@
-"""A plan in words and numbers: what is to be done, what is not and why, and what it will take."""
+"""A plan in words and numbers: work to do, work struck out and why, time and memory."""
 
 import heapq
 from collections.abc import Iterable
@@ -15,16 +15,17 @@ from pipeline.shapes.section import in_mm
 from pipeline.study.capabilities import obstacle
 from pipeline.study.sweep import Case
 
-# Depth over half width at which tissue at the edge of a bonded punch folds, and large displacements end; on finer
-# meshes somewhat less.
+# Depth over half width at which tissue folds at the edge of a bonded punch, so that Newton's method stops; somewhat
+# less on finer meshes.
 _FOLDS = 0.3
 _MAY_END = (
-    "A depth that is not reached fails, and tells how far it came. Smaller depths of the same sweep keep their forces."
+    "A case that does not reach its depth fails, and reports the depth that it reached; smaller depths of the same "
+    "sweep keep their forces."
 )
 
 
 def summary(plan: Plan, ranks: int = 1) -> dict[str, Any]:
-    """Return the plan as plain data: ``steps`` in the order in which they begin, with the ranks that each gets."""
+    """Return the plan as plain data: ``steps`` in the order of their start, with the ranks of each."""
     phases = schedule(plan.meshes, ranks, plan.cost, apart=plan.study.solve.timing)
     steps, seconds = [], 0.0
     for phase in phases:
@@ -62,7 +63,7 @@ def summary(plan: Plan, ranks: int = 1) -> dict[str, Any]:
 
 
 def _notes(plan: Plan) -> list[str]:
-    """Return up to which depth large displacements are expected to be computed, and which cases ask for more."""
+    """Return notes on large displacements: the largest depth to expect, and the number of cases beyond it."""
     large = [solve.case for solve in plan.solves if solve.case.material.is_large]
     if not large:
         return []
@@ -76,13 +77,13 @@ def _notes(plan: Plan) -> list[str]:
 
 
 def _unasked(plan: Plan) -> dict[str, float]:
-    """Return how many scenes have no F_exact since nobody has asked for it, and the seconds that it would take."""
+    """Return the number of scenes without F_exact because `solve.exact` is off by default, and its time (s)."""
     steps = mesh_steps(plan.unasked, shared=plan.shared)
     return {"scenes": len(plan.unasked), "seconds": sum(plan.cost.step(step).seconds for step in steps)}
 
 
 def _makespan(costs: Iterable[float], groups: int) -> float:
-    """Return when the last of ``groups`` is done, if each takes the next step when it is free."""
+    """Return the time at which the last of ``groups`` finishes, if each free group takes the next step."""
     busy = [0.0] * groups
     for seconds in costs:
         heapq.heappush(busy, heapq.heappop(busy) + seconds)
@@ -90,7 +91,7 @@ def _makespan(costs: Iterable[float], groups: int) -> float:
 
 
 def story(plan: Plan, index: tuple[int, ...]) -> dict[str, Any]:
-    """Return what is to be known of one case: its steps, with whom it shares them, and what a change would cost."""
+    """Return one case's steps, the cases that share them, and the cost of changing each input."""
     position = next(i for i, case in enumerate(plan.study.cases()) if case.index == index)
     case, key = plan.study.case(index), plan.keys[position]
     if case.lost_contact:
@@ -113,12 +114,12 @@ def story(plan: Plan, index: tuple[int, ...]) -> dict[str, Any]:
 
 
 def _changes(plan: Plan, case: Case, solve: Solve | None) -> dict[str, str]:
-    """Return what a change of each input would cost, with the reductions that this plan was made by."""
+    """Return the cost of changing each input, with this plan's reductions."""
     all_of_it = "mesh, assembly and solve"
     shares = plan.shared and not (solve and solve.axisymmetric)
     material = "one solve, on the same mesh and assembly" if shares else all_of_it
     contact = "one assembly and one solve, on the same mesh" if shares else all_of_it
-    # What is known of contact: where none of it is, it cannot be another, and each depth has a mesh of its own.
+    # If the contact area is to be found, probe.contact has no alternative, and each depth has its own mesh.
     is_found = not case.probe.has_singular_edge
     deeper = {"depth": all_of_it if is_found else contact} if case.probe.is_unilateral else {}
     if depth_key(case) and "scaling" in plan.used:
@@ -140,7 +141,7 @@ def _changes(plan: Plan, case: Case, solve: Solve | None) -> dict[str, str]:
 def _steps(plan: Plan, solve: Solve, step: MeshStep | None) -> list[str]:
     if solve.axisymmetric:
         if solve.case.probe.is_unilateral:
-            return ["meridian: a few meshes and direct solves in two dimensions until the area of contact is found"]
+            return ["meridian: a few meshes and direct solves in two dimensions, until the contact radius is found"]
         return ["meridian: mesh, assembly and direct solve in two dimensions"]
     part = {0: "whole body", 1: "half of the body", 2: "quarter of the body"}[len(solve.mirrors)]
     shared = f", shared by {len(step.solves)} solves" if step and len(step.solves) > 1 else ""
@@ -154,5 +155,5 @@ def _solving(plan: Plan, solve: Solve, step: MeshStep | None) -> list[str]:
         return [plain]
     depths = max(len(sweep) for sweep in operator.sweeps if solve in sweep)
     if plan.condensed and operator.is_condensed:
-        return [f"operator and, on a small body, a surface condensed for {depths} depths: a dense solve, and its bar"]
-    return [f"{plain}, begun from the neighbours of {depths} depths" if plan.reuse and depths > 1 else plain]
+        return [f"operator, condensed to the contact surface for {depths} depths if the body is small: a dense solve"]
+    return [f"{plain}, with an initial guess from {depths} depths" if plan.reuse and depths > 1 else plain]

@@ -1,7 +1,7 @@
-"""Places that are images of each other on one body: mirrored in its planes, or turned about its axis.
+"""Equivalent places: images of each other on one body, by reflection in its planes or rotation about its axis.
 
-The force on one is the image of the force on the other. A column, or a half ball that a half-space closes, is its own
-image anywhere on flat tissue, as long as it keeps clear of the sides: the whole body is not.
+The force at one place is the image of the force at the other. A column, or a half ball with the far field of a
+half-space, is the same anywhere on flat tissue away from the sides, although the whole body is not.
 """
 
 from collections.abc import Iterator
@@ -18,22 +18,22 @@ from pipeline.shapes.frame import Vector
 from pipeline.study.capabilities import obstacle
 from pipeline.study.sweep import Case
 
-# Places that differ by less than this, in units of the body, are the same; so are directions.
+# Digits to which places, in units of the body's size, and directions are compared.
 _DIGITS = 9
 _SAME = 1e-9
-# What keys have in the place of a place.
+# Keys of equivalent places contain this place instead of their own.
 NOWHERE = (0.0, 0.0)
 
-# Three by three, by rows.
+# A 3 × 3 matrix by rows.
 Matrix = tuple[Vector, Vector, Vector]
 _UNITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
 class EquivalentPlace:
-    """The index of the case that is solved instead, and the matrix (3, 3), by rows, that takes its vectors here.
+    """The index of the case that is solved instead, and the matrix (3, 3), by rows, from its vectors to this case's.
 
-    ``of_scene`` says that the whole body is the other's image, too, and not only what the mesh keeps of it.
+    ``of_scene``: the whole body is the other's image, not only the part that is meshed.
     """
 
     of: tuple[int, ...]
@@ -46,16 +46,16 @@ class EquivalentPlace:
         return x, y, z
 
     def bars(self, values: tuple[float, float, float]) -> tuple[float, float, float]:
-        """Return the bars on the components of the image: what all that a component is made of may be off by."""
+        """Return the error bars of the image's components: for each, the sum over its contributions."""
         x, y, z = (sum(abs(t) * v for t, v in zip(row, values, strict=True) if abs(t) > _SAME) for row in self.rows)
         return x, y, z
 
 
 def image_key(case: Case, scaled: bool) -> tuple[str, Matrix] | None:
-    """Return a key that images have in common, and the matrix (3, 3) that takes the case to where they are compared.
+    """Return a key that all images share, and the matrix (3, 3) from the case to their common frame.
 
-    ``scaled`` leaves out what F is proportional to. None where no images are looked for: on bodies without symmetry,
-    of tools whose stiffness is asked for, and where loads act, which tell one side from the other.
+    ``scaled`` leaves out the inputs that F is proportional to. The result is None for bodies without symmetry, for
+    ``motion = "all"``, and with loads, which distinguish the sides.
     """
     if obstacle("images", case):
         return None
@@ -70,10 +70,10 @@ def image_key(case: Case, scaled: bool) -> tuple[str, Matrix] | None:
 
 
 def moved_key(case: Case, scaled: bool) -> tuple[str, Matrix] | None:
-    """Return a key that all places have in common where what is kept of the body is the same, None where it is not.
+    """Return a key that is the same for all places with the same part of the body, None if there are none.
 
-    That is a column in level layers, or a half ball closed by a half-space, clear of the sides. Not where inclusions
-    or loads are, and not one that the body's own far field closes, which knows where it stands.
+    It exists for a column in horizontal layers, and for a half ball with a half-space's far field, away from the sides.
+    There is none with inclusions or loads, or with the body's own far field, which depends on the place.
     """
     body, frame = case.body, case.frame
     if not case.is_truncated or not isinstance(body, Layered) or obstacle("equivalent places", case):
@@ -85,7 +85,7 @@ def moved_key(case: Case, scaled: bool) -> tuple[str, Matrix] | None:
 
 
 def _compared(case: Case) -> Iterator[tuple[tuple[float, ...], Matrix]]:
-    """Yield every image of a case's place, as numbers, with the matrix that takes the case there."""
+    """Yield each image of a case's place, as numbers, with the matrix from the case to the image."""
     probe, frame, extent = case.probe, case.frame, case.body.extent
     along = (0.0, 0.0, 0.0) if probe.is_round else frame.along
     turn, planes = _UNITY, body_planes(case.body)
@@ -97,7 +97,7 @@ def _compared(case: Case) -> Iterator[tuple[tuple[float, ...], Matrix]]:
         planes = ("y",)
     if not planes:
         return
-    # A mirror turns a tool's length and breadth into a left hand: they must be their own image.
+    # A reflection reverses the tool's handedness, so the tool must be its own mirror image.
     signs = [(-1.0, 1.0) if plane in planes and probe.is_mirrored(0.0, 1.0) else (1.0,) for plane in ("x", "y")]
     is_pushed = case.travel == tuple(probe.depth * c for c in frame.axis) and probe.slit is None
     turns_round = is_pushed and probe.is_mirrored(1.0, 0.0) and probe.is_mirrored(0.0, 1.0)
@@ -111,7 +111,7 @@ def _compared(case: Case) -> Iterator[tuple[tuple[float, ...], Matrix]]:
 
 
 def from_place(there: Matrix, here: Matrix) -> Matrix:
-    """Return the matrix that takes vectors of one place to another: each with its own to where they are compared."""
+    """Return the matrix from vectors at ``there`` to vectors at ``here``; both are matrices to a common frame."""
     x, y, z = zip(*there, strict=True)
     first, second, third = (_times((x, y, z), column) for column in zip(*here, strict=True))
     return first, second, third

@@ -1,15 +1,14 @@
-"""What a case will need, before it is begun: tetrahedra, and memory."""
+"""Estimates before a case starts: number of tetrahedra, and memory."""
 
 from math import inf, log, pi
 
 from pipeline.shapes.indenter import Indenter
 from pipeline.study.sweep import Case
 
-# Volume of gmsh's mean tetrahedron in units of the cube of the size asked for: measured, docs/performance.md.
+# Mean volume of gmsh's tetrahedra, in units of the cube of the element size: measured, docs/performance.md.
 _TETRAHEDRON = 0.21
-# Bytes for each dof at the peak of a solve, degree by degree, of elements or of a law of large displacements:
-# multigrid, whose operators are products or, for large displacements, matrices, and what conjugate residuals keep;
-# for an error bar, where a tenth is enough, little; the factor of a system of 50,000 dofs. Measured: docs/solvers.md.
+# Peak bytes per dof by degree: of a multigrid solve with displacement or mixed elements, or at large displacements; of
+# an error bar, which needs little accuracy; of a factorisation with 50,000 dofs. Measured: docs/solvers.md.
 _BYTES_PER_DOF = {
     "displacement": {1: 3000, 2: 700, 3: 420, 4: 420},
     "mixed": {2: 1450, 3: 1200, 4: 1200},
@@ -17,35 +16,35 @@ _BYTES_PER_DOF = {
 }
 _OF_BAR = {"displacement": {2: 700, 3: 420, 4: 420}, "mixed": {3: 850, 4: 850}, "large": {2: 600, 3: 600, 4: 600}}
 _OF_FACTOR = {1: 9000, 2: 9000, 3: 10_000}
-# And what a reduced basis keeps besides: a hierarchy for its bound, and five vectors of each of some eight solutions.
+# Further bytes per dof of a reduced basis: a multigrid hierarchy for its bound, and five vectors for each of some eight
+# solutions.
 _BYTES_OF_BASIS = {1: 1000, 2: 1100, 3: 1800, 4: 2500}
 _BASE = 200e6
-# What a process holds besides once it has meshed and solved, programs and compiled forms; and what every further rank
-# has of its own.
+# Further memory of a process after meshing and solving (libraries, compiled forms), and of each further rank.
 _LOADED, _RANK = 60e6, 180e6
-# Dofs for each tetrahedron on large meshes, three components.
+# Dofs per tetrahedron on large meshes, with three components.
 _DOFS_PER_CELL = {1: 0.55, 2: 4.4, 3: 15.0, 4: 35.0}
-# Bytes gmsh and the arrays take for each tetrahedron while meshing.
+# Bytes per tetrahedron of gmsh and the arrays while meshing.
 _BYTES_PER_CELL = 1000
-# Far elements of a round side, in its radius; tetrahedra on a boundary beyond those of the volume, for each of its
-# triangles; and, for each unit of a surface's curvature over elements of unit size, how many follow it.
+# Curved sides: far element size in units of the radius; additional tetrahedra per boundary triangle; additional
+# tetrahedra per unit of a surface's curvature, for elements of unit size.
 _OF_BEND, _ON_BOUNDARY, _FOLLOW = 0.5, 1.4, 30.0
 _TRIANGLE = 0.43
-# Elements on an inclusion, in its smallest semi-axis, and in a layer, in its thickness (mesh/regions.py); and so many
-# times more than their sizes tell, since faces of elements lie where materials meet.
+# Element sizes on an inclusion, in its smallest semi-axis, and in a layer, in its thickness (mesh/regions.py); factor
+# on their number, because element faces follow the interfaces.
 _ON_INCLUSION, _IN_LAYER, _MEETING = 0.4, 0.5, 1.75
 
 
 def cells(case: Case) -> float:
-    """Estimate the tetrahedra of the case's mesh, within about a factor of two."""
+    """Return the estimated number of tetrahedra of a case, within about a factor of two."""
     mesh, probe, body = case.mesh, case.probe, case.body
     rim, growth, thickness = mesh.rim_size(probe.half_width), mesh.growth, body.thickness(case.frame)
     length, area = probe.rim_size
     # Half discs round the rim: ∫ π s / (rim + growth s)³ ds up to the distance where the size is fine.
     total = length * pi * (1 / rim - 1 / mesh.fine) ** 2 * rim / (2 * growth**2) if rim < mesh.fine else 0.0
-    # Below an area in which contact may end: ∫ 1 / (rim + growth s)³ ds.
+    # Below the area where contact may end: ∫ 1 / (rim + growth s)³ ds.
     total += area / (2 * growth * rim**2)
-    if isinstance(probe, Indenter):  # elements there are small down to the depth of the tool, and beside that
+    if isinstance(probe, Indenter):  # small elements down to the depth of the tool, and beside it
         _, depth = probe.depths
         total += area * depth / rim**3 + length * depth / (growth * rim**2)
     total += _of_bend(case) + _of_regions(case)
@@ -55,7 +54,7 @@ def cells(case: Case) -> float:
     inside = min(2 / 3 * pi * epsilon**3, body.volume)
     if case.is_truncated and not case.is_closed:
         inside = min(inside, pi * mesh.epsilon**2 * thickness)
-        # A column is resolved to half its radius all along.
+        # In a column, elements are at most half its radius.
         total += min(pi * mesh.epsilon**2 * thickness, body.volume) / (mesh.epsilon / 2) ** 3
     total += inside / mesh.fine**3
     if case.is_closed:
@@ -69,7 +68,7 @@ def cells(case: Case) -> float:
 
 
 def _of_bend(case: Case) -> float:
-    """Return what sides that are not plane ask for, in cubes of the size, far from the contact."""
+    """Return the number of elements (as cubes of their size) for curved sides, far from the contact."""
     body, far = case.body, _OF_BEND * case.body.bend
     if case.column < inf or far == inf:
         return 0.0
@@ -78,7 +77,7 @@ def _of_bend(case: Case) -> float:
 
 
 def _of_regions(case: Case) -> float:
-    """Return what layers and inclusions ask for, in cubes of the size."""
+    """Return the number of elements (as cubes of their size) for layers and inclusions."""
     body, growth = case.body, case.mesh.growth
     # Both sides of an inclusion's surface: ∫ 1 / (0.4 least + growth s)³ ds.
     total = sum(
@@ -97,33 +96,33 @@ def _of_regions(case: Case) -> float:
 
 
 def _area(axes: tuple[float, float, float]) -> float:
-    """Return the area (m²) of an ellipsoid to a per cent (K. Thomsen)."""
+    """Return the area (m²) of an ellipsoid, within 1 % (K. Thomsen's formula)."""
     a, b, c = (axis**1.6 for axis in axes)
     return float(4 * pi * ((a * b + a * c + b * c) / 3) ** (1 / 1.6))
 
 
 def dofs(count: float, degree: int) -> float:
-    """Estimate the unknowns on ``count`` tetrahedra."""
+    """Return the estimated number of unknowns on ``count`` tetrahedra."""
     return _DOFS_PER_CELL[degree] * count
 
 
 def solving_memory(dofs: float, degree: int, formulation: str = "displacement", *, direct: bool) -> float:
-    """Estimate the bytes that a solve takes, all ranks together; ``formulation`` is that of its case."""
-    if direct:  # fill of a factorisation in 3D grows like dofs^(4/3); the figure above is for 50,000
+    """Return the estimated bytes of a solve, all ranks together; ``formulation`` is that of its case."""
+    if direct:  # the fill of a 3D factorisation grows like dofs^(4/3); _OF_FACTOR is for 50,000 dofs
         return _BASE + _OF_FACTOR[degree] * (dofs / 50_000) ** (1 / 3) * dofs
     return _BASE + _BYTES_PER_DOF.get(formulation, _BYTES_PER_DOF["large"])[degree] * dofs
 
 
 def enriched_memory(dofs: float, degree: int, formulation: str = "displacement") -> float:
-    """Estimate the bytes that an error bar takes: a solve of one degree more than that of ``dofs`` unknowns."""
+    """Return the estimated bytes of an error bar: a solve of one degree more than that of ``dofs`` unknowns."""
     growth = _DOFS_PER_CELL[degree + 1] / _DOFS_PER_CELL[degree]
     return _BASE + _OF_BAR.get(formulation, _OF_BAR["large"])[degree + 1] * growth * dofs
 
 
 def peak_memory(case: Case, share: float = 1.0, of_bar: float | None = None, *, reduced: bool = False) -> float:
-    """Estimate the bytes that a case takes with its error bar, within a factor of 1.5; see :func:`case_memory`.
+    """Return the estimated bytes of a case with its error bar, within a factor of 1.5; see :func:`case_memory`.
 
-    ``of_bar`` is the part of the body that the bar is found on, if that is another; ``reduced`` cases have a basis.
+    ``of_bar`` is the part of the body for the error bar, if it differs; ``reduced`` cases have a reduced basis.
     """
     degree = case.mesh.degree
     count = dofs((share if of_bar is None else of_bar) * cells(case), degree)
@@ -133,19 +132,19 @@ def peak_memory(case: Case, share: float = 1.0, of_bar: float | None = None, *, 
 
 
 def basis_memory(dofs: float, degree: int) -> float:
-    """Estimate the bytes that a reduced basis takes besides the solves that it is made of and their error bars."""
+    """Return the estimated bytes of a reduced basis, without its solves and their error bars."""
     return _BYTES_OF_BASIS[degree] * dofs
 
 
 def on_ranks(memory: float, ranks: int) -> float:
-    """Estimate the bytes of all ``ranks`` together for what takes ``memory`` on one."""
+    """Return the estimated bytes of all ``ranks`` together, for a task of ``memory`` bytes on one."""
     return memory + (ranks - 1) * _RANK
 
 
 def case_memory(case: Case, share: float = 1.0) -> float:
-    """Estimate the bytes for meshing and solving a case that has no mesh yet, within about a factor of two.
+    """Return the estimated bytes of meshing and solving a case, within about a factor of two.
 
-    ``share`` is the part of the body that is modelled.
+    ``share`` is the modelled part of the body.
     """
     count, degree, direct = share * cells(case), case.mesh.degree, case.solve.method == "direct"
     solving = solving_memory(dofs(count, degree), degree, case.formulation, direct=direct)

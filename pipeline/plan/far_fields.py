@@ -1,4 +1,4 @@
-"""The meshes on which far fields of a body are found: one for a place, or one for many places of a study."""
+"""Meshes for the far field of a body: one for each place, or one for many places of a study."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import replace
@@ -13,15 +13,15 @@ from pipeline.study.closure import FarRegion, room
 from pipeline.study.schema import Mesh
 from pipeline.study.sweep import Case
 
-# Elements along the way to the nearest side or the bottom, and through the thickness, and their growth. Half of them
-# moves F by less than 1e-3.
+# Number of elements to the nearest side or the bottom, and through the thickness; growth. Half as many change F by less
+# than 1e-3.
 _NEAR, _THROUGH, _GROWTH = 4, 3, 0.5
-# Elements through the thickness of a mesh for many places.
+# Number of elements through the thickness, for a mesh of many places.
 _THROUGH_FOR_MANY = 4
 
 
 def far_regions(cases: Collection[Case]) -> dict[Body, FarRegion]:
-    """Return, by body, the region of the places of ``cases`` if one mesh for it has fewer elements than one each."""
+    """Return, by body, the region of all places of ``cases``, if one mesh for it has fewer elements than one each."""
     places: dict[Body, dict[tuple[float, ...], Case]] = {}
     for case in cases:
         if case.has_own_far_field:
@@ -31,8 +31,8 @@ def far_regions(cases: Collection[Case]) -> dict[Body, FarRegion]:
 
 
 def far_mesh(case: Case) -> Case:
-    """Return the case on whose mesh the far field of ``case`` is found; its probe only marks fine elements."""
-    shapes: Mapping[str, Any] = PROBES  # loaded when asked for
+    """Return the case whose mesh is for the far field of ``case``; its probe only marks fine elements."""
+    shapes: Mapping[str, Any] = PROBES  # loaded on access
     if (region := case.far_region) is None:
         low, high = case.body.heights
         radius = room(case.body, case.probe)

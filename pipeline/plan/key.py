@@ -1,4 +1,4 @@
-"""What a case is, in canonical form: equal cases have equal keys, in every study and on every machine."""
+"""Keys of cases: hashes of their inputs. Equal cases have equal keys, in every study and on every machine."""
 
 import hashlib
 import json
@@ -17,21 +17,21 @@ from pipeline.study.schema import Mesh
 from pipeline.study.sweep import Case
 from pipeline.units import canonical
 
-# Raise by hand when the same input gives another force: records made before are then not used any more.
+# Raise by hand when the same input gives another force: earlier records are then no longer used.
 PHYSICS_VERSION = 6
 
-# Keys of a probe that no force depends on: what a blade does, its slice and its incision say.
+# Keys of a probe without effect on any force: action is a label.
 _UNPHYSICAL = ("action",)
 _MANY = 200_000  # sections of a large study
-# What a body may hold of other materials.
+# Keys of a body's other materials.
 _PIECES = ("layers", "inclusion")
 
 
 def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
-    """Key of the case's record: all that its force depends on, defaults resolved, in SI units.
+    """Return the key of a case's record: a hash of all inputs of its force, with defaults, in SI units.
 
-    ``folded`` takes every ε past the body for the full order; ``scaled`` leaves out what the force is proportional to.
-    Timed cases are records of their own, each: they are never shared.
+    ``folded`` replaces every ε beyond the body by the full order; ``scaled`` leaves out the inputs that the force is
+    proportional to. Each timed case has a key of its own.
     """
     scaled = scaled and not obstacle("scaling", case)
     parts = [
@@ -51,7 +51,7 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
 
 
 def reference_key(case: Case, accuracy: float) -> str:
-    """Key of F_exact of the case's scene, for E = 1 and depth = 1: of what F / (E d) depends on, no mesh."""
+    """Return the key of F_exact of a case's scene for E = 1 and depth = 1: the inputs of F / (E d), without mesh."""
     probe = case.probe.model_copy(update=_pressed(case.probe))
     ratios = "0.0" if _slides_across_a_mirror(case) else _ratios_text(probe)
     parts = [
@@ -67,24 +67,25 @@ def reference_key(case: Case, accuracy: float) -> str:
 
 
 def mesh_key(case: Case) -> str:
-    """Key of the case's mesh: body, footprint, sizes, and whether elements are straight or curved."""
+    """Return the key of a case's mesh: body, footprint, sizes, and whether elements are straight or curved."""
     sizes = _mesh_text(case.mesh, case.is_full, case.probe.half_width, "")
     footprint = text_of(case.probe, case.probe.not_drawn)
     return digest("\n".join([_body_text(case.body), footprint, sizes, str(case.mesh.degree > 1)]))
 
 
 def operator_key(case: Case) -> str:
-    """Key of the case's spaces and conditions on its mesh: all but the material's moduli, and the depth if contact is
-    found, or if displacements are large.
+    """Return the key of a case's spaces and boundary conditions: all inputs but the moduli.
+
+    The depth is left out, too, if contact is found or displacements are large.
     """
     probe = text_of(case.probe, (*_UNPHYSICAL, "depth") if case.is_followed else _UNPHYSICAL)
     return digest("\n".join([mesh_key(case), probe, str(case.mesh.degree), case.formulation]))
 
 
 def normalised(case: Case) -> Case:
-    """Return the case in the units of its scale, 1 Pa and 1 m, pressed only, no loads: its force is F / (E d).
+    """Return the case for E = 1 and depth = 1, pressed only, without loads: its force is F / (E d).
 
-    Loads that bend the surface on which contact is found stay, and so does the material.
+    If loads bend the surface on which contact is found, loads and material stay as they are.
     """
     travel = _ratios(case.probe)
     if _slides_across_a_mirror(case):
@@ -98,13 +99,13 @@ def normalised(case: Case) -> Case:
 
 
 def _pressed(probe: Probe) -> dict[str, Any]:
-    """Return what changes of a probe that is pressed only, once, and has a mesh of its own."""
+    """Return the changes of a probe's keys for one press, on a mesh of its own."""
     return {"motion": "press", **dict.fromkeys(probe.SWEPT)}
 
 
 @lru_cache(_MANY)
 def _ratios(probe: Probe) -> dict[str, float]:
-    """Return all that F is proportional to, for a unit of the first of them: how far a blade slices for each depth."""
+    """Return the keys that F is proportional to, per unit of the first one: a blade's slice per depth."""
     values = {key: getattr(probe, key) for key in probe.proportional_to}
     return {key: canonical(value / values[probe.proportional_to[0]]) for key, value in values.items()}
 
@@ -122,13 +123,13 @@ def _in_units_of(stress: float, body: Body) -> Body:
 
 @lru_cache(_MANY)
 def _body_text(body: Body, stress: float | None = None) -> str:
-    """Write a body in canonical form, moduli in units of ``stress`` (Pa); without it, its geometry alone."""
+    """Return a body in canonical form, moduli in units of ``stress`` (Pa); without it, only the geometry."""
     if not body.regions:
         return text_of(body)
     content = (body if stress is None else _in_units_of(stress, body)).model_dump()
     ends = (*body.interfaces, body.heights[0])
     for number, layer in enumerate(content.get("layers", ())):
-        layer["thickness"] = ends[number]  # where it ends: one way to say it
+        layer["thickness"] = ends[number]  # its lower end, so that equal layers have equal texts
     for inclusion, ball in zip(content["inclusion"], body.inclusion, strict=True):
         inclusion.update(axes=ball.surface.axes, radius=None)
     for piece in (piece for key in _PIECES for piece in content.get(key, ())):
@@ -140,7 +141,7 @@ def _body_text(body: Body, stress: float | None = None) -> str:
 
 @lru_cache(_MANY)
 def _load_text(load: Load, densities: tuple[float | None, ...]) -> str:
-    """Write loads in canonical form, with the densities if there is gravity."""
+    """Return loads in canonical form, with the densities if there is gravity."""
     content = load.model_dump()
     return _text({**content, "densities": densities if any(load.gravity) else ()})
 
@@ -157,13 +158,13 @@ def digest(text: str) -> str:
 
 @lru_cache(_MANY)
 def text_of(section: Section, without: tuple[str, ...] = ()) -> str:
-    """Write a section in canonical form, ``without`` some of its keys."""
+    """Return a section in canonical form, ``without`` some of its keys."""
     return _text({key: value for key, value in section.model_dump().items() if key not in without})
 
 
 def _mesh_text(mesh: Mesh, is_full: bool, half_width: float, element: str) -> str:
-    """Write a mesh section in canonical form; without an ``element``, what the mesh itself depends on."""
-    # Sections are equal whether a value is a default or was given, and of an accuracy what was given is kept.
+    """Return a mesh section in canonical form; without an ``element``, only the inputs of the mesh itself."""
+    # Equal sections may differ in which keys the file gives; beside an accuracy the given keys count.
     return _written(mesh, frozenset(mesh.model_fields_set - {"name"}), is_full, half_width, element)
 
 
@@ -172,7 +173,7 @@ def _written(mesh: Mesh, given_keys: frozenset[str], is_full: bool, half_width: 
     content: dict[str, Any]
     if mesh.accuracy is not None:
         given = {key: getattr(mesh, key) for key in given_keys}
-        if is_full or mesh.outside == "coarse":  # what is meshed finely is then chosen
+        if is_full or mesh.outside == "coarse":  # the program then chooses ε
             given = {key: value for key, value in given.items() if key not in ("epsilon", "outside")}
         content = {**given, "accuracy": mesh.accuracy, "model": mesh.model}
     else:
@@ -186,7 +187,7 @@ def _written(mesh: Mesh, given_keys: frozenset[str], is_full: bool, half_width: 
 
 
 def _slides_across_a_mirror(case: Case) -> bool:
-    """Where a blade moves across a plane of symmetry, that movement takes no force along the axis."""
+    """Return whether a blade moves across a plane of symmetry: that movement has no force along the axis."""
     pressed = replace(case, probe=case.probe.model_copy(update={"motion": "press"}))
     return mirror_planes(case) != movement_planes(pressed)
 

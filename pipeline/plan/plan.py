@@ -1,4 +1,4 @@
-"""The plan of a study: which steps yield its cases, and what was struck out, by which reduction, and why."""
+"""The plan of a study: the steps that compute its cases, and what each reduction struck out, and why."""
 
 from collections.abc import Collection
 from dataclasses import replace
@@ -16,18 +16,16 @@ from pipeline.study.sweep import Case, Study
 
 __all__ = ["EXACT", "Plan", "Struck", "ask_for_exact", "declare", "first_attempts", "make_plan"]
 
-# F_exact is to have errors well below the study's: this relative error, or this share of what a study asks for.
+# Relative error of F_exact, or its share of the study's accuracy: well below the errors of the study.
 EXACT, _EXACT_SHARE = 1e-3, 0.3
-# Three times the cells, and ten times the time, is what a thousandth takes at the many edges of a slit.
+# A slit has many edges: an error of 1e-3 would need three times the cells and ten times the time.
 EXACT_OF_SLIT = 3e-3
-_NO_EXACT = (
-    "F_exact of large displacements is not computed: what their elements converge to is known to their bars only."
-)
-_LOST = "Where the tool does not stand on the body, nothing is solved."
+_NO_EXACT = "F_exact is not computed at large displacements: no solve there is more accurate than the error bars."
+_LOST = "Places where the tool does not touch the body need no solve."
 
 
 def declare(study: Study) -> Plan:
-    """Return the plan that solves every case of ``study`` for itself."""
+    """Return the plan that solves every case of ``study`` by itself."""
     found = [None if case.lost_contact else _declared(case) for case in study.cases()]
     keys = tuple(solve.key if solve else NO_RECORD for solve in found)
     plan = Plan(study, tuple(solve for solve in found if solve), keys)
@@ -41,18 +39,18 @@ def _declared(case: Case) -> Solve:
 def make_plan(
     study: Study, stored: Collection[str] = (), without: Collection[str] = (), shard: Shard | None = None
 ) -> Plan:
-    """Return the plan of ``study`` with everything avoidable struck out; ``stored`` are the keys on record.
+    """Return the plan of ``study`` after all reductions; ``stored`` are the keys of stored records.
 
-    ``without`` names reductions to leave out, besides those that the study itself leaves out; "all" is all of them. A
-    timing study strikes nothing: each of its cases runs afresh and alone. A ``shard`` takes its part of what the study
-    needs before what is stored is struck out, so that all of them deal alike.
+    ``without`` names reductions not to use, besides those of the study; "all" is all of them. A timing study uses none:
+    each case is computed alone. ``shard`` selects a part before stored cases are struck out, so that all shards split
+    the study in the same way.
 
     Raises:
-        ValueError: if ``without`` holds an unknown name.
+        ValueError: if ``without`` has an unknown name.
     """
     left_out = {*without, *study.planning.without}
     if unknown := left_out - {*REDUCTIONS, "stored", "all"}:
-        raise ValueError(f"no reduction is called {', '.join(sorted(unknown))}; there are {', '.join(REDUCTIONS)}")
+        raise ValueError(f"unknown reduction {', '.join(sorted(unknown))}; there are {', '.join(REDUCTIONS)}")
     plan = declare(study)
     if not study.solve.timing and "all" not in left_out:
         for name, reduction in REDUCTIONS.items():
@@ -66,7 +64,7 @@ def make_plan(
 
 
 def first_attempts(plan: Plan) -> Plan:
-    """Return the plan in which every goal has its first mesh, and the others in reserve."""
+    """Return the plan in which every solve with an accuracy has its first mesh, and further ones to try later."""
     solves = (
         replace(solve, later=rungs_for(solve.case, solve.goal)).again() if solve.goal and not solve.later else solve
         for solve in plan.solves
@@ -75,9 +73,9 @@ def first_attempts(plan: Plan) -> Plan:
 
 
 def ask_for_exact(plan: Plan) -> Plan:
-    """Add F_exact of every scene, once for all meshes, Young's moduli and depths: F is proportional to both.
+    """Add F_exact of every scene, once for all meshes, Young's moduli and depths, which F is proportional to.
 
-    There is none of neo-Hookean bodies, nor beside an accuracy unless `exact = true` asks for it.
+    It is left out at large displacements, and beside `mesh.accuracy` unless the study has `exact = true`.
     """
     plan = first_attempts(plan)
     if not plan.study.solve.exact:

@@ -1,8 +1,8 @@
-"""Which mesh gives the accuracy that was asked for: elements, rim and growth, cheapest first.
+"""The mesh for an accuracy: degree, rim and growth of the elements, cheapest first.
 
-The error of F comes from the probe's edge and from what the elements can follow between there and the support: both
-scale with the probe, hardly with the body. What error bars to expect was measured (docs/accuracy.md); the bar of the
-case itself decides whether its mesh was good enough, or the next one is tried.
+The error of F comes from the singular edge of the probe, and from the elements between it and the support. Both parts
+scale with the probe, hardly with the body. The expected error bars are measured ones (docs/accuracy.md). If a case's
+own error bar exceeds the accuracy, the next mesh is tried.
 """
 
 from dataclasses import dataclass
@@ -20,9 +20,9 @@ from pipeline.study.sweep import Case
 
 @dataclass(frozen=True)
 class Recipe:
-    """``rim`` is in units of the half width of contact, ``bar`` the relative error bar to expect.
+    """Mesh settings: ``rim`` in units of the half width of contact, and ``bar``, the expected relative error bar.
 
-    That is for a disc on a deep body at ν = 0.3; see :func:`_expected` for others.
+    ``bar`` is for a disc on a deep body at ν = 0.3; see :func:`_expected` for others.
     """
 
     degree: int
@@ -33,7 +33,7 @@ class Recipe:
 
 @dataclass(frozen=True)
 class Rung:
-    """The mesh settings that a recipe gives for a case, and the relative error bar to expect of them there."""
+    """Mesh settings of a recipe for one case, with the expected relative error bar."""
 
     mesh: Mesh
     bar: float
@@ -51,8 +51,8 @@ LADDER = (
     Recipe(3, 0.05, 0.35, 1.0e-4),
     Recipe(3, 0.025, 0.3, 5.0e-5),
 )
-# Where the probe's edge rules the error, bars are told well enough for rungs in between. None is of degree 3 with a
-# larger rim: a few quadratic arcs are not quite a circle, and its force is then too low (docs/accuracy.md).
+# If the probe's edge dominates the error, error bars are predictable enough for rungs in between. None has degree 3 and
+# a larger rim: few quadratic arcs approximate a circle poorly, and the force is too low (docs/accuracy.md).
 _BETWEEN = (
     Recipe(2, 0.25, 0.55, 2.6e-3),
     Recipe(3, 0.25, 0.55, 7.0e-4),
@@ -60,8 +60,8 @@ _BETWEEN = (
     Recipe(3, 0.07, 0.37, 1.4e-4),
 )
 _EVEN = tuple(sorted((*LADDER, *_BETWEEN), key=lambda recipe: -recipe.bar))
-# Beside a round surface elements of degree 2 on smaller cells have a narrower bar in the time of the first rung of
-# degree 3 (docs/decisions.md).
+# On a curved surface, smaller elements of degree 2 have a smaller error bar than the first rung of degree 3, in the
+# same time (docs/decisions.md).
 _ROUND = (
     *LADDER[:4],
     Recipe(2, 0.15, 0.35, 1.15e-3),
@@ -69,8 +69,8 @@ _ROUND = (
     Recipe(2, 0.07, 0.25, 6.0e-4),
     *LADDER[5:],
 )
-# Where contact is unilateral elements are of degree 2. Of tools that find where it ends (`contact_width`), the pressure
-# below them asks for small elements as much as its edge.
+# Unilateral contact uses degree 2. For tools whose contact width is found, the pressure below them needs small elements
+# as much as the edge of contact.
 _FLAT = (*LADDER[:4], Recipe(2, 0.1, 0.4, 9.0e-4), Recipe(2, 0.05, 0.35, 4.5e-4), Recipe(2, 0.025, 0.3, 2.3e-4))
 _FOUND = (
     Recipe(2, 0.4, 0.6, 1.1e-2),
@@ -82,32 +82,32 @@ _FOUND = (
     Recipe(2, 0.08, 0.17, 2.8e-4),
     Recipe(2, 0.06, 0.14, 1.8e-4),
 )
-# Bars grow by 1 + 10 a/H with the half width a of the probe and the thickness H of the body, as far as was measured.
+# Error bars grow by 1 + 10 a/H with the probe's half width a over the body's thickness H, measured up to _THINNEST.
 _THICKNESS, _THINNEST = 10.0, 0.15
-# Those of the mixed element over those of the displacement element at ν = 0.3, by degree: where the probe's edge rules
-# them, and otherwise.
+# Error bars of mixed elements, in units of those of displacement elements at ν = 0.3, by degree: if the probe's edge
+# dominates, and otherwise.
 _MIXED_EVEN, _MIXED = {2: 1.0, 3: 1.05}, {2: 1.2, 3: 1.05}
-# Those of several movements over those of one, of mixed elements.
+# Error bars of mixed elements with several movements, in units of those with one.
 _SEVERAL = 1.15
-# And those of bodies of several materials, with a curved surface, or of plates, by element (solve/estimate.py).
+# Factor for several materials, curved surfaces, and plates, by element (solve/estimate.py).
 _ELSEWHERE = {"displacement": 1.6, "mixed": 2.6}
-# Bars of displacement elements grow like (1 - 2 ν)^-0.35 on the way to locking; measured from ν = 0.3 to 0.49.
+# Error bars of displacement elements grow like (1 - 2 ν)^-0.35 (locking), measured from ν = 0.3 to 0.49.
 _LOCKING = 0.35
-# The bar on the force along the axis grows by this share of the slide over the depth, where both movements mix.
+# The error bar of the axial force grows by this factor times slide over depth, if both movements couple.
 _SLIDE = 0.8
-# A bar is expected to be met if the mesh should give this share of it. One that misses is followed by one that should
-# have a bar smaller by this factor at least: rungs in between are to begin with.
+# A mesh is chosen if its expected error bar is below MARGIN times the accuracy. If its error bar exceeds the accuracy,
+# the next one's expected bar is smaller by _STEP at least; rungs in between only serve as first meshes.
 MARGIN, _STEP = 0.9, 1.4
-# Elements between the probe's edge and a held face beside it.
+# Number of elements between the probe's edge and a fixed face.
 _ACROSS_GAP = 3
-# Elements through the thickness of a layer, near the probe.
+# Number of elements through the thickness near the probe.
 _THROUGH = 2
 
 
 def rungs_for(case: Case, accuracy: float) -> tuple[Rung, ...]:
     """Return the meshes to try, in turn, for a relative error of F below ``accuracy``.
 
-    What the study file gives of rim, growth, degree and sizes is kept.
+    Values that the study gives for rim, growth, degree and sizes stay.
     """
     ladder = _ladder(case)
     expected = [_expected(case, recipe) for recipe in ladder]
@@ -135,12 +135,12 @@ def _ladder(case: Case) -> tuple[Recipe, ...]:
 
 
 def half_width_of(case: Case) -> float:
-    """Return the half width (m) of contact, as far as it is known."""
+    """Return the half width (m) of contact, estimated if contact is found."""
     return case.probe.contact_width if isinstance(case.probe, Indenter) else case.probe.half_width
 
 
 def _expected(case: Case, recipe: Recipe) -> float:
-    """Return the error bar to expect of a recipe."""
+    """Return the expected relative error bar of a recipe for a case."""
     shape = case.probe.EXPECTED_ERROR
     if mirror_planes(case) == movement_planes(case):
         shape *= 1 + _SLIDE * _slide(case)
@@ -157,10 +157,10 @@ def _expected(case: Case, recipe: Recipe) -> float:
 
 
 def _near(case: Case) -> float:
-    """Return the share of the compliance that is near the probe, of whose energy the error is one.
+    """Return the share of the compliance near the probe, where the error arises.
 
-    The rest is of a slender body that is held at its bottom alone: as much of it as lies deeper than it is wide is a
-    column, and gives way in series with what a half-space would near a disc.
+    A slender body fixed at its bottom is a half-space near a disc, in series with a column: the part that is deeper
+    than the body is wide.
     """
     body = case.body
     if not isinstance(body, Layered) or body.fixed != "bottom" or case.is_truncated:
@@ -172,7 +172,7 @@ def _near(case: Case) -> float:
 
 
 def _slide(case: Case) -> float:
-    """Return how far the probe moves across its axis for each unit of depth."""
+    """Return the probe's movement across its axis, per unit of depth."""
     across = [t - case.probe.depth * a for t, a in zip(case.travel, case.frame.axis, strict=True)]
     return hypot(*across) / case.probe.depth
 

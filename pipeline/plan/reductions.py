@@ -1,4 +1,4 @@
-"""What is not done: each reduction is a function from plan to plan whose docstring is the reason that users read."""
+"""Reductions: functions from plan to plan that strike out work. Users read their docstrings as the reasons."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -16,27 +16,27 @@ from pipeline.study.capabilities import obstacle
 from pipeline.study.closure import FarRegion
 from pipeline.study.sweep import Case
 
-# Fewer Poisson's ratios than this are solved one by one: a basis needs about five solutions itself.
+# With fewer Poisson's ratios, each is solved: a reduced basis needs about five solutions itself.
 _FEWEST_RATIOS = 8
 _LONE_DEPTHS = (
-    "No start from neighbouring depths: each depth of this tool has a mesh of its own; probe.depth_range makes it one "
-    "for all."
+    "No initial guess from other depths: each depth of this tool has its own mesh. With probe.depth_range all depths "
+    "share one mesh."
 )
 
 
 def strike_past_body(plan: Plan) -> Plan:
-    """An ε that reaches past the body is the full order, whatever becomes of the outside."""
+    """If ε extends beyond the body, the case is the full order, for every `outside`."""
     return _rekeyed(plan, "full", strike_past_body, lambda case: case_key(case, folded=True))
 
 
 def strike_duplicates(plan: Plan) -> Plan:
-    """The same case twice is solved once."""
+    """Equal cases are solved once."""
     return _merged(plan, "duplicates", reason_of(strike_duplicates))
 
 
 def strike_scaled(plan: Plan) -> Plan:
-    """F is proportional to Young's modulus and, unless contact grows with it, displacements are large or the tool is in
-    a slit, to the depth: cases that differ in them only are solved once.
+    """F is proportional to Young's modulus, and to the depth if the contact area is constant, displacements are small
+    and the tool is not in a slit: cases that differ only in these are solved once.
     """
     first: dict[str, Case] = {}
     deeper: dict[tuple[int, ...], ProportionalDepth] = {}
@@ -46,7 +46,7 @@ def strike_scaled(plan: Plan) -> Plan:
             deeper |= dict.fromkeys(solve.serves, proportional_to_depth(solve.case, other))
 
     def key(case: Case) -> str:
-        # Records are those of a depth: which one is solved for the others is the study's order.
+        # A record belongs to one depth: the study's first one is solved for the others.
         text = depth_key(case)
         return case_key(first[text] if text else case, folded=True, scaled=True)
 
@@ -54,12 +54,12 @@ def strike_scaled(plan: Plan) -> Plan:
 
 
 def strike_images(plan: Plan) -> Plan:
-    """Places that are each other's image, mirrored or turned about the body's axis, are solved once."""
+    """Places that are images of each other, by reflection or rotation of the body, are solved once."""
     return _struck_places(plan, "images", strike_images, image_key, of_scene=True)
 
 
 def strike_moved(plan: Plan) -> Plan:
-    """A column, or a half ball that a half-space closes, is the same anywhere on flat tissue: it is solved once."""
+    """A column, or a half ball in a half-space, is the same anywhere on flat tissue: it is solved once."""
     return _struck_places(plan, "moved", strike_moved, moved_key, of_scene=False)
 
 
@@ -71,9 +71,9 @@ def _struck_places(
     *,
     of_scene: bool,
 ) -> Plan:
-    """Let the first of all solves of which ``key_of`` gives one key, each with the matrix to it, stand for the others.
+    """Solve only the first of all cases with the same ``key_of``, which also returns the matrix to a common frame.
 
-    ``of_scene`` says that the whole body is the other's image, too.
+    ``of_scene``: the whole body is the other's image, too.
     """
     first: dict[str, tuple[Solve, Matrix]] = {}
     places: dict[tuple[int, ...], EquivalentPlace] = {}
@@ -92,13 +92,13 @@ def _struck_places(
 
 
 def _sweeps_places(plan: Plan) -> bool:
-    """Tell whether a tool of the plan's study stands in several places, or in several directions."""
+    """Return whether the study has several places or directions of the tool."""
     found = {(probe.at, probe.axis, getattr(probe, "direction", None)) for probe in plan.study.probes}
     return len(found) > 1
 
 
 def use_axisymmetry(plan: Plan) -> Plan:
-    """A round scene of which the mesh is not the question is solved on its meridian, on a mesh of its own."""
+    """Axisymmetric scenes are solved in two dimensions, on their own mesh, if the study does not compare meshes."""
     if not _asks_for_accuracy_or_truncation(plan):
         return plan
     solves = tuple(map(_on_meridian, plan.solves))
@@ -107,22 +107,22 @@ def use_axisymmetry(plan: Plan) -> Plan:
 
 
 def _on_meridian(solve: Solve) -> Solve:
-    """Return a solve of a round scene on its meridian: another force than that of the mesh asked for, another key."""
+    """Return an axisymmetric solve on its meridian; its force differs from that of the 3D mesh, so does its key."""
     if not is_round(solve.case) or solve.case.mesh.model != "auto":
         return solve
     return replace(solve, axisymmetric=True, key=solve.key if solve.goal else digest(f"{solve.key} axisymmetric"))
 
 
 def use_symmetry(plan: Plan) -> Plan:
-    """Body, support and probe are their own mirror image: half or a quarter of the body is solved."""
+    """Body, support and probe are symmetric: half or a quarter of the body is solved."""
     solves = tuple(_mirrored(solve) for solve in plan.solves)
     count = sum(bool(solve.mirrors) for solve in solves)
     return replace(plan, solves=solves).struck_by("symmetry", count, reason_of(use_symmetry))
 
 
 def share_meshes(plan: Plan) -> Plan:
-    """Cases on the same geometry and sizes share one mesh, and its set-up if they differ in the material only; half
-    balls that the body's own far field closes, in the place, too. The far fields of many places share a mesh as well.
+    """Cases with the same geometry and element sizes share one mesh, and its assembly if they differ only in material.
+    With `outside = "green"`, places share both, and one mesh gives the far fields of many places.
     """
     regions = far_regions([solve.case for solve in plan.solves])
     plan = replace(plan.with_solves([_with_far_region(solve, regions) for solve in plan.solves]), shared=True)
@@ -130,7 +130,7 @@ def share_meshes(plan: Plan) -> Plan:
 
 
 def _with_far_region(solve: Solve, regions: Mapping[Body, FarRegion]) -> Solve:
-    """Return ``solve`` with the far field of a mesh that many places share: another force, hence another key."""
+    """Return ``solve`` with a far field from a mesh of many places; its force differs slightly, so does its key."""
     region = regions.get(solve.case.body) if solve.case.has_own_far_field else None
     if region is None:
         return solve
@@ -139,8 +139,8 @@ def _with_far_region(solve: Solve, regions: Mapping[Body, FarRegion]) -> Solve:
 
 
 def reuse_solutions(plan: Plan) -> Plan:
-    """A solve begins from the solutions for neighbouring Poisson's ratios or places, or, where contact is found or
-    displacements are large, depths.
+    """The initial guess of a solve comes from the solutions for neighbouring Poisson's ratios or places; if contact is
+    found or displacements are large, for neighbouring depths.
     """
     plan = replace(plan, reuse=True)
     operators = [operator for step in plan.meshes for operator in step.operators if not step.axisymmetric]
@@ -151,7 +151,7 @@ def reuse_solutions(plan: Plan) -> Plan:
 
 
 def use_reduced_basis(plan: Plan) -> Plan:
-    """Many Poisson's ratios on one operator: a few are solved, and the rest follow with a bound on the error of F."""
+    """Of many Poisson's ratios a few are solved; a reduced basis gives the others, with a bound on the error of F."""
     if not plan.shared:
         return plan
     operators = [operator for step in plan.meshes for operator in step.operators if _sweeps_ratios(operator)]
@@ -164,7 +164,7 @@ def use_reduced_basis(plan: Plan) -> Plan:
         for solve in operator.solves
     }
     if operators and not many:
-        reason = f"No reduced basis: {obstacles[0]}, and each is solved."
+        reason = f"No reduced basis: {obstacles[0]}; each case is solved."
         return replace(plan, struck=(*plan.struck, Struck("reduced", 0, reason)))
     plan = plan.with_solves(
         [
@@ -176,8 +176,9 @@ def use_reduced_basis(plan: Plan) -> Plan:
 
 
 def _sweeps_ratios(operator: OperatorStep) -> bool:
-    """Tell whether an operator is solved for many materials, with displacement elements, whose operator depends on one
-    parameter, and for one force: the bound is on the work of one movement, not on forces that several take.
+    """Return whether a reduced basis suits an operator: many materials, displacement elements, one force.
+
+    The operator of displacement elements depends on one parameter; the error bound is on the work of one movement.
     """
     solve, case = operator.solves[0], operator.case
     ratios = {solve.key if case.body.regions else solve.case.material.poisson for solve in operator.solves}
@@ -191,8 +192,8 @@ def _sweeps_ratios(operator: OperatorStep) -> bool:
 
 
 def condense_sweeps(plan: Plan) -> Plan:
-    """Ten or more depths of a tool that finds its contact, on one mesh of a small body: what may touch is condensed
-    once, and each depth is solved on that.
+    """Ten or more depths with found contact on one mesh of a small body: the stiffness is condensed once to the possible
+    contact surface, and each depth is solved there.
     """
     if not plan.shared:
         return plan
@@ -203,7 +204,7 @@ def condense_sweeps(plan: Plan) -> Plan:
 
 
 def strike_stored(plan: Plan, stored: frozenset[str]) -> Plan:
-    """A case whose record is stored is read back."""
+    """Stored cases are read, not computed again."""
     if plan.study.solve.timing:
         stored &= frozenset(plan.reference_keys)
     kept = tuple(solve for solve in plan.solves if solve.key not in stored)
@@ -212,7 +213,7 @@ def strike_stored(plan: Plan, stored: frozenset[str]) -> Plan:
     return plan.struck_by("stored", len(found), reason_of(strike_stored))
 
 
-# In the order in which they are applied.
+# In the order of their application.
 REDUCTIONS: dict[str, Callable[[Plan], Plan]] = {
     "duplicates": strike_duplicates,
     "full": strike_past_body,
@@ -229,7 +230,7 @@ REDUCTIONS: dict[str, Callable[[Plan], Plan]] = {
 
 
 def _rekeyed(plan: Plan, name: str, reduction: Callable[[Plan], Plan], key: Callable[..., str]) -> Plan:
-    """Give every solve the key that ``key`` makes of its case, and merge those that then agree."""
+    """Give every solve a new key, and merge solves with equal keys."""
     plan = plan.with_solves([replace(solve, key=key(solve.case)) for solve in plan.solves])
     return _merged(plan, name, reason_of(reduction))
 
@@ -252,12 +253,12 @@ def _mirrored(solve: Solve) -> Solve:
 
 
 def _fresh(operator: OperatorStep) -> int:
-    """Return how many solves of an operator have no neighbour to begin from."""
+    """Return the number of an operator's solves without an initial guess from a neighbour."""
     return len(operator.sweeps) if operator.case.is_followed else 1
 
 
 def _has_lone_depths(operators: list[OperatorStep]) -> bool:
-    """Tell whether solves differ in the depth only, and have meshes of their own for that."""
+    """Return whether solves with different meshes differ only in the depth."""
     seen = set[str]()
     for solve in (solve for operator in operators for solve in operator.solves):
         case, probe = solve.case, solve.case.probe
@@ -270,7 +271,7 @@ def _has_lone_depths(operators: list[OperatorStep]) -> bool:
 
 
 def _is_small(step: MeshStep) -> bool:
-    """Tell whether a body is small enough to be condensed, as far as can be told before it is meshed."""
+    """Return whether a body is estimated to be small enough for condensation."""
     case = step.case
     cells = estimate.cells(case) * 0.5 ** len(step.mirrors)
     return (
@@ -281,7 +282,7 @@ def _is_small(step: MeshStep) -> bool:
 
 
 def _asks_for_accuracy_or_truncation(plan: Plan) -> bool:
-    """Tell whether a study varies scenes and truncation, but not the mesh: sizes, elements, or ε with all outside."""
+    """Return whether a study varies scenes and truncation only: no element sizes, no elements, no ε of a whole body."""
     if any(obstacle("meridian of a comparison", solve.case) for solve in plan.solves):
         return False
     swept = {axis.key for axis in plan.study.axes if axis.section == "mesh"}

@@ -1,4 +1,4 @@
-"""How many ranks each step gets: many small steps side by side, a large one on all ranks."""
+"""Ranks for each step: small steps run side by side, a large one on all ranks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,13 +7,13 @@ from math import inf
 from pipeline.plan.cost import CostModel, StepEstimate, speed_up
 from pipeline.plan.steps import MeshStep
 
-# A rank with fewer tetrahedra than this waits for the others more than it computes.
+# With fewer tetrahedra than this, a rank communicates more than it computes.
 _FEWEST_CELLS = 1_000
 
 
 @dataclass(frozen=True)
 class Phase:
-    """Steps for groups of ``size`` ranks each, which take the next one, the costliest first, when they are free."""
+    """Steps for groups of ``size`` ranks each: a free group takes the next step, the most expensive first."""
 
     size: int
     steps: tuple[MeshStep, ...]
@@ -22,10 +22,10 @@ class Phase:
 def schedule(
     steps: Sequence[MeshStep], ranks: int, cost: CostModel, memory: float = inf, *, apart: bool = False
 ) -> tuple[Phase, ...]:
-    """Share ``steps`` between groups of ``ranks`` ranks, which have ``memory`` bytes together.
+    """Distribute ``steps`` over groups of ``ranks`` ranks, which have ``memory`` bytes together.
 
-    One rank a step wastes least, unless a step takes longer than its fair share of the whole, or more memory than all
-    ranks have for as many steps at a time. ``apart`` runs each step alone, on all ranks, for the sake of its timing.
+    One rank per step is most efficient. A step gets more if it would take longer than its share of the total time, or
+    if as many steps at once would not fit in memory. ``apart`` runs each step alone, on all ranks, for timing.
     """
     if apart or ranks == 1:
         return (Phase(ranks, tuple(steps)),) if steps else ()
@@ -39,7 +39,7 @@ def schedule(
 
 
 def group_size(step: StepEstimate, ranks: int, fair: float, memory: float = inf) -> int:
-    """Return the ranks that a step gets: as few as keep it within ``fair`` seconds, and within the memory."""
+    """Return the number of ranks of a step: the fewest that keep it within ``fair`` seconds and the memory."""
     size = 1
     while size < ranks:
         too_long = step.seconds / speed_up(size) > fair * 1.001 and step.cells / (2 * size) >= _FEWEST_CELLS

@@ -1,4 +1,4 @@
-"""A plan dealt out to shards that never speak to each other: each makes the same deal, and takes its own part of it."""
+"""Shards: independent parts of a plan. Each shard computes the same partition, without communication."""
 
 import re
 from collections.abc import Iterable
@@ -25,7 +25,7 @@ class Shard:
         return f"{self.number}/{self.count}"
 
     def store(self, output: Path, study: Study) -> Path:
-        """Return the file of the shard's own store: no two jobs write one file."""
+        """Return the file of the shard's own store, so that no two jobs write the same file."""
         return output / "shards" / f"{study.name}.{self.number}-of-{self.count}.sqlite"
 
 
@@ -40,43 +40,43 @@ def parse_shard(text: str) -> Shard:
         shard = Shard(int(match[1]), int(match[2]))
         if 1 <= shard.number <= shard.count:
             return shard
-    raise ValueError(f"{text!r} is no shard; give i/n, part i of n, with 1 <= i <= n: 3/8")
+    raise ValueError(f"{text!r} is no shard; give i/n (part i of n, 1 <= i <= n), such as 3/8")
 
 
 def shard_of(path: Path) -> Shard | None:
-    """Return the shard whose store a file is, by its name."""
+    """Return the shard of a store, by its file name; None if it has no such name."""
     match = _NAME.search(path.name)
     return Shard(int(match[1]), int(match[2])) if match else None
 
 
 def stores_of(output: Path, study: Study) -> list[Path]:
-    """Return the stores of a study's shards below ``output``, whatever the number of shards they are of."""
+    """Return the stores of all shards of a study below ``output``."""
     folder = output / "shards"
     found = sorted(folder.iterdir()) if folder.is_dir() else []
     return [path for path in found if shard_of(path) and _NAME.sub("", path.name) == study.name]
 
 
 def reason_against(study: Study) -> str:
-    """Return why a study cannot be dealt out, if it cannot."""
+    """Return why a study cannot be sharded, "" if it can."""
     if study.solve.timing:
         return "solve.timing = true compares times, which must come from one machine: run it without --shard"
     return ""
 
 
 def take(plan: Plan, shard: Shard) -> Plan:
-    """Return the plan with what is ``shard``'s; ``plan`` must be made without a look at any store."""
+    """Return the part of the plan for ``shard``; ``plan`` must not depend on any store."""
     part = deal(plan, shard.count)[shard.number - 1]
     solves = tuple(solve for solve in plan.solves if solve.key in part)
-    reason = f"This is shard {shard}: the others see to the rest."
+    reason = f"This is shard {shard}; other shards compute these."
     return replace(plan, solves=solves, part=part).struck_by("shard", len(plan.solves) - len(solves), reason)
 
 
 def deal(plan: Plan, count: int) -> tuple[frozenset[str], ...]:
-    """Return the keys of the solves of each of ``count`` shards: costliest first, always to whoever has least to do."""
+    """Return the keys of each of ``count`` shards: most expensive group first, to the shard with the least work."""
     parts: tuple[set[str], ...] = tuple(set() for _ in range(count))
     loads = [(0, number) for number in range(count)]
     heapify(loads)
-    # Sorting is stable: equally costly ones stay in the study's order.
+    # The sort is stable: groups of equal cost stay in the study's order.
     for cost, keys in sorted(_units(plan), key=lambda unit: -unit[0]):
         load, number = loads[0]
         parts[number].update(keys)
@@ -85,7 +85,7 @@ def deal(plan: Plan, count: int) -> tuple[frozenset[str], ...]:
 
 
 def _units(plan: Plan) -> list[tuple[int, list[str]]]:
-    """Return what must stay together, with its cost: keys that share a mesh, or that wait for each other."""
+    """Return groups of keys that share a mesh or wait for each other, with their costs."""
     steps = plan.meshes
     groups = _Groups()
     for step in steps:
@@ -103,7 +103,7 @@ def _units(plan: Plan) -> list[tuple[int, list[str]]]:
 
 
 def _waiting(plan: Plan) -> Iterable[list[str]]:
-    """Yield the keys, for an early stop along ε, of cases that differ in ε only, and of their F_exact."""
+    """Return, for studies with `stop_when`, the keys of cases that differ in ε only, with those of their F_exact."""
     position = next((i for i, axis in enumerate(plan.study.axes) if axis.path == "mesh.epsilon"), None)
     if plan.study.planning.stop_when is None or position is None or not plan.reference_keys:
         return ()
@@ -115,27 +115,27 @@ def _waiting(plan: Plan) -> Iterable[list[str]]:
 
 
 def _cost(step: MeshStep) -> int:
-    """Return the estimated milliseconds of a step, alike for every shard.
+    """Return the estimated milliseconds of a step, equal for all shards.
 
-    By the law that knows no records, to three digits: the last ones may differ between machines.
+    The estimate does not use stored times, and is rounded to three digits, because later ones may differ by machine.
     """
     return max(1, round(1000 * float(f"{CostModel().step(step).seconds:.3g}")))
 
 
 class _Groups:
-    """Keys that belong together, because they were joined, one with the other or through others."""
+    """Disjoint sets of keys (union-find)."""
 
     def __init__(self) -> None:
         self._parents: dict[str, str] = {}
 
     def root(self, key: str) -> str:
-        """Return the key that stands for the group of ``key``."""
+        """Return the representative of the group of ``key``."""
         while (parent := self._parents.setdefault(key, key)) != key:
             self._parents[key] = key = self._parents[parent]
         return key
 
     def join(self, keys: Iterable[str]) -> None:
-        """Make one group of the groups of ``keys``."""
+        """Merge the groups of ``keys``."""
         first, *others = map(self.root, keys)
         for other in others:
             self._parents[self.root(other)] = self.root(first)

@@ -8,22 +8,22 @@ from pipeline.plan.key import mesh_key, operator_key
 from pipeline.plan.recipe import MARGIN, Rung
 from pipeline.study.sweep import Case
 
-# Coordinates on the top of the place in its middle.
+# The middle of the top face.
 CENTRE = (0.0, 0.0)
-# From so many depths of found contact on a small body on, the body is condensed to the surface that may touch.
+# With at least so many depths of found contact, a small body is condensed to the possible contact surface.
 FEWEST_DEPTHS = 10
-# Unknowns up to which a body counts as small there, measured: docs/solvers.md.
+# Largest number of unknowns of a small body, measured: docs/solvers.md.
 MOST_DOFS = 40_000
 
 
 @dataclass(frozen=True)
 class Solve:
-    """One case to be solved, and the indices of the cases of the study that its record serves.
+    """One case to solve, and the indices of the study's cases that use its record.
 
-    ``mirrors`` are the planes of symmetry ("x": x = 0) that leave half or a quarter of the body to be solved;
-    ``axisymmetric`` leaves the meridian; ``reduced`` may be answered from a reduced basis. A case with a ``goal``, the
-    relative error asked for, is tried again with the meshes of ``later`` until its error bar is below it; ``expected``
-    is the bar to expect of its present mesh.
+    ``mirrors`` are the planes of symmetry ("x": x = 0), so that half or a quarter of the body is solved;
+    ``axisymmetric`` solves the meridian; ``reduced`` allows a reduced basis. With a ``goal``, a relative error, the
+    case is solved on the meshes of ``later``, in turn, until its error bar is below the goal; ``expected`` is the
+    expected error bar of its present mesh.
     """
 
     key: str
@@ -39,21 +39,21 @@ class Solve:
 
     @property
     def meshed_case(self) -> Case:
-        """The case on whose mesh it is solved: itself, but half balls of all places share the one at the centre."""
+        """The case that is meshed: this one, or, for half balls, the one at the centre, which all places share."""
         if not self.case.is_closed:
             return self.case
         return replace(self.case, probe=self.case.probe.model_copy(update={"at": CENTRE}))
 
     @property
     def label(self) -> str:
-        """What people call it."""
+        """The name for messages."""
         return f"F_exact of {self.case}" if self.is_reference else str(self.case)
 
     def again(self, bar: float = nan) -> "Solve":
         """Return the next attempt at the goal.
 
-        If the last one came to an error ``bar``, meshes that would miss the goal if theirs were as much more than
-        expected are passed over, where there is one that would not.
+        ``bar`` is the error bar of the last attempt. Its ratio to the expected one corrects the expectations of later
+        meshes, and the first that should reach the goal is chosen.
         """
         more, goal = bar / self.expected, self.goal or 0.0
         serves = (number for number, rung in enumerate(self.later) if more * rung.bar <= MARGIN * goal)
@@ -65,28 +65,30 @@ class Solve:
 
 @dataclass(frozen=True)
 class OperatorStep:
-    """Solves that share spaces, conditions and the assembly: they differ in material only, in the depth of a tool whose
-    contact is found, or in where the half ball stands that is kept of a body.
+    """Solves that share spaces, boundary conditions and the assembly.
+
+    They differ only in the material, in the depth if contact is found, or in the place of a half ball.
     """
 
     solves: tuple[Solve, ...]
 
     @property
     def case(self) -> Case:
-        """A case that stands for all of them."""
+        """The first case."""
         return self.solves[0].case
 
     @property
     def sweeps(self) -> tuple[tuple[Solve, ...], ...]:
-        """The solves by material, loads and place, those of each in the order of their depths."""
+        """The solves by material, loads and place, each group in the order of the depths."""
         return tuple(
             tuple(sorted(group, key=lambda solve: solve.case.probe.depth)) for group in _grouped(self.solves, _scene_of)
         )
 
     @property
     def is_condensed(self) -> bool:
-        """Whether found contact has so many depths, of each material, that it pays to condense a small body: not where
-        an accuracy is asked for, and every depth must prove its own.
+        """Whether found contact has enough depths for each material to condense a small body.
+
+        With an accuracy it does not apply: each depth then has its own error bar.
         """
         is_plain = self.case.probe.is_unilateral and not self.case.solve.timing
         return is_plain and all(
@@ -102,17 +104,17 @@ class MeshStep:
 
     @property
     def case(self) -> Case:
-        """A case that stands for all of them."""
+        """The first case."""
         return self.operators[0].case
 
     @property
     def mirrors(self) -> tuple[str, ...]:
-        """The planes of symmetry that leave the part of the body to be meshed."""
+        """The planes of symmetry that bound the meshed part of the body."""
         return self.solves[0].mirrors
 
     @property
     def axisymmetric(self) -> bool:
-        """Whether the solves are on meridians, each with its own mesh."""
+        """Whether the solves are axisymmetric, each with its own mesh of the meridian."""
         return self.solves[0].axisymmetric
 
     @property
@@ -122,7 +124,7 @@ class MeshStep:
 
 
 def mesh_steps(solves: Collection[Solve], *, shared: bool = True) -> tuple[MeshStep, ...]:
-    """Group solves by mesh and operator, in order of first appearance, or leave each by itself."""
+    """Group solves by mesh and operator, in order of first appearance; without ``shared``, each is a group."""
     if not shared:
         return tuple(MeshStep((OperatorStep((solve,)),)) for solve in solves)
     steps = []
@@ -133,12 +135,12 @@ def mesh_steps(solves: Collection[Solve], *, shared: bool = True) -> tuple[MeshS
 
 
 def _mesh_of(solve: Solve) -> Hashable:
-    """Tell apart the meshes of solves: each meridian is one of its own."""
+    """Return the identity of a solve's mesh; each meridian has its own."""
     return (solve.key if solve.axisymmetric else mesh_key(solve.meshed_case), solve.mirrors)
 
 
 def _scene_of(solve: Solve) -> Hashable:
-    """Tell apart what differs by more than the depth."""
+    """Return all that distinguishes solves of one operator, except the depth."""
     case = solve.case
     return tuple(tissue.lame for tissue in case.tissues), case.load, case.densities, case.probe.at
 

@@ -1,6 +1,6 @@
-"""Symmetry of a scene: where body, support and probe, each for itself, are their own images.
+"""Symmetry of a scene: the planes and the axis for which body, support and probe are all symmetric.
 
-Each shape answers for itself, and none of them by default.
+Each shape declares its own symmetry; the default is none.
 """
 
 from functools import lru_cache
@@ -13,29 +13,29 @@ from pipeline.study.sweep import Case
 
 _MANY = 200_000  # pairs of body and probe of a large study
 _ON_AXIS = (0.0, 0.0)
-_SAME = 1e-9  # of a height: nearer than this, two are one
-_STIFFER = 1.25  # times the shear modulus
+_SAME = 1e-9  # relative difference at which two heights are equal
+_STIFFER = 1.25  # ratio of shear moduli
 
 
 def mirror_planes(case: Case) -> tuple[str, ...]:
-    """Return the planes, of x = 0 ("x") and y = 0 ("y"), in which the geometry of the scene is its own mirror image."""
+    """Return the planes of symmetry of the scene's geometry, of x = 0 ("x") and y = 0 ("y")."""
     return _geometry(case.body, case.probe)
 
 
 def movement_planes(case: Case) -> tuple[str, ...]:
-    """Return the mirror planes that the probe's movement respects, too."""
+    """Return the planes of symmetry of geometry and movement."""
     return _movement(case.body, case.probe)
 
 
 def model_planes(case: Case) -> tuple[str, ...]:
-    """Return those that loads respect, as well: half or quarter of the body tells all."""
+    """Return the planes of symmetry of geometry, movement and loads: half or a quarter of the body is enough."""
     return tuple(plane for plane in movement_planes(case) if case.load.is_mirrored(PLANES[plane]))
 
 
 def is_round(case: Case) -> bool:
-    """Tell whether body, support and probe are the same all round one axis, movement along it, no loads.
+    """Return whether the scene is axisymmetric: body, support, probe and movement, and no loads.
 
-    None is at large displacements: there are no elements for them on the meridian.
+    Scenes at large displacements are not: there are no elements for them on the meridian.
     """
     body, probe, frame = case.body, case.probe, case.frame
     half_plane = body.half_plane()
@@ -48,10 +48,10 @@ def is_round(case: Case) -> bool:
 
 
 def _is_held_below_stiffer(case: Case) -> bool:
-    """Tell whether the support begins at the lower end of a layer that is stiffer than what is below it.
+    """Return whether the support begins at an interface with a stiffer layer above.
 
-    There the displacement goes like r to a power below ½, for which no bar on the meridian is made: at 1.7 times the
-    modulus an error was 1.1 of its bar, at 10 times 1.4.
+    The displacement there goes like r to a power below ½, which the meridian's error bar does not cover: the error was
+    1.1 error bars at 1.7 times the modulus, and 1.4 at 10 times.
     """
     level, interfaces = case.body.support.on_half_plane(), case.body.interfaces
     layers = [*case.tissues[1:], case.tissues[0]][: len(interfaces) + 1]
@@ -62,9 +62,9 @@ def _is_held_below_stiffer(case: Case) -> bool:
 
 
 def body_planes(body: Body) -> tuple[str, ...]:
-    """Return the planes in which a body, its support and what is in it are their own mirror images."""
+    """Return the planes of symmetry of a body with its support and inclusions."""
     own = body.mirror_planes
-    # An inclusion is its own image, or there is no symmetry: pairs of images are not looked for.
+    # Every inclusion must be symmetric by itself: pairs of mirrored inclusions are not recognised.
     return tuple(
         plane
         for number, plane in enumerate(PLANES)
@@ -73,7 +73,7 @@ def body_planes(body: Body) -> tuple[str, ...]:
 
 
 def is_body_round(body: Body) -> bool:
-    """Tell whether a body, its support and what is in it are the same all round the z axis."""
+    """Return whether a body with its support and inclusions is axisymmetric about z."""
     return body.half_plane() is not None
 
 

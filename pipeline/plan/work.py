@@ -1,4 +1,4 @@
-"""The work that a study needs, as a value that reductions make smaller, each with its reason."""
+"""The plan as a value: the work of a study, which reductions make smaller."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,13 +9,13 @@ from pipeline.plan.proportional_depths import ProportionalDepth
 from pipeline.plan.steps import MeshStep, Solve, mesh_steps
 from pipeline.study.sweep import Case, Scale, Study
 
-# The key of what has no record: a case whose tool has lost contact, an F_exact that is not computed.
+# The key of a case without record: the tool has lost contact, or F_exact is not computed.
 NO_RECORD = ""
 
 
 @dataclass(frozen=True)
 class Struck:
-    """Work that a reduction took out or made smaller: how many solves, and why."""
+    """Work that a reduction struck out: the number of solves, and the reason."""
 
     name: str
     count: int
@@ -24,21 +24,21 @@ class Struck:
 
 @dataclass(frozen=True)
 class Plan:
-    """What a study needs done, after the reductions.
+    """The work of a study after the reductions.
 
     Attributes:
-        solves: what is to be solved.
-        keys: for each case in order, the key of its record; ``NO_RECORD`` where the tool has left the body.
-        reference_keys: likewise those of its scene's F_exact.
-        struck: what each reduction took out, and why.
-        used: the reductions that were tried, whether they found anything or not.
-        stored: the keys that were on record.
+        solves: the cases to solve.
+        keys: for each case in order, the key of its record; ``NO_RECORD`` if the tool has lost contact.
+        reference_keys: for each case, the key of its scene's F_exact.
+        struck: the work that each reduction struck out.
+        used: the reductions that were applied, even if they found nothing.
+        stored: the keys of stored records.
         shared: whether solves share meshes and assembly.
-        reuse: whether solves begin from their neighbours' solutions.
-        condensed: whether many depths of found contact on a small body are solved on its condensed surface.
-        cost: estimates what steps take.
-        part: of a shard's plan, the keys that are its own.
-        unasked: the solves that F_exact would take where nobody has asked for it.
+        reuse: whether solutions of neighbouring cases are initial guesses.
+        condensed: whether many depths of found contact on a small body use condensation.
+        cost: the cost model of steps.
+        part: the keys of a shard; None for a whole study.
+        unasked: the solves for F_exact that are left out because `solve.exact` is off by default.
         equivalent: by index of a case, the equivalent place that is solved instead.
         proportional: by index of a case, the proportional depth that is solved instead.
     """
@@ -60,25 +60,25 @@ class Plan:
     proportional: Mapping[tuple[int, ...], ProportionalDepth] = field(default_factory=dict)
 
     def scale_of(self, case: Case) -> Scale:
-        """Return the scale of a case of the study, to which the record of its key is taken."""
+        """Return the scale of a case, by which its record is multiplied."""
         depth = self.proportional.get(case.index)
         return replace(case.scale, length=depth.times * case.scale.length) if depth else case.scale
 
     @property
     def meshes(self) -> tuple[MeshStep, ...]:
-        """The solves grouped by mesh and operator, in the study's order, or each by itself."""
+        """The solves grouped by mesh and operator, in the study's order; if not shared, each is a group."""
         return mesh_steps(self.solves, shared=self.shared)
 
     def with_solves(self, solves: Sequence[Solve]) -> "Plan":
-        """Return the plan with ``solves`` in the place of its own, one for each; its cases have their keys."""
+        """Return the plan with each solve replaced by one of ``solves``; keys of cases follow."""
         key = {old.key: new.key for old, new in zip(self.solves, solves, strict=True)}
         return replace(self, solves=tuple(solves), keys=tuple(key.get(old, old) for old in self.keys))
 
     def struck_by(self, name: str, count: int, reason: str) -> "Plan":
-        """Return the plan with a note of what a reduction did, if it did anything."""
+        """Return the plan with a record of a reduction, if it struck out anything."""
         return replace(self, struck=(*self.struck, Struck(name, count, reason))) if count else self
 
 
 def reason_of(reduction: Callable[..., Plan]) -> str:
-    """Return the reason that a reduction's docstring gives, on one line."""
+    """Return the docstring of a reduction, its reason, on one line."""
     return " ".join((reduction.__doc__ or "").split())

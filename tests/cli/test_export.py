@@ -31,7 +31,7 @@ accuracy = "1 %"
 @pytest.mark.parametrize(
     ("contact", "arguments", "word"),
     [
-        ("unilateral", (), '"unilateral" of a disc has no real-time model yet'),
+        ("unilateral", (), '"unilateral" has no real-time model for a disc'),
         ("frictionless", ("--accuracy", "0.01%"), "must be between 0.2% and 20%"),
         ("frictionless", ("--accuracy", "fine"), "--accuracy fine"),
     ],
@@ -51,7 +51,7 @@ LONGEST = 30
 @pytest.mark.parametrize(
     ("line", "word"),
     [
-        ("axis = [0.3, 0.0, -1.0]", "probe.axis: a model is of tools that press straight down"),
+        ("axis = [0.3, 0.0, -1.0]", "probe.axis: tools of a real-time model press straight down"),
         ('motion = "all"', 'probe.motion = "all": a model is of tools that press'),
     ],
 )

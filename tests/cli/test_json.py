@@ -73,7 +73,7 @@ def test_a_bad_study_is_told_problem_by_problem(epsmesh, small, command):
     assert errors["probe.radius"]["howto"] == "docs/howto/own-study.md"
     assert {error["file"] for error in errors.values()} == {str(small)}
     assert "material.poisson = 0.9: must be at most 0.5" in done.stderr
-    assert done.stderr.splitlines()[-1] == "how to: docs/howto/own-study.md"
+    assert done.stderr.splitlines()[-1] == "see docs/howto/own-study.md"
     (report,) = json.loads(epsmesh("plan", "--check", small, "--json").stdout)
     assert report["errors"] == list(errors.values())
 
@@ -148,7 +148,7 @@ def test_pruning_says_first_what_would_go(epsmesh, tmp_path):
     assert json.loads(epsmesh(*words, "--yes").stdout)["done"]
     assert json.loads(epsmesh("status", "--store", path, "--json").stdout)["sound"]
     assert json.loads(epsmesh("status", "--store", path, "--json").stdout)["records"] == 3
-    assert "none of 3 records would be removed" in epsmesh(*words[:-1]).stdout
+    assert "no record to remove, 3 stay" in epsmesh(*words[:-1]).stdout
 
 
 def test_report_and_guide_agree_on_every_number():
@@ -169,6 +169,6 @@ def test_the_how_to_of_a_refusal_is_a_page(epsmesh, small, here):
     for words in ("guide known.nc", "plan SMALL --without x", "run SMALL --shard 9/3", "touch known.nc"):
         done = epsmesh(*(small if word == "SMALL" else word for word in words.split()), "--json")
         (error,) = failed(done)
-        assert f"how to: {error['howto']}" in done.stderr
+        assert f"see {error['howto']}" in done.stderr
         pages.add(error["howto"])
     assert all((ROOT / page).is_file() for page in pages)

@@ -71,7 +71,7 @@ def test_new_writes_a_study_and_leaves_an_existing_one_alone(elsewhere):
     file.write_text("changed")
     again = new("mine")
     assert again.exit_code == 2
-    assert "exists already" in again.stderr
+    assert "is not overwritten" in again.stderr
     assert file.read_text() == "changed"
 
 
@@ -112,7 +112,7 @@ def test_the_evaluator_in_c_is_copied_and_nothing_overwritten(elsewhere):
         assert (elsewhere / "mine" / "c" / name).read_text() == (STUDIES.parent / "realtime" / name).read_text()
     (elsewhere / "mine" / "c" / "epsmesh.h").unlink()
     again = epsmesh("export", "--evaluator", "mine/c")
-    assert (again.exit_code, "exists already" in again.stderr) == (2, True)
+    assert (again.exit_code, "is not overwritten" in again.stderr) == (2, True)
     assert not (elsewhere / "mine" / "c" / "epsmesh.h").exists()
 
 

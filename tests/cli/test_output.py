@@ -80,7 +80,7 @@ def test_a_disk_that_fills_while_results_are_written_loses_no_record(epsmesh, tm
     assert done.exit_code == 2
     (line,) = [line for line in done.stderr.splitlines() if "cannot be written" in line]
     assert "No space left on device" in line
-    assert "(1 read back)" in epsmesh("run", file, *options).stdout
+    assert "(1 from the store)" in epsmesh("run", file, *options).stdout
 
 
 @pytest.fixture(scope="module")
@@ -148,7 +148,7 @@ def test_a_folder_that_the_system_needs_is_looked_at_first(epsmesh, results, tmp
     monkeypatch.chdir(results)
     done = epsmesh("run", "small.toml", "--fresh", "--output", tmp_path / "out")
     assert done.exit_code == 2
-    assert f"file is a file, not a folder; {name} may name another folder" in done.stderr
+    assert f"file is a file, not a folder; set the environment variable {name} to another" in done.stderr
 
 
 def test_a_store_that_cannot_be_changed_is_told(epsmesh, results, tmp_path, monkeypatch):

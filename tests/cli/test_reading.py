@@ -43,7 +43,7 @@ def test_a_damaged_store_is_named_and_left_where_it_is(epsmesh, small, tmp_path,
     assert f"the case store {store} is damaged" in done.stderr
     assert f"`epsmesh status --prune --yes --store {store}` moves it aside" in done.stderr
     preview = epsmesh("status", "--prune", "--store", store)
-    assert "is damaged as a whole" in preview.stdout
+    assert "the whole store is damaged" in preview.stdout
     assert contents(tmp_path) == before
     mended = epsmesh("status", "--prune", "--store", store, "--yes")
     assert mended.exit_code == 0
@@ -86,7 +86,7 @@ def test_status_counts_what_is_not_to_be_run_as_skipped(epsmesh, small, tmp_path
     fill(store, make_plan(load(small)), at_4="ok", at_6="ok")
     told = json.loads(epsmesh("status", small, "--store", store, "--json").stdout)
     assert [told[state] for state in ("ok", "skipped", "failed", "pending")] == [8, 4, 0, 0]
-    assert "8 done, 0 failed, 4 skipped, 0 pending" in epsmesh("status", small, "--store", store).stdout
+    assert "8 ok, 0 failed, 4 skipped, 0 pending" in epsmesh("status", small, "--store", store).stdout
 
 
 def test_status_asks_after_a_run_without_reductions(epsmesh, small, tmp_path):

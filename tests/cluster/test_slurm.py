@@ -159,7 +159,7 @@ def test_one_job_on_two_nodes_interrupted_and_resumed(cluster, serial, tmp_path)
     assert not all_done(tmp_path / "cluster.nc")
     cluster.wait_for(job)
     assert cluster.field(job, "JobState") == "COMPLETED", cluster.story(tmp_path)
-    assert "is stored is read back" in told(tmp_path)
+    assert "Stored cases are read" in told(tmp_path)
     assert_same(tmp_path / "cluster.nc", dataset, rtol=1e-6, alike=False)
 
 
@@ -191,7 +191,7 @@ def test_a_node_is_lost_in_the_middle(cluster, serial, tmp_path):
     cluster.wait_for(merge)
     assert cluster.field(job, "JobState") == "COMPLETED", cluster.story(tmp_path)
     assert cluster.field(merge, "JobState") == "COMPLETED", cluster.story(tmp_path)
-    assert "is stored is read back" in (tmp_path / f"epsmesh-shards-{array}_{number}.log").read_text()
+    assert "Stored cases are read" in (tmp_path / f"epsmesh-shards-{array}_{number}.log").read_text()
     assert_same(tmp_path / "cluster.nc", dataset)
 
 

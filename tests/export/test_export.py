@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from pipeline.export.checks import Check, needed, told
+from pipeline.export.checks import Check, error_of_full, needed
 from pipeline.export.compliance import coarse_mesh, compliances
 from pipeline.export.curved import curved_model
 from pipeline.export.full import Full, Tool
@@ -277,9 +277,9 @@ def test_other_tissue_bounds_what_is_answered_for():
 def test_what_full_solves_tell_is_what_checks_show_with_a_safety():
     touches = [Check(0, 0, 1e-3, 1e-5, 0.4, 1.0, 1e-3, 1 + error, 0.006) for error in (0.001, -0.002)]
     # 0.5 % by their own bars, of 0.6 % in all.
-    assert told(touches, 0.005) == pytest.approx(1.6 * (0.002 - 0.001))
-    assert told(touches[:1], 0.005) == 0.25 * 0.005
-    assert told([replace(touches[0], force=1.02)], 0.005) == 0.005
+    assert error_of_full(touches, 0.005) == pytest.approx(1.6 * (0.002 - 0.001))
+    assert error_of_full(touches[:1], 0.005) == 0.25 * 0.005
+    assert error_of_full([replace(touches[0], force=1.02)], 0.005) == 0.005
 
 
 def test_bars_grow_until_they_hold_what_they_were_fitted_to():

@@ -109,7 +109,7 @@ def test_studies_of_the_mesh_and_scenes_that_are_not_round_stay_in_three_dimensi
 
 
 def test_names_are_checked():
-    with pytest.raises(ValueError, match="no reduction is called symetry"):
+    with pytest.raises(ValueError, match="unknown reduction symetry"):
         make_plan(study(), without=("symetry",))
     assert {"full", "scaling", "axisymmetric", "symmetry", "sharing"} <= set(REDUCTIONS)
 
