@@ -6,7 +6,8 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-# Open MPI 4 and 5 (PMIx), MPICH and Slurm's PMI, Intel's.
+# Open MPI 4 and 5 (PMIx), MPICH and Slurm's PMI, Intel's. Slurm's own SLURM_PROCID is no sign of MPI: each process of
+# `srun --mpi=none` is a run of its own.
 _RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK")
 _LAUNCHED = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "MPI_LOCALNRANKS")
 _PREFIXES = ("OMPI_", "PMIX_", "PMI_", "MPI_", "PRTE_")
@@ -18,8 +19,8 @@ def is_launched() -> bool:
 
 
 def is_first_rank() -> bool:
-    """Tell whether this is the rank that speaks."""
-    ranks = (os.environ.get(name) for name in (*_RANK, "SLURM_PROCID"))
+    """Return whether this process prints messages: the first rank, or a process without launcher."""
+    ranks = (os.environ.get(name) for name in _RANK)
     return next((rank for rank in ranks if rank is not None), "0") == "0"
 
 

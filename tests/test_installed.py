@@ -19,9 +19,9 @@ def installed(tmp_path_factory):
     pytest.importorskip("setuptools", reason="nothing here to build a wheel with")
     folder = tmp_path_factory.mktemp("installed")
     # Building leaves files beside the sources.
-    shutil.copytree(
-        ROOT / "pipeline", folder / "src" / "pipeline", ignore=shutil.ignore_patterns("__pycache__", "cache")
-    )
+    for package in ("pipeline", "epsmesh"):
+        ignored = shutil.ignore_patterns("__pycache__", "cache")
+        shutil.copytree(ROOT / package, folder / "src" / package, ignore=ignored)
     for name in ("pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, folder / "src" / name)
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation"]
@@ -45,6 +45,13 @@ def test_every_command_loads(installed, command):
     done = installed("-m", "pipeline", command, "--help")
     assert done.returncode == 0, done.stderr
     assert "Example" in done.stdout
+
+
+def test_the_package_has_the_name_of_the_command_too(installed):
+    said = installed(
+        "-c", "import epsmesh, pipeline; print(epsmesh.open is pipeline.open, epsmesh.StudyError.__name__)"
+    )
+    assert said.stdout.split() == ["True", "StudyError"], said.stderr
 
 
 def test_the_command_is_installed_beside_its_packages(installed):

@@ -35,8 +35,9 @@ def strike_duplicates(plan: Plan) -> Plan:
 
 
 def strike_scaled(plan: Plan) -> Plan:
-    """F is proportional to Young's modulus, and to the depth if the contact area is constant, displacements are small
-    and the tool is not in a slit: cases that differ only in these are solved once.
+    """F is proportional to Young's modulus and mostly to the depth: cases that differ only in these are solved once.
+
+    It is proportional to the depth if the contact area is constant, displacements are small and there is no slit.
     """
     first: dict[str, Case] = {}
     deeper: dict[tuple[int, ...], ProportionalDepth] = {}
@@ -122,7 +123,8 @@ def use_symmetry(plan: Plan) -> Plan:
 
 def share_meshes(plan: Plan) -> Plan:
     """Cases with the same geometry and element sizes share one mesh, and its assembly if they differ only in material.
-    With `outside = "green"`, places share both, and one mesh gives the far fields of many places.
+
+    With ``outside = "green"``, places share both, and one mesh gives the far fields of many places.
     """
     regions = far_regions([solve.case for solve in plan.solves])
     plan = replace(plan.with_solves([_with_far_region(solve, regions) for solve in plan.solves]), shared=True)
@@ -139,8 +141,9 @@ def _with_far_region(solve: Solve, regions: Mapping[Body, FarRegion]) -> Solve:
 
 
 def reuse_solutions(plan: Plan) -> Plan:
-    """The initial guess of a solve comes from the solutions for neighbouring Poisson's ratios or places; if contact is
-    found or displacements are large, for neighbouring depths.
+    """Solves start from the solutions of neighbouring cases (ν, places, or depths) as the initial guess.
+
+    Depths are neighbours if contact is found or displacements are large; else Poisson's ratios or places.
     """
     plan = replace(plan, reuse=True)
     operators = [operator for step in plan.meshes for operator in step.operators if not step.axisymmetric]
@@ -192,8 +195,9 @@ def _sweeps_ratios(operator: OperatorStep) -> bool:
 
 
 def condense_sweeps(plan: Plan) -> Plan:
-    """Ten or more depths with found contact on one mesh of a small body: the stiffness is condensed once to the possible
-    contact surface, and each depth is solved there.
+    """Ten or more depths on one mesh of a small body are solved on the contact surface, to which it is condensed once.
+
+    The tool finds its contact there.
     """
     if not plan.shared:
         return plan

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from inspect import cleandoc
 
 from pipeline.plan.cost import CostModel
 from pipeline.plan.equivalent_places import EquivalentPlace
@@ -80,5 +81,6 @@ class Plan:
 
 
 def reason_of(reduction: Callable[..., Plan]) -> str:
-    """Return the docstring of a reduction, its reason, on one line."""
-    return " ".join((reduction.__doc__ or "").split())
+    """Return the reason of a reduction: the first paragraph of its docstring, on one line."""
+    reason, *_ = cleandoc(reduction.__doc__ or "").split("\n\n")
+    return " ".join(reason.split())

@@ -71,7 +71,7 @@ def test_new_writes_a_study_and_leaves_an_existing_one_alone(elsewhere):
     file.write_text("changed")
     again = new("mine")
     assert again.exit_code == 2
-    assert "is not overwritten" in again.stderr
+    assert "exists already" in again.stderr
     assert file.read_text() == "changed"
 
 
