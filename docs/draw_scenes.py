@@ -34,9 +34,9 @@ MOST = 150_000
 
 _HEAD = """# Scenes
 
-Every body and every probe with its mesh, cut open at the contact: the black line is the sphere of radius ε, red the
-edge of the probe's footprint. `epsmesh view docs/scenes/box.toml` draws the first of them; where PyVista is not
-installed, it writes a page to turn it round ([Looking at a case](view.md)).
+A picture and a study file for every body and every tool. The mesh is cut open at the contact; the black line is the sphere of
+radius ε, red the edge of the tool's footprint. `epsmesh new mine --like docs/scenes/box.toml` starts from the first of them,
+and `epsmesh view docs/scenes/box.toml` [draws it](view.md).
 
 <!-- Written by docs/draw_scenes.py from the studies in docs/scenes/. -->
 """
@@ -56,18 +56,12 @@ def page() -> str:
 def _section(path: Path) -> str:
     text = path.read_text(encoding="utf-8")
     title = tomllib.loads(text)["title"]
-    lines = text.splitlines()
-    words = [line.removeprefix("# ") for line in lines if line.startswith("# ")]
-    shown = [line for line in lines if not line.startswith(("# ", "title = "))]
+    words = [line.removeprefix("# ") for line in text.splitlines() if line.startswith("# ")]
     return f"""## {title}
 
-{" ".join(words)}
+{" ".join(words)} Study file: [{path.name}](scenes/{path.name}).
 
 ![{title}](figures/scenes/{path.stem}.png)
-
-```toml
-{chr(10).join(shown).strip()}
-```
 """
 
 

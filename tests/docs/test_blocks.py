@@ -90,8 +90,7 @@ def test_blocks_of_a_page_run(page, checkout):
         assert not absent, f"{block}: no line {absent!r} in\n{done.stdout}\n{done.stderr}"
 
 
-# What stands on the page of scenes are whole studies: test_scenes.py reads them.
-_PIECES = [b for page in pages() if page.name != "scenes.md" for b in blocks(page, ("toml",))]
+_PIECES = [block for page in pages() for block in blocks(page, ("toml",))]
 
 
 @pytest.fixture(scope="module")
