@@ -34,9 +34,9 @@ MOST = 150_000
 
 _HEAD = """# Scenes
 
-A picture and a study file for every body and every tool. The mesh is cut open at the contact; the black line is the sphere of
-radius ε, red the edge of the tool's footprint. `epsmesh new mine --like docs/scenes/box.toml` starts from the first of them,
-and `epsmesh view docs/scenes/box.toml` [draws it](view.md).
+A picture and a study file for every body and every tool. The mesh is cut open at the contact; the black line is the
+sphere of radius ε, red the edge of the tool's footprint. `epsmesh new mine --like docs/scenes/box.toml` starts from
+the first of them, and `epsmesh view docs/scenes/box.toml` [draws it](view.md).
 
 <!-- Written by docs/draw_scenes.py from the studies in docs/scenes/. -->
 """

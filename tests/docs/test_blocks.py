@@ -1,6 +1,7 @@
 """Every command and every piece of Python in README and docs runs, in a folder laid out like a checkout."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -135,3 +136,16 @@ def test_output_is_compared_in_order_with_room_for_what_varies():
     assert missing(("first … s", "…", "second…"), shown) == ""
     assert missing(("second…", "first…"), shown) == "first…"
     assert missing(("third",), shown) == "third"
+
+
+@pytest.mark.parametrize(
+    "page", [*pages(), ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"], ids=lambda page: page.name
+)
+def test_links_lead_to_files_that_a_clone_has(page):
+    """The reference is not among them: ``make docs`` writes it."""
+    ignored = (ROOT / "docs" / "reference", ROOT / "docs" / "_build", ROOT / "results")
+    for link in re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8")):
+        if not link.startswith(("https://", "http://")):
+            target = (page.parent / link).resolve()
+            assert target.exists(), f"{page.name}: {link}"
+            assert not any(target.is_relative_to(folder) for folder in ignored), f"{page.name}: {link}"
