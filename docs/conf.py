@@ -26,16 +26,22 @@ html_static_path, html_css_files = ["_static"], ["tables.css"]
 html_copy_source = False
 html_show_copyright = False
 
+# A clone has no reference that its pages could link to; the site has.
+_REFERENCE = (
+    "the reference (`make docs` builds it)",
+    "[study file](reference/study.md), [dataset](reference/dataset.md), [commands](reference/commands.md)",
+)
+
 
 def complete_contents(app: Any, name: str, source: list[str]) -> None:
-    """Leave pages out of the contents that there are none of; where it says OTHERS, name those that are left."""
+    """Leave out of the contents what does not exist, name the other pages at OTHERS, and link the reference."""
     if name != "index":
         return
     found = app.env.found_docs
     lines = source[0].splitlines()
     lines = [line for line in lines if not re.fullmatch(r"[\w/-]+", line) or line == "OTHERS" or line in found]
     others = sorted(page for page in found if "/" not in page and page not in (*lines, name))
-    source[0] = "\n".join(lines).replace("OTHERS", "\n".join(others))
+    source[0] = "\n".join(lines).replace("OTHERS", "\n".join(others)).replace(*_REFERENCE)
 
 
 def setup(app: Any) -> None:
