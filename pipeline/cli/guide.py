@@ -16,12 +16,15 @@ def guide(
     file: Dataset,
     accuracy: Annotated[str | None, typer.Option(help='How near F must be to F_exact: "5%".')] = None,
     budget: Annotated[str | None, typer.Option(help='How long a case may take: "10ms".')] = None,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Add corrections of F, every value of outside, and what is missing.")
+    ] = False,
     output: Found = DEFAULT_OUTPUT,
     as_json: Json = False,
 ) -> None:
-    """Say how small ε may be for an accuracy, or what is best within a budget, over all scenes of a study.
+    """Return the smallest ε for an accuracy, or the most accurate setting within a time, over all scenes of a study.
 
-    Exit status 1 if no mesh setting of the study does what is asked.
+    Exit status 1 if no mesh setting of the study suffices.
 
     Example: epsmesh guide studies/figure3.toml --accuracy 5%
 
@@ -44,5 +47,6 @@ def guide(
         found = make_guide(dataset, accuracy, budget)
     except DatasetError as wrong:
         fail(of_file(file, str(wrong), _HOWTO))
-    say(found.to_dict(), str(found))
+    more = "" if verbose else "More: corrections of F and what is missing with --verbose, figures with `epsmesh report`."
+    say(found.to_dict(), found.text(verbose=verbose), *filter(None, [more]))
     raise typer.Exit(DONE if found.answer else SOME_FAILED)

@@ -19,13 +19,14 @@ USUAL_ACCURACY = "5 %"
 
 
 class Guide(Guideline):
-    """A guideline in words, which prints as the text for people."""
+    """A guideline in words; it prints as the answer, and ``text(verbose=True)`` holds all of it."""
 
-    question = property(guide_text.question)
-    setting = property(guide_text.setting)
+    sentence = property(guide_text.answer)
     details = property(guide_text.details)
+    gaps = property(guide_text.gaps)
     others = property(guide_text.others)
     settings = property(guide_text.settings)
+    text = guide_text.text
     __str__ = __repr__ = guide_text.text
 
 

@@ -1,113 +1,145 @@
 """A guide in words, and its settings as a table in the units that people read."""
 
 from math import inf, isfinite
-from pathlib import Path
 
 import pandas as pd
-from jinja2 import Environment, StrictUndefined
 
 from pipeline.printable import counted
 from pipeline.quantities import symbol, write
 from pipeline.report.guideline import Guideline
 from pipeline.report.laws import Law
-from pipeline.report.table import Labels, words
+from pipeline.report.table import Labels
 from pipeline.report.verdict import Verdict
+from pipeline.report.words import choices
 
-_TEMPLATE = Path(__file__).parent / "templates" / "guide.txt.j2"
 _NOUGHT = 1e-9  # what rounding leaves of no error
+_MOST_NAMED = 4
 
 
-def text(guide: Guideline) -> str:
-    """Return the answer, what it costs, the laws of correction and what is left out."""
-    environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    template = environment.from_string(_TEMPLATE.read_text(encoding="utf-8"))
+def text(guide: Guideline, *, verbose: bool = False) -> str:
+    """Return title, answer, worst case, cost and mesh; ``verbose`` adds corrections and every value of outside."""
+    lines = [guide.title, answer(guide), *(f"{name}: {words}" for name, words in details(guide))]
+    lines += gaps(guide)[:1]
+    if not verbose:
+        return "\n".join(lines)
     table = of_each_outside(guide)
-    shown = table.to_string(index=False).splitlines() if len(table) > 1 else []
-    lost = "; ".join([*map(words, guide.lost[:4]), *(["…"] if len(guide.lost) > 4 else [])])
-    return template.render(
-        guide=guide,
-        table=shown,
-        lost=f"{counted(len(guide.lost), 'scene')} ({lost})",
-    ).rstrip()
+    parts = [
+        [f"{scenes(guide)}."],
+        others(guide),
+        table.to_string(index=False).splitlines() if len(table) > 1 else [],
+        [f"Times: {doubt}." for doubt in guide.doubts],
+        _reasons("scenes that are not covered", guide.left_out),
+        _reasons("mesh settings that are incomplete", guide.unjudged),
+    ]
+    return "\n\n".join("\n".join(part) for part in [lines, *parts] if part)
 
 
-def question(guide: Guideline) -> str:
-    """Return what was asked for, and of how many scenes."""
-    axes = " × ".join(f"{length} {name}" for name, length in guide.axes.items())
-    wanted = [f"F within {percent(guide.accuracy)} of F_exact, error bars included"] if isfinite(guide.accuracy) else []
-    wanted += [f"at most {time(guide.budget)} a case"] if isfinite(guide.budget) else []
-    scenes = f"{counted(guide.scenes, 'scene')}{f' ({axes})' if axes and not guide.lost else ''}"
-    return f"Asked for: {', '.join(wanted)}, over {scenes}."
+def answer(guide: Guideline) -> str:
+    """Return the answer in one sentence; where no setting suffices, the best one and why it does not."""
+    chosen = guide.answer
+    if chosen is None:
+        return _no_answer(guide)
+    if not isfinite(guide.accuracy):
+        return (
+            f"{_named(guide, chosen)} is the most accurate setting within {time(guide.budget)} a case: F is within "
+            f"{percent(chosen.error)} of F_exact in {_all(guide.scenes)}, error bars included."
+        )
+    smallest = "the smallest ε" if "epsilon" in chosen.labels else "the cheapest setting"
+    allowed = " and ".join([percent(guide.accuracy), *([time(guide.budget)] if isfinite(guide.budget) else [])])
+    return (
+        f"{_named(guide, chosen)} is {smallest} that suffices: F is within {percent(chosen.error)} of F_exact in "
+        f"{_all(guide.scenes)}, error bars included ({allowed} allowed)."
+    )
 
 
-def setting(guide: Guideline) -> str:
-    """Return the chosen setting, or the best one where none does what was asked for."""
-    if guide.answer is not None:
-        smallest = "Smallest ε" if "epsilon" in guide.answer.labels else "Fewest unknowns"
-        return f"{smallest if isfinite(guide.accuracy) else 'Most accurate'}: {words(guide.answer.labels)}"
-    none = f"No setting of this study {_asked(guide)}"
-    if guide.best:
-        return f"{none}; best reached: {words(guide.best.labels)}"
-    judged = [v for v in guide.verdicts if v.is_judged]
-    if not judged:
-        return f"{none}: none was computed for every scene."
-    quickest = min(judged, key=lambda v: v.seconds)
-    return f"{none}; the quickest takes {time(quickest.seconds)}: {words(quickest.labels)}"
-
-
-def _asked(guide: Guideline) -> str:
-    parts = [f"is within {percent(guide.accuracy)} in every scene"] if isfinite(guide.accuracy) else []
-    return " and ".join([*parts, *([f"takes at most {time(guide.budget)}"] if isfinite(guide.budget) else [])])
+def _no_answer(guide: Guideline) -> str:
+    limits = [f"keeps F within {percent(guide.accuracy)} of F_exact in {_all(guide.scenes)}"]
+    limits = limits if isfinite(guide.accuracy) else []
+    limits += [f"takes at most {time(guide.budget)} a case"] if isfinite(guide.budget) else []
+    none = f"No mesh setting {' and '.join(limits)}"
+    if guide.best is None:
+        judged = [v for v in guide.verdicts if v.is_judged]
+        if not judged:
+            return f"{none}: none has a force for every scene."
+        quickest = min(judged, key=lambda v: v.seconds)
+        return f"{none}. The quickest, {_named(guide, quickest)}, takes {time(quickest.seconds)}."
+    best = guide.best
+    if best.error <= guide.accuracy:
+        return f"{none}. {_named(guide, best)} is within {percent(best.error)}, but by chance: a larger ε is not."
+    parts = {"distance of F from F_exact": best.distance, "error bar of F": best.force_bar}
+    parts |= {"error bar of F_exact": best.exact_bar}
+    total = " + ".join(f"{percent(part)} {name}" for name, part in parts.items())
+    alone = f" The error bar of F alone is within {percent(guide.accuracy)}." if best.force_bar <= guide.accuracy else ""
+    return f"{none}. Best: {_named(guide, best)}, within {percent(best.error)} ({total}).{alone}"
 
 
 def details(guide: Guideline) -> list[tuple[str, str]]:
-    """Return how sure the chosen setting is, what limits it, what it costs and its elements: names and words."""
+    """Return the worst case of the chosen setting, its cost and its elements: names and words."""
     verdict = guide.answer or guide.best
     if verdict is None:
         return []
-    margin = guide.accuracy - verdict.error
-    spare = f" (margin {percent(margin)})" if isfinite(margin) and margin >= 0 else ""
-    limit = f" at {words(verdict.limit)}" if verdict.limit else ""
+    where = f", at {choices(guide.coordinates, verdict.limit)}" if verdict.limit else ""
+    bars = (f" ± {percent(bar)}" if isfinite(bar) else "" for bar in (verdict.force_bar, verdict.exact_bar))
+    force, exact = (f"{newton(f)}{bar}" for f, bar in zip((verdict.force, verdict.exact), bars, strict=True))
     return [
-        ("worst error", f"{percent(verdict.error)}{spare}; {percent(verdict.deviation)} without error bars"),
-        ("worst case", f"F = {newton(verdict.force)}, F_exact = {newton(verdict.exact)}{limit}"),
-        ("cost", f"{cost(verdict)}, on {guide.timing}"),
-        *(("times", doubt) for doubt in guide.doubts),
-        ("mesh", elements(verdict.mesh)),
+        ("Worst case", f"F = {force}, F_exact = {exact}{where}"),
+        ("Cost", f"{cost(verdict)}, on {guide.timing}{' (times are doubtful)' if guide.doubts else ''}"),
+        ("Mesh", elements(guide, verdict.mesh)),
     ]
 
 
+def scenes(guide: Guideline) -> str:
+    """Return how many scenes the answer is for, and what differs between them."""
+    axes = " × ".join(f"{length} {symbol(name)}" for name, length in guide.axes.items() if length > 1)
+    return f"{counted(guide.scenes, 'scene')}{f' ({axes})' if axes and not guide.lost else ''}"
+
+
+def gaps(guide: Guideline) -> list[str]:
+    """Return which scenes the answer does not cover, and how many settings lack a force, a sentence each."""
+    found = []
+    if guide.lost:
+        names = [choices(guide.coordinates, scene) for scene in guide.lost[:_MOST_NAMED]]
+        names += ["…"] if len(guide.lost) > _MOST_NAMED else []
+        found.append(f"Not covered: {counted(len(guide.lost), 'scene')} without results ({'; '.join(names)}).")
+    if guide.unjudged:
+        count = sum(not v.is_judged for v in guide.verdicts)
+        found.append(f"Incomplete: {counted(count, 'mesh setting')} without a result for every scene.")
+    return found
+
+
+def _reasons(what: str, counts: dict[str, int]) -> list[str]:
+    return [f"Cases of {what}:", *(f"  {count} {reason}" for reason, count in counts.items())] if counts else []
+
+
 def others(guide: Guideline) -> list[str]:
-    """Return the setting with the fewest unknowns, and those with laws of correction."""
+    """Return the setting with the fewest unknowns, and those that suffice once F is corrected."""
     chosen, lean = guide.answer, guide.lean
     lines = []
     if chosen and lean and lean is not chosen and lean.dofs < chosen.dofs:
-        lines.append(f"Fewest unknowns: {words(lean.labels)} ({cost(lean)})")
+        lines.append(f"Fewest unknowns: {_named(guide, lean)} ({cost(lean)}).")
     corrected = guide.corrected or guide.best_corrected
     if corrected is None:
-        why = (
-            "nothing can be said: it takes more than one scene" if guide.scenes == 1 else "no setting does that either"
-        )
-        lines.append(f"With F_exact ≈ F / r: {why}")
+        why = "needs more than one scene" if guide.scenes == 1 else "does not help: no setting suffices with it"
+        lines.append(f"Correction F_exact ≈ F / r: {why}.")
     else:
         law = corrected.correction
-        best = "" if guide.corrected else "no setting does that either; best reached: "
-        off = f"off by at most {percent(law.error)} on scenes that r was not fitted to"
-        lines.append(f"With F_exact ≈ F / r: {best}{words(corrected.labels)}, r = {law.r:.4g}; {off}")
+        best = "" if guide.corrected else "no setting suffices with it; best: "
+        off = f"within {percent(law.error)} in scenes that r was not fitted to"
+        lines.append(f"Correction F_exact ≈ F / r: {best}{_named(guide, corrected)}, r = {law.r:.4g}, {off}.")
     return [*lines, _for_other_tools(guide)]
 
 
 def _for_other_tools(guide: Guideline) -> str:
-    """Say which setting serves with the best law for other tools, and how sure that is."""
+    """Say which setting and which correction suit other tools, and how sure that is."""
     chosen = guide.carried or guide.best_carried
     law = chosen.laws.best if chosen else None
     if chosen is None or law is None:
         why = "; ".join(f"{counted(count, 'scene')}: {reason}" for reason, count in guide.no_law.items())
-        return f"For other tools: nothing can be said: it takes a study of several tools{f' ({why})' if why else ''}"
-    best = "" if guide.carried else "no setting does that either; best reached: "
-    found = f"{best}{words(chosen.labels)}, {law.formula}, {constants(law)}"
-    off = f"off by at most {percent(law.error)} for tools that it was not fitted to"
-    return f"For other tools on the same tissue: {found}; {off}. Fitted to: {'; '.join(guide.tools)}"
+        return f"Correction for other tools: needs a study of several tools{f' ({why})' if why else ''}."
+    best = "" if guide.carried else "no setting suffices with it; best: "
+    found = f"{best}{_named(guide, chosen)}, {law.formula}, {constants(law)}"
+    off = f"within {percent(law.error)} for tools that it was not fitted to"
+    return f"Correction for other tools on the same tissue: {found}, {off}. Fitted to: {'; '.join(guide.tools)}."
 
 
 def of_each_outside(guide: Guideline) -> pd.DataFrame:
@@ -118,9 +150,9 @@ def of_each_outside(guide: Guideline) -> pd.DataFrame:
         rows.append(
             {
                 "outside": name,
-                "smallest ε": _short(plain),
+                "smallest ε": _short(guide, plain),
                 "worst error": percent(plain.error) if plain else "",
-                "smallest ε with F / r": _short(corrected),
+                "smallest ε with F / r": _short(guide, corrected),
                 "r": f"{law.r:.4g}" if law else "",
                 "worst error with F / r": percent(law.error) if law else "",
             }
@@ -137,7 +169,7 @@ def settings(guide: Guideline) -> pd.DataFrame:
         if v.labels.get("epsilon") == inf and "outside" in v.labels:
             row[symbol("outside")] = "any"
         if not v.is_judged:
-            rows.append(row | {"worst error": f"not judged: {v.missing} of {guide.scenes} scenes not computed"})
+            rows.append(row | {"worst error": f"incomplete: {v.missing} of {guide.scenes} scenes have no result"})
             continue
         law, spread = v.correction, v.spread
         row |= {"worst error": percent(v.error), "unknowns": f"{v.dofs:,.0f}"}
@@ -159,18 +191,18 @@ def constants(law: Law) -> str:
     name, unit = ("r", "") if law.name == "ratio" else ("c", " 1/m")
     if f"{law.least:.3g}" == f"{law.most:.3g}":
         return f"{name} = {law.most:.3g}{unit}"
-    return f"{name} = {law.least:.3g} … {law.most:.3g}{unit} by tissue"
+    return f"{name} = {law.least:.3g} … {law.most:.3g}{unit}, depending on the tissue"
 
 
-def elements(mesh: Labels) -> str:
+def elements(guide: Guideline, mesh: Labels) -> str:
     """Return the sizes and kind of the elements in words."""
     if "accuracy" in mesh:
         return f"chosen by the program for an accuracy of {percent(mesh['accuracy'])}"
     if "fine" not in mesh:
-        return words(mesh)
+        return choices(guide.coordinates, mesh)
     full = mesh.get("epsilon", inf) == inf
     edge = "a tenth of its half width" if mesh["rim"] is None else write("rim", mesh["rim"])
-    parts = [f"{write('fine', mesh['fine'])} {'everywhere' if full else 'within ε'}"]
+    parts = [f"elements of {write('fine', mesh['fine'])} {'everywhere' if full else 'within ε'}"]
     parts += [] if full else [f"{write('coarse', mesh['coarse'])} far away"]
     parts += [f"{edge} at the probe's edge", f"growth {mesh['growth']:g}", f"degree {mesh['degree']}"]
     return ", ".join([*parts, f"element {mesh['element']}"])
@@ -179,7 +211,7 @@ def elements(mesh: Labels) -> str:
 def cost(verdict: Verdict) -> str:
     """Return unknowns, elements and time, the largest over the scenes."""
     size = f"up to {verdict.dofs:,.0f} unknowns, {verdict.cells:,.0f} elements"
-    return f"{size}, {time(verdict.seconds)} (median {time(verdict.usual)})"
+    return f"{size}, {time(verdict.seconds)} a case (median {time(verdict.usual)})"
 
 
 def percent(share: float) -> str:
@@ -201,5 +233,20 @@ def newton(force: float) -> str:
     return f"{1e3 * force:.4g} mN"
 
 
-def _short(verdict: Verdict | None) -> str:
-    return words({k: v for k, v in verdict.labels.items() if k != "outside"}) if verdict else "none"
+def _named(guide: Guideline, verdict: Verdict) -> str:
+    """Name a setting, ε first."""
+    labels = {name: verdict.labels[name] for name in sorted(verdict.labels, key="epsilon".__ne__)}
+    return choices(guide.coordinates, labels) or "the one setting"
+
+
+def _all(count: int) -> str:
+    return {1: "the one scene", 2: "both scenes"}.get(count, f"all {count} scenes")
+
+
+def _short(guide: Guideline, verdict: Verdict | None) -> str:
+    labels = {k: v for k, v in verdict.labels.items() if k != "outside"} if verdict else None
+    if labels is None:
+        return "none"
+    if labels.get("epsilon") == inf:
+        return "none: full order only"
+    return choices(guide.coordinates, labels) or "the one setting"

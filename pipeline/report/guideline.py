@@ -19,7 +19,7 @@ from pipeline.report.verdict import Verdict, choose, judge, keeps, most_accurate
 
 # Settings that are chosen from the verdicts.
 _CHOSEN = ("answer", "corrected", "best", "best_corrected", "carried", "best_carried", "lean")
-_NOT_PLAIN = {*_CHOSEN, "verdicts", "has_full"}
+_NOT_PLAIN = {*_CHOSEN, "verdicts", "has_full", "coordinates"}
 # Parts of a verdict that are no number or text.
 _APART = ("labels", "mesh", "spread", "correction", "laws", "laws_of_full")
 
@@ -35,7 +35,7 @@ class Guideline:
     """
 
     def __init__(self, dataset: xr.Dataset, table: Table, accuracy: float, budget: float):
-        self.title = str(dataset.attrs.get("title", ""))
+        self.title, self.coordinates = str(dataset.attrs.get("title", "")), dataset.coords
         self.accuracy, self.budget = accuracy, budget
         self.timing, self.doubts = _timing(dataset), doubts(dataset)
         self.axes = {name: len(np.unique(labels)) for name, labels in table.axes.items()}

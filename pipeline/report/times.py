@@ -5,7 +5,7 @@ import xarray as xr
 
 from pipeline.arrays import BoolArray
 from pipeline.printable import counted
-from pipeline.report.table import words
+from pipeline.report.words import choices
 
 # Processes for each core above which some of them wait: times are then longer than what was done.
 LOADED = 1.1
@@ -51,7 +51,7 @@ def slower(dataset: xr.Dataset) -> str:
     if not count:
         return ""
     worst = found.where(found == found.min(), drop=True)
-    case = words({str(dim): worst[dim].values[0] for dim in dataset["speedup"].dims})
+    case = choices(dataset, {str(dim): worst[dim].values[0] for dim in dataset["speedup"].dims})
     most = f"most of all {case}, {float(found.min()):.2g} ×"
     return f"fewer unknowns were slower than the full order: {counted(count, 'case')}, {most}"
 

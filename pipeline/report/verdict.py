@@ -39,7 +39,8 @@ class Verdict:
     """What a mesh setting is worth over the scenes.
 
     ``deviation`` is the worst |F/F_exact - 1|, ``error`` the worst with the error bars; ``limit`` the scene that has
-    it, its ``force`` and ``exact`` in N. ``seconds``, ``dofs`` and ``cells`` are the largest over the scenes, ``usual``
+    it, its ``force`` and ``exact`` in N; there ``error`` is ``distance`` from F_exact + ``force_bar`` + ``exact_bar``, all
+    three as shares of F_exact. ``seconds``, ``dofs`` and ``cells`` are the largest over the scenes, ``usual``
     is the median of the seconds. ``laws`` are those that take F to F_exact, ``laws_of_full`` those that take it to
     F_max, without bars: what they leave is of ε alone, and not of the mesh's elements. A setting with ``missing``
     scenes is not judged: its errors are those of the rest.
@@ -53,6 +54,9 @@ class Verdict:
     limit: Labels | None = None
     force: float = nan
     exact: float = nan
+    distance: float = nan
+    force_bar: float = nan
+    exact_bar: float = nan
     seconds: float = nan
     usual: float = nan
     dofs: float = nan
@@ -95,6 +99,9 @@ def judge(table: Table, row: int) -> Verdict:
         limit=table.scenes[scene],
         force=float(table.force[row, scene]),
         exact=float(table.exact[row, scene]),
+        distance=float(deviation[worst]),
+        force_bar=float(table.ratio[row, scene] * table.force_bar[row, scene]),
+        exact_bar=float(table.ratio[row, scene] * table.exact_bar[row, scene]),
         seconds=float(table.seconds[row, use].max()),
         usual=float(np.median(table.seconds[row, use])),
         dofs=float(table.dofs[row, use].max()),

@@ -1,6 +1,7 @@
 """Values of a dataset's arrays in the words and units that people use: mm, kPa, mN, per cent."""
 
 import re
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -31,9 +32,10 @@ def choice(coordinate: xr.DataArray, value: Any) -> str:
     return f"{symbol(coordinate)} = {re.sub(r'^-', '−', number(coordinate, value))}"
 
 
-def choices(dataset: xr.Dataset, selection: dict[str, Any]) -> str:
-    """Write a choice along several dimensions."""
-    return ", ".join(choice(dataset[name], value) for name, value in selection.items())
+def choices(coordinates: Mapping[Any, xr.DataArray], selection: Mapping[str, Any]) -> str:
+    """Write a choice along several dimensions, with the units of ``coordinates``: of a dataset, or its own."""
+    known = {name: coordinates[name] if name in coordinates else xr.DataArray(name=name) for name in selection}
+    return ", ".join(choice(known[name], value) for name, value in selection.items())
 
 
 def lengths(coordinate: xr.DataArray, text: str) -> str:
@@ -84,5 +86,5 @@ def is_numeric(array: xr.DataArray) -> bool:
     return bool(np.issubdtype(array.dtype, np.number))
 
 
-def _unit(array: xr.DataArray) -> str:
-    return str(array.attrs.get("units", ""))
+def _unit(array: xr.DataArray) -> str | None:
+    return array.attrs.get("units")

@@ -22,7 +22,7 @@ def results(tmp_path):
 def test_answer_from_a_dataset_and_from_its_study(results):
     done = call(results / "known.nc", "--accuracy", "5%")
     assert done.exit_code == 0
-    assert "Smallest ε: outside coarse, ε = 4 mm" in done.stdout
+    assert "ε = 4 mm, outside coarse is the smallest ε that suffices: F is within 2.5 % of F_exact" in done.stdout
     assert call("anywhere/known.toml", "--accuracy", "5%", "--output", results).stdout == done.stdout
 
 
@@ -38,7 +38,15 @@ def test_json_is_for_scripts(results):
 def test_what_no_setting_reaches_ends_with_1(results):
     done = call(results / "known.nc", "--accuracy", "0.4%")
     assert done.exit_code == 1
-    assert "No setting of this study is within 0.4 % in every scene" in done.stdout
+    assert "No mesh setting keeps F within 0.4 % of F_exact in all 4 scenes" in done.stdout
+
+
+def test_corrections_are_for_those_who_ask(results):
+    short, long = (call(results / "known.nc", "--accuracy", "5%", *more).stdout for more in ((), ("-v",)))
+    assert "Correction" not in short
+    assert "--verbose" in short
+    assert "Correction F_exact ≈ F / r" in long
+    assert "smallest ε with F / r" in long
 
 
 @pytest.mark.parametrize(

@@ -155,9 +155,9 @@ def test_report_and_guide_agree_on_every_number():
     data = dataset()
     found, section = guide(data, USUAL_ACCURACY), guide_if_any(data)
     assert section.settings.equals(settings(found))
-    words = text(found)
+    words = text(found, verbose=True)
     details = [told for _, told in section.details]
-    assert all(line in words for line in (section.question, section.setting, *details, *section.others))
+    assert all(line in words for line in (section.sentence, *details, *section.others))
     # What takes longest in one scene is not what it usually takes: neither stands for the other.
     slow = dataset(seconds=lambda case: 1 + 9 * (case.material.poisson > 0.35) * isinstance(case.probe, Blade))
     table = guide_if_any(slow).settings

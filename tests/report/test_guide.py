@@ -70,8 +70,27 @@ def test_what_cannot_be_reached_is_said_plainly():
     assert found.corrected is None
     assert found.best.labels["epsilon"] == inf
     text = str(found)
-    assert "No setting of this study is within 0.4 % in every scene; best reached: outside coarse, ε = full" in text
-    assert "no setting does that either" in text
+    assert "No mesh setting keeps F within 0.4 % of F_exact in all 4 scenes. Best: ε = full, outside coarse" in text
+    assert "no setting suffices with it" in found.text(verbose=True)
+
+
+def test_a_bar_of_one_force_is_told_from_the_distance_to_the_exact_one():
+    found = guide(dataset(), "1.3%")
+    best = found.best
+    assert found.answer is None
+    assert best.distance + best.force_bar + best.exact_bar == pytest.approx(best.error)
+    assert best.distance == pytest.approx(0.01)
+    assert best.force_bar == pytest.approx(1.01 * BAR)
+    assert "1 % distance of F from F_exact + 0.4 % error bar of F + 0.1 % error bar of F_exact" in str(found)
+    assert "The error bar of F alone is within 1.3 %" in str(found)
+
+
+@pytest.mark.parametrize("accuracy", ["5%", "0.4%"])
+def test_the_answer_is_within_the_first_lines(accuracy):
+    found = guide(dataset(), accuracy)
+    assert len(str(found).splitlines()) <= 8
+    assert str(found).splitlines()[1] == found.sentence
+    assert found.text(verbose=True).startswith(str(found))
 
 
 def test_budget_alone_and_with_an_accuracy():
@@ -82,8 +101,9 @@ def test_budget_alone_and_with_an_accuracy():
     assert guide(dataset(), "5%", "35ms").answer is None
     assert guide(dataset(), "5%", "35ms").best.labels == {"outside": "free", "epsilon": 6e-3}
     text = str(guide(dataset(), "5%", "1ms"))
-    assert "the quickest takes 20 ms" in text
-    assert "With F_exact ≈ F / r: no setting does that either" in text
+    assert "No mesh setting keeps F within 5 % of F_exact in all 4 scenes and takes at most 1 ms a case" in text
+    assert "The quickest, ε = 4 mm, outside free, takes 20 ms" in text
+    assert "no setting suffices with it" in guide(dataset(), "5%", "1ms").text(verbose=True)
 
 
 def test_correction_takes_what_the_scenes_have_in_common():
@@ -127,7 +147,7 @@ def test_one_scene_has_no_law():
     found = guide(dataset(one[0] + "[[probe]]" + one[1] + "[mesh]" + one[2].split("[mesh]")[1]), "5%")
     assert found.scenes == 1
     assert found.corrected is None
-    assert "it takes more than one scene" in str(found)
+    assert "needs more than one scene" in found.text(verbose=True)
 
 
 @pytest.mark.parametrize("state", ["failed", "skipped", "pending"])
@@ -142,8 +162,9 @@ def test_settings_that_lack_a_case_are_not_judged(state):
     assert not lacking.is_judged
     assert lacking.missing == 2
     assert not found.lost
-    text = str(found)
-    assert "not judged: 2 of 4 scenes not computed" in settings(found).to_string()
+    assert "Incomplete: 1 mesh setting without a result for every scene" in str(found)
+    text = found.text(verbose=True)
+    assert "incomplete: 2 of 4 scenes have no result" in settings(found).to_string()
     assert {"failed": "2 failed: so it went", "skipped": "2 skipped", "pending": "2 not yet run"}[state] in text
 
 
@@ -152,8 +173,8 @@ def test_scenes_that_were_never_computed_are_left_out_and_named():
     found = guide(data, "5%")
     assert found.scenes == 2
     assert {scene["poisson"] for scene in found.lost} == {0.4}
-    assert "nothing is claimed of them: 2 scenes" in str(found)
-    assert "F_exact is not known" in str(found)
+    assert "Not covered: 2 scenes without results (ν = 0.4, needle; ν = 0.4, scalpel)" in str(found)
+    assert "F_exact is not known" in found.text(verbose=True)
     assert all(v.limit["poisson"] == 0.3 for v in found.verdicts)
 
 
@@ -253,7 +274,7 @@ def test_elements_are_told():
     text = str(guide(dataset(TEXT + 'rim = "0.1 mm"\n'), "5%"))
     assert "2 mm within ε, 8 mm far away, 0.1 mm at the probe's edge, growth 0.5, degree 2, element auto" in text
     assert "up to 40,000 unknowns, 4,000 elements, 40 ms" in text
-    assert "F = 13.26 mN, F_exact = 13 mN at ν = 0.3, probe = needle" in text
+    assert "F = 13.26 mN ± 0.41 %, F_exact = 13 mN ± 0.1 %, at ν = 0.3, needle" in text
 
 
 def test_json_and_rows_hold_the_same(tmp_path):
