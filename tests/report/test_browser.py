@@ -143,11 +143,30 @@ def test_links_of_failures_show_them(browser, path):
     assert column(browser, "status") == ["failed", "failed"]
 
 
-def test_every_scene_has_a_curve_that_can_be_hidden(browser, path):
-    """The points are the table's; what is drawn across and up can be chosen."""
+def test_every_scene_has_a_curve_that_can_be_chosen(browser, path):
+    """The points are the table's; axes, colours and which cases are drawn can be chosen."""
     browser.open(path)
-    names = browser.ask(NAMES)
-    assert len(names) == 40 and "ν = 0.3, outside = free" in names
+    traces = "document.querySelectorAll('#plot .scatterlayer .trace').length"
+    choose = "e => { e.value = 'VALUE'; e.dispatchEvent(new Event('input', {bubbles: true})); }"
+
+    def choose_in_curves(name, value):
+        field = f"document.querySelector('.axes select[name=\"{name}\"]')"
+        browser.ask(f"({choose.replace('VALUE', value)})({field})")
+
+    assert browser.ask(NAMES) == ["outside = coarse", "outside = free"]
+    assert browser.ask(traces) == 40
+    assert browser.ask("document.getElementById('plot').layout.xaxis.title.text") == "radius of the fine mesh ε, mm"
+    choose_in_curves("colour", "poisson")
+    assert "ν = 0.3" in browser.ask(NAMES) and len(browser.ask(NAMES)) == 20
+    choose_in_curves("colour", "")
+    choose_in_curves("only-outside", "free")
+    choose_in_curves("only-poisson", "0.3")
+    assert browser.ask(traces) == 1
+    hover = browser.ask("document.getElementById('plot').data[0].text")
+    assert len(hover) == 7 and all("ν = 0.3" in text and "outside = free" in text for text in hover)
+    choose_in_curves("only-outside", "")
+    assert browser.ask(NAMES) == ["ν = 0.3, outside = coarse", "ν = 0.3, outside = free"]
+    choose_in_curves("only-poisson", "")
     buttons = browser.ask("[...document.querySelectorAll('.modebar-btn')].map(one => one.dataset.title)")
     assert "Zoom" in buttons and not any("Share" in button or "loud" in button for button in buttons)
     table = json.loads(browser.ask("document.getElementById('data').textContent"))
@@ -158,9 +177,8 @@ def test_every_scene_has_a_curve_that_can_be_hidden(browser, path):
     )
     browser.ask("void Plotly.restyle('plot', {visible: 'legendonly'}, [0])")
     assert browser.ask("document.querySelectorAll('#plot .scatterlayer .trace').length") == 39
-    choose = "e => { e.value = 'speedup'; e.dispatchEvent(new Event('input', {bubbles: true})); }"
-    browser.ask(f"({choose})(document.querySelector('.axes select[name=y]'))")
-    assert browser.ask("document.getElementById('plot').layout.yaxis.title.text") == "speed-up"
+    choose_in_curves("y", "speedup")
+    assert browser.ask("document.getElementById('plot').layout.yaxis.title.text") == "speed-up over full order"
     assert browser.messages == []
 
 

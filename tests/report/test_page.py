@@ -127,7 +127,7 @@ def test_failures_come_first_and_say_why():
     assert set(states[:count]) == {"failed"}
     assert sorted(table.order) == list(range(data["status"].size))
     text = render(data, "small")
-    assert text.index("it went wrong") < text.index("<svg") < text.index('id="table"')
+    assert text.index(f"Failed cases: {count}") < text.index("<svg") < text.index("it went wrong") < text.index('id="table"')
     assert 'id="guide"' not in text  # F_exact is not known
 
 
@@ -135,7 +135,7 @@ def test_the_report_begins_with_the_answer_and_says_how_it_is_turned_round_unles
     data, words = chosen.dataset(), "epsmesh report results/chosen.nc --scene answer"
     page, section = render(data, "chosen"), guide_if_any(data)
     seen = [text.strip() for text in Reader(page).texts if text.strip()]
-    assert seen.index(section.setting) < seen.index("cases")
+    assert seen.index(section.sentence) < seen.index("cases")
     assert all(seen.index(detail) < seen.index("cases") for _, detail in section.details)
     assert words in page
     assert words not in render(data, "chosen", "<p>a scene</p>")

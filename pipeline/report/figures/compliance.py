@@ -28,13 +28,14 @@ def compliance(dataset: xr.Dataset, title: str, warning: str) -> Figure:
         if panel.ax.get_xlabel():
             panel.ax.set_xlabel(heading)
         if panel.column == 0:
-            panel.ax.set_ylabel("compliance $E d/F$, 1/mm")
+            panel.ax.set_ylabel("compliance E d / F, 1/mm")
     share(panels, facets)
     # All share it: not before all are drawn.
     figure.axes[0].set_xlim(0, _ROOM * figure.axes[0].get_xlim()[1])
     contacts = np.unique(data["touch"].values.astype(str))
-    bonded = "dashed: bonded" if "bonded" in contacts and len(contacts) > 1 else ""
-    finish(figure, title, "; ".join(filter(None, (bonded, facets.note))), warning)
+    tells = "Each line is one ε. Parallel lines: an ε-mesh adds the same compliance to every tool."
+    bonded = "Dashed: bonded." if "bonded" in contacts and len(contacts) > 1 else ""
+    finish(figure, title, " ".join(filter(None, (tells, bonded, facets.note))), warning)
     return figure
 
 
@@ -51,7 +52,7 @@ def _with_positions(dataset: xr.Dataset) -> tuple[xr.Dataset, str]:
     places = {"position": inverse if is_round else full, "of_full_order": full}
     places["force_bar"] = relative(dataset, "force_error")
     data = dataset.assign({_WHOLE: whole, "touch": known["contact"], **places})
-    return data, "1 / radius a, 1/mm" if is_round else "$E d/F_{max}$, 1/mm"
+    return data, "1 / radius of the tool a, 1/mm" if is_round else "compliance at full order E d / F_max, 1/mm"
 
 
 def _draw(ax: Axes, data: xr.Dataset) -> None:

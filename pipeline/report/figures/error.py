@@ -35,7 +35,7 @@ def error(dataset: xr.Dataset, title: str, warning: str) -> Figure:
         for ax, name in zip(row, (str(facets.x), *_COSTS), strict=True):
             if number == len(facets.rows) - 1:
                 ax.set_xlabel(heading(data[name]))
-        row[0].set_ylabel(f"error of F against $F_{{{reference}}}$, %")
+        row[0].set_ylabel(f"distance of F from F_{reference}, %")
         row[1].set_title(textwrap.fill(choices(data, shown), 60))
         write_ticks(row[0], part[facets.x])
     log_scale(axes[0, 0])
@@ -47,10 +47,15 @@ def error(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     for ax in axes[0, 1:]:
         log_scale(ax, "x")
     bar = at_most(data["exact_bar"])
-    grey = f"grey: below the error bar of F_exact{bar}" if reference == "exact" else "no F_exact: errors against F_max"
-    steps = "lines against cost: cases that no other beats in both, without errors 1.5 times as large on a finer mesh"
-    repeats = "" if spread is None else "bars: how far repeats are apart"
-    finish(figure, title, "; ".join(filter(None, (grey, steps, repeats, facets.note))), warned(warning, dataset))
+    parts = [
+        f"Distance of F from F_{reference}: lower is better.",
+        "Unknowns and run time: the line joins cases that no other case beats in both."
+        " A case whose error a finer mesh does not confirm is not on it.",
+        f"Grey: below the error bar of F_exact{bar}." if reference == "exact" and np.isfinite(floor) else "",
+        "" if spread is None else "Bars: how far repeats are apart.",
+        facets.note,
+    ]
+    finish(figure, title, " ".join(filter(None, parts)), warned(warning, dataset))
     return figure
 
 

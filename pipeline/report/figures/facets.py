@@ -84,7 +84,7 @@ def arrange(
         if len(some) < dataset.sizes[d]
     ]
     curves, columns, rows = chosen
-    note = f"shown: {', '.join([*words, *part])}" if words or part else ""
+    note = f"Shown: {', '.join([*words, *part])}." if words or part else ""
     return Facets(x, curves, columns, rows, at | fixed, fixed, note, tuple(part))
 
 

@@ -8,6 +8,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pipeline.quantities import symbol
 from pipeline.report.figures.curves import Panel, draw
 from pipeline.report.figures.facets import arrange, swept
 from pipeline.report.figures.style import FAILED, LINE, QUIET, finish, look, new_figure
@@ -39,12 +40,13 @@ def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
         low, high = row[0].get_ylim()
         if name not in _SHARES and low * high > 0 and low > -0.05 * high:
             row[0].set_ylim(0, 1.05 * high)  # a small change then looks small
-    band = f"grey: error bar of F_exact{at_most(exact_bar)}" if "force_exact_ratio" in quantities else ""
-    more = f"not shown: against {', '.join(dims[_MOST_PANELS:])}" if dims[_MOST_PANELS:] else ""
+    band = f"Grey: error bar of F_exact{at_most(exact_bar)}." if "force_exact_ratio" in quantities else ""
+    more = f"Not shown: against {', '.join(map(symbol, dims[_MOST_PANELS:]))}." if dims[_MOST_PANELS:] else ""
     figure.set_figheight(figure.get_figheight() + _LINE * max(map(_legend_lines, axes[0])))
     part = dict.fromkeys(words for column in left_out for words in column)
-    notes = ("bars: 95 % error bars", band, f"curves: {', '.join(part)}" if part else "", more)
-    finish(figure, title, "; ".join(filter(None, notes)), warning, legend=False)
+    tells = "The force against each quantity that the study varies; bars are 95 % error bars."
+    notes = (tells, band, f"Shown: {', '.join(part)}." if part else "", more)
+    finish(figure, title, " ".join(filter(None, notes)), warning, legend=False)
     return figure
 
 
@@ -109,7 +111,7 @@ def _one(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     ax.set_xticks([0], [f"{value:.4g} {unit} ± {100 * share:.2g} %"])
     ax.set_ylim(bottom=min(0.0, 1.1 * value))
     ax.set_ylabel(heading(dataset["force"]))
-    finish(figure, title, "bar: 95 % error bar", warning)
+    finish(figure, title, "The force of the one case, with its 95 % error bar.", warning)
     return figure
 
 

@@ -29,7 +29,7 @@ def force_map(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     panel = _PANEL * min(1.0, max(0.4, height / width))
     figure = new_figure(_PANEL * len(parts) + 1.2, 2 * panel + 1.3)
     axes = figure.subplots(2, len(parts), squeeze=False, sharex=True, sharey=True)
-    for row, (name, label) in enumerate((("force", heading(dataset["force"])), ("force_error", "its error bar, mN"))):
+    for row, (name, label) in enumerate((("force", heading(dataset["force"])), ("force_error", "error bar of F, mN"))):
         # Zero where contact is lost would leave no colours for the others.
         maps = [1e3 * part[name].where(part["status"] == "ok").values for part in parts]
         known = np.concatenate([values[np.isfinite(values)] for values in maps])
@@ -40,7 +40,8 @@ def force_map(dataset: xr.Dataset, title: str, warning: str) -> Figure:
             ax.set_xlabel(heading(dataset["x"]) if row == 1 else "")
             ax.set_ylabel(heading(dataset["y"]) if column == 0 else "")
         figure.colorbar(drawn, ax=axes[row].tolist(), label=label)
-    finish(figure, title, f"seen from above; bars: 95 %{f'; {facets.note}' if facets.note else ''}", warning)
+    tells = "The force at each place, seen from above, and below it its 95 % error bar."
+    finish(figure, title, " ".join(filter(None, (tells, facets.note))), warning)
     return figure
 
 
@@ -84,8 +85,8 @@ def draw_excess(ax: Axes, excess: xr.DataArray, bar: xr.DataArray, point: tuple[
     x, y = 1e3 * seen["x"].values, 1e3 * seen["y"].values
     ax.plot(x[columns], y[rows], ".", color="white", markersize=3, label="beyond the error bars")
     ax.plot(1e3 * point[0], 1e3 * point[1], "+", color=CLAIM, markersize=12, markeredgewidth=2, label="centre")
-    ax.set_xlabel("x, mm")
-    ax.set_ylabel("y, mm")
+    ax.set_xlabel("position x, mm")
+    ax.set_ylabel("position y, mm")
     return drawn
 
 

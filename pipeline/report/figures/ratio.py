@@ -16,6 +16,11 @@ from pipeline.study.sweep import Study
 # The paper's claims: 80 % of F_max at ε = 10 mm, 50 times faster.
 CLAIM_EPSILON, CLAIM_RATIO, CLAIM_SPEEDUP = 10e-3, 0.8, 50.0
 _LEAST = 0.99  # a panel reaches from here to as far above 1, at least: smaller differences do not matter
+_TELLS = {
+    "force_ratio": "F/F_max: force of the ε-mesh over that of the full-order mesh; 1 is no difference.",
+    "energy_release_ratio": "G/G_max: the same of the energy release.",
+    "speedup": "Speed-up: how many times faster than the full-order mesh.",
+}
 _FAR = 3.0  # from such a ratio on, the axis is logarithmic
 
 
@@ -36,8 +41,9 @@ def ratio(dataset: xr.Dataset, title: str, warning: str) -> Figure:
             _mark_speedup(panel, claimed=paper is not None)
         else:
             _mark_ratio(panel, claimed=paper is not None and _shows_free(paper, panel.data))
-    notes = (facets.note, "" if spread is None else "bars: how far repeats are apart")
-    finish(figure, title, "; ".join(filter(None, notes)), warned(warning, dataset))
+    parts = [_TELLS[name] for name in quantities]
+    parts += [facets.note, "" if spread is None else "Bars: how far repeats are apart."]
+    finish(figure, title, " ".join(filter(None, parts)), warned(warning, dataset))
     return figure
 
 

@@ -19,6 +19,8 @@ COLOURS = ("#00204d", "#1f5fa8", "#2a9d8f", "#b87d00", "#b0413e", "#9030f0", "#4
 MARKERS = "osD^vPX"
 CLAIM, FAILED, QUIET, LINE, GRID, PAPER = "#d81b60", "#c62828", "#555555", "#000000", "#dddddd", "#ffffff"
 SIZE = 9.0  # points
+# Inches: the width of a phone, the height of a panel there and of a line of its legend; letters of a line.
+_PHONE, _PHONE_PANEL, _PHONE_LINE, _PHONE_LETTERS = 3.7, 2.3, 0.19, 40
 # Letters of SIZE in an inch of a line, and in a line of the legend.
 _LETTERS, _LEGEND_LETTERS = 13, 24
 _DECADES = {"x": 1.4, "y": 2.2}  # from here on a logarithmic axis writes powers of ten alone
@@ -52,12 +54,17 @@ def look(position: int) -> dict[str, str]:
     return {"color": COLOURS[position % len(COLOURS)], "marker": MARKERS[position % len(MARKERS)]}
 
 
-def finish(figure: Figure, title: str, note: str = "", warning: str = "", *, legend: bool = True) -> None:
-    """Add the title, a legend beside the panels, and notes below them; with a warning these are red."""
+def finish(figure: Figure, title: str, caption: str = "", warning: str = "", *, legend: bool = True) -> None:
+    """Add the title, a legend beside the panels, and the caption below them; with a warning it is red.
+
+    The caption is the figure's label as well, for a page, which writes it itself.
+    """
     letters = int(_LETTERS * figure.get_figwidth())
     if title:
         figure.suptitle(textwrap.fill(title, int(0.9 * letters)), fontsize=SIZE + 1, fontweight="bold")
-    if lines := [textwrap.fill(text, letters) for text in (note, warning) if text]:
+    parts = [text for text in (caption, warning) if text]
+    figure.set_label(" ".join(parts))
+    if lines := [textwrap.fill(text, letters) for text in parts]:
         colour = FAILED if warning else QUIET
         figure.supxlabel("\n".join(lines), x=0.01, ha="left", fontsize=SIZE, color=colour)
     if legend:
@@ -65,8 +72,8 @@ def finish(figure: Figure, title: str, note: str = "", warning: str = "", *, leg
     figure.align_ylabels()
 
 
-def write_legend(figure: Figure) -> None:
-    """Name the curves of all panels, to the right of the upper right one."""
+def write_legend(figure: Figure, above: Axes | None = None) -> None:
+    """Name the curves of all panels, to the right of the upper right one, or in the empty axes ``above`` them."""
     known = [ax.get_legend_handles_labels() for ax in figure.axes]
     entries = {
         label: handle for handles, labels in reversed(known) for handle, label in zip(handles, labels, strict=True)
@@ -77,14 +84,48 @@ def write_legend(figure: Figure) -> None:
     first = figure.axes[0].get_subplotspec()
     last = first.get_gridspec().ncols - 1 if first else 0
     beside = next(ax for ax in figure.axes if not first or ax.get_subplotspec().colspan.start == last)
-    beside.legend(
+    (above or beside).legend(
         [entries[name] for name in names],
-        [textwrap.fill(name, _LEGEND_LETTERS) for name in names],
+        [textwrap.fill(name, _LEGEND_LETTERS if above is None else _PHONE_LETTERS) for name in names],
         loc="upper left",
-        bbox_to_anchor=(1.02, 1.0),
+        bbox_to_anchor=(1.02, 1.0) if above is None else (0.0, 1.0),
         borderaxespad=0.0,
         frameon=False,
     )
+
+
+def stack(figure: Figure) -> Figure:
+    """Put the panels of a figure below one another, each with a title, ticks and axis titles of its own: for a phone."""
+    places = {ax: spec for ax in figure.axes if (spec := ax.get_subplotspec()) is not None}
+    at = {ax: (spec.rowspan.start, spec.colspan.start) for ax, spec in places.items()}
+    panels = sorted(at, key=at.__getitem__)
+    words = {}
+    for ax in panels:
+        row, column = ([p for p in panels if at[p][i] == at[ax][i]] for i in (0, 1))
+        words[ax] = (
+            next(filter(None, (p.get_title() for p in (ax, *column, *row))), ""),
+            next(filter(None, (p.get_xlabel() for p in (ax, *reversed(column)))), ""),
+            next(filter(None, (p.get_ylabel() for p in (ax, *row))), ""),
+        )
+    legends = [legend for ax in panels if (legend := ax.get_legend()) is not None]
+    is_beside = len(legends) == 1 and legends[0].get_bbox_to_anchor().x0 > legends[0].axes.bbox.x1
+    lines = sum(text.get_text().count("\n") + 1 for text in legends[0].get_texts()) if is_beside else 0
+    heights = [_PHONE_LINE * lines + 0.01, *([_PHONE_PANEL] * len(panels))]
+    figure.set_size_inches(_PHONE, sum(heights) + 0.4 * len(panels))
+    grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+    for number, ax in enumerate(panels, start=1):
+        ax.set_subplotspec(grid[number, 0])
+        ax.tick_params(labelbottom=True, labelleft=True)
+        title, x, y = (" ".join(text.split()) for text in words[ax])
+        ax.set_title(textwrap.fill(title, _PHONE_LETTERS))
+        ax.set_xlabel(textwrap.fill(x, _PHONE_LETTERS))
+        ax.set_ylabel(textwrap.fill(y, 26))
+    if is_beside:
+        legends[0].remove()
+        above = figure.add_subplot(grid[0, 0])
+        above.axis("off")
+        write_legend(figure, above)
+    return figure
 
 
 def log_scale(ax: Axes, which: str = "y") -> None:

@@ -7,14 +7,25 @@ from shlex import quote as shell
 from typing import Any
 from urllib.parse import quote
 
+import matplotlib as mpl
 import xarray as xr
 
 from pipeline.files import write_whole
 from pipeline.pages import hash_of, joined, render_page
-from pipeline.report.figures import choose, describe, figure
+from pipeline.report.figures import choose, figure
+from pipeline.report.figures.style import STYLE, stack
 from pipeline.report.guide import guide_if_any
 from pipeline.report.page.cases import FIRST_ROWS, case_table
-from pipeline.report.page.facts import by_status, facts, origins, provenance, reproduce, struck, without_exact
+from pipeline.report.page.facts import (
+    by_status,
+    facts,
+    origins,
+    provenance,
+    reproduce,
+    struck,
+    summary,
+    without_exact,
+)
 from pipeline.report.page.inline import inline_svg
 from pipeline.report.table import warnings_of
 
@@ -62,6 +73,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         warnings=warnings_of(dataset),
         figures=_figures(dataset),
         guide=guide,
+        answer=guide.sentence if guide else summary(dataset),
         table=table,
         main=next((name for name in _MAIN if name in names), "force"),
         first_rows=FIRST_ROWS,
@@ -82,10 +94,13 @@ def _data_tables() -> str:
 
 
 def _figures(dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return the figures that suit the study, as SVG to stand in the page, with what they show."""
+    """Return the figures that suit the study as SVG, for a wide page and for a phone, with what to see."""
     found: list[dict[str, Any]] = []
     for kind in choose(dataset):
         if kind != "nothing":
-            svg, width = inline_svg(figure(dataset, kind, titled=False), kind)
-            found.append({"kind": kind, "caption": describe(kind), "svg": svg, "width": width})
+            drawn = figure(dataset, kind, titled=False)
+            svg, width = inline_svg(drawn, kind)
+            with mpl.rc_context(STYLE):
+                phone, _ = inline_svg(stack(drawn), f"{kind}-phone")
+            found.append({"kind": kind, "caption": drawn.get_label(), "svg": svg, "width": width, "phone": phone})
     return found

@@ -10,6 +10,7 @@ from markupsafe import Markup
 from pipeline.pages import json_in_page
 from pipeline.quantities import LARGEST, QUANTITIES
 from pipeline.report.values import by_case
+from pipeline.report.words import heading as title_of_axis
 from pipeline.report.words import is_numeric, number, scale, symbol
 
 # Rows of a page of the table.
@@ -45,7 +46,7 @@ _DIGITS = 4
 class Column:
     """A column: ``values`` are numbers (None: none) or, where there are ``words``, the index of a word.
 
-    ``keys`` sort the words of a swept number; ``hint`` is the long name; ``is_first`` columns are shown at first, an
+    ``keys`` sort the words of a swept number; ``hint`` is the long name, ``axis`` the title of an axis; ``is_first`` columns are shown at first, an
     ``is_axis`` column is swept.
     """
 
@@ -58,6 +59,7 @@ class Column:
     is_filter: bool = False
     is_first: bool = True
     is_axis: bool = False
+    axis: str = ""
 
     def text(self, row: int) -> str:
         """Return what stands in a row."""
@@ -117,7 +119,17 @@ def _axis(dataset: xr.Dataset, dim: str, position: int, dims: list[str]) -> Colu
     keys = [min(float(value), 1e300) for value in values] if is_numeric(coordinate) else None
     hint = str(coordinate.attrs.get("long_name", dim))
     words = [number(coordinate, value) for value in values]
-    return Column(dim, symbol(coordinate), codes.tolist(), hint, words, keys, is_filter=True, is_axis=True)
+    return Column(
+        dim,
+        symbol(coordinate),
+        codes.tolist(),
+        hint,
+        words,
+        keys,
+        is_filter=True,
+        is_axis=True,
+        axis=title_of_axis(coordinate),
+    )
 
 
 def _quantity(array: xr.DataArray, name: str) -> Column:
@@ -129,7 +141,8 @@ def _quantity(array: xr.DataArray, name: str) -> Column:
     else:
         flat = array.values.ravel()
         values = [_rounded(value, name, factor) if np.isfinite(value) else None for value in flat]
-    return Column(name, f"{heading} ({unit})" if unit else heading, values, hint, is_first=name in _SHOWN)
+    title = f"{heading} ({unit})" if unit else heading
+    return Column(name, title, values, hint, is_first=name in _SHOWN, axis=title_of_axis(array))
 
 
 def _rounded(value: float, name: str, factor: float) -> float | int:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from pipeline.quantities import write
 from pipeline.report.times import doubts
 from pipeline.report.values import by_case, relative
 from pipeline.report.words import choices
@@ -57,6 +58,17 @@ def facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
     if taken := _taken(dataset):
         found.append(("run", taken))
     return found
+
+
+def summary(dataset: xr.Dataset) -> str:
+    """Return what came out, in a sentence, where a study has no F_exact to measure errors against."""
+    force, size = dataset["force"].values, dataset["force"].size
+    known = int(np.isfinite(force).sum())
+    if not known:
+        return "No case has a force."
+    lowest, highest = (write("force", float(f"{value:.4g}")) for value in (np.nanmin(force), np.nanmax(force)))
+    many = f"{known} of {size} cases have a force, from {lowest} to {highest}"
+    return f"F = {lowest}." if size == 1 else f"{many}." if known > 1 else f"One of {size} cases has a force, {lowest}."
 
 
 def by_status(dataset: xr.Dataset, status: str) -> list[dict[str, Any]]:

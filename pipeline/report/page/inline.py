@@ -22,7 +22,11 @@ _COLOUR = re.compile("|".join(_THEME))
 
 
 def inline_svg(figure: Figure, name: str) -> tuple[Markup, int]:
-    """Return ``figure`` as an ``<svg>`` element, and its width (CSS pixels); ``name`` goes before every name in it."""
+    """Return ``figure`` as an ``<svg>`` element, and its width (CSS pixels); ``name`` goes before every name in it.
+
+    Its caption is left to the page. It is never shown smaller than it is drawn: letters would be.
+    """
+    figure.supxlabel("")
     with mpl.rc_context(STYLE):
         buffer = StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None})
@@ -34,5 +38,5 @@ def inline_svg(figure: Figure, name: str) -> tuple[Markup, int]:
     points = float(re.findall(r'width="([\d.]+)pt"', head)[0])
     width = round(points * 4 / 3)
     head = re.sub(r' (width|height)="[^"]*"', "", head)
-    head = f'{head} style="max-width: {1.3 * width:.0f}px; min-width: {points:.0f}px" aria-hidden="true"'
+    head = f'{head} style="max-width: {1.3 * width:.0f}px; min-width: {width:.0f}px" aria-hidden="true"'
     return Markup(f"{head}>{_COLOUR.sub(lambda found: _THEME[found[0]], rest)}".strip()), width

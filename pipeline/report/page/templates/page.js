@@ -3,7 +3,7 @@
 const { columns, order, rows: step } = JSON.parse(document.getElementById("data").textContent);
 const byName = new Map(columns.map((column) => [column.name, column]));
 const form = document.getElementById("filters");
-const escaped = (text) => text.replace(/[&<>"']/g, (sign) => `&#${sign.charCodeAt(0)};`);
+const escaped = (text) => text.replace(/[&<>"'$]/g, (sign) => `&#${sign.charCodeAt(0)};`);
 
 function textOf(column, row) {
   const value = column.values[row];
@@ -93,33 +93,70 @@ follow();
 table.on("draw", write);
 window.addEventListener("hashchange", follow);
 
-// The curves: one for each combination of what is swept, but for what is drawn across.
+// The curves: one for each combination of what is swept, but for what is drawn across. Few have a colour and a name each;
+// many share those of one swept quantity.
+const MOST_NAMED = 7;
 const axes = document.querySelector(".axes");
 const swept = columns.filter((column) => column.is_axis && column.words.length > 1);
 const measured = columns.filter((column) => !column.words && column.name !== "case");
 const alone = (column) => ({ column, label: (row) => `${column.heading} = ${textOf(column, row)}` });
 const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const nameOf = (labels, row) => labels.map(({ label }) => label(row)).join(", ");
+const isShown = (row) =>
+  swept.every((column) => {
+    const wanted = axes.elements[`only-${column.name}`].value;
+    return !wanted || wanted === textOf(column, row);
+  });
 
-function curves(x, y) {
+// The rows of each curve across `x`.
+function groups(x) {
   const along = x.is_axis ? x : byName.get("epsilon") || swept[0];
   const others = swept.filter((column) => column !== along).map(alone);
-  const groups = new Map();
-  for (const row of [...order].sort((a, b) => a - b)) {
-    const name = others.map(({ label }) => label(row)).join(", ");
-    if (!groups.has(name)) groups.set(name, []);
-    groups.get(name).push(row);
+  const found = new Map();
+  for (const row of [...order].sort((a, b) => a - b).filter(isShown)) {
+    const name = nameOf(others, row);
+    if (!found.has(name)) found.set(name, []);
+    found.get(name).push(row);
   }
-  const bars = ["force", "accuracy"].includes(y.name) && byName.get("force_error");
-  return [...groups].map(([name, rows]) => ({
-    name: escaped(name),
-    x: rows.map((row) => (x.words ? place(x, x.values[row]) : x.values[row])),
-    y: rows.map((row) => y.values[row]),
-    text: rows.map((row) => escaped(`case ${row}: ${columns.filter((c) => c.is_axis).map((c) => alone(c).label(row)).join(", ")}`)),
-    error_y: bars ? { array: rows.map((row) => (y.values[row] * bars.values[row]) / 100), thickness: 1 } : undefined,
-    hovertemplate: "%{text}<br>%{y}<extra></extra>",
-    mode: x.keys || !x.words ? "lines+markers" : "markers",
-  }));
+  return [found, others.map(({ column }) => column)];
 }
+
+// What colours tell apart: what was chosen; else each curve, where there are few; else what has few values, outside first.
+function coloured(count, others) {
+  const chosen = axes.elements.colour.value;
+  if (chosen) return others.find(({ name }) => name === chosen);
+  if (count <= MOST_NAMED) return undefined;
+  const few = others.filter(({ words }) => words.length <= MOST_NAMED);
+  return few.find(({ name }) => name === "outside") || few.at(-1) || others[0];
+}
+
+function curves(x, y) {
+  const [found, others] = groups(x);
+  const by = coloured(found.size, others);
+  const named = new Map();
+  const bars = byName.get("force_error") && ["force", "force_exact_ratio", "accuracy"].includes(y.name);
+  return [...found].map(([name, rows]) => {
+    const entry = by ? alone(by).label(rows[0]) : name;
+    const isFirst = !named.has(entry);
+    if (isFirst) named.set(entry, named.size);
+    const number = named.get(entry);
+    return {
+      name: escaped(entry),
+      legendgroup: String(number),
+      showlegend: isFirst,
+      x: rows.map((row) => (x.words ? place(x, x.values[row]) : x.values[row])),
+      y: rows.map((row) => y.values[row]),
+      text: rows.map((row) => escaped(`case ${row}: ${nameOf(columns.filter((c) => c.is_axis).map(alone), row)}`)),
+      error_y: bars ? { array: rows.map((row) => barOf(y, row)), thickness: 1 } : undefined,
+      line: { color: style(`--curve-${(number % 7) + 1}`), dash: number < 7 ? "solid" : "dash" },
+      marker: { symbol: number % 7 },
+      hovertemplate: "%{text}<br>%{y}<extra></extra>",
+      mode: x.keys || !x.words ? "lines+markers" : "markers",
+    };
+  });
+}
+
+const barOf = (y, row) => (y.values[row] * byName.get("force_error").values[row]) / 100;
 
 // Numbers are to scale, in the unit that is read, the full order a step past the largest; words are in a row.
 function place(column, index) {
@@ -128,10 +165,13 @@ function place(column, index) {
   return column.keys[index] < 1e300 ? Number.parseFloat(column.words[index]) : 1.2 * Math.max(...finite, 0) || 1;
 }
 
+const tickOf = (column, word) => (column.keys ? word.split(" ")[0] : word);
+
 function plot() {
   const [x, y] = ["x", "y"].map((name) => byName.get(axes.elements[name].value));
-  const ticks = x.words && { tickvals: x.words.map((_, i) => place(x, i)), ticktext: x.words.map(escaped) };
-  const lines = { gridcolor: style("--grid"), zeroline: false };
+  const ticks = x.words && { tickvals: x.words.map((_, i) => place(x, i)), ticktext: x.words.map((word) => escaped(tickOf(x, word))) };
+  const isNarrow = innerWidth < 700;
+  const lines = { gridcolor: style("--grid"), zeroline: false, automargin: true };
   const type = axes.elements.log.checked ? "log" : "linear";
   Plotly.react(
     "plot",
@@ -140,24 +180,36 @@ function plot() {
       paper_bgcolor: "transparent",
       plot_bgcolor: "transparent",
       font: { color: style("--ink"), size: 14 },
-      colorway: [1, 2, 3, 4, 5, 6, 7].map((number) => style(`--curve-${number}`)),
       hovermode: "closest",
       showlegend: true,
-      legend: innerWidth < 700 ? { orientation: "h", y: -0.3 } : {},
-      margin: { t: 20, r: 20 },
-      xaxis: { ...lines, ...ticks, title: { text: escaped(x.hint || x.heading) } },
-      yaxis: { ...lines, type, title: { text: escaped(y.heading) } },
+      legend: isNarrow ? { orientation: "h", yref: "container", y: 1, yanchor: "top" } : {},
+      margin: { t: isNarrow ? 20 : 40, r: 20 },
+      modebar: { bgcolor: "transparent", color: style("--quiet"), activecolor: style("--ink") },
+      xaxis: { ...lines, ...ticks, title: { text: wrapped(x.axis, isNarrow ? 36 : 80) } },
+      yaxis: { ...lines, type, title: { text: wrapped(y.axis, 40) } },
     },
     {
       responsive: true,
       displaylogo: false,
+      displayModeBar: !isNarrow,
       plotlyServerURL: "", // nothing of a page leaves it
       modeBarButtonsToRemove: ["sendChartToCloud", "select2d", "lasso2d"],
     },
   );
 }
 
+// Return text in lines of about so many letters.
+function wrapped(text, letters) {
+  const lines = [""];
+  for (const word of text.split(" ")) {
+    if (lines.at(-1) && lines.at(-1).length + word.length > letters) lines.push("");
+    lines.push(`${lines.pop()} ${word}`.trim());
+  }
+  return lines.map(escaped).join("<br>");
+}
+
 if (swept.length && measured.length) {
+  axes.elements.colour.append(new Option("automatic", ""), ...swept.map((column) => new Option(column.heading, column.name)));
   axes.addEventListener("input", plot);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", plot);
   axes.closest("section").hidden = false;
