@@ -47,6 +47,6 @@ def guide(
         found = make_guide(dataset, accuracy, budget)
     except DatasetError as wrong:
         fail(of_file(file, str(wrong), _HOWTO))
-    more = "" if verbose else "More: corrections of F and what is missing with --verbose, figures with `epsmesh report`."
+    more = "" if verbose else "More: --verbose for corrections of F and what is missing, `epsmesh report` for figures."
     say(found.to_dict(), found.text(verbose=verbose), *filter(None, [more]))
     raise typer.Exit(DONE if found.answer else SOME_FAILED)

@@ -27,7 +27,7 @@ def text(guide: Guideline, *, verbose: bool = False) -> str:
         [f"{scenes(guide)}."],
         others(guide),
         table.to_string(index=False).splitlines() if len(table) > 1 else [],
-        [f"Times: {doubt}." for doubt in guide.doubts],
+        [f"{doubt[0].upper()}{doubt[1:]}." for doubt in guide.doubts],
         _reasons("scenes that are not covered", guide.left_out),
         _reasons("mesh settings that are incomplete", guide.unjudged),
     ]
@@ -69,8 +69,9 @@ def _no_answer(guide: Guideline) -> str:
     parts = {"distance of F from F_exact": best.distance, "error bar of F": best.force_bar}
     parts |= {"error bar of F_exact": best.exact_bar}
     total = " + ".join(f"{percent(part)} {name}" for name, part in parts.items())
-    alone = f" The error bar of F alone is within {percent(guide.accuracy)}." if best.force_bar <= guide.accuracy else ""
-    return f"{none}. Best: {_named(guide, best)}, within {percent(best.error)} ({total}).{alone}"
+    found = f"{none}. Best: {_named(guide, best)}, within {percent(best.error)} ({total})."
+    alone = best.force_bar <= guide.accuracy
+    return f"{found} The error bar of F alone is within {percent(guide.accuracy)}." if alone else found
 
 
 def details(guide: Guideline) -> list[tuple[str, str]]:

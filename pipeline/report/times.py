@@ -18,9 +18,9 @@ def doubts(dataset: xr.Dataset) -> list[str]:
     return [text for text in (_of_load(dataset), _of_spread(dataset), slower(dataset)) if text]
 
 
-def warned(warning: str, dataset: xr.Dataset) -> str:
-    """Return what a figure of times must say below it: its ``warning``, and what makes times doubtful."""
-    return "; ".join(filter(None, (warning, *doubts(dataset))))
+def doubtful(dataset: xr.Dataset) -> list[str]:
+    """Return what makes times doubtful as whole sentences, for the caption of a figure of times."""
+    return [f"{text[0].upper()}{text[1:]}." for text in doubts(dataset)]
 
 
 def spreads(dataset: xr.Dataset, name: str) -> xr.DataArray | None:

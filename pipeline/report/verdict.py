@@ -39,8 +39,8 @@ class Verdict:
     """What a mesh setting is worth over the scenes.
 
     ``deviation`` is the worst |F/F_exact - 1|, ``error`` the worst with the error bars; ``limit`` the scene that has
-    it, its ``force`` and ``exact`` in N; there ``error`` is ``distance`` from F_exact + ``force_bar`` + ``exact_bar``, all
-    three as shares of F_exact. ``seconds``, ``dofs`` and ``cells`` are the largest over the scenes, ``usual``
+    it, its ``force`` and ``exact`` in N. There ``error`` is the sum of ``distance`` from F_exact, ``force_bar`` and
+    ``exact_bar``, all shares of F_exact. ``seconds``, ``dofs`` and ``cells`` are the largest over the scenes, ``usual``
     is the median of the seconds. ``laws`` are those that take F to F_exact, ``laws_of_full`` those that take it to
     F_max, without bars: what they leave is of ε alone, and not of the mesh's elements. A setting with ``missing``
     scenes is not judged: its errors are those of the rest.

@@ -81,7 +81,7 @@ def test_forces_and_errors_are_drawn_as_they_are_in_the_dataset():
     errors = 100 * abs(data["force_exact_ratio"].values - 1).ravel()
     drawn = np.concatenate([line.get_ydata() for line in first.lines if len(line.get_xdata()) == 3])
     assert {*np.round(drawn, 9)} <= {*np.round(errors, 9)}
-    assert first.get_xlabel() == "ε-mesh radius ε, mm"
+    assert first.get_xlabel() == "radius of the fine mesh ε, mm"
     assert heading(data["force"]) == "reaction force F, mN"
 
 

@@ -230,4 +230,4 @@ def test_lines_of_the_figure_are_as_far_apart_as_the_compliances():
     np.testing.assert_allclose(full.get_xdata(), [0.25, 1 / 3, 0.5, 1.0])
     np.testing.assert_allclose(ten.get_ydata() - full.get_ydata(), 22e-3, rtol=1e-9)
     np.testing.assert_allclose(six.get_ydata() - full.get_ydata(), 90e-3, rtol=1e-9)
-    assert "1 / radius a" in drawn.axes[-1].get_xlabel()
+    assert "1 / radius of the tool a" in drawn.axes[-1].get_xlabel()

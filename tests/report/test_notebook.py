@@ -48,7 +48,7 @@ def test_notebook_runs(name, tmp_path, monkeypatch):
     text = "".join(output.get("text", "") for output in outputs)
     assert "80 % at ε = 8." in text
     assert "exp(-ε / 5.0 mm), largest residual 0.000" in text
-    assert "Smallest ε: " in text
+    assert "is the smallest ε that suffices" in text
     assert sum("image/png" in output.get("data", {}) for output in outputs) == 5
     assert len((tmp_path / "small.csv").read_text().splitlines()) == 1 + (56 if name == "figure" else 7)
     assert not [output for output in outputs if output.get("name") == "stderr"], outputs

@@ -64,7 +64,7 @@ def test_the_centre_of_the_excess_is_found_within_a_third_of_a_step(path):
     assert not found.reaches_edge
     assert 0 < found.error[0] < 5e-3
     assert "mm" in str(found)
-    assert found.plot().get_xlabel() == ("x, mm" if path is RASTER else "length along the path, mm")
+    assert found.plot().get_xlabel() == ("position x, mm" if path is RASTER else "length along the path, mm")
 
 
 def test_an_excess_at_the_edge_is_said_to_go_on():

@@ -52,7 +52,7 @@ def _with_positions(dataset: xr.Dataset) -> tuple[xr.Dataset, str]:
     places = {"position": inverse if is_round else full, "of_full_order": full}
     places["force_bar"] = relative(dataset, "force_error")
     data = dataset.assign({_WHOLE: whole, "touch": known["contact"], **places})
-    return data, "1 / radius of the tool a, 1/mm" if is_round else "compliance at full order E d / F_max, 1/mm"
+    return data, "1 / radius of the tool a,\n1/mm" if is_round else "compliance at full order\nE d / F_max, 1/mm"
 
 
 def _draw(ax: Axes, data: xr.Dataset) -> None:

@@ -13,7 +13,7 @@ from pipeline.report.figures.curves import BARS, positions, write_ticks
 from pipeline.report.figures.facets import Facets, arrange, main_dimension, with_error
 from pipeline.report.figures.style import LEGEND, QUIET, WIDTH, finish, log_scale, look, new_figure
 from pipeline.report.pareto import front
-from pipeline.report.times import spreads, warned
+from pipeline.report.times import doubtful, spreads
 from pipeline.report.words import at_most, choices, heading, is_numeric
 
 _HEIGHT, _BESIDE = 2.3, 1.6  # inches: of a row, and of what is above and below the panels
@@ -55,7 +55,7 @@ def error(dataset: xr.Dataset, title: str, warning: str) -> Figure:
         "" if spread is None else "Bars: how far repeats are apart.",
         facets.note,
     ]
-    finish(figure, title, " ".join(filter(None, parts)), warned(warning, dataset))
+    finish(figure, title, " ".join(filter(None, [*parts, *doubtful(dataset)])), warning)
     return figure
 
 

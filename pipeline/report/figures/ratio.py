@@ -10,7 +10,7 @@ from pipeline.report.figures.curves import BARS, Panel, draw, grid, positions, s
 from pipeline.report.figures.facets import Facets, arrange
 from pipeline.report.figures.style import CLAIM, LINE, finish, log_scale, look
 from pipeline.report.table import study_of
-from pipeline.report.times import spreads, warned
+from pipeline.report.times import doubtful, spreads
 from pipeline.study.sweep import Study
 
 # The paper's claims: 80 % of F_max at ε = 10 mm, 50 times faster.
@@ -43,7 +43,7 @@ def ratio(dataset: xr.Dataset, title: str, warning: str) -> Figure:
             _mark_ratio(panel, claimed=paper is not None and _shows_free(paper, panel.data))
     parts = [_TELLS[name] for name in quantities]
     parts += [facets.note, "" if spread is None else "Bars: how far repeats are apart."]
-    finish(figure, title, " ".join(filter(None, parts)), warned(warning, dataset))
+    finish(figure, title, " ".join(filter(None, [*parts, *doubtful(dataset)])), warning)
     return figure
 
 

@@ -50,8 +50,9 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def look(position: int) -> dict[str, str]:
-    """Return colour and marker of the curve at ``position``."""
-    return {"color": COLOURS[position % len(COLOURS)], "marker": MARKERS[position % len(MARKERS)]}
+    """Return colour and marker of the curve at ``position``; markers are open where colours come again."""
+    style = {"color": COLOURS[position % len(COLOURS)], "marker": MARKERS[position % len(MARKERS)]}
+    return style if position < len(COLOURS) else style | {"markerfacecolor": PAPER}
 
 
 def finish(figure: Figure, title: str, caption: str = "", warning: str = "", *, legend: bool = True) -> None:
@@ -95,7 +96,7 @@ def write_legend(figure: Figure, above: Axes | None = None) -> None:
 
 
 def stack(figure: Figure) -> Figure:
-    """Put the panels of a figure below one another, each with a title, ticks and axis titles of its own: for a phone."""
+    """Put the panels of a figure below one another, each with its own title, ticks and axis titles: for a phone."""
     places = {ax: spec for ax in figure.axes if (spec := ax.get_subplotspec()) is not None}
     at = {ax: (spec.rowspan.start, spec.colspan.start) for ax, spec in places.items()}
     panels = sorted(at, key=at.__getitem__)

@@ -46,8 +46,8 @@ _DIGITS = 4
 class Column:
     """A column: ``values`` are numbers (None: none) or, where there are ``words``, the index of a word.
 
-    ``keys`` sort the words of a swept number; ``hint`` is the long name, ``axis`` the title of an axis; ``is_first`` columns are shown at first, an
-    ``is_axis`` column is swept.
+    ``keys`` sort the words of a swept number; ``hint`` is the long name, ``axis`` the title of an axis; ``is_first``
+    columns are shown at first, an ``is_axis`` column is swept.
     """
 
     name: str
