@@ -12,9 +12,8 @@ from pipeline.report.compliance import Against, compliance
 from pipeline.report.guide import Guide, guide
 from pipeline.report.locate import Located, locate
 from pipeline.report.pareto import front, is_by_chance
-from pipeline.report.table import words
 from pipeline.report.values import relative, with_words
-from pipeline.report.words import formula
+from pipeline.report.words import choices, formula
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -166,7 +165,7 @@ def _draw(ax: "Axes", data: xr.DataArray, dims: list[str], scene: list[str]) -> 
     x = 1e3 * data["epsilon"].values
     count = int(np.prod([data.sizes[d] for d in scene]))
     for number, labels in enumerate(_combinations(data, dims)):
-        chosen, style, name = data.sel(labels), look(number), words(labels) if labels else ""
+        chosen, style, name = data.sel(labels), look(number), choices(data.coords, labels)
         if scene:
             low, high = chosen.min(scene).values, chosen.max(scene).values
             ax.fill_between(x, low, high, color=style["color"], alpha=0.25, linewidth=0)

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from pipeline.quantities import MESH_DIMENSIONS, symbol, write
+from pipeline.quantities import MESH_DIMENSIONS
 from pipeline.report.sinking import LOADS, PLACES, Sinking
 from pipeline.report.values import by_case, relative
 from pipeline.study.load import load_text
@@ -149,15 +149,6 @@ def _study(text: str, file: str) -> Study | None:
         return load_text(text, file)
     except StudyError:
         return None
-
-
-def words(labels: Labels) -> str:
-    """Write labels as people read them."""
-    parts = []
-    for name, value in labels.items():
-        text = write(name, value)
-        parts.append(f"outside {text}" if name == "outside" else f"{symbol(name)} = {text}")
-    return ", ".join(parts) or "the one setting"
 
 
 def _labels(dataset: xr.Dataset, dims: list[str]) -> list[Labels]:

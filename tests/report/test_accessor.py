@@ -57,7 +57,7 @@ def test_ratio_is_drawn_against_epsilon_in_mm():
     np.testing.assert_allclose(line.get_xdata(), [4, 6, 10])
     here = data["force_ratio"].sel(outside="free", poisson=0.3, probe="needle").values[:3]
     np.testing.assert_allclose(line.get_ydata(), here)
-    assert "ν = 0.3, probe = needle" in [text.get_text() for text in axes.get_legend().get_texts()]
+    assert "ν = 0.3, needle" in [text.get_text() for text in axes.get_legend().get_texts()]
     exact = data.epsmesh.plot_ratio(variable="force_exact_ratio", outside="coarse", ax=axes)
     assert exact is axes
     assert "exact" in axes.get_ylabel()
@@ -71,8 +71,8 @@ def test_many_scenes_are_drawn_as_bands():
     data = dataset()
     axes = data.epsmesh.plot_ratio(by="probe")
     words = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert "probe = scalpel, outside free: median and range of 2 scenes" in words
-    band = axes.collections[words.index("probe = scalpel, outside free: median and range of 2 scenes")]
+    assert "scalpel, outside free: median and range of 2 scenes" in words
+    band = axes.collections[words.index("scalpel, outside free: median and range of 2 scenes")]
     here = data["force_ratio"].sel(probe="scalpel", outside="free", epsilon=4e-3)
     at = band.get_paths()[0].vertices
     assert {round(y, 9) for x, y in at if x == 4.0} == {round(float(y), 9) for y in here}

@@ -23,6 +23,14 @@ SORTED = (
     "Object.fromEntries([...document.querySelectorAll('#table thead th')].map(h => [h.dataset.name, h.ariaSort ?? '']))"
 )
 SHOWN = "document.querySelector('.dt-info').textContent"
+# The height of the letters that are seen, those of figures at the size that they are shown.
+LETTERS = """[...document.querySelectorAll('body *')].filter(e => e.getBoundingClientRect().width
+  && !e.closest('script, style') && [...e.childNodes].some(n => n.nodeType === 3 && n.textContent.trim())).map(e => {
+    const figure = e.closest('figure svg');
+    const size = parseFloat(getComputedStyle(e).fontSize);
+    return figure ? size * figure.getBoundingClientRect().width / figure.viewBox.baseVal.width : size;
+  })"""
+SCROLLED = "[...document.querySelectorAll('figure > div')].some(e => e.scrollWidth > e.clientWidth)"
 NAMES = "[...document.querySelectorAll('#plot .legendtext')].map(name => name.textContent)"
 
 
@@ -187,6 +195,8 @@ def test_fits_the_screen_with_enough_contrast(browser, path, width, dark):
     browser.look_like(width, 800, dark=dark)
     browser.open(path)
     assert browser.ask("document.documentElement.scrollWidth") <= width
+    assert min(browser.ask(LETTERS)) >= 11.9, "letters of figures and page are 9 pt or larger"
+    assert not browser.ask(SCROLLED)
     colours = "[...document.querySelectorAll(SELECTOR)].map(e => getComputedStyle(e).color)"
     ground = luminance(browser.ask("getComputedStyle(document.body).backgroundColor"))
     assert (ground < 0.1) == dark

@@ -150,7 +150,8 @@ def test_table_says_what_the_dataset_says():
     shown = {name: column.text(row) for name, column in columns.items()}
     assert (shown["epsilon"], shown["poisson"], shown["outside"]) == ("10 mm", "0.4", "free")
     assert float(shown["force"]) == pytest.approx(1e3 * float(case["force"]), rel=1e-3)
-    assert float(shown["force_error"]) == pytest.approx(0.01 * float(shown["force"]), rel=1e-3)  # mN
+    assert float(shown["force_error_share"]) == pytest.approx(1)  # %
+    assert float(shown["force_error"]) == pytest.approx(1e3 * float(case["force_error"]), rel=1e-3)  # mN
     assert shown["dofs"] == "1000"
     assert "force_exact_ratio" not in columns  # no F_exact was asked for
     assert columns["epsilon"].words[-1] == "full"

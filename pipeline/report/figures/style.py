@@ -20,7 +20,7 @@ MARKERS = "osD^vPX"
 CLAIM, FAILED, QUIET, LINE, GRID, PAPER = "#d81b60", "#c62828", "#555555", "#000000", "#dddddd", "#ffffff"
 SIZE = 9.0  # points
 # Inches: the width of a phone, the height of a panel there and of a line of its legend; letters of a line.
-_PHONE, _PHONE_PANEL, _PHONE_LINE, _PHONE_LETTERS = 3.7, 2.3, 0.19, 40
+_PHONE, _PHONE_PANEL, _PHONE_LINE, _PHONE_LETTERS = 3.4, 2.2, 0.19, 38
 # Letters of SIZE in an inch of a line, and in a line of the legend.
 _LETTERS, _LEGEND_LETTERS = 13, 24
 _DECADES = {"x": 1.4, "y": 2.2}  # from here on a logarithmic axis writes powers of ten alone

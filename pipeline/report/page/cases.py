@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from pipeline.pages import json_in_page
 from pipeline.quantities import LARGEST, QUANTITIES
-from pipeline.report.values import by_case
+from pipeline.report.values import by_case, relative
 from pipeline.report.words import heading as title_of_axis
 from pipeline.report.words import is_numeric, number, scale, symbol
 
@@ -19,6 +19,7 @@ _STATES = ("failed", "pending", "skipped", "lost", "ok")  # the order of the row
 # The columns of numbers; some are shown only when asked for.
 _QUANTITIES = (
     "force",
+    "force_error_share",
     "force_error",
     "force_ratio",
     "force_exact_ratio",
@@ -38,7 +39,8 @@ _QUANTITIES = (
     "energy",
     "balance",
 )
-_SHOWN = {"force", "force_error", "force_ratio", "force_exact_ratio", "speedup", "time_total"}
+_SHARE = "force_error_share"  # of F: what errors of different forces are compared by
+_SHOWN = {"force", _SHARE, "force_ratio", "force_exact_ratio", "speedup", "time_total"}
 _DIGITS = 4
 
 
@@ -93,6 +95,7 @@ def case_table(dataset: xr.Dataset) -> Table:
     dims = [str(dim) for dim in dataset["status"].dims]
     size = dataset["status"].size
     states = [str(state) for state in dataset["status"].values.ravel()]
+    dataset = dataset.assign({_SHARE: relative(dataset, "force_error")})
     numbers = Column("case", "case", list(range(size)), "the number by which `epsmesh plan` knows it")
     axes = [_axis(dataset, dim, position, dims) for position, dim in enumerate(dims)]
     quantities = [_quantity(by_case(dataset, name), name) for name in _QUANTITIES if name in dataset]
@@ -133,8 +136,10 @@ def _axis(dataset: xr.Dataset, dim: str, position: int, dims: list[str]) -> Colu
 
 
 def _quantity(array: xr.DataArray, name: str) -> Column:
-    heading = symbol(array)
-    factor, unit = scale(array)
+    if name == _SHARE:
+        heading, factor, unit = "± F", 100.0, "%"
+    else:
+        heading, (factor, unit) = symbol(array), scale(array)
     hint = str(array.attrs.get("long_name", name))
     if np.issubdtype(array.dtype, np.integer):
         values: list[Any] = [int(value) if value >= 0 else None for value in array.values.ravel()]
@@ -142,14 +147,16 @@ def _quantity(array: xr.DataArray, name: str) -> Column:
         flat = array.values.ravel()
         values = [_rounded(value, name, factor) if np.isfinite(value) else None for value in flat]
     title = f"{heading} ({unit})" if unit else heading
-    return Column(name, title, values, hint, is_first=name in _SHOWN, axis=title_of_axis(array))
+    return Column(
+        name, title, values, hint, is_first=name in _SHOWN, axis=title if name == _SHARE else title_of_axis(array)
+    )
 
 
 def _rounded(value: float, name: str, factor: float) -> float | int:
     if name in ("dofs", "cells", "iterations"):
         return int(value)
     # Ratios near 1 are told apart by what they differ from it.
-    return float(f"{value * factor:.{_DIGITS + 2 if name in ('force_ratio', 'accuracy') else _DIGITS}g}")
+    return float(f"{value * factor:.{_DIGITS + 2 if name in ('force_ratio', 'force_exact_ratio') else _DIGITS}g}")
 
 
 def _texts(name: str, values: Any, hint: str, *, is_filter: bool = False, is_first: bool = True) -> Column:

@@ -134,7 +134,7 @@ function curves(x, y) {
   const [found, others] = groups(x);
   const by = coloured(found.size, others);
   const named = new Map();
-  const bars = byName.get("force_error") && ["force", "force_exact_ratio", "accuracy"].includes(y.name);
+  const bars = ["force", "force_exact_ratio"].includes(y.name) && byName.get("force_error_share");
   return [...found].map(([name, rows]) => {
     const entry = by ? alone(by).label(rows[0]) : name;
     const isFirst = !named.has(entry);
@@ -147,7 +147,7 @@ function curves(x, y) {
       x: rows.map((row) => (x.words ? place(x, x.values[row]) : x.values[row])),
       y: rows.map((row) => y.values[row]),
       text: rows.map((row) => escaped(`case ${row}: ${nameOf(columns.filter((c) => c.is_axis).map(alone), row)}`)),
-      error_y: bars ? { array: rows.map((row) => barOf(y, row)), thickness: 1 } : undefined,
+      error_y: bars ? { array: rows.map((row) => (y.values[row] * bars.values[row]) / 100), thickness: 1 } : undefined,
       line: { color: style(`--curve-${(number % 7) + 1}`), dash: number < 7 ? "solid" : "dash" },
       marker: { symbol: number % 7 },
       hovertemplate: "%{text}<br>%{y}<extra></extra>",
@@ -155,8 +155,6 @@ function curves(x, y) {
     };
   });
 }
-
-const barOf = (y, row) => (y.values[row] * byName.get("force_error").values[row]) / 100;
 
 // Numbers are to scale, in the unit that is read, the full order a step past the largest; words are in a row.
 function place(column, index) {
