@@ -245,7 +245,7 @@ def _size(body: Section) -> str:
 
 def _regions(body: Section) -> str:
     """Write what a body is made of besides its material."""
-    layers, inclusions = body.get("layers", ()), body.get("inclusion", ())
+    layers, inclusions = body.get("layer", ()), body.get("inclusion", ())
     sizes = [piece["thickness"] for piece in layers]
     sizes += [f"{p.get('radius') or ' × '.join(p['axes'])} at {' '.join(p['at'])}" for p in inclusions]
     return "".join(

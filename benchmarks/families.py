@@ -137,7 +137,7 @@ def _mesh_of_design(dice: Dice, scene: Section) -> Section:
 def _not_straight(scene: Section, mesh: Section) -> Thrown:
     """Raise the degree where a piece of the body needs it."""
     body = scene["body"]
-    pieces = (scene["material"], *body.get("layers", ()), *body.get("inclusion", ()))
+    pieces = (scene["material"], *body.get("layer", ()), *body.get("inclusion", ()))
     if max(piece["poisson"] for piece in pieces) >= MOST_STRAIGHT:
         mesh["degree"] = max(mesh["degree"], 2)
     return scene, mesh
@@ -234,7 +234,7 @@ def regions(dice: Dice) -> Thrown:
         inclusions = [{"name": "inclusion", "at": [mm(x), mm(y), mm(-depth)], **shape, **_other_tissue(dice)}]
     probe = _blade(dice, 5.0) if dice.chance(0.25) else {"shape": "disc", "radius": "1 mm"}
     scene = {
-        "body": {**body, "layers": layers, "inclusion": inclusions},
+        "body": {**body, "layer": layers, "inclusion": inclusions},
         "material": _tissue(dice.one_of(_POISSON)),
         "probe": probe | {"depth": "0.01 mm", "contact": dice.one_of(_BONDED)},
     }
@@ -337,7 +337,7 @@ def contact(dice: Dice) -> Thrown:
             }
             for number in range(int(dice.random.integers(1, 3)))
         ]
-        body = _cylinder(dice.log(5.0, 15.0), height) | {"layers": layers}
+        body = _cylinder(dice.log(5.0, 15.0), height) | {"layer": layers}
     elif kind == "off axis":
         width, height = dice.log(12.0, 30.0), dice.log(2.0, 12.0)
         body = _cylinder(width / 2, height) if dice.chance(0.5) else _box(width, 14, height)
@@ -385,7 +385,6 @@ def slits(dice: Dice) -> Thrown:
     is_open, bonded = dice.chance(0.3), dice.chance(0.5)
     size = [mm(length + 2 + dice.log(3.0, 8.0), ".3f"), mm(width), mm(height, ".3f")]
     probe: Section = {
-        "action": "cut",
         "shape": "blade",
         "length": mm(length),
         "width": mm(dice.log(0.3, 1.0)),

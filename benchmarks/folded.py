@@ -120,7 +120,7 @@ def study_of(file: Path, points: FloatArray, exact: bool = False) -> Study:
                 "body": {"shape": "surface", "file": str(file), "unit": "mm",
                          "fixed": {"below": f"{low + 0.25 * (high - low):.3f} mm"}},
                 "material": {"young": "5 kPa", "poisson": 0.45},
-                "probe": {"action": "pierce", "shape": "disc", "radius": "1.5 mm", "depth": "0.2 mm",
+                "probe": {"shape": "disc", "radius": "1.5 mm", "depth": "0.2 mm",
                           "axis": [0, 0, -1], "at": [f"{x:.4f} mm" for x in top]},
                 "mesh": {"accuracy": "1 %"}, "solve": {"exact": exact},
             })  # fmt: skip

@@ -29,7 +29,7 @@ from pipeline.study.load import parse
 WARM = {
     "body": {"shape": "box", "size": ["30 mm", "30 mm", "15 mm"], "fixed": "bottom"},
     "material": {"young": "10 kPa", "poisson": 0.3},
-    "probe": {"action": "pierce", "shape": "disc", "radius": "2 mm", "depth": "0.1 mm"},
+    "probe": {"shape": "disc", "radius": "2 mm", "depth": "0.1 mm"},
     "mesh": {"epsilon": "full", "fine": "6 mm", "coarse": "6 mm", "rim": "1 mm", "growth": 0.9, "degree": 1},
     "solve": {"exact": False},
 }

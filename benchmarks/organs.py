@@ -37,9 +37,9 @@ from pipeline.study.toml import to_toml
 MESHES = Path(__file__).parents[1] / "meshes"
 LIVER = {"shape": "surface", "file": "liver.stl", "unit": "mm", "fixed": {"below": "-20 mm"}}
 KIDNEY = {"shape": "surface", "file": "kidney.obj", "unit": "mm", "fixed": {"below": "-8 mm"}}
-DISC = {"action": "pierce", "shape": "disc", "radius": "4 mm", "depth": "0.3 mm"}
-BLADE = {"action": "cut", "shape": "blade", "length": "8 mm", "width": "2 mm", "depth": "0.3 mm"}
-BALL = {"action": "pierce", "shape": "sphere", "radius": "8 mm", "depth": "0.5 mm", "contact": "unilateral"}
+DISC = {"shape": "disc", "radius": "4 mm", "depth": "0.3 mm"}
+BLADE = {"shape": "blade", "length": "8 mm", "width": "2 mm", "depth": "0.3 mm"}
+BALL = {"shape": "sphere", "radius": "8 mm", "depth": "0.5 mm", "contact": "unilateral"}
 THICK, THIN = {"thick lobe": "-25 mm 0 mm"}, {"thin lobe": "60 mm -8 mm"}
 Scene = tuple[dict[str, Any], list[float], dict[str, Any], dict[str, str]]
 # Body, ν, probe, places by name.

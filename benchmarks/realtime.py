@@ -61,17 +61,17 @@ axes = ["7 mm", "5 mm", "4 mm"]
 young = "35 kPa"
 poisson = 0.4
 """
-_LAYERS = """[[body.layers]]
+_LAYERS = """[[body.layer]]
 name = "skin"
 thickness = "7 mm"
 young = "30 kPa"
 poisson = 0.4
-[[body.layers]]
+[[body.layer]]
 name = "fat"
 thickness = "9 mm"
 young = "5 kPa"
 poisson = 0.45
-[[body.layers]]
+[[body.layer]]
 name = "muscle"
 young = "20 kPa"
 poisson = 0.45

@@ -113,7 +113,7 @@ def write(file: File, organ: Organ, folder: Path) -> dict[str, Any]:
 
 def solve(body: dict[str, Any], place: str, folder: Path, axis: list[float] | None = None) -> dict[str, Any]:
     """Return F (N), its bar, and the axis and height (m) of one place, or why there is none."""
-    probe: dict[str, Any] = {"action": "pierce", "shape": "disc", "radius": f"{RADIUS} mm", "depth": "0.3 mm"}
+    probe: dict[str, Any] = {"shape": "disc", "radius": f"{RADIUS} mm", "depth": "0.3 mm"}
     probe["at"] = [f"{x} mm" for x in PLACES[place]]
     raw = {
         "body": body | {"fixed": {"below": "-20 mm"}},

@@ -3,7 +3,7 @@
 from typing import Any
 
 BOX = {"shape": "box", "size": ["60 mm", "60 mm", "20 mm"], "fixed": "bottom"}
-DISC = {"action": "pierce", "shape": "disc", "radius": "2 mm", "depth": "0.2 mm"}
+DISC = {"shape": "disc", "radius": "2 mm", "depth": "0.2 mm"}
 
 
 def study(

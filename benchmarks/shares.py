@@ -11,8 +11,8 @@ from benchmarks.processor import ROOT, run
 from benchmarks.scenes import BOX, DISC, graded, study
 from benchmarks.tables import Table, options
 
-BLADE = {"action": "cut", "shape": "blade", "length": "6 mm", "width": "1 mm", "depth": "0.05 mm", "slice": "0.05 mm"}
-BALL = {"action": "pierce", "shape": "sphere", "radius": "8 mm", "depth": "0.3 mm", "contact": "unilateral"}
+BLADE = {"shape": "blade", "length": "6 mm", "width": "1 mm", "depth": "0.05 mm", "slice": "0.05 mm"}
+BALL = {"shape": "sphere", "radius": "8 mm", "depth": "0.3 mm", "contact": "unilateral"}
 FIGURE = graded("1.5 mm", "6 mm", "0.05 mm", 0.4, outside="coarse", degree=2)
 NEAR = FIGURE | {"epsilon": "10 mm"}
 ELLIPSOID = {"shape": "ellipsoid", "axes": ["40 mm", "30 mm", "20 mm"], "fixed": {"below": "-8 mm"}}

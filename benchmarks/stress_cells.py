@@ -241,9 +241,9 @@ def _blades() -> Iterator[_Corner]:
     turned = blade(50, 0.5, direction=[1.0, 1.0, 0.0], at=["0 mm", "3 mm"])
     yield "blade 100:1 across, nu 0.45", study(0.45, box(), turned, sizes), "right"
     for slice_ in (0.01, 1.0):
-        probe = blade(10, 2, action="cut", slice=f"{slice_} mm")
+        probe = blade(10, 2, slice=f"{slice_} mm")
         yield f"blade slices {100 * slice_:g} times its depth", study(0.3, box(), probe, mesh(0.2)), "right"
-    off = blade(10, 2, action="cut", slice="1 mm", at=["20 mm", "25 mm"])
+    off = blade(10, 2, slice="1 mm", at=["20 mm", "25 mm"])
     # The work of the slice hides what the depth takes: the bar may say that F is not known.
     yield "slices in a corner, nu 0.5", study(0.5, box(), off, mesh(0.2)), "either"
 

@@ -95,10 +95,9 @@ def _solved(
     assert isinstance(body, Layered)
     height = body.heights[1] - body.heights[0]
     size = (body.half_sides[0], height) if body.is_round else (2 * body.half_sides[0], 2 * body.half_sides[1], height)
-    ends = np.cumsum([layer.thickness for layer in body.layers[:-1]]).tolist()
+    ends = np.cumsum([layer.thickness for layer in body.layer[:-1]]).tolist()
     layers = [
-        (layer.young / scope.young, layer.poisson, end)
-        for layer, end in zip(body.layers, [*ends, height], strict=False)
+        (layer.young / scope.young, layer.poisson, end) for layer, end in zip(body.layer, [*ends, height], strict=False)
     ]
     mesh = meshed(size, discs, finer, ends)
     (x, y, a), (to_x, to_y, b) = discs

@@ -29,7 +29,6 @@ _VARIANTS: tuple[dict[str, dict[str, Any]], ...] = (
     {
         "probe": {
             "shape": "blade",
-            "action": "cut",
             "length": "8 mm",
             "width": "1 mm",
             "depth": "0.2 mm",

@@ -14,13 +14,13 @@ from tests.studies import changed
 BASE: dict[str, Any] = {
     "body": {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "bottom"},
     "material": {"young": "10 kPa", "poisson": 0.3},
-    "probe": {"action": "pierce", "shape": "disc", "radius": "3 mm", "depth": "0.2 mm"},
+    "probe": {"shape": "disc", "radius": "3 mm", "depth": "0.2 mm"},
     "mesh": {"epsilon": "full", "fine": "5 mm", "coarse": "8 mm", "rim": "1 mm", "growth": 0.8, "degree": 2},
     "solve": {"exact": False},
     "plan": {"without": ["axisymmetric"]},
 }
 
-BLADE: dict[str, Any] = {"action": "cut", "shape": "blade", "length": "10 mm", "width": "3 mm", "depth": "0.1 mm"}
+BLADE: dict[str, Any] = {"shape": "blade", "length": "10 mm", "width": "3 mm", "depth": "0.1 mm"}
 
 
 def raw(**changes: Any) -> dict[str, Any]:

@@ -30,7 +30,7 @@ Study = dict[str, Any]
 BASE: Study = {
     "body": {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "bottom"},
     "material": {"young": "10 kPa", "poisson": 0.3, "density": "1060 kg/m^3"},
-    "probe": {"action": "pierce", "shape": "disc", "radius": "4 mm", "depth": "0.2 mm"},
+    "probe": {"shape": "disc", "radius": "4 mm", "depth": "0.2 mm"},
     "mesh": {"epsilon": "8 mm", "fine": "3 mm", "coarse": "8 mm", "rim": "1 mm", "growth": 0.8, "outside": "coarse"},
     "solve": {"exact": False},
 }
@@ -100,12 +100,12 @@ def _inclusion(study: Study) -> None:
 
 def _layers(study: Study) -> None:
     skin = {"name": "skin", "thickness": "4 mm", "young": "30 kPa", "poisson": 0.3, "density": "1060 kg/m^3"}
-    study["body"]["layers"] = [skin]
+    study["body"]["layer"] = [skin]
 
 
 def _poisson(value: float) -> Callable[[Study], None]:
     def change(study: Study) -> None:
-        for tissue in (study["material"], *study["body"].get("layers", ()), *study["body"].get("inclusion", ())):
+        for tissue in (study["material"], *study["body"].get("layer", ()), *study["body"].get("inclusion", ())):
             tissue["poisson"] = value
 
     return change
@@ -132,8 +132,8 @@ gmsh.initialize(); gmsh.option.setNumber("General.Terminal", 0)
 gmsh.model.occ.addBox(-20, -20, -20, 40, 40, 20); gmsh.model.occ.synchronize(); gmsh.write(sys.argv[1])
 """
 _BLADE = {"shape": "blade", "length": "8 mm", "width": "2 mm"}
-_CUT = _BLADE | {"action": "cut", "slice": "0.3 mm"}
-_SLIT = _BLADE | {"action": "cut", "width": "1 mm", "incision": "8 mm", "ahead": "3 mm"}
+_CUT = _BLADE | {"slice": "0.3 mm"}
+_SLIT = _BLADE | {"width": "1 mm", "incision": "8 mm", "ahead": "3 mm"}
 # In the order in which their changes are made: what a later one does rests on what the earlier ones have set.
 FEATURES = (
     Feature("cylinder", "body", _body(shape="cylinder", radius="20 mm", height="20 mm", fixed="bottom")),

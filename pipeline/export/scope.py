@@ -78,7 +78,7 @@ def scope_of(study: Study) -> Scope:
 def surface_tissue(case: Case) -> Tissue:
     """Return the tissue at the face of the body."""
     body = case.body
-    return body.layers[0] if isinstance(body, Layered) and body.layers else case.material
+    return body.layer[0] if isinstance(body, Layered) and body.layer else case.material
 
 
 def _is_same_but_for_poisson(case: Case, first: Case) -> bool:
@@ -114,7 +114,7 @@ def _refusal(case: Case, first: Case) -> str:
 def _flat_refusal(case: Case, first: Case, body: Layered) -> str:
     probe = case.probe
     if body.regions and case.material != first.material:
-        if body.layers:
+        if body.layer:
             return "the study has several sets of materials, and a model of layers has one, material.poisson too"
         if not _is_same_but_for_poisson(case, first):
             return "the study has several sets of materials, and a model of inclusions has one: export a study of each"

@@ -13,6 +13,7 @@ from pipeline.shapes.probe import Probe
 from pipeline.shapes.section import Section
 from pipeline.study.capabilities import obstacle
 from pipeline.study.loads import Load
+from pipeline.study.renamed import STORED
 from pipeline.study.schema import Mesh
 from pipeline.study.sweep import Case
 from pipeline.units import canonical
@@ -24,7 +25,7 @@ PHYSICS_VERSION = 6
 _UNPHYSICAL = ("action",)
 _MANY = 200_000  # sections of a large study
 # Keys of a body's other materials.
-_PIECES = ("layers", "inclusion")
+_PIECES = ("layer", "inclusion")
 
 
 def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
@@ -128,7 +129,7 @@ def _body_text(body: Body, stress: float | None = None) -> str:
         return text_of(body)
     content = (body if stress is None else _in_units_of(stress, body)).model_dump()
     ends = (*body.interfaces, body.heights[0])
-    for number, layer in enumerate(content.get("layers", ())):
+    for number, layer in enumerate(content.get("layer", ())):
         layer["thickness"] = ends[number]  # its lower end, so that equal layers have equal texts
     for inclusion, ball in zip(content["inclusion"], body.inclusion, strict=True):
         inclusion.update(axes=ball.surface.axes, radius=None)
@@ -193,7 +194,7 @@ def _slides_across_a_mirror(case: Case) -> bool:
 
 
 def _text(content: dict[str, Any]) -> str:
-    return json.dumps({key: _plain(value) for key, value in content.items()}, sort_keys=True)
+    return json.dumps({STORED.get(key, key): _plain(value) for key, value in content.items()}, sort_keys=True)
 
 
 def _plain(value: Any) -> Any:

@@ -159,7 +159,7 @@ def use_reduced_basis(plan: Plan) -> Plan:
         return plan
     operators = [operator for step in plan.meshes for operator in step.operators if _sweeps_ratios(operator)]
     obstacles = [obstacle("reduced basis", operator.case) for operator in operators]
-    tolerance = plan.study.planning.tolerance
+    tolerance = plan.study.planning.reduced_basis_error
     many = {
         solve.key
         for operator, obstacle in zip(operators, obstacles, strict=True)

@@ -8,7 +8,7 @@ from pydantic import BaseModel
 
 from pipeline.study.sweep import Case
 
-# Values by key, as mesh.fine or body.layers[1].young. A key that a shape does not have is not there.
+# Values by key, as mesh.fine or body.layer[1].young. A key that a shape does not have is not there.
 Parameters = dict[str, Any]
 
 # Digits of a number that are told apart: "3 mm" and "0.3 cm" are one length.

@@ -166,7 +166,7 @@ def solve_problem(case: Case, problem: Problem, *, estimate: bool, meshed: Case 
         SolveError: if that fails, too, or what is found cannot be.
     """
     law, movement = law_of(case), movement_of(case, meshed)
-    asked = Request(law, movement, case.solve.method, case.solve.tolerance, estimate)
+    asked = Request(law, movement, case.solve.method, case.solve.energy_tolerance, estimate)
     try:
         solution = problem.answer(asked)
     except ContactError:

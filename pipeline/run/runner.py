@@ -157,7 +157,7 @@ class StepRunner:
             record = self._records[solve.key]
             return record if record.is_ok else None
 
-        tolerance = self._plan.study.planning.tolerance
+        tolerance = self._plan.study.planning.reduced_basis_error
         if missing := lacks_memory(self._free, memory_of_basis(step.case, problem.dofs), "it"):
             found: Failure | None = Failure(missing)
         else:

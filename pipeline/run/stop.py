@@ -18,7 +18,7 @@ _IN_A_ROW = 2
 
 def waves(plan: Plan, todo: Collection[Solve]) -> list[tuple[Solve, ...]]:
     """Return the solves in the order in which they must be known: all at once, or F_exact first and then by ε."""
-    if plan.study.planning.stop_when is None:
+    if plan.study.planning.stop_near_exact is None:
         return [tuple(todo)]
     exact = tuple(solve for solve in todo if solve.is_reference)
     rest = [solve for solve in todo if not solve.is_reference]
@@ -31,7 +31,7 @@ def reason_to_skip(plan: Plan, solve: Solve, find: Callable[[str], Record | None
 
     One of full order serves every outside, and is run for the one that needs it.
     """
-    limit = plan.study.planning.stop_when
+    limit = plan.study.planning.stop_near_exact
     if limit is None or solve.is_reference or not plan.reference_keys:
         return ""
     reasons = [_reason(solve.case, row, limit, find) for row in _rows(plan, solve)]

@@ -204,20 +204,20 @@ class Drawn(Body):
 class Layered(Drawn):
     """A body with a flat top, and horizontal layers if any."""
 
-    layers: Annotated[
-        tuple[Layer, ...], Words("Horizontal layers of other materials, from the top down.", "[[body.layers]]")
+    layer: Annotated[
+        tuple[Layer, ...], Words("Horizontal layers of other materials, from the top down.", "[[body.layer]]")
     ] = ()
 
     @property
     def regions(self) -> tuple[Region, ...]:
         """Its layers from the top down, then its inclusions."""
-        return (*self.layers, *self.inclusion)
+        return (*self.layer, *self.inclusion)
 
     @property
     def interfaces(self) -> tuple[float, ...]:
         """Heights z (m) of the interfaces between layers of different materials, from the top down."""
         low, high = self.heights
-        ends = (high - total for total in accumulate(layer.thickness or inf for layer in self.layers))
+        ends = (high - total for total in accumulate(layer.thickness or inf for layer in self.layer))
         return tuple(end for end in ends if end - low > _SAME * (high - low))
 
     @property
@@ -269,4 +269,4 @@ class Layered(Drawn):
     @property
     def is_filled(self) -> bool:
         """Whether its layers reach the bottom."""
-        return len(self.interfaces) < len(self.layers)
+        return len(self.interfaces) < len(self.layer)

@@ -64,7 +64,6 @@ class Indenter(Probe):
     NOT_DRAWN: ClassVar[tuple[str, ...]] = ("action", "contact", "motion")
     SWEPT = ("depth_range",)
 
-    action: Literal["pierce"] = "pierce"
     depth: Annotated[
         Length,
         Words(

@@ -42,8 +42,14 @@ class Probe(Section, ABC):
         str, Words("Shape of the footprint: a blunt needle's tip, or a blade's edge.", '"disc"', is_used=True)
     ]
     action: Annotated[
-        Literal["pierce", "cut"], Words("What the tool does; only a blade cuts.", '"pierce"', is_used=True)
-    ] = "pierce"
+        Literal["pierce", "cut"] | None,
+        Words(
+            "Label for people who read the study. No result depends on it. The dataset has it in the study's text, and "
+            "as a dimension if it is swept.",
+            '"pierce"',
+            default="none",
+        ),
+    ] = None
     depth: Annotated[
         Length,
         Words(

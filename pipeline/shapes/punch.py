@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from math import inf
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 
@@ -63,5 +63,3 @@ class Straight(Punch):
     """A punch that moves along its axis only."""
 
     PROPORTIONAL_TO = ("depth",)
-
-    action: Literal["pierce"] = "pierce"

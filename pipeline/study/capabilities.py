@@ -101,7 +101,7 @@ def _is_flat(scene: Scene) -> bool:
 
 
 FEATURES: dict[str, Feature] = {
-    "layers": Feature("body.layers", lambda s: isinstance(s.body, Layered) and bool(s.body.layers)),
+    "layers": Feature("body.layer", lambda s: isinstance(s.body, Layered) and bool(s.body.layer)),
     "inclusion": Feature("body.inclusion", lambda s: bool(s.body.inclusion)),
     "curved body": Feature("body.shape", lambda s: not isinstance(s.body, Layered)),
     "large strains": Feature("material.law", lambda s: s.material.is_large),
@@ -112,7 +112,6 @@ FEATURES: dict[str, Feature] = {
     "tool that is not flat": Feature("probe.shape", lambda s: isinstance(s.probe, Indenter)),
     "found contact": Feature("probe.contact", lambda s: s.probe.is_unilateral),
     "frictionless contact": Feature("probe.contact", lambda s: s.probe.contact == "frictionless"),
-    "cut": Feature("probe.action", lambda s: s.probe.action == "cut"),
     "slice": Feature("probe.slice", lambda s: getattr(s.probe, "slice", 0.0) != 0, write=in_mm),
     "slit": Feature("probe.incision", lambda s: s.probe.slit is not None, write=in_mm),
     "open slit": Feature("probe.ends", lambda s: bool(s.probe.slit and s.probe.slit.is_open)),
@@ -201,8 +200,13 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("six motions", "slit", "a blade in a slit is pressed and drawn only: leave it out"),
     Refusal(
         "found contact",
-        "cut",
-        'tissue does not lift off a blade that cuts: use contact = "bonded" or "frictionless"',
+        "slice",
+        'tissue does not lift off a blade that slides along: use contact = "bonded"',
+    ),
+    Refusal(
+        "found contact",
+        "slit",
+        'tissue does not lift off a blade in a slit: use contact = "bonded" or "frictionless"',
     ),
     Refusal(
         "slice",
@@ -294,7 +298,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "large strains": "material.law: large displacements have no real-time model: F is in proportion to nothing",
         "slit": f"probe.incision: {_PRESSED_ONLY}",
         "six motions": f'probe.motion = "all": {_PRESSED_ONLY}',
-        "cut": f'probe.action = "cut": {_PRESSED_ONLY}',
+        "slice": f"probe.slice: {_PRESSED_ONLY}",
     },
 }
 

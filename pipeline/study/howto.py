@@ -4,9 +4,9 @@ import re
 
 # The first that a key begins with counts. Keys of tables in arrays have numbers, which are left out.
 _PAGES = {
-    "body.layers": "howto/layers",
+    "body.layer": "howto/layers",
     "body.inclusion": "howto/layers",
-    "layers": "howto/layers",
+    "layer": "howto/layers",
     "inclusion": "howto/layers",
     "body.fixed": "howto/own-body",
     "body": "howto/own-body",

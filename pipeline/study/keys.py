@@ -29,7 +29,7 @@ class Key:
 
 SECTION_TEXTS = {
     "body": "The tissue, in its own coordinates: z points out of the top face, tissue lies at z <= 0.",
-    "body.layers": "Horizontal layers of other materials under a flat top, one table each, from the top down. "
+    "body.layer": "Horizontal layers of other materials under a flat top, one table each, from the top down. "
     "Optional; every value can be swept.",
     "body.inclusion": "Balls and ellipsoids of other materials inside the body, one table each: clear of its surface, "
     "of each other and of where layers end. Optional; every value can be swept.",

@@ -129,7 +129,7 @@ def _check_top(raw: dict[str, Any], problems: Problems) -> None:
             check_text(key, value, problems)
     bodies = raw.get("body")
     tables = bodies if isinstance(bodies, list) else [bodies]
-    layered = any("layers" in table for table in tables if isinstance(table, dict))
+    layered = any("layer" in table for table in tables if isinstance(table, dict))
     for name in ("body", *(() if layered else ("material",)), "probe", "mesh"):
         if name not in raw or raw[name] == {}:
             problems.error(f"[{name}]", None, "this section is required")

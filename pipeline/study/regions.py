@@ -66,7 +66,7 @@ def tissues_of(body: Body, material: Material) -> Iterator[tuple[str, Tissue | M
         yield "material", material
     count = len(body.regions) - len(body.inclusion)
     for number, region in enumerate(body.regions):
-        place = f"layers[{number + 1}]" if number < count else f"inclusion[{number - count + 1}]"
+        place = f"layer[{number + 1}]" if number < count else f"inclusion[{number - count + 1}]"
         yield f"body.{place}", region
 
 
@@ -84,10 +84,10 @@ def _check_pieces(body: Body, problems: Problems) -> None:
 
 def _check_layers(body: Layered, problems: Problems) -> None:
     height, total = body.heights[1] - body.heights[0], 0.0
-    for number, layer in enumerate(body.layers, start=1):
-        key = f"body.layers[{number}].thickness"
+    for number, layer in enumerate(body.layer, start=1):
+        key = f"body.layer[{number}].thickness"
         if layer.thickness is None:
-            if number < len(body.layers):
+            if number < len(body.layer):
                 problems.error(key, None, "is required: only the last layer reaches the bottom by itself")
                 return
             if height - total <= _SAME * height:
@@ -181,14 +181,14 @@ def _check_sweep(bodies: Sequence[Body], axes: tuple[Axis, ...], problems: Probl
                 "[[material]]",
                 None,
                 f"is a sweep: the whole body is made of {', then of '.join(names)}; layers of one body are "
-                f"[[body.layers]]: {page_of('body.layers')}",
+                f"[[body.layer]]: {page_of('body.layer')}",
             )
-        elif any(isinstance(body, Layered) and body.layers for body in bodies):
+        elif any(isinstance(body, Layered) and body.layer for body in bodies):
             problems.warn(
                 "[[material]]",
                 None,
                 f"is a sweep, and no layer: below the layers the body is made of {', then of '.join(names)}, in a case "
-                "each; another layer is one more [[body.layers]]",
+                "each; another layer is one more [[body.layer]]",
             )
 
 

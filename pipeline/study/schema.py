@@ -189,10 +189,14 @@ class Solving(Section):
         Literal["auto", "direct", "iterative"],
         Words("Factorisation or conjugate gradients; auto takes the faster.", '"auto"'),
     ] = "auto"
-    tolerance: Annotated[
+    energy_tolerance: Annotated[
         float,
         Field(ge=1e-14, le=1e-6),  # above, forces do not balance to what every solve must show
-        Words("Of the iterative solver, in its energy norm; the error of F is its square.", "1e-8"),
+        Words(
+            "Relative error of the iterative solver in the energy norm. The solver's share in the error of F is the "
+            "square of it.",
+            "1e-8",
+        ),
     ] = 1e-6
     exact: Annotated[
         bool,
@@ -211,27 +215,23 @@ class Solving(Section):
 
 
 class Planning(Section):
-    """What the planner may leave out: reductions not to be used, and where a sweep over ε may end.
-
-    ``tolerance`` is the relative error of F that a reduced basis may cost.
-
-    ``stop_when`` is how near to F_exact F must be, at two values of ε in a row, for larger ones not to be run.
-    """
+    """What the planner may leave out: reductions not to be used, and where a sweep over ε may end."""
 
     without: Annotated[
         tuple[Literal[REDUCTIONS], ...],  # type: ignore[valid-type]
         Words("Reductions not to be used: see what `epsmesh plan` strikes out.", '["symmetry"]'),
     ] = ()
-    tolerance: Annotated[
+    reduced_basis_error: Annotated[
         float,
         Field(ge=1e-10, le=1e-2),
-        Words("Relative error of F that a reduced basis over many Poisson's ratios may cost.", "1e-6"),
+        Words("Largest relative error of F that a reduced basis over many Poisson's ratios may add.", "1e-6"),
     ] = 1e-6
-    stop_when: Annotated[
+    stop_near_exact: Annotated[
         Share | None,
         Field(gt=0, le=0.5),
         Words(
-            "Once F is this near to F_exact at two values of epsilon in a row, larger ones are not run.",
+            "Relative distance of F from F_exact at which a sweep over epsilon ends: once two values in a row are that "
+            "near, larger ones are not run.",
             '"1 %"',
             default="none: every epsilon is run",
         ),
@@ -266,7 +266,7 @@ SECTIONS: dict[str, type[Section] | Mapping[str, type[Section]]] = {
 }
 # Arrays of tables within a section: pieces of it, each with keys that can be swept.
 NESTED: dict[str, dict[str, type[Section]]] = {
-    "body": {"layers": Layer, "inclusion": Inclusion},
+    "body": {"layer": Layer, "inclusion": Inclusion},
     "load": {"traction": Traction},
 }
 # Sections that say how, not what: their lists are no sweeps.

@@ -36,7 +36,7 @@ class Axis:
     key: str  # "" for an array of tables, which sweeps the section as a whole
     labels: tuple[float | int | str, ...]
     unit: str
-    piece: str = ""  # of an array of tables within the section, such as layers[2]
+    piece: str = ""  # of an array of tables within the section, such as layer[2]
     owner: str = ""  # the name of that piece
     off: str = ""  # of a path: what becomes of places off the body, "refuse" or "lost"
 

@@ -89,5 +89,5 @@ def _unit_of(model: type[BaseModel], key: str) -> str:
 
 
 def written(place: Place) -> str:
-    """Write a place as messages do: ``layers[2].young``."""
+    """Write a place as messages do: ``layer[2].young``."""
     return "".join(f"[{step + 1}]" if isinstance(step, int) else f".{step}" for step in place).removeprefix(".")

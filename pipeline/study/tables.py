@@ -12,6 +12,7 @@ from pipeline.shapes.section import Section
 from pipeline.study.path import Way, read_path
 from pipeline.study.problems import MOST_ERRORS, Problems, closest, nearest, tuples
 from pipeline.study.read import check_text
+from pipeline.study.renamed import renamed
 from pipeline.study.schema import NESTED, SECTIONS, SINGLE
 from pipeline.study.sweep import Axis
 from pipeline.study.swept import Place, axis_of, placed, sweeps, written
@@ -196,14 +197,17 @@ def _possible(name: str, raw: dict[str, Any], problems: Problems, where: str = "
     lacking = [key for key in raw if key not in model.model_fields]
     for key in lacking[:MOST_ERRORS]:
         found = None if key in NESTED.get(name, {}) else raw[key]
-        problems.unknown(f"{where or name}.{key}", found, _lacking(models, model, str(shape), key))
+        problems.unknown(f"{where or name}.{key}", found, _lacking(name, model, str(shape), key))
     if len(lacking) > MOST_ERRORS:
         problems.unknown(where or name, None, f"… and {len(lacking) - MOST_ERRORS} more")
     return {key: value for key, value in raw.items() if key in model.model_fields}
 
 
-def _lacking(models: Mapping[str, type[Section]] | type[Section], model: type[Section], shape: str, key: str) -> str:
+def _lacking(name: str, model: type[Section], shape: str, key: str) -> str:
     """Say that a section has no such key; if other shapes have it, or one like it, which do."""
+    models = SECTIONS[name]
+    if new := renamed(name, key):
+        return new
     if key in NOT_COMPUTED:
         return NOT_COMPUTED[key]
     if not isinstance(models, Mapping):
@@ -248,7 +252,7 @@ def _model(name: str, raw: dict[str, Any], problems: Problems, where: str = "") 
     known = dict.fromkeys(key for kind in model.values() for key in kind.model_fields)
     unknown = [key for key in raw if key not in known]
     for key in unknown[:MOST_ERRORS]:
-        problems.error(f"{where}.{key}", raw[key], f"unknown key; {nearest(key, known)}")
+        problems.error(f"{where}.{key}", raw[key], renamed(name, key) or f"unknown key; {nearest(key, known)}")
     if len(unknown) > MOST_ERRORS:
         problems.error(where, None, f"… and {len(unknown) - MOST_ERRORS} more")
     return None

@@ -102,7 +102,7 @@ def _solid(comm: MPI.Comm) -> Iterator[Row]:
         for nu in (0.3, 0.5):
             scene = _scene(_SMALL, tool, nu)
             yield against_meridian(comm, f"cylinder R = 6 mm, H = 5 mm, {name}, unilateral, ν = {nu:g}", scene)
-    skin = _scene(_SMALL | {"layers": [_SKIN]}, _TOOLS["sphere"], 0.45)
+    skin = _scene(_SMALL | {"layer": [_SKIN]}, _TOOLS["sphere"], 0.45)
     yield against_meridian(comm, "the same, skin of 0.6 mm, sphere, unilateral", skin)
     egg = {"shape": "ellipsoid", "axes": ["9 mm", "9 mm", "6 mm"], "fixed": {"below": "-2 mm"}}
     yield against_meridian(comm, "ellipsoid, sphere, unilateral, ν = 0.45", _scene(egg, _TOOLS["sphere"], 0.45))

@@ -43,7 +43,7 @@ def _half_spaces(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
         force = layered_disc(solids[0], 1e-3 * thickness, solids[1], 1e-3, _DEPTH)
         force = known.in_cylinder(force, solids[1].young, nu_below, 1e-3 * FAR, _DEPTH)
         scene = {
-            "body": cylinder(FAR, FAR) | {"layers": layers([layer])},
+            "body": cylinder(FAR, FAR) | {"layer": layers([layer])},
             "material": tissue(nu_below, young_below),
             "probe": disc(1, contact="frictionless"),
         }
@@ -90,7 +90,7 @@ def _layered(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
     kinds = {"soft on firm": [soft], "soft on bone": [soft, bone], "skin and fat": [skin, fat]}
     for name, stack in [*kinds.items()][: 1 if quick else None]:
         for contact in ("bonded", "frictionless"):
-            body = cylinder(20, 20) | {"layers": layers(stack)}
+            body = cylinder(20, 20) | {"layer": layers(stack)}
             scene = {"body": body, "material": tissue(0.45), "probe": disc(2, contact=contact)}
             yield against_meridian(comm, f"cylinder of layers, {name}, a = 2 mm, {contact}", scene)
 
@@ -101,11 +101,11 @@ def _of_one_material(comm: MPI.Comm, quick: bool) -> Iterator[Row]:
         same: Section = {"material": tissue(nu), "probe": disc(2.0)}
         ball = {"name": "ball", "at": ["1 mm", "0 mm", "-5 mm"], "radius": "3 mm", **tissue(nu)}
         body = cylinder(12, 10)
-        pieces = body | {"layers": layers([(1.0, 10.0, nu)]), "inclusion": [ball]}
+        pieces = body | {"layer": layers([(1.0, 10.0, nu)]), "inclusion": [ball]}
         name = f"layer and inclusion of the same tissue, ν = {nu:g}"
         yield against_meridian(comm, name, same | {"body": pieces}, same | {"body": body})
 
 
 def _layers(radius: float, stack: _Stack) -> Section:
     """Return a cylinder that layers fill."""
-    return cylinder(radius, sum(thickness for thickness, _, _ in stack)) | {"layers": layers(stack)}
+    return cylinder(radius, sum(thickness for thickness, _, _ in stack)) | {"layer": layers(stack)}

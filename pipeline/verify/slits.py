@@ -33,7 +33,6 @@ _STRIP: dict[str, Section] = {
     "body": {"shape": "box", "size": ["4 mm", "10 mm", "30 mm"]},
     "material": {"young": "10 kPa", "poisson": 0.0},
     "probe": {
-        "action": "cut",
         "shape": "blade",
         "length": "2 mm",
         "width": "1 mm",
@@ -132,7 +131,6 @@ def _blade(comm: MPI.Comm, nu: float, contact: str, incision: float, ahead: floa
         "body": {"shape": "box", "size": ["20 mm", "20 mm", "12 mm"], "fixed": "bottom"},
         "material": {"young": "10 kPa", "poisson": nu},
         "probe": {
-            "action": "cut",
             "shape": "blade",
             "length": "6 mm",
             "width": "1 mm",

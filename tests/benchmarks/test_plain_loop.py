@@ -16,7 +16,7 @@ MESH = {"epsilon": ["6 mm", "full"], "outside": ["coarse", "fixed"], "rim": "0.3
 
 @pytest.mark.parametrize("contact", ["bonded", "frictionless"])
 def test_plain_forces_are_the_programs(contact):
-    probe = {"action": "pierce", "shape": "disc", "radius": "3 mm", "depth": "0.2 mm", "contact": contact}
+    probe = {"shape": "disc", "radius": "3 mm", "depth": "0.2 mm", "contact": contact}
     study = cases.study(mesh=MESH, probe=probe)
     forces = {index: record.force for index, record in cases.solve(mesh=MESH, probe=probe).items()}
     for case in study.cases():
@@ -56,7 +56,7 @@ def test_totals_count_what_a_case_stands_for():
 STUDY = """
 body = {shape = "box", size = ["40 mm", "40 mm", "20 mm"], fixed = "bottom"}
 material = {young = "10 kPa", poisson = 0.3}
-probe = {action = "pierce", shape = "disc", radius = "3 mm", depth = "0.2 mm"}
+probe = {shape = "disc", radius = "3 mm", depth = "0.2 mm"}
 mesh = {epsilon = "full", fine = "6 mm", coarse = "8 mm", rim = "1 mm", growth = 0.8}
 [solve]
 exact = true

@@ -53,7 +53,7 @@ def test_starter_is_a_study_with_every_key():
             assert f"\n{key.name} = " in text or f"\n# {key.name} = " in text
 
 
-@pytest.mark.parametrize("key", ["mesh.rim", "mesh.growth", "probe.contact", "solve.timing", "plan.stop_when"])
+@pytest.mark.parametrize("key", ["mesh.rim", "mesh.growth", "probe.contact", "solve.timing", "plan.stop_near_exact"])
 def test_what_the_starter_leaves_out_can_be_let_in(key):
     section, name = key.split(".")
     lines = starter("mine").splitlines()

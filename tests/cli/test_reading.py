@@ -82,7 +82,7 @@ def test_looking_makes_no_files(epsmesh, small, tmp_path, monkeypatch, command):
 def test_status_counts_what_is_not_to_be_run_as_skipped(epsmesh, small, tmp_path):
     """F is at F_exact at 4 and 6 mm: the full order need not be run, and never will be."""
     store = tmp_path / "cases.sqlite"
-    small.write_text(small.read_text() + '[plan]\nstop_when = "5 %"\n')
+    small.write_text(small.read_text() + '[plan]\nstop_near_exact = "5 %"\n')
     fill(store, make_plan(load(small)), at_4="ok", at_6="ok")
     told = json.loads(epsmesh("status", small, "--store", store, "--json").stdout)
     assert [told[state] for state in ("ok", "skipped", "failed", "pending")] == [8, 4, 0, 0]

@@ -86,7 +86,7 @@ def test_more_shards_than_steps_and_a_run_of_the_whole_that_takes_them_in(whole,
 def test_early_stop_in_shards(whole, meshes, tmp_path):
     """Which cases are skipped is decided within a shard, and told in the merged dataset."""
     study = tmp_path / "small.toml"
-    study.write_text(SMALL.replace("exact = false", '[plan]\nstop_when = "40 %"'))
+    study.write_text(SMALL.replace("exact = false", '[plan]\nstop_near_exact = "40 %"'))
     outputs = [run(study, tmp_path, meshes, "--shard", f"{number}/2") for number in (1, 2)]
     assert [output.exit_code for output in outputs] == [0, 0]
     assert epsmesh("status", study, "--merge", "--output", tmp_path).exit_code == 0

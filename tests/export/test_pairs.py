@@ -23,11 +23,11 @@ def fields(body: dict, poissons: tuple[float, float], margin: float) -> FarField
 
 @pytest.mark.parametrize(
     ("body", "most"),
-    [(CYLINDER, 0.004), (CYLINDER | {"layers": [SKIN | {"thickness": "6 mm"}]}, 0.012)],
+    [(CYLINDER, 0.004), (CYLINDER | {"layer": [SKIN | {"thickness": "6 mm"}]}, 0.012)],
 )
 def test_a_table_of_two_places_is_reciprocal_and_knows_each_by_itself(body, most, monkeypatch):
     monkeypatch.setattr(tabulate, "_POISSONS", 2)
-    is_layered = "layers" in body  # whose skin has ν = 0.45
+    is_layered = "layer" in body  # whose skin has ν = 0.45
     known = fields(body, (0.45, 0.45) if is_layered else (0.35, 0.45), 0.3)
     pairs, region = tabulate_pairs(known), known.body.region
     assert np.array_equal(pairs.links, pairs.links.transpose(0, 2, 1))

@@ -63,7 +63,7 @@ def test_the_far_field_is_that_of_the_body(body, volume):
 
 def test_a_skin_has_a_far_field_of_its_own(monkeypatch):
     monkeypatch.setattr(compliance, "_TO_TISSUE", 1)
-    scope = scope_of(study(body=CYLINDER | {"layers": [SKIN | {"thickness": "6 mm"}]}))
+    scope = scope_of(study(body=CYLINDER | {"layer": [SKIN | {"thickness": "6 mm"}]}))
     pressed = seen_body(scope, None, 0.5)
     table = tabulate_surface(far_fields(pressed, scope.poissons), np.zeros(3))
     middle = np.argmin(np.linalg.norm(table.points, axis=1))

@@ -44,8 +44,9 @@ _WORDS = (
 _KEYS = (
     "name", "shape", "size", "radius", "axes", "fixed", "young", "poisson", "density", "law", "action", "depth",
     "at", "axis", "contact", "motion", "epsilon", "fine", "coarse", "rim", "growth", "outside", "degree",
-    "element", "model", "accuracy", "depth_range", "method", "tolerance", "exact", "timing", "repeats",
-    "without", "stop_when", "gravity", "traction", "layers", "inclusion", "path", "file", "unit", "slice",
+    "element", "model", "accuracy", "depth_range", "method", "energy_tolerance", "reduced_basis_error",
+    "exact", "timing", "repeats",
+    "without", "stop_near_exact", "gravity", "traction", "layer", "inclusion", "path", "file", "unit", "slice",
     "incision", "title", "body", "mesh", "probe", "x", "épsilon", "a b", "", "\0", "\u202e",
 )  # fmt: skip
 

@@ -45,7 +45,7 @@ def test_a_body_of_one_material_has_no_regions():
 
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_volumes_of_regions_are_those_of_the_study(mirrored):
-    case = case_of({"layers": [SKIN], "inclusion": [BALL]}, fine="3 mm")
+    case = case_of({"layer": [SKIN], "inclusion": [BALL]}, fine="3 mm")
     mirrors = mirror_planes(case) if mirrored else ()
     assert mirrors in ((), ("x", "y"))
     found, share = volumes(mesh_arrays(case, mirrors)), 0.5 ** len(mirrors)
@@ -66,7 +66,7 @@ def test_ellipsoids_off_centre_have_their_volume_and_leave_one_plane():
 
 def test_layers_that_fill_a_cylinder_leave_no_other_cell():
     fat = {"name": "fat", "young": "5 kPa", "poisson": 0.3}
-    case = case_of({"shape": "cylinder", "radius": "20 mm", "height": "12 mm", "layers": [SKIN, fat]})
+    case = case_of({"shape": "cylinder", "radius": "20 mm", "height": "12 mm", "layer": [SKIN, fat]})
     found = volumes(mesh_arrays(case, ()))
     assert list(found) == [1, 2]
     assert found[1] / found[2] == pytest.approx(2 / 10, rel=1e-5)
@@ -74,7 +74,7 @@ def test_layers_that_fill_a_cylinder_leave_no_other_cell():
 
 @pytest.mark.parametrize(("thickness", "longest"), [(0.6, 0.6), (2.0, 1.6)])
 def test_elements_along_the_probes_edge_are_no_longer_than_a_layer_below_is_thick(thickness, longest):
-    mesh = mesh_arrays(case_of({"layers": [SKIN | {"thickness": f"{thickness} mm"}]}, rim="2 mm", fine="3 mm"), ())
+    mesh = mesh_arrays(case_of({"layer": [SKIN | {"thickness": f"{thickness} mm"}]}, rim="2 mm", fine="3 mm"), ())
     x, y, _ = mesh.points[np.intersect1d(mesh.rim, mesh.cells[:, :4])].T
     arcs = 1e3 * np.hypot(x, y).max() * np.diff(np.sort(np.arctan2(y, x)))
     assert 0.9 * longest < arcs.max() < longest
@@ -94,7 +94,7 @@ def test_the_lowest_layer_has_elements_as_small_as_its_thickness_asks_for():
     body = {"shape": "box", "size": ["40 mm", "40 mm", "5 mm"]}
     thick, rest = SKIN | {"thickness": "4 mm"}, {"name": "fascia", "young": "900 kPa", "poisson": 0.3}
     for layers in ([thick], [thick, rest]):
-        mesh = mesh_arrays(case_of(body | {"layers": layers}), ())
+        mesh = mesh_arrays(case_of(body | {"layer": layers}), ())
         low = mesh.points[mesh.cells[mesh.regions != 1][:, :4]]
         near = np.linalg.norm(low.mean(axis=1)[:, :2], axis=1) < 5e-3
         longest = np.linalg.norm(low[near][:, :, None] - low[near][:, None], axis=-1).max(axis=(1, 2))
@@ -136,7 +136,7 @@ def test_an_inclusion_near_the_surface_is_resolved():
 
 
 def test_cells_keep_their_region_in_images_in_the_cache_and_on_ranks(tmp_path):
-    case = case_of({"layers": [SKIN], "inclusion": [BALL]})
+    case = case_of({"layer": [SKIN], "inclusion": [BALL]})
     quarter = mesh_arrays(case, ("x", "y"))
     whole = reflect(quarter, ("x", "y"))
     assert whole.regions is not None
@@ -151,7 +151,7 @@ def test_cells_keep_their_region_in_images_in_the_cache_and_on_ranks(tmp_path):
 
 @pytest.mark.mpi
 def test_local_cells_know_their_region():
-    arrays = mesh_arrays(case_of({"layers": [SKIN], "inclusion": [BALL]}), ()) if MPI.COMM_WORLD.rank == 0 else None
+    arrays = mesh_arrays(case_of({"layer": [SKIN], "inclusion": [BALL]}), ()) if MPI.COMM_WORLD.rank == 0 else None
     body = distribute(MPI.COMM_WORLD, arrays)
     middles = body.mesh.geometry.x[compat.geometry_dofs(body.mesh)[:, :4]].mean(axis=1)
     expected = np.where(middles[:, 2] > -0.002, 1, 0)

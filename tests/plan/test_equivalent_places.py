@@ -49,7 +49,7 @@ COLUMN = {"outside": "free", "epsilon": "8 mm"}
     ("expected", "mesh", "changes"),
     [
         (1, COLUMN, {}),
-        (1, COLUMN, {"body": {"layers": [{"name": "skin", "thickness": "3 mm", "young": "50 kPa", "poisson": 0.4}]}}),
+        (1, COLUMN, {"body": {"layer": [{"name": "skin", "thickness": "3 mm", "young": "50 kPa", "poisson": 0.4}]}}),
         (1, COLUMN, {"body": {"fixed": "bottom+sides"}, "probe": BLADE}),
         (1, {"outside": "halfspace", "epsilon": "8 mm"}, {}),
         (2, {"outside": "free", "epsilon": "10 mm"}, {}),  # the last one is 9 mm from a side

@@ -38,7 +38,7 @@ BALL = {"name": "ball", "at": ["0 mm", "0 mm", "-6 mm"], "radius": "3 mm", "youn
 LAYER = {"name": "skin", "thickness": "1 mm", "young": "60 kPa", "poisson": 0.45}
 
 
-@pytest.mark.parametrize("body", [ORGAN, {"inclusion": [BALL]}, {"layers": [LAYER]}], ids=["organ", "tumour", "skin"])
+@pytest.mark.parametrize("body", [ORGAN, {"inclusion": [BALL]}, {"layer": [LAYER]}], ids=["organ", "tumour", "skin"])
 def test_cells_that_a_surface_and_regions_ask_for(body):
     sizes = {"fine": "15 mm", "coarse": "15 mm", "growth": 0.5}
     case = study(body=body, probe={"at": ["0 mm", "0 mm"]}, mesh=sizes).case(())

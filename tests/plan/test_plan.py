@@ -1,5 +1,7 @@
 """The plan: every case gets its record, nothing is solved twice, timing strikes nothing."""
 
+import pytest
+
 from pipeline.plan.describe import summary
 from pipeline.plan.plan import declare, make_plan
 from pipeline.study.load import parse
@@ -52,10 +54,12 @@ def test_timing_strikes_nothing():
     assert not any(solve.mirrors for solve in plan.solves)
 
 
-def test_what_a_blade_is_said_to_do_changes_no_force():
-    """A cut that neither slices nor has an incision is a press."""
-    pressed, cut = (study(probe=BLADE | {"action": action}) for action in ("pierce", "cut"))
-    assert make_plan(pressed).keys == make_plan(cut).keys
+@pytest.mark.parametrize("probe", [{}, {"slice": "0.1 mm"}, {"incision": "4 mm"}], ids=str)
+def test_what_a_blade_is_said_to_do_changes_no_force(probe):
+    """The action is a label: it may be left out, and no key of a case depends on it."""
+    said = [{}, {"action": "pierce"}, {"action": "cut"}]
+    keys = [make_plan(study(probe=BLADE | probe | action)).keys for action in said]
+    assert keys[0] == keys[1] == keys[2]
 
 
 def test_a_radius_that_an_accuracy_makes_meaningless_is_solved_once():

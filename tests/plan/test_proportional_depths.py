@@ -15,7 +15,7 @@ from tests.cases import raw
 LIFTS = {
     "body": {
         "shape": "cylinder", "radius": "8 mm", "height": "8 mm", "fixed": "bottom",
-        "layers": [{"name": "skin", "thickness": "1 mm", "young": "300 kPa", "poisson": 0.3}],
+        "layer": [{"name": "skin", "thickness": "1 mm", "young": "300 kPa", "poisson": 0.3}],
     },
     "material": {"young": "10 kPa", "poisson": 0.3},
     "probe": {"shape": "disc", "radius": "3 mm", "depth": ["0.1 mm", "0.25 mm"], "contact": "unilateral"},
@@ -24,7 +24,7 @@ LIFTS = {
 SLIDES = {
     "body": {"shape": "box", "size": ["12 mm", "8 mm", "6 mm"], "fixed": "bottom"},
     "probe": {
-        "action": "cut", "shape": "blade", "length": "4 mm", "width": "0.8 mm", "incision": "3 mm", "ahead": "1 mm",
+        "shape": "blade", "length": "4 mm", "width": "0.8 mm", "incision": "3 mm", "ahead": "1 mm",
         "depth": ["0.1 mm", "0.3 mm"], "contact": "frictionless",
     },
     "mesh": {"fine": "2 mm", "coarse": "4 mm", "rim": "0.5 mm", "growth": 1.0},

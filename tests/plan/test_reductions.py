@@ -178,7 +178,7 @@ def test_plan_of_a_hundred_thousand_cases_is_made_of_few_steps():
 @pytest.mark.parametrize("at", [["0 mm", "0 mm"], ["3 mm", "0 mm"], ["3 mm", "2 mm"]])
 def test_exact_force_is_the_same_whatever_motions_are_asked_for(at):
     """All six leave no plane of symmetry to solve on; a slice is as much part of the force along the axis as before."""
-    blade = BLADE | {"action": "cut", "slice": "0.1 mm", "at": at}
+    blade = BLADE | {"slice": "0.1 mm", "at": at}
     found = []
     for motion in ("press", "all"):
         plan = make_plan(parse(raw(probe=blade | {"motion": motion}, solve={"exact": True})))

@@ -28,14 +28,14 @@ def case(**changes: Any):
     ("body", "expected"),
     [
         ({}, True),
-        ({"layers": [SKIN]}, True),
-        ({"layers": [SKIN, FAT]}, True),
+        ({"layer": [SKIN]}, True),
+        ({"layer": [SKIN, FAT]}, True),
         ({"inclusion": [BALL]}, False),
-        ({"layers": [SKIN], "inclusion": [BALL]}, False),
+        ({"layer": [SKIN], "inclusion": [BALL]}, False),
         # Held from where a stiff layer ends: the displacement goes like r to a power below one half.
-        ({"layers": [SKIN], "fixed": {"below": "-2 mm"}}, False),
-        ({"layers": [SKIN], "fixed": {"below": "-2.1 mm"}}, True),
-        ({"layers": [SKIN | {"young": "5 kPa"}], "fixed": {"below": "-2 mm"}}, True),
+        ({"layer": [SKIN], "fixed": {"below": "-2 mm"}}, False),
+        ({"layer": [SKIN], "fixed": {"below": "-2.1 mm"}}, True),
+        ({"layer": [SKIN | {"young": "5 kPa"}], "fixed": {"below": "-2 mm"}}, True),
     ],
 )
 def test_layered_cylinders_are_round(body, expected):
@@ -43,6 +43,6 @@ def test_layered_cylinders_are_round(body, expected):
 
 
 def test_layers_reach_the_meridian():
-    whole, part = (meridian_of(case(body={"layers": layers})) for layers in ([SKIN, FAT], [SKIN]))
+    whole, part = (meridian_of(case(body={"layer": layers})) for layers in ([SKIN, FAT], [SKIN]))
     assert (whole.interfaces, whole.is_filled) == ((-0.002,), True)
     assert (part.interfaces, part.is_filled) == ((-0.002,), False)

@@ -14,7 +14,7 @@ SWEEP = {
     "solve": {"exact": True},
 }
 ROUND = {"body": {"shape": "cylinder", "radius": "30 mm", "height": "20 mm", "fixed": "bottom"}}
-STOP = {"plan": {"without": ["axisymmetric"], "stop_when": "1 %"}}
+STOP = {"plan": {"without": ["axisymmetric"], "stop_near_exact": "1 %"}}
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 50])
@@ -32,7 +32,7 @@ def test_every_solve_is_dealt_once_and_meshes_stay_whole(count, changes):
 
 
 def test_shards_are_even():
-    radii = {"action": "pierce", "shape": "disc", "radius": [f"{r} mm" for r in (1, 2, 3, 4, 5)], "depth": "0.2 mm"}
+    radii = {"shape": "disc", "radius": [f"{r} mm" for r in (1, 2, 3, 4, 5)], "depth": "0.2 mm"}
     plan = make_plan(study(**SWEEP | {"probe": radii}))
     costs = {step.solves[0].key: CostModel().step(step).seconds for step in plan.meshes}
     loads = [sum(cost for key, cost in costs.items() if key in part) for part in deal(plan, 4)]
@@ -54,7 +54,7 @@ def test_the_deal_does_not_depend_on_what_is_stored():
 
 def test_cases_of_an_early_stop_wait_in_one_shard():
     """Cases of two probes have nothing in common; those of one probe wait for its F_exact and for smaller ε."""
-    probe = {"action": "pierce", "shape": "disc", "radius": ["2 mm", "3 mm"], "depth": "0.2 mm"}
+    probe = {"shape": "disc", "radius": ["2 mm", "3 mm"], "depth": "0.2 mm"}
     plan = make_plan(study(**SWEEP | STOP | {"probe": probe}))
     parts = [part for part in deal(plan, 8) if part]
     assert len(parts) == 2

@@ -26,7 +26,6 @@ radius = "2 mm"
 depth = "0.2 mm"
 [[probe]]
 name = "scalpel"
-action = "cut"
 shape = "blade"
 length = "6 mm"
 width = "1 mm"

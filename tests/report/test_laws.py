@@ -191,7 +191,7 @@ def test_scenes_in_which_compliances_do_not_add_have_none_and_say_why():
     ball = {"shape": "sphere", "radius": "6 mm", "depth": "0.1 mm"}
     wedge = {"shape": "wedge", "angle": "70 deg", "length": "6 mm", "depth": "0.1 mm"}
     cone = {"shape": "cone", "angle": "70 deg", "radius": "3 mm", "depth": "0.1 mm"}
-    cut = {"action": "cut", "shape": "blade", "length": "6 mm", "width": "1 mm", "depth": "0.1 mm", "slice": "0.1 mm"}
+    cut = {"shape": "blade", "length": "6 mm", "width": "1 mm", "depth": "0.1 mm", "slice": "0.1 mm"}
     slit = cut | {"slice": "0 mm", "incision": "3 mm"}
     assert not any(why_not(of(probe)) for probe in (ball, cone, cut))
     assert "wedge goes with no one power" in why_not(of(wedge))

@@ -10,7 +10,7 @@ import pytest
 from tests import commands
 from tests.cases import BLADE
 
-SPHERE = {"action": "pierce", "shape": "sphere", "radius": "6 mm", "depth": "0.5 mm", "contact": "unilateral"}
+SPHERE = {"shape": "sphere", "radius": "6 mm", "depth": "0.5 mm", "contact": "unilateral"}
 ROUND = {"body": {"shape": "cylinder", "radius": "20 mm", "height": "20 mm"}, "plan": {"without": []}}
 PULLED = {
     "traction": [{"on": "sides", "traction": ["100 Pa", "0 Pa", "0 Pa"]}],

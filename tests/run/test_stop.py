@@ -19,7 +19,7 @@ SWEEP = {
     "mesh": {"epsilon": ["10 mm", "5 mm", "15 mm", "full", "7 mm"], "outside": ["coarse", "free"], "rim": "0.5 mm"},
     "solve": {"exact": True},
 }
-STOPPED = SWEEP | {"plan": {"without": ["axisymmetric"], "stop_when": "5 %"}}
+STOPPED = SWEEP | {"plan": {"without": ["axisymmetric"], "stop_near_exact": "5 %"}}
 
 
 def test_larger_epsilons_are_not_run_and_say_so():
@@ -46,7 +46,7 @@ def test_larger_epsilons_are_not_run_and_say_so():
 
 def test_full_order_is_not_run_where_no_outside_needs_it():
     near = SWEEP | {"mesh": SWEEP["mesh"] | {"outside": ["coarse", "fixed"]}}
-    plan = make_plan(study(**near, plan={"without": ["axisymmetric"], "stop_when": "50 %"}))
+    plan = make_plan(study(**near, plan={"without": ["axisymmetric"], "stop_near_exact": "50 %"}))
     dataset = build(plan, compute(plan, MPI.COMM_SELF))
     assert set(dataset["status"].sel(epsilon=np.inf).values.ravel()) == {"skipped"}
 
@@ -65,7 +65,7 @@ def test_stop_is_decided_alike_from_stored_records():
 @pytest.mark.parametrize(("bar", "stops"), [(1e-3, True), (0.04, True), (0.06, False), (nan, False)])
 def test_near_to_a_doubtful_exact_force_is_not_near(bar, stops):
     plan = make_plan(
-        study(mesh={"epsilon": ["5 mm", "7 mm", "10 mm"]}, plan={"stop_when": "5 %"}, solve={"exact": True})
+        study(mesh={"epsilon": ["5 mm", "7 mm", "10 mm"]}, plan={"stop_near_exact": "5 %"}, solve={"exact": True})
     )
     known = {
         solve.key: Record(

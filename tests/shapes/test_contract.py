@@ -10,7 +10,6 @@ from math import cos, inf, pi, sin
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 from scipy.spatial import ConvexHull
 
 from pipeline.mesh.generate import generate
@@ -19,9 +18,7 @@ from pipeline.plan.key import case_key, normalised, reference_key
 from pipeline.scene.model import Scene
 from pipeline.shapes.body import Body, Drawn
 from pipeline.shapes.frame import Frame
-from pipeline.shapes.indenter import Indenter
 from pipeline.shapes.probe import PLANES, Probe
-from pipeline.shapes.punch import Straight
 from pipeline.shapes.registry import BODIES, PROBES
 from pipeline.shapes.section import words_of
 from tests.cases import study
@@ -433,12 +430,6 @@ def test_elements_are_small_where_contact_is_expected_to_end(a_probe):
 
 def test_the_error_to_expect_is_that_of_a_few_discs(a_probe):
     assert 0.1 < a_probe.EXPECTED_ERROR < 10
-
-
-@pytest.mark.parametrize("shape", [name for name, model in PROBES.items() if issubclass(model, Straight | Indenter)])
-def test_what_is_only_pushed_in_does_not_cut(shape):
-    with pytest.raises(ValidationError, match="pierce"):
-        probe(shape, action="cut")
 
 
 # ---- frames -----------------------------------------------------------------------------------------

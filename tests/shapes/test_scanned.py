@@ -152,7 +152,7 @@ TUMOUR = {"name": "tumour", "at": ["0 mm"] * 3, "radius": "3 mm", "young": "1 kP
         ({"inclusion": [TUMOUR | {"at": ["0 mm"] * 2 + ["26.9 mm"]}]}, r"at = .* 0.3 mm .* 0.0\d+ mm from it"),
         ({"inclusion": [TUMOUR | {"at": ["0 mm"] * 2 + ["29 mm"]}]}, r"reaches 2(\.0\d*)? mm out of it"),
         ({"inclusion": [TUMOUR | {"radius": "100 mm"}]}, r"reaches \d+\.?\d* mm out of it"),
-        ({"layers": [TUMOUR]}, r"body.layers"),
+        ({"layer": [TUMOUR]}, r"body.layer"),
         ({"fixed": {"below": "-70 mm"}}, "inside the body"),
     ],
 )  # fmt: skip

@@ -152,7 +152,7 @@ def test_mixed_elements_agree_and_take_incompressible_tissue():
             "body": {"shape": "ellipsoid", "axes": ["8 mm", "7 mm", "6 mm"], "fixed": {"below": "-2 mm"}},
             "probe": {"shape": "sphere", "radius": "3 mm", "depth": "0.1 mm", "axis": [0.08, 0.0, -1.0]},
         },
-        "layers": {"body": SMALL | {"layers": [
+        "layers": {"body": SMALL | {"layer": [
             {"name": "skin", "thickness": "0.6 mm", "young": "40 kPa", "poisson": 0.3},
         ]}},
     }.values(),

@@ -167,7 +167,7 @@ def test_however_large_elements_may_be_a_disc_keeps_its_quarter_points(size):
 @pytest.mark.mpi
 def test_long_arcs_cost_quarter_points():
     """Some of an ellipse's fold cells; the same on the whole body, its parts, and any number of ranks."""
-    flat = {"action": "pierce", "shape": "ellipse", "axes": ["3 mm", "2 mm"], "depth": "0.2 mm"}
+    flat = {"shape": "ellipse", "axes": ["3 mm", "2 mm"], "depth": "0.2 mm"}
     coarse = {"probe": flat, "mesh": {"rim": "1.5 mm", "fine": "2 mm"}}
     quarter = share(**coarse)
     assert 0.1 < quarter < 0.9

@@ -77,7 +77,7 @@ def test_resultants_are_those_of_the_loads(body):
 
 def test_each_layer_has_its_own_weight():
     skin = {"name": "skin", "thickness": "5 mm", "young": "10 kPa", "poisson": 0.3, "density": "2120 kg/m^3"}
-    case = study(body={"layers": [skin]}, material=HEAVY, load=GRAVITY, mesh={"degree": 1}).case(())
+    case = study(body={"layer": [skin]}, material=HEAVY, load=GRAVITY, mesh={"degree": 1}).case(())
     layered = mesh_case(case, ("x", "y"), MPI.COMM_SELF)
     with Spaces(layered) as spaces:
         applied = apply_loads(loads_of(case), layered, spaces.get(1, Conditions()).space)

@@ -61,7 +61,7 @@ def test_a_point_of_very_many_cells():
         (2, (), {}),
         (3, ("x", "y"), {}),
         (2, ("x", "y"), {"mesh": {"degree": 1}}),  # without curved cells
-        (2, ("x", "y"), {"body": {"layers": [SKIN]}}),
+        (2, ("x", "y"), {"body": {"layer": [SKIN]}}),
     ],
 )
 def test_operators_are_those_that_dolfinx_assembles(degree, mirrors, changes, kernel, monkeypatch):

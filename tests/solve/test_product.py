@@ -12,7 +12,7 @@ from pipeline.solve.spaces import ElasticSpace, Spaces
 from tests.solve.test_mixed import make_mesh
 
 pytestmark = pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="for one process")
-LAYERS = {"body": {"layers": [{"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.48}]}}
+LAYERS = {"body": {"layer": [{"name": "skin", "thickness": "2 mm", "young": "60 kPa", "poisson": 0.48}]}}
 
 
 @pytest.mark.parametrize(

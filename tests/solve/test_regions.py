@@ -21,7 +21,7 @@ from tests.cases import study
 
 SKIN = {"name": "skin", "thickness": "3 mm", "young": "60 kPa", "poisson": 0.3}
 BALL = {"name": "tumour", "at": ["0 mm", "0 mm", "-10 mm"], "radius": "4 mm", "young": "50 kPa", "poisson": 0.45}
-BODY = {"layers": [SKIN], "inclusion": [BALL]}
+BODY = {"layer": [SKIN], "inclusion": [BALL]}
 PRESS = Movement.along((0.0, 0.0, -0.2e-3))
 QUARTER = ("x", "y")
 
@@ -56,7 +56,7 @@ def test_pieces_as_stiff_as_their_surroundings_change_nothing(body, degree, meth
 
 
 def test_straight_cells_alone_take_the_same_law():
-    layered = {"layers": [SKIN, SKIN | {"name": "fat"}]}
+    layered = {"layer": [SKIN, SKIN | {"name": "fat"}]}
     body = mesh_case(study(body=layered, mesh={"degree": 1}).case(()), QUARTER, MPI.COMM_SELF)
     one = solve(replace(body, regions=None), MaterialLaw.of_moduli(10e3, 0.3), degree=1, method="direct")
     assert solve(body, moduli(*[(10e3, 0.3)] * 3), degree=1, method="direct").reaction == pytest.approx(one.reaction)
@@ -157,7 +157,7 @@ def test_a_thin_layer_of_the_same_material_changes_nothing_but_the_mesh():
     mesh = {"fine": "3 mm", "coarse": "5 mm", "growth": 0.5}
     ((layered,), (plain,)) = (
         solve_study(body=body | more, probe=probe, mesh=mesh | {"rim": rim}).values()
-        for more, rim in (({"layers": [skin]}, "1 mm"), ({}, "0.1 mm"))
+        for more, rim in (({"layer": [skin]}, "1 mm"), ({}, "0.1 mm"))
     )
     assert layered.status == plain.status == "ok"
     error = abs(layered.force / plain.force - 1)

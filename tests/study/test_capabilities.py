@@ -13,13 +13,12 @@ from tests.studies import changed
 SPHERE = {"shape": "sphere", "radius": "6 mm", "depth": "0.2 mm", "contact": "unilateral"}
 # A tilted tool touches beside its axis, an ellipsoid has no layers, and mixed elements are for larger ν: these are
 # refused before the table is asked.
-_BEFORE = ("would touch the body", "an ellipsoid has no layers", "mixed elements are for")
+_BEFORE = ("would touch the body", "an ellipsoid has no layer", "mixed elements are for")
 TISSUE = {"young": "20 kPa", "poisson": 0.3, "density": "1 g/cm^3"}
 HAVING = {
     "found contact": {"probe": SPHERE},
     "tool that is not flat": {"probe": SPHERE},
     "six motions": {"probe": {"motion": "all"}},
-    "cut": {"probe": BLADE},
     "slice": {"probe": BLADE | {"slice": "0.1 mm"}},
     "slit": {"probe": BLADE | {"incision": "6 mm"}},
     "large strains": {"material": {"law": "neo-hookean"}},
@@ -40,7 +39,7 @@ HAVING = {
     "held at its sides alone": {"body": {"fixed": "sides"}},
     "cut free": {"mesh": {"epsilon": "9 mm", "outside": "free"}},
     "ν < 0.2 or > 0.45": {"material": {"poisson": 0.1}},
-    "layers": {"body": {"layers": [{"name": "skin", "thickness": "3 mm", **TISSUE}]}},
+    "layers": {"body": {"layer": [{"name": "skin", "thickness": "3 mm", **TISSUE}]}},
     "inclusion": {"body": {"inclusion": [{"name": "a", "at": ["9 mm", "9 mm", "-9 mm"], "radius": "2 mm", **TISSUE}]}},
     "curved body": {"body": {"shape": "ellipsoid", "axes": ["30 mm"] * 3, "fixed": {"below": "-5 mm"}}},
 }

@@ -31,10 +31,11 @@ def test_every_study_fits_the_schema(validator, path):
         ("probe", "radius", 2),
         ("probe", "shape", "disk"),
         ("probe", "friction", 0.3),
+        ("solve", "tolerance", 1e-8),
         ("material", "poisson", 0.7),
         ("material", "poison", 0.3),
         ("mesh", "outside", "nowhere"),
-        ("solve", "tolerance", 1e-3),
+        ("solve", "energy_tolerance", 1e-3),
         ("solve", "repeats", [1, 2]),
     ],
 )

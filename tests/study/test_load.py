@@ -60,7 +60,7 @@ MISTAKES = {
     "truth for a degree": ({"mesh": {"degree": True}}, ["mesh.degree = true", "1, 2 or 3"]),
     "word for a radius": ({"mesh": {"epsilon": "Full"}}, ['mesh.epsilon = "Full"', 'or "full"']),
     "number for a radius": ({"mesh": {"epsilon": float("inf")}}, ['or "full"']),
-    "a loose solver": ({"solve": {"tolerance": 1e-3}}, ["solve.tolerance = 0.001", "at most 1e-06"]),
+    "a loose solver": ({"solve": {"energy_tolerance": 1e-3}}, ["solve.energy_tolerance = 0.001", "at most 1e-06"]),
     "friction": ({"probe": {"friction": 0.3}}, ["probe.friction = 0.3", "friction is not computed", "bonded"]),
     "viscoelasticity": ({"material": {"relaxation": []}}, ["material.relaxation", "viscoelasticity is not computed"]),
     "a radius beside an accuracy": (
@@ -99,11 +99,8 @@ MISTAKES = {
     "ellipse outside": (
         {"probe": ELLIPSE | {"at": ["17.5 mm", "0 mm"]}}, ["probe.at", "ellipse", "inside the body's top"],
     ),
-    "ellipse that cuts": ({"probe": ELLIPSE | {"action": "cut"}}, ["probe.action", "'pierce'"]),
-    "slice without cut": (
-        {"probe": BLADE | {"action": "pierce", "slice": "1 mm"}}, ["probe.slice", 'action = "cut"'],
-    ),
-    "disc that cuts": ({"probe": {"action": "cut"}}, ['probe.action = "cut"', "'pierce'"]),
+    "unknown action": ({"probe": {"action": "slash"}}, ['probe.action = "slash"', "'pierce' or 'cut'"]),
+    "slice of a disc": ({"probe": {"slice": "1 mm"}}, ["probe.slice", "a disc has no slice: blade has"]),
     "floating column": (
         {"body": {"fixed": "sides"}, "mesh": {"outside": "free", "epsilon": "8 mm"}}, ["mesh.outside", "float"],
     ),
@@ -189,13 +186,13 @@ MISTAKES = {
 def test_a_mistake_of_one_probe_hides_none_of_another():
     probes = [
         {"name": "sideways", **BLADE, "direction": [0.0, 0.0, 1.0]},
-        {"name": "slicing", **BLADE, "action": "pierce", "slice": "1 mm", "length": "41 mm"},
+        {"name": "slicing", **BLADE, "ahead": "1 mm", "length": "41 mm"},
         {"name": "outside", **ELLIPSE, "at": ["19 mm", "0 mm"]},
     ]
     with pytest.raises(StudyError) as caught:
         parse(raw() | {"probe": probes})
     assert [problem.key for problem in caught.value.problems] == [
-        "probe[2].slice",
+        "probe[2].ahead",
         "probe[1].direction",
         "probe[2].at",
         "probe[3].at",
@@ -329,6 +326,6 @@ def test_the_text_of_a_study_is_read_as_if_it_lay_in_its_folder(tmp_path):
 def test_several_materials_beside_layers_are_told_to_be_a_sweep():
     layers = [{"name": "skin", "thickness": "2 mm", "young": "30 kPa", "poisson": 0.3}]
     materials = [{"name": name, "young": "10 kPa", "poisson": 0.3} for name in ("a", "b")]
-    content = raw(body={"layers": layers}) | {"material": materials}
+    content = raw(body={"layer": layers}) | {"material": materials}
     (warning,) = (text for text in parse(content).warnings if "[[material]]" in text)
     assert "is a sweep, and no layer" in warning

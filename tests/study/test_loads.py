@@ -25,7 +25,7 @@ def pulled(**changes):
 MISTAKES = {
     "gravity without density": ({"load": {"gravity": DOWN}}, ["material.density", "1060 kg/m^3"]),
     "layer without density": (
-        {"load": {"gravity": DOWN}, "body": {"layers": [SKIN, SKIN | {"name": "fat", "thickness": "18 mm"}]}},
+        {"load": {"gravity": DOWN}, "body": {"layer": [SKIN, SKIN | {"name": "fat", "thickness": "18 mm"}]}},
         ["body: skin", "no density"],
     ),
     "bare number": ({"load": {"gravity": ["0", "0", "-9.81 m/s^2"]}}, ["load.gravity", "an acceleration"]),

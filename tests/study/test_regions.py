@@ -13,38 +13,38 @@ BALL = {"name": "tumour", "at": ["0 mm", "0 mm", "-10 mm"], "radius": "4 mm", "y
 
 # [body] -> what the message must hold: the key, what was found, what is allowed
 MISTAKES = {
-    "value of a layer": ({"layers": [SKIN, FAT | {"young": 3}]}, ["body.layers[2].young = 3", "10 kPa"]),
-    "value of a sweep": ({"layers": [SKIN, FAT | {"poisson": [0.3, 0.7]}]}, ["body.layers[2].poisson = 0.7", "0.5"]),
-    "empty sweep": ({"layers": [SKIN | {"young": []}]}, ["body.layers[1].young", "empty list"]),
+    "value of a layer": ({"layer": [SKIN, FAT | {"young": 3}]}, ["body.layer[2].young = 3", "10 kPa"]),
+    "value of a sweep": ({"layer": [SKIN, FAT | {"poisson": [0.3, 0.7]}]}, ["body.layer[2].poisson = 0.7", "0.5"]),
+    "empty sweep": ({"layer": [SKIN | {"young": []}]}, ["body.layer[1].young", "empty list"]),
     "unknown key": ({"inclusion": [BALL | {"axis": 1}]}, ["body.inclusion[1].axis = 1", "`axes`"]),
-    "no name": ({"layers": [{k: v for k, v in SKIN.items() if k != "name"}]}, ["body.layers[1].name", "required"]),
-    "bad name": ({"layers": [SKIN | {"name": "my skin"}]}, ['body.layers[1].name = "my skin"', "letters, digits"]),
-    "same name": ({"layers": [SKIN], "inclusion": [BALL | {"name": "skin"}]}, ["skin", "names must differ"]),
-    "one table": ({"layers": SKIN}, ["body.layers", "[[body.layers]]"]),
-    "no table": ({"layers": ["skin"]}, ['body.layers[1] = "skin"', "must be a table"]),
-    "too thick": ({"layers": [SKIN, FAT | {"thickness": "19 mm"}]}, ["body.layers[2].thickness", "at most", "20 mm"]),
-    "too thin": ({"layers": [SKIN, FAT | {"thickness": "3e-16 mm"}]}, ["body.layers[2].thickness", "a millionth"]),
-    "thickness missing": ({"layers": [FAT, SKIN]}, ["body.layers[1].thickness", "only the last"]),
-    "nothing left": ({"layers": [SKIN | {"thickness": "20 mm"}, FAT]}, ["body.layers[2].thickness", "nothing is"]),
+    "no name": ({"layer": [{k: v for k, v in SKIN.items() if k != "name"}]}, ["body.layer[1].name", "required"]),
+    "bad name": ({"layer": [SKIN | {"name": "my skin"}]}, ['body.layer[1].name = "my skin"', "letters, digits"]),
+    "same name": ({"layer": [SKIN], "inclusion": [BALL | {"name": "skin"}]}, ["skin", "names must differ"]),
+    "one table": ({"layer": SKIN}, ["body.layer", "[[body.layer]]"]),
+    "no table": ({"layer": ["skin"]}, ['body.layer[1] = "skin"', "must be a table"]),
+    "too thick": ({"layer": [SKIN, FAT | {"thickness": "19 mm"}]}, ["body.layer[2].thickness", "at most", "20 mm"]),
+    "too thin": ({"layer": [SKIN, FAT | {"thickness": "3e-16 mm"}]}, ["body.layer[2].thickness", "a millionth"]),
+    "thickness missing": ({"layer": [FAT, SKIN]}, ["body.layer[1].thickness", "only the last"]),
+    "nothing left": ({"layer": [SKIN | {"thickness": "20 mm"}, FAT]}, ["body.layer[2].thickness", "nothing is"]),
     "ball or ellipsoid": ({"inclusion": [BALL | {"axes": ["1 mm"] * 3}]}, ["body.inclusion[1]", "radius", "axes"]),
     "near the surface": (
         {"inclusion": [BALL | {"at": ["0 mm", "0 mm", "-4.3 mm"]}]}, ["body.inclusion[1].at", "0.4 mm", "0.3 mm"],
     ),
     "outside": ({"inclusion": [BALL | {"at": ["30 mm", "0 mm", "-10 mm"]}]}, ["body.inclusion[1].at", "inside"]),
     "across a layer's end": (
-        {"layers": [SKIN | {"thickness": "9 mm"}], "inclusion": [BALL]}, ["body.inclusion[1].at", "-9 mm"],
+        {"layer": [SKIN | {"thickness": "9 mm"}], "inclusion": [BALL]}, ["body.inclusion[1].at", "-9 mm"],
     ),
     "touching": (
         {"inclusion": [BALL, BALL | {"name": "other", "at": ["8.1 mm", "0 mm", "-10 mm"]}]},
         ["body.inclusion[2].at", "from tumour", "0.1 mm from it"],
     ),
-    "locking of a layer": ({"layers": [SKIN | {"poisson": 0.499}]}, ["body.layers[1].poisson = 0.499", "lock"]),
+    "locking of a layer": ({"layer": [SKIN | {"poisson": 0.499}]}, ["body.layer[1].poisson = 0.499", "lock"]),
 }  # fmt: skip
 
 
 def layered(**changes):
     """Return a box of skin on fat, which leave nothing to [material]."""
-    content = raw(body={"layers": [SKIN | changes, FAT]})
+    content = raw(body={"layer": [SKIN | changes, FAT]})
     del content["material"]
     return parse(content)
 
@@ -66,13 +66,13 @@ def test_mistakes_are_named(mistake):
 
 def test_only_what_has_a_flat_top_has_layers():
     sections = raw(probe={"at": ["0 mm", "0 mm"]})
-    sections["probe"]["layers"] = [SKIN]
-    assert "probe.layers" in messages(sections)
+    sections["probe"]["layer"] = [SKIN]
+    assert "probe.layer" in messages(sections)
 
 
 def test_every_value_of_a_piece_is_swept():
     found = study(
-        body={"layers": [SKIN | {"thickness": ["2 mm", "3 mm"]}], "inclusion": [BALL | {"radius": ["3 mm", "4 mm"]}]},
+        body={"layer": [SKIN | {"thickness": ["2 mm", "3 mm"]}], "inclusion": [BALL | {"radius": ["3 mm", "4 mm"]}]},
         material={"poisson": [0.3, 0.4, 0.45]},
     )
     assert [axis.name for axis in found.axes] == ["skin_thickness", "tumour_radius", "poisson"]
@@ -85,11 +85,11 @@ def test_every_value_of_a_piece_is_swept():
 
 
 def test_material_is_needed_for_what_is_left_and_for_nothing_else():
-    content = raw(body={"layers": [SKIN]})
+    content = raw(body={"layer": [SKIN]})
     del content["material"]
     assert "[material]" in messages(content)
-    assert "nothing is made of" in str(study(body={"layers": [SKIN, FAT]}).warnings)
-    assert "sweeps nothing" in messages(raw(body={"layers": [SKIN, FAT]}, material={"poisson": [0.3, 0.4]}))
+    assert "nothing is made of" in str(study(body={"layer": [SKIN, FAT]}).warnings)
+    assert "sweeps nothing" in messages(raw(body={"layer": [SKIN, FAT]}, material={"poisson": [0.3, 0.4]}))
     assert layered().case(()).scale.stress == 60e3
 
 
@@ -97,7 +97,7 @@ def test_forces_scale_with_all_moduli_together_only():
     first, second = layered(young=["60 kPa", "30 kPa"]).cases()
     assert case_key(first, scaled=True) != case_key(second, scaled=True)
     assert mesh_key(first) == mesh_key(second)
-    content = raw(body={"layers": [SKIN | {"young": "30 kPa"}, FAT | {"young": "2.5 kPa"}]})
+    content = raw(body={"layer": [SKIN | {"young": "30 kPa"}, FAT | {"young": "2.5 kPa"}]})
     del content["material"]
     half = parse(content).case(())
     assert case_key(half, scaled=True) == case_key(first, scaled=True) != case_key(half)
@@ -107,11 +107,11 @@ def test_forces_scale_with_all_moduli_together_only():
 
 
 def test_a_body_of_one_material_has_the_key_it_always_had():
-    assert case_key(study().case(())) == case_key(study(body={"layers": [], "inclusion": []}).case(()))
+    assert case_key(study().case(())) == case_key(study(body={"layer": [], "inclusion": []}).case(()))
 
 
 def test_the_same_layers_said_in_another_way_have_one_key():
     (first,) = layered().cases()
-    content = raw(body={"layers": [SKIN, FAT | {"thickness": "18 mm"}]})
+    content = raw(body={"layer": [SKIN, FAT | {"thickness": "18 mm"}]})
     del content["material"]
     assert case_key(parse(content).case(())) == case_key(first)

@@ -9,7 +9,7 @@ from tests.cases import BLADE, raw
 
 BOX = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "bottom"}
 SLIT = {**BLADE, "width": "1 mm", "incision": "4 mm"}
-LAYERED = {**BOX, "layers": [{"name": "skin", "thickness": "4.1 mm", "young": "20 kPa", "poisson": 0.4}]}
+LAYERED = {**BOX, "layer": [{"name": "skin", "thickness": "4.1 mm", "young": "20 kPa", "poisson": 0.4}]}
 TUMOUR = {"name": "tumour", "at": ["0 mm", "2 mm", "-3 mm"], "radius": "1.5 mm", "young": "20 kPa", "poisson": 0.4}
 ORGAN = {"shape": "ellipsoid", "axes": ["30 mm", "30 mm", "30 mm"], "fixed": {"below": "-10 mm"}}
 
@@ -23,7 +23,6 @@ def problems(**changes):
 @pytest.mark.parametrize(
     ("key", "said", "changes"),
     [
-        ("probe.incision", "only a cut has an incision", {"probe": {**SLIT, "action": "pierce"}}),
         ("probe.direction", "along x or y only", {"probe": {**SLIT, "contact": "frictionless",
                                                            "direction": [1.0, 0.2, 0.0]}}),
         ("probe.incision", "the blade's tip 0 mm from", {"probe": {**SLIT, "contact": "frictionless",

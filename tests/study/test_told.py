@@ -9,6 +9,7 @@ from pipeline.study.howto import page_of, pages
 from pipeline.study.keys import all_sections, keys_of
 from pipeline.study.load import parse
 from pipeline.study.problems import StudyError
+from pipeline.study.renamed import RENAMED
 from tests.cases import BLADE, raw, study
 
 
@@ -24,10 +25,10 @@ def needles(**changes):
 
 
 def test_what_a_shape_lacks_hides_neither_unknown_keys_nor_wrong_values():
-    body = {"shape": "ellipsoid", "axes": ["9 mm"] * 3, "fixed": "top", "colour": 3, "layers": [{"name": "skin"}]}
+    body = {"shape": "ellipsoid", "axes": ["9 mm"] * 3, "fixed": "top", "colour": 3, "layer": [{"name": "skin"}]}
     content = raw() | {"body": body, "probe": {"shape": "disk", "deth": "1 mm"}}
     assert {problem.key for problem in told(content).problems} == {
-        "body.layers", "body.fixed", "body.colour", "probe.shape", "probe.deth",
+        "body.layer", "body.fixed", "body.colour", "probe.shape", "probe.deth",
     }  # fmt: skip
 
 
@@ -92,15 +93,15 @@ def test_materials_named_like_layers_are_said_to_be_a_sweep():
 
     (warning,) = parse(materials("skin", "fat")).warnings
     assert "[[material]]: is a sweep: the whole body is made of skin, then of fat" in warning
-    assert "[[body.layers]]: docs/howto/layers.md" in warning
+    assert "[[body.layer]]: docs/howto/layers.md" in warning
     assert not parse(materials("liver", "muscle")).warnings
-    assert "write [[body.layers]]" in str(told(raw() | {"layers": [{"name": "skin"}]}))
+    assert "write [[body.layer]]" in str(told(raw() | {"layer": [{"name": "skin"}]}))
 
 
 @pytest.mark.parametrize(
     ("content", "page"),
     [
-        (raw(body={"layers": 3}), "layers"),
+        (raw(body={"layer": 3}), "layers"),
         (raw() | {"probe": BLADE | {"incision": "1 m"}}, "cut"),
         (raw(load={"gravity": 1}), "loads"),
         (raw(solve={"repeats": 2}), "timing"),
@@ -121,8 +122,18 @@ def test_pages_are_there_and_keys_are_those_of_studies():
 def test_moduli_in_thousandths_of_a_pascal_are_doubted():
     """An m for an M: nothing else would tell."""
     layer = {"name": "skin", "thickness": "2 mm", "young": "20 mPa", "poisson": 0.4}
-    (warning,) = study(body={"layers": [layer]}).warnings
-    assert 'body.layers[1].young = "0.02 Pa"' in warning
+    (warning,) = study(body={"layer": [layer]}).warnings
+    assert 'body.layer[1].young = "0.02 Pa"' in warning
     (warning,) = study(material={"young": "10 mPa"}).warnings
     assert 'material.young = "0.01 Pa"' in warning and "MPa are millions" in warning
     assert not study(material={"young": "10 MPa"}).warnings
+
+
+@pytest.mark.parametrize(("section", "old", "value"), [
+    ("solve", "tolerance", 1e-8), ("plan", "tolerance", 1e-6), ("plan", "stop_when", "1 %"), ("body", "layers", []),
+])  # fmt: skip
+def test_an_old_name_is_answered_with_the_new_one(section, old, value):
+    new = RENAMED[f"{section}.{old}"]
+    with pytest.raises(StudyError, match=f"`{section}.{old}` is now `{new}`.*--from"):
+        parse(raw(**{section: {old: value}}))
+    parse(raw(**{section: {new.split(".")[1]: value}}))

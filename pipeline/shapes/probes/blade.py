@@ -145,12 +145,8 @@ class Blade(Punch):
                 if key in self.model_fields_set:
                     found = in_mm(self.ahead) if key == "ahead" and self.ahead else getattr(self, key)
                     problems.error(f"probe.{key}", found, "applies to a slit only: there is no incision")
-        if self.slice > 0 and self.action != "cut":
-            problems.error("probe.slice", in_mm(self.slice), 'only a cut slices: set action = "cut"')
 
     def _check_slit(self, slit: Slit, problems: Problems) -> None:
-        if self.action != "cut":
-            problems.error("probe.incision", in_mm(self.incision), 'only a cut has an incision: set action = "cut"')
         if slit.tip <= 0:
             problems.error(
                 "probe.ahead",
