@@ -9,6 +9,7 @@ from typing import Annotated, Any, Union
 from pydantic import BaseModel, Field, create_model
 
 from pipeline.shapes.section import Section, words_of
+from pipeline.study.ranges import KEYS, MOST_STEPS
 from pipeline.study.schema import NESTED, SECTIONS, SINGLE, TABLES
 
 Schema = dict[str, Any]
@@ -22,6 +23,18 @@ _QUANTITIES = {
     "kg/m^3": ("density", "densities"),
     "m/s^2": ("acceleration", "accelerations"),
     "": ("number", "numbers"),
+}
+_NAMES = {name for name, _ in _QUANTITIES.values()}
+# A range of values: see pipeline/study/ranges.py.
+_RANGE: Schema = {
+    "type": "object",
+    "description": "Range: `steps` values at equal distances, both ends among them.",
+    "properties": {
+        **{key: {"type": ["string", "number"]} for key in ("from", "to")},
+        "steps": {"type": "integer", "minimum": 2, "maximum": MOST_STEPS},
+    },
+    "required": [*KEYS],
+    "additionalProperties": False,
 }
 _PLAIN = {"boolean": "true | false", "integer": "whole number", "string": "text"}
 _SIGNS = {
@@ -94,7 +107,17 @@ def _in_file(schema: Schema, model: type[Section] | None, key: str) -> Schema:
     if model is None or key in {**NESTED.get("body", {}), **NESTED.get("load", {}), **TABLES["probe"]}:
         return value
     described = {"description": words_of(model, key).text}
-    return described | {"anyOf": [value, {"type": "array", "items": value, "minItems": 1}]}
+    several: Schema = {"type": "array", "items": value, "minItems": 1}
+    if _is_number(value):
+        several["items"] = {"anyOf": [value, _RANGE]}
+        return described | {"anyOf": [value, several, _RANGE]}
+    return described | {"anyOf": [value, several]}
+
+
+def _is_number(schema: Schema) -> bool:
+    """Tell whether a value is a number or a quantity, of which there are ranges."""
+    kinds = schema.get("anyOf", [schema])
+    return any(kind.get("title") in _NAMES or kind.get("type") in ("number", "integer") for kind in kinds)
 
 
 def _as_text(schema: Any) -> Any:

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from pipeline.shapes.section import Section
 from pipeline.study.path import Way, read_path
 from pipeline.study.problems import MOST_ERRORS, Problems, closest, nearest, tuples
+from pipeline.study.ranges import without_ranges
 from pipeline.study.read import check_text
 from pipeline.study.renamed import renamed
 from pipeline.study.schema import NESTED, SECTIONS, SINGLE
@@ -26,6 +27,8 @@ MOST_CASES = 200_000
 
 def read_section(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], tuple[Section, ...]]:
     """Return the axes of a section and every combination of their values."""
+    if name not in SINGLE:
+        raw = without_ranges(raw, name, problems)
     if name == "probe":
         raw, way = _walked(raw, problems)
         axes, variants = _read_tables(name, raw, problems)

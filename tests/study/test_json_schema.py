@@ -47,6 +47,20 @@ def test_a_mistake_does_not_fit(validator, section, key, value):
     assert not validator.is_valid(wrong)
 
 
+@pytest.mark.parametrize(
+    ("value", "fits"),
+    [
+        ({"from": "1 mm", "to": "3 mm", "steps": 3}, True),
+        ([{"from": "1 mm", "to": "3 mm", "steps": 3}, "9 mm"], True),
+        ({"from": "1 mm", "to": "3 mm"}, False),
+        ({"from": "1 mm", "to": "3 mm", "steps": 3, "by": 2}, False),
+    ],
+)
+def test_ranges_of_quantities(validator, value, fits):
+    study = tomllib.loads(starter("study"))
+    assert validator.is_valid(study | {"probe": study["probe"] | {"depth": value}}) == fits
+
+
 def test_every_key_of_the_reference_is_in_the_schema():
     definitions = study_schema()["$defs"].values()
     known = {key for definition in definitions for key in definition.get("properties", {})}
