@@ -1,6 +1,5 @@
 """The reference pages, written from the code when the documentation is built: study keys, dataset, commands."""
 
-import json
 import re
 import tomllib
 from pathlib import Path
@@ -13,7 +12,7 @@ from pipeline.plan.plan import make_plan
 from pipeline.quantities import RUN, attributes
 from pipeline.report.dataset import build
 from pipeline.study.capabilities import FEATURES, OBSTACLES, REFUSALS
-from pipeline.study.json_schema import study_schema
+from pipeline.study.json_schema import schema_text
 from pipeline.study.keys import SECTION_TEXTS, all_sections, heading, keys_of
 from pipeline.study.load import parse
 from pipeline.study.starter import starter
@@ -45,7 +44,7 @@ def write_reference(folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     pages = {"study": study_page, "features": features_page, "dataset": dataset_page, "commands": commands_page}
     texts = {f"{name}.md": page() for name, page in pages.items()}
-    texts["study.schema.json"] = json.dumps(study_schema(), indent=1, ensure_ascii=False) + "\n"
+    texts["study.schema.json"] = schema_text()
     for name, text in texts.items():
         path = folder / name
         if not path.exists() or path.read_text(encoding="utf-8") != text:

@@ -1,16 +1,17 @@
-"""The command that begins a study file."""
+"""The command that begins a study file: from an example, another study, or one with old key names."""
 
+import json
 import shutil
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from pipeline.cli.console import say
-from pipeline.cli.faults import Fault, fail, of_file, of_option
+from pipeline.cli.faults import Fault, fail, of_file, of_option, of_study
 from pipeline.cli.words import Json
 from pipeline.files import atomic, write_new
-from pipeline.study.named import NAME, examples, is_name
+from pipeline.study.named import NAME, SCHEMA, SHORT, examples, is_name
 
 _FOLDER = Path("studies")
 _HOWTO = "docs/howto/own-body.md"
@@ -27,38 +28,59 @@ def new(
         str | None,
         typer.Option(
             metavar="STUDY",
-            help="Begin with a copy of this study: a name in studies/, or a path.",
+            help=f"Copy a study: one of the short examples {', '.join(SHORT)}; another study by its name; or a path.",
             show_default=False,
             autocompletion=_names,
         ),
     ] = None,
+    old: Annotated[
+        Path | None,
+        typer.Option("--from", metavar="FILE", help="Convert a study file with old key names.", show_default=False),
+    ] = None,
+    every_key: Annotated[bool, typer.Option("--all", help="Write every key with its explanation.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Begin a study file: studies/NAME.toml. An existing file is left alone.
+    """Begin a study file: studies/NAME.toml. Existing study files are not changed.
 
-    Without --like it is a small study in which every key is explained. The file of a body that a study names is copied
-    with it.
+    Without options, the study is the short example `pad`: a disc on a soft pad, which runs in seconds. The file of a
+    body that a study names is copied, too. So is study.schema.json, with which editors complete and check keys.
 
     Example: epsmesh new mine
 
-    Example: epsmesh new mine --like figure3
+    Example: epsmesh new mine --like organ
+
+    Example: epsmesh new mine --from old.toml
     """
     path = Path(name) if name.endswith(".toml") else _FOLDER / f"{name}.toml"
     if not is_name(path.name.removesuffix(".toml")):  # of "...toml" the stem is all of it since Python 3.14
         fail(_of_name(name, f"must be {NAME}"))
     if not name.endswith(".toml") and Path(name).name != name:
-        fail(_of_name(name, f"a name has no folders: it stands for {_FOLDER}/NAME.toml; a path ends in .toml"))
-    text, source = (_starter(path.stem), path) if like is None else _copy_of(like)
+        fail(_of_name(name, f"a name has no folders: the file is {_FOLDER}/NAME.toml; a path ends in .toml"))
+    if (like is not None) + (old is not None) + every_key > 1:
+        fail("--like, --from and --all exclude each other: give one of them")
+    changed: dict[str, str] = {}
+    if every_key:
+        text, source = _starter(path.stem), path
+    elif old is not None:
+        text, source, changed = _converted(old)
+    else:
+        text, source = _copy_of(like or SHORT[0])
+        text = text if like else _titled(text, path.stem)
     try:
-        carried = [] if like is None or path.exists() else _carried(text, source.parent, path.parent)
-        write_new(path, text)
+        carried = [] if path.exists() else _carried(text, source.parent, path.parent)
+        write_new(path, _with_schema(text))
+        _write_schema(path.parent)
     except FileExistsError:
-        fail(of_file(path, "exists already, and is left alone; give another name"))
+        fail(of_file(path, "exists already, and is not changed; give another name"))
     except OSError as problem:
         fail(of_file(path, problem.strerror or str(problem)))
+    data: dict[str, Any] = {"file": str(path)}
+    data |= {"carried": [str(file) for file in carried]} if carried else {}
     say(
-        {"file": str(path)} | ({"carried": [str(file) for file in carried]} if carried else {}),
-        *(f"{file}: the body's, which the study names" for file in carried),
+        data | ({"renamed": changed} if old else {}),
+        *(f"{before} is now {after}" for before, after in changed.items()),
+        *(["no key has a new name: the copy is as it was"] if old and not changed else []),
+        *(f"{file}: file of the body, copied with the study" for file in carried),
         f"{path}: edit it, then `epsmesh plan {path}` and `epsmesh run {path}`",
     )
 
@@ -71,6 +93,42 @@ def _starter(name: str) -> str:
     from pipeline.study.starter import starter
 
     return starter(name)
+
+
+def _titled(text: str, name: str) -> str:
+    """Return the text of an example as that of a study of that name."""
+    return "".join(
+        f"title = {json.dumps(name, ensure_ascii=False)}\n" if line.startswith("title = ") else line
+        for line in text.splitlines(keepends=True)
+    )
+
+
+def _converted(old: Path) -> tuple[str, Path, dict[str, str]]:
+    """Return the text of an old study file with new key names, its path, and the keys that have changed."""
+    from pipeline.study.problems import StudyError
+    from pipeline.study.read import read
+    from pipeline.study.renamed import converted
+
+    try:
+        text, changed = converted(read(old)[0], str(old))
+    except StudyError as wrong:
+        fail(*of_study(wrong))
+    except ValueError as unknown_form:
+        fail(of_file(old, str(unknown_form)))
+    return text, old, changed
+
+
+def _with_schema(text: str) -> str:
+    """Return the text of a study with the line by which editors find the schema of its keys."""
+    return text if text.startswith("#:schema") else f"#:schema ./{SCHEMA.name}\n{text}"
+
+
+def _write_schema(folder: Path) -> None:
+    """Copy the schema of study files into a folder, or bring the copy there up to date."""
+    text, there = SCHEMA.read_text(encoding="utf-8"), folder / SCHEMA.name
+    if not there.exists() or there.read_text(encoding="utf-8") != text:
+        with atomic(there) as temporary:
+            temporary.write_text(text, encoding="utf-8")
 
 
 def _copy_of(like: str) -> tuple[str, Path]:

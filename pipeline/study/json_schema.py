@@ -1,4 +1,7 @@
-"""The JSON schema of a study file, from the models: for editors, for the reference, and for what each key takes."""
+"""The JSON schema of a study file, from the models: for editors, for the reference, and for what each key takes.
+
+``python -m pipeline.study.json_schema`` writes it to ``studies/study.schema.json``, which `epsmesh new` copies.
+"""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -9,6 +12,7 @@ from typing import Annotated, Any, Union
 from pydantic import BaseModel, Field, create_model
 
 from pipeline.shapes.section import Section, words_of
+from pipeline.study.named import SCHEMA
 from pipeline.study.ranges import KEYS, MOST_STEPS
 from pipeline.study.schema import NESTED, SECTIONS, SINGLE, TABLES
 
@@ -154,3 +158,12 @@ def _bounds(schema: Schema) -> str:
     found = [(sign, schema[name]) for name, sign in _SIGNS.items() if name in schema]
     limits = [f" {sign} {scale * limit:g}{end}" for sign, limit in found]
     return ",".join(limits)
+
+
+def schema_text() -> str:
+    """Return the schema as the file that is beside study files."""
+    return json.dumps(study_schema(), indent=1, ensure_ascii=False) + "\n"
+
+
+if __name__ == "__main__":
+    SCHEMA.write_text(schema_text(), encoding="utf-8")

@@ -6,6 +6,11 @@ from pathlib import Path
 EXAMPLES = Path(__file__).parent / "examples"
 
 
+# Examples of at most 30 lines that run within a minute; the first one is what `epsmesh new NAME` writes.
+SHORT = ("pad", "layers", "organ", "tumour", "needle", "cut")
+# The JSON schema of study files, for editors.
+SCHEMA = EXAMPLES / "study.schema.json"
+
 # What a name may be, in words. Files are called after it, with a few letters more: theirs have 255 bytes at most.
 NAME = "letters, digits, - and _, at most 200 bytes: results are called after it"
 _LONGEST = 200

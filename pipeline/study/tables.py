@@ -199,7 +199,7 @@ def _possible(name: str, raw: dict[str, Any], problems: Problems, where: str = "
     model = models[str(shape)] if isinstance(models, Mapping) else models
     lacking = [key for key in raw if key not in model.model_fields]
     for key in lacking[:MOST_ERRORS]:
-        found = None if key in NESTED.get(name, {}) else raw[key]
+        found = None if key in NESTED.get(name, {}) or renamed(name, key) else raw[key]
         problems.unknown(f"{where or name}.{key}", found, _lacking(name, model, str(shape), key))
     if len(lacking) > MOST_ERRORS:
         problems.unknown(where or name, None, f"… and {len(lacking) - MOST_ERRORS} more")

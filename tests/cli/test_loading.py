@@ -74,6 +74,6 @@ def test_a_study_begun_like_another_loads_no_shape(tmp_path):
 
 
 def test_a_first_study_lists_every_shape_and_computes_nothing(tmp_path):
-    modules = loaded("new", "mine", within=tmp_path)
+    modules = loaded("new", "mine", "--all", within=tmp_path)
     assert shapes(modules) == {*BODIES, *PROBES}
     assert not libraries(modules) & (_SLOW | _ELSEWHERE)

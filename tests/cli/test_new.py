@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from math import prod
 from pathlib import Path
 
 import pytest
@@ -9,10 +10,12 @@ import pytest
 from pipeline.plan.plan import make_plan
 from pipeline.study.keys import SECTION_TEXTS, all_sections, keys_of, shapes_of, words_of
 from pipeline.study.load import load, parse
-from pipeline.study.named import examples
+from pipeline.study.named import SCHEMA, SHORT, examples
+from pipeline.study.renamed import RENAMED
 from pipeline.study.starter import starter
 from tests.commands import epsmesh
 
+_SCHEMA = "#:schema ./study.schema.json\n"
 STUDIES = Path(__file__).parents[2] / "studies"
 
 
@@ -64,10 +67,11 @@ def test_what_the_starter_leaves_out_can_be_let_in(key):
     assert name in next(iter(study.sections[section])).model_fields_set
 
 
-def test_new_writes_a_study_and_leaves_an_existing_one_alone(elsewhere):
+def test_new_writes_a_short_study_and_leaves_an_existing_one_alone(elsewhere):
     assert new("mine").exit_code == 0
     file = elsewhere / "studies" / "mine.toml"
     assert load(file).title == "mine"
+    assert len(file.read_text().splitlines()) <= 25
     file.write_text("changed")
     again = new("mine")
     assert again.exit_code == 2
@@ -75,18 +79,105 @@ def test_new_writes_a_study_and_leaves_an_existing_one_alone(elsewhere):
     assert file.read_text() == "changed"
 
 
+def test_all_writes_every_key(elsewhere):
+    assert new("mine", "--all").exit_code == 0
+    assert (elsewhere / "studies" / "mine.toml").read_text() == _SCHEMA + starter("mine")
+
+
+@pytest.mark.parametrize("name", SHORT)
+def test_short_examples_are_short_named_in_the_help_and_without_warnings(name):
+    assert 10 <= len((STUDIES / f"{name}.toml").read_text().splitlines()) <= 30
+    assert name in new("--help").stdout
+    study = load(STUDIES / f"{name}.toml")
+    assert 1 < prod(study.shape) <= 20
+    assert not study.warnings
+
+
 @pytest.mark.parametrize("name", sorted(path.stem for path in STUDIES.glob("*.toml")))
 def test_like_copies_the_studies_that_come_with_the_program(elsewhere, name):
     assert new("mine", "--like", name).exit_code == 0
-    assert (elsewhere / "studies" / "mine.toml").read_text() == (STUDIES / f"{name}.toml").read_text()
+    assert (elsewhere / "studies" / "mine.toml").read_text() == _SCHEMA + (STUDIES / f"{name}.toml").read_text()
     load(elsewhere / "studies" / "mine.toml")  # with the file of its body
+
+
+def test_the_schema_for_editors_is_beside_every_study_and_up_to_date(elsewhere):
+    schema = elsewhere / "deep" / SCHEMA.name
+    new("deep/first.toml")
+    assert schema.read_text() == SCHEMA.read_text()
+    schema.write_text("{}")
+    new("deep/second.toml", "--like", "deep/first.toml")
+    assert schema.read_text() == SCHEMA.read_text()
+    assert (elsewhere / "deep" / "second.toml").read_text().count("#:schema") == 1
+
+
+OLD = """title = "solve.tolerance = 1" # tolerance = 2
+[body] # layers
+shape = "box"
+size = ["40 mm", "40 mm", "20 mm"]
+
+[[body.layers]]   # the skin
+name = "layers"
+thickness = "2 mm"
+young = "60 kPa"
+poisson = 0.45
+[[ body.layers ]]
+name = "fat"
+young = "3 kPa"
+poisson = 0.45
+[probe]
+shape = "disc"
+radius = "2 mm"
+depth = "0.2 mm"
+[mesh]
+accuracy = "5 %"
+[solve]
+  tolerance=1e-8 # tolerance of the solver
+[plan]
+stop_when = "1 %" # stop_when
+tolerance = 1e-5
+"""
+
+
+def test_an_old_study_is_converted_with_its_comments(elsewhere):
+    (elsewhere / "old.toml").write_text(OLD)
+    done = new("mine", "--from", "old.toml")
+    assert done.exit_code == 0, done.stderr
+    for before, after in RENAMED.items():
+        assert f"{before} is now {after}" in done.stdout
+    text = (elsewhere / "studies" / "mine.toml").read_text()
+    expected = OLD.replace("[[body.layers]]", "[[body.layer]]").replace("[[ body.layers ]]", "[[ body.layer ]]")
+    expected = expected.replace("  tolerance=", "  energy_tolerance=").replace(
+        "\ntolerance = 1e-5", "\nreduced_basis_error = 1e-5"
+    )
+    assert text == _SCHEMA + expected.replace("\nstop_when = ", "\nstop_near_exact = ")
+    study = load(elsewhere / "studies" / "mine.toml")
+    assert (study.solve.energy_tolerance, study.planning.reduced_basis_error) == (1e-8, 1e-5)
+
+
+@pytest.mark.parametrize("line", ["solve.tolerance = 1e-8", "solve = {method = 'direct', tolerance = 1e-8}"])
+def test_dotted_keys_and_tables_in_line_are_converted_too(elsewhere, line):
+    (elsewhere / "old.toml").write_text(line)
+    assert new("mine", "--from", "old.toml").exit_code == 0
+    text = (elsewhere / "studies" / "mine.toml").read_text()
+    assert text == _SCHEMA + line.replace("tolerance", "energy_tolerance")
+
+
+def test_what_is_not_converted_is_refused_by_its_key(elsewhere):
+    (elsewhere / "old.toml").write_text('[solve]\n"tolerance" = 1e-8\n')
+    done = new("mine", "--from", "old.toml")
+    assert (done.exit_code, "`solve.energy_tolerance`" in done.stderr) == (2, True)
+    assert not (elsewhere / "studies").exists()
+    assert new("mine", "--from", "none.toml").exit_code == 2
+    (elsewhere / "new.toml").write_text("[solve]\nexact = true\n")
+    assert "no key has a new name" in new("mine", "--from", "new.toml").stdout
+    assert "exclude each other" in new("other", "--from", "new.toml", "--all").stderr
 
 
 def test_like_takes_a_path_and_a_study_of_the_folder(elsewhere):
     assert new("deep/first.toml").exit_code == 0
     assert new("second", "--like", "deep/first.toml").exit_code == 0
     assert new("third", "--like", "second").exit_code == 0
-    assert (elsewhere / "studies" / "third.toml").read_text() == starter("first")
+    assert (elsewhere / "studies" / "third.toml").read_text() == (elsewhere / "deep" / "first.toml").read_text()
 
 
 def test_the_file_of_a_body_is_taken_along_within_the_project(elsewhere):

@@ -1,15 +1,20 @@
 """The JSON schema of a study file takes every study that there is, and refuses what no study is."""
 
 import copy
+import shutil
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
 import jsonschema
 import pytest
 
-from pipeline.study.json_schema import study_schema
+from pipeline.study.json_schema import schema_text, study_schema
 from pipeline.study.keys import all_sections, keys_of
+from pipeline.study.named import SCHEMA, examples
 from pipeline.study.starter import starter
+from tests.commands import epsmesh
 
 STUDIES = [*Path("studies").glob("*.toml"), *Path("docs/scenes").glob("*.toml")]
 
@@ -59,6 +64,35 @@ def test_a_mistake_does_not_fit(validator, section, key, value):
 def test_ranges_of_quantities(validator, value, fits):
     study = tomllib.loads(starter("study"))
     assert validator.is_valid(study | {"probe": study["probe"] | {"depth": value}}) == fits
+
+
+def test_the_schema_beside_the_studies_is_that_of_the_program():
+    assert SCHEMA.read_text(encoding="utf-8") == schema_text(), "write it anew: python -m pipeline.study.json_schema"
+
+
+@pytest.fixture(scope="module")
+def taplo():
+    """The linter that editors use, of the same schema."""
+    found = Path(sys.executable).with_name("taplo")
+    return str(found) if found.exists() else shutil.which("taplo") or pytest.skip("taplo is not installed")
+
+
+def test_taplo_takes_every_study_and_finds_a_broken_one(taplo, tmp_path, monkeypatch):
+    """By the file that `epsmesh new` writes beside a study, and by the settings of the project."""
+    checked = subprocess.run([taplo, "check", *map(str, STUDIES)], capture_output=True, text=True, check=False)
+    assert checked.returncode == 0, checked.stderr
+    monkeypatch.chdir(tmp_path)
+    for name in sorted(examples()):
+        assert epsmesh("new", name, "--like", name).exit_code == 0
+    fine = [str(path) for path in Path("studies").glob("*.toml")]
+    assert len(fine) == len(examples())
+    checked = subprocess.run([taplo, "check", *fine], capture_output=True, text=True, check=False)
+    assert checked.returncode == 0, checked.stderr
+    broken = Path("studies/broken.toml")
+    broken.write_text(Path("studies/pad.toml").read_text().replace("poisson =", "poison ="))
+    checked = subprocess.run([taplo, "check", str(broken)], capture_output=True, text=True, check=False)
+    assert checked.returncode != 0
+    assert "poison" in checked.stderr
 
 
 def test_every_key_of_the_reference_is_in_the_schema():
