@@ -26,7 +26,11 @@ class Section(BaseModel):
     # Built at the first validation: no study has all sections.
     model_config = ConfigDict(strict=True, frozen=True, extra="forbid", defer_build=True)
 
-    name: Annotated[str, Field(exclude=True)] = ""
+    name: Annotated[
+        str,
+        Field(exclude=True),
+        Words("Label of the table in an array of tables: its value along the dimension of the sweep.", '"first"'),
+    ] = ""
 
 
 class Problems(Protocol):

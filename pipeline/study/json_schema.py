@@ -6,14 +6,16 @@
 import json
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
+from itertools import chain, product
 from math import isinf
-from typing import Annotated, Any, Union
+from typing import Any, get_args
 
-from pydantic import BaseModel, Field, create_model
+from pydantic import BaseModel
+from pydantic.json_schema import models_json_schema
 
 from pipeline.shapes.section import Section, words_of
 from pipeline.study.named import SCHEMA
-from pipeline.study.ranges import KEYS, MOST_STEPS
+from pipeline.study.ranges import KEYS
 from pipeline.study.schema import NESTED, SECTIONS, SINGLE, TABLES
 
 Schema = dict[str, Any]
@@ -29,17 +31,10 @@ _QUANTITIES = {
     "": ("number", "numbers"),
 }
 _NAMES = {name for name, _ in _QUANTITIES.values()}
-# A range of values: see pipeline/study/ranges.py.
-_RANGE: Schema = {
-    "type": "object",
-    "description": "Range: `steps` values at equal distances, both ends among them.",
-    "properties": {
-        **{key: {"type": ["string", "number"]} for key in ("from", "to")},
-        "steps": {"type": "integer", "minimum": 2, "maximum": MOST_STEPS},
-    },
-    "required": [*KEYS],
-    "additionalProperties": False,
-}
+# A range of values: see pipeline/study/ranges.py. Its keys are no properties, or editors would complete them alone.
+_RANGE: Schema = {"propertyNames": {"enum": [*KEYS]}, "required": [*KEYS]}
+# Arrays of tables, and tables, within sections.
+_INNER = (*chain.from_iterable(NESTED.values()), *chain.from_iterable(TABLES.values()))
 _PLAIN = {"boolean": "true | false", "integer": "whole number", "string": "text"}
 _SIGNS = {
     "gt": ">",
@@ -54,29 +49,65 @@ _SIGNS = {
 
 
 def study_schema() -> Schema:
-    """Return the schema of a study file: quantities are text, and a list where one value is expected is a sweep."""
-    fields: dict[str, Any] = {"title": (str, "")}
-    for name, models in SECTIONS.items():
-        kind: Any = models
-        if isinstance(models, Mapping):
-            kind = Annotated[Union.__getitem__(tuple(models.values())), Field(discriminator="shape")]
-        fields[name] = (kind if name in SINGLE else kind | list[kind], None)
-    make: Any = create_model  # mypy does not follow models that are made here
-    schema: Schema = make("Study", **fields).model_json_schema()
+    """Return the schema of a study file: quantities are text, and a list where one value is expected is a sweep.
+
+    It has few ``anyOf``: there, editors do not name the key that is wrong, and repeat each completion.
+    """
+    sections = {name: _models(name) for name in SECTIONS}
+    tables = [model for inner in TABLES.values() for model in inner.values()]
+    _, schema = models_json_schema([(m, "validation") for m in (*chain(*sections.values()), *tables)])
     definitions: Schema = schema["$defs"]
-    for section, tables in TABLES.items():
-        for key, model in tables.items():
-            table = model.model_json_schema(ref_template="#/$defs/{model}")
-            definitions |= table.pop("$defs", {}) | {model.__name__: table}
-            for owner in _models(section):
-                definitions[owner.__name__]["properties"][key] = {"$ref": f"#/$defs/{model.__name__}"}
+    for section, inner in TABLES.items():
+        for owner, (key, model) in product(sections[section], inner.items()):
+            definitions[owner.__name__]["properties"][key] = {"$ref": f"#/$defs/{model.__name__}"}
     swept = {model.__name__: model for model in _swept()}
+    words = swept | {model.__name__: model for model in (*chain(*sections.values()), *tables)}
     for name, definition in definitions.items():
-        owner_of = swept.get(name)
         properties = definition.get("properties", {})
         for key, value in properties.items():
-            properties[key] = _in_file(value, owner_of if key not in ("name", "shape") else None, key)
-    return schema | {"additionalProperties": False, "$schema": "https://json-schema.org/draft/2020-12/schema"}
+            properties[key] = _described(_in_file(value, name in swept, key), words.get(name), key)
+    found = {name: _section(name, models, definitions) for name, models in sections.items()}
+    title = {"description": "Title of the study, in figures and reports.", "type": "string"}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "epsmesh study file",
+        "type": "object",
+        "properties": {"title": title, **found},
+        "additionalProperties": False,
+        "$defs": definitions,
+    }
+
+
+def _section(name: str, models: tuple[type[Section], ...], definitions: Schema) -> Schema:
+    """Return the schema of a section: a table, or an array of tables where it can be swept."""
+    table: Schema = {"$ref": f"#/$defs/{models[0].__name__}"}
+    if len(models) > 1:
+        # All keys of all shapes, for editors to complete; what each shape allows is said under its condition.
+        properties: Schema = {}
+        for model in models:
+            for key, value in definitions[model.__name__]["properties"].items():
+                known = properties.setdefault(key, value)
+                if known != value:
+                    properties[key] = {"description": known["description"]}
+        properties["shape"] = {
+            "description": properties["shape"]["description"],
+            "enum": [shape for model in models for shape in get_args(model.model_fields["shape"].annotation)],
+        }
+        rules = [
+            {
+                "if": {"properties": {"shape": {"const": get_args(model.model_fields["shape"].annotation)[0]}}},
+                "then": {"$ref": f"#/$defs/{model.__name__}"},
+            }
+            for model in models
+        ]
+        table = {"allOf": [{"required": ["shape"], "properties": properties}, *rules]}
+        definitions[name.capitalize()] = table
+        table = {"$ref": f"#/$defs/{name.capitalize()}"}
+    for model in models:  # of what is no table, a section says it
+        definitions[model.__name__].pop("type", None)
+    if name in SINGLE:
+        return {"type": "object", "allOf": [table]}
+    return {"type": ["object", "array"], "allOf": [table], "minItems": 1, "items": {"type": "object", "allOf": [table]}}
 
 
 def takes_of(model: type[BaseModel], key: str) -> str:
@@ -102,26 +133,32 @@ def _swept() -> Iterator[type[Section]]:
             yield from NESTED.get(section, {}).values()
 
 
-def _in_file(schema: Schema, model: type[Section] | None, key: str) -> Schema:
-    """Return the schema of a property as a file writes it; of a ``model`` that is swept, or a list of such values."""
+def _described(schema: Schema, model: type[BaseModel] | None, key: str) -> Schema:
+    """Return the schema of a property with the words of its key, which editors show."""
+    if model is None or key not in model.model_fields:
+        return schema
+    return {"description": words_of(model, key).text} | schema
+
+
+def _in_file(schema: Schema, is_swept: bool, key: str) -> Schema:
+    """Return the schema of a property as a file writes it: of a value, or of a sweep of values."""
     value = _as_text(schema)
+    is_number = value.pop("title", None) in _NAMES or value.get("type") in ("number", "integer")
     default = value.pop("default", None)
     if default is not None and "unit" not in json.dumps(schema) and not (isinstance(default, float) and isinf(default)):
         value["default"] = default
-    if model is None or key in {**NESTED.get("body", {}), **NESTED.get("load", {}), **TABLES["probe"]}:
+    if not is_swept or key in ("name", "shape", *_INNER):
         return value
-    described = {"description": words_of(model, key).text}
-    several: Schema = {"type": "array", "items": value, "minItems": 1}
-    if _is_number(value):
-        several["items"] = {"anyOf": [value, _RANGE]}
-        return described | {"anyOf": [value, several, _RANGE]}
-    return described | {"anyOf": [value, several]}
-
-
-def _is_number(schema: Schema) -> bool:
-    """Tell whether a value is a number or a quantity, of which there are ranges."""
-    kinds = schema.get("anyOf", [schema])
-    return any(kind.get("title") in _NAMES or kind.get("type") in ("number", "integer") for kind in kinds)
+    (kind, *others) = value.pop("anyOf", [value])
+    if others or "type" not in kind or kind["type"] == "array" or "enum" in kind or "const" in kind:
+        value = value if not others else value | {"anyOf": [kind, *others]}
+        return {"anyOf": [value, {"type": "array", "items": value, "minItems": 1}]}
+    # Each keyword is about one type: bounds about numbers, items about lists, names of properties about ranges.
+    item = {**kind, **value}
+    if is_number or kind.pop("title", None) in _NAMES:
+        item |= {"type": [kind["type"], "object"], **_RANGE}
+    several = {"type": "array", "items": item, "minItems": 1}
+    return item | several | {"type": [*([item["type"]] if isinstance(item["type"], str) else item["type"]), "array"]}
 
 
 def _as_text(schema: Any) -> Any:
