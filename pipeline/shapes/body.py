@@ -33,13 +33,15 @@ class Body(Section, ABC):
     fixed: Annotated[
         Fixed,
         Words(
-            "Where the body is held: on its bottom, its sides, both, or everywhere below a height.",
+            "Support of the body: its bottom, its sides, both, or all tissue below a height. "
+            "Displacements are zero there.",
             '"bottom"',
             takes='"bottom" | "sides" | "bottom+sides" | {below = length}',
         ),
     ] = "bottom"
     inclusion: Annotated[
-        tuple[Inclusion, ...], Words("Balls and ellipsoids inside it, of another material.", "[[body.inclusion]]")
+        tuple[Inclusion, ...],
+        Words("Inclusions: balls and ellipsoids of another material inside the body.", "[[body.inclusion]]"),
     ] = ()
 
     @property
@@ -204,9 +206,7 @@ class Drawn(Body):
 class Layered(Drawn):
     """A body with a flat top, and horizontal layers if any."""
 
-    layer: Annotated[
-        tuple[Layer, ...], Words("Horizontal layers of other materials, from the top down.", "[[body.layer]]")
-    ] = ()
+    layer: Annotated[tuple[Layer, ...], Words("Layers of other materials, from the top down.", "[[body.layer]]")] = ()
 
     @property
     def regions(self) -> tuple[Region, ...]:

@@ -33,7 +33,8 @@ class FromFile(Facetted):
     fixed: Annotated[
         Fixed,
         Words(
-            "Where it is held: everywhere below a height, in the file's own frame.",
+            "Support of the body: all tissue below a height, in the coordinates of the file. "
+            "Displacements are zero there.",
             '{below = "-40 mm"}',
             takes="{below = length}",
         ),

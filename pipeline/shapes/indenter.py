@@ -67,7 +67,8 @@ class Indenter(Probe):
     depth: Annotated[
         Length,
         Words(
-            "How far the tool is pushed in along its axis, from where it first touches the surface as loads leave it.",
+            "Depth of the tool below the first touch, along its axis. With loads, depth 0 is the "
+            "first touch of the loaded surface.",
             '"0.5 mm"',
             is_used=True,
         ),
@@ -75,8 +76,8 @@ class Indenter(Probe):
     depth_range: Annotated[
         tuple[Length, Length] | None,
         Words(
-            "Least and largest depth of a sweep on one mesh: nodes where the tool touches at the largest, small "
-            "elements wherever contact ends in between. Such a sweep starts each depth from its neighbours.",
+            "Range of depths that share one mesh: smallest and largest depth. Elements are small "
+            "wherever contact may end. Each depth is solved from the solution of the depth before.",
             '["0.1 mm", "0.5 mm"]',
             default="a mesh for each depth",
         ),
@@ -84,7 +85,9 @@ class Indenter(Probe):
     contact: Annotated[
         Literal["unilateral"],
         BeforeValidator(_found),
-        Words("Tissue slides along the tool, and touches it where it is pressed.", '"unilateral"'),
+        Words(
+            "Contact: tissue slides along the tool and may lift off. The area in contact is computed.", '"unilateral"'
+        ),
     ] = "unilateral"
 
     # ---- for each indenter to define --------------------------------------------------------------------

@@ -38,14 +38,12 @@ class Probe(Section, ABC):
     :class:`Frame`.
     """
 
-    shape: Annotated[
-        str, Words("Shape of the footprint: a blunt needle's tip, or a blade's edge.", '"disc"', is_used=True)
-    ]
+    shape: Annotated[str, Words("Shape of the tool.", '"disc"', is_used=True)]
     action: Annotated[
         Literal["pierce", "cut"] | None,
         Words(
-            "Label for people who read the study. No result depends on it. The dataset has it in the study's text, and "
-            "as a dimension if it is swept.",
+            "Label for people who read the study. No result depends on it. The dataset has it in the "
+            "study's text, and as a dimension if it is swept.",
             '"pierce"',
             default="none",
         ),
@@ -53,8 +51,8 @@ class Probe(Section, ABC):
     depth: Annotated[
         Length,
         Words(
-            "How far the tool is pushed in. F is proportional to it, unless contact is unilateral or it stands in a "
-            "slit.",
+            "Depth of the tool below the first touch, along its axis. F is proportional to it, except "
+            "for unilateral contact and in a slit.",
             '"0.2 mm"',
             is_used=True,
         ),
@@ -63,32 +61,33 @@ class Probe(Section, ABC):
         tuple[Coordinate, ...],
         AfterValidator(_two_or_three),
         Words(
-            "Where its axis meets the body: x and y of the highest point there, or three coordinates, from which the "
-            "nearest point of the surface is taken.",
+            "Place of contact: x and y of the highest point there, or x, y and z of a place whose "
+            "nearest point on the surface is used.",
             '["0 mm", "0 mm"]',
         ),
     ] = (0.0, 0.0)
     axis: Annotated[
         tuple[float, float, float] | None,
         Words(
-            "Direction in which it advances, of any length; at most 60° from the inward normal.",
+            "Direction in which the tool advances, a vector of any length. At most 60° from the inward normal.",
             "[0.0, 0.0, -1.0]",
-            default="the inward normal where it touches",
+            default="the inward normal at the contact",
         ),
     ] = None
     contact: Annotated[
         Contact,
         Words(
-            "Tissue sticks to the footprint (bonded), slides along it (frictionless), or slides and may lift off where "
-            "it would be pulled (unilateral).",
+            "Contact: tissue sticks to the tool (bonded), slides along it (frictionless), or slides "
+            "and may lift off (unilateral).",
             '"bonded"',
         ),
     ] = "bonded"
     motion: Annotated[
         Literal["press", "all"],
         Words(
-            "Which movements are solved for: those of the study (`press`), or all six rigid motions (`all`), for the "
-            "6 × 6 stiffness of the bonded tool: forces and torques about the point of contact.",
+            "Motions that are solved for: those of the study (press), or all six rigid motions (all). "
+            "All six give the 6 × 6 stiffness of a bonded tool: forces and torques about the point of "
+            "contact.",
             '"all"',
         ),
     ] = "press"

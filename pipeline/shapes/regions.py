@@ -16,7 +16,11 @@ class Region(Tissue):
     name: Annotated[
         str,
         Field(exclude=True, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$"),
-        Words("Its name: letters, digits, _ and -. A sweep over its young is the dimension NAME_young.", '"skin"'),
+        Words(
+            "Name of the layer or inclusion: letters, digits, _ and -. The dimension of a sweep "
+            "begins with it: skin_young.",
+            '"skin"',
+        ),
     ]
 
 
@@ -25,7 +29,7 @@ class Layer(Region):
 
     thickness: Annotated[
         Length | None,
-        Words("Thickness; the last layer may leave it out, and then reaches the bottom.", '"2 mm"'),
+        Words("Thickness of the layer. The last layer may omit it, and then reaches the bottom.", '"2 mm"'),
     ] = None
 
 
@@ -34,7 +38,7 @@ class Inclusion(Region):
 
     at: Annotated[
         tuple[Coordinate, Coordinate, Coordinate],
-        Words("Its centre, in the body's coordinates.", '["0 mm", "0 mm", "-10 mm"]'),
+        Words("Centre, in the coordinates of the body.", '["0 mm", "0 mm", "-10 mm"]'),
     ]
     radius: Annotated[Length | None, Words("Radius of a ball.", '"3 mm"', default="none: axes are given")] = None
     axes: Annotated[

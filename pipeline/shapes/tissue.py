@@ -13,12 +13,12 @@ class Tissue(Section):
     """Isotropic linear elasticity."""
 
     young: Annotated[Pressure, Words("Young's modulus.", '"10 kPa"', is_used=True)]
-    poisson: Annotated[float, Field(ge=0, le=0.5), Words("Poisson's ratio; 0.5 is incompressible.", "0.45")]
+    poisson: Annotated[float, Field(ge=0, le=0.5), Words("Poisson's ratio. 0.5 is incompressible.", "0.45")]
 
     density: Annotated[
         Density | None,
         Field(json_schema_extra={"unit": "kg/m^3"}),
-        Words("Density, which gravity needs.", '"1060 kg/m^3"', default="none; of regions, the material's"),
+        Words("Density. Gravity needs it.", '"1060 kg/m^3"', default="none; of regions, the material's"),
     ] = None
 
     @property

@@ -1,6 +1,6 @@
-"""What every key of a study file means: for the reference, and for the studies that ``epsmesh new`` begins.
+"""Keys of a study file with their meaning: for the reference, and for `epsmesh new --all`.
 
-All of it is read from the models: what a key takes, its default, and the words in its annotation.
+The models are the source: allowed values, default, and the words in the annotation of each key.
 """
 
 import json
@@ -18,7 +18,7 @@ from pipeline.study.schema import NESTED, SECTIONS, TABLES
 
 @dataclass(frozen=True)
 class Key:
-    """A key of a section, as a study's author sees it. ``default`` is empty where the key is required."""
+    """A key of a section, for the author of a study. ``default`` is empty if the key is required."""
 
     name: str
     shapes: tuple[str, ...]  # to which it belongs, if not to all of the section's
@@ -28,28 +28,30 @@ class Key:
 
 
 SECTION_TEXTS = {
-    "body": "The tissue, in its own coordinates: z points out of the top face, tissue lies at z <= 0.",
-    "body.layer": "Horizontal layers of other materials under a flat top, one table each, from the top down. "
+    "body": "Body: the tissue, in its own coordinates. z points out of the top face, and the tissue is at z <= 0.",
+    "body.layer": "Layers: horizontal layers of other materials under a flat top, one table each, from the top down. "
     "Optional; every value can be swept.",
-    "body.inclusion": "Balls and ellipsoids of other materials inside the body, one table each: clear of its surface, "
-    "of each other and of where layers end. Optional; every value can be swept.",
-    "material": "Isotropic, linear elastic tissue: what no layer or inclusion is. Left out where layers fill the body.",
-    "probe": "The tool, and how it moves.",
-    "probe.path": "Places one after the other, instead of `at`: one of `line`, `circle`, `raster` and `points`. "
-    "Optional.",
-    "mesh": "Element sizes, elements, and what is kept of the body.",
-    "solve": "How cases are solved and timed. Optional; lists are no sweeps here.",
-    "load": "What acts on the body besides the probe, and keeps its size and direction. F is what the depth adds; "
-    "`load_force` in the dataset is what loads add. Optional.",
-    "load.traction": "Forces on parts of the boundary, one table each. Optional; the values of one with a name can be "
+    "body.inclusion": "Inclusions: balls and ellipsoids of other materials, one table each. An inclusion is inside the "
+    "body and touches neither its surface, nor other inclusions, nor the ends of layers. Optional; every value can be "
     "swept.",
-    "plan": "What may be left out of the work. Optional; lists are no sweeps here.",
-    "figure": "What the study's main figure shows: forces do not depend on it. Optional; lists are no sweeps here.",
+    "material": "Material of all tissue outside layers and inclusions: isotropic and elastic. Omit it if layers fill "
+    "the body.",
+    "probe": "Probe: the tool, and its movement.",
+    "probe.path": "Path: several places of contact, instead of `at`. Give one of `line`, `circle`, `raster` and "
+    "`points`. Optional.",
+    "mesh": "Mesh: sizes and degree of elements, and the part of the body that is meshed.",
+    "solve": "Solver, and timing of cases. Optional; its lists are no sweeps.",
+    "load": "Loads besides the tool. They keep their size and direction. F is the additional force at the given depth; "
+    "`load_force` in the dataset is the force of the loads alone. Optional.",
+    "load.traction": "Tractions: forces per area on parts of the boundary, one table each. Optional; the values of a "
+    "named traction can be swept.",
+    "plan": "Plan: work that may be skipped. Optional; its lists are no sweeps.",
+    "figure": "Main figure of the study. Forces do not depend on it. Optional; its lists are no sweeps.",
 }
 
 
 def keys_of(section: str) -> tuple[Key, ...]:
-    """Return every key that a section may hold, those of all its shapes: one for each meaning that it has."""
+    """Return every key of a section, those of all its shapes. A key with two meanings is listed twice."""
     models = shapes_of(section)
     found: dict[str, dict[str, list[str]]] = {}
     # A section's name labels it; a piece's is a key like others.
@@ -76,7 +78,7 @@ def all_sections() -> tuple[str, ...]:
 
 
 def heading(section: str) -> str:
-    """Return the heading of a section as it stands in a study file."""
+    """Return the heading of a section in a study file."""
     return f"[[{section}]]" if section in _labelled() else f"[{section}]"
 
 
@@ -91,14 +93,14 @@ def _labelled() -> set[str]:
 
 
 def shapes_of(section: str) -> dict[str, type[BaseModel]]:
-    """Return the models of a section by shape; one without shapes has the one shape ''."""
+    """Return the models of a section by shape. A section without shapes has the single shape ''."""
     outer, _, piece = section.partition(".")
     model = _inner(outer)[piece] if piece else SECTIONS[section]
     return dict(model) if isinstance(model, Mapping) else {"": model}
 
 
 def _takes(model: type[BaseModel], name: str) -> str:
-    """Say what a key takes, as far as its type tells."""
+    """Return the values that a key allows, in words."""
     if name == "epsilon":
         return 'length > 0 | "full"'
     if own := words_of(model, name).takes:
@@ -109,7 +111,7 @@ def _takes(model: type[BaseModel], name: str) -> str:
 
 
 def _default(field: FieldInfo, takes: str) -> str:
-    """Write a field's default as it would stand in a study file; nothing if the key is required."""
+    """Return a field's default as a study file writes it; "" if the key is required."""
     value = field.default
     if field.is_required() or value is None or (isinstance(value, float) and isinf(value)):
         return ""

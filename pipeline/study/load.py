@@ -138,7 +138,7 @@ def _check_top(raw: dict[str, Any], problems: Problems) -> None:
         if isinstance(table, dict) and table and "accuracy" not in table:
             for key in Mesh.SIZES:
                 if key not in table:
-                    problems.error(f"mesh.{key}", None, "is required, unless an accuracy is asked for")
+                    problems.error(f"mesh.{key}", None, "is required: give the sizes, or `accuracy` instead of them")
 
 
 def _meant(key: str) -> str:

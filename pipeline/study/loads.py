@@ -48,7 +48,8 @@ class Traction(Section):
         str,
         Field(exclude=True, pattern=r"^([A-Za-z][A-Za-z0-9_-]*)?$"),
         Words(
-            "Its name: letters, digits, _ and -. A sweep over its pressure is the dimension NAME_pressure.",
+            "Name of the traction: letters, digits, _ and -. The dimension of a sweep begins with it: "
+            "retractor_pressure.",
             '"retractor"',
             default="none: nothing of it is swept",
         ),
@@ -57,19 +58,24 @@ class Traction(Section):
         str | Cap,
         BeforeValidator(_on),
         Words(
-            'Where it acts: a face of the body by name ("top", "sides", "bottom"; not of a CAD file), a cap '
-            'round a point of the surface, or "free", all of the boundary that is neither held nor under the probe.',
+            'Part of the boundary: a face of the body ("top", "sides", "bottom"; not of a CAD file), '
+            'a cap around a point of the surface, or "free", all of the boundary without support and '
+            "tool.",
             '"sides"',
         ),
     ]
     pressure: Annotated[
         Stress | None,
         Field(json_schema_extra={"unit": "Pa"}),
-        Words("Pressure against the outward normal; negative, it pulls.", '"1 kPa"', default="none: it is a vector"),
+        Words("Pressure, against the outward normal. Negative values pull.", '"1 kPa"', default="none: it is a vector"),
     ] = None
     traction: Annotated[
         tuple[Stress, Stress, Stress] | None,
-        Words("Force for each area, along x, y and z.", '["1 kPa", "0 Pa", "0 Pa"]', default="none: it is a pressure"),
+        Words(
+            "Traction vector: force per area along x, y and z.",
+            '["1 kPa", "0 Pa", "0 Pa"]',
+            default="none: it is a pressure",
+        ),
     ] = None
 
     @property
@@ -84,13 +90,13 @@ class Load(Section):
     gravity: Annotated[
         tuple[Acceleration, Acceleration, Acceleration],
         Words(
-            "Acceleration along x, y and z; every material needs a density then.",
+            "Acceleration along x, y and z. Every material then needs a density.",
             '["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]',
             default="none",
         ),
     ] = (0.0, 0.0, 0.0)
     traction: Annotated[
-        tuple[Traction, ...], Words("Forces on parts of the boundary.", "[[load.traction]]", default="none")
+        tuple[Traction, ...], Words("Tractions on parts of the boundary.", "[[load.traction]]", default="none")
     ] = ()
 
     @property

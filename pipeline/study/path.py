@@ -86,17 +86,17 @@ class Raster(_Table):
     y: Coordinates
 
 
-_POINT = "two coordinates, of the highest point there, or three, from which the nearest point of the surface is taken"
+_POINT = "x and y of the highest point there, or x, y and z of a place whose nearest point on the surface is used"
 
 
 class Path(_Table):
-    """The section as a study's author sees it: one of its forms, and what becomes of places off the body."""
+    """The section as the author of a study sees it: one of its forms, and the treatment of places off the body."""
 
     line: Annotated[
         Line | None,
         Words(
             f"Places on a straight line: `from` and `to` ({_POINT}), and `steps`, the number of places, both ends "
-            "among them. The dimension `path` is the length along it.",
+            "included. The dimension `path` is the distance along the line.",
             '{ from = ["-12 mm", "0 mm"], to = ["12 mm", "0 mm"], steps = 7 }',
             default="one of line, circle, raster and points is required",
         ),
@@ -104,8 +104,8 @@ class Path(_Table):
     circle: Annotated[
         Circle | None,
         Words(
-            "Places on a level circle: `centre`, `radius`, and `steps`, the number of places all round, the first one "
-            "along x. The dimension `path` is the length along it.",
+            "Places on a level circle: `centre`, `radius`, and `steps`, the number of places on the whole circle. The "
+            "first place is along x from the centre. The dimension `path` is the distance along the circle.",
             '{ centre = ["0 mm", "0 mm"], radius = "8 mm", steps = 8 }',
             default="none",
         ),
@@ -113,8 +113,8 @@ class Path(_Table):
     raster: Annotated[
         Raster | None,
         Words(
-            "All places of a grid: `x` and `y`, each a rising list, or a table of `from`, `to` and `steps`. They are "
-            "the dimensions `x` and `y`.",
+            "Places on a grid: `x` and `y`, each a rising list, or a range of `from`, `to` and `steps`. They are the "
+            "dimensions `x` and `y`.",
             '{ x = ["-5 mm", "0 mm", "5 mm"], y = { from = "-6 mm", to = "6 mm", steps = 5 } }',
             default="none",
         ),
@@ -123,7 +123,8 @@ class Path(_Table):
         tuple[Place, ...] | None,
         BeforeValidator(_several),
         Words(
-            "Places one by one. The dimension `path` is the length from the first one, straight from place to place.",
+            "Places one by one. The dimension `path` is the distance from the first place, straight from place to "
+            "place.",
             '[["0 mm", "0 mm"], ["3 mm", "0 mm"], ["8 mm", "2 mm"]]',
             default="none",
         ),
@@ -131,8 +132,8 @@ class Path(_Table):
     off: Annotated[
         Literal["refuse", "lost"],
         Words(
-            "What becomes of places where the tool cannot stand: they are refused, or contact is `lost` there: nought "
-            "where the tool is clear of the body, no force, and why, where it would stand over an edge.",
+            "Places off the body. refuse: they are errors. lost: the path goes on without contact there. F is 0 where "
+            "the tool is clear of the body; where it overlaps an edge, there is no F, and `message` has the reason.",
             '"lost"',
         ),
     ] = "refuse"

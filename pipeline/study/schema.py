@@ -30,7 +30,7 @@ class Material(Tissue):
         float,
         Field(ge=0, le=0.5),
         Words(
-            "Poisson's ratio; 0.5 is incompressible. Elements of degree 1 take up to 0.45.",
+            "Poisson's ratio. 0.5 is incompressible. Elements of degree 1 allow values up to 0.45.",
             "[0.30, 0.45]",
             is_used=True,
         ),
@@ -39,8 +39,9 @@ class Material(Tissue):
     law: Annotated[
         Literal["linear", "neo-hookean"],
         Words(
-            "Linear elasticity, or a compressible neo-Hookean body at large displacements, the same at small depths: "
-            "for bonded probes that press, one material, and Poisson's ratios from 0.2 to 0.45.",
+            "Law of the material: linear elasticity, or neo-Hookean at large displacements. Both "
+            "agree at small depths. The neo-Hookean law needs a bonded tool that presses, one "
+            "material, and Poisson's ratios from 0.2 to 0.45.",
             '["linear", "neo-hookean"]',
         ),
     ] = "linear"
@@ -84,43 +85,45 @@ def _degree(value: Any) -> Any:
 Epsilon = Annotated[float, BeforeValidator(_epsilon), Field(gt=0, json_schema_extra={"unit": "m"})]
 
 
-_REQUIRED = "required, unless an accuracy is asked for"
+_REQUIRED = "required without `accuracy`"
 
 
 class Mesh(Section):
     """Element sizes and elements; ``epsilon`` is infinite for the full-order mesh.
 
-    With an ``accuracy``, the largest relative error that F may have, what is not given is chosen.
+    With an ``accuracy``, the largest relative error bar of F, sizes that are not given are chosen.
     """
 
     accuracy: Annotated[
         Share | None,
         Field(ge=1e-4, le=0.2),
         Words(
-            "Largest relative error that F may have. Elements and sizes that are not given are then chosen, and a case "
-            "that cannot be shown to be that good fails.",
+            "Largest error bar of F of each case, relative to F. Element sizes and degree that are "
+            "not given are chosen for it. A case whose error bar stays larger fails. The distance of "
+            "an ε-mesh's F from F_exact is not part of it: see `epsmesh guide --accuracy`.",
             '"1 %"',
-            default="none: the sizes given are used",
+            default="none: the given sizes are used",
         ),
     ] = None
     epsilon: Annotated[
         Epsilon,
         Words(
-            'Radius round the contact within which the mesh is fine; "full" is fine everywhere, and F / F_max needs '
-            "it.",
+            "Radius of the fine mesh around the contact. full: the mesh is fine everywhere, which gives F_max.",
             '["4 mm", "7 mm", "10 mm", "15 mm", "full"]',
             default=_REQUIRED,
             is_used=True,
         ),
     ] = inf
     fine: Annotated[Length, Words("Element size within epsilon.", '"2 mm"', default=_REQUIRED, is_used=True)] = inf
-    coarse: Annotated[Length, Words("Element size far away.", '"8 mm"', default=_REQUIRED, is_used=True)] = inf
+    coarse: Annotated[
+        Length, Words("Element size far from the contact.", '"8 mm"', default=_REQUIRED, is_used=True)
+    ] = inf
     rim: Annotated[
         Length | None,
         Field(json_schema_extra={"unit": "m"}),
         Words(
-            "Element size at the probe's edge, where stresses are singular: F_max depends on it more than on anything "
-            "else. A round punch has at least twelve along its edge.",
+            "Element size at the tool's edge. Stresses are singular there, so F_max depends on it "
+            "more than on any other size. A round tool has at least twelve elements along its edge.",
             '"0.2 mm"',
             default="a tenth of the probe's half width, at most fine",
         ),
@@ -128,31 +131,37 @@ class Mesh(Section):
     growth: Annotated[
         float,
         Field(ge=1e-6, le=2),
-        Words("By how much an element may be larger for each unit of distance from the edge.", "0.5"),
+        Words("Growth of the element size with the distance from the edge: size added per unit of distance.", "0.5"),
     ] = 0.5
     outside: Annotated[
         Literal["coarse", "free", "fixed", "halfspace", "green"],
         Words(
-            "What becomes of the body beyond epsilon: meshed coarsely; or cut away, which leaves a column whose side "
-            "is free of traction, or fixed; or a half ball, closed by the far field of a half-space, or by the body's "
-            "own, its Green's function.",
+            "Treatment of the body beyond epsilon. coarse: a coarse mesh. free, fixed: cut away; a "
+            "column remains, whose side has no traction or no displacement. halfspace, green: cut "
+            "away; a half ball remains, coupled to the far field of a half-space or to the Green's "
+            "function of the body.",
             '["coarse", "free"]',
             is_used=True,
         ),
     ] = "coarse"
     degree: Annotated[
-        Literal[1, 2, 3], BeforeValidator(_degree), Words("Degree of the displacement's polynomials.", "2")
+        Literal[1, 2, 3], BeforeValidator(_degree), Words("Degree of the polynomials of the displacement.", "2")
     ] = 2
     element: Annotated[
         Literal["auto", "displacement", "mixed"],
         Words(
-            "Displacement only, or mixed with pressure, which does not lock; auto is mixed from poisson = 0.45 on.",
+            "Element: displacement alone, or mixed with pressure, which does not lock. auto: mixed "
+            "from poisson = 0.45 on.",
             '"auto"',
         ),
     ] = "auto"
     model: Annotated[
         Literal["auto", "3d"],
-        Words("auto may use symmetry and two dimensions where the scene has them, 3d may not.", '"auto"'),
+        Words(
+            "Dimension of the model. auto: symmetry and two dimensions are used where the scene "
+            "allows them. 3d: never.",
+            '"auto"',
+        ),
     ] = "auto"
 
     # A tenth of the probe's half width puts F within about 1 % on the default elements (docs/accuracy.md).
@@ -183,43 +192,50 @@ class Mesh(Section):
 
 
 class Solving(Section):
-    """How cases are solved and timed; ``exact`` asks for F_exact of every scene."""
+    """How cases are solved and timed."""
 
     method: Annotated[
         Literal["auto", "direct", "iterative"],
-        Words("Factorisation or conjugate gradients; auto takes the faster.", '"auto"'),
+        Words(
+            "Linear solver: factorisation (direct) or conjugate gradients (iterative). auto: the faster one.", '"auto"'
+        ),
     ] = "auto"
     energy_tolerance: Annotated[
         float,
         Field(ge=1e-14, le=1e-6),  # above, forces do not balance to what every solve must show
         Words(
-            "Relative error of the iterative solver in the energy norm. The solver's share in the error of F is the "
-            "square of it.",
+            "Tolerance of the iterative solver: its relative error in the energy norm. The relative "
+            "error that it adds to F is the square of it.",
             "1e-8",
         ),
     ] = 1e-6
     exact: Annotated[
         bool,
         Words(
-            "Whether F_exact, F without mesh error, is computed for every scene.",
+            "Computation of F_exact, the force without mesh error, for every scene.",
             "true",
-            default="true, or false where an accuracy is asked for",
+            default="true; false with `accuracy`",
         ),
     ] = True
-    timing: Annotated[bool, Words("Solve every case afresh and alone, for timings to be compared.", "false")] = False
+    timing: Annotated[
+        bool,
+        Words(
+            "Timing study: every case is solved from the beginning and alone, so that times can be compared.", "false"
+        ),
+    ] = False
     repeats: Annotated[
         int,
         Field(ge=1, le=1000),
-        Words("In a timing study: runs of each case, of whose times the median is kept.", "3"),
+        Words("Runs of each case of a timing study. The dataset has the median of their times.", "3"),
     ] = 3
 
 
 class Planning(Section):
-    """What the planner may leave out: reductions not to be used, and where a sweep over ε may end."""
+    """What the planner may skip: reductions that are not used, and the end of a sweep over ε."""
 
     without: Annotated[
         tuple[Literal[REDUCTIONS], ...],  # type: ignore[valid-type]
-        Words("Reductions not to be used: see what `epsmesh plan` strikes out.", '["symmetry"]'),
+        Words("Reductions that are not used. `epsmesh plan` lists those that apply to a study.", '["symmetry"]'),
     ] = ()
     reduced_basis_error: Annotated[
         float,
@@ -230,8 +246,8 @@ class Planning(Section):
         Share | None,
         Field(gt=0, le=0.5),
         Words(
-            "Relative distance of F from F_exact at which a sweep over epsilon ends: once two values in a row are that "
-            "near, larger ones are not run.",
+            "Relative distance of F from F_exact at which a sweep over epsilon ends. Once two values "
+            "of epsilon in a row are that near, larger ones are skipped.",
             '"1 %"',
             default="none: every epsilon is run",
         ),
@@ -243,12 +259,13 @@ class Drawing(Section):
 
     kind: Annotated[
         Literal["auto", *FIGURES],  # type: ignore[valid-type]
-        Words("The study's main figure; auto is the most telling one of what is swept.", '"compliance"'),
+        Words("Kind of the study's main figure. auto: chosen by what is swept.", '"compliance"'),
     ] = "auto"
     paper: Annotated[
         bool,
         Words(
-            "Whether the paper's claims are marked: 80 % of F_max at 10 mm, for bodies cut free, and 50 times faster.",
+            "Marks of the paper's claims in the figure: 80 % of F_max at 10 mm for bodies cut free, "
+            "and a speed-up of 50.",
             "true",
         ),
     ] = False

@@ -1,4 +1,4 @@
-"""A first study file, with every key that there is explained."""
+"""A study file in which every key is explained: what `epsmesh new --all` writes."""
 
 import json
 import textwrap
@@ -9,10 +9,10 @@ _WIDTH = 110
 
 
 def starter(name: str) -> str:
-    """Return the text of a study of a disc on a box that takes seconds; what is optional is there as comments."""
+    """Return the text of a study of a disc on a box that runs in seconds. Optional keys are comments."""
     lines = [
-        "# A list where one value is expected is a sweep, and a dimension of the dataset. Lengths and pressures carry",
-        "# their units. Behind each key stands what it takes; keys that are commented out may be left out.",
+        "# A list in place of one value is a sweep, and a dimension of the dataset; so is {from, to, steps}. Lengths and",
+        "# pressures have units. A comment after each key lists its values. Keys in comments are optional.",
         f"title = {json.dumps(name, ensure_ascii=False)}",
     ]
     for section in all_sections():
@@ -26,7 +26,7 @@ def starter(name: str) -> str:
 
 
 def _lines(key: Key, chosen: str, *, is_left_out: bool) -> list[str]:
-    """Return a key's comment and its line; the line is a comment, too, where the starter does without."""
+    """Return a key's comment and its line. The line of an unused key is a comment, too."""
     belongs = not key.shapes or chosen in key.shapes
     shape = "" if belongs else f"{' or '.join(key.shapes).capitalize()}. "
     mark = "" if key.words.is_used and belongs and not is_left_out else "# "

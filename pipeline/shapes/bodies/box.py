@@ -30,7 +30,7 @@ class Box(Layered):
     size: Annotated[
         tuple[Length, Length, Length],
         Words(
-            "Extent along x, y and z; the top face is centred on the origin.",
+            "Size along x, y and z. The top face is centred on the origin.",
             '["40 mm", "40 mm", "20 mm"]',
             is_used=True,
         ),

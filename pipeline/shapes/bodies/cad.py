@@ -57,14 +57,17 @@ class FromCad(FromFile):
     unit: Annotated[
         Literal["m", "cm", "mm", "um", "µm", "in"],
         Field(exclude=True),
-        Words("Unit of the file's lengths; that which a STEP file says itself.", '"mm"'),
+        Words("Unit of length of the file. A STEP file names its own.", '"mm"'),
     ]
-    file: Annotated[str, Words("Solid, STEP or BREP: its path from the folder of the study.", '"phantom.step"')]
+    file: Annotated[
+        str, Words("File of a solid, STEP or BREP: its path from the folder of the study.", '"phantom.step"')
+    ]
     fixed: Annotated[
         Below | NamedFace,
         BeforeValidator(_held),
         Words(
-            "Where it is held: everywhere below a height of the file, or on faces by a name.",
+            "Support of the body: all tissue below a height of the file, or faces of one name. "
+            "Displacements are zero there.",
             '{face = "base"}',
             takes="{below = length} | {face = text}",
         ),

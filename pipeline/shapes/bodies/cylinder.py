@@ -27,8 +27,8 @@ class Cylinder(Layered):
     has_round_top: ClassVar[bool] = True
 
     shape: Literal["cylinder"]
-    radius: Annotated[Length, Words("Radius; the axis is z, and the top face in z = 0.", '"30 mm"')]
-    height: Annotated[Length, Words("Height: the thickness of the tissue.", '"20 mm"')]
+    radius: Annotated[Length, Words("Radius of the cylinder. Its axis is z, and its top face is at z = 0.", '"30 mm"')]
+    height: Annotated[Length, Words("Height of the cylinder: the thickness of the tissue.", '"20 mm"')]
 
     @property
     def extent(self) -> float:

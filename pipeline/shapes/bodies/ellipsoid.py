@@ -42,12 +42,16 @@ class Ellipsoid(Drawn):
     shape: Literal["ellipsoid"]
     axes: Annotated[
         tuple[Length, Length, Length],
-        Words("Three semi-axes, along x, y and z; the centre is the origin.", '["40 mm", "35 mm", "25 mm"]'),
+        Words("Semi-axes along x, y and z. The centre is the origin.", '["40 mm", "35 mm", "25 mm"]'),
     ]
     fixed: Annotated[
         Below,
         BeforeValidator(_below),
-        Words("Where the body is held: everywhere below a height.", '{below = "-6 mm"}', takes="{below = length}"),
+        Words(
+            "Support of the body: all tissue below a height. Displacements are zero there.",
+            '{below = "-6 mm"}',
+            takes="{below = length}",
+        ),
     ]
 
     @property

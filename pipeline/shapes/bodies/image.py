@@ -19,22 +19,27 @@ class FromImage(FromFile, Scanned):
     READ_BY: ClassVar[frozenset[str]] = frozenset({"label", "unit", "smooth"})
 
     shape: Literal["image"]
-    label: Annotated[int, Field(gt=0, exclude=True), Words("Number of the voxels that are the body.", "1")]
+    label: Annotated[
+        int, Field(gt=0, exclude=True), Words("Label of the body: the number of its voxels in the image.", "1")
+    ]
     unit: Annotated[
         Literal["m", "cm", "mm", "um", "µm"] | None,
         Field(exclude=True),
-        Words("Unit of the image's frame, where its header names none.", '"mm"', "the header's"),
+        Words("Unit of length of the image, if its header names none.", '"mm"', "the header's"),
     ] = None
     smooth: Annotated[
         Travel | None,
         Field(exclude=True),
         Words(
-            "Standard deviation of the filter that takes the steps of the voxels off; its level keeps the volume.",
+            "Smoothing length: standard deviation of the filter that removes the steps of the voxels. "
+            "The volume is kept.",
             '"2 mm"',
             "one and a half voxels, or the distance of thick slices",
         ),
     ] = None
-    file: Annotated[str, Words("Label map, NIfTI or NRRD: its path from the folder of the study.", '"liver.nii.gz"')]
+    file: Annotated[
+        str, Words("File of a label map, NIfTI or NRRD: its path from the folder of the study.", '"liver.nii.gz"')
+    ]
 
     @classmethod
     def load(cls, file: str, given: Mapping[str, Any]) -> Loaded:

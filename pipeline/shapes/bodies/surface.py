@@ -22,20 +22,26 @@ class FromSurface(FromFile, Scanned):
     unit: Annotated[
         Literal["m", "cm", "mm", "um", "µm"],
         Field(exclude=True),
-        Words("Unit of the file's coordinates: such files do not say.", '"mm"'),
+        Words("Unit of length of the file. Files of surfaces do not name their unit.", '"mm"'),
     ]
     repair: Annotated[
         bool,
         Field(exclude=True),
-        Words("Whether a broken surface is mended: holes closed, crumbs left out. What was done is told.", "true"),
+        Words(
+            "Repair of a broken surface: holes are closed, and small loose parts are removed. A "
+            "warning lists the changes.",
+            "true",
+        ),
     ] = False
     smooth: Annotated[
         Travel | None,
         Field(exclude=True),
-        Words("Bumps shorter than 2π times this are taken off.", '"1 mm"', "nothing is smoothed"),
+        Words(
+            "Smoothing length: bumps shorter than 2π times this length are removed.", '"1 mm"', "nothing is smoothed"
+        ),
     ] = None
     file: Annotated[
-        str, Words("Closed surface, STL, PLY or OBJ: its path from the folder of the study.", '"liver.stl"')
+        str, Words("File of a closed surface, STL, PLY or OBJ: its path from the folder of the study.", '"liver.stl"')
     ]
 
     @classmethod

@@ -30,18 +30,19 @@ class Blade(Punch):
     EXPECTED_ERROR = 0.75
 
     shape: Literal["blade"]
-    length: Annotated[Length, Words("Length of the edge.", '"6 mm"')]
-    width: Annotated[Length, Words("Width of the edge.", '"1 mm"')]
+    length: Annotated[Length, Words("Length of the blade's edge.", '"6 mm"')]
+    width: Annotated[Length, Words("Width of the blade's edge.", '"1 mm"')]
     direction: Annotated[
         tuple[float, float, float],
-        Words("Along which the edge lies, as far as it is normal to the probe's axis.", "[1.0, 0.0, 0.0]"),
+        Words("Direction of the edge: the part of this vector that is normal to the axis.", "[1.0, 0.0, 0.0]"),
     ] = (1.0, 0.0, 0.0)
-    slice: Annotated[Travel, Words("How far it is drawn along its edge as it cuts.", '"0.05 mm"')] = 0.0
+    slice: Annotated[Travel, Words("Travel along the edge while the blade is pressed in.", '"0.05 mm"')] = 0.0
     incision: Annotated[
         Travel,
         Words(
-            "Depth of the slit that it stands in. Its flanks then hold the slit's faces apart by its width, and take "
-            "them along (bonded) or let them slide (frictionless). 0 presses its edge on the whole surface.",
+            "Depth of an open slit that holds the blade. The blade keeps the faces of the slit apart "
+            "by its width; they stick to it (bonded) or slide (frictionless). 0: no slit, the edge "
+            "presses on the whole surface.",
             '"4 mm"',
         ),
     ] = 0.0
@@ -49,14 +50,17 @@ class Blade(Punch):
         Length | None,
         Field(json_schema_extra={"unit": "m"}),
         Words(
-            "How far the slit runs ahead of the blade: of its tip, and of its ends.",
+            "Distance from the blade to the front of the slit, below its tip and beyond its ends.",
             '"1 mm"',
             default="the blade's width",
         ),
     ] = None
     ends: Annotated[
         Literal["blade", "open"],
-        Words("Where the slit ends: with the blade, or, open, at the sides of the body.", '"blade"'),
+        Words(
+            "Ends of the slit: `ahead` beyond the ends of the blade (blade), or the sides of the body (open).",
+            '"blade"',
+        ),
     ] = "blade"
 
     def travel(self, frame: Frame) -> Vector:

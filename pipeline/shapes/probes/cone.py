@@ -15,9 +15,11 @@ class Cone(RoundIndenter):
     REALTIME = ("unilateral",)
 
     shape: Literal["cone"]
-    angle: Annotated[Angle, Words("Half angle to the axis: the larger, the blunter.", '"70 deg"', is_used=True)]
+    angle: Annotated[
+        Angle, Words("Half angle, between the axis and the flank. The larger, the blunter.", '"70 deg"', is_used=True)
+    ]
     radius: Annotated[Length, Words("Radius of the shaft, where the cone ends.", '"3 mm"', is_used=True)]
-    tip: Annotated[Rounding, Words("Radius of the rounding at the tip; 0 is sharp.", '"0.2 mm"')] = 0.0
+    tip: Annotated[Rounding, Words("Radius of the rounded tip. 0 is sharp.", '"0.2 mm"')] = 0.0
 
     @property
     def section(self) -> Rounded:

@@ -20,7 +20,7 @@ class Disc(RoundPunch):
     EXPECTED_ERROR = 1.0
 
     shape: Literal["disc"]
-    radius: Annotated[Length, Words("Radius of the footprint.", '"2 mm"', is_used=True)]
+    radius: Annotated[Length, Words("Radius of the disc.", '"2 mm"', is_used=True)]
 
     @property
     def semi_axes(self) -> tuple[float, float]:

@@ -24,10 +24,14 @@ class Ellipse(RoundPunch):
     EXPECTED_ERROR = 0.9
 
     shape: Literal["ellipse"]
-    axes: Annotated[tuple[Length, Length], Words("Two semi-axes: along and across.", '["3 mm", "1.5 mm"]')]
+    axes: Annotated[
+        tuple[Length, Length], Words("Semi-axes of the ellipse: along `direction` and across it.", '["3 mm", "1.5 mm"]')
+    ]
     direction: Annotated[
         tuple[float, float, float],
-        Words("Along which the first axis lies, as far as it is normal to the probe's axis.", "[1.0, 0.0, 0.0]"),
+        Words(
+            "Direction of the first semi-axis: the part of this vector that is normal to the axis.", "[1.0, 0.0, 0.0]"
+        ),
     ] = (1.0, 0.0, 0.0)
 
     @property

@@ -23,12 +23,14 @@ class Wedge(Indenter):
     mean_square: ClassVar[float] = nan
 
     shape: Literal["wedge"]
-    angle: Annotated[Angle, Words("Half angle to the axis: the larger, the blunter.", '"70 deg"', is_used=True)]
-    length: Annotated[Length, Words("Length of the edge.", '"6 mm"', is_used=True)]
-    tip: Annotated[Rounding, Words("Radius of the rounding along the edge; 0 is sharp.", '"0.2 mm"')] = 0.0
+    angle: Annotated[
+        Angle, Words("Half angle, between the axis and the flank. The larger, the blunter.", '"70 deg"', is_used=True)
+    ]
+    length: Annotated[Length, Words("Length of the wedge's edge.", '"6 mm"', is_used=True)]
+    tip: Annotated[Rounding, Words("Radius of the rounded edge. 0 is sharp.", '"0.2 mm"')] = 0.0
     direction: Annotated[
         tuple[float, float, float],
-        Words("Along which the edge lies, as far as it is normal to the probe's axis.", "[1.0, 0.0, 0.0]"),
+        Words("Direction of the edge: the part of this vector that is normal to the axis.", "[1.0, 0.0, 0.0]"),
     ] = (1.0, 0.0, 0.0)
 
     @property
