@@ -11,8 +11,8 @@ _WIDTH = 110
 def starter(name: str) -> str:
     """Return the text of a study of a disc on a box that runs in seconds. Optional keys are comments."""
     lines = [
-        "# A list in place of one value is a sweep, and a dimension of the dataset; so is {from, to, steps}. Lengths and",
-        "# pressures have units. A comment after each key lists its values. Keys in comments are optional.",
+        "# A list in place of one value is a sweep, and a dimension of the dataset; so is {from, to, steps}. Quantities",
+        "# have units. A comment after each key lists its values. Keys in comments are optional.",
         f"title = {json.dumps(name, ensure_ascii=False)}",
     ]
     for section in all_sections():
@@ -20,9 +20,14 @@ def starter(name: str) -> str:
         lines += ["", *_comment(SECTION_TEXTS.get(section, "")), f"{'# ' if is_piece else ''}{heading(section)}"]
         keys = keys_of(section)
         chosen = next((json.loads(key.words.example) for key in keys if key.name == "shape"), "")
-        for key in keys:
+        for key in sorted(keys, key=lambda key: _shapes_of(key, chosen)):
             lines += _lines(key, chosen, is_left_out=is_piece)
     return "\n".join(lines) + "\n"
+
+
+def _shapes_of(key: Key, chosen: str) -> tuple[str, ...]:
+    """Return the shapes of a key, none if the chosen one is among them: keys are sorted by them."""
+    return () if chosen in key.shapes else key.shapes
 
 
 def _lines(key: Key, chosen: str, *, is_left_out: bool) -> list[str]:

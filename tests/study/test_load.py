@@ -43,7 +43,7 @@ MISTAKES = {
     "accuracy without unit": ({"mesh": {"accuracy": 0.01}}, ["mesh.accuracy = 0.01", "1 %"]),
     "accuracy out of reach": ({"mesh": {"accuracy": "0.001 %"}}, ["mesh.accuracy", "at least 0.0001"]),
     "sizes missing": (
-        {"mesh": {"fine": None, "epsilon": None}}, ["mesh.fine", "mesh.epsilon", "unless an accuracy is asked for"],
+        {"mesh": {"fine": None, "epsilon": None}}, ["mesh.fine", "mesh.epsilon", "give the sizes, or `accuracy`"],
     ),
     "not a number": ({"material": {"poisson": float("nan")}}, ["material.poisson"]),
     "text for a number": ({"material": {"poisson": "0.3"}}, ['material.poisson = "0.3"', "number"]),
